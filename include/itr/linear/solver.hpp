@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// What a sparse direct or iterative solver does for Newton, whatever library is behind it.
+//
+// A symmetric matrix of order n is stored as its lower triangle with the diagonal, by columns, rows ascending.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace itr::linear {
+
+/// Where the entries of the lower triangle stand. column_starts has n + 1 entries; rows of column j are
+/// row_indices[column_starts[j] .. column_starts[j+1]), ascending, the first one j itself.
+struct SparsityPattern {
+  int order = 0;
+  std::vector<int> column_starts;
+  std::vector<int> row_indices;
+  std::size_t nonzeros() const { return row_indices.size(); }
+};
+
+enum class Outcome {
+  ok,
+  not_positive_definite,  ///< a Cholesky backend met a pivot that is not positive
+  singular,               ///< no factorisation exists to working precision
+  non_finite,             ///< a value or the result is NaN or infinite
+  out_of_memory,
+  not_converged,  ///< an iterative solver or the asked residual was not reached
+  failed          ///< anything else; message() says what
+};
+
+const char* to_string(Outcome outcome);
+
+struct Capabilities {
+  bool indefinite = false;  ///< solves symmetric indefinite systems too
+  bool iterative = false;
+  bool threads = false;
+  bool mpi = false;
+};
+
+/// What may help an analysis; all optional.
+struct AnalyzeHints {
+  int block_size = 1;                        ///< unknowns that belong together (the dimension)
+  std::span<const double> coordinates = {};  ///< block_size values an unknown block [m]
+};
+
+struct SolveReport {
+  Outcome outcome = Outcome::ok;
+  double relative_residual = 0;  ///< max over right-hand sides of |b - A x| / |b| (Euclidean), as achieved
+};
+
+/// One solver of one matrix at a time. Not thread-safe; two objects do not disturb each other.
+class Solver {
+ public:
+  virtual ~Solver() = default;
+  virtual std::string_view name() const = 0;  ///< "eigen:ldlt"
+  virtual Capabilities capabilities() const = 0;
+  /// Once per pattern. The pattern is copied where the solver needs it later.
+  virtual Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) = 0;
+  /// `values` in the order of the analysed pattern.
+  virtual Outcome factorize(std::span<const double> values) = 0;
+  /// Solves A X = B for `columns` right-hand sides, columns of length n one after another. Refines until the relative
+  /// residual is at most `asked_residual` or no longer falls; reports what was achieved.
+  virtual SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked_residual) = 0;
+  virtual std::string message() const = 0;  ///< details of the last outcome that was not ok
+};
+
+}  // namespace itr::linear

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+// The simplicial mesh of the bodies' rest shape: triangles in 2D, tetrahedra in 3D.
+//
+// Cells, boundary facets and vertices live in slots; an edit kills some and adds some, ids of the others stay. compact()
+// removes dead slots. Boundary facets are the facets with one incident cell; each carries the surface tag that boundary
+// conditions refer to.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "itr/core/types.hpp"
+
+namespace itr {
+
+/// Tag of a boundary facet that no selection named: carries no boundary condition.
+inline constexpr int kNoTag = std::numeric_limits<int>::max();
+
+/// Stands in an Edit for the vertex that the edit creates.
+inline constexpr VertexId kNewVertex = std::numeric_limits<int>::max();
+
+template <int Dim>
+struct MeshTypes {
+  using Cell = std::array<VertexId, Dim + 1>;  ///< vertices, positive volume in the rest shape
+  using Facet = std::array<VertexId, Dim>;     ///< vertices, outward oriented (2D: the body lies left of a -> b)
+};
+
+/// One change of a mesh as a value: made from a const mesh, previewed, then committed with Mesh::apply or dropped.
+template <int Dim>
+struct Edit {
+  using Cell = typename MeshTypes<Dim>::Cell;
+  using Facet = typename MeshTypes<Dim>::Facet;
+  enum class Kind { split, collapse, swap, smooth };
+
+  struct NewCell {
+    Cell vertices;
+    int body;
+  };
+  struct NewFacet {
+    Facet vertices;
+    int tag;
+  };
+  /// The one vertex whose position and field values the edit sets: kNewVertex, or one that stays.
+  struct Value {
+    VertexId vertex;
+    Vec<Dim> rest;                            ///< new rest position [m]
+    std::array<VertexId, Dim + 1> parents{};  ///< its fields are the weighted sums over parents of the old mesh
+    std::array<double, Dim + 1> weights{};
+    int num_parents = 0;
+  };
+
+  Kind kind;
+  EdgeKey edge{kNone, kNone};  ///< the edge; for a smooth, {vertex, kNone}
+  std::vector<CellId> removed_cells;
+  std::vector<NewCell> inserted_cells;
+  std::vector<FacetId> removed_facets;
+  std::vector<NewFacet> inserted_facets;
+  std::optional<Value> value;
+  VertexId removed_vertex = kNone;
+};
+
+template <int Dim>
+class Mesh {
+ public:
+  using Cell = typename MeshTypes<Dim>::Cell;
+  using Facet = typename MeshTypes<Dim>::Facet;
+
+  Mesh() = default;
+
+  /// Builds adjacency and boundary facets (all tagged kNoTag).
+  /// Throws InputError (place "cell i") for an index out of range, a cell of zero or negative rest volume, or a facet with
+  /// more than two cells. `body` has one body id a cell.
+  Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector<int> body);
+
+  int num_vertices() const { return num_vertices_; }  ///< alive ones; ids run to vertex_slots()
+  int num_cells() const { return num_cells_; }
+  int num_facets() const { return num_facets_; }
+  int vertex_slots() const { return static_cast<int>(rest_.size()); }
+  int cell_slots() const { return static_cast<int>(cells_.size()); }
+  int facet_slots() const { return static_cast<int>(facets_.size()); }
+  bool is_vertex_alive(VertexId v) const { return vertex_alive_[v]; }
+  bool is_cell_alive(CellId c) const { return cells_[c][0] != kNone; }
+  bool is_facet_alive(FacetId f) const { return facets_[f][0] != kNone; }
+
+  const Vec<Dim>& rest(VertexId v) const { return rest_[v]; }
+  const Cell& cell(CellId c) const { return cells_[c]; }
+  int body(CellId c) const { return body_[c]; }
+  double volume(CellId c) const { return volume_[c]; }  ///< rest area (2D) or volume (3D)
+  /// Inverse of the matrix whose columns are the rest edges X_1 - X_0, ..., X_Dim - X_0.
+  const Mat<Dim>& inverse_rest_edges(CellId c) const { return inverse_edges_[c]; }
+  const Facet& facet(FacetId f) const { return facets_[f]; }
+  int facet_tag(FacetId f) const { return facet_tag_[f]; }
+  void set_facet_tag(FacetId f, int tag) { facet_tag_[f] = tag; }
+  std::span<const CellId> cells_of(VertexId v) const { return cells_of_[v]; }
+  std::span<const FacetId> facets_of(VertexId v) const { return facets_of_[v]; }
+  bool is_boundary(VertexId v) const { return !facets_of_[v].empty(); }
+
+  /// Cells that hold both ends of the edge, ascending.
+  std::vector<CellId> cells_of_edge(const EdgeKey& edge) const;
+  /// The boundary facet on these vertices in any order, or kNone.
+  FacetId find_facet(const Facet& vertices) const;
+  /// All edges of alive cells, ascending.
+  std::vector<EdgeKey> edges() const;
+  double total_volume() const;
+
+  /// Carries out an edit. Returns the id of the vertex that was created, or kNone. Ids of new cells are the next slots, in
+  /// the order of the edit. Fields are the caller's to extend (see Edit::Value).
+  VertexId apply(const Edit<Dim>& edit);
+
+  struct Renumbering {
+    std::vector<VertexId> vertex;  ///< old id -> new id, kNone for dead ones
+    std::vector<CellId> cell;
+  };
+  /// Removes dead slots, keeps the order of the others.
+  Renumbering compact();
+
+  /// First broken invariant in words (adjacency, orientation, facets against cells), or an empty string.
+  std::string find_defect() const;
+
+ private:
+  void add_cell(const Cell& cell, int body);
+  void add_facet(const Facet& facet, int tag);
+  void remove_cell(CellId c);
+  void remove_facet(FacetId f);
+  void update_geometry(CellId c);
+
+  int num_vertices_ = 0, num_cells_ = 0, num_facets_ = 0;
+  std::vector<Vec<Dim>> rest_;
+  std::vector<char> vertex_alive_;
+  std::vector<Cell> cells_;
+  std::vector<int> body_;
+  std::vector<double> volume_;
+  std::vector<Mat<Dim>> inverse_edges_;
+  std::vector<Facet> facets_;
+  std::vector<int> facet_tag_;
+  std::vector<std::vector<CellId>> cells_of_;
+  std::vector<std::vector<FacetId>> facets_of_;
+};
+
+extern template class Mesh<2>;
+extern template class Mesh<3>;
+
+}  // namespace itr

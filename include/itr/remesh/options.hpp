@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// Options of in-timestep remeshing, with the paper's defaults (scene-format §8.1).
+#pragma once
+
+namespace itr {
+
+enum class Screening {
+  energy_percentile,    ///< the paper's culling of edges by energy
+  predicted_decrease,   ///< by the second-order estimate of what one new vertex gains
+  none
+};
+
+/// What x-hat, x_t and v_t are on a changed mesh when an operation is judged.
+enum class HistoryRule {
+  function,     ///< the functions on the mesh before the operation: what the new mesh cannot represent counts
+  interpolated  ///< interpolated onto the new mesh (the paper's rule)
+};
+
+struct SplitOptions {
+  bool enabled = true;
+  double acceptance_tolerance = 1e-3;  ///< least energy decrease [J]
+  double culling_threshold = 0.95;
+  int max_depth = 3;                ///< generations of one edge a step
+  double min_edge_length = 1e-6;    ///< shorter rest edges are not split [m]
+};
+
+struct CollapseOptions {
+  bool enabled = true;
+  double acceptance_tolerance = -1e-8;  ///< [J]; negative: allowed increase
+  double culling_threshold = 0.01;
+  int max_depth = 3;
+  double rel_max_edge_length = 1;      ///< longest edge collapsed, in shortest edges of the initial mesh
+  double abs_max_edge_length = 1e100;  ///< [m]
+};
+
+struct SwapOptions {
+  bool enabled = false;
+  double acceptance_tolerance = -1e-8;  ///< [J]
+  int max_depth = 3;
+};
+
+struct SmoothOptions {
+  bool enabled = false;
+  double acceptance_tolerance = -1e-8;  ///< [J]
+  int max_iterations = 1;
+};
+
+struct LocalRelaxationOptions {
+  int rings = 2;                  ///< rings of cells around the operation
+  double relative_volume = 0.01;  ///< least share of the total rest volume
+  int max_iterations = 1;         ///< Newton iterations before the decision
+  int max_contact_iterations = 4;  ///< the same where the patch touches contact
+};
+
+struct RemeshOptions {
+  bool enabled = false;
+  bool sizing_field = false;  ///< the baseline of scene-format §8.7 instead of energies
+  SplitOptions split;
+  CollapseOptions collapse;
+  SwapOptions swap;
+  SmoothOptions smooth;
+  LocalRelaxationOptions local;
+  Screening screening = Screening::energy_percentile;
+  HistoryRule history = HistoryRule::function;
+  int sweeps = 1;
+};
+
+}  // namespace itr

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// Scene files (PolyFEM's JSON, the subset in scene-format.md) into typed setups. The only module that knows JSON and
+// expressions. Everything wrong with a scene is an InputError, thrown before anything is computed.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "itr/output/options.hpp"
+#include "itr/simulation/setup.hpp"
+
+namespace itr::scene {
+
+/// One `--set /json/pointer=VALUE`.
+struct Override {
+  std::string pointer;
+  std::string value;  ///< JSON text
+};
+
+struct Scene {
+  std::variant<Setup<2>, Setup<3>> setup;  ///< the dimension is chosen here, once
+  OutputOptions output;
+  int max_threads = 0;                ///< solver/max_threads; 0: all
+  std::string directory;              ///< output/directory, may be empty
+  std::vector<std::string> warnings;  ///< legal but suspicious things
+};
+
+/// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.
+Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides = {});
+
+}  // namespace itr::scene

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// What a simulation shows of itself after a step: values that observers (output, a host program) read.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "itr/core/types.hpp"
+#include "itr/mesh/mesh.hpp"
+
+namespace itr {
+
+/// Terms of the incremental potential divided by alpha h^2 [J], after the last solve of the step.
+struct EnergyReport {
+  double inertia = 0, elastic = 0, body = 0, contact = 0, friction = 0, total = 0;
+};
+
+struct OperationCount {
+  int tried = 0, accepted = 0;
+};
+
+/// Wall-clock seconds of one step. The parts are disjoint and sum to the total but for what nobody names.
+struct StepSeconds {
+  double assembly = 0, linear_solve = 0, line_search = 0, ccd = 0, remesh = 0, projection = 0, output = 0, total = 0;
+};
+
+struct StepReport {
+  int step = 0;
+  double t = 0;  ///< [s]
+  int vertices = 0, elements = 0, unknowns = 0;
+  int newton_iterations = 0;
+  EnergyReport energy;
+  double energy_before_remesh = 0;  ///< total after the first solve [J]
+  OperationCount splits, collapses, swaps, smooths;
+  double min_distance = 0;      ///< over contact pairs near each other; infinity where there are none [m]
+  double min_volume_ratio = 1;  ///< smallest J = det F over the cells
+  StepSeconds seconds;
+  double peak_rss_mb = 0;
+};
+
+/// The state after a step on its own mesh. References are valid during the observer's call only.
+template <int Dim>
+struct FrameView {
+  const Mesh<Dim>& mesh;  ///< compact: no dead slots
+  ConstVectorView x;      ///< positions of the bodies' vertices, interleaved [m]
+  ConstVectorView v;      ///< velocities [m/s]
+  const std::vector<double>& elastic_density;  ///< elastic energy by rest volume, a cell [J/m^3]
+  const std::vector<Vec<Dim>>& obstacle_x;     ///< obstacle positions now [m]
+  const std::vector<std::array<int, 2>>& obstacle_edges;
+  const std::vector<std::array<int, 3>>& obstacle_triangles;
+};
+
+}  // namespace itr

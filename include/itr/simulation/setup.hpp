@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Everything that defines a simulation, as plain values with units: what a scene file is read into, and what a program
+// that embeds the library fills in itself. SI units throughout.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "itr/energy/contact/options.hpp"
+#include "itr/energy/material.hpp"
+#include "itr/mesh/mesh.hpp"
+#include "itr/newton/options.hpp"
+#include "itr/remesh/options.hpp"
+#include "itr/time/options.hpp"
+
+namespace itr {
+
+/// A vector-valued function of rest position X [m] and time t [s].
+template <int Dim>
+using SpaceTimeFunction = std::function<Vec<Dim>(const Vec<Dim>& X, double t)>;
+
+/// Collision-only geometry that moves as prescribed: no unknowns.
+template <int Dim>
+struct Obstacles {
+  std::vector<Vec<Dim>> rest;                 ///< vertices [m]
+  std::vector<std::array<int, 2>> edges;      ///< 2D: surface edges; 3D: edges of faces and codimensional edges
+  std::vector<std::array<int, 3>> triangles;  ///< 3D only
+  std::vector<int> motion;                    ///< per vertex: index into `motions`, or kNone for a fixed one
+  std::vector<SpaceTimeFunction<Dim>> motions;  ///< displacement from rest [m]
+};
+
+/// Displacement prescribed at the vertices of the boundary facets with a tag.
+template <int Dim>
+struct DirichletCondition {
+  int tag = 0;
+  std::array<bool, Dim> components{};  ///< which are prescribed
+  SpaceTimeFunction<Dim> displacement;  ///< from rest [m]
+};
+
+/// Traction on the boundary facets with a tag, force per rest area [N/m^2] (2D: per rest length [N/m]).
+template <int Dim>
+struct NeumannCondition {
+  int tag = 0;
+  SpaceTimeFunction<Dim> traction;
+};
+
+template <int Dim>
+struct InitialCondition {
+  int body = 0;
+  SpaceTimeFunction<Dim> value;  ///< evaluated at t = 0
+};
+
+struct LinearOptions {
+  std::vector<std::string> solvers = {"eigen"};  ///< the first one that there is; canonical names or aliases
+};
+
+template <int Dim>
+struct Setup {
+  Mesh<Dim> mesh;  ///< with body ids and facet tags
+  Obstacles<Dim> obstacles;
+  std::map<int, Material> materials;  ///< by body id; every body of the mesh has one
+  std::vector<DirichletCondition<Dim>> dirichlet;
+  std::vector<NeumannCondition<Dim>> neumann;
+  SpaceTimeFunction<Dim> body_acceleration;  ///< acts along +: gravity is (0, -9.81) [m/s^2]; empty: none
+  std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
+  bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
+
+  TimeOptions time;
+  ContactOptions contact;
+  NewtonOptions newton;
+  RemeshOptions remesh;
+  LinearOptions linear;
+  bool lump_mass = false;
+};
+
+}  // namespace itr
