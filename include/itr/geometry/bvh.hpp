@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <span>
+#include <limits>
 #include <vector>
 
 #include "itr/core/types.hpp"

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <map>
+
+#include "itr/energy/energy.hpp"
+#include "itr/energy/material.hpp"
+#include "itr/energy/elastic/neo_hookean.hpp"
+#include "itr/fem/cell_set.hpp"
+
+namespace itr {
+
+/// scale * sum over elements of rest volume * W(F). Feasible: every element has det F > 0.
+template <int Dim>
+class ElasticEnergy final : public Energy {
+ public:
+  /// `scale` is alpha h^2 [s^2]. Elements are referred to, not copied: `cells` must outlive this.
+  ElasticEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale);
+  std::string_view name() const override { return "elastic"; }
+  double value(ConstVectorView x, Workspace&) const override;
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
+  /// 0.9 of the first time at which an element's volume vanishes on the way.
+  double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override;
+
+ private:
+  const LameParameters& lame(int body) const;
+
+  const CellSet<Dim>& cells_;
+  std::vector<std::pair<int, LameParameters>> lame_;  ///< by body; few, searched linearly
+  double scale_;
+};
+
+}  // namespace itr

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// The interface of every term of the incremental potential (paper eq. 4), and their sum.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string_view>
+#include <typeindex>
+#include <vector>
+
+#include "itr/core/types.hpp"
+#include "itr/fem/hessian_sink.hpp"
+
+namespace itr {
+
+enum class PsdProjection { none, clamp };
+
+/// Scratch of one solve, owned by the caller: terms keep no mutable caches, so solves never meet. What is in it never
+/// changes a result, only the time that it takes.
+class Workspace {
+ public:
+  /// The one object of type T of this workspace.
+  template <typename T>
+  T& get() {
+    auto& slot = slots_[std::type_index(typeid(T))];
+    if (!slot) slot = std::make_shared<T>();
+    return *static_cast<T*>(slot.get());
+  }
+
+ private:
+  std::map<std::type_index, std::shared_ptr<void>> slots_;
+};
+
+/// E: R^n -> R, +infinity outside the feasible set; x interleaved positions [m], n = Dim * num_vertices.
+class Energy {
+ public:
+  virtual ~Energy() = default;
+  virtual std::string_view name() const = 0;  ///< for logs and per-term statistics
+  virtual double value(ConstVectorView x, Workspace& workspace) const = 0;
+  virtual void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const = 0;
+  virtual void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const = 0;
+  /// Largest a in [0, 1] such that x + s dx is feasible for all s in [0, a] (conservative).
+  virtual double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
+};
+
+/// A sum that does not own its terms' data but shares the terms.
+class EnergySum final : public Energy {
+ public:
+  void add(std::shared_ptr<const Energy> term) { terms_.push_back(std::move(term)); }
+  const std::vector<std::shared_ptr<const Energy>>& terms() const { return terms_; }
+  std::string_view name() const override { return "total"; }
+  double value(ConstVectorView x, Workspace& workspace) const override;
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
+  double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
+
+ private:
+  std::vector<std::shared_ptr<const Energy>> terms_;
+};
+
+}  // namespace itr

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <map>
+
+#include "itr/energy/energy.hpp"
+#include "itr/energy/material.hpp"
+#include "itr/fem/cell_set.hpp"
+
+namespace itr {
+
+enum class MassKind { consistent, lumped };
+
+/// 1/2 (x - xhat)^T M (x - xhat): the body's distance to where it would fly without forces, as a function on the body.
+template <int Dim>
+class InertiaEnergy final : public Energy {
+ public:
+  /// `predictor` is xhat at the vertices of `cells`, which must outlive this.
+  InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind, VectorX predictor);
+
+  /// Adds residual . (x - xhat) + loss, by which the functional becomes 1/2 ||x - xhat_old||^2 for an xhat_old that the
+  /// mesh cannot represent (design §3, rule b): residual = M xhat - A xhat_old, loss = 1/2 ||xhat - xhat_old||^2.
+  void set_unrepresented_history(VectorX residual, double loss);
+
+  std::string_view name() const override { return "inertia"; }
+  double value(ConstVectorView x, Workspace&) const override;
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
+  /// y += M x.
+  void add_mass_product(ConstVectorView x, VectorView y) const;
+
+ private:
+  const CellSet<Dim>& cells_;
+  std::vector<double> mass_;  ///< rho |e| by element
+  MassKind kind_;
+  VectorX predictor_;
+  VectorX residual_;  ///< empty: none
+  double loss_ = 0;
+};
+
+/// Density of each element [kg/m^Dim].
+template <int Dim>
+std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials);
+
+}  // namespace itr

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <functional>
+#include <map>
+
+#include "itr/energy/energy.hpp"
+#include "itr/energy/material.hpp"
+#include "itr/fem/cell_set.hpp"
+
+namespace itr {
+
+/// What acts on a body at one time: functions of rest position.
+template <int Dim>
+struct Loads {
+  std::function<Vec<Dim>(const Vec<Dim>& X)> acceleration;  ///< body force by mass [m/s^2]; empty: none
+  std::vector<std::pair<int, std::function<Vec<Dim>(const Vec<Dim>& X)>>> tractions;  ///< by facet tag [N/m^(Dim-1)]
+  bool empty() const { return !acceleration && tractions.empty(); }
+};
+
+/// -scale * f . (x - X) with the consistent nodal forces f of body force and tractions: minus the work done from rest.
+template <int Dim>
+class LoadEnergy final : public Energy {
+ public:
+  LoadEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, const Loads<Dim>& loads, double scale);
+  std::string_view name() const override { return "body"; }
+  double value(ConstVectorView x, Workspace&) const override { return -(scale_ * (forces_.dot(x) - rest_work_)); }
+  void add_gradient(ConstVectorView, VectorView gradient, Workspace&) const override { gradient -= scale_ * forces_; }
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+  const VectorX& forces() const { return forces_; }  ///< [N]
+
+ private:
+  VectorX forces_;
+  double rest_work_ = 0;  ///< f . X
+  double scale_;
+};
+
+}  // namespace itr

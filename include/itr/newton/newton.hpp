@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+// Projected Newton with a line search whose steps are filtered by the energy's own feasibility (CCD and inversion). Sees
+// only Energy: the global step, a local relaxation and the safe projection are the same code.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <string>
+
+#include "itr/energy/energy.hpp"
+#include "itr/fem/hessian_sink.hpp"
+#include "itr/linear/solver.hpp"
+#include "itr/newton/options.hpp"
+
+namespace itr {
+
+/// Assembles and solves the Newton system of one solve.
+class NewtonSystem {
+ public:
+  virtual ~NewtonSystem() = default;
+  /// Assembles the Hessian over the unknowns of `dofs`; `coupling` receives H_fD * prescribed_step (held dofs).
+  virtual void assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
+                        const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) = 0;
+  /// Factorises Hessian + shift * I.
+  virtual linear::Outcome factorize(double shift) = 0;
+  virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
+  /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
+  virtual double diagonal_scale() const = 0;
+};
+
+/// For patches of up to some hundred unknowns.
+class DenseSystem final : public NewtonSystem {
+ public:
+  void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, const VectorX& prescribed_step,
+                VectorX& coupling, Workspace&) override;
+  linear::Outcome factorize(double shift) override;
+  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  double diagonal_scale() const override;
+
+ private:
+  MatrixX hessian_;
+  Eigen::LLT<MatrixX, Eigen::Lower> llt_;
+};
+
+/// For whole meshes: fixed base pattern of the elements, contacts added as they appear, analysed when the pattern changes.
+class SparseSystem final : public NewtonSystem {
+ public:
+  /// `solver` must outlive this. `stencils`: vertices of the elements, `stencil_size` each.
+  SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, std::span<const int> stencils, int stencil_size);
+  void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, const VectorX& prescribed_step,
+                VectorX& coupling, Workspace&) override;
+  linear::Outcome factorize(double shift) override;
+  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  double diagonal_scale() const override;
+
+ private:
+  linear::Solver& solver_;
+  SparseAssembler assembler_;
+  bool pattern_changed_ = true;
+  int dim_;
+};
+
+enum class Termination {
+  gradient,        ///< gradient norm below tolerance
+  step,            ///< full Newton step below tolerance
+  iterations,      ///< out of iterations
+  no_descent,      ///< no direction or no step that lowers the energy, and the gradient is not small
+  infeasible       ///< the start is not feasible or a number is not finite
+};
+const char* to_string(Termination termination);
+
+struct NewtonSummary {
+  Termination termination = Termination::iterations;
+  bool converged() const { return termination == Termination::gradient || termination == Termination::step; }
+  int iterations = 0;
+  double energy = 0;         ///< at the end
+  double gradient_norm = 0;  ///< over the unknowns, at the last evaluation
+  double step_norm = 0;      ///< of the last full step
+  double linear_residual = 0;  ///< worst relative residual of the linear solves
+  double assembly_seconds = 0, linear_seconds = 0, line_search_seconds = 0, ccd_seconds = 0;
+  std::string message;  ///< what stopped it, where it did not converge
+
+  void add_effort(const NewtonSummary& other);
+};
+
+/// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as
+/// x; empty: they stay), as far in each iteration as feasibility allows, by an exact-penalty merit function (Nocedal &
+/// Wright 2006, §18.3); convergence is tested only once they are there. x stays feasible throughout.
+NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
+                       const NewtonOptions& options, Workspace& workspace);
+
+}  // namespace itr

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Implicit time integrators as minimisation: predictor x-hat, scaling alpha h^2, and how velocity and acceleration follow
+// from new positions (design §3, scene-format §5).
+#pragma once
+
+#include <vector>
+
+#include "itr/core/types.hpp"
+#include "itr/time/options.hpp"
+
+namespace itr {
+
+/// Past states, newest first; interleaved fields of one mesh.
+struct History {
+  std::vector<VectorX> x;  ///< [m]
+  std::vector<VectorX> v;  ///< [m/s]
+  std::vector<VectorX> a;  ///< [m/s^2]
+};
+
+class TimeIntegrator {
+ public:
+  explicit TimeIntegrator(const TimeOptions& options) : options_(options) {}
+
+  /// How many past states the next step uses: BDF starts with order 1 and grows as states become available.
+  int order(const History& history) const;
+  /// How many past states need to be kept.
+  int depth() const;
+  bool uses_acceleration() const { return options_.integrator == Integrator::newmark; }
+
+  /// x-hat: where the body flies without forces [m].
+  VectorX predictor(const History& history) const;
+  /// alpha h^2 [s^2]; 1 for statics.
+  double scaling(const History& history) const;
+  /// dv/dx [1/s].
+  double velocity_rate(const History& history) const;
+  /// The positions at which the velocity would vanish: v = velocity_rate * (x - reference).
+  VectorX velocity_reference(const History& history) const;
+
+  VectorX velocity(const VectorX& x, const History& history) const;
+  VectorX acceleration(const VectorX& v, const History& history) const;
+  /// Makes x the newest state.
+  void push(VectorX x, History& history) const;
+
+ private:
+  TimeOptions options_;
+};
+
+}  // namespace itr

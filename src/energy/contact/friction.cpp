@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+// f0(y) = y^2 (1 - y / (3 eps)) / eps + eps / 3 below eps, y above: the potential whose derivative f1 rises smoothly from 0
+// to 1 over the slip speeds below eps (IPC, Li et al. 2020, eq. 15).
+#include "itr/energy/contact/friction.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "itr/geometry/distance.hpp"
+
+namespace itr {
+
+namespace {
+
+double f0(double y, double eps) { return y < eps ? y * y * (1 - y / (3 * eps)) / eps + eps / 3 : y; }
+double f1_over_y(double y, double eps) { return y < eps ? (2 - y / eps) / eps : 1 / y; }
+double f2(double y, double eps) { return y < eps ? 2 * (1 - y / eps) / eps : 0; }
+
+Eigen::Matrix<double, 2, 1> tangent_basis(const Vec<2>& normal) { return {-normal[1], normal[0]}; }
+Eigen::Matrix<double, 3, 2> tangent_basis(const Vec<3>& normal) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = normal.unitOrthogonal();
+  basis.col(1) = normal.cross(basis.col(0));
+  return basis;
+}
+
+}  // namespace
+
+template <int Dim>
+FrictionEnergy<Dim>::FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVectorView x, Workspace& workspace,
+                                    const ContactOptions& options, VelocityRule velocity, double scale)
+    : velocity_(std::move(velocity)), epsv_(options.friction_velocity), scale_(scale) {
+  for (const auto& s : contact.active(x, workspace)) {
+    Pair pair{s.vertices(), s.size(), {1, -1, 0}, {}, 0};
+    const Vec<Dim> p = x.segment<Dim>(Dim * s.a), a = x.segment<Dim>(Dim * s.b1);
+    Vec<Dim> normal = p - a;
+    if (s.b2 != kNone) {
+      const Vec<Dim> edge = x.segment<Dim>(Dim * s.b2) - a;
+      const double t = normal.dot(edge) / edge.squaredNorm();
+      pair.coefficients = {1, t - 1, -t};
+      normal -= t * edge;
+    }
+    const double D = contact.squared_distance(s, x), distance = std::sqrt(D);
+    pair.tangents = tangent_basis(Vec<Dim>(normal / distance));
+    pair.force = options.friction_coefficient * s.weight * contact.stiffness() * -contact.barrier_first(D) * 2 * distance;
+    pairs_.push_back(pair);
+  }
+}
+
+template <int Dim>
+auto FrictionEnergy<Dim>::slip_velocity(const Pair& pair, ConstVectorView x) const -> Vec<kTangents> {
+  Vec<Dim> relative = Vec<Dim>::Zero();
+  for (int k = 0; k < pair.size; ++k) {
+    const int dof = Dim * pair.vertices[k];
+    relative += pair.coefficients[k] * (x.segment<Dim>(dof) - velocity_.reference.segment<Dim>(dof));
+  }
+  return velocity_.rate * (pair.tangents.transpose() * relative);
+}
+
+template <int Dim>
+double FrictionEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
+  double sum = 0;
+  for (const auto& pair : pairs_) sum += pair.force * f0(slip_velocity(pair, x).norm(), epsv_);
+  return scale_ / velocity_.rate * sum;
+}
+
+template <int Dim>
+void FrictionEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
+  for (const auto& pair : pairs_) {
+    const Vec<kTangents> v = slip_velocity(pair, x);
+    const Vec<Dim> force = scale_ * pair.force * f1_over_y(v.norm(), epsv_) * (pair.tangents * v);
+    for (int k = 0; k < pair.size; ++k) gradient.segment<Dim>(Dim * pair.vertices[k]) += pair.coefficients[k] * force;
+  }
+}
+
+template <int Dim>
+void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
+  for (const auto& pair : pairs_) {
+    const Vec<kTangents> v = slip_velocity(pair, x);
+    const double y = v.norm(), isotropic = f1_over_y(y, epsv_);
+    // Along v the second derivative is f2, across it f1 / y; both are >= 0, so only the sign of the force can spoil it.
+    Mat<kTangents> inner = isotropic * Mat<kTangents>::Identity();
+    if (y > 0) inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
+    if (psd == PsdProjection::clamp && pair.force < 0) continue;
+    const Mat<Dim> world = scale_ * velocity_.rate * pair.force * pair.tangents * inner * pair.tangents.transpose();
+    Mat<3 * Dim> block = Mat<3 * Dim>::Zero();
+    for (int i = 0; i < pair.size; ++i)
+      for (int j = 0; j < pair.size; ++j)
+        block.template block<Dim, Dim>(Dim * i, Dim * j) = pair.coefficients[i] * pair.coefficients[j] * world;
+    if (pair.size == 2) {
+      const Mat<2 * Dim> two = block.template topLeftCorner<2 * Dim, 2 * Dim>();
+      sink.add<Dim>(std::span(pair.vertices.data(), 2), two.data());
+    } else {
+      sink.add<Dim>(std::span(pair.vertices.data(), 3), block.data());
+    }
+  }
+}
+
+template class FrictionEnergy<2>;
+template class FrictionEnergy<3>;
+
+}  // namespace itr

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/elastic/elastic.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "itr/core/check.hpp"
+#include "itr/core/parallel.hpp"
+#include "itr/geometry/measures.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr std::size_t kBlock = 256;
+constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
+
+/// Gradients of the shape functions as columns: dF = sum over vertices of dx_i * gradient_i^T.
+template <int Dim>
+Eigen::Matrix<double, Dim, Dim + 1> shape_gradients(const Mat<Dim>& inverse_edges) {
+  Eigen::Matrix<double, Dim, Dim + 1> gradients;
+  gradients.template rightCols<Dim>() = inverse_edges.transpose();
+  gradients.col(0) = -inverse_edges.transpose().rowwise().sum();
+  return gradients;
+}
+
+template <int Dim>
+Mat<Dim> edges_of(const typename CellSet<Dim>::Element& element, ConstVectorView x) {
+  Mat<Dim> edges;
+  for (int k = 0; k < Dim; ++k)
+    edges.col(k) = x.segment<Dim>(Dim * element.vertices[k + 1]) - x.segment<Dim>(Dim * element.vertices[0]);
+  return edges;
+}
+
+/// Smallest root in (0, 1] of a + b t + c t^2 (+ d t^3) with a > 0; 2 if there is none.
+double first_root(double a, double b, double c, double d) {
+  const auto f = [&](double t) { return a + t * (b + t * (c + t * d)); };
+  double knots[4] = {0, 1, 1, 1};
+  int count = 1;
+  const double discriminant = c * c - 3 * d * b;  // of the derivative b + 2 c t + 3 d t^2
+  if (d != 0 && discriminant > 0) {
+    const double q = -(c + std::copysign(std::sqrt(discriminant), c));
+    double r[2] = {q / (3 * d), q != 0 ? b / q : -1};
+    if (r[0] > r[1]) std::swap(r[0], r[1]);
+    for (const double t : r)
+      if (t > 0 && t < 1) knots[count++] = t;
+  } else if (d == 0 && c != 0) {
+    const double t = -b / (2 * c);
+    if (t > 0 && t < 1) knots[count++] = t;
+  }
+  knots[count] = 1;
+  for (int k = 0; k < count; ++k) {
+    double low = knots[k], high = knots[k + 1];
+    if (f(high) > 0) continue;
+    for (int i = 0; i < 50; ++i) {
+      const double middle = (low + high) / 2;
+      (f(middle) > 0 ? low : high) = middle;
+    }
+    return low;
+  }
+  return 2;
+}
+
+double first_inversion(const Mat<2>& E, const Mat<2>& D) {
+  const double b = E(0, 0) * D(1, 1) + D(0, 0) * E(1, 1) - E(0, 1) * D(1, 0) - D(0, 1) * E(1, 0);
+  return first_root(E.determinant(), b, D.determinant(), 0);
+}
+
+double first_inversion(const Mat<3>& E, const Mat<3>& D) {
+  const auto det = [](const auto& a, const auto& b, const auto& c) { return a.dot(b.cross(c)); };
+  const double b = det(D.col(0), E.col(1), E.col(2)) + det(E.col(0), D.col(1), E.col(2)) + det(E.col(0), E.col(1), D.col(2));
+  const double c = det(E.col(0), D.col(1), D.col(2)) + det(D.col(0), E.col(1), D.col(2)) + det(D.col(0), D.col(1), E.col(2));
+  return first_root(E.determinant(), b, c, D.determinant());
+}
+
+}  // namespace
+
+template <int Dim>
+ElasticEnergy<Dim>::ElasticEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale)
+    : cells_(cells), scale_(scale) {
+  for (const auto& [body, material] : materials)
+    lame_.emplace_back(body, LameParameters{material.lame_mu(), material.lame_lambda(Dim)});
+}
+
+template <int Dim>
+const LameParameters& ElasticEnergy<Dim>::lame(int body) const {
+  for (const auto& entry : lame_)
+    if (entry.first == body) return entry.second;
+  ITR_CHECK(false, "no material for body", body);
+  return lame_.front().second;
+}
+
+template <int Dim>
+double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
+  return scale_ * parallel_sum(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+           double sum = 0;
+           for (std::size_t e = begin; e < end; ++e) {
+             const auto& element = cells_.elements[e];
+             sum += element.volume * neo_hookean_density<Dim>(deformation_gradient<Dim>(element, x), lame(element.body));
+           }
+           return sum;
+         });
+}
+
+template <int Dim>
+void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
+  for (const auto& element : cells_.elements) {
+    const Mat<Dim> P = neo_hookean_stress<Dim>(deformation_gradient<Dim>(element, x), lame(element.body));
+    const Mat<Dim> forces = scale_ * element.volume * P * element.inverse_edges.transpose();
+    for (int k = 0; k < Dim; ++k) {
+      gradient.segment<Dim>(Dim * element.vertices[k + 1]) += forces.col(k);
+      gradient.segment<Dim>(Dim * element.vertices[0]) -= forces.col(k);
+    }
+  }
+}
+
+template <int Dim>
+void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
+  constexpr int kDofs = Dim * (Dim + 1);
+  std::vector<Mat<kDofs>> blocks(std::min(cells_.elements.size(), kBlock * 16));
+  for (std::size_t start = 0; start < cells_.elements.size(); start += blocks.size()) {
+    const std::size_t count = std::min(blocks.size(), cells_.elements.size() - start);
+    parallel_blocks(count, 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto& element = cells_.elements[start + i];
+        const auto system = neo_hookean_eigensystem<Dim>(deformation_gradient<Dim>(element, x), lame(element.body));
+        const auto gradients = shape_gradients<Dim>(element.inverse_edges);
+        auto& block = blocks[i];
+        block.setZero();
+        for (std::size_t k = 0; k < system.values.size(); ++k) {
+          if (psd == PsdProjection::clamp && system.values[k] <= 0) continue;
+          Vec<kDofs> w;
+          for (int v = 0; v <= Dim; ++v) w.template segment<Dim>(Dim * v) = system.modes[k] * gradients.col(v);
+          block.noalias() += (scale_ * element.volume * system.values[k]) * w * w.transpose();
+        }
+      }
+    });
+    for (std::size_t i = 0; i < count; ++i) sink.add<Dim>(cells_.elements[start + i].vertices, blocks[i].data());
+  }
+}
+
+template <int Dim>
+double ElasticEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const {
+  double step = 1;
+  for (const auto& element : cells_.elements) {
+    const double t = first_inversion(edges_of<Dim>(element, x), edges_of<Dim>(element, dx));
+    if (t <= 1) step = std::min(step, kInversionMargin * t);
+  }
+  return step;
+}
+
+template class ElasticEnergy<2>;
+template class ElasticEnergy<3>;
+
+}  // namespace itr

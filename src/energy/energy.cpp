@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/energy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace itr {
+
+double Energy::max_step(ConstVectorView, ConstVectorView, Workspace&) const { return 1; }
+
+double EnergySum::value(ConstVectorView x, Workspace& workspace) const {
+  double sum = 0;
+  for (const auto& term : terms_) {
+    sum += term->value(x, workspace);
+    if (!std::isfinite(sum)) return sum;
+  }
+  return sum;
+}
+
+void EnergySum::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
+  for (const auto& term : terms_) term->add_gradient(x, gradient, workspace);
+}
+
+void EnergySum::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
+  for (const auto& term : terms_) term->add_hessian(x, psd, sink, workspace);
+}
+
+double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
+  double step = 1;
+  for (const auto& term : terms_) step = std::min(step, term->max_step(x, dx, workspace));
+  return step;
+}
+
+}  // namespace itr

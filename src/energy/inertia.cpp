@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/inertia.hpp"
+
+namespace itr {
+
+namespace {
+
+/// Entry of the element mass matrix over its total mass: consistent (1 + delta_ij) / ((d+1)(d+2)), lumped delta_ij / (d+1).
+template <int Dim>
+double mass_share(MassKind kind, bool diagonal) {
+  if (kind == MassKind::lumped) return diagonal ? 1.0 / (Dim + 1) : 0.0;
+  return (diagonal ? 2.0 : 1.0) / ((Dim + 1) * (Dim + 2));
+}
+
+}  // namespace
+
+template <int Dim>
+std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
+  std::vector<double> densities;
+  densities.reserve(cells.elements.size());
+  for (const auto& element : cells.elements) densities.push_back(materials.at(element.body).density);
+  return densities;
+}
+
+template <int Dim>
+InertiaEnergy<Dim>::InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind,
+                                  VectorX predictor)
+    : cells_(cells), mass_(element_densities(cells, materials)), kind_(kind), predictor_(std::move(predictor)) {
+  for (std::size_t e = 0; e < mass_.size(); ++e) mass_[e] *= cells.elements[e].volume;
+}
+
+template <int Dim>
+void InertiaEnergy<Dim>::set_unrepresented_history(VectorX residual, double loss) {
+  residual_ = std::move(residual);
+  loss_ = loss;
+}
+
+template <int Dim>
+double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
+  const double off = mass_share<Dim>(kind_, false), extra = mass_share<Dim>(kind_, true) - off;
+  double sum = 0;
+  for (std::size_t e = 0; e < mass_.size(); ++e) {
+    Vec<Dim> total = Vec<Dim>::Zero();
+    double squares = 0;
+    for (const int v : cells_.elements[e].vertices) {
+      const Vec<Dim> d = x.segment<Dim>(Dim * v) - predictor_.segment<Dim>(Dim * v);
+      total += d;
+      squares += d.squaredNorm();
+    }
+    sum += 0.5 * mass_[e] * (off * total.squaredNorm() + extra * squares);
+  }
+  if (residual_.size() > 0) sum += residual_.dot(x - predictor_) + loss_;
+  return sum;
+}
+
+template <int Dim>
+void InertiaEnergy<Dim>::add_mass_product(ConstVectorView x, VectorView y) const {
+  const double off = mass_share<Dim>(kind_, false), extra = mass_share<Dim>(kind_, true) - off;
+  for (std::size_t e = 0; e < mass_.size(); ++e) {
+    Vec<Dim> total = Vec<Dim>::Zero();
+    for (const int v : cells_.elements[e].vertices) total += x.segment<Dim>(Dim * v);
+    for (const int v : cells_.elements[e].vertices)
+      y.segment<Dim>(Dim * v) += mass_[e] * (off * total + extra * x.segment<Dim>(Dim * v));
+  }
+}
+
+template <int Dim>
+void InertiaEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
+  add_mass_product(x - predictor_, gradient);
+  if (residual_.size() > 0) gradient += residual_;
+}
+
+template <int Dim>
+void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
+  constexpr int kDofs = Dim * (Dim + 1);
+  Mat<kDofs> unit = Mat<kDofs>::Zero();
+  for (int i = 0; i <= Dim; ++i)
+    for (int j = 0; j <= Dim; ++j)
+      for (int c = 0; c < Dim; ++c) unit(Dim * i + c, Dim * j + c) = mass_share<Dim>(kind_, i == j);
+  for (std::size_t e = 0; e < mass_.size(); ++e) {
+    const Mat<kDofs> block = mass_[e] * unit;
+    sink.add<Dim>(cells_.elements[e].vertices, block.data());
+  }
+}
+
+#define ITR_INSTANTIATE(Dim)          \
+  template class InertiaEnergy<Dim>;  \
+  template std::vector<double> element_densities<Dim>(const CellSet<Dim>&, const std::map<int, Material>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

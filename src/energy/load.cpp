@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/load.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+namespace itr {
+
+namespace {
+
+/// Points in barycentric coordinates with equal weights, exact for degree 2: `near` at one vertex, the rest shared.
+template <int Vertices>
+constexpr double near_vertex() {
+  if constexpr (Vertices == 2) return 0.5 + 0.28867513459481287;  // Gauss points of an edge
+  if constexpr (Vertices == 3) return 2.0 / 3.0;
+  return 0.5854101966249685;
+}
+
+template <int Dim, std::size_t Vertices>
+void add_forces(const std::array<int, Vertices>& vertices, const CellSet<Dim>& cells, double weight,
+                const std::function<Vec<Dim>(const Vec<Dim>&)>& load, VectorX& forces) {
+  constexpr double kNear = near_vertex<static_cast<int>(Vertices)>(), kFar = (1 - kNear) / (Vertices - 1);
+  for (std::size_t q = 0; q < Vertices; ++q) {
+    Vec<Dim> X = Vec<Dim>::Zero();
+    for (std::size_t k = 0; k < Vertices; ++k) X += (k == q ? kNear : kFar) * cells.rest[vertices[k]];
+    const Vec<Dim> f = weight / Vertices * load(X);
+    for (std::size_t k = 0; k < Vertices; ++k) forces.segment<Dim>(Dim * vertices[k]) += (k == q ? kNear : kFar) * f;
+  }
+}
+
+double facet_area(const std::array<int, 2>& f, const CellSet<2>& cells) {
+  return (cells.rest[f[1]] - cells.rest[f[0]]).norm();
+}
+double facet_area(const std::array<int, 3>& f, const CellSet<3>& cells) {
+  return 0.5 * (cells.rest[f[1]] - cells.rest[f[0]]).cross(cells.rest[f[2]] - cells.rest[f[0]]).norm();
+}
+
+}  // namespace
+
+template <int Dim>
+LoadEnergy<Dim>::LoadEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, const Loads<Dim>& loads,
+                            double scale)
+    : forces_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
+  if (loads.acceleration)
+    for (const auto& element : cells.elements)
+      add_forces<Dim>(element.vertices, cells, materials.at(element.body).density * element.volume, loads.acceleration, forces_);
+  for (const auto& facet : cells.facets)
+    for (const auto& [tag, traction] : loads.tractions)
+      if (tag == facet.tag) add_forces<Dim>(facet.vertices, cells, facet_area(facet.vertices, cells), traction, forces_);
+  for (int v = 0; v < cells.num_vertices; ++v) rest_work_ += forces_.segment<Dim>(Dim * v).dot(cells.rest[v]);
+}
+
+template class LoadEnergy<2>;
+template class LoadEnergy<3>;
+
+}  // namespace itr

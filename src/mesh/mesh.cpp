@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: MIT
+#include "itr/mesh/mesh.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <string>
+
+#include "itr/core/check.hpp"
+#include "itr/core/error.hpp"
+#include "itr/geometry/measures.hpp"
+
+namespace itr {
+
+namespace {
+
+template <std::size_t N>
+std::array<int, N> sorted(std::array<int, N> ids) {
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+/// The facet of a positively oriented cell opposite its vertex `k`, oriented outward.
+template <int Dim>
+typename MeshTypes<Dim>::Facet opposite_facet(const typename MeshTypes<Dim>::Cell& c, int k) {
+  if constexpr (Dim == 2) {
+    return {c[(k + 1) % 3], c[(k + 2) % 3]};
+  } else {
+    static constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    return {c[kFaces[k][0]], c[kFaces[k][1]], c[kFaces[k][2]]};
+  }
+}
+
+void erase_value(std::vector<int>& list, int value) { list.erase(std::find(list.begin(), list.end(), value)); }
+
+}  // namespace
+
+template <int Dim>
+Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector<int> body)
+    : num_vertices_(static_cast<int>(rest.size())), rest_(std::move(rest)) {
+  ITR_CHECK(cells.size() == body.size(), cells.size(), body.size());
+  vertex_alive_.assign(rest_.size(), 1);
+  cells_of_.resize(rest_.size());
+  facets_of_.resize(rest_.size());
+  std::map<Facet, std::pair<int, Facet>> facets;  // sorted vertices -> number of cells, outward facet of the first
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const auto place = [&] { return "cell " + std::to_string(c); };
+    for (const int v : cells[c])
+      if (v < 0 || v >= vertex_slots())
+        throw InputError({"", place(), "vertex index " + std::to_string(v), "0 to " + std::to_string(vertex_slots() - 1)});
+    add_cell(cells[c], body[c]);
+    if (!(volume_.back() > 0))
+      throw InputError({"", place(), "rest volume " + std::to_string(volume_.back()), "a positive one (not degenerate or inverted)"});
+    for (int k = 0; k <= Dim; ++k) {
+      const Facet facet = opposite_facet<Dim>(cells[c], k);
+      auto& entry = facets.try_emplace(sorted(facet), 0, facet).first->second;
+      if (++entry.first > 2) throw InputError({"", place(), "a facet with more than two cells", "a manifold mesh"});
+    }
+  }
+  for (const auto& [key, entry] : facets)
+    if (entry.first == 1) add_facet(entry.second, kNoTag);
+}
+
+template <int Dim>
+void Mesh<Dim>::update_geometry(CellId c) {
+  std::array<Vec<Dim>, Dim + 1> p;
+  for (int k = 0; k <= Dim; ++k) p[k] = rest_[cells_[c][k]];
+  const Mat<Dim> edges = edge_matrix<Dim>(p);
+  volume_[c] = simplex_volume<Dim>(edges);
+  inverse_edges_[c] = edges.inverse();
+}
+
+template <int Dim>
+void Mesh<Dim>::add_cell(const Cell& cell, int body) {
+  const int c = cell_slots();
+  cells_.push_back(cell);
+  body_.push_back(body);
+  volume_.push_back(0);
+  inverse_edges_.emplace_back();
+  update_geometry(c);
+  for (const int v : cell) cells_of_[v].push_back(c);
+  ++num_cells_;
+}
+
+template <int Dim>
+void Mesh<Dim>::add_facet(const Facet& facet, int tag) {
+  const int f = facet_slots();
+  facets_.push_back(facet);
+  facet_tag_.push_back(tag);
+  for (const int v : facet) facets_of_[v].push_back(f);
+  ++num_facets_;
+}
+
+template <int Dim>
+void Mesh<Dim>::remove_cell(CellId c) {
+  for (const int v : cells_[c]) erase_value(cells_of_[v], c);
+  cells_[c].fill(kNone);
+  --num_cells_;
+}
+
+template <int Dim>
+void Mesh<Dim>::remove_facet(FacetId f) {
+  for (const int v : facets_[f]) erase_value(facets_of_[v], f);
+  facets_[f].fill(kNone);
+  --num_facets_;
+}
+
+template <int Dim>
+std::vector<CellId> Mesh<Dim>::cells_of_edge(const EdgeKey& edge) const {
+  std::vector<CellId> found;
+  for (const CellId c : cells_of_[edge[0]])
+    if (std::find(cells_[c].begin(), cells_[c].end(), edge[1]) != cells_[c].end()) found.push_back(c);
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+template <int Dim>
+FacetId Mesh<Dim>::find_facet(const Facet& vertices) const {
+  const Facet key = sorted(vertices);
+  for (const FacetId f : facets_of_[vertices[0]])
+    if (sorted(facets_[f]) == key) return f;
+  return kNone;
+}
+
+template <int Dim>
+std::vector<EdgeKey> Mesh<Dim>::edges() const {
+  std::vector<EdgeKey> all;
+  for (const Cell& cell : cells_) {
+    if (cell[0] == kNone) continue;
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = i + 1; j <= Dim; ++j) all.push_back({std::min(cell[i], cell[j]), std::max(cell[i], cell[j])});
+  }
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
+
+template <int Dim>
+double Mesh<Dim>::total_volume() const {
+  double sum = 0;
+  for (int c = 0; c < cell_slots(); ++c)
+    if (is_cell_alive(c)) sum += volume_[c];
+  return sum;
+}
+
+template <int Dim>
+VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
+  VertexId created = kNone;
+  if (edit.value && edit.value->vertex == kNewVertex) {
+    created = vertex_slots();
+    rest_.push_back(edit.value->rest);
+    vertex_alive_.push_back(1);
+    cells_of_.emplace_back();
+    facets_of_.emplace_back();
+    ++num_vertices_;
+  } else if (edit.value) {
+    rest_[edit.value->vertex] = edit.value->rest;
+  }
+  const auto resolve = [&](auto ids) {
+    for (int& v : ids)
+      if (v == kNewVertex) v = created;
+    return ids;
+  };
+  for (const CellId c : edit.removed_cells) remove_cell(c);
+  for (const FacetId f : edit.removed_facets) remove_facet(f);
+  for (const auto& cell : edit.inserted_cells) {
+    add_cell(resolve(cell.vertices), cell.body);
+    ITR_CHECK(volume_.back() > 0, volume_.back());
+  }
+  for (const auto& facet : edit.inserted_facets) add_facet(resolve(facet.vertices), facet.tag);
+  if (edit.removed_vertex != kNone) {
+    const VertexId v = edit.removed_vertex;
+    ITR_CHECK(cells_of_[v].empty() && facets_of_[v].empty(), v);
+    vertex_alive_[v] = 0;
+    --num_vertices_;
+  }
+  return created;
+}
+
+template <int Dim>
+typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
+  Renumbering map{std::vector<VertexId>(vertex_slots(), kNone), std::vector<CellId>(cell_slots(), kNone)};
+  int vertices = 0, cells = 0, facets = 0;
+  for (int v = 0; v < vertex_slots(); ++v) {
+    if (!vertex_alive_[v]) continue;
+    map.vertex[v] = vertices;
+    rest_[vertices++] = rest_[v];
+  }
+  const auto renumber = [&](auto ids) {
+    for (int& v : ids) v = map.vertex[v];
+    return ids;
+  };
+  cells_of_.assign(vertices, {});
+  facets_of_.assign(vertices, {});
+  for (int c = 0; c < cell_slots(); ++c) {
+    if (!is_cell_alive(c)) continue;
+    const int to = map.cell[c] = cells++;
+    cells_[to] = renumber(cells_[c]);
+    body_[to] = body_[c];
+    volume_[to] = volume_[c];
+    inverse_edges_[to] = inverse_edges_[c];
+    for (const int v : cells_[to]) cells_of_[v].push_back(to);
+  }
+  for (int f = 0; f < facet_slots(); ++f) {
+    if (!is_facet_alive(f)) continue;
+    const int to = facets++;
+    facets_[to] = renumber(facets_[f]);
+    facet_tag_[to] = facet_tag_[f];
+    for (const int v : facets_[to]) facets_of_[v].push_back(to);
+  }
+  rest_.resize(vertices);
+  vertex_alive_.assign(vertices, 1);
+  cells_.resize(cells);
+  body_.resize(cells);
+  volume_.resize(cells);
+  inverse_edges_.resize(cells);
+  facets_.resize(facets);
+  facet_tag_.resize(facets);
+  return map;
+}
+
+template <int Dim>
+std::string Mesh<Dim>::find_defect() const {
+  std::map<Facet, std::pair<int, Facet>> seen;
+  int alive = 0;
+  for (int c = 0; c < cell_slots(); ++c) {
+    if (!is_cell_alive(c)) continue;
+    ++alive;
+    if (!(volume_[c] > 0)) return "cell " + std::to_string(c) + " has rest volume " + std::to_string(volume_[c]);
+    for (const int v : cells_[c]) {
+      if (!vertex_alive_[v]) return "cell " + std::to_string(c) + " uses dead vertex " + std::to_string(v);
+      if (std::count(cells_of_[v].begin(), cells_of_[v].end(), c) != 1) return "adjacency of vertex " + std::to_string(v);
+    }
+    for (int k = 0; k <= Dim; ++k) {
+      const Facet facet = opposite_facet<Dim>(cells_[c], k);
+      if (++seen.try_emplace(sorted(facet), 0, facet).first->second.first > 2) return "facet with more than two cells";
+    }
+  }
+  if (alive != num_cells_) return "wrong number of cells";
+  int boundary = 0;
+  for (const auto& [key, entry] : seen) {
+    if (entry.first != 1) continue;
+    ++boundary;
+    const FacetId f = find_facet(key);
+    if (f == kNone) return "boundary facet at vertex " + std::to_string(key[0]) + " is missing";
+    if (Dim == 2 && facets_[f] != entry.second) return "facet " + std::to_string(f) + " is oriented inward";
+  }
+  if (boundary != num_facets_) return "a facet that is not on the boundary";
+  return {};
+}
+
+template class Mesh<2>;
+template class Mesh<3>;
+
+}  // namespace itr

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: MIT
+#include "itr/newton/newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "itr/core/timer.hpp"
+
+namespace itr {
+
+const char* to_string(Termination termination) {
+  switch (termination) {
+    case Termination::gradient: return "gradient below tolerance";
+    case Termination::step: return "step below tolerance";
+    case Termination::iterations: return "out of iterations";
+    case Termination::no_descent: return "no step lowers the energy";
+    case Termination::infeasible: return "not feasible";
+  }
+  return "";
+}
+
+void NewtonSummary::add_effort(const NewtonSummary& other) {
+  iterations += other.iterations;
+  assembly_seconds += other.assembly_seconds;
+  linear_seconds += other.linear_seconds;
+  line_search_seconds += other.line_search_seconds;
+  ccd_seconds += other.ccd_seconds;
+  linear_residual = std::max(linear_residual, other.linear_residual);
+}
+
+namespace {
+
+constexpr double kArmijo = 1e-4;
+constexpr int kIterationsPerFallback = 5;  ///< iterations with the projected Hessian before the true one is tried again
+constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
+
+class Minimizer {
+ public:
+  Minimizer(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
+            const NewtonOptions& options, Workspace& workspace)
+      : energy_(energy), x_(x), dofs_(dofs), target_(target), system_(system), options_(options), workspace_(workspace) {}
+
+  NewtonSummary run() {
+    value_ = timed_value(x_);
+    if (!std::isfinite(value_)) return stop(Termination::infeasible, "the energy at the start is not finite");
+    compute_gradient();
+    for (summary_.iterations = 0; summary_.iterations < options_.max_iterations; ++summary_.iterations) {
+      compute_remaining();
+      const double tolerance = summary_.iterations == 0 ? options_.first_gradient_tolerance : options_.gradient_tolerance;
+      if (!moving_ && summary_.gradient_norm < tolerance) return stop(Termination::gradient);
+      if (!compute_direction()) return stop(Termination::no_descent, "the Newton system has no descent direction");
+      if (!moving_ && summary_.step_norm < options_.step_tolerance) return stop(Termination::step);
+      if (!line_search() && !retry_projected()) {
+        if (moving_ && !relaxing_) {  // held dofs are blocked: let the bodies give way first
+          relax_next_ = true;
+          if (++blocked_ > kMaxBlocked) return stop(Termination::no_descent, "held vertices cannot reach their targets");
+          continue;
+        }
+        return stop(Termination::no_descent, "the line search found no step");
+      }
+    }
+    return stop(Termination::iterations, "no convergence in " + std::to_string(options_.max_iterations) + " iterations");
+  }
+
+ private:
+  static constexpr int kMaxBlocked = 50;
+
+  NewtonSummary stop(Termination termination, std::string message = {}) {
+    summary_.termination = termination;
+    summary_.energy = value_;
+    summary_.message = std::move(message);
+    return summary_;
+  }
+
+  double timed_value(const VectorX& x) {
+    const ScopedTimer timer(summary_.line_search_seconds);
+    return energy_.value(x, workspace_);
+  }
+
+  VectorX gradient_at(const VectorX& x) {
+    const ScopedTimer timer(summary_.assembly_seconds);
+    VectorX gradient = VectorX::Zero(x.size());
+    energy_.add_gradient(x, gradient, workspace_);
+    return gradient;
+  }
+
+  double free_dot(const VectorX& a, const VectorX& b) const {
+    double sum = 0;
+    for (Eigen::Index i = 0; i < a.size(); ++i)
+      if (dofs_.unknown[i] != kNone) sum += a[i] * b[i];
+    return sum;
+  }
+
+  void compute_gradient() {
+    gradient_ = gradient_at(x_);
+    summary_.gradient_norm = std::sqrt(free_dot(gradient_, gradient_));
+  }
+
+  /// What is left of the way of the held dofs.
+  void compute_remaining() {
+    moving_ = false;
+    relaxing_ = std::exchange(relax_next_, false);
+    remaining_.resize(0);
+    if (target_.size() == 0) return;
+    VectorX remaining = VectorX::Zero(x_.size());
+    for (Eigen::Index i = 0; i < x_.size(); ++i)
+      if (dofs_.unknown[i] == kNone) remaining[i] = target_[i] - x_[i];
+    remaining_l1_ = remaining.lpNorm<1>();
+    moving_ = remaining_l1_ > 0;
+    if (moving_ && !relaxing_) remaining_ = std::move(remaining);
+  }
+
+  bool compute_direction() {
+    projected_ = options_.project_to_psd && psd_iterations_ > 0;
+    if (psd_iterations_ > 0) --psd_iterations_;
+    if (!projected_ && try_direction(PsdProjection::none, 0)) return true;
+    if (options_.project_to_psd) {
+      if (!projected_) psd_iterations_ = kIterationsPerFallback - 1;
+      projected_ = true;
+      if (try_direction(PsdProjection::clamp, 0)) return true;
+    }
+    double shift = 1e-10 * std::max(system_.diagonal_scale(), 1e-300);
+    for (int attempt = 0; attempt < 12; ++attempt, shift *= 10)
+      if (factor_and_solve(shift)) return true;
+    return false;
+  }
+
+  bool try_direction(PsdProjection psd, double shift) {
+    {
+      const ScopedTimer timer(summary_.assembly_seconds);
+      coupling_ = VectorX::Zero(dofs_.num_unknowns);
+      system_.assemble(energy_, x_, psd, dofs_, remaining_, coupling_, workspace_);
+    }
+    return factor_and_solve(shift);
+  }
+
+  /// Solves for the full step; true where it is one of descent.
+  bool factor_and_solve(double shift) {
+    const ScopedTimer timer(summary_.linear_seconds);
+    if (dofs_.num_unknowns == 0) {
+      step_ = remaining_.size() > 0 ? remaining_ : VectorX::Zero(x_.size());
+      summary_.step_norm = 0;
+      return true;
+    }
+    if (system_.factorize(shift) != linear::Outcome::ok) return false;
+    VectorX rhs = -coupling_, solution;
+    for (Eigen::Index i = 0; i < x_.size(); ++i)
+      if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
+    const auto report = system_.solve(rhs, solution);
+    if ((report.outcome != linear::Outcome::ok && report.outcome != linear::Outcome::not_converged) || !solution.allFinite())
+      return false;
+    summary_.linear_residual = std::max(summary_.linear_residual, report.relative_residual);
+    if (solution.dot(rhs) < 0) return false;  // not the minimiser of a convex model
+    step_ = remaining_.size() > 0 ? remaining_ : VectorX::Zero(x_.size());
+    for (Eigen::Index i = 0; i < x_.size(); ++i)
+      if (dofs_.unknown[i] != kNone) step_[i] = solution[dofs_.unknown[i]];
+    summary_.step_norm = solution.norm();
+    return true;
+  }
+
+  /// A failed search along the true Newton direction is tried once more along the projected one.
+  bool retry_projected() {
+    if (projected_ || !options_.project_to_psd) return false;
+    psd_iterations_ = kIterationsPerFallback - 1;
+    projected_ = true;
+    return try_direction(PsdProjection::clamp, 0) && line_search();
+  }
+
+  bool line_search() {
+    double step = 1;
+    {
+      const ScopedTimer timer(summary_.ccd_seconds);
+      step = energy_.max_step(x_, step_, workspace_);
+    }
+    const bool advancing = remaining_.size() > 0;
+    if (advancing && step < kRelaxBelow) relax_next_ = true;
+    const double slope = gradient_.dot(step_);
+    if (advancing) penalty_ = std::max(penalty_, 2 * std::max(0.0, slope) / remaining_l1_);
+    const double merit_slope = advancing ? slope - penalty_ * remaining_l1_ : slope;
+    const int limit = options_.line_search == LineSearch::backtracking ? 30 : 40;
+    for (int i = 0; i < limit && step > 1e-14; ++i, step /= 2) {
+      candidate_ = x_ + step * step_;
+      if (advancing && step == 1)  // exactly there, not to round-off
+        for (Eigen::Index k = 0; k < x_.size(); ++k)
+          if (dofs_.unknown[k] == kNone) candidate_[k] = target_[k];
+      const double value = timed_value(candidate_);
+      if (!std::isfinite(value)) continue;
+      const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
+      if (!acceptable(merit_change, value, step, merit_slope, advancing)) continue;
+      x_.swap(candidate_);
+      value_ = value;
+      if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
+      compute_gradient();
+      return true;
+    }
+    return false;
+  }
+
+  bool acceptable(double change, double value, double step, double slope, bool advancing) {
+    if (options_.line_search == LineSearch::backtracking && !advancing) return change < 0;
+    if (change <= kArmijo * step * slope) return true;
+    if (advancing || options_.line_search == LineSearch::armijo) return false;
+    // Where differences of energies drown in round-off, compare slopes (Hager & Zhang; PolyFEM's "RobustArmijo").
+    if (std::abs(value - value_) > 0.1 * std::abs(value_)) return false;
+    const VectorX gradient = gradient_at(candidate_);
+    const double before = free_dot(step_, gradient_), after = free_dot(step_, gradient);
+    const double mean = step / 2 * (before + after), spread = step / 2 * std::abs(after - before);
+    return mean + spread <= kArmijo * step * slope;
+  }
+
+  const Energy& energy_;
+  VectorX& x_;
+  const DofMap& dofs_;
+  const VectorX& target_;
+  NewtonSystem& system_;
+  const NewtonOptions& options_;
+  Workspace& workspace_;
+
+  NewtonSummary summary_;
+  double value_ = 0;
+  VectorX gradient_, step_, candidate_, coupling_;
+  VectorX remaining_;        ///< step asked of the held dofs in this iteration; empty: none
+  double remaining_l1_ = 0;
+  double penalty_ = 0;
+  bool moving_ = false;      ///< held dofs are not yet at their targets
+  bool relaxing_ = false;    ///< this iteration leaves them where they are
+  bool relax_next_ = false;
+  bool projected_ = false;
+  int psd_iterations_ = 0;
+  int blocked_ = 0;
+};
+
+}  // namespace
+
+NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
+                       const NewtonOptions& options, Workspace& workspace) {
+  return Minimizer(energy, x, dofs, target, system, options, workspace).run();
+}
+
+}  // namespace itr

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+
+#include "itr/newton/newton.hpp"
+
+namespace itr {
+
+namespace {
+
+void assemble_into(HessianSink& sink, const Energy& energy, ConstVectorView x, PsdProjection psd,
+                   const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) {
+  if (prescribed_step.size() > 0) sink.set_prescribed_step(prescribed_step, coupling);
+  energy.add_hessian(x, psd, sink, workspace);
+}
+
+}  // namespace
+
+void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
+                           const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) {
+  hessian_.setZero(dofs.num_unknowns, dofs.num_unknowns);
+  HessianSink sink(dofs, hessian_);
+  assemble_into(sink, energy, x, psd, prescribed_step, coupling, workspace);
+}
+
+linear::Outcome DenseSystem::factorize(double shift) {
+  if (shift != 0) hessian_.diagonal().array() += shift;
+  llt_.compute(hessian_);
+  if (shift != 0) hessian_.diagonal().array() -= shift;
+  return llt_.info() == Eigen::Success ? linear::Outcome::ok : linear::Outcome::not_positive_definite;
+}
+
+linear::SolveReport DenseSystem::solve(const VectorX& rhs, VectorX& solution) {
+  solution = llt_.solve(rhs);
+  return {solution.allFinite() ? linear::Outcome::ok : linear::Outcome::non_finite, 0};
+}
+
+double DenseSystem::diagonal_scale() const {
+  return hessian_.rows() > 0 ? hessian_.diagonal().cwiseAbs().maxCoeff() : 0;
+}
+
+SparseSystem::SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, std::span<const int> stencils,
+                           int stencil_size)
+    : solver_(solver), dim_(dim) {
+  assembler_.reset(dofs, dim, stencils, stencil_size);
+}
+
+void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
+                            const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) {
+  assembler_.begin();
+  HessianSink sink(dofs, assembler_);
+  assemble_into(sink, energy, x, psd, prescribed_step, coupling, workspace);
+  if (assembler_.finish()) pattern_changed_ = true;
+}
+
+linear::Outcome SparseSystem::factorize(double shift) {
+  if (pattern_changed_) {
+    const auto outcome = solver_.analyze(assembler_.pattern(), {.block_size = dim_});
+    if (outcome != linear::Outcome::ok) return outcome;
+    pattern_changed_ = false;
+  }
+  if (shift == 0) return solver_.factorize(assembler_.values());
+  std::vector<double> shifted(assembler_.values().begin(), assembler_.values().end());
+  for (int j = 0; j < assembler_.pattern().order; ++j) shifted[assembler_.pattern().column_starts[j]] += shift;
+  return solver_.factorize(shifted);
+}
+
+linear::SolveReport SparseSystem::solve(const VectorX& rhs, VectorX& solution) {
+  constexpr double kAskedResidual = 1e-10;
+  solution.resize(rhs.size());
+  return solver_.solve({rhs.data(), static_cast<std::size_t>(rhs.size())},
+                       {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kAskedResidual);
+}
+
+double SparseSystem::diagonal_scale() const {
+  double scale = 0;
+  for (int j = 0; j < assembler_.pattern().order; ++j)
+    scale = std::max(scale, std::abs(assembler_.values()[assembler_.pattern().column_starts[j]]));
+  return scale;
+}
+
+}  // namespace itr

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+#include "itr/time/integrator.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace itr {
+
+namespace {
+
+struct BdfRow {
+  std::array<double, 6> past;  ///< weights of past states, newest first
+  double b;                    ///< weight of h times the derivative
+};
+
+/// Backward differentiation formulas of order 1 to 6.
+const BdfRow& bdf(int order) {
+  static constexpr auto row = [](double d, std::array<double, 6> n, double b) {
+    for (double& w : n) w /= d;
+    return BdfRow{n, b / d};
+  };
+  static constexpr std::array<BdfRow, 6> kRows = {row(1, {1}, 1),
+                                                  row(3, {4, -1}, 2),
+                                                  row(11, {18, -9, 2}, 6),
+                                                  row(25, {48, -36, 16, -3}, 12),
+                                                  row(137, {300, -300, 200, -75, 12}, 60),
+                                                  row(147, {360, -450, 400, -225, 72, -10}, 60)};
+  return kRows[order - 1];
+}
+
+VectorX combine(const BdfRow& row, int order, const std::vector<VectorX>& past) {
+  VectorX sum = row.past[0] * past[0];
+  for (int i = 1; i < order; ++i) sum += row.past[i] * past[i];
+  return sum;
+}
+
+}  // namespace
+
+int TimeIntegrator::depth() const { return options_.integrator == Integrator::bdf ? options_.bdf_order : 1; }
+
+int TimeIntegrator::order(const History& history) const {
+  return std::min<int>(depth(), static_cast<int>(history.x.size()));
+}
+
+VectorX TimeIntegrator::predictor(const History& history) const {
+  const double h = options_.dt;
+  if (options_.integrator == Integrator::newmark)
+    return history.x[0] + h * history.v[0] + h * h * (0.5 - options_.newmark_beta) * history.a[0];
+  const int k = order(history);
+  return combine(bdf(k), k, history.x) + bdf(k).b * h * combine(bdf(k), k, history.v);
+}
+
+double TimeIntegrator::scaling(const History& history) const {
+  if (options_.is_static) return 1;
+  const double h = options_.dt;
+  if (options_.integrator == Integrator::newmark) return options_.newmark_beta * h * h;
+  const double b = bdf(order(history)).b;
+  return b * b * h * h;
+}
+
+double TimeIntegrator::velocity_rate(const History& history) const {
+  if (options_.is_static) return 1;
+  if (options_.integrator == Integrator::newmark) return options_.newmark_gamma / (options_.newmark_beta * options_.dt);
+  return 1 / (bdf(order(history)).b * options_.dt);
+}
+
+VectorX TimeIntegrator::velocity_reference(const History& history) const {
+  if (options_.integrator == Integrator::newmark) {
+    const double beta = options_.newmark_beta, gamma = options_.newmark_gamma, h = options_.dt;
+    return history.x[0] - ((1 - gamma / beta) * history.v[0] + (1 - gamma / (2 * beta)) * h * history.a[0]) * (beta * h / gamma);
+  }
+  const int k = order(history);
+  return combine(bdf(k), k, history.x);
+}
+
+VectorX TimeIntegrator::velocity(const VectorX& x, const History& history) const {
+  return velocity_rate(history) * (x - velocity_reference(history));
+}
+
+VectorX TimeIntegrator::acceleration(const VectorX& v, const History& history) const {
+  const double h = options_.dt;
+  if (options_.integrator == Integrator::newmark)
+    return (v - history.v[0] - (1 - options_.newmark_gamma) * h * history.a[0]) / (options_.newmark_gamma * h);
+  const int k = order(history);
+  return (v - combine(bdf(k), k, history.v)) / (bdf(k).b * h);
+}
+
+void TimeIntegrator::push(VectorX x, History& history) const {
+  VectorX v = velocity(x, history);
+  VectorX a = uses_acceleration() ? acceleration(v, history) : VectorX();
+  const auto push_front = [&](std::vector<VectorX>& past, VectorX newest) {
+    past.insert(past.begin(), std::move(newest));
+    past.resize(std::min<std::size_t>(past.size(), depth()));
+  };
+  push_front(history.x, std::move(x));
+  push_front(history.v, std::move(v));
+  if (uses_acceleration()) push_front(history.a, std::move(a));
+}
+
+}  // namespace itr
