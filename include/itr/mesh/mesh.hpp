@@ -54,11 +54,11 @@ struct Edit {
 
   Kind kind;
   EdgeKey edge{kNone, kNone};  ///< the edge; for a smooth, {vertex, kNone}
-  std::vector<CellId> removed_cells;
-  std::vector<NewCell> inserted_cells;
-  std::vector<FacetId> removed_facets;
-  std::vector<NewFacet> inserted_facets;
-  std::optional<Value> value;
+  std::vector<CellId> removed_cells{};
+  std::vector<NewCell> inserted_cells{};
+  std::vector<FacetId> removed_facets{};
+  std::vector<NewFacet> inserted_facets{};
+  std::optional<Value> value{};
   VertexId removed_vertex = kNone;
 };
 

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "itr/energy/energy.hpp"
-#include "itr/fem/hessian_sink.hpp"
 #include "itr/linear/solver.hpp"
 #include "itr/newton/options.hpp"
 

@@ -44,6 +44,8 @@ class ContactEnergy final : public Energy {
   std::vector<ContactStencil> active(ConstVectorView x, Workspace& workspace) const;
   /// Smallest distance [m] over counted pairs nearer than the candidates reach; infinity where there are none.
   double min_distance(ConstVectorView x, Workspace& workspace) const;
+  /// Whether any counted pair is near enough to x to be looked at.
+  bool has_candidates(ConstVectorView x, Workspace& workspace) const { return !candidates(x, nullptr, workspace).empty(); }
   double squared_distance(const ContactStencil& stencil, ConstVectorView x) const;
   /// b(D) and its derivatives with respect to D.
   double barrier(double squared_distance) const;

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+// What a remesher works on beside the mesh: nodal fields that follow its edits, and what defines the step's energy.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "itr/energy/contact/friction.hpp"
+#include "itr/energy/contact/options.hpp"
+#include "itr/energy/inertia.hpp"
+#include "itr/energy/load.hpp"
+#include "itr/energy/material.hpp"
+#include "itr/mesh/mesh.hpp"
+#include "itr/newton/options.hpp"
+#include "itr/remesh/options.hpp"
+
+namespace itr {
+
+/// Interleaved fields over the vertex slots of a mesh.
+template <int Dim>
+struct RemeshFields {
+  VectorX x;                            ///< positions [m]
+  VectorX predictor;                    ///< x-hat [m]; empty where there is no inertia
+  VectorX velocity_reference;           ///< positions of no velocity [m], for friction; empty where there is none
+  std::vector<VectorX> past_positions;  ///< must stay free of inversion and intersection
+  std::vector<VectorX> past_rates;      ///< velocities and accelerations
+
+  /// Calls f(field) on each field that is there.
+  template <typename F>
+  void for_each(F&& f) {
+    for (VectorX* field : {&x, &predictor, &velocity_reference})
+      if (field->size() > 0) f(*field);
+    for (auto& field : past_positions) f(field);
+    for (auto& field : past_rates) f(field);
+  }
+  /// Interpolated value of a field at the vertex that an edit sets.
+  static Vec<Dim> interpolate(const VectorX& field, const typename Edit<Dim>::Value& value) {
+    Vec<Dim> sum = Vec<Dim>::Zero();
+    for (int k = 0; k < value.num_parents; ++k) sum += value.weights[k] * field.segment<Dim>(Dim * value.parents[k]);
+    return sum;
+  }
+  /// Extends or updates all fields for an edit that was just applied and created `created` (or kNone).
+  void follow(const Edit<Dim>& edit, VertexId created);
+};
+
+/// The energy of the step, as every local problem needs it.
+template <int Dim>
+struct StepContext {
+  std::map<int, Material> materials;
+  Loads<Dim> loads;
+  bool has_inertia = true;
+  MassKind mass = MassKind::consistent;
+  double scaling = 1;  ///< alpha h^2 [s^2]
+  ContactOptions contact;
+  double velocity_rate = 1;                                ///< [1/s]
+  std::map<int, std::array<bool, Dim>> held_components;  ///< by facet tag
+  NewtonOptions newton;
+  double shortest_edge = 0;  ///< of the initial mesh [m]
+
+  struct ObstacleGeometry {
+    std::vector<Vec<Dim>> rest;
+    std::vector<Vec<Dim>> x;                   ///< now [m]
+    std::vector<Vec<Dim>> velocity_reference;  ///< [m]
+    std::vector<std::vector<Vec<Dim>>> past_x;  ///< one a past position
+    std::vector<std::array<int, 2>> edges;
+    std::vector<double> area;  ///< by vertex, as in CollisionSurface
+    std::vector<int> degree;
+  } obstacles;
+};
+
+}  // namespace itr

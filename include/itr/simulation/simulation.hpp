@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// A simulation: the state, and one time step after another. `src/simulation/step.cpp` is the whole method on a page.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "itr/core/log.hpp"
+#include "itr/linear/registry.hpp"
+#include "itr/newton/newton.hpp"
+#include "itr/simulation/frame.hpp"
+#include "itr/simulation/setup.hpp"
+#include "itr/time/integrator.hpp"
+
+namespace itr {
+
+/// Where a simulation stands: a value. Fields are interleaved over the mesh's vertices followed by the obstacles' ones.
+template <int Dim>
+struct State {
+  Mesh<Dim> mesh;   ///< compact
+  History history;  ///< history.x[0] is the present
+  int step = 0;
+  double t = 0;     ///< [s]
+};
+
+struct StepResult {
+  bool ok = true;
+  std::string reason;  ///< where not ok: why the step could not be done; the state is that before the step
+  StepReport report;
+};
+
+template <int Dim>
+class Simulation {
+ public:
+  /// Samples initial conditions. Throws InputError for a setup that cannot be simulated: surfaces that intersect at the
+  /// start (with the edges), what is not supported yet, an unknown solver.
+  explicit Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger = {});
+  ~Simulation();
+  Simulation(Simulation&&) noexcept;
+
+  /// What the state at t0 looks like: all counters 0.
+  StepReport initial_report() const;
+  /// One time step with remeshing inside it. Numerical failure is a result with a reason.
+  StepResult advance();
+  bool finished() const;
+
+  const State<Dim>& state() const;
+  const Setup<Dim>& setup() const;
+  std::string solver_name() const;
+  /// Calls `observer` with the present state as output sees it.
+  template <typename Observer>
+  void observe(Observer&& observer) const {
+    const FrameData data = frame_data();
+    observer(FrameView<Dim>{state().mesh, data.x, data.v, data.elastic_density, data.obstacle_x, setup().obstacles.edges,
+                            setup().obstacles.triangles});
+  }
+
+ private:
+  struct FrameData {
+    VectorX x, v;
+    std::vector<double> elastic_density;
+    std::vector<Vec<Dim>> obstacle_x;
+  };
+  FrameData frame_data() const;
+
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+extern template class Simulation<2>;
+extern template class Simulation<3>;
+
+}  // namespace itr

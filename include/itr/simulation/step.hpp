@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "itr/core/log.hpp"
+#include "itr/simulation/simulation.hpp"
+#include "itr/simulation/step_problem.hpp"
+
+namespace itr {
+
+/// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again.
+/// `shortest_edge` is that of the initial mesh [m]. On failure `state` is left as it was.
+template <int Dim>
+StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solver& solver, const Logger& logger,
+                     State<Dim>& state);
+
+/// Most memory that this process has held [MB].
+double peak_rss_mb();
+
+}  // namespace itr

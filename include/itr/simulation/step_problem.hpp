@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// The incremental potential of one time step on one mesh, and its solution: terms that the scene needs and no others.
+#pragma once
+
+#include "itr/energy/contact/contact.hpp"
+#include "itr/energy/contact/friction.hpp"
+#include "itr/energy/elastic/elastic.hpp"
+#include "itr/energy/inertia.hpp"
+#include "itr/energy/load.hpp"
+#include "itr/newton/newton.hpp"
+#include "itr/simulation/frame.hpp"
+#include "itr/simulation/setup.hpp"
+#include "itr/time/integrator.hpp"
+
+namespace itr {
+
+/// Loads of a setup at time t.
+template <int Dim>
+Loads<Dim> loads_at(const Setup<Dim>& setup, double t);
+
+/// The surface of a compact mesh and of the obstacles, whose vertices follow the mesh's.
+template <int Dim>
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles);
+
+/// Which dofs are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two conditions the
+/// one with the larger tag wins.
+template <int Dim>
+struct HeldDofs {
+  std::vector<char> held;
+  VectorX target;  ///< only entries of held dofs mean anything
+};
+template <int Dim>
+HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t);
+
+template <int Dim>
+class StepProblem {
+ public:
+  /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this.
+  StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, linear::Solver& solver);
+
+  /// Solves from x (feasible) in place, with lagging rounds of friction. The friction of the first round is lagged at
+  /// `lagged_x`.
+  NewtonSummary solve(VectorX& x, const VectorX& lagged_x);
+
+  EnergyReport report(const VectorX& x);
+  double min_distance(const VectorX& x);
+  const DofMap& dofs() const { return dofs_; }
+  const CellSet<Dim>& cells() const { return cells_; }
+  const CollisionSurface& surface() const { return surface_; }
+  double scaling() const { return scaling_; }
+
+ private:
+  EnergySum energy(const VectorX& lagged_x);
+
+  const Setup<Dim>& setup_;
+  CellSet<Dim> cells_;
+  CollisionSurface surface_;
+  HeldDofs<Dim> held_;
+  DofMap dofs_;
+  double scaling_;
+  VelocityRule velocity_;
+  Workspace workspace_;
+  std::shared_ptr<InertiaEnergy<Dim>> inertia_;
+  std::shared_ptr<ElasticEnergy<Dim>> elastic_;
+  std::shared_ptr<LoadEnergy<Dim>> loads_;
+  std::shared_ptr<ContactEnergy<Dim>> contact_;
+  std::shared_ptr<FrictionEnergy<Dim>> friction_;
+  std::unique_ptr<SparseSystem> system_;
+};
+
+/// The least det F over the elements.
+template <int Dim>
+double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x);
+
+}  // namespace itr

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "itr/core/error.hpp"
+#include "itr/linear/registry.hpp"
+#include "itr/output/certify.hpp"
+#include "run.hpp"
+
+namespace {
+
+using namespace itr;
+
+scene::Override parse_override(const std::string& text) {
+  const auto equals = text.find('=');
+  if (text.empty() || text[0] != '/' || equals == std::string::npos)
+    throw InputError({"", "--set", "\"" + text + "\"", "/json/pointer=VALUE"});
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+int list_solvers() {
+  linear::Registry registry;
+  for (const auto& row : registry.list()) {
+    if (!row.available) {
+      fmt::print("{:22} absent: {}\n", row.name, row.reason);
+      continue;
+    }
+    const auto solver = registry.create(row.name);
+    std::string abilities = "SPD";
+    if (row.capabilities.indefinite) abilities += ", indefinite";
+    if (row.capabilities.iterative) abilities += ", iterative";
+    if (row.capabilities.threads) abilities += ", threads";
+    if (row.capabilities.mpi) abilities += ", MPI";
+    fmt::print("{:22} {}; {}; {}; self-test residual {:.1e}\n", row.name, row.library_version, abilities, row.license,
+               linear::self_test_residual(*solver));
+  }
+  return cli::done;
+}
+
+int certify(const std::string& directory) {
+  const auto certificate = output::certify(directory);
+  for (const auto& violation : certificate.violations) fmt::print("{}\n", violation);
+  fmt::print("{} frames: {}\n", certificate.frames, certificate.passed() ? "no intersection, no inversion" : "failed");
+  return certificate.passed() ? cli::done : cli::certificate_failed;
+}
+
+int dispatch(int argc, char** argv) {
+  CLI::App app("In-Timestep Remeshing for contacting elastodynamics");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", ITR_VERSION);
+  cli::RunOptions options;
+  std::vector<std::string> sets;
+  std::string directory;
+  auto* run = app.add_subcommand("run", "simulate a scene");
+  run->add_option("scene", options.scene, "scene file (JSON)")->required();
+  run->add_option("-o,--output", options.directory, "result folder (default: the scene's, or results/<scene>)");
+  run->add_option("--solver", options.solver, "linear solver, see `itr solvers`");
+  run->add_option("--threads", options.threads, "number of threads (0: all)")->check(CLI::NonNegativeNumber);
+  run->add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")->allow_extra_args(false);
+  auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
+  auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
+  check->add_option("directory", directory, "result folder")->required();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    app.exit(error);
+    return cli::bad_input;
+  }
+  if (*solvers) return list_solvers();
+  if (*check) return certify(directory);
+  for (const auto& text : sets) options.overrides.push_back(parse_override(text));
+  return cli::run(options);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("itr"));
+  spdlog::set_pattern("%v");
+  try {
+    return dispatch(argc, argv);
+  } catch (const itr::InputError& error) {
+    fmt::print(stderr, "itr: {}\n", error.what());
+    return itr::cli::bad_input;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "itr: internal error: {}\n", error.what());
+    return itr::cli::simulation_stopped;
+  }
+}

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#include "itr/mesh/validate.hpp"
+
+#include <algorithm>
+
+#include "itr/geometry/bvh.hpp"
+#include "itr/geometry/predicates.hpp"
+
+namespace itr {
+
+namespace {
+
+int cell_orientation(const std::array<int, 3>& c, ConstVectorView x) {
+  return orientation(Vec<2>(x.segment<2>(2 * c[0])), Vec<2>(x.segment<2>(2 * c[1])), Vec<2>(x.segment<2>(2 * c[2])));
+}
+int cell_orientation(const std::array<int, 4>& c, ConstVectorView x) {
+  return orientation(Vec<3>(x.segment<3>(3 * c[0])), Vec<3>(x.segment<3>(3 * c[1])), Vec<3>(x.segment<3>(3 * c[2])),
+                     Vec<3>(x.segment<3>(3 * c[3])));
+}
+
+}  // namespace
+
+std::optional<std::array<int, 2>> find_intersection(ConstVectorView x, std::span<const std::array<int, 2>> edges,
+                                                    std::span<const char> counts) {
+  std::vector<Box<2>> boxes(edges.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    for (const int v : edges[e]) boxes[e].include(Vec<2>(x.segment<2>(2 * v)));
+  const Bvh<2> tree(boxes);
+  std::vector<int> hits;
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    hits.clear();
+    tree.query(boxes[e], hits);
+    std::sort(hits.begin(), hits.end());
+    const auto [a, b] = edges[e];
+    for (const int f : hits) {
+      if (f <= static_cast<int>(e)) continue;
+      const auto [c, d] = edges[f];
+      if (a == c || a == d || b == c || b == d) continue;
+      if (!counts[a] && !counts[b] && !counts[c] && !counts[d]) continue;
+      if (segments_intersect(x.segment<2>(2 * a), x.segment<2>(2 * b), x.segment<2>(2 * c), x.segment<2>(2 * d)))
+        return std::array{static_cast<int>(e), f};
+    }
+  }
+  return std::nullopt;
+}
+
+template <int Dim>
+CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView x) {
+  for (int c = 0; c < mesh.cell_slots(); ++c)
+    if (mesh.is_cell_alive(c) && cell_orientation(mesh.cell(c), x) <= 0) return c;
+  return kNone;
+}
+
+template CellId find_inverted<2>(const Mesh<2>&, ConstVectorView);
+template CellId find_inverted<3>(const Mesh<3>&, ConstVectorView);
+
+}  // namespace itr

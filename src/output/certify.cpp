@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+// The surface is taken from the cells, not from what the frame says it is: a certificate should trust as little as it can.
+// Obstacles are prescribed, so two of them may cross each other; anything else that shares a point without sharing a vertex
+// is a violation.
+#include "itr/output/certify.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "frame_file.hpp"
+#include "itr/core/error.hpp"
+#include "itr/geometry/bvh.hpp"
+#include "itr/geometry/predicates.hpp"
+
+namespace itr::output {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Vertices of bodies, then of obstacles, and the surface simplices on them.
+template <int Dim>
+struct Surface {
+  std::vector<Vec<Dim>> x;
+  int num_body_vertices = 0;
+  std::vector<std::array<int, 2>> edges;
+  std::vector<std::array<int, 3>> triangles;  ///< 3D only
+
+  template <std::size_t N>
+  bool is_obstacle(const std::array<int, N>& simplex) const {
+    return simplex[0] >= num_body_vertices;
+  }
+  std::string name(int v) const {
+    return v < num_body_vertices ? std::to_string(v) : fmt::format("obstacle {}", v - num_body_vertices);
+  }
+  template <std::size_t N>
+  std::string name(const std::array<int, N>& simplex) const {
+    std::string text = "(" + name(simplex[0]);
+    for (std::size_t k = 1; k < N; ++k) text += ", " + name(simplex[k]);
+    return text + ")";
+  }
+};
+
+template <int Dim>
+std::vector<Vec<Dim>> points(const std::vector<double>& x) {
+  std::vector<Vec<Dim>> result(x.size() / Dim);
+  for (std::size_t v = 0; v < result.size(); ++v) result[v] = Eigen::Map<const Vec<Dim>>(x.data() + Dim * v);
+  return result;
+}
+
+/// Facets with one incident cell, vertices sorted (orientation does not matter to an intersection).
+template <int Dim>
+std::vector<std::array<int, Dim>> boundary_facets(const std::vector<std::int64_t>& simplices) {
+  std::vector<std::array<int, Dim>> facets;
+  for (std::size_t c = 0; c < simplices.size(); c += Dim + 1) {
+    for (int skipped = 0; skipped <= Dim; ++skipped) {
+      std::array<int, Dim> facet;
+      for (int k = 0, i = 0; k <= Dim; ++k) {
+        if (k != skipped) facet[i++] = static_cast<int>(simplices[c + k]);
+      }
+      std::sort(facet.begin(), facet.end());
+      facets.push_back(facet);
+    }
+  }
+  std::sort(facets.begin(), facets.end());
+  std::vector<std::array<int, Dim>> once;
+  for (std::size_t i = 0, j = 0; i < facets.size(); i = j) {
+    while (j < facets.size() && facets[j] == facets[i]) ++j;
+    if (j == i + 1) once.push_back(facets[i]);
+  }
+  return once;
+}
+
+void add_facets(const std::vector<std::array<int, 2>>& facets, Surface<2>& surface) { surface.edges = facets; }
+
+void add_facets(const std::vector<std::array<int, 3>>& facets, Surface<3>& surface) {
+  surface.triangles = facets;
+  for (const auto& f : facets) surface.edges.insert(surface.edges.end(), {{f[0], f[1]}, {f[0], f[2]}, {f[1], f[2]}});
+  std::sort(surface.edges.begin(), surface.edges.end());
+  surface.edges.erase(std::unique(surface.edges.begin(), surface.edges.end()), surface.edges.end());
+}
+
+template <int Dim>
+Surface<Dim> make_surface(const StoredFrame& frame) {
+  Surface<Dim> surface;
+  surface.x = points<Dim>(frame.x);
+  const int offset = surface.num_body_vertices = static_cast<int>(surface.x.size());
+  add_facets(boundary_facets<Dim>(frame.simplices), surface);
+  const std::vector<Vec<Dim>> obstacle = points<Dim>(frame.obstacle_x);
+  surface.x.insert(surface.x.end(), obstacle.begin(), obstacle.end());
+  const auto& edges = frame.obstacle_edges;
+  for (std::size_t i = 0; i < edges.size(); i += 2) {
+    surface.edges.push_back({offset + static_cast<int>(edges[i]), offset + static_cast<int>(edges[i + 1])});
+  }
+  const auto& faces = frame.obstacle_faces;
+  for (std::size_t i = 0; i < faces.size(); i += 3) {
+    surface.triangles.push_back({offset + static_cast<int>(faces[i]), offset + static_cast<int>(faces[i + 1]),
+                                 offset + static_cast<int>(faces[i + 2])});
+  }
+  return surface;
+}
+
+int orientation_of(const std::array<Vec<2>, 3>& p) { return orientation(p[0], p[1], p[2]); }
+int orientation_of(const std::array<Vec<3>, 4>& p) { return orientation(p[0], p[1], p[2], p[3]); }
+
+template <int Dim>
+void check_cells(const StoredFrame& frame, const std::string& name, std::vector<std::string>& violations) {
+  const std::vector<Vec<Dim>> x = points<Dim>(frame.x);
+  for (std::size_t c = 0; c < frame.simplices.size() / (Dim + 1); ++c) {
+    std::array<Vec<Dim>, Dim + 1> p;
+    for (int k = 0; k <= Dim; ++k) p[k] = x[frame.simplices[(Dim + 1) * c + k]];
+    const int sign = orientation_of(p);
+    if (sign <= 0) violations.push_back(fmt::format("{}: cell {} is {}", name, c, sign < 0 ? "inverted" : "degenerate"));
+  }
+}
+
+template <int Dim, std::size_t N>
+std::vector<Box<Dim>> boxes_of(const std::vector<Vec<Dim>>& x, const std::vector<std::array<int, N>>& simplices) {
+  std::vector<Box<Dim>> boxes(simplices.size());
+  for (std::size_t i = 0; i < simplices.size(); ++i) {
+    for (const int v : simplices[i]) boxes[i].include(x[v]);
+  }
+  return boxes;
+}
+
+template <std::size_t N, std::size_t M>
+int num_shared(const std::array<int, N>& a, const std::array<int, M>& b) {
+  return static_cast<int>(
+      std::count_if(a.begin(), a.end(), [&](int v) { return std::find(b.begin(), b.end(), v) != b.end(); }));
+}
+
+/// Whether two edges with one common vertex lie on each other: in one line, and to the same side of that vertex. Exact.
+bool is_folded(const Surface<2>& surface, const std::array<int, 2>& a, const std::array<int, 2>& b) {
+  const int common = a[0] == b[0] || a[0] == b[1] ? a[0] : a[1];
+  const Vec<2>& origin = surface.x[common];
+  const Vec<2>& p = surface.x[a[0] == common ? a[1] : a[0]];
+  const Vec<2>& q = surface.x[b[0] == common ? b[1] : b[0]];
+  if (orientation(origin, p, q) != 0) return false;
+  const int axis = p[0] != origin[0] ? 0 : 1;
+  return (p[axis] < origin[axis]) == (q[axis] < origin[axis]);
+}
+
+void check_surface(const Surface<2>& surface, const std::string& name, std::vector<std::string>& violations) {
+  const auto& edges = surface.edges;
+  const std::vector<Box<2>> boxes = boxes_of<2>(surface.x, edges);
+  const Bvh<2> tree(boxes);
+  std::vector<int> hits;
+  for (int i = 0; i < static_cast<int>(edges.size()); ++i) {
+    if (surface.is_obstacle(edges[i])) continue;  // met from the side of the body
+    hits.clear();
+    tree.query(boxes[i], hits);
+    for (const int j : hits) {
+      if (!surface.is_obstacle(edges[j]) && j <= i) continue;
+      const auto &a = edges[i], &b = edges[j];
+      const bool meet = num_shared(a, b) > 0
+                            ? is_folded(surface, a, b)
+                            : segments_intersect(surface.x[a[0]], surface.x[a[1]], surface.x[b[0]], surface.x[b[1]]);
+      if (meet) violations.push_back(fmt::format("{}: edges {} and {} intersect", name, surface.name(a), surface.name(b)));
+    }
+  }
+}
+
+void check_surface(const Surface<3>& surface, const std::string& name, std::vector<std::string>& violations) {
+  const Bvh<3> tree(boxes_of<3>(surface.x, surface.triangles));
+  const std::vector<Box<3>> boxes = boxes_of<3>(surface.x, surface.edges);
+  std::vector<int> hits;
+  for (std::size_t i = 0; i < surface.edges.size(); ++i) {
+    const auto& e = surface.edges[i];
+    hits.clear();
+    tree.query(boxes[i], hits);
+    for (const int j : hits) {
+      const auto& t = surface.triangles[j];
+      if ((surface.is_obstacle(e) && surface.is_obstacle(t)) || num_shared(e, t) > 0) continue;
+      const auto& x = surface.x;
+      if (!segment_intersects_triangle(x[e[0]], x[e[1]], x[t[0]], x[t[1]], x[t[2]])) continue;
+      violations.push_back(fmt::format("{}: edge {} and triangle {} intersect", name, surface.name(e), surface.name(t)));
+    }
+  }
+}
+
+template <int Dim>
+void check_frame(const StoredFrame& frame, const std::string& name, std::vector<std::string>& violations) {
+  // What is not a number compares false with everything, and every predicate after it would pass.
+  const auto is_finite = [](double value) { return std::isfinite(value); };
+  if (!std::all_of(frame.x.begin(), frame.x.end(), is_finite) ||
+      !std::all_of(frame.obstacle_x.begin(), frame.obstacle_x.end(), is_finite)) {
+    violations.push_back(name + ": a position is not finite");
+    return;
+  }
+  check_cells<Dim>(frame, name, violations);
+  check_surface(make_surface<Dim>(frame), name, violations);
+}
+
+std::vector<fs::path> frame_files(const fs::path& directory) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(directory / "frames", error)) {
+    if (entry.path().extension() == ".h5") files.push_back(entry.path());
+  }
+  if (files.empty()) throw InputError({directory.string(), "frames", "no *.h5 there", "a folder that `itr run` wrote"});
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace
+
+Certificate certify(const fs::path& directory) {
+  Certificate certificate;
+  for (const fs::path& file : frame_files(directory)) {
+    const StoredFrame frame = read_frame(file);
+    const std::string name = "frames/" + file.filename().string();
+    if (frame.dim == 2) {
+      check_frame<2>(frame, name, certificate.violations);
+    } else {
+      check_frame<3>(frame, name, certificate.violations);
+    }
+    ++certificate.frames;
+  }
+  return certificate;
+}
+
+}  // namespace itr::output

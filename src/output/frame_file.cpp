@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+#include "frame_file.hpp"
+
+#include <string>
+
+#include "files.hpp"
+#include "itr/core/check.hpp"
+#include "itr/core/error.hpp"
+
+namespace itr::output {
+
+namespace {
+
+using Integers = std::vector<std::int64_t>;
+
+std::span<const double> as_span(ConstVectorView v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
+
+template <int Dim>
+VectorX rest_positions(const Mesh<Dim>& mesh) {
+  VectorX rest(Dim * mesh.vertex_slots());
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) vertex_of<Dim>(rest, v) = mesh.rest(v);
+  return rest;
+}
+
+template <int Dim>
+void write_mesh(hdf5::File& file, const Mesh<Dim>& mesh, ConstVectorView rest) {
+  Integers simplices, body, surface;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    simplices.insert(simplices.end(), mesh.cell(c).begin(), mesh.cell(c).end());
+    body.push_back(mesh.body(c));
+  }
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+    if (mesh.is_facet_alive(f)) surface.insert(surface.end(), mesh.facet(f).begin(), mesh.facet(f).end());
+  }
+  file.write("/mesh/rest", as_span(rest), Dim);
+  file.write("/mesh/simplices", simplices, Dim + 1);
+  file.write("/mesh/body", body, 0);
+  file.write("/mesh/surface", surface, Dim);
+}
+
+template <std::size_t N>
+void write_index_rows(hdf5::File& file, const std::string& name, const std::vector<std::array<int, N>>& rows) {
+  Integers flat;
+  for (const auto& row : rows) flat.insert(flat.end(), row.begin(), row.end());
+  file.write(name, flat, N);
+}
+
+template <int Dim>
+void write_obstacles(hdf5::File& file, const FrameView<Dim>& frame) {
+  std::vector<double> x;
+  for (const Vec<Dim>& p : frame.obstacle_x) x.insert(x.end(), p.data(), p.data() + Dim);
+  file.write("/obstacles/x", x, Dim);
+  write_index_rows(file, "/obstacles/edges", frame.obstacle_edges);
+  write_index_rows(file, "/obstacles/faces", frame.obstacle_triangles);
+}
+
+void require_shape(const std::filesystem::path& path, const std::string& name, int columns, int expected) {
+  if (columns == expected) return;
+  throw InputError({path.string(), name, std::to_string(columns) + " columns", std::to_string(expected) + " columns"});
+}
+
+void require_range(const std::filesystem::path& path, const std::string& name, const Integers& ids, std::size_t n) {
+  for (const std::int64_t id : ids) {
+    if (id >= 0 && id < static_cast<std::int64_t>(n)) continue;
+    throw InputError({path.string(), name, "index " + std::to_string(id), "0 to " + std::to_string(n) + " (exclusive)"});
+  }
+}
+
+Integers read_indices(const std::filesystem::path& path, const hdf5::File& file, const std::string& name, int columns,
+                      std::size_t vertices) {
+  hdf5::Table<std::int64_t> table = file.read_integers(name);
+  require_shape(path, name, table.columns, columns);
+  require_range(path, name, table.values, vertices);
+  return std::move(table.values);
+}
+
+}  // namespace
+
+template <int Dim>
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t) {
+  const Mesh<Dim>& mesh = frame.mesh;
+  ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots() && mesh.num_cells() == mesh.cell_slots(), "mesh is not compact");
+  ITR_CHECK(frame.x.size() == Dim * mesh.num_vertices(), frame.x.size(), mesh.num_vertices());
+  const VectorX rest = rest_positions(mesh);
+  const VectorX u = frame.x - rest;
+
+  const hdf5::Session session;
+  hdf5::File file = hdf5::File::create(temporary_name(path));
+  file.write_attribute("step", static_cast<std::int64_t>(step));
+  file.write_attribute("t", t);
+  write_mesh(file, mesh, rest);
+  file.write("/fields/x", as_span(frame.x), Dim);
+  file.write("/fields/u", as_span(u), Dim);
+  file.write("/fields/v", as_span(frame.v), Dim);
+  file.write("/fields/elastic_density", frame.elastic_density, 0);
+  write_obstacles(file, frame);
+  file.close();
+  publish(path);
+}
+
+StoredFrame read_frame(const std::filesystem::path& path) {
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(path);
+  StoredFrame frame;
+  hdf5::Table<double> x = file.read_doubles("/fields/x");
+  if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
+  frame.dim = x.columns;
+  hdf5::Table<double> obstacle_x = file.read_doubles("/obstacles/x");
+  require_shape(path, "/obstacles/x", obstacle_x.columns, frame.dim);
+  frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
+  frame.obstacle_edges = read_indices(path, file, "/obstacles/edges", 2, obstacle_x.rows());
+  frame.obstacle_faces = read_indices(path, file, "/obstacles/faces", 3, obstacle_x.rows());
+  frame.x = std::move(x.values);
+  frame.obstacle_x = std::move(obstacle_x.values);
+  return frame;
+}
+
+template void write_frame<2>(const std::filesystem::path&, const FrameView<2>&, int, double);
+template void write_frame<3>(const std::filesystem::path&, const FrameView<3>&, int, double);
+
+}  // namespace itr::output

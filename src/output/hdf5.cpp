@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include "hdf5.hpp"
+
+#include <array>
+
+#include "itr/core/error.hpp"
+
+namespace itr::output::hdf5 {
+
+namespace {
+
+std::mutex& library_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+InputError unusable(const std::filesystem::path& path, const std::string& place, const std::string& expected) {
+  return InputError({path.string(), place, "HDF5 could not do it", expected});
+}
+
+}  // namespace
+
+Session::Session() : lock_(library_mutex()) {
+  H5Eget_auto2(H5E_DEFAULT, &print_, &print_data_);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+Session::~Session() { H5Eset_auto2(H5E_DEFAULT, print_, print_data_); }
+
+File File::create(const std::filesystem::path& path) {
+  Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+  if (!file.is_valid()) throw unusable(path, "file", "a place where a file can be written");
+  return File(path, std::move(file));
+}
+
+File File::open(const std::filesystem::path& path) {
+  Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!file.is_valid()) throw unusable(path, "file", "a readable, complete HDF5 file");
+  return File(path, std::move(file));
+}
+
+void File::require(bool ok, const std::string& what) const {
+  if (!ok) throw unusable(path_, what, "to be written or read");
+}
+
+void File::write_raw(const std::string& name, hid_t type, const void* values, std::size_t size, int columns) {
+  const std::array<hsize_t, 2> shape = {columns ? size / columns : size, static_cast<hsize_t>(columns)};
+  const Handle space(H5Screate_simple(columns ? 2 : 1, shape.data(), nullptr), H5Sclose);
+  const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+  H5Pset_create_intermediate_group(links.id(), 1);
+  const Handle set(H5Dcreate2(file_.id(), name.c_str(), type, space.id(), links.id(), H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+  require(set.is_valid(), name);
+  if (size > 0) require(H5Dwrite(set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name);
+}
+
+void File::write(const std::string& name, std::span<const double> values, int columns) {
+  write_raw(name, H5T_NATIVE_DOUBLE, values.data(), values.size(), columns);
+}
+
+void File::write(const std::string& name, std::span<const std::int64_t> values, int columns) {
+  write_raw(name, H5T_NATIVE_INT64, values.data(), values.size(), columns);
+}
+
+void File::write_attribute_raw(const char* name, hid_t type, const void* value) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(H5Acreate2(file_.id(), name, type, space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  require(attribute.is_valid() && H5Awrite(attribute.id(), type, value) >= 0, name);
+}
+
+void File::write_attribute(const char* name, double value) { write_attribute_raw(name, H5T_NATIVE_DOUBLE, &value); }
+
+void File::write_attribute(const char* name, std::int64_t value) { write_attribute_raw(name, H5T_NATIVE_INT64, &value); }
+
+void File::link_file(const std::string& name, const std::string& relative_path) {
+  const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+  H5Pset_create_intermediate_group(links.id(), 1);
+  require(H5Lcreate_external(relative_path.c_str(), "/", file_.id(), name.c_str(), links.id(), H5P_DEFAULT) >= 0, name);
+}
+
+void File::close() {
+  require(H5Fflush(file_.id(), H5F_SCOPE_LOCAL) >= 0, "file");
+  const Handle closing = std::move(file_);
+}
+
+template <typename T>
+Table<T> File::read_raw(const std::string& name, hid_t type) const {
+  const Handle set(H5Dopen2(file_.id(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  require(set.is_valid(), name);
+  const Handle space(H5Dget_space(set.id()), H5Sclose);
+  const int rank = H5Sget_simple_extent_ndims(space.id());
+  require(rank == 1 || rank == 2, name);
+  std::array<hsize_t, 2> shape = {0, 1};
+  H5Sget_simple_extent_dims(space.id(), shape.data(), nullptr);
+  Table<T> table;
+  table.columns = rank == 2 ? static_cast<int>(shape[1]) : 0;
+  table.values.resize(shape[0] * shape[1]);
+  if (!table.values.empty()) {
+    require(H5Dread(set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, table.values.data()) >= 0, name);
+  }
+  return table;
+}
+
+Table<double> File::read_doubles(const std::string& name) const { return read_raw<double>(name, H5T_NATIVE_DOUBLE); }
+
+Table<std::int64_t> File::read_integers(const std::string& name) const {
+  return read_raw<std::int64_t>(name, H5T_NATIVE_INT64);
+}
+
+}  // namespace itr::output::hdf5

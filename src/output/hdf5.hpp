@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// The little of HDF5 that we need, with failures as InputError and handles that close themselves.
+#pragma once
+
+#include <hdf5.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace itr::output::hdf5 {
+
+/// Owns an HDF5 identifier.
+class Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Handle(hid_t id, Close close) : id_(id), close_(close) {}
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
+  Handle& operator=(Handle&&) = delete;
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  hid_t id() const { return id_; }
+  bool is_valid() const { return id_ >= 0; }
+
+ private:
+  hid_t id_;
+  Close close_;
+};
+
+/// While it lives, this thread alone is inside HDF5 (the serial library is not re-entrant, and two simulations of one
+/// process must not meet there) and HDF5 does not print its error stack.
+class Session {
+ public:
+  Session();
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+ private:
+  std::unique_lock<std::mutex> lock_;
+  H5E_auto2_t print_ = nullptr;
+  void* print_data_ = nullptr;
+};
+
+/// A table of rows x columns, row-major; columns = 0 stands for a plain vector.
+template <typename T>
+struct Table {
+  std::vector<T> values;
+  int columns = 0;
+  std::size_t rows() const { return columns ? values.size() / columns : values.size(); }
+};
+
+/// A file that is being written or read. Names of datasets are full paths; groups are made on the way.
+class File {
+ public:
+  static File create(const std::filesystem::path& path);
+  static File open(const std::filesystem::path& path);
+
+  void write(const std::string& name, std::span<const double> values, int columns);
+  void write(const std::string& name, std::span<const std::int64_t> values, int columns);
+  void write_attribute(const char* name, double value);
+  void write_attribute(const char* name, std::int64_t value);
+  /// Link `name` here to the root of another file, by a path relative to this file's folder.
+  void link_file(const std::string& name, const std::string& relative_path);
+  /// Writes everything out and closes; throws where that fails (a full disk shows only here).
+  void close();
+
+  Table<double> read_doubles(const std::string& name) const;
+  Table<std::int64_t> read_integers(const std::string& name) const;
+
+ private:
+  File(std::filesystem::path path, Handle file) : path_(std::move(path)), file_(std::move(file)) {}
+  void require(bool ok, const std::string& what) const;
+  void write_raw(const std::string& name, hid_t type, const void* values, std::size_t size, int columns);
+  void write_attribute_raw(const char* name, hid_t type, const void* value);
+  template <typename T>
+  Table<T> read_raw(const std::string& name, hid_t type) const;
+
+  std::filesystem::path path_;
+  Handle file_;
+};
+
+}  // namespace itr::output::hdf5

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+#include "report_json.hpp"
+
+#include <fmt/format.h>
+#include <hdf5.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace itr::output {
+
+namespace {
+
+std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
+
+std::string json_string(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+std::string energy_json(const EnergyReport& e) {
+  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},"total":{}}})", number(e.inertia),
+                     number(e.elastic), number(e.body), number(e.contact), number(e.friction), number(e.total));
+}
+
+std::string count_json(const OperationCount& count) {
+  return fmt::format(R"({{"tried":{},"accepted":{}}})", count.tried, count.accepted);
+}
+
+std::string seconds_json(const StepSeconds& s) {
+  return fmt::format(
+      R"({{"assembly":{},"linear_solve":{},"line_search":{},"ccd":{},"remesh":{},"projection":{},"output":{},"total":{}}})",
+      number(s.assembly), number(s.linear_solve), number(s.line_search), number(s.ccd), number(s.remesh),
+      number(s.projection), number(s.output), number(s.total));
+}
+
+std::string norms_json(const DisplacementNorms& n) {
+  return fmt::format(R"({{"l2":{},"h1":{},"h1_semi":{},"linf":{},"linf_grad":{},"lp":{}}})", number(n.l2), number(n.h1),
+                     number(n.h1_semi), number(n.linf), number(n.linf_grad), number(n.lp));
+}
+
+std::string versions_json() {
+  unsigned major = 0, minor = 0, release = 0;
+  H5get_libversion(&major, &minor, &release);
+  return fmt::format(R"({{"itr":{},"compiler":{},"eigen":"{}.{}.{}","hdf5":"{}.{}.{}"}})", json_string(ITR_VERSION),
+                     json_string(__VERSION__), EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, major, minor,
+                     release);
+}
+
+/// What a step's line and the summary have in common.
+std::string common_members(const StepReport& r) {
+  return fmt::format(
+      R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"energy":{},"energy_before_remesh":{},)"
+      R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"min_distance":{},"min_volume_ratio":{},"seconds":{},)"
+      R"("peak_rss_mb":{})",
+      r.vertices, r.elements, r.unknowns, r.newton_iterations, energy_json(r.energy), number(r.energy_before_remesh),
+      count_json(r.splits), count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), number(r.min_distance),
+      number(r.min_volume_ratio), seconds_json(r.seconds), number(r.peak_rss_mb));
+}
+
+OperationCount operator+(const OperationCount& a, const OperationCount& b) {
+  return {a.tried + b.tried, a.accepted + b.accepted};
+}
+
+StepSeconds operator+(const StepSeconds& a, const StepSeconds& b) {
+  return {a.assembly + b.assembly, a.linear_solve + b.linear_solve, a.line_search + b.line_search, a.ccd + b.ccd,
+          a.remesh + b.remesh,     a.projection + b.projection,     a.output + b.output,           a.total + b.total};
+}
+
+}  // namespace
+
+std::string step_json(const StepReport& report) {
+  return fmt::format(R"({{"step":{},"t":{},{}}})", report.step, number(report.t), common_members(report));
+}
+
+void Totals::add(const StepReport& report) {
+  const StepReport before = total_;
+  const bool is_first = before.vertices == 0;
+  total_ = report;
+  total_.newton_iterations += before.newton_iterations;
+  total_.splits = before.splits + report.splits;
+  total_.collapses = before.collapses + report.collapses;
+  total_.swaps = before.swaps + report.swaps;
+  total_.smooths = before.smooths + report.smooths;
+  total_.seconds = before.seconds + report.seconds;
+  if (report.step > 0) energy_decrease_ += report.energy_before_remesh - report.energy.total;
+  if (is_first) return;
+  total_.min_distance = std::min(before.min_distance, report.min_distance);
+  total_.min_volume_ratio = std::min(before.min_volume_ratio, report.min_volume_ratio);
+  total_.peak_rss_mb = std::max(before.peak_rss_mb, report.peak_rss_mb);
+}
+
+std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {
+  return fmt::format(R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"t":{},{},)"
+                     R"("energy_decrease_by_remeshing":{},"norms":{}}})"
+                     "\n",
+                     json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(),
+                     total_.step, number(total_.t), common_members(total_), number(energy_decrease_), norms_json(norms));
+}
+
+}  // namespace itr::output

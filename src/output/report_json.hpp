@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// Reports as JSON text with the names that design §5 promises.
+#pragma once
+
+#include <string>
+
+#include "itr/output/writer.hpp"
+
+namespace itr::output {
+
+/// One line of steps.jsonl, without the line end. Numbers read back with the same bits; what JSON cannot say is null.
+std::string step_json(const StepReport& report);
+
+/// Sums over a run; where a sum says nothing (energy, sizes), the last value; of minima, the least.
+class Totals {
+ public:
+  void add(const StepReport& report);
+  /// The text of summary.json.
+  std::string summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const;
+
+ private:
+  StepReport total_;
+  double energy_decrease_ = 0;  ///< sum of energy_before_remesh - total [J]
+};
+
+}  // namespace itr::output

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// The expression language of scene files (scene-format §4.3): tinyexpr's grammar and functions, and PolyFEM's additions.
+// Parsed once into a program for a stack of numbers.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace itr::scene {
+
+/// What is wrong with an expression, and where (`what()` has both in words).
+class ExpressionError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Expression {
+ public:
+  struct Variables {
+    double x = 0, y = 0, z = 0, t = 0;
+  };
+
+  /// `^` is left-associative and binds weaker than unary minus: -2^2 = 4. Throws ExpressionError.
+  explicit Expression(std::string_view text);
+
+  double operator()(const Variables& variables) const;
+  bool is_constant() const { return !uses_space_ && !uses_time_; }
+
+ private:
+  friend class ExpressionParser;
+  enum class Code : unsigned char { number, x, y, z, t, negate, add, subtract, multiply, divide, modulo, power, drop, call };
+  struct Instruction {
+    Code code;
+    unsigned char arity = 0;
+    int function = 0;   ///< index into the table of functions
+    double number = 0;
+  };
+
+  std::vector<Instruction> program_;
+  int depth_ = 0;  ///< most numbers on the stack at a time
+  bool uses_space_ = false, uses_time_ = false;
+};
+
+}  // namespace itr::scene

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+#include "merge.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+namespace itr::scene {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string read_text(const fs::path& file, const std::string& asking_file, const std::string& place) {
+  std::error_code ignored;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || fs::is_directory(file, ignored))
+    throw InputError({asking_file, place, "no readable file '" + file.string() + "'", "a scene file"});
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return std::move(text).str();
+}
+
+Json parse(const std::string& text, const fs::path& file) {
+  try {
+    Json json = Json::parse(text);
+    if (!json.is_object()) throw InputError({file.string(), "/", abbreviate(json), "an object"});
+    return json;
+  } catch (const Json::parse_error& error) {
+    const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(text.size(), error.byte ? error.byte - 1 : 0));
+    const auto line = 1 + std::count(text.begin(), end, '\n');
+    std::string what = error.what();  // "[json.exception.parse_error.101] parse error at line 3, column 5: syntax error ..."
+    if (const auto colon = what.find(": "); colon != std::string::npos) what = what.substr(colon + 2);
+    throw InputError({file.string(), "line " + std::to_string(line), what, "JSON"});
+  }
+}
+
+std::string string_member(const Json& args, const char* key, const fs::path& file) {
+  const auto found = args.find(key);
+  if (found == args.end() || found->is_null()) return "";
+  if (!found->is_string()) throw InputError({file.string(), std::string("/") + key, abbreviate(*found), "a path"});
+  return found->get<std::string>();
+}
+
+void apply_patch(Json& args, const Json& patch, const fs::path& file) {
+  if (!patch.is_array()) throw InputError({file.string(), "/patch", abbreviate(patch), "a list of JSON Patch operations"});
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    try {
+      args = args.patch(Json::array({patch[i]}));
+    } catch (const Json::exception& error) {
+      throw InputError({file.string(), "/patch/" + std::to_string(i), abbreviate(patch[i]) + " (" + error.what() + ")",
+                        "a JSON Patch operation that applies to the merged scene"});
+    }
+  }
+}
+
+/// Merges `args` (of `file`, with root_path set) over what its `common` names; `chain` are the files being merged.
+Json apply_common(Json args, const fs::path& file, std::vector<fs::path> chain) {
+  if (!args.contains("common")) {
+    if (args.contains("patch"))
+      throw InputError({file.string(), "/patch", "a patch without \"common\"", "both or neither: it would not be applied"});
+    return args;
+  }
+  const std::string common = string_member(args, "common", file);
+  args.erase("common");
+  if (common.empty()) return args;
+
+  const fs::path base_file = resolve_path(common, string_member(args, "root_path", file), file);
+  const fs::path identity = fs::weakly_canonical(base_file);
+  if (std::find(chain.begin(), chain.end(), identity) != chain.end())
+    throw InputError({file.string(), "/common", "'" + common + "', which is being merged already", "no cycle of common files"});
+  chain.push_back(identity);
+
+  Json base = parse(read_text(base_file, file.string(), "/common"), base_file);
+  const std::string base_root = string_member(base, "root_path", base_file);
+  base["root_path"] = base_root.empty() ? base_file.string() : resolve_path(base_root, base_file, base_file).string();
+  Json merged = apply_common(std::move(base), base_file, std::move(chain));
+
+  const Json explicit_root = merged["root_path"];
+  const Json patch = args.value("patch", Json::array());
+  args.erase("patch");
+  merged.merge_patch(args);
+  if (!base_root.empty()) merged["root_path"] = explicit_root;
+  apply_patch(merged, patch, file);
+  return merged;
+}
+
+[[noreturn]] void refuse_override(const Override& override, const std::string& found, const std::string& expected) {
+  throw InputError({"", "--set " + override.pointer + "=" + override.value, found, expected});
+}
+
+/// The member or element that a token names, made if it is not there.
+Json& descend(Json& parent, const std::string& token, const Override& override) {
+  if (parent.is_null()) parent = Json::object();
+  if (parent.is_object()) return parent[token];
+  if (!parent.is_array()) refuse_override(override, abbreviate(parent) + " above '" + token + "'", "an object or a list there");
+  if (token == "-") return parent.emplace_back();
+  const bool is_index = !token.empty() && token.size() < 9 && token.find_first_not_of("0123456789") == std::string::npos;
+  const std::size_t index = is_index ? std::stoul(token) : parent.size() + 1;
+  if (index > parent.size())
+    refuse_override(override, "index '" + token + "'", "0 to " + std::to_string(parent.size()) + ", or -");
+  return index == parent.size() ? parent.emplace_back() : parent[index];
+}
+
+void apply_override(Json& args, const Override& override) {
+  Json value;
+  try {
+    value = Json::parse(override.value);
+  } catch (const Json::parse_error&) {
+    refuse_override(override, "'" + override.value + "'", "JSON (a string needs its quotes: '\"text\"')");
+  }
+  Json* place = &args;
+  try {
+    Json::json_pointer pointer(override.pointer);
+    if (pointer.empty()) refuse_override(override, "an empty pointer", "a pointer to a key, such as /time/dt");
+    std::vector<std::string> tokens;
+    for (; !pointer.empty(); pointer.pop_back()) tokens.insert(tokens.begin(), pointer.back());
+    for (const auto& token : tokens) place = &descend(*place, token, override);
+  } catch (const Json::exception&) {
+    refuse_override(override, "'" + override.pointer + "'", "a JSON pointer, such as /time/dt");
+  }
+  *place = std::move(value);
+}
+
+/// A null is as good as absent in every place of the format.
+void remove_null_members(Json& json) {
+  if (json.is_object())
+    for (auto member = json.begin(); member != json.end();) member = member->is_null() ? json.erase(member) : std::next(member);
+  if (json.is_structured())
+    for (auto& child : json) remove_null_members(child);
+}
+
+}  // namespace
+
+Document load_document(const fs::path& file, const std::vector<Override>& overrides) {
+  Json args = parse(read_text(file, file.string(), ""), file);
+  if (string_member(args, "root_path", file).empty()) args["root_path"] = file.string();
+  args = apply_common(std::move(args), file, {fs::weakly_canonical(file)});
+  for (const Override& override : overrides) apply_override(args, override);
+
+  Document document{file, string_member(args, "root_path", file), std::move(args)};
+  document.json.erase("root_path");
+  remove_null_members(document.json);
+  return document;
+}
+
+}  // namespace itr::scene

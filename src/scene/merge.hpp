@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+// From a scene file to one document: `common` and `patch` (scene-format §1.2), root path, command-line overrides.
+#pragma once
+
+#include "itr/scene/scene.hpp"
+#include "node.hpp"
+
+namespace itr::scene {
+
+/// Throws InputError: unreadable file, wrong JSON (with the line), a cycle of `common`, a patch that does not apply, an
+/// override that is no JSON. The result has no `common`, `patch`, `root_path` and no null members.
+Document load_document(const std::filesystem::path& file, const std::vector<Override>& overrides);
+
+}  // namespace itr::scene

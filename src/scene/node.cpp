@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+#include "node.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace itr::scene {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string quoted_list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "\"" : ", \"") + name + "\"";
+  return text;
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+fs::path resolve_path(const fs::path& path, const fs::path& root, const fs::path& scene_file) {
+  if (path.empty() || path.is_absolute()) return path;
+  std::error_code ignored;
+  if (fs::exists(path, ignored)) return path;
+  // A root_path that names a folder of somebody else's computer: the scene's own folder is what was meant.
+  const fs::path& base = fs::exists(root, ignored) ? root : scene_file;
+  const fs::path folder = fs::is_directory(base, ignored) ? base : base.parent_path();
+  return (folder / path).lexically_normal();
+}
+
+fs::path Document::resolve(const std::string& path) const { return resolve_path(path, root, file); }
+
+std::string escape_token(std::string_view token) {
+  std::string escaped;
+  for (const char c : token) {
+    if (c == '~') escaped += "~0";
+    else if (c == '/') escaped += "~1";
+    else escaped += c;
+  }
+  return escaped;
+}
+
+std::string abbreviate(const Json& json) {
+  constexpr std::size_t kLongest = 80;
+  // Invalid UTF-8 cannot come from a parsed file, but may come from an embedding program.
+  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
+  return text;
+}
+
+std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
+  std::string nearest;
+  std::size_t least = std::max<std::size_t>(2, name.size() / 2) + 1;
+  for (const auto& candidate : candidates) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = candidate;
+  }
+  return nearest;
+}
+
+Node Node::operator[](std::string_view key) const {
+  const Json* member = nullptr;
+  if (json_ && json_->is_object()) {
+    const auto found = json_->find(std::string(key));
+    if (found != json_->end() && !found->is_null()) member = &*found;
+  }
+  return Node(*document_, member, pointer_ + "/" + escape_token(key));
+}
+
+Node Node::at(std::size_t index) const { return Node(*document_, &json_->at(index), pointer_ + "/" + std::to_string(index)); }
+
+std::vector<Node> Node::items() const {
+  std::vector<Node> nodes;
+  if (!json_) return nodes;
+  if (!json_->is_array()) return {*this};
+  for (std::size_t i = 0; i < json_->size(); ++i) nodes.push_back(at(i));
+  return nodes;
+}
+
+double Node::number(double fallback) const {
+  if (!json_) return fallback;
+  if (!json_->is_number() || !std::isfinite(json_->get<double>())) fail("a number");
+  return json_->get<double>();
+}
+
+int Node::integer(int fallback) const {
+  if (!json_) return fallback;
+  const double value = json_->is_number() ? json_->get<double>() : 0.5;
+  if (value != std::floor(value) || std::abs(value) > std::numeric_limits<int>::max()) fail("an integer");
+  return static_cast<int>(value);
+}
+
+bool Node::boolean(bool fallback) const {
+  if (!json_) return fallback;
+  if (!json_->is_boolean()) fail("true or false");
+  return json_->get<bool>();
+}
+
+std::string Node::string(std::string fallback) const {
+  if (!json_) return fallback;
+  if (!json_->is_string()) fail("a string");
+  return json_->get<std::string>();
+}
+
+std::vector<double> Node::numbers() const {
+  std::vector<double> values;
+  if (!json_) return values;
+  if (!json_->is_array()) fail("a list of numbers");
+  for (const Node& item : items()) values.push_back(item.number(0));
+  return values;
+}
+
+int Node::choice(const std::vector<std::string>& names, int fallback) const {
+  if (!json_) return fallback;
+  const std::string name = json_->is_string() ? json_->get<std::string>() : "";
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (!json_->is_string() || found == names.end()) fail("one of " + quoted_list(names));
+  return static_cast<int>(found - names.begin());
+}
+
+double Node::positive(double fallback) const {
+  const double value = number(fallback);
+  if (!(value > 0)) fail("a number > 0");
+  return value;
+}
+
+double Node::non_negative(double fallback) const {
+  const double value = number(fallback);
+  if (!(value >= 0)) fail("a number >= 0");
+  return value;
+}
+
+int Node::integer_at_least(int least, int fallback) const {
+  const int value = integer(fallback);
+  if (value < least) fail("an integer >= " + std::to_string(least));
+  return value;
+}
+
+void Node::fail(const std::string& expected) const { fail(json_ ? abbreviate(*json_) : "nothing", expected); }
+
+void Node::fail(const std::string& found, const std::string& expected) const {
+  throw InputError({document_->file.string(), pointer_.empty() ? "/" : pointer_, found, expected});
+}
+
+}  // namespace itr::scene

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// A place in a scene document: the JSON value there (or nothing), and the pointer that an error names.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "itr/core/error.hpp"
+
+namespace itr::scene {
+
+using Json = nlohmann::json;
+
+/// A scene after merging: what all pointers point into.
+struct Document {
+  std::filesystem::path file;  ///< the outermost scene file
+  std::filesystem::path root;  ///< effective root_path
+  Json json;
+
+  /// scene-format §1.3: absolute, else relative to the working directory if it exists there, else relative to `root`.
+  std::filesystem::path resolve(const std::string& path) const;
+};
+
+std::filesystem::path resolve_path(const std::filesystem::path& path, const std::filesystem::path& root,
+                                   const std::filesystem::path& scene_file);
+
+/// One reference token of a JSON pointer, escaped.
+std::string escape_token(std::string_view token);
+/// The JSON text of a value, cut to one short line.
+std::string abbreviate(const Json& json);
+/// The candidate with the least edit distance; empty if none is close enough to be meant.
+std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
+
+class Node {
+ public:
+  explicit Node(const Document& document) : Node(document, &document.json, "") {}
+
+  bool exists() const { return json_ != nullptr; }
+  const Json& json() const { return *json_; }
+  const std::string& pointer() const { return pointer_; }
+  const Document& document() const { return *document_; }
+
+  /// The member, absent if there is none or this is no object.
+  Node operator[](std::string_view key) const;
+  bool has(std::string_view key) const { return (*this)[key].exists(); }
+  /// The element; this must be a list that is long enough.
+  Node at(std::size_t index) const;
+  /// The elements of a list; a single value that stands where a list is expected is a list of one; absent: none.
+  std::vector<Node> items() const;
+
+  /// Values with a default for absent ones. InputError if the type is another.
+  double number(double fallback) const;
+  int integer(int fallback) const;
+  bool boolean(bool fallback) const;
+  std::string string(std::string fallback) const;
+  std::vector<double> numbers() const;
+  /// Index into `names`; `fallback` if absent.
+  int choice(const std::vector<std::string>& names, int fallback) const;
+
+  double positive(double fallback) const;      ///< > 0
+  double non_negative(double fallback) const;  ///< >= 0
+  int integer_at_least(int least, int fallback) const;
+
+  [[noreturn]] void fail(const std::string& expected) const;
+  [[noreturn]] void fail(const std::string& found, const std::string& expected) const;
+
+ private:
+  Node(const Document& document, const Json* json, std::string pointer)
+      : document_(&document), json_(json), pointer_(std::move(pointer)) {}
+
+  const Document* document_;
+  const Json* json_;
+  std::string pointer_;
+};
+
+}  // namespace itr::scene

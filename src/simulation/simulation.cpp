@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+#include "itr/simulation/simulation.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "itr/core/error.hpp"
+#include "itr/core/timer.hpp"
+#include "itr/mesh/validate.hpp"
+#include "itr/simulation/step.hpp"
+
+namespace itr {
+
+namespace {
+
+template <int Dim>
+std::string describe(const Vec<Dim>& p) {
+  std::string text = "(";
+  for (int c = 0; c < Dim; ++c) text += (c ? ", " : "") + std::to_string(p[c]);
+  return text + ")";
+}
+
+template <int Dim>
+void refuse_unsupported(const Setup<Dim>& setup) {
+  const auto refuse = [](const char* place, const char* found) {
+    throw InputError({"", place, found, "something that this version supports"});
+  };
+  if (setup.contact.enabled && setup.contact.adaptive_stiffness)
+    refuse("/solver/contact/barrier_stiffness", "adaptive stiffness, which is not supported yet (give a number)");
+  if (setup.remesh.enabled && setup.remesh.sizing_field)
+    refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
+  if constexpr (Dim == 3) {
+    if (setup.contact.enabled) refuse("/contact/enabled", "contact in 3D, which is not supported yet");
+    if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing in 3D, which is not supported yet");
+  }
+}
+
+template <int Dim>
+void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
+  if constexpr (Dim == 2) {
+    if (!setup.contact.enabled) return;
+    const CollisionSurface surface = collision_surface(state.mesh, setup.obstacles);
+    const VectorX& x = state.history.x[0];
+    const auto pair = find_intersection(x, surface.edges, surface.counts);
+    if (!pair) return;
+    const auto edge = [&](int e) {
+      const auto [a, b] = surface.edges[e];
+      return describe<2>(x.segment<2>(2 * a)) + "-" + describe<2>(x.segment<2>(2 * b));
+    };
+    throw InputError({"", "initial state", "surfaces that intersect: edges " + edge((*pair)[0]) + " and " + edge((*pair)[1]),
+                      "surfaces that do not touch"});
+  }
+}
+
+/// Value of the first condition that names the body of one of the vertex's cells; the last cell's body wins.
+template <int Dim>
+VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<Dim>& mesh, int obstacle_vertices) {
+  VectorX field = VectorX::Zero(Dim * (mesh.vertex_slots() + obstacle_vertices));
+  if (conditions.empty()) return field;
+  for (int c = 0; c < mesh.cell_slots(); ++c)
+    for (const auto& condition : conditions) {
+      if (condition.body != mesh.body(c)) continue;
+      for (const int v : mesh.cell(c)) field.segment<Dim>(Dim * v) = condition.value(mesh.rest(v), 0);
+      break;
+    }
+  return field;
+}
+
+template <int Dim>
+State<Dim> initial_state(const Setup<Dim>& setup) {
+  State<Dim> state;
+  state.mesh = setup.mesh;
+  state.mesh.compact();
+  state.t = setup.time.t0;
+  const int obstacles = static_cast<int>(setup.obstacles.rest.size()), bodies = state.mesh.vertex_slots();
+  VectorX x = sample(setup.initial_displacement, state.mesh, obstacles);
+  for (int v = 0; v < bodies; ++v) x.segment<Dim>(Dim * v) += state.mesh.rest(v);
+  x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);
+  state.history.x = {std::move(x)};
+  state.history.v = {sample(setup.initial_velocity, state.mesh, obstacles)};
+  if (setup.time.integrator == Integrator::newmark) state.history.a = {sample(setup.initial_acceleration, state.mesh, obstacles)};
+  return state;
+}
+
+/// Makes a0 solve M a0 = f - grad Psi at the start (held dofs keep theirs).
+template <int Dim>
+void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, linear::Solver& solver) {
+  const CellSet<Dim> cells = whole_mesh(state.mesh, setup.obstacles.rest);
+  const DofMap dofs = DofMap::from_held(held_dofs(setup, state.mesh, state.t).held);
+  VectorX& a = state.history.a[0];
+  EnergySum sum;
+  const VectorX zero = VectorX::Zero(a.size());
+  sum.add(std::make_shared<InertiaEnergy<Dim>>(cells, setup.materials,
+                                               setup.lump_mass ? MassKind::lumped : MassKind::consistent, zero));
+  VectorX force = VectorX::Zero(a.size());
+  Workspace workspace;
+  ElasticEnergy<Dim>(cells, setup.materials, 1).add_gradient(state.history.x[0], force, workspace);
+  if (const auto loads = loads_at(setup, state.t); !loads.empty())
+    force -= LoadEnergy<Dim>(cells, setup.materials, loads, 1).forces();
+  std::vector<int> stencils;
+  for (const auto& element : cells.elements) stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
+  SparseSystem system(solver, dofs, Dim, stencils, Dim + 1);
+  VectorX coupling, rhs(dofs.num_unknowns), solution;
+  system.assemble(sum, zero, PsdProjection::none, dofs, VectorX(), coupling, workspace);
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) rhs[dofs.unknown[i]] = -force[i];
+  if (system.factorize(0) != linear::Outcome::ok || system.solve(rhs, solution).outcome != linear::Outcome::ok) return;
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) a[i] = solution[dofs.unknown[i]];
+}
+
+std::unique_ptr<linear::Solver> create_solver(const LinearOptions& options, linear::Registry& registry) {
+  const auto rows = registry.list();
+  for (const auto& asked : options.solvers) {
+    const std::string name = linear::Registry::canonical_name(asked);
+    const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return r.name == name && r.available; });
+    if (row != rows.end()) return registry.create(name);
+  }
+  // Names of other programs' solvers that we have no equal of fall back to the default; a wrong name is an error.
+  for (const auto& asked : options.solvers)
+    if (asked.find("Eigen::") != 0 && !asked.empty()) return registry.create(asked);
+  return registry.create("eigen");
+}
+
+}  // namespace
+
+template <int Dim>
+struct Simulation<Dim>::Impl {
+  Setup<Dim> setup;
+  Logger logger;
+  std::unique_ptr<linear::Solver> solver;
+  State<Dim> state;
+  double shortest_edge = 0;  ///< of the initial mesh [m]
+};
+
+template <int Dim>
+Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger) : impl_(std::make_unique<Impl>()) {
+  refuse_unsupported(setup);
+  impl_->setup = std::move(setup);
+  impl_->logger = std::move(logger);
+  impl_->solver = create_solver(impl_->setup.linear, registry);
+  impl_->state = initial_state(impl_->setup);
+  refuse_intersections(impl_->setup, impl_->state);
+  if (impl_->setup.consistent_initial_acceleration && !impl_->state.history.a.empty())
+    set_consistent_acceleration(impl_->setup, impl_->state, *impl_->solver);
+  impl_->shortest_edge = std::numeric_limits<double>::infinity();
+  const auto& mesh = impl_->state.mesh;
+  for (const auto& [a, b] : mesh.edges()) impl_->shortest_edge = std::min(impl_->shortest_edge, (mesh.rest(a) - mesh.rest(b)).norm());
+}
+
+template <int Dim>
+Simulation<Dim>::~Simulation() = default;
+template <int Dim>
+Simulation<Dim>::Simulation(Simulation&&) noexcept = default;
+
+template <int Dim>
+StepReport Simulation<Dim>::initial_report() const {
+  StepReport report;
+  const State<Dim>& state = impl_->state;
+  report.step = state.step;
+  report.t = state.t;
+  report.vertices = state.mesh.num_vertices();
+  report.elements = state.mesh.num_cells();
+  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->solver);
+  report.unknowns = problem.dofs().num_unknowns;
+  report.energy = problem.report(state.history.x[0]);
+  report.energy_before_remesh = report.energy.total;
+  report.min_distance = problem.min_distance(state.history.x[0]);
+  report.min_volume_ratio = min_volume_ratio(problem.cells(), state.history.x[0]);
+  report.peak_rss_mb = peak_rss_mb();
+  return report;
+}
+
+template <int Dim>
+StepResult Simulation<Dim>::advance() {
+  return take_step(impl_->setup, impl_->shortest_edge, *impl_->solver, impl_->logger, impl_->state);
+}
+
+template <int Dim>
+bool Simulation<Dim>::finished() const {
+  return impl_->state.step >= impl_->setup.time.steps;
+}
+
+template <int Dim>
+const State<Dim>& Simulation<Dim>::state() const {
+  return impl_->state;
+}
+
+template <int Dim>
+const Setup<Dim>& Simulation<Dim>::setup() const {
+  return impl_->setup;
+}
+
+template <int Dim>
+std::string Simulation<Dim>::solver_name() const {
+  return std::string(impl_->solver->name());
+}
+
+template <int Dim>
+typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
+  const State<Dim>& state = impl_->state;
+  const int bodies = state.mesh.vertex_slots();
+  FrameData data;
+  data.x = state.history.x[0].head(Dim * bodies);
+  data.v = state.history.v[0].head(Dim * bodies);
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
+  for (const auto& element : cells.elements) {
+    const Material& material = impl_->setup.materials.at(element.body);
+    data.elastic_density.push_back(neo_hookean_density<Dim>(deformation_gradient<Dim>(element, data.x),
+                                                            {material.lame_mu(), material.lame_lambda(Dim)}));
+  }
+  const VectorX& all = state.history.x[0];
+  for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
+  return data;
+}
+
+template class Simulation<2>;
+template class Simulation<3>;
+
+}  // namespace itr

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+// One time step: solve -> remesh -> project the history -> solve again (paper Algorithm 1).
+#include "itr/simulation/step.hpp"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "itr/core/check.hpp"
+#include "itr/core/timer.hpp"
+#include "itr/mesh/validate.hpp"
+#include "itr/remesh/remesher.hpp"
+#include "itr/simulation/history_transfer.hpp"
+
+namespace itr {
+
+double peak_rss_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+namespace {
+
+void add_seconds(const NewtonSummary& summary, StepSeconds& seconds) {
+  seconds.assembly += summary.assembly_seconds;
+  seconds.linear_solve += summary.linear_seconds;
+  seconds.line_search += summary.line_search_seconds;
+  seconds.ccd += summary.ccd_seconds;
+}
+
+/// The bodies' part of a field over bodies and obstacles.
+VectorX head_of(const VectorX& field, int dofs) { return field.head(dofs); }
+
+std::vector<Vec<2>> as_points(const VectorX& field, int first) {
+  std::vector<Vec<2>> points;
+  for (Eigen::Index i = 2 * first; i < field.size(); i += 2) points.emplace_back(field.segment<2>(i));
+  return points;
+}
+
+StepContext<2> make_context(const Setup<2>& setup, const State<2>& state, const StepProblem<2>& problem, const VectorX& x,
+                            double t, double shortest_edge) {
+  const TimeIntegrator integrator(setup.time);
+  StepContext<2> context;
+  context.materials = setup.materials;
+  context.loads = loads_at(setup, t);
+  context.has_inertia = !setup.time.quasistatic && !setup.time.is_static;
+  context.mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
+  context.scaling = problem.scaling();
+  context.contact = setup.contact;
+  context.velocity_rate = integrator.velocity_rate(state.history);
+  for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
+  context.newton = setup.newton;
+  context.shortest_edge = shortest_edge;
+  const int bodies = state.mesh.vertex_slots();
+  auto& obstacles = context.obstacles;
+  obstacles.rest = setup.obstacles.rest;
+  obstacles.edges = setup.obstacles.edges;
+  obstacles.x = as_points(x, bodies);
+  obstacles.velocity_reference = as_points(integrator.velocity_reference(state.history), bodies);
+  for (const auto& past : state.history.x) obstacles.past_x.push_back(as_points(past, bodies));
+  if (setup.contact.enabled) {
+    obstacles.area.assign(problem.surface().area.begin() + bodies, problem.surface().area.end());
+    obstacles.degree.assign(problem.surface().degree.begin() + bodies, problem.surface().degree.end());
+  }
+  return context;
+}
+
+RemeshFields<2> make_fields(const Setup<2>& setup, const State<2>& state, const VectorX& x) {
+  const int dofs = 2 * state.mesh.vertex_slots();
+  const TimeIntegrator integrator(setup.time);
+  RemeshFields<2> fields;
+  fields.x = head_of(x, dofs);
+  if (!setup.time.quasistatic && !setup.time.is_static) fields.predictor = head_of(integrator.predictor(state.history), dofs);
+  if (setup.contact.enabled) fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
+  for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
+  for (const auto& past : state.history.v) fields.past_rates.push_back(head_of(past, dofs));
+  for (const auto& past : state.history.a) fields.past_rates.push_back(head_of(past, dofs));
+  return fields;
+}
+
+/// Remeshes state.mesh and carries state.history and x over to the new mesh.
+RemeshReport remesh_and_project(const Setup<2>& setup, double shortest_edge, const StepProblem<2>& problem, double t,
+                                State<2>& state, VectorX& x, StepSeconds& seconds, linear::Solver& solver,
+                                const Logger& logger) {
+  const StepContext<2> context = make_context(setup, state, problem, x, t, shortest_edge);
+  RemeshFields<2> fields = make_fields(setup, state, x);
+  const Mesh<2> before = state.mesh;
+  RemeshReport report;
+  {
+    const ScopedTimer timer(seconds.remesh);
+    report = remesh(state.mesh, fields, context, setup.remesh);
+  }
+  if (!report.changed()) return report;
+  const ScopedTimer timer(seconds.projection);
+  TouchedCells touched;
+  for (int c = 0; c < before.cell_slots(); ++c)
+    if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
+  const int first_new = before.cell_slots();
+  const auto renumbering = state.mesh.compact();
+  for (int c = first_new; c < static_cast<int>(renumbering.cell.size()); ++c)
+    if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
+  const auto obstacle_dofs = 2 * static_cast<Eigen::Index>(setup.obstacles.rest.size());
+  const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
+    VectorX field(2 * state.mesh.vertex_slots() + obstacle_dofs);
+    for (std::size_t v = 0; v < renumbering.vertex.size(); ++v)
+      if (renumbering.vertex[v] != kNone) field.segment<2>(2 * renumbering.vertex[v]) = slots.segment<2>(2 * static_cast<int>(v));
+    field.tail(obstacle_dofs) = with_obstacles.tail(obstacle_dofs);
+    return field;
+  };
+  const History old_history = state.history;
+  x = carried(fields.x, x);
+  for (std::size_t i = 0; i < state.history.x.size(); ++i)
+    state.history.x[i] = carried(fields.past_positions[i], old_history.x[i]);
+  std::size_t next = 0;
+  for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
+  for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
+  if (report.coarsened())  // refinement alone: interpolation is exact
+    transfer_history(setup, before, old_history, state.mesh, touched, problem.scaling(), solver, logger, state.history);
+  return report;
+}
+
+/// The invariants: exact, on every configuration that the state holds.
+template <int Dim>
+std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
+  if (find_inverted<Dim>(mesh, x) != kNone) return "an inverted cell";
+  if constexpr (Dim == 2) {
+    if (setup.contact.enabled) {
+      const CollisionSurface surface = collision_surface(mesh, setup.obstacles);
+      if (find_intersection(x, surface.edges, surface.counts)) return "an intersection";
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+template <int Dim>
+StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solver& solver, const Logger& logger,
+                     State<Dim>& state) {
+  StepResult result;
+  StepReport& report = result.report;
+  const double start = seconds_now();
+  State<Dim> next = state;
+  next.step = state.step + 1;
+  next.t = setup.time.t0 + next.step * setup.time.dt;
+  const double t = setup.time.is_static ? 1 : next.t;
+  report.step = next.step;
+  report.t = next.t;
+  const auto fail = [&](const NewtonSummary& summary) {
+    result.ok = false;
+    result.reason = std::string(to_string(summary.termination)) + ": " + summary.message;
+    report.seconds.total = seconds_now() - start;
+    return result;
+  };
+
+  VectorX x = next.history.x[0];
+  auto problem = std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+  NewtonSummary summary = problem->solve(x, next.history.x[0]);
+  add_seconds(summary, report.seconds);
+  report.newton_iterations = summary.iterations;
+  if (!summary.converged()) return fail(summary);
+  report.energy_before_remesh = problem->report(x).total;
+
+  if constexpr (Dim == 2) {
+    if (setup.remesh.enabled) {
+      const RemeshReport remeshed =
+          remesh_and_project(setup, shortest_edge, *problem, t, next, x, report.seconds, solver, logger);
+      report.splits = {remeshed.splits.tried, remeshed.splits.accepted};
+      report.collapses = {remeshed.collapses.tried, remeshed.collapses.accepted};
+      report.swaps = {remeshed.swaps.tried, remeshed.swaps.accepted};
+      report.smooths = {remeshed.smooths.tried, remeshed.smooths.accepted};
+      if (remeshed.changed()) {
+        problem = std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+        const VectorX lagged = x;
+        summary = problem->solve(x, lagged);
+        add_seconds(summary, report.seconds);
+        report.newton_iterations += summary.iterations;
+        if (!summary.converged()) return fail(summary);
+      }
+    }
+  }
+
+  ITR_AUDIT(find_violation(setup, next.mesh, x).empty(), find_violation(setup, next.mesh, x));
+  report.energy = problem->report(x);
+  report.vertices = next.mesh.num_vertices();
+  report.elements = next.mesh.num_cells();
+  report.unknowns = problem->dofs().num_unknowns;
+  report.min_distance = problem->min_distance(x);
+  report.min_volume_ratio = min_volume_ratio(problem->cells(), x);
+  TimeIntegrator(setup.time).push(std::move(x), next.history);
+  state = std::move(next);
+  report.peak_rss_mb = peak_rss_mb();
+  report.seconds.total = seconds_now() - start;
+  return result;
+}
+
+template StepResult take_step<2>(const Setup<2>&, double, linear::Solver&, const Logger&, State<2>&);
+template StepResult take_step<3>(const Setup<3>&, double, linear::Solver&, const Logger&, State<3>&);
+
+}  // namespace itr

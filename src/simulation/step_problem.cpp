@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+#include "itr/simulation/step_problem.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace itr {
+
+template <int Dim>
+Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
+  Loads<Dim> loads;
+  if (setup.body_acceleration)
+    loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) { return f(X, t); };
+  for (const auto& condition : setup.neumann)
+    loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const Vec<Dim>& X) { return f(X, t); });
+  return loads;
+}
+
+template <int Dim>
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
+  const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.rest.size());
+  CollisionSurface surface;
+  surface.area.assign(total, 0);
+  surface.degree.assign(total, 0);
+  surface.counts.assign(total, 0);
+  std::vector<char> used(total, 0);
+  const auto rest = [&](int v) { return v < bodies ? mesh.rest(v) : obstacles.rest[v - bodies]; };
+  const auto add_edge = [&](int a, int b) {
+    surface.edges.push_back({std::min(a, b), std::max(a, b)});
+    const double length = (rest(b) - rest(a)).norm();
+    for (const int v : {a, b}) {
+      surface.area[v] += length / 2;
+      ++surface.degree[v];
+      used[v] = 1;
+    }
+  };
+  for (int f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.is_facet_alive(f))
+      for (int k = 0; k < Dim; ++k)
+        if (Dim == 3 || k == 0) add_edge(mesh.facet(f)[k], mesh.facet(f)[(k + 1) % Dim]);
+  for (int v = 0; v < bodies; ++v) surface.counts[v] = used[v];
+  for (const auto& [a, b] : obstacles.edges) add_edge(bodies + a, bodies + b);
+  for (int v = bodies; v < total; ++v)
+    if (!used[v]) {
+      used[v] = 1;
+      surface.area[v] = 1;
+    }
+  for (int v = 0; v < total; ++v)
+    if (used[v]) surface.vertices.push_back(v);
+  std::sort(surface.edges.begin(), surface.edges.end());
+  surface.edges.erase(std::unique(surface.edges.begin(), surface.edges.end()), surface.edges.end());
+  return surface;
+}
+
+template <int Dim>
+HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t) {
+  const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(setup.obstacles.rest.size());
+  HeldDofs<Dim> result{std::vector<char>(Dim * total, 0), VectorX::Zero(Dim * total)};
+  std::vector<const DirichletCondition<Dim>*> by_tag;
+  for (const auto& condition : setup.dirichlet)
+    if (std::none_of(by_tag.begin(), by_tag.end(), [&](const auto* c) { return c->tag == condition.tag; }))
+      by_tag.push_back(&condition);
+  std::sort(by_tag.begin(), by_tag.end(), [](const auto* a, const auto* b) { return a->tag < b->tag; });
+  for (const auto* condition : by_tag)
+    for (int f = 0; f < mesh.facet_slots(); ++f) {
+      if (!mesh.is_facet_alive(f) || mesh.facet_tag(f) != condition->tag) continue;
+      for (const int v : mesh.facet(f)) {
+        const Vec<Dim> target = mesh.rest(v) + condition->displacement(mesh.rest(v), t);
+        for (int c = 0; c < Dim; ++c) {
+          if (!condition->components[c]) continue;
+          result.held[Dim * v + c] = 1;
+          result.target[Dim * v + c] = target[c];
+        }
+      }
+    }
+  for (int o = 0; o < total - bodies; ++o) {
+    const Vec<Dim>& X = setup.obstacles.rest[o];
+    const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
+    result.target.template segment<Dim>(Dim * (bodies + o)) =
+        motion == kNone ? X : Vec<Dim>(X + setup.obstacles.motions[motion](X, t));
+    for (int c = 0; c < Dim; ++c) result.held[Dim * (bodies + o) + c] = 1;
+  }
+  return result;
+}
+
+template <int Dim>
+StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
+                              linear::Solver& solver)
+    : setup_(setup),
+      cells_(whole_mesh(mesh, setup.obstacles.rest)),
+      held_(held_dofs(setup, mesh, t)),
+      dofs_(DofMap::from_held(held_.held)) {
+  const TimeIntegrator integrator(setup.time);
+  scaling_ = integrator.scaling(history);
+  if (!setup.time.quasistatic && !setup.time.is_static)
+    inertia_ = std::make_shared<InertiaEnergy<Dim>>(
+        cells_, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent, integrator.predictor(history));
+  elastic_ = std::make_shared<ElasticEnergy<Dim>>(cells_, setup.materials, scaling_);
+  if (const auto loads = loads_at(setup, t); !loads.empty())
+    loads_ = std::make_shared<LoadEnergy<Dim>>(cells_, setup.materials, loads, scaling_);
+  if (setup.contact.enabled) {
+    surface_ = collision_surface(mesh, setup.obstacles);
+    contact_ = std::make_shared<ContactEnergy<Dim>>(surface_, setup.contact, setup.contact.barrier_stiffness, scaling_);
+    velocity_ = {integrator.velocity_rate(history), integrator.velocity_reference(history)};
+  }
+  std::vector<int> stencils;
+  stencils.reserve(cells_.elements.size() * (Dim + 1));
+  for (const auto& element : cells_.elements) stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
+  system_ = std::make_unique<SparseSystem>(solver, dofs_, Dim, stencils, Dim + 1);
+}
+
+template <int Dim>
+EnergySum StepProblem<Dim>::energy(const VectorX& lagged_x) {
+  EnergySum sum;
+  if (inertia_) sum.add(inertia_);
+  sum.add(elastic_);
+  if (loads_) sum.add(loads_);
+  if (contact_) sum.add(contact_);
+  friction_.reset();
+  if (contact_ && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0) {
+    friction_ = std::make_shared<FrictionEnergy<Dim>>(*contact_, lagged_x, workspace_, setup_.contact, velocity_, scaling_);
+    if (!friction_->empty()) sum.add(friction_);
+  }
+  return sum;
+}
+
+template <int Dim>
+NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
+  NewtonSummary summary = minimize(energy(lagged_x), x, dofs_, held_.target, *system_, setup_.newton, workspace_);
+  const bool lagging = contact_ && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
+  if (!lagging) return summary;
+  const int rounds = setup_.contact.friction_iterations;
+  const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
+  VectorX previous = lagged_x;
+  for (int round = 1; summary.converged(); ++round) {
+    const EnergySum relagged = energy(x);
+    VectorX gradient = VectorX::Zero(x.size());
+    relagged.add_gradient(x, gradient, workspace_);
+    double norm = 0;
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
+    if (std::sqrt(norm) <= tolerance) break;
+    if ((x - previous).template lpNorm<Eigen::Infinity>() <= 1e-12) break;
+    if (rounds >= 0 && round >= std::max(1, rounds)) break;
+    previous = x;
+    NewtonSummary next = minimize(relagged, x, dofs_, held_.target, *system_, setup_.newton, workspace_);
+    next.add_effort(summary);
+    summary = next;
+  }
+  return summary;
+}
+
+template <int Dim>
+EnergyReport StepProblem<Dim>::report(const VectorX& x) {
+  EnergyReport report;
+  const auto value = [&](const auto& term) { return term ? term->value(x, workspace_) / scaling_ : 0.0; };
+  report.inertia = value(inertia_);
+  report.elastic = value(elastic_);
+  report.body = value(loads_);
+  report.contact = value(contact_);
+  report.friction = value(friction_);
+  report.total = report.inertia + report.elastic + report.body + report.contact + report.friction;
+  return report;
+}
+
+template <int Dim>
+double StepProblem<Dim>::min_distance(const VectorX& x) {
+  return contact_ ? contact_->min_distance(x, workspace_) : std::numeric_limits<double>::infinity();
+}
+
+template <int Dim>
+double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& element : cells.elements) least = std::min(least, deformation_gradient<Dim>(element, x).determinant());
+  return least;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                        \
+  template class StepProblem<Dim>;                                                                  \
+  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                                     \
+  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&);        \
+  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double);               \
+  template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Compares the includes between modules with the module table, and the walls around third-party libraries.
+
+usage: include_graph_test.py SOURCE_DIR
+"""
+
+import pathlib
+import re
+import sys
+
+# Module -> modules it may include. Dependencies point downward only: each row uses rows above it.
+MAY_USE = {
+    "core": "",
+    "geometry": "core",
+    "linear": "core",
+    "mesh": "core geometry",
+    "fem": "core geometry linear mesh",
+    "time": "core",
+    "energy": "core geometry linear mesh fem",
+    "newton": "core linear energy",
+    "projection": "core geometry linear mesh fem energy newton",
+    "remesh": "core geometry linear mesh fem energy newton projection",
+    "simulation": "core geometry linear mesh fem time energy newton projection remesh",
+    "output": "core geometry mesh fem simulation",
+    "scene": "core mesh",
+}
+
+# What describes a simulation as plain values: open to `scene`, and all that simulation/setup.hpp is made of.
+OPTIONS = {
+    "energy/contact/options.hpp",
+    "energy/material.hpp",
+    "newton/options.hpp",
+    "output/options.hpp",
+    "remesh/options.hpp",
+    "time/options.hpp",
+}
+EXTRA = {"scene": OPTIONS | {"simulation/setup.hpp"}}
+SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp"}
+
+# Third-party header -> the modules that may know it.
+WALLS = {
+    r"nlohmann/": {"scene", "cli"},
+    r"CGAL/": {"geometry"},
+    r"(oneapi/)?tbb/": {"core"},
+    r"hdf5\.h|H5": {"output"},
+    r"CLI/|spdlog/": {"cli"},
+}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*(<|")([^>"]+)[>"]', re.MULTILINE)
+
+
+def module_files(root):
+    """(module, file) of every source of the library and the command."""
+    for folder in (root / "include" / "itr", root / "src"):
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in (".hpp", ".cpp"):
+                yield path.relative_to(folder).parts[0], path
+
+
+def resolve(root, path, kind, name):
+    """The included header relative to include/itr or src, or None for a third-party one."""
+    if name.startswith("itr/"):
+        return name[len("itr/"):]
+    if kind == '"':
+        for base in (path.parent, root / "src"):
+            target = (base / name).resolve()
+            if target.is_file() and target.is_relative_to(root / "src"):
+                return str(target.relative_to(root / "src"))
+    return None
+
+
+def is_allowed(module, path, header):
+    target = header.split("/")[0]
+    if path.name == "setup.hpp" and module == "simulation":
+        return header in SETUP
+    return target == module or target in MAY_USE[module].split() or header in EXTRA.get(module, ())
+
+
+def find_violations(root):
+    for module, path in module_files(root):
+        if module != "cli" and module not in MAY_USE:
+            if len(path.relative_to(root).parts) > 2 and path.parent.name != "itr":
+                yield f"{path.relative_to(root)}: module `{module}` is not in the table"
+            continue
+        for kind, name in INCLUDE.findall(path.read_text()):
+            header = resolve(root, path, kind, name)
+            if header and module != "cli" and not is_allowed(module, path, header):
+                yield f"{path.relative_to(root)}: `{module}` may not include itr/{header}"
+            for wall, owners in WALLS.items():
+                if header is None and re.match(wall, name) and module not in owners:
+                    yield f"{path.relative_to(root)}: <{name}> belongs behind {', '.join(sorted(owners))}"
+
+
+def check_table():
+    """The table itself has no cycle: rows use earlier rows only."""
+    seen = set()
+    for module, uses in MAY_USE.items():
+        assert set(uses.split()) <= seen, f"table: `{module}` uses a later module"
+        seen.add(module)
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]).resolve()
+    check_table()
+    violations = list(find_violations(root))
+    print("\n".join(violations) or "the include graph is as the module table says")
+    return 1 if violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

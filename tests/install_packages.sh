@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Installs the Debian 12 packages that the build, the tests and the examples need. Asks apt for what is missing only, so a
+# machine that has all of them needs neither root nor a network.
+set -euo pipefail
+
+packages=(
+  g++ cmake ninja-build ccache
+  libeigen3-dev libtbb-dev libhdf5-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
+  libcgal-dev libgmp-dev libmpfr-dev
+  libsuitesparse-dev libopenblas-dev
+  libgtest-dev librapidcheck-dev libbenchmark-dev
+  python3 python3-h5py python3-matplotlib python3-numpy python3-pil
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" = installed ] || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "missing packages, and neither root nor sudo to install them: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+echo "installing: ${missing[*]}"
+"${as_root[@]}" apt-get update -q
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"

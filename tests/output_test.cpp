@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: MIT
+// What `itr run` leaves in a folder (design §5), and that a certificate finds what is wrong in it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "itr/core/error.hpp"
+#include "itr/output/certify.hpp"
+#include "itr/output/writer.hpp"
+#include "output/hdf5.hpp"
+
+namespace itr::output {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// Two unit squares one above the other, a gap between them, and a line obstacle below: all that a frame refers to.
+struct Plane {
+  Mesh<2> mesh = Mesh<2>({{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 2}, {1, 2}, {1, 3}, {0, 3}},
+                         {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}}, {1, 1, 2, 2});
+  VectorX x, v;
+  std::vector<double> density = {1, 2, 3, 4};
+  std::vector<Vec<2>> obstacle_x = {{-1, -0.5}, {2, -0.5}};
+  std::vector<std::array<int, 2>> obstacle_edges = {{0, 1}};
+  std::vector<std::array<int, 3>> obstacle_triangles;
+
+  Plane() {
+    x.resize(16);
+    for (int i = 0; i < 8; ++i) vertex_of<2>(x, i) = mesh.rest(i);
+    v = VectorX::LinSpaced(16, 0, 1);
+  }
+  FrameView<2> view() const { return {mesh, x, v, density, obstacle_x, obstacle_edges, obstacle_triangles}; }
+};
+
+struct Solid {
+  Mesh<3> mesh = Mesh<3>({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2, 3}}, {1});
+  VectorX x, v = VectorX::Zero(12);
+  std::vector<double> density = {0};
+  std::vector<Vec<3>> obstacle_x = {{-9, -9, -1}, {9, -9, -1}, {0, 9, -1}};
+  std::vector<std::array<int, 2>> obstacle_edges = {{0, 1}, {1, 2}, {0, 2}};
+  std::vector<std::array<int, 3>> obstacle_triangles = {{0, 1, 2}};
+
+  Solid() {
+    x.resize(12);
+    for (int i = 0; i < 4; ++i) vertex_of<3>(x, i) = mesh.rest(i);
+  }
+  FrameView<3> view() const { return {mesh, x, v, density, obstacle_x, obstacle_edges, obstacle_triangles}; }
+};
+
+StepReport report_of(int step) {
+  StepReport report;
+  report.step = step;
+  report.t = 0.1 * step;
+  report.vertices = 8;
+  report.elements = 4;
+  report.unknowns = 16;
+  report.newton_iterations = 3;
+  report.splits = {10, 2};
+  report.energy.total = 1.0 / 3;
+  report.energy_before_remesh = 4.0 / 3;
+  report.min_distance = 0.5 / (step + 1);
+  report.seconds.total = 0.25;
+  return report;
+}
+
+std::string text_of(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+std::vector<std::string> keys_of(const Json& object) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.push_back(key);
+  return keys;
+}
+
+int count_of(const std::string& text, const std::string& what) {
+  int count = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
+  return count;
+}
+
+class OutputTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    folder = fs::path(testing::TempDir()) / ("itr_output_" + std::string(test->name()));
+    fs::remove_all(folder);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  Writer make_writer(int skip_frames = 1) { return Writer(folder, {skip_frames}, {"a \"scene\".json", "eigen:ldlt", 1}); }
+
+  template <typename Scene>
+  std::vector<std::string> violations_of(const Scene& scene) {
+    Writer writer = make_writer();
+    writer.write(scene.view(), report_of(0));
+    writer.finish("finished");
+    return certify(folder).violations;
+  }
+
+  fs::path folder;
+};
+
+TEST_F(OutputTest, FrameHoldsTheStateWithTheAgreedNames) {
+  Plane plane;
+  plane.x[0] = -0.1;
+  make_writer().write(plane.view(), report_of(7));
+
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(folder / "frames/000007.h5");
+  const auto x = file.read_doubles("/fields/x");
+  EXPECT_EQ(x.columns, 2);
+  EXPECT_EQ(x.values, std::vector<double>(plane.x.begin(), plane.x.end()));
+  EXPECT_EQ(file.read_doubles("/fields/u").values[0], -0.1);
+  EXPECT_EQ(file.read_doubles("/fields/v").values, std::vector<double>(plane.v.begin(), plane.v.end()));
+  EXPECT_EQ(file.read_doubles("/fields/elastic_density").values, plane.density);
+  EXPECT_EQ(file.read_doubles("/mesh/rest").values[0], 0);
+  EXPECT_EQ(file.read_integers("/mesh/simplices").columns, 3);
+  EXPECT_EQ(file.read_integers("/mesh/simplices").rows(), 4u);
+  EXPECT_EQ(file.read_integers("/mesh/body").values, (std::vector<std::int64_t>{1, 1, 2, 2}));
+  EXPECT_EQ(file.read_integers("/mesh/surface").rows(), 8u);
+  EXPECT_EQ(file.read_doubles("/obstacles/x").values, (std::vector<double>{-1, -0.5, 2, -0.5}));
+  EXPECT_EQ(file.read_integers("/obstacles/edges").values, (std::vector<std::int64_t>{0, 1}));
+  EXPECT_EQ(file.read_integers("/obstacles/faces").columns, 3);
+  EXPECT_EQ(file.read_integers("/obstacles/faces").rows(), 0u);
+}
+
+TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
+  StepReport report = report_of(1);
+  report.min_distance = std::numeric_limits<double>::infinity();
+  make_writer().write(Plane().view(), report);
+
+  const Json line = Json::parse(text_of(folder / "steps.jsonl"));
+  EXPECT_EQ(keys_of(line),
+            (std::vector<std::string>{"step", "t", "vertices", "elements", "unknowns", "newton_iterations", "energy",
+                                      "energy_before_remesh", "splits", "collapses", "swaps", "smooths", "min_distance",
+                                      "min_volume_ratio", "seconds", "peak_rss_mb"}));
+  EXPECT_EQ(keys_of(line["energy"]),
+            (std::vector<std::string>{"inertia", "elastic", "body", "contact", "friction", "total"}));
+  EXPECT_EQ(keys_of(line["seconds"]), (std::vector<std::string>{"assembly", "linear_solve", "line_search", "ccd", "remesh",
+                                                                "projection", "output", "total"}));
+  EXPECT_EQ(keys_of(line["splits"]), (std::vector<std::string>{"tried", "accepted"}));
+  EXPECT_TRUE(line["min_distance"].is_null());
+  EXPECT_EQ(line["energy"]["total"].get<double>(), 1.0 / 3);  // the same bits
+}
+
+TEST_F(OutputTest, EachLineIsThereAsSoonAsItsStep) {
+  Writer writer = make_writer();
+  for (int step = 0; step < 5; ++step) {
+    writer.write(Plane().view(), report_of(step));
+    const std::string text = text_of(folder / "steps.jsonl");
+    EXPECT_EQ(count_of(text, "\n"), step + 1);
+    EXPECT_EQ(text.back(), '\n');
+  }
+}
+
+TEST_F(OutputTest, SummaryHasTotalsAndNorms) {
+  Writer writer = make_writer();
+  for (int step = 0; step <= 3; ++step) writer.write(Plane().view(), report_of(step));
+  writer.finish("finished");
+
+  const Json summary = Json::parse(text_of(folder / "summary.json"));
+  EXPECT_EQ(summary["scene"], "a \"scene\".json");
+  EXPECT_EQ(summary["outcome"], "finished");
+  EXPECT_EQ(summary["backend"], "eigen:ldlt");
+  EXPECT_EQ(summary["threads"], 1);
+  EXPECT_EQ(summary["steps"], 3);
+  EXPECT_EQ(summary["newton_iterations"], 12);
+  EXPECT_EQ(summary["splits"]["tried"], 40);
+  EXPECT_EQ(summary["seconds"]["total"], 1.0);
+  EXPECT_EQ(summary["min_distance"], 0.125);
+  EXPECT_DOUBLE_EQ(summary["energy_decrease_by_remeshing"].get<double>(), 3);
+  EXPECT_EQ(keys_of(summary["norms"]), (std::vector<std::string>{"l2", "h1", "h1_semi", "linf", "linf_grad", "lp"}));
+  EXPECT_TRUE(summary["versions"].contains("hdf5"));
+}
+
+TEST_F(OutputTest, StoresEveryNthStepOnly) {
+  Writer writer = make_writer(3);
+  for (int step = 0; step < 7; ++step) writer.write(Plane().view(), report_of(step));
+  EXPECT_TRUE(fs::exists(folder / "frames/000000.h5"));
+  EXPECT_FALSE(fs::exists(folder / "frames/000001.h5"));
+  EXPECT_TRUE(fs::exists(folder / "frames/000006.h5"));
+  EXPECT_EQ(count_of(text_of(folder / "steps.jsonl"), "\n"), 7);
+}
+
+TEST_F(OutputTest, SeriesIsReadableAtAnyMomentAndCompleteAtTheEnd) {
+  constexpr int kSteps = 60;
+  Writer writer = make_writer();
+  for (int step = 0; step < kSteps; ++step) {
+    writer.write(Plane().view(), report_of(step));
+    const std::string xdmf = text_of(folder / "sim.xdmf");
+    EXPECT_EQ(count_of(xdmf, "</Xdmf>"), 1);
+    EXPECT_GE(count_of(xdmf, "<Time "), step * 15 / 16);
+  }
+  writer.finish("finished");
+  EXPECT_EQ(count_of(text_of(folder / "sim.xdmf"), "<Time "), kSteps);
+
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(folder / "sim.h5");
+  for (const char* frame : {"/frames/000000", "/frames/000059"}) {
+    EXPECT_EQ(file.read_doubles(std::string(frame) + "/fields/x").rows(), 8u);
+  }
+}
+
+TEST_F(OutputTest, LeavesNoTemporaryFilesAndNoFramesOfAnEarlierRun) {
+  {
+    Writer earlier = make_writer();
+    for (int step = 0; step < 4; ++step) earlier.write(Plane().view(), report_of(step));
+    earlier.finish("finished");
+  }
+  std::ofstream(folder / "frames/notes.txt") << "mine";
+  Writer writer = make_writer();
+  writer.write(Plane().view(), report_of(0));
+  EXPECT_FALSE(fs::exists(folder / "frames/000003.h5"));
+  EXPECT_FALSE(fs::exists(folder / "summary.json"));
+  EXPECT_TRUE(fs::exists(folder / "frames/notes.txt"));
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) EXPECT_NE(entry.path().extension(), ".tmp");
+}
+
+TEST_F(OutputTest, FolderThatCannotBeWrittenIsAnInputError) {
+  fs::create_directories(folder.parent_path());
+  std::ofstream(folder) << "a file stands here";
+  EXPECT_THROW(make_writer(), InputError);
+}
+
+TEST(DisplacementNorms, AreThoseOfAffineMaps) {
+  const Plane plane;  // area 2
+  VectorX x = plane.x;
+  Mat<2> gradient;
+  gradient << 0.1, 0.2, -0.3, 0.4;
+  for (int i = 0; i < 8; ++i) vertex_of<2>(x, i) += gradient * plane.mesh.rest(i);
+  const DisplacementNorms linear = displacement_norms(plane.mesh, x);
+  EXPECT_NEAR(linear.h1_semi, gradient.norm() * std::sqrt(2.0), 1e-14);
+  EXPECT_NEAR(linear.linf_grad, gradient.norm(), 1e-14);
+  EXPECT_NEAR(linear.h1, std::hypot(linear.l2, linear.h1_semi), 1e-14);
+
+  x = plane.x;
+  for (int i = 0; i < 8; ++i) x[2 * i + 1] -= 0.00613125;
+  const DisplacementNorms constant = displacement_norms(plane.mesh, x);
+  EXPECT_NEAR(constant.l2, 0.00613125 * std::sqrt(2.0), 1e-15);
+  EXPECT_NEAR(constant.linf, 0.00613125, 1e-15);
+  EXPECT_NEAR(constant.lp, 0.00613125 * std::pow(2.0, 0.125), 1e-15);
+  EXPECT_NEAR(constant.h1_semi, 0, 1e-15);
+}
+
+TEST_F(OutputTest, CertifiesAValidPlaneFrame) { EXPECT_TRUE(violations_of(Plane()).empty()); }
+
+TEST_F(OutputTest, CertifiesAValidSolidFrame) { EXPECT_TRUE(violations_of(Solid()).empty()); }
+
+TEST_F(OutputTest, FindsInvertedAndDegenerateCells) {
+  Plane plane;
+  plane.x[2 * 3] = 1.5;  // vertex 3 moves across the diagonal 0-2 of its cell
+  const auto inverted = violations_of(plane);
+  ASSERT_FALSE(inverted.empty());
+  EXPECT_EQ(inverted[0], "frames/000000.h5: cell 1 is inverted");
+
+  plane.x[2 * 3] = plane.x[2 * 3 + 1] = 0.25;  // onto it
+  const auto degenerate = violations_of(plane);
+  ASSERT_FALSE(degenerate.empty());
+  EXPECT_EQ(degenerate[0], "frames/000000.h5: cell 1 is degenerate");
+}
+
+TEST_F(OutputTest, FindsBodiesThatTouch) {
+  Plane plane;
+  for (int i = 4; i < 8; ++i) plane.x[2 * i + 1] = plane.mesh.rest(i)[1] - 1;
+  for (int i = 4; i < 6; ++i) plane.x[2 * i + 1] = std::nextafter(1.0, 2.0);
+  EXPECT_TRUE(violations_of(plane).empty()) << "a gap of one unit in the last place";
+  for (int i = 4; i < 6; ++i) plane.x[2 * i + 1] = 1;
+  EXPECT_FALSE(violations_of(plane).empty());
+}
+
+TEST_F(OutputTest, FindsABodyInAnObstacleButLetsObstaclesCross) {
+  Plane plane;
+  plane.obstacle_x.insert(plane.obstacle_x.end(), {{0, -1}, {0, -0.25}});
+  plane.obstacle_edges.push_back({2, 3});
+  EXPECT_TRUE(violations_of(plane).empty());
+  plane.obstacle_x[3] = {0.5, 0.25};
+  const auto violations = violations_of(plane);
+  ASSERT_EQ(violations.size(), 1u);
+  EXPECT_EQ(violations[0], "frames/000000.h5: edges (0, 1) and (obstacle 2, obstacle 3) intersect");
+}
+
+TEST_F(OutputTest, FindsAnEdgeFoldedOntoItsNeighbour) {
+  Plane plane;  // two triangles with one common vertex, an edge of one on an edge of the other
+  plane.mesh = Mesh<2>({{0, 0}, {2, 0}, {1, 1}, {0.5, -1}, {1, 0}}, {{0, 1, 2}, {0, 3, 4}}, {1, 1});
+  plane.x.resize(10);
+  plane.v = VectorX::Zero(10);
+  plane.density = {0, 0};
+  for (int i = 0; i < 5; ++i) vertex_of<2>(plane.x, i) = plane.mesh.rest(i);
+  plane.obstacle_x = {};
+  plane.obstacle_edges = {};
+  const auto violations = violations_of(plane);
+  ASSERT_FALSE(violations.empty());
+  EXPECT_EQ(violations[0], "frames/000000.h5: edges (0, 1) and (0, 4) intersect");
+  plane.x[9] = -0.1;
+  EXPECT_TRUE(violations_of(plane).empty());
+}
+
+TEST_F(OutputTest, FindsASolidThatPiercesAnObstacle) {
+  Solid solid;
+  for (int i = 0; i < 4; ++i) solid.x[3 * i + 2] -= 1.5;
+  EXPECT_EQ(violations_of(solid).size(), 3u);  // the three edges at the apex
+}
+
+TEST_F(OutputTest, FindsPositionsThatAreNotNumbers) {
+  Plane plane;
+  plane.x[5] = std::nan("");
+  EXPECT_EQ(violations_of(plane).size(), 1u);
+}
+
+TEST_F(OutputTest, CertifyRefusesWhatItCannotRead) {
+  EXPECT_THROW(certify(folder), InputError);
+  EXPECT_TRUE(violations_of(Plane()).empty());
+  fs::resize_file(folder / "frames/000000.h5", 1000);
+  EXPECT_THROW(certify(folder), InputError);
+}
+
+}  // namespace
+}  // namespace itr::output

@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Sets up, builds and runs all tests but the ones labelled `long`. Needs Debian 12 and nothing else.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+export DEBIAN_FRONTEND=noninteractive
+
+bash tests/install_packages.sh
+
+if command -v clang-format >/dev/null; then
+  find include src backends tests -name '*.[ch]pp' -print0 | xargs -0 clang-format --dry-run -Werror
+fi
+
+cmake --preset release
+cmake --build --preset release -- -j "${ITR_JOBS:-2}"
+ctest --test-dir build/release --output-on-failure --no-tests=error -LE long
