@@ -104,11 +104,15 @@ void HessianSink::add(std::span<const int> vertices, const double* block) {
     const int column = unknown[j];
     for (int i = 0; i < n; ++i) {
       const int row = unknown[i];
-      if (row == kNone) continue;
       const double value = block[n * j + i];
       if (column == kNone) {
-        if (coupling_) (*coupling_)[row] += value * step_[dof[j]];
-      } else if (row >= column) {
+        if (!motion_) continue;
+        const double product = value * motion_->step[dof[j]];
+        if (row == kNone)
+          motion_->curvature += motion_->step[dof[i]] * product;
+        else
+          motion_->coupling[row] += product;
+      } else if (row >= column) {  // kNone is below every unknown
         if (dense_)
           (*dense_)(row, column) += value;
         else

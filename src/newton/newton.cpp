@@ -101,14 +101,14 @@ class Minimizer {
   void compute_remaining() {
     moving_ = false;
     relaxing_ = std::exchange(relax_next_, false);
-    remaining_.resize(0);
+    motion_.step.resize(0);
     if (target_.size() == 0) return;
     VectorX remaining = VectorX::Zero(x_.size());
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] == kNone) remaining[i] = target_[i] - x_[i];
     remaining_l1_ = remaining.lpNorm<1>();
     moving_ = remaining_l1_ > 0;
-    if (moving_ && !relaxing_) remaining_ = std::move(remaining);
+    if (moving_ && !relaxing_) motion_.step = std::move(remaining);
   }
 
   bool compute_direction() {
@@ -129,8 +129,7 @@ class Minimizer {
   bool try_direction(PsdProjection psd, double shift) {
     {
       const ScopedTimer timer(summary_.assembly_seconds);
-      coupling_ = VectorX::Zero(dofs_.num_unknowns);
-      system_.assemble(energy_, x_, psd, dofs_, remaining_, coupling_, workspace_);
+      system_.assemble(energy_, x_, psd, dofs_, motion_, workspace_);
     }
     return factor_and_solve(shift);
   }
@@ -139,12 +138,13 @@ class Minimizer {
   bool factor_and_solve(double shift) {
     const ScopedTimer timer(summary_.linear_seconds);
     if (dofs_.num_unknowns == 0) {
-      step_ = remaining_.size() > 0 ? remaining_ : VectorX::Zero(x_.size());
+      step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
       summary_.step_norm = 0;
+      model_curvature_ = motion_.curvature;
       return true;
     }
     if (system_.factorize(shift) != linear::Outcome::ok) return false;
-    VectorX rhs = -coupling_, solution;
+    VectorX rhs = -motion_.coupling, solution;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
     const auto report = system_.solve(rhs, solution);
@@ -152,7 +152,9 @@ class Minimizer {
       return false;
     summary_.linear_residual = std::max(summary_.linear_residual, report.relative_residual);
     if (solution.dot(rhs) < 0) return false;  // not the minimiser of a convex model
-    step_ = remaining_.size() > 0 ? remaining_ : VectorX::Zero(x_.size());
+    step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
+    // step^T H step over all dofs, with H_ff step_f = rhs.
+    model_curvature_ = solution.dot(rhs) + 2 * solution.dot(motion_.coupling) + motion_.curvature;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = solution[dofs_.unknown[i]];
     summary_.step_norm = solution.norm();
@@ -173,10 +175,11 @@ class Minimizer {
       const ScopedTimer timer(summary_.ccd_seconds);
       step = energy_.max_step(x_, step_, workspace_);
     }
-    const bool advancing = remaining_.size() > 0;
+    const bool advancing = motion_.step.size() > 0;
     if (advancing && step < kRelaxBelow) relax_next_ = true;
     const double slope = gradient_.dot(step_);
-    if (advancing) penalty_ = std::max(penalty_, 2 * std::max(0.0, slope) / remaining_l1_);
+    // Large enough for the step to lower the merit function of the quadratic model by half of what the penalty gives up.
+    if (advancing) penalty_ = std::max(penalty_, 2 * std::max(0.0, slope + 0.5 * std::max(0.0, model_curvature_)) / remaining_l1_);
     const double merit_slope = advancing ? slope - penalty_ * remaining_l1_ : slope;
     const int limit = options_.line_search == LineSearch::backtracking ? 30 : 40;
     for (int i = 0; i < limit && step > 1e-14; ++i, step /= 2) {
@@ -219,8 +222,9 @@ class Minimizer {
 
   NewtonSummary summary_;
   double value_ = 0;
-  VectorX gradient_, step_, candidate_, coupling_;
-  VectorX remaining_;        ///< step asked of the held dofs in this iteration; empty: none
+  VectorX gradient_, step_, candidate_;
+  PrescribedMotion motion_;  ///< asked of the held dofs in this iteration
+  double model_curvature_ = 0;
   double remaining_l1_ = 0;
   double penalty_ = 0;
   bool moving_ = false;      ///< held dofs are not yet at their targets

@@ -6,21 +6,12 @@
 
 namespace itr {
 
-namespace {
-
-void assemble_into(HessianSink& sink, const Energy& energy, ConstVectorView x, PsdProjection psd,
-                   const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) {
-  if (prescribed_step.size() > 0) sink.set_prescribed_step(prescribed_step, coupling);
-  energy.add_hessian(x, psd, sink, workspace);
-}
-
-}  // namespace
-
 void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
-                           const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) {
+                           PrescribedMotion& motion, Workspace& workspace) {
   hessian_.setZero(dofs.num_unknowns, dofs.num_unknowns);
   HessianSink sink(dofs, hessian_);
-  assemble_into(sink, energy, x, psd, prescribed_step, coupling, workspace);
+  sink.set_motion(motion);
+  energy.add_hessian(x, psd, sink, workspace);
 }
 
 linear::Outcome DenseSystem::factorize(double shift) {
@@ -46,10 +37,11 @@ SparseSystem::SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, 
 }
 
 void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
-                            const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) {
+                            PrescribedMotion& motion, Workspace& workspace) {
   assembler_.begin();
   HessianSink sink(dofs, assembler_);
-  assemble_into(sink, energy, x, psd, prescribed_step, coupling, workspace);
+  sink.set_motion(motion);
+  energy.add_hessian(x, psd, sink, workspace);
   if (assembler_.finish()) pattern_changed_ = true;
 }
 

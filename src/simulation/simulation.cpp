@@ -100,8 +100,9 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, lin
   std::vector<int> stencils;
   for (const auto& element : cells.elements) stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
   SparseSystem system(solver, dofs, Dim, stencils, Dim + 1);
-  VectorX coupling, rhs(dofs.num_unknowns), solution;
-  system.assemble(sum, zero, PsdProjection::none, dofs, VectorX(), coupling, workspace);
+  PrescribedMotion motion;
+  VectorX rhs(dofs.num_unknowns), solution;
+  system.assemble(sum, zero, PsdProjection::none, dofs, motion, workspace);
   for (Eigen::Index i = 0; i < a.size(); ++i)
     if (dofs.unknown[i] != kNone) rhs[dofs.unknown[i]] = -force[i];
   if (system.factorize(0) != linear::Outcome::ok || system.solve(rhs, solution).outcome != linear::Outcome::ok) return;

@@ -165,6 +165,8 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
 
   if constexpr (Dim == 2) {
     if (setup.remesh.enabled) {
+      const State<Dim> unchanged = next;
+      const VectorX solution = x;
       const RemeshReport remeshed =
           remesh_and_project(setup, shortest_edge, *problem, t, next, x, report.seconds, solver, logger);
       report.splits = {remeshed.splits.tried, remeshed.splits.accepted};
@@ -177,7 +179,13 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
         summary = problem->solve(x, lagged);
         add_seconds(summary, report.seconds);
         report.newton_iterations += summary.iterations;
-        if (!summary.converged()) return fail(summary);
+        if (!summary.converged()) {
+          logger.warning("step " + std::to_string(next.step) + ": the remeshed step did not converge (" + summary.message +
+                         "), keeping the mesh as it was");
+          next = unchanged;
+          x = solution;
+          problem = std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+        }
       }
     }
   }

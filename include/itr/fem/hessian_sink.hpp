@@ -45,15 +45,23 @@ class SparseAssembler {
   bool changed_ = false;
 };
 
+/// A step that held dofs are made to take, and what it does to the Newton system of the unknowns.
+struct PrescribedMotion {
+  VectorX step;          ///< full length, zero at unknowns; empty: held dofs stay
+  VectorX coupling;      ///< out, by unknown: H_fD * step_D
+  double curvature = 0;  ///< out: step_D^T H_DD step_D
+};
+
 class HessianSink {
  public:
   HessianSink(const DofMap& dofs, MatrixX& dense) : dofs_(dofs), dense_(&dense) {}
   HessianSink(const DofMap& dofs, SparseAssembler& sparse) : dofs_(dofs), sparse_(&sparse) {}
 
-  /// With a step prescribed for held dofs, `coupling` (length: unknowns) receives H_fD * step_D.
-  void set_prescribed_step(ConstVectorView step, VectorX& coupling) {
-    step_ = step.data();
-    coupling_ = &coupling;
+  /// Collects `motion.coupling` and `motion.curvature` along with the blocks.
+  void set_motion(PrescribedMotion& motion) {
+    motion.coupling.setZero(dofs_.num_unknowns);
+    motion.curvature = 0;
+    if (motion.step.size() > 0) motion_ = &motion;
   }
   /// Adds the symmetric `block` (column-major, Dim * vertices.size() squared) of a stencil.
   template <int Dim>
@@ -63,8 +71,7 @@ class HessianSink {
   const DofMap& dofs_;
   MatrixX* dense_ = nullptr;
   SparseAssembler* sparse_ = nullptr;
-  const double* step_ = nullptr;
-  VectorX* coupling_ = nullptr;
+  PrescribedMotion* motion_ = nullptr;
 };
 
 }  // namespace itr

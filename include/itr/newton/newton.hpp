@@ -16,9 +16,9 @@ namespace itr {
 class NewtonSystem {
  public:
   virtual ~NewtonSystem() = default;
-  /// Assembles the Hessian over the unknowns of `dofs`; `coupling` receives H_fD * prescribed_step (held dofs).
+  /// Assembles the Hessian over the unknowns of `dofs`, and what `motion` of the held dofs does to it.
   virtual void assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
-                        const VectorX& prescribed_step, VectorX& coupling, Workspace& workspace) = 0;
+                        PrescribedMotion& motion, Workspace& workspace) = 0;
   /// Factorises Hessian + shift * I.
   virtual linear::Outcome factorize(double shift) = 0;
   virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
@@ -29,8 +29,7 @@ class NewtonSystem {
 /// For patches of up to some hundred unknowns.
 class DenseSystem final : public NewtonSystem {
  public:
-  void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, const VectorX& prescribed_step,
-                VectorX& coupling, Workspace&) override;
+  void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
   double diagonal_scale() const override;
@@ -45,8 +44,7 @@ class SparseSystem final : public NewtonSystem {
  public:
   /// `solver` must outlive this. `stencils`: vertices of the elements, `stencil_size` each.
   SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, std::span<const int> stencils, int stencil_size);
-  void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, const VectorX& prescribed_step,
-                VectorX& coupling, Workspace&) override;
+  void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
   double diagonal_scale() const override;

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#include "itr/mesh/readers.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "readers.hpp"
+
+namespace itr {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string read_bytes(const fs::path& file) {
+  std::error_code ignored;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || fs::is_directory(file, ignored)) throw InputError({file.string(), "", "no readable file", "a mesh file"});
+  std::ostringstream bytes;
+  bytes << stream.rdbuf();
+  return std::move(bytes).str();
+}
+
+template <std::size_t N>
+void check_indices(const std::vector<std::array<int, N>>& elements, std::size_t num_vertices, const std::string& kind,
+                   const fs::path& file) {
+  for (std::size_t i = 0; i < elements.size(); ++i)
+    for (const int v : elements[i])
+      if (v < 0 || static_cast<std::size_t>(v) >= num_vertices)
+        throw InputError({file.string(), kind + " " + std::to_string(i), "vertex " + std::to_string(v) + " (0-based)",
+                          "0 to " + std::to_string(num_vertices) + " - 1"});
+}
+
+void check(const MeshFile& mesh, const fs::path& file) {
+  if (mesh.vertices.empty()) throw InputError({file.string(), "", "no vertices", "a mesh"});
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    if (!mesh.vertices[v].allFinite())
+      throw InputError({file.string(), "vertex " + std::to_string(v), "a coordinate that is not finite", "finite ones"});
+  check_indices(mesh.edges, mesh.vertices.size(), "edge", file);
+  check_indices(mesh.triangles, mesh.vertices.size(), "triangle", file);
+  check_indices(mesh.tetrahedra, mesh.vertices.size(), "tetrahedron", file);
+}
+
+}  // namespace
+
+MeshFile read_mesh_file(const fs::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (ending != ".msh" && ending != ".obj")
+    throw InputError({file.string(), "", "a name that ends in '" + ending + "'", ".msh or .obj (others are not supported yet)"});
+  const std::string bytes = read_bytes(file);
+  MeshFile mesh = ending == ".msh" ? read_msh(bytes, file) : read_obj(bytes, file);
+  check(mesh, file);
+  return mesh;
+}
+
+}  // namespace itr

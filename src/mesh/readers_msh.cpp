@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: MIT
+// Gmsh .msh, versions 2.2 and 4.1, text and binary (https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format).
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <unordered_map>
+#include <utility>
+
+#include "readers.hpp"
+
+namespace itr {
+
+namespace {
+
+/// Position in the bytes of a file, reading numbers as the file writes them.
+class Cursor {
+ public:
+  Cursor(std::string_view bytes, const std::filesystem::path& file) : bytes_(bytes), file_(file) {}
+
+  bool binary = false;
+
+  /// Next word of text, empty at the end.
+  std::string_view word() {
+    skip_space();
+    const std::size_t begin = position_;
+    while (position_ < bytes_.size() && !is_space(bytes_[position_])) ++position_;
+    return bytes_.substr(begin, position_ - begin);
+  }
+
+  /// Binary data begins after the end of the line.
+  void end_line() {
+    while (position_ < bytes_.size() && bytes_[position_] != '\n') ++position_;
+    position_ = std::min(position_ + 1, bytes_.size());
+  }
+
+  std::int64_t small() { return binary ? raw<std::int32_t>() : text<std::int64_t>(); }  ///< C int
+  std::int64_t size() {                                                                  ///< C size_t
+    const std::int64_t value = binary ? raw<std::int64_t>() : text<std::int64_t>();
+    if (value < 0) fail("the number " + std::to_string(value), "one >= 0");
+    return value;
+  }
+  double real() { return binary ? raw<double>() : text<double>(); }
+
+  /// A number of things of which each takes at least one byte: more than there are bytes is a broken file.
+  std::size_t count(std::int64_t value) {
+    if (value < 0 || static_cast<std::uint64_t>(value) > bytes_.size() - position_)
+      fail("a count of " + std::to_string(value), "at most as many as the rest of the file can hold");
+    return static_cast<std::size_t>(value);
+  }
+
+  void skip_section(const std::string& name) {
+    const auto end = bytes_.find("$End" + name, position_);
+    if (end == std::string_view::npos) fail("no $End" + name, "it before the end of the file");
+    position_ = end;
+    word();
+  }
+
+  void expect_end(const std::string& name) {
+    const std::string_view found = word();
+    if (found != "$End" + name) fail("'" + std::string(found.substr(0, 40)) + "'", "$End" + name);
+  }
+
+  [[noreturn]] void fail(const std::string& found, const std::string& expected) const {
+    const auto lines = std::count(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(position_), '\n');
+    const std::string place = binary ? "byte " + std::to_string(position_) : "line " + std::to_string(lines + 1);
+    throw InputError({file_.string(), place, found, expected});
+  }
+
+ private:
+  static bool is_space(char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
+
+  void skip_space() {
+    while (position_ < bytes_.size() && is_space(bytes_[position_])) ++position_;
+  }
+
+  template <typename T>
+  T raw() {
+    if (bytes_.size() - position_ < sizeof(T)) fail("the end of the file", "more data");
+    T value;
+    std::memcpy(&value, bytes_.data() + position_, sizeof(T));
+    position_ += sizeof(T);
+    return value;
+  }
+
+  template <typename T>
+  T text() {
+    skip_space();
+    const std::size_t begin = position_;
+    const std::string_view token = word();
+    const std::string_view digits = token.substr(token.starts_with('+') ? 1 : 0);
+    T value{};
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error != std::errc() || end != digits.data() + digits.size()) {
+      position_ = begin;
+      fail(token.empty() ? "the end of the file" : "'" + std::string(token.substr(0, 40)) + "'", "a number");
+    }
+    return value;
+  }
+
+  std::string_view bytes_;
+  const std::filesystem::path& file_;
+  std::size_t position_ = 0;
+};
+
+class MshReader {
+ public:
+  MshReader(std::string_view bytes, const std::filesystem::path& file) : in_(bytes, file), file_(file) {}
+
+  MeshFile read() {
+    if (in_.word() != "$MeshFormat") in_.fail("another beginning", "$MeshFormat");
+    read_format();
+    for (std::string_view section = in_.word(); !section.empty(); section = in_.word()) read_section(section);
+    if (tags_.empty()) in_.fail("no nodes", "a $Nodes section");
+    number_nodes();
+    return std::move(mesh_);
+  }
+
+ private:
+  void read_format() {
+    const std::string version(in_.word());
+    if (version != "2.2" && version != "4.1") in_.fail("version '" + version + "'", "2.2 or 4.1");
+    is_new_ = version == "4.1";
+    const std::int64_t binary = in_.small(), size = in_.small();
+    if (binary < 0 || binary > 1) in_.fail("file type " + std::to_string(binary), "0 (text) or 1 (binary)");
+    if (size != 8) in_.fail("data size " + std::to_string(size), "8");
+    in_.end_line();
+    in_.binary = binary == 1;
+    if (in_.binary && in_.small() != 1) in_.fail("another byte order", "that of this computer");
+    in_.expect_end("MeshFormat");
+  }
+
+  void read_section(std::string_view section) {
+    if (section.front() != '$') in_.fail("'" + std::string(section.substr(0, 40)) + "'", "a section, such as $Nodes");
+    const std::string name(section.substr(1));
+    if (name != "Entities" && name != "Nodes" && name != "Elements") return in_.skip_section(name);
+    if (name == "Entities" && !is_new_) return in_.skip_section(name);
+    if (in_.binary && is_new_) in_.end_line();
+    if (name == "Entities") read_entities();
+    if (name == "Nodes") is_new_ ? read_nodes_4() : read_nodes_2();
+    if (name == "Elements") is_new_ ? read_elements_4() : read_elements_2();
+    in_.expect_end(name);
+  }
+
+  void read_entities() {
+    std::array<std::size_t, 4> counts;
+    for (auto& count : counts) count = in_.count(in_.size());
+    for (int dim = 0; dim < 4; ++dim)
+      for (std::size_t i = 0; i < counts[dim]; ++i) read_entity(dim);
+  }
+
+  void read_entity(int dim) {
+    const std::int64_t tag = in_.small();
+    for (int i = 0; i < (dim == 0 ? 3 : 6); ++i) in_.real();
+    const std::size_t num_groups = in_.count(in_.size());
+    for (std::size_t i = 0; i < num_groups; ++i) {
+      const std::int64_t group = in_.small();
+      if (i == 0) group_[{dim, tag}] = static_cast<int>(group);
+    }
+    if (dim == 0) return;
+    const std::size_t num_bounding = in_.count(in_.size());
+    for (std::size_t i = 0; i < num_bounding; ++i) in_.small();
+  }
+
+  void read_point() {
+    for (int c = 0; c < 3; ++c) point_[c] = in_.real();
+    mesh_.vertices.push_back(point_);
+  }
+
+  void read_nodes_2() {
+    const std::size_t num_nodes = read_count_2();
+    for (std::size_t i = 0; i < num_nodes; ++i) {
+      tags_.push_back(in_.small());
+      read_point();
+    }
+  }
+
+  void read_nodes_4() {
+    const std::size_t num_blocks = in_.count(in_.size());
+    for (int i = 0; i < 3; ++i) in_.size();
+    for (std::size_t block = 0; block < num_blocks; ++block) {
+      const std::int64_t dim = in_.small();
+      in_.small();
+      const bool is_parametric = in_.small() != 0;
+      if (dim < 0 || dim > 3) in_.fail("entity dimension " + std::to_string(dim), "0 to 3");
+      const std::size_t num_nodes = in_.count(in_.size());
+      for (std::size_t i = 0; i < num_nodes; ++i) tags_.push_back(in_.size());
+      for (std::size_t i = 0; i < num_nodes; ++i) {
+        read_point();
+        for (int c = 0; is_parametric && c < dim; ++c) in_.real();
+      }
+    }
+  }
+
+  /// In 2.2 a section begins with its count in text, also in binary files.
+  std::size_t read_count_2() {
+    const bool binary = std::exchange(in_.binary, false);
+    const std::size_t count = in_.count(in_.size());
+    in_.end_line();
+    in_.binary = binary;
+    return count;
+  }
+
+  void read_elements_2() {
+    const std::size_t num_elements = read_count_2();
+    for (std::size_t done = 0; done < num_elements;) {
+      std::size_t num_here = 1, num_tags = 0;
+      std::int64_t type = 0, number = 0;
+      if (in_.binary) {
+        type = in_.small(), num_here = in_.count(in_.small()), num_tags = in_.count(in_.small());
+        if (num_here == 0) in_.fail("an empty block of elements", "at least one");
+      }
+      for (std::size_t i = 0; i < num_here; ++i) {
+        number = in_.small();
+        if (!in_.binary) type = in_.small(), num_tags = in_.count(in_.small());
+        std::int64_t body = 0;
+        for (std::size_t tag = 0; tag < num_tags; ++tag) {
+          const std::int64_t value = in_.small();
+          if (tag == 0) body = value;
+        }
+        read_element(type, number, static_cast<int>(body));
+      }
+      done += num_here;
+    }
+  }
+
+  void read_elements_4() {
+    const std::size_t num_blocks = in_.count(in_.size());
+    for (int i = 0; i < 3; ++i) in_.size();
+    for (std::size_t block = 0; block < num_blocks; ++block) {
+      const std::int64_t dim = in_.small(), entity = in_.small(), type = in_.small();
+      const std::size_t num_elements = in_.count(in_.size());
+      const auto group = group_.find({static_cast<int>(dim), entity});
+      const int body = group == group_.end() ? 0 : group->second;
+      for (std::size_t i = 0; i < num_elements; ++i) {
+        const std::int64_t number = in_.size();
+        read_element(type, number, body);
+      }
+    }
+  }
+
+  void read_element(std::int64_t type, std::int64_t number, int body) {
+    switch (type) {
+      case 15: read_node_tags<1>(); return;
+      case 1: edges_.push_back(read_node_tags<2>()); return;
+      case 2: triangles_.push_back(read_node_tags<3>()), mesh_.triangle_body.push_back(body); return;
+      case 4: tetrahedra_.push_back(read_node_tags<4>()), mesh_.tetrahedron_body.push_back(body); return;
+      default:
+        in_.fail("element " + std::to_string(number) + " of type " + std::to_string(type),
+                 "1 (line), 2 (triangle), 4 (tetrahedron) or 15 (point)");
+    }
+  }
+
+  template <std::size_t N>
+  std::array<std::int64_t, N> read_node_tags() {
+    std::array<std::int64_t, N> tags;
+    for (auto& tag : tags) tag = is_new_ ? in_.size() : in_.small();
+    return tags;
+  }
+
+  /// Node tags 1..n are positions; otherwise nodes are numbered as they come.
+  void number_nodes() {
+    const auto n = static_cast<std::int64_t>(tags_.size());
+    const auto [least, greatest] = std::minmax_element(tags_.begin(), tags_.end());
+    const bool is_dense = *least == 1 && *greatest == n;
+    std::unordered_map<std::int64_t, int> index;
+    index.reserve(tags_.size());
+    for (std::int64_t i = 0; i < n; ++i)
+      if (!index.emplace(tags_[i], static_cast<int>(is_dense ? tags_[i] - 1 : i)).second)
+        throw InputError({file_.string(), "$Nodes", "node " + std::to_string(tags_[i]) + " twice", "different node numbers"});
+    if (is_dense) sort_vertices();
+    renumber(edges_, mesh_.edges, index);
+    renumber(triangles_, mesh_.triangles, index);
+    renumber(tetrahedra_, mesh_.tetrahedra, index);
+  }
+
+  void sort_vertices() {
+    std::vector<Vec<3>> sorted(mesh_.vertices.size());
+    for (std::size_t i = 0; i < sorted.size(); ++i) sorted[static_cast<std::size_t>(tags_[i] - 1)] = mesh_.vertices[i];
+    mesh_.vertices = std::move(sorted);
+  }
+
+  template <std::size_t N>
+  void renumber(const std::vector<std::array<std::int64_t, N>>& from, std::vector<std::array<int, N>>& to,
+                const std::unordered_map<std::int64_t, int>& index) {
+    to.resize(from.size());
+    for (std::size_t i = 0; i < from.size(); ++i)
+      for (std::size_t k = 0; k < N; ++k) {
+        const auto found = index.find(from[i][k]);
+        if (found == index.end())
+          throw InputError({file_.string(), "$Elements", "node " + std::to_string(from[i][k]), "a node of the $Nodes section"});
+        to[i][k] = found->second;
+      }
+  }
+
+  Cursor in_;
+  const std::filesystem::path& file_;
+  bool is_new_ = false;
+  Vec<3> point_;
+  MeshFile mesh_;
+  std::vector<std::int64_t> tags_;  ///< of the nodes, as they come
+  std::vector<std::array<std::int64_t, 2>> edges_;
+  std::vector<std::array<std::int64_t, 3>> triangles_;
+  std::vector<std::array<std::int64_t, 4>> tetrahedra_;
+  std::map<std::pair<int, std::int64_t>, int> group_;  ///< (dimension, entity) -> first physical group
+};
+
+}  // namespace
+
+MeshFile read_msh(std::string_view bytes, const std::filesystem::path& file) { return MshReader(bytes, file).read(); }
+
+}  // namespace itr

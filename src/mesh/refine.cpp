@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include "itr/mesh/refine.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include "itr/core/check.hpp"
+
+namespace itr {
+
+namespace {
+
+/// Midpoints of edges, numbered behind the old vertices as they are asked for.
+template <int Dim>
+class Midpoints {
+ public:
+  Midpoints(const Mesh<Dim>& mesh, std::vector<Vec<Dim>>& rest) : mesh_(mesh), rest_(rest) {}
+
+  VertexId operator()(VertexId a, VertexId b) {
+    const auto [entry, is_new] = ids_.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<VertexId>(rest_.size()));
+    if (is_new) rest_.push_back(0.5 * (mesh_.rest(a) + mesh_.rest(b)));
+    return entry->second;
+  }
+
+ private:
+  const Mesh<Dim>& mesh_;
+  std::vector<Vec<Dim>>& rest_;
+  std::map<EdgeKey, VertexId> ids_;
+};
+
+std::array<std::array<VertexId, 3>, 4> children(const std::array<VertexId, 3>& c, Midpoints<2>& mid) {
+  const VertexId m01 = mid(c[0], c[1]), m02 = mid(c[0], c[2]), m12 = mid(c[1], c[2]);
+  return {{{c[0], m01, m02}, {c[1], m12, m01}, {c[2], m02, m12}, {m01, m12, m02}}};
+}
+
+std::array<std::array<VertexId, 4>, 8> children(const std::array<VertexId, 4>& c, Midpoints<3>& mid) {
+  const VertexId m01 = mid(c[0], c[1]), m02 = mid(c[0], c[2]), m03 = mid(c[0], c[3]);
+  const VertexId m12 = mid(c[1], c[2]), m13 = mid(c[1], c[3]), m23 = mid(c[2], c[3]);
+  return {{{c[0], m01, m02, m03},
+           {m01, c[1], m12, m13},
+           {m02, m12, c[2], m23},
+           {m03, m13, m23, c[3]},
+           // around the diagonal m01 - m23 of the octahedron
+           {m01, m23, m02, m03},
+           {m01, m23, m03, m13},
+           {m01, m23, m13, m12},
+           {m01, m23, m12, m02}}};
+}
+
+std::array<std::array<VertexId, 2>, 2> children_of_facet(const std::array<VertexId, 2>& f, Midpoints<2>& mid) {
+  const VertexId m = mid(f[0], f[1]);
+  return {{{f[0], m}, {m, f[1]}}};
+}
+
+std::array<std::array<VertexId, 3>, 4> children_of_facet(const std::array<VertexId, 3>& f, Midpoints<3>& mid) {
+  const VertexId m01 = mid(f[0], f[1]), m02 = mid(f[0], f[2]), m12 = mid(f[1], f[2]);
+  return {{{f[0], m01, m02}, {f[1], m12, m01}, {f[2], m02, m12}, {m01, m12, m02}}};
+}
+
+}  // namespace
+
+template <int Dim>
+Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
+  ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots(), mesh.num_vertices(), mesh.vertex_slots());
+  std::vector<Vec<Dim>> rest;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  Midpoints<Dim> mid(mesh, rest);
+
+  std::vector<typename Mesh<Dim>::Cell> cells;
+  std::vector<int> body;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    for (const auto& child : children(mesh.cell(c), mid)) {
+      cells.push_back(child);
+      body.push_back(mesh.body(c));
+    }
+  }
+
+  std::vector<std::pair<typename Mesh<Dim>::Facet, int>> tagged;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.is_facet_alive(f) && mesh.facet_tag(f) != kNoTag)
+      for (const auto& child : children_of_facet(mesh.facet(f), mid)) tagged.emplace_back(child, mesh.facet_tag(f));
+
+  Mesh<Dim> refined(std::move(rest), std::move(cells), std::move(body));
+  for (const auto& [facet, tag] : tagged) refined.set_facet_tag(refined.find_facet(facet), tag);
+  return refined;
+}
+
+template Mesh<2> refine_uniformly(const Mesh<2>&);
+template Mesh<3> refine_uniformly(const Mesh<3>&);
+
+}  // namespace itr

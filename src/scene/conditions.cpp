@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+#include "conditions.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <set>
+
+#include "function.hpp"
+#include "selection.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+template <int Dim>
+class ConditionReader {
+ public:
+  ConditionReader(const Node& root, Setup<Dim>& setup, std::vector<std::string>& warnings)
+      : boundary_(root["boundary_conditions"]), initial_(root["initial_conditions"]), setup_(setup), warnings_(warnings) {
+    for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
+    for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c) bodies_.insert(setup_.mesh.body(c));
+  }
+
+  void read(ObstacleGeometry<Dim> geometry) {
+    obstacle_ids_.insert(geometry.id.begin(), geometry.id.end());
+    read_body_acceleration();
+    read_dirichlet();
+    read_neumann();
+    read_motions(geometry);
+    setup_.obstacles = std::move(geometry.obstacles);
+    setup_.initial_displacement = read_initial("solution");
+    setup_.initial_velocity = read_initial("velocity");
+    const Node acceleration = initial_["acceleration"];
+    if (acceleration.exists() && acceleration.json().is_string()) {
+      acceleration.choice({"consistent"}, 0);
+      setup_.consistent_initial_acceleration = true;
+    } else {
+      setup_.initial_acceleration = read_initial("acceleration");
+    }
+  }
+
+ private:
+  using Function = SpaceTimeFunction<Dim>;
+
+  /// `rhs` stands on the left side of PolyFEM's equation: positive values push in the negative direction.
+  void read_body_acceleration() {
+    const Node rhs = boundary_["rhs"];
+    if (!rhs.exists()) return;
+    const ValueFunction<Dim> value = read_function<Dim>(rhs, rhs["interpolation"], -1);
+    if (value.is_zero) return;
+    check_defined<Dim>(value.function, all_vertices(), setup_.time.t0, rhs);
+    setup_.body_acceleration = value.function;
+  }
+
+  void read_dirichlet() {
+    std::set<int> seen;
+    for (const Node& node : boundary_["dirichlet_boundary"].items()) {
+      const Function function = read_value(node);
+      const std::array<bool, Dim> components = read_components(node["dimension"]);
+      const bool is_free = std::none_of(components.begin(), components.end(), [](bool b) { return b; });
+      for (const int tag : tags_of(node, seen)) {
+        check_defined<Dim>(function, vertices_with(tag), setup_.time.t0, node["value"]);
+        if (!is_free) setup_.dirichlet.push_back({tag, components, function});
+      }
+    }
+  }
+
+  void read_neumann() {
+    std::set<int> seen;
+    for (const Node& node : boundary_["neumann_boundary"].items()) {
+      const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
+      for (const int tag : tags_of(node, seen)) {
+        check_defined<Dim>(value.function, vertices_with(tag), setup_.time.t0, node["value"]);
+        if (!value.is_zero) setup_.neumann.push_back({tag, value.function});
+      }
+    }
+  }
+
+  /// The first entry with an obstacle's id moves it; obstacle_displacements come before dirichlet_boundary.
+  void read_motions(ObstacleGeometry<Dim>& geometry) {
+    std::vector<Node> entries = boundary_["obstacle_displacements"].items();
+    for (const Node& node : entries)
+      if (!is_all(node["id"]) && !obstacle_ids_.contains(read_condition_id(node["id"]))) warn_unused(node);
+    for (const Node& node : boundary_["dirichlet_boundary"].items()) entries.push_back(node);
+    Obstacles<Dim>& obstacles = geometry.obstacles;
+    std::vector<char> is_taken(obstacles.rest.size(), false);
+    for (const Node& node : entries) {
+      const std::optional<int> id = is_all(node["id"]) ? std::nullopt : std::optional(read_condition_id(node["id"]));
+      const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
+      std::vector<Vec<Dim>> moved;
+      for (std::size_t v = 0; v < obstacles.rest.size(); ++v) {
+        if (is_taken[v] || (id && *id != geometry.id[v])) continue;
+        is_taken[v] = true;
+        if (value.is_zero) continue;  // fixed
+        obstacles.motion[v] = static_cast<int>(obstacles.motions.size());
+        moved.push_back(obstacles.rest[v]);
+      }
+      if (moved.empty()) continue;
+      check_defined<Dim>(value.function, moved, setup_.time.t0, node["value"]);
+      obstacles.motions.push_back(value.function);
+    }
+  }
+
+  std::vector<InitialCondition<Dim>> read_initial(const char* name) {
+    std::vector<InitialCondition<Dim>> conditions;
+    std::set<int> seen;
+    for (const Node& node : initial_[name].items()) {
+      if (!node.has("id")) node["id"].fail("the id of a body");
+      const int body = read_id(node["id"], 0);
+      const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
+      if (!bodies_.contains(body)) warn_unused(node);
+      if (!seen.insert(body).second) {
+        warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
+        continue;
+      }
+      check_defined<Dim>(value.function, vertices_of_body(body), 0, node["value"]);
+      if (!value.is_zero) conditions.push_back({body, value.function});
+    }
+    return conditions;
+  }
+
+  Function read_value(const Node& node) const { return read_function<Dim>(node["value"], node["interpolation"]).function; }
+
+  std::array<bool, Dim> read_components(const Node& node) const {
+    std::array<bool, Dim> components;
+    components.fill(true);
+    const std::vector<Node> flags = node.items();
+    if (node.exists() && (!node.json().is_array() || flags.size() < Dim)) node.fail("true or false for each component");
+    for (std::size_t c = 0; c < Dim && c < flags.size(); ++c) components[c] = flags[c].boolean(true);
+    return components;
+  }
+
+  static bool is_all(const Node& id) { return id.exists() && id.json() == "all"; }
+
+  int read_condition_id(const Node& node) const {
+    if (!node.exists() || !node.json().is_number()) node.fail("an id, or \"all\"");
+    return read_id(node, 0);
+  }
+
+  /// Tags of facets that a condition acts on, without those that an entry before it has taken.
+  std::vector<int> tags_of(const Node& node, std::set<int>& seen) {
+    std::vector<int> tags;
+    if (is_all(node["id"])) {
+      for (const int tag : facet_tags_)
+        if (tag > 0 && seen.insert(tag).second) tags.push_back(tag);
+      return tags;
+    }
+    const int tag = read_condition_id(node["id"]);
+    const bool is_on_facets = tag > 0 && facet_tags_.contains(tag);
+    if (!is_on_facets && !obstacle_ids_.contains(tag)) warn_unused(node);
+    if (!seen.insert(tag).second) warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
+    else if (is_on_facets) tags.push_back(tag);
+    return tags;
+  }
+
+  void warn_unused(const Node& node) {
+    warnings_.push_back(node["id"].pointer() + ": nothing has the id " + abbreviate(node["id"].json()));
+  }
+
+  std::vector<Vec<Dim>> points(std::set<int> vertices) const {
+    std::vector<Vec<Dim>> result;
+    for (const int v : vertices) result.push_back(setup_.mesh.rest(v));
+    return result;
+  }
+
+  std::vector<Vec<Dim>> vertices_with(int tag) const {
+    std::set<int> vertices;
+    for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f)
+      if (setup_.mesh.facet_tag(f) == tag) vertices.insert(setup_.mesh.facet(f).begin(), setup_.mesh.facet(f).end());
+    return points(std::move(vertices));
+  }
+
+  std::vector<Vec<Dim>> vertices_of_body(int body) const {
+    std::set<int> vertices;
+    for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c)
+      if (setup_.mesh.body(c) == body) vertices.insert(setup_.mesh.cell(c).begin(), setup_.mesh.cell(c).end());
+    return points(std::move(vertices));
+  }
+
+  std::vector<Vec<Dim>> all_vertices() const {
+    std::vector<Vec<Dim>> result;
+    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) result.push_back(setup_.mesh.rest(v));
+    return result;
+  }
+
+  Node boundary_, initial_;
+  Setup<Dim>& setup_;
+  std::vector<std::string>& warnings_;
+  std::set<int> facet_tags_, bodies_, obstacle_ids_;
+};
+
+}  // namespace
+
+template <int Dim>
+void read_conditions(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup, std::vector<std::string>& warnings) {
+  ConditionReader<Dim>(root, setup, warnings).read(std::move(obstacles));
+}
+
+template void read_conditions(const Node&, ObstacleGeometry<2>, Setup<2>&, std::vector<std::string>&);
+template void read_conditions(const Node&, ObstacleGeometry<3>, Setup<3>&, std::vector<std::string>&);
+
+}  // namespace itr::scene

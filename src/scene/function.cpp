@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "function.hpp"
+
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+#include "expression.hpp"
+#include "interpolation.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+Expression parse_expression(const Node& node) {
+  try {
+    return Expression(node.string(""));
+  } catch (const ExpressionError& error) {
+    node.fail(abbreviate(node.json()) + ", with " + error.what(), "an expression");
+  }
+}
+
+/// One component: a number, or an expression where there are variables in it; times g(t).
+struct Component {
+  double constant = 0;
+  std::optional<Expression> expression;
+  Interpolation scale;
+
+  double operator()(const Expression::Variables& variables) const {
+    const double value = expression ? (*expression)(variables) : constant;
+    return scale.is_one() ? value : value * scale(variables.t);
+  }
+  bool is_constant() const { return !expression && (scale.is_one() || constant == 0); }
+};
+
+Component read_component(const Node& node) {
+  Component component;
+  if (node.json().is_number()) {
+    component.constant = node.number(0);
+  } else if (node.json().is_string()) {
+    Expression expression = parse_expression(node);
+    if (expression.is_constant()) component.constant = expression({});
+    else component.expression = std::move(expression);
+  } else {
+    node.fail("a number or an expression");
+  }
+  if (std::isnan(component.constant)) node.fail(abbreviate(node.json()) + ", which is not a number", "one with a value");
+  return component;
+}
+
+}  // namespace
+
+double read_constant(const Node& node, double fallback) {
+  if (!node.exists() || !node.json().is_string()) return node.number(fallback);
+  const Expression expression = parse_expression(node);
+  if (!expression.is_constant()) node.fail("a constant: values that vary are not supported yet");
+  const double value = expression({});
+  if (!std::isfinite(value)) node.fail("an expression with a finite value");
+  return value;
+}
+
+template <int Dim>
+ValueFunction<Dim> read_function(const Node& value, const Node& interpolation, double sign) {
+  if (!value.exists() || !value.json().is_array()) value.fail("a list of numbers or expressions");
+  const std::vector<Node> values = value.items(), scales = interpolation.items();
+  std::array<Component, Dim> components;
+  bool is_constant = true;
+  for (std::size_t c = 0; c < Dim; ++c) {
+    if (c < values.size()) components[c] = read_component(values[c]);
+    if (scales.size() > 1 && c >= scales.size()) interpolation.fail("one entry, or one a component");
+    if (!scales.empty()) components[c].scale = Interpolation(scales.size() == 1 ? scales[0] : scales[c]);
+    is_constant = is_constant && components[c].is_constant();
+  }
+  if (is_constant) {
+    Vec<Dim> constant;
+    for (int c = 0; c < Dim; ++c) constant[c] = sign * components[c].constant;
+    return {[constant](const Vec<Dim>&, double) { return constant; }, constant.isZero(0)};
+  }
+  return {[components, sign](const Vec<Dim>& X, double t) {
+            const Expression::Variables variables{X[0], X[1], Dim == 3 ? X[Dim - 1] : 0, t};
+            Vec<Dim> result;
+            for (int c = 0; c < Dim; ++c) result[c] = sign * components[c](variables);
+            return result;
+          },
+          false};
+}
+
+template <int Dim>
+void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t, const Node& value) {
+  for (const Vec<Dim>& X : points) {
+    if (!function(X, t).hasNaN()) continue;
+    std::ostringstream place;
+    place << abbreviate(value.json()) << ", which has no value at X = (" << X.transpose() << "), t = " << t;
+    value.fail(place.str(), "a value there");
+  }
+}
+
+template ValueFunction<2> read_function(const Node&, const Node&, double);
+template ValueFunction<3> read_function(const Node&, const Node&, double);
+template void check_defined(const SpaceTimeFunction<2>&, const std::vector<Vec<2>>&, double, const Node&);
+template void check_defined(const SpaceTimeFunction<3>&, const std::vector<Vec<3>>&, double, const Node&);
+
+}  // namespace itr::scene

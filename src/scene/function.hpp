@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Vector values of a scene (scene-format §4.2) into functions of rest position and time.
+#pragma once
+
+#include "itr/simulation/setup.hpp"
+#include "node.hpp"
+
+namespace itr::scene {
+
+/// A number, or an expression without variables.
+double read_constant(const Node& node, double fallback);
+
+template <int Dim>
+struct ValueFunction {
+  SpaceTimeFunction<Dim> function;
+  bool is_zero = false;  ///< all components are the constant 0
+};
+
+/// Missing components are 0, extra ones are passed over. `interpolation` may be absent; `sign` multiplies the value.
+template <int Dim>
+ValueFunction<Dim> read_function(const Node& value, const Node& interpolation, double sign = 1);
+
+/// Throws InputError at `value` if the function has no value (NaN) at one of the points at time t.
+template <int Dim>
+void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t, const Node& value);
+
+}  // namespace itr::scene

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+#include "geometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "itr/mesh/refine.hpp"
+#include "selection.hpp"
+#include "transformation.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+constexpr double kFlat = 1e-5;            ///< least extent in z of a surface that is no 2D mesh [m], PolyFEM's
+constexpr double kLeastShape = 1e-13;     ///< cells with less volume, relative to longest edge^Dim, are degenerate
+constexpr std::size_t kMostCells = 200'000'000;
+
+/// Bodies as they are collected, before one mesh is made of them.
+template <int Dim>
+struct Collected {
+  std::vector<Vec<Dim>> rest;
+  std::vector<typename Mesh<Dim>::Cell> cells;
+  std::vector<int> body;
+  std::vector<std::pair<typename Mesh<Dim>::Facet, int>> tagged;
+};
+
+const std::vector<std::array<int, 3>>& cells_of(const MeshFile& file, const Vec<2>&) { return file.triangles; }
+const std::vector<std::array<int, 4>>& cells_of(const MeshFile& file, const Vec<3>&) { return file.tetrahedra; }
+const std::vector<int>& bodies_of(const MeshFile& file, const Vec<2>&) { return file.triangle_body; }
+const std::vector<int>& bodies_of(const MeshFile& file, const Vec<3>&) { return file.tetrahedron_body; }
+
+template <int Dim>
+double signed_volume(const std::vector<Vec<Dim>>& points, const typename Mesh<Dim>::Cell& cell) {
+  Mat<Dim> edges;
+  for (int k = 0; k < Dim; ++k) edges.col(k) = points[cell[k + 1]] - points[cell[0]];
+  return edges.determinant() / (Dim == 2 ? 2 : 6);
+}
+
+template <int Dim>
+double longest_edge(const std::vector<Vec<Dim>>& points, const typename Mesh<Dim>::Cell& cell) {
+  double longest = 0;
+  for (int i = 0; i <= Dim; ++i)
+    for (int j = 0; j < i; ++j) longest = std::max(longest, (points[cell[i]] - points[cell[j]]).norm());
+  return longest;
+}
+
+/// Triangles are turned to positive area; tetrahedra only if the transformation is a mirror: a file with inverted ones is wrong.
+template <int Dim>
+void orient_cells(const Node& geometry, const std::vector<Vec<Dim>>& points, bool is_mirror,
+                  std::vector<typename Mesh<Dim>::Cell>& cells) {
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    auto& cell = cells[c];
+    if (is_mirror) std::swap(cell[0], cell[1]);
+    double volume = signed_volume<Dim>(points, cell);
+    if (Dim == 2 && volume < 0) {
+      std::swap(cell[0], cell[1]);
+      volume = -volume;
+    }
+    const std::string where = "cell " + std::to_string(c) + " (of " + geometry["mesh"].string("") + ")";
+    if (std::abs(volume) <= kLeastShape * std::pow(longest_edge<Dim>(points, cell), Dim))
+      geometry["mesh"].fail(where + " with rest volume " + std::to_string(volume), "no degenerate cells");
+    if (volume < 0) geometry["mesh"].fail(where + " inverted", "cells of positive volume");
+  }
+}
+
+/// Removes points that no cell uses; returns how many there were.
+template <int Dim>
+std::size_t drop_unused(std::vector<Vec<Dim>>& points, std::vector<typename Mesh<Dim>::Cell>& cells) {
+  std::vector<int> renumbered(points.size(), kNone);
+  for (const auto& cell : cells)
+    for (const int v : cell) renumbered[v] = 0;
+  int used = 0;
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    if (renumbered[v] == kNone) continue;
+    points[used] = points[v];
+    renumbered[v] = used++;
+  }
+  const std::size_t unused = points.size() - static_cast<std::size_t>(used);
+  points.resize(used);
+  for (auto& cell : cells)
+    for (int& v : cell) v = renumbered[v];
+  return unused;
+}
+
+template <int Dim>
+Mesh<Dim> make_mesh(const Node& geometry, std::vector<Vec<Dim>> points, std::vector<typename Mesh<Dim>::Cell> cells,
+                    std::vector<int> body) {
+  try {
+    return Mesh<Dim>(std::move(points), std::move(cells), std::move(body));
+  } catch (const InputError& error) {
+    geometry["mesh"].fail(error.parts().place + " with " + error.parts().found, error.parts().expected);
+  }
+}
+
+template <int Dim>
+Mesh<Dim> refine(Mesh<Dim> mesh, const Node& node) {
+  const int times = node.integer_at_least(0, 0);
+  for (int i = 0; i < times; ++i) {
+    if (static_cast<std::size_t>(mesh.num_cells()) << Dim > kMostCells) node.fail("less refinement: too many cells");
+    mesh = refine_uniformly(mesh);
+  }
+  return mesh;
+}
+
+/// Adds the mesh, with ids by the geometry's selections, and its copies.
+template <int Dim>
+void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, Collected<Dim>& all) {
+  const auto barycenter = [&](const auto& vertices) {
+    Vec<Dim> sum = Vec<Dim>::Zero();
+    for (const int v : vertices) sum += mesh.rest(v);
+    return (sum / static_cast<double>(vertices.size())).eval();
+  };
+  const Selection<Dim> volumes(geometry["volume_selection"], box), surfaces(geometry["surface_selection"], box);
+  std::vector<int> body(mesh.num_cells()), tag(mesh.num_facets());
+  for (CellId c = 0; c < mesh.num_cells(); ++c)
+    body[c] = volumes(barycenter(mesh.cell(c)), mesh.body(c)).value_or(mesh.body(c));
+  for (FacetId f = 0; f < mesh.num_facets(); ++f) tag[f] = surfaces(barycenter(mesh.facet(f))).value_or(kNoTag);
+
+  for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) {
+    const int first = static_cast<int>(all.rest.size());
+    const auto shifted = [first](auto vertices) {
+      for (int& v : vertices) v += first;
+      return vertices;
+    };
+    for (VertexId v = 0; v < mesh.num_vertices(); ++v) all.rest.push_back(mesh.rest(v) + shift);
+    for (CellId c = 0; c < mesh.num_cells(); ++c) all.cells.push_back(shifted(mesh.cell(c)));
+    all.body.insert(all.body.end(), body.begin(), body.end());
+    for (FacetId f = 0; f < mesh.num_facets(); ++f)
+      if (tag[f] != kNoTag) all.tagged.emplace_back(shifted(mesh.facet(f)), tag[f]);
+  }
+}
+
+template <int Dim>
+void read_body(const Node& geometry, const MeshFile& file, Collected<Dim>& all, std::vector<std::string>& warnings) {
+  std::vector<Vec<Dim>> points = points_of<Dim>(file);
+  std::vector<typename Mesh<Dim>::Cell> cells = cells_of(file, Vec<Dim>());
+  const bool is_mirror = transform<Dim>(points, geometry);
+  const Box<Dim> box = bounding_box<Dim>(points);
+  orient_cells<Dim>(geometry, points, is_mirror, cells);
+  if (const std::size_t unused = drop_unused<Dim>(points, cells); unused > 0)
+    warnings.push_back(geometry["mesh"].pointer() + ": " + std::to_string(unused) + " vertices in no cell are left out");
+  const Mesh<Dim> mesh = make_mesh<Dim>(geometry, std::move(points), std::move(cells), bodies_of(file, Vec<Dim>()));
+  collect<Dim>(geometry, refine<Dim>(mesh, geometry["n_refs"]), box, all);
+}
+
+int dimension_of(const Node& geometry, const MeshFile& file) {
+  if (!file.tetrahedra.empty()) return 3;
+  if (file.triangles.empty()) geometry["mesh"].fail("a mesh without cells", "triangles (2D) or tetrahedra (3D)");
+  const Box<3> box = bounding_box<3>(file.vertices);
+  const bool is_surface_format = std::filesystem::path(geometry["mesh"].string("")).extension() != ".msh";
+  if (is_surface_format && box.sizes()[2] >= kFlat)
+    geometry["mesh"].fail("a surface mesh, " + abbreviate(geometry["mesh"].json()), "tetrahedra, or a flat mesh (2D)");
+  return 2;
+}
+
+}  // namespace
+
+const MeshFile& MeshFiles::get(const Node& geometry) {
+  const Node node = geometry["mesh"];
+  if (!node.exists()) node.fail("the path of a mesh file");
+  const std::filesystem::path path = geometry.document().resolve(node.string(""));
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored))
+    node.fail(abbreviate(node.json()) + ", but there is no file '" + path.string() + "'", "the path of a mesh file");
+  const auto found = files_.find(path.string());
+  return found != files_.end() ? found->second : files_.emplace(path.string(), read_mesh_file(path)).first->second;
+}
+
+Geometries list_geometries(const Node& root) {
+  if (!root.has("geometry")) root["geometry"].fail("the geometries of the scene");
+  Geometries geometries;
+  for (const Node& geometry : root["geometry"].items()) {
+    if (!geometry["enabled"].boolean(true)) continue;
+    const int type = geometry["type"].choice({"mesh", "mesh_array", "plane", "ground", "mesh_sequence"}, 0);
+    if (type > 1) geometry["type"].fail("\"mesh\" or \"mesh_array\": the others are not supported yet");
+    const bool is_array = type == 1;
+    if (is_array != geometry.has("array")) geometry["array"].fail("an array if and only if type is \"mesh_array\"");
+    const bool is_obstacle = geometry["is_obstacle"].boolean(false);
+    if (!is_obstacle && geometry["extract"].string("volume") != "volume")
+      geometry["extract"].fail("\"volume\" for what is no obstacle");
+    (is_obstacle ? geometries.obstacles : geometries.bodies).push_back(geometry);
+  }
+  if (geometries.bodies.empty()) root["geometry"].fail("no enabled geometry but obstacles", "at least one body");
+  return geometries;
+}
+
+int find_dimension(const Geometries& geometries, MeshFiles& files) {
+  int dimension = 0;
+  for (const Node& geometry : geometries.bodies) {
+    const int here = dimension_of(geometry, files.get(geometry));
+    if (dimension != 0 && here != dimension)
+      geometry["mesh"].fail("a " + std::to_string(here) + "D mesh", std::to_string(dimension) + "D, as the ones before");
+    dimension = here;
+  }
+  return dimension;
+}
+
+template <int Dim>
+Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
+  Collected<Dim> all;
+  for (const Node& geometry : geometries.bodies) read_body<Dim>(geometry, files.get(geometry), all, warnings);
+  Mesh<Dim> mesh = make_mesh<Dim>(geometries.bodies.front(), std::move(all.rest), std::move(all.cells), std::move(all.body));
+  for (const auto& [facet, tag] : all.tagged) mesh.set_facet_tag(mesh.find_facet(facet), tag);
+  return mesh;
+}
+
+template <int Dim>
+std::vector<Vec<Dim>> read_copies(const Node& geometry, const Vec<Dim>& extent) {
+  std::vector<Vec<Dim>> shifts = {Vec<Dim>::Zero()};
+  const Node array = geometry["array"];
+  if (!array.exists()) return shifts;
+  if (!array.has("offset")) array["offset"].fail("the distance between copies");
+  const double offset = array["offset"].number(0);
+  const Vec<Dim> step = array["relative"].boolean(false) ? (offset * extent).eval() : Vec<Dim>::Constant(offset).eval();
+  const std::vector<Node> sizes = array["size"].items();
+  if (sizes.size() < Dim) array["size"].fail(std::to_string(Dim) + " integers");
+  std::array<int, 3> size = {1, 1, 1};
+  for (int c = 0; c < Dim; ++c) size[c] = sizes[c].integer_at_least(1, 1);
+  for (int i = 0; i < size[0]; ++i)
+    for (int j = 0; j < size[1]; ++j)
+      for (int k = 0; k < size[2]; ++k)
+        if (i + j + k > 0) shifts.push_back(step.cwiseProduct(Vec<3>(i, j, k).template head<Dim>()));
+  return shifts;
+}
+
+template <int Dim>
+std::vector<Vec<Dim>> points_of(const MeshFile& file) {
+  std::vector<Vec<Dim>> points;
+  points.reserve(file.vertices.size());
+  for (const Vec<3>& vertex : file.vertices) points.push_back(vertex.template head<Dim>());
+  return points;
+}
+
+template Mesh<2> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template Mesh<3> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template std::vector<Vec<2>> read_copies(const Node&, const Vec<2>&);
+template std::vector<Vec<3>> read_copies(const Node&, const Vec<3>&);
+template std::vector<Vec<2>> points_of(const MeshFile&);
+template std::vector<Vec<3>> points_of(const MeshFile&);
+
+}  // namespace itr::scene

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// `geometry` of a scene: the bodies' mesh and the obstacles (scene-format §2).
+#pragma once
+
+#include <map>
+
+#include "itr/mesh/readers.hpp"
+#include "itr/simulation/setup.hpp"
+#include "node.hpp"
+
+namespace itr::scene {
+
+/// Mesh files by path, each read once: a scene may name one file many times.
+class MeshFiles {
+ public:
+  /// The file that `geometry/mesh` names; InputError there if it is missing.
+  const MeshFile& get(const Node& geometry);
+
+ private:
+  std::map<std::string, MeshFile> files_;
+};
+
+/// Enabled geometries, in the order of the file. The others are not looked at further.
+struct Geometries {
+  std::vector<Node> bodies, obstacles;
+};
+Geometries list_geometries(const Node& root);
+
+/// 2 or 3: what all bodies' meshes agree on.
+int find_dimension(const Geometries& geometries, MeshFiles& files);
+
+/// All bodies in one mesh, transformed, refined, with body ids and facet tags.
+template <int Dim>
+Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings);
+
+template <int Dim>
+struct ObstacleGeometry {
+  Obstacles<Dim> obstacles;  ///< without motions
+  std::vector<int> id;       ///< per vertex: `surface_selection`, which conditions refer to; kNoTag if there is none
+};
+
+template <int Dim>
+ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files);
+
+/// Translations of the copies of a mesh_array, the zero one first; only that for other types.
+template <int Dim>
+std::vector<Vec<Dim>> read_copies(const Node& geometry, const Vec<Dim>& extent);
+
+/// The coordinates of a file in the dimension of the scene.
+template <int Dim>
+std::vector<Vec<Dim>> points_of(const MeshFile& file);
+
+}  // namespace itr::scene

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+// The table of all keys of a scene (scene-format §1.6): which are read, which only concern output or speed, which must have
+// their default because what they ask for is not built. What is read is checked by its reader.
+#include "known_keys.hpp"
+
+#include <map>
+#include <set>
+#include <sstream>
+
+namespace itr::scene {
+
+namespace {
+
+enum class Role {
+  read,     ///< honoured
+  ignored,  ///< output or speed, or how PolyFEM gets to a result that does not depend on it; with all that is below
+  only,     ///< supported with the one value that follows `=`
+  refused   ///< changes results, not built
+};
+
+struct Group {
+  const char* prefix;  ///< `*` stands for the elements of a list
+  Role role;
+  const char* keys;  ///< separated by spaces
+};
+
+constexpr const char* kSelectionKeys =
+    "id id_offset box threshold center radius p1 p2 axis position point normal offset relative";
+
+constexpr Group kGroups[] = {
+    {"", Role::ignored, "tests output"},
+    {"/units", Role::only, "length=\"m\" mass=\"kg\" time=\"s\""},
+    {"/units", Role::read, "characteristic_length"},
+    {"/input/data", Role::only, "state=\"\""},
+    {"/input/data", Role::ignored, "reorder u_path"},
+
+    {"/geometry/*", Role::read, "mesh type enabled is_obstacle extract n_refs"},
+    {"/geometry/*", Role::only, "unit=\"\""},
+    {"/geometry/*", Role::refused, "point_selection curve_selection"},
+    {"/geometry/*/array", Role::read, "offset size relative"},
+    {"/geometry/*/transformation", Role::read, "translation rotation rotation_mode scale dimensions"},
+    {"/geometry/*/advanced", Role::read, "normalize_mesh refinement_location"},
+    {"/geometry/*/advanced", Role::only, "force_linear_geometry=false min_component=-1"},
+    {"/geometry/*/volume_selection", Role::read, "*"},
+    {"/geometry/*/volume_selection/*", Role::read, kSelectionKeys},
+    {"/geometry/*/surface_selection", Role::read, "*"},
+    {"/geometry/*/surface_selection/*", Role::read, kSelectionKeys},
+    {"/geometry/*/surface_selection/*", Role::only, "boundary_only=true"},
+    {"/geometry/*/surface_selection/*", Role::refused, "file"},
+    {"/geometry/*/volume_selection/*", Role::refused, "file"},
+    {"/geometry/*", Role::refused, "height point normal fps mesh_sequence"},
+
+    {"/materials/*", Role::read, "type id E nu lambda mu rho plane_strain"},
+    {"/materials/*", Role::only, "phi=0 psi=0"},
+    {"/materials/*", Role::refused, "c1 c2 c3 d1 k elasticity_tensor alphas mus Ds models"},
+
+    {"/boundary_conditions", Role::read, "rhs"},
+    {"/boundary_conditions", Role::only,
+     "pressure_boundary=[] pressure_cavity=[] normal_aligned_neumann_boundary=[] normal_aligned_dirichlet_boundary=[]"},
+    {"/boundary_conditions/dirichlet_boundary/*", Role::read, "id value dimension"},
+    {"/boundary_conditions/neumann_boundary/*", Role::read, "id value"},
+    {"/boundary_conditions/obstacle_displacements/*", Role::read, "id value"},
+    {"/boundary_conditions/dirichlet_boundary/*/interpolation/*", Role::read, "type from to points values extend"},
+    {"/boundary_conditions/neumann_boundary/*/interpolation/*", Role::read, "type from to points values extend"},
+    {"/boundary_conditions/obstacle_displacements/*/interpolation/*", Role::read, "type from to points values extend"},
+    {"/initial_conditions/solution/*", Role::read, "id value"},
+    {"/initial_conditions/velocity/*", Role::read, "id value"},
+    {"/initial_conditions/acceleration", Role::read, "*"},  // also the word "consistent"
+    {"/initial_conditions/acceleration/*", Role::read, "id value"},
+
+    {"/time", Role::read, "t0 tend dt time_steps integrator quasistatic"},
+    {"/time/integrator", Role::read, "type steps beta gamma"},
+
+    {"/contact", Role::read, "enabled dhat dhat_percentage epsv friction_coefficient use_convergent_formulation"},
+    {"/contact", Role::only, "use_area_weighting=true use_improved_max_operator=true use_physical_barrier=true"},
+    {"/contact/collision_mesh", Role::only, "enabled=false"},
+    {"/contact/collision_mesh", Role::refused, "mesh linear_map max_edge_length tessellation_type"},
+
+    {"/solver", Role::ignored, "max_threads"},
+    {"/solver", Role::only, "rayleigh_damping=[]"},
+    {"/solver/linear", Role::read, "solver"},
+    {"/solver/linear", Role::ignored, "precond enable_overwrite_solver max_iter tolerance Eigen AMGCL Hypre Pardiso MUMPS"},
+    {"/solver/contact", Role::read, "barrier_stiffness friction_iterations friction_convergence_tol"},
+    {"/solver/contact", Role::only, "initial_barrier_stiffness=1"},
+    // Any conservative CCD leads to the same converged solutions, and so does any way to the Dirichlet values: their
+    // elimination in the end is exact.
+    {"/solver/contact/CCD", Role::ignored, "broad_phase tolerance max_iterations"},
+    {"/solver/augmented_lagrangian", Role::ignored, "initial_weight scaling max_weight eta error nonlinear"},
+
+    {"/solver/nonlinear", Role::only, "solver=\"Newton\" allow_out_of_iterations=false"},
+    {"/solver/nonlinear", Role::read, "max_iterations f_delta"},
+    {"/solver/nonlinear", Role::read, "x_delta grad_norm"},
+    {"/solver/nonlinear", Role::read, "x_delta_tol grad_norm_tol rel_grad_norm_tol rel_x_delta_tol newton_decrement_tol norm_type"},
+    {"/solver/nonlinear", Role::ignored, "iterations_per_strategy use_grad_norm"},
+    {"/solver/nonlinear/advanced", Role::read, "first_grad_norm_tol f_delta f_delta_tol"},
+    {"/solver/nonlinear/advanced", Role::ignored, "f_delta_step_tol derivative_along_delta_x_tol apply_gradient_fd gradient_fd_eps"},
+    {"/solver/nonlinear/line_search", Role::read, "method"},
+    {"/solver/nonlinear/line_search", Role::ignored,
+     "use_grad_norm_tol min_step_size max_step_size_iter min_step_size_final max_step_size_iter_final "
+     "default_init_step_size step_ratio Armijo RobustArmijo"},
+    {"/solver/nonlinear/Newton", Role::read, "use_psd_projection"},
+    {"/solver/nonlinear/Newton", Role::ignored,
+     "force_psd_projection residual_tolerance reg_weight_min reg_weight_max reg_weight_inc use_psd_projection_in_regularized"},
+
+    {"/solver/advanced", Role::read, "lump_mass_matrix"},
+    {"/solver/advanced", Role::only,
+     "lagged_regularization_weight=0 lagged_regularization_iterations=1 check_inversion=\"Discrete\""},
+    {"/solver/advanced", Role::ignored, "cache_size characteristic_length characteristic_force_density"},
+
+    {"/space", Role::read, "discr_order"},
+    {"/space/advanced", Role::only,
+     "bc_method=\"sample\" quadrature_order=-1 mass_quadrature_order=-1 n_boundary_samples=-1"},
+    {"/space/remesh", Role::read, "enabled type screening sweeps history"},
+    {"/space/remesh/split", Role::read, "enabled acceptance_tolerance culling_threshold max_depth min_edge_length"},
+    {"/space/remesh/collapse", Role::read,
+     "enabled acceptance_tolerance culling_threshold max_depth rel_max_edge_length abs_max_edge_length"},
+    {"/space/remesh/swap", Role::read, "enabled acceptance_tolerance max_depth"},
+    {"/space/remesh/smooth", Role::read, "enabled acceptance_tolerance max_iters"},
+    {"/space/remesh/local_relaxation", Role::read, "local_mesh_n_ring local_mesh_rel_area max_nl_iterations"},
+};
+
+struct Entry {
+  Role role;
+  Json only;
+};
+
+class KeyTable {
+ public:
+  KeyTable() {
+    for (const Group& group : kGroups) {
+      std::istringstream keys(group.keys);
+      for (std::string key; keys >> key;) add(group, key);
+    }
+  }
+
+  const Entry* find(const std::string& pattern) const {
+    const auto found = entries_.find(pattern);
+    return found == entries_.end() ? nullptr : &found->second;
+  }
+
+  /// Keys that may stand below a pattern, or null if none may.
+  const std::set<std::string>* children(const std::string& pattern) const {
+    const auto found = children_.find(pattern);
+    return found == children_.end() ? nullptr : &found->second;
+  }
+
+  /// A pointer elsewhere in the scene with this key, or nothing.
+  std::string place_of(const std::string& key) const {
+    for (const auto& [pattern, entry] : entries_)
+      if (pattern.ends_with("/" + key)) return pattern;
+    return "";
+  }
+
+ private:
+  void add(const Group& group, const std::string& key) {
+    const auto equal = key.find('=');
+    const std::string pattern = group.prefix + ("/" + key.substr(0, equal));
+    entries_[pattern] = {group.role, equal == std::string::npos ? Json() : Json::parse(key.substr(equal + 1))};
+    for (std::string child = pattern; !child.empty();) {
+      const auto slash = child.rfind('/');
+      children_[child.substr(0, slash)].insert(child.substr(slash + 1));
+      child.resize(slash);
+    }
+  }
+
+  std::map<std::string, Entry> entries_;
+  std::map<std::string, std::set<std::string>> children_;
+};
+
+const KeyTable& key_table() {
+  static const KeyTable table;
+  return table;
+}
+
+[[noreturn]] void refuse_unknown(const Node& parent, const std::string& key, const std::set<std::string>& known) {
+  std::vector<std::string> names(known.begin(), known.end());
+  std::string expected;
+  if (const std::string near = nearest_name(key, names); !near.empty()) expected = "\"" + near + "\" perhaps; ";
+  else if (const std::string place = key_table().place_of(key); !place.empty()) expected = "it at " + place + " perhaps; ";
+  expected += "known here:";
+  for (const auto& name : names) expected += " " + name;
+  parent[key].fail("an unknown key", expected);
+}
+
+void check_keys(const Node& node, const std::string& pattern) {
+  const Entry* entry = key_table().find(pattern);
+  if (entry && entry->role == Role::ignored) return;
+  if (entry && entry->role == Role::refused) node.fail(abbreviate(node.json()), "no such key: it is not supported yet");
+  if (entry && entry->role == Role::only) {
+    if (node.json() != entry->only) node.fail(abbreviate(entry->only) + ": others are not supported yet");
+    return;
+  }
+  const std::set<std::string>* children = key_table().children(pattern);
+  if (!children) return;
+  if (children->contains("*")) {
+    for (const Node& item : node.items()) check_keys(item, pattern + "/*");
+    return;
+  }
+  if (!node.json().is_object()) {
+    if (entry) return;
+    node.fail("an object");
+  }
+  for (const auto& [key, value] : node.json().items()) {
+    if (!children->contains(key)) refuse_unknown(node, key, *children);
+    check_keys(node[key], pattern + "/" + key);
+  }
+}
+
+}  // namespace
+
+void check_keys(const Document& document) { check_keys(Node(document), ""); }
+
+}  // namespace itr::scene

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+// Obstacles: collision-only surfaces out of mesh files (scene-format §2.6).
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "geometry.hpp"
+#include "selection.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+using Edge = std::array<int, 2>;
+using Triangle = std::array<int, 3>;
+
+/// Surface primitives over the points of one file.
+struct Surface {
+  std::vector<Edge> edges;  ///< those of the file and of faces, each once
+  std::vector<Triangle> triangles;
+  std::vector<char> is_used;  ///< per point; points inside of a solid are not
+};
+
+template <std::size_t N>
+std::array<int, N> sorted(std::array<int, N> vertices) {
+  std::sort(vertices.begin(), vertices.end());
+  return vertices;
+}
+
+/// Adds an edge unless it is there in either direction.
+class EdgeList {
+ public:
+  void add(const Edge& edge) {
+    if (seen_.insert(sorted(edge)).second) edges_.push_back(edge);
+  }
+  std::vector<Edge> take() { return std::move(edges_); }
+
+ private:
+  std::set<Edge> seen_;
+  std::vector<Edge> edges_;
+};
+
+/// Facets of simplices that belong to one of them only, in the orientation that they have there.
+template <std::size_t N>
+std::vector<std::array<int, N - 1>> boundary_of(const std::vector<std::array<int, N>>& cells) {
+  std::map<std::array<int, N - 1>, std::pair<int, std::array<int, N - 1>>> facets;
+  for (const auto& cell : cells)
+    for (std::size_t opposite = 0; opposite < N; ++opposite) {
+      std::array<int, N - 1> facet;
+      for (std::size_t k = 0; k + 1 < N; ++k) facet[k] = cell[k < opposite ? k : k + 1];
+      if (opposite % 2 == 1) std::swap(facet[0], facet[1]);
+      auto& [count, oriented] = facets[sorted(facet)];
+      ++count;
+      oriented = facet;
+    }
+  std::vector<std::array<int, N - 1>> boundary;
+  for (const auto& [key, entry] : facets)
+    if (entry.first == 1) boundary.push_back(entry.second);
+  return boundary;
+}
+
+/// A point that only the cells of a solid use is used if it is on their boundary.
+template <typename Cells, typename Facets>
+std::vector<char> find_used(std::size_t num_points, const Cells& solid, const Facets& boundary, const std::vector<Edge>& edges) {
+  std::vector<char> is_used(num_points, true);
+  for (const auto& cell : solid)
+    for (const int v : cell) is_used[v] = false;
+  for (const auto& facet : boundary)
+    for (const int v : facet) is_used[v] = true;
+  for (const Edge& edge : edges)
+    for (const int v : edge) is_used[v] = true;
+  return is_used;
+}
+
+Surface extract_surface(const MeshFile& file, const std::vector<Edge>& polylines, const std::vector<Vec<2>>& points) {
+  std::vector<Triangle> triangles = file.triangles;
+  for (Triangle& t : triangles) {
+    const Vec<2> a = points[t[1]] - points[t[0]], b = points[t[2]] - points[t[0]];
+    if (a[0] * b[1] - a[1] * b[0] < 0) std::swap(t[0], t[1]);
+  }
+  const std::vector<Edge> boundary = boundary_of(triangles);
+  EdgeList edges;
+  for (const Edge& edge : polylines) edges.add(edge);
+  for (const Edge& edge : boundary) edges.add(edge);
+  return {edges.take(), {}, find_used(points.size(), triangles, boundary, polylines)};
+}
+
+Surface extract_surface(const MeshFile& file, const std::vector<Edge>& polylines, const std::vector<Vec<3>>& points) {
+  const std::vector<Triangle> triangles = file.tetrahedra.empty() ? file.triangles : boundary_of(file.tetrahedra);
+  EdgeList edges;
+  for (const Edge& edge : polylines) edges.add(edge);
+  for (const Triangle& t : triangles)
+    for (const Edge& edge : {Edge{t[0], t[1]}, Edge{t[1], t[2]}, Edge{t[2], t[0]}}) edges.add(edge);
+  return {edges.take(), triangles, find_used(points.size(), file.tetrahedra, triangles, polylines)};
+}
+
+/// Splits every edge of the polylines, `times` times.
+template <int Dim>
+void refine_polylines(const Node& geometry, std::vector<Edge>& polylines, std::vector<Vec<Dim>>& points) {
+  constexpr int kMost = 16;
+  const int times = geometry["n_refs"].integer_at_least(0, 0);
+  if (times > kMost) geometry["n_refs"].fail("at most " + std::to_string(kMost));
+  const Node location = geometry["advanced"]["refinement_location"];
+  const double where = location.number(0.5);
+  if (!(where > 0 && where < 1)) location.fail("a number between 0 and 1");
+  for (int i = 0; i < times; ++i) {
+    std::vector<Edge> halves;
+    for (const auto& [a, b] : polylines) {
+      const int middle = static_cast<int>(points.size());
+      points.push_back((1 - where) * points[a] + where * points[b]);
+      halves.insert(halves.end(), {{a, middle}, {middle, b}});
+    }
+    polylines = std::move(halves);
+  }
+}
+
+template <int Dim>
+void check_lengths(const Node& geometry, const Surface& surface, const std::vector<Vec<Dim>>& points) {
+  for (const auto& [a, b] : surface.edges)
+    if (!((points[a] - points[b]).norm() > 0))
+      geometry["mesh"].fail("an obstacle edge of length 0 (vertices " + std::to_string(a) + " and " + std::to_string(b) + ")",
+                            "no degenerate obstacles");
+}
+
+int read_obstacle_id(const Node& node) {
+  if (node.exists() && !node.json().is_number()) node.fail("an integer: an obstacle has one id");
+  return node.exists() ? read_id(node, 0) : kNoTag;
+}
+
+template <int Dim>
+void append(const Surface& surface, const std::vector<Vec<Dim>>& points, const Vec<Dim>& shift, int id,
+            ObstacleGeometry<Dim>& out) {
+  std::vector<int> renumbered(points.size(), kNone);
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    if (!surface.is_used[v]) continue;
+    renumbered[v] = static_cast<int>(out.obstacles.rest.size());
+    out.obstacles.rest.push_back(points[v] + shift);
+    out.obstacles.motion.push_back(kNone);
+    out.id.push_back(id);
+  }
+  for (const auto& [a, b] : surface.edges) out.obstacles.edges.push_back({renumbered[a], renumbered[b]});
+  for (const auto& [a, b, c] : surface.triangles)
+    out.obstacles.triangles.push_back({renumbered[a], renumbered[b], renumbered[c]});
+}
+
+template <int Dim>
+void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<Dim>& out) {
+  std::vector<Vec<Dim>> points = points_of<Dim>(file);
+  transform<Dim>(points, geometry);
+  const Box<Dim> box = bounding_box<Dim>(points);
+  std::vector<Edge> polylines = file.edges;
+  refine_polylines<Dim>(geometry, polylines, points);
+  Surface surface = extract_surface(file, polylines, points);
+  const int extract = geometry["extract"].choice({"volume", "surface", "edges", "points"}, 0);
+  if (extract == 2) surface.triangles.clear();
+  if (extract == 3) surface.triangles.clear(), surface.edges.clear();
+  check_lengths<Dim>(geometry, surface, points);
+  const int id = read_obstacle_id(geometry["surface_selection"]);
+  for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
+}
+
+}  // namespace
+
+template <int Dim>
+ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files) {
+  ObstacleGeometry<Dim> all;
+  for (const Node& geometry : geometries.obstacles) read_obstacle<Dim>(geometry, files.get(geometry), all);
+  return all;
+}
+
+template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&);
+template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&);
+
+}  // namespace itr::scene

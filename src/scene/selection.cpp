@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+#include "selection.hpp"
+
+#include <cmath>
+
+namespace itr::scene {
+
+int read_id(const Node& node, int fallback) {
+  if (node.exists() && node.json().is_string()) node.fail("an integer: files of ids are not supported yet");
+  const int id = node.integer(fallback);
+  if (id < 0 || id > 2147483646) node.fail("an id of 0 to 2147483646");
+  return id;
+}
+
+template <int Dim>
+Selection<Dim>::Selection(const Node& node, const Box<Dim>& box) : box_(box) {
+  for (const Node& item : node.items()) rules_.push_back(read_rule(item));
+}
+
+template <int Dim>
+std::optional<int> Selection<Dim>::operator()(const Vec<Dim>& p, int stored) const {
+  for (const Rule& rule : rules_)
+    if (const std::optional<int> id = rule(p, stored)) return id;
+  return std::nullopt;
+}
+
+template <int Dim>
+typename Selection<Dim>::Rule Selection<Dim>::read_rule(const Node& node) const {
+  if (!node.json().is_object()) return [id = read_id(node, 0)](const Vec<Dim>&, int) { return std::optional(id); };
+  if (!node.has("box") && node.has("threshold")) return read_threshold(node);
+  if (!node.has("id")) {
+    if (node.json().size() != 1 || !node.has("id_offset")) node["id"].fail("the id of what is selected");
+    return [offset = node["id_offset"].integer(0)](const Vec<Dim>&, int stored) { return std::optional(stored + offset); };
+  }
+  const int id = read_id(node["id"], 0);
+  Test test;
+  if (node.has("box")) test = read_box(node);
+  else if (node.has("center")) test = read_sphere(node);
+  else if (node.has("radius")) test = read_cylinder(node);
+  else if (node.has("axis")) test = read_axis(node);
+  else if (node.has("normal")) test = read_plane(node);
+  else if (node.json().size() == 1) test = [](const Vec<Dim>&) { return true; };
+  else node.fail("box, threshold, center, radius, axis or normal, beside the id");
+  return [test, id](const Vec<Dim>& p, int) { return test(p) ? std::optional(id) : std::nullopt; };
+}
+
+/// Sides of the bounding box: left 1, bottom 2, right 3, top 4, back 5, front 6; the rest 7.
+template <int Dim>
+typename Selection<Dim>::Rule Selection<Dim>::read_threshold(const Node& node) const {
+  const double given = node["threshold"].number(0), threshold = given < 0 ? 1e-7 : given;
+  const int offset = node["id_offset"].integer(0);
+  return [box = box_, threshold, offset](const Vec<Dim>& p, int) {
+    const auto is_near = [&](double a, double b) { return std::abs(a - b) < threshold; };
+    int side = 7;
+    if (is_near(p[0], box.min()[0])) side = 1;
+    else if (is_near(p[1], box.min()[1])) side = 2;
+    else if (is_near(p[0], box.max()[0])) side = 3;
+    else if (is_near(p[1], box.max()[1])) side = 4;
+    else if (Dim == 3 && is_near(p[Dim - 1], box.min()[Dim - 1])) side = 5;
+    else if (Dim == 3 && is_near(p[Dim - 1], box.max()[Dim - 1])) side = 6;
+    return std::optional(side + offset);
+  };
+}
+
+template <int Dim>
+Vec<Dim> Selection<Dim>::read_point(const Node& list, bool is_relative) const {
+  const std::vector<double> values = list.numbers();
+  if (values.size() != Dim) list.fail(std::to_string(Dim) + " numbers");
+  const Vec<Dim> point = Eigen::Map<const Vec<Dim>>(values.data());
+  return is_relative ? (box_.min() + point.cwiseProduct(box_.sizes())).eval() : point;
+}
+
+template <int Dim>
+typename Selection<Dim>::Test Selection<Dim>::read_box(const Node& node) const {
+  const Node corners = node["box"];
+  if (!corners.json().is_array() || corners.json().size() != 2) corners.fail("two corners: [[...], [...]]");
+  const bool is_relative = node["relative"].boolean(false);
+  const Box<Dim> box(read_point(corners.at(0), is_relative), read_point(corners.at(1), is_relative));
+  return [box](const Vec<Dim>& p) { return box.contains(p); };
+}
+
+template <int Dim>
+typename Selection<Dim>::Test Selection<Dim>::read_sphere(const Node& node) const {
+  const bool is_relative = node["relative"].boolean(false);
+  if (!node.has("radius")) node["radius"].fail("the radius of the sphere");
+  const Vec<Dim> center = read_point(node["center"], is_relative);
+  const double radius = node["radius"].number(0) * (is_relative ? box_.diagonal().norm() : 1);
+  return [=](const Vec<Dim>& p) { return (p - center).norm() <= radius; };
+}
+
+template <int Dim>
+typename Selection<Dim>::Test Selection<Dim>::read_cylinder(const Node& node) const {
+  const bool is_relative = node["relative"].boolean(false);
+  const Vec<Dim> begin = read_point(node["p1"], is_relative), end = read_point(node["p2"], is_relative);
+  const double radius = node["radius"].number(0) * (is_relative ? box_.diagonal().norm() : 1);
+  const double length = (end - begin).norm();
+  if (!(length > 0)) node["p2"].fail("a point other than p1");
+  const Vec<Dim> axis = (end - begin) / length;
+  return [=](const Vec<Dim>& p) {
+    const double along = (p - begin).dot(axis);
+    return along >= 0 && along <= length && (p - begin - along * axis).norm() <= radius;
+  };
+}
+
+template <int Dim>
+typename Selection<Dim>::Test Selection<Dim>::read_axis(const Node& node) const {
+  const Node axis_node = node["axis"];
+  int axis = 0;  // 1 to Dim, negative for the other direction
+  if (axis_node.json().is_string()) {
+    const std::string name = axis_node.string("");
+    const bool has_sign = name.size() == 2 && (name[0] == '+' || name[0] == '-');
+    const auto found = std::string_view("xyz").find(has_sign || name.size() == 1 ? name.back() : '?');
+    if (found != std::string_view::npos) axis = static_cast<int>(found) + 1;
+    if (has_sign && name[0] == '-') axis = -axis;
+  } else {
+    axis = axis_node.integer(0);
+  }
+  if (axis == 0 || std::abs(axis) > Dim)
+    axis_node.fail(Dim == 2 ? "1, 2, -1, -2 or [+-]x, y" : "1 to 3, -1 to -3 or [+-]x, y, z");
+  const int a = std::abs(axis) - 1;
+  double position = node["position"].number(0);
+  if (!node.has("position")) node["position"].fail("where on the axis the selection begins");
+  if (node["relative"].boolean(false)) position = box_.min()[a] + position * box_.sizes()[a];
+  return [=](const Vec<Dim>& p) { return axis > 0 ? p[a] >= position : p[a] <= position; };
+}
+
+template <int Dim>
+typename Selection<Dim>::Test Selection<Dim>::read_plane(const Node& node) const {
+  const Vec<Dim> normal = read_point(node["normal"], false);
+  const bool is_relative = node["relative"].boolean(false);
+  if (!node.has("point") && !node.has("offset")) node["point"].fail("a point of the plane, or its offset");
+  const Vec<Dim> point =
+      node.has("point") ? read_point(node["point"], is_relative) : (normal * node["offset"].number(0)).eval();
+  return [=](const Vec<Dim>& p) { return (p - point).dot(normal) >= 0; };
+}
+
+template class Selection<2>;
+template class Selection<3>;
+
+}  // namespace itr::scene

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "itr/core/types.hpp"
+#include "node.hpp"
+
+namespace itr::scene {
+
+template <int Dim>
+using Box = Eigen::AlignedBox<double, Dim>;
+
+template <int Dim>
+Box<Dim> bounding_box(const std::vector<Vec<Dim>>& points);
+
+/// Applies `advanced/normalize_mesh` and `transformation` of a geometry (scene-format §2.2): scale, rotate, translate.
+/// Returns whether that turns the orientation round (a mirror).
+template <int Dim>
+bool transform(std::vector<Vec<Dim>>& points, const Node& geometry);
+
+}  // namespace itr::scene

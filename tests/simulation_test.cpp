@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+// Whole steps, with and without remeshing: what must hold whatever the scene.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "itr/core/error.hpp"
+#include "itr/core/parallel.hpp"
+#include "itr/mesh/validate.hpp"
+#include "itr/simulation/simulation.hpp"
+#include "itr/simulation/step_problem.hpp"
+
+namespace itr {
+namespace {
+
+/// A square of n x n cells, two triangles each, with its corner at the origin; facets by side as `threshold` selects them.
+Mesh<2> make_square(int n, double size) {
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i) rest.emplace_back(size * i / n, size * j / n);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const int a = j * (n + 1) + i, b = a + 1, c = a + n + 2, d = a + n + 1;
+      if ((i + j) % 2) {
+        cells.push_back({a, b, c});
+        cells.push_back({a, c, d});
+      } else {
+        cells.push_back({a, b, d});
+        cells.push_back({b, c, d});
+      }
+    }
+  Mesh<2> mesh(rest, cells, std::vector<int>(cells.size(), 1));
+  for (int f = 0; f < mesh.facet_slots(); ++f) {
+    const Vec<2> middle = 0.5 * (mesh.rest(mesh.facet(f)[0]) + mesh.rest(mesh.facet(f)[1]));
+    mesh.set_facet_tag(f, middle[0] < 1e-9 ? 1 : middle[1] < 1e-9 ? 2 : middle[0] > size - 1e-9 ? 3 : 4);
+  }
+  return mesh;
+}
+
+Setup<2> free_square(int n) {
+  Setup<2> setup;
+  setup.mesh = make_square(n, 0.2);
+  setup.materials[1] = {.youngs_modulus = 1e4, .poisson_ratio = 0.4, .density = 1000};
+  setup.time = {.dt = 0.01, .steps = 10};
+  setup.newton.step_tolerance = 1e-10;
+  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 1e-14;
+  return setup;
+}
+
+/// A soft square thrown onto a line.
+Setup<2> impact() {
+  auto setup = free_square(4);
+  setup.obstacles.rest = {{-1, -0.01}, {1, -0.011}};
+  setup.obstacles.edges = {{0, 1}};
+  setup.obstacles.motion = {kNone, kNone};
+  setup.contact = {.enabled = true, .activation_distance = 2e-3, .convergent = true, .barrier_stiffness = 1e4,
+                   .friction_coefficient = 0.2};
+  setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(0.3, -2); }});
+  setup.newton.step_tolerance = 1e-7;
+  setup.newton.gradient_tolerance = 1e-10;
+  return setup;
+}
+
+void enable_remeshing(Setup<2>& setup) {
+  setup.remesh.enabled = true;
+  setup.remesh.split.acceptance_tolerance = 1e-4;
+  setup.remesh.split.culling_threshold = 0.8;
+  setup.remesh.collapse.acceptance_tolerance = -1e-4;
+  setup.remesh.collapse.culling_threshold = 0.1;
+  setup.remesh.collapse.rel_max_edge_length = 3;
+  setup.remesh.swap.enabled = setup.remesh.smooth.enabled = true;
+  setup.remesh.swap.acceptance_tolerance = setup.remesh.smooth.acceptance_tolerance = -1e-5;
+}
+
+Vec<2> momentum(const Simulation<2>& simulation) {
+  const auto& state = simulation.state();
+  const CellSet<2> cells = whole_mesh(state.mesh, simulation.setup().obstacles.rest);
+  const VectorX& v = state.history.v[0];
+  VectorX product = VectorX::Zero(v.size());
+  InertiaEnergy<2>(cells, simulation.setup().materials, MassKind::consistent, VectorX::Zero(v.size())).add_mass_product(v, product);
+  Vec<2> sum = Vec<2>::Zero();
+  for (int i = 0; i < state.mesh.vertex_slots(); ++i) sum += product.segment<2>(2 * i);
+  return sum;
+}
+
+void expect_valid(const Simulation<2>& simulation) {
+  const auto& state = simulation.state();
+  EXPECT_EQ(state.mesh.find_defect(), "");
+  EXPECT_NEAR(state.mesh.total_volume(), 0.04, 1e-15);
+  for (const VectorX& x : state.history.x) {
+    EXPECT_EQ(find_inverted<2>(state.mesh, x), kNone);
+    const CollisionSurface surface = collision_surface(state.mesh, simulation.setup().obstacles);
+    EXPECT_FALSE(find_intersection(x, surface.edges, surface.counts)) << "step " << state.step;
+  }
+}
+
+TEST(Simulation, FreeFallIsExact) {
+  auto setup = free_square(2);
+  setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -10); };
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  for (int step = 1; step <= 10; ++step) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    // Implicit Euler: v_k = -g h k, x_k = x_0 - g h^2 k (k + 1) / 2.
+    EXPECT_NEAR(simulation.state().history.x[0][1], -10 * 1e-4 * step * (step + 1) / 2, 1e-12);
+  }
+}
+
+class Integrators : public ::testing::TestWithParam<TimeOptions> {};
+
+TEST_P(Integrators, KeepMomentumThroughRemeshing) {
+  auto setup = free_square(4);
+  setup.time = GetParam();
+  setup.time.dt = 0.01;
+  setup.time.steps = 8;
+  setup.initial_velocity.push_back({1, [](const Vec<2>& X, double) { return Vec<2>(1 + 8 * X[1] * X[1], 40 * X[0] * X[1] - 0.5); }});
+  enable_remeshing(setup);
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const Vec<2> start = momentum(simulation);
+  int operations = 0;
+  while (!simulation.finished()) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    operations += result.report.splits.accepted + result.report.collapses.accepted + result.report.swaps.accepted +
+                  result.report.smooths.accepted;
+    EXPECT_LE((momentum(simulation) - start).norm(), 1e-10 * start.norm()) << "step " << simulation.state().step;
+    expect_valid(simulation);
+  }
+  EXPECT_GT(operations, 10);
+}
+
+std::string integrator_name(const ::testing::TestParamInfo<TimeOptions>& info) {
+  return info.param.integrator == Integrator::newmark ? "newmark" : info.param.integrator == Integrator::bdf ? "bdf2" : "euler";
+}
+INSTANTIATE_TEST_SUITE_P(All, Integrators,
+                         ::testing::Values(TimeOptions{.integrator = Integrator::implicit_euler},
+                                           TimeOptions{.integrator = Integrator::newmark},
+                                           TimeOptions{.integrator = Integrator::bdf, .bdf_order = 2}),
+                         integrator_name);
+
+TEST(Simulation, ImpactWithRemeshingNeverIntersects) {
+  auto setup = impact();
+  setup.time.steps = 30;
+  enable_remeshing(setup);
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  double nearest = std::numeric_limits<double>::infinity();
+  int accepted = 0;
+  while (!simulation.finished()) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    expect_valid(simulation);
+    EXPECT_GT(result.report.min_distance, 0);
+    nearest = std::min(nearest, result.report.min_distance);
+    accepted += result.report.splits.accepted;
+  }
+  EXPECT_LT(nearest, 2e-3) << "the square never touched the line";
+  EXPECT_GT(accepted, 0);
+}
+
+TEST(Simulation, HasTheSameBitsForOneAndTwoThreads) {
+  const auto run = [](int threads) {
+    const ThreadLimit limit(threads);
+    auto setup = impact();
+    setup.time.steps = 8;
+    enable_remeshing(setup);
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    while (!simulation.finished() && simulation.advance().ok) {
+    }
+    return simulation.state().history.x[0];
+  };
+  const VectorX one = run(1), two = run(2);
+  ASSERT_EQ(one.size(), two.size());
+  EXPECT_TRUE((one.array() == two.array()).all());
+}
+
+TEST(Simulation, RefusesSurfacesThatIntersectAtTheStart) {
+  auto setup = impact();
+  setup.obstacles.rest = {{-1, 0.1}, {1, 0.1}};
+  linear::Registry registry;
+  EXPECT_THROW(Simulation<2>(setup, registry), InputError);
+}
+
+TEST(Simulation, DirichletIsExactAtTheEndOfEachStep) {
+  auto setup = free_square(3);
+  setup.time.quasistatic = true;
+  const auto pull = [](const Vec<2>& X, double t) { return Vec<2>(0.3 * X[1] * t, 2 * t); };
+  setup.dirichlet.push_back({4, {true, true}, pull});
+  setup.dirichlet.push_back({2, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }});
+  enable_remeshing(setup);
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  while (!simulation.finished()) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    const auto& state = simulation.state();
+    for (int f = 0; f < state.mesh.facet_slots(); ++f)
+      if (state.mesh.facet_tag(f) == 4)
+        for (const int v : state.mesh.facet(f)) {
+          const Vec<2> target = state.mesh.rest(v) + pull(state.mesh.rest(v), state.t);
+          EXPECT_EQ(state.history.x[0][2 * v], target[0]);
+          EXPECT_EQ(state.history.x[0][2 * v + 1], target[1]);
+        }
+  }
+}
+
+}  // namespace
+}  // namespace itr
