@@ -33,6 +33,7 @@ namespace {
 
 constexpr double kArmijo = 1e-4;
 constexpr int kIterationsPerFallback = 5;  ///< iterations with the projected Hessian before the true one is tried again
+constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 class Minimizer {
@@ -179,7 +180,9 @@ class Minimizer {
     if (advancing && step < kRelaxBelow) relax_next_ = true;
     const double slope = gradient_.dot(step_);
     // Large enough for the step to lower the merit function of the quadratic model by half of what the penalty gives up.
-    if (advancing) penalty_ = std::max(penalty_, 2 * std::max(0.0, slope + 0.5 * std::max(0.0, model_curvature_)) / remaining_l1_);
+    if (advancing)
+      penalty_ = std::max({penalty_, kLeastPenalty * system_.diagonal_scale() * remaining_l1_,
+                           2 * std::max(0.0, slope + 0.5 * std::max(0.0, model_curvature_)) / remaining_l1_});
     const double merit_slope = advancing ? slope - penalty_ * remaining_l1_ : slope;
     const int limit = options_.line_search == LineSearch::backtracking ? 30 : 40;
     for (int i = 0; i < limit && step > 1e-14; ++i, step /= 2) {

@@ -63,7 +63,7 @@ std::vector<VertexId> common_neighbours(const Mesh<2>& mesh, VertexId a, VertexI
 /// Whether boundary vertex v can slide along the boundary edge v-w: its other boundary edge goes straight on with one tag.
 bool can_slide(const Mesh<2>& mesh, VertexId v, VertexId w, FacetId edge) {
   const auto facets = mesh.facets_of(v);
-  if (facets.size() != 2) return false;
+  if (facets.size() != 2 || is_on_interface(mesh, v)) return false;
   const FacetId other = facets[0] == edge ? facets[1] : facets[0];
   if (mesh.facet_tag(other) != mesh.facet_tag(edge)) return false;
   const auto& f = mesh.facet(other);

@@ -2,7 +2,6 @@
 #include "conditions.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <set>
 
 #include "function.hpp"
@@ -85,11 +84,12 @@ class ConditionReader {
     Obstacles<Dim>& obstacles = geometry.obstacles;
     std::vector<char> is_taken(obstacles.rest.size(), false);
     for (const Node& node : entries) {
-      const std::optional<int> id = is_all(node["id"]) ? std::nullopt : std::optional(read_condition_id(node["id"]));
+      const bool matches_all = is_all(node["id"]);
+      const int id = matches_all ? kNoTag : read_condition_id(node["id"]);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
       std::vector<Vec<Dim>> moved;
       for (std::size_t v = 0; v < obstacles.rest.size(); ++v) {
-        if (is_taken[v] || (id && *id != geometry.id[v])) continue;
+        if (is_taken[v] || (!matches_all && id != geometry.id[v])) continue;
         is_taken[v] = true;
         if (value.is_zero) continue;  // fixed
         obstacles.motion[v] = static_cast<int>(obstacles.motions.size());

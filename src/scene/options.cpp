@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: MIT
+#include "options.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "function.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+constexpr double kMostSteps = 1e9;
+
+void read_integrator(const Node& node, TimeOptions& options) {
+  const bool is_object = node.exists() && node.json().is_object();
+  const Node name = is_object ? node["type"] : node;
+  if (is_object && !name.exists()) name.fail("the type of integrator");
+  const int index =
+      name.choice({"ImplicitEuler", "ImplicitNewmark", "BDF", "BDF1", "BDF2", "BDF3", "BDF4", "BDF5", "BDF6"}, 0);
+  options.integrator = std::array{Integrator::implicit_euler, Integrator::newmark, Integrator::bdf}[std::min(index, 2)];
+  if (index > 2) options.bdf_order = index - 2;
+  if (index == 2) {
+    if (!is_object) name.fail("BDF1 to BDF6, or an object with type and steps");
+    options.bdf_order = node["steps"].integer_at_least(1, 1);
+    if (options.bdf_order > 6) node["steps"].fail("1 to 6");
+  }
+  options.newmark_beta = node["beta"].positive(0.25);
+  options.newmark_gamma = node["gamma"].positive(0.5);
+  if (options.newmark_beta > 0.5) node["beta"].fail("a number of (0, 0.5]");
+  if (options.newmark_gamma > 1) node["gamma"].fail("a number of (0, 1]");
+}
+
+/// Two of tend, dt, time_steps; a third must agree with them.
+void read_steps(const Node& time, TimeOptions& options) {
+  const Node tend = time["tend"], dt = time["dt"], steps = time["time_steps"];
+  if (tend.exists() + dt.exists() + steps.exists() < 2)
+    time.fail(abbreviate(time.json()), "two of tend, dt and time_steps");
+  if (tend.exists() && !(tend.number(0) > options.t0)) tend.fail("a time after t0 = " + std::to_string(options.t0));
+  const double duration = tend.number(0) - options.t0;
+  options.steps = steps.integer_at_least(1, 1);
+  options.dt = dt.exists() ? dt.positive(1) : duration / options.steps;
+  if (!tend.exists()) return;
+  if (steps.exists()) {
+    if (std::abs(options.steps * options.dt - duration) > 1e-12 * std::max(1.0, duration))
+      time.fail(abbreviate(time.json()), "tend = t0 + dt * time_steps, or only two of them");
+    return;
+  }
+  const double count = std::ceil(duration / options.dt);
+  if (count > kMostSteps) dt.fail("at most 1e9 steps");
+  options.steps = static_cast<int>(count);
+}
+
+void read_acceptance(const Node& node, bool& enabled, double& tolerance) {
+  enabled = node["enabled"].boolean(enabled);
+  tolerance = node["acceptance_tolerance"].number(tolerance);
+}
+
+double read_share(const Node& node, double fallback) {
+  const double value = node.number(fallback);
+  if (!(value >= 0 && value <= 1)) node.fail("a number of [0, 1]");
+  return value;
+}
+
+}  // namespace
+
+TimeOptions read_time(const Node& root) {
+  TimeOptions options;
+  const Node time = root["time"];
+  if (!time.exists()) {
+    options.is_static = true;
+    return options;
+  }
+  options.t0 = time["t0"].number(0);
+  options.quasistatic = time["quasistatic"].boolean(false);
+  read_steps(time, options);
+  read_integrator(time["integrator"], options);
+  return options;
+}
+
+double characteristic_length(const Node& root, const TimeOptions& time) {
+  return root["units"]["characteristic_length"].positive(1) * (time.is_static ? 1 : time.dt);
+}
+
+ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<std::string>& warnings) {
+  const Node contact = root["contact"], solver = root["solver"]["contact"];
+  ContactOptions options;
+  options.enabled = contact["enabled"].boolean(false);
+  options.activation_distance = contact["dhat"].positive(1e-3);
+  const double share = contact["dhat_percentage"].positive(0.8);
+  if (options.enabled && options.activation_distance > shortest_edge) {
+    if (!contact.has("dhat")) options.activation_distance = share * shortest_edge;
+    else warnings.push_back(contact["dhat"].pointer() + ": longer than the shortest edge of the surfaces, " +
+                            std::to_string(shortest_edge));
+  }
+  options.convergent = contact["use_convergent_formulation"].boolean(false);
+  options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
+  options.friction_velocity = contact["epsv"].positive(1e-3);
+  const Node stiffness = solver["barrier_stiffness"];
+  options.adaptive_stiffness = !stiffness.exists() || stiffness.json() == "adaptive";
+  if (!options.adaptive_stiffness) {
+    if (!stiffness.json().is_number()) stiffness.fail("a number > 0, or \"adaptive\"");
+    options.barrier_stiffness = stiffness.positive(1);
+  }
+  options.friction_iterations = solver["friction_iterations"].integer(1);
+  options.friction_tolerance = solver["friction_convergence_tol"].non_negative(1e-2);
+  return options;
+}
+
+namespace {
+
+constexpr const char* kMainKeys[] = {"x_delta_tol",     "grad_norm_tol",        "rel_grad_norm_tol",
+                                     "rel_x_delta_tol", "newton_decrement_tol", "norm_type"};
+
+/// Energy differences between iterates are not tested; a scene that asks for no more than rounding loses nothing.
+void check_energy_tolerance(const Node& node) {
+  constexpr double kTiny = 1e-10;
+  if (node.non_negative(0) > kTiny) node.fail("at most 1e-10: stopping by energy differences is not supported yet");
+}
+
+Node find_main_key(const Node& nonlinear) {
+  for (const char* key : kMainKeys)
+    if (nonlinear.has(key)) return nonlinear[key];
+  return nonlinear["x_delta_tol"];
+}
+
+/// scene-format §7.2: tolerances in the paper's sense.
+void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& options) {
+  options.step_tolerance = length * nonlinear["x_delta"].non_negative(0);
+  options.gradient_tolerance = length * nonlinear["grad_norm"].non_negative(1e-8);
+  options.first_gradient_tolerance = length * nonlinear["advanced"]["first_grad_norm_tol"].non_negative(1e-10);
+}
+
+/// scene-format §7.3, as far as it says the same as §7.2: in the Euclidean norm, without relative tests.
+void read_main_tolerances(const Node& nonlinear, const Node& present, NewtonOptions& options) {
+  for (const char* key : {"x_delta", "grad_norm"})
+    if (nonlinear.has(key)) nonlinear[key].fail(std::string("\"") + key + "\" beside " + present.pointer(),
+                                                "one vocabulary of tolerances, not two");
+  const Node norm = nonlinear["norm_type"];
+  if (norm.choice({"L2", "Linf", "Euclidean"}, 0) != 2)
+    present.fail("x_delta and grad_norm, or norm_type \"Euclidean\": the norms L2 and Linf are not supported yet");
+  for (const char* key : {"rel_grad_norm_tol", "rel_x_delta_tol", "newton_decrement_tol"}) {
+    constexpr double kTiny = 1e-10;  // the default of the first: to stop there or a little later is the same
+    if (nonlinear[key].non_negative(0) > kTiny) nonlinear[key].fail("at most 1e-10: relative tests are not supported yet");
+  }
+  options.step_tolerance = nonlinear["x_delta_tol"].non_negative(0);
+  options.gradient_tolerance = nonlinear["grad_norm_tol"].non_negative(1e-10);
+  options.first_gradient_tolerance = nonlinear["advanced"]["first_grad_norm_tol"].non_negative(1e-12);
+}
+
+}  // namespace
+
+NewtonOptions read_newton(const Node& root, double characteristic_length) {
+  const Node nonlinear = root["solver"]["nonlinear"];
+  NewtonOptions options;
+  options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, 500);
+  const Node main_key = find_main_key(nonlinear);
+  if (main_key.exists()) read_main_tolerances(nonlinear, main_key, options);
+  else read_paper_tolerances(nonlinear, characteristic_length, options);
+  check_energy_tolerance(nonlinear["f_delta"]);
+  check_energy_tolerance(nonlinear["advanced"]["f_delta"]);
+  check_energy_tolerance(nonlinear["advanced"]["f_delta_tol"]);
+  options.line_search = static_cast<LineSearch>(
+      nonlinear["line_search"]["method"].choice({"Backtracking", "Armijo", "RobustArmijo"}, static_cast<int>(options.line_search)));
+  options.project_to_psd = nonlinear["Newton"]["use_psd_projection"].boolean(true);
+  return options;
+}
+
+LinearOptions read_linear(const Node& root) {
+  LinearOptions options;
+  std::vector<std::string> names;
+  for (const Node& node : root["solver"]["linear"]["solver"].items())
+    if (const std::string name = node.string(""); !name.empty()) names.push_back(name);
+  if (!names.empty()) options.solvers = names;
+  return options;
+}
+
+RemeshOptions read_remesh(const Node& root) {
+  const Node node = root["space"]["remesh"];
+  RemeshOptions options;
+  options.enabled = node["enabled"].boolean(false);
+  options.sizing_field = node["type"].choice({"physics", "sizing_field"}, 0) == 1;
+  options.screening = static_cast<Screening>(node["screening"].choice({"energy-percentile", "predicted-decrease", "none"}, 0));
+  options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));
+  options.sweeps = node["sweeps"].integer_at_least(1, 1);
+
+  const Node split = node["split"], collapse = node["collapse"], swap = node["swap"], smooth = node["smooth"];
+  read_acceptance(split, options.split.enabled, options.split.acceptance_tolerance);
+  options.split.culling_threshold = read_share(split["culling_threshold"], options.split.culling_threshold);
+  options.split.max_depth = split["max_depth"].integer_at_least(0, options.split.max_depth);
+  options.split.min_edge_length = split["min_edge_length"].non_negative(options.split.min_edge_length);
+
+  read_acceptance(collapse, options.collapse.enabled, options.collapse.acceptance_tolerance);
+  options.collapse.culling_threshold = read_share(collapse["culling_threshold"], options.collapse.culling_threshold);
+  options.collapse.max_depth = collapse["max_depth"].integer_at_least(0, options.collapse.max_depth);
+  options.collapse.rel_max_edge_length = collapse["rel_max_edge_length"].non_negative(options.collapse.rel_max_edge_length);
+  options.collapse.abs_max_edge_length = collapse["abs_max_edge_length"].non_negative(options.collapse.abs_max_edge_length);
+
+  read_acceptance(swap, options.swap.enabled, options.swap.acceptance_tolerance);
+  options.swap.max_depth = swap["max_depth"].integer_at_least(0, options.swap.max_depth);
+  read_acceptance(smooth, options.smooth.enabled, options.smooth.acceptance_tolerance);
+  options.smooth.max_iterations = smooth["max_iters"].integer_at_least(1, options.smooth.max_iterations);
+
+  const Node local = node["local_relaxation"];
+  options.local.rings = local["local_mesh_n_ring"].integer_at_least(0, options.local.rings);
+  options.local.relative_volume = read_share(local["local_mesh_rel_area"], options.local.relative_volume);
+  options.local.max_iterations = local["max_nl_iterations"].integer_at_least(1, options.local.max_iterations);
+  options.local.max_contact_iterations = std::max(options.local.max_contact_iterations, options.local.max_iterations);
+  return options;
+}
+
+OutputOptions read_output(const Node& root) {
+  // Output keys never stop a scene: what is no positive integer is passed over.
+  const Node skip = root["output"]["paraview"]["skip_frame"];
+  const bool is_usable = skip.exists() && skip.json().is_number_integer() && skip.json() > 0 && skip.json() < 1e9;
+  OutputOptions options;
+  if (is_usable) options.skip_frames = skip.integer(1);
+  return options;
+}
+
+bool read_lump_mass(const Node& root) { return root["solver"]["advanced"]["lump_mass_matrix"].boolean(false); }
+
+void check_space(const Node& root) {
+  for (const Node& entry : root["space"]["discr_order"].items()) {
+    const Node order = entry.json().is_object() ? entry["order"] : entry;
+    if (order.integer_at_least(1, 1) != 1) order.fail("1: higher orders are not supported yet");
+  }
+}
+
+namespace {
+
+/// E and nu, given or from the Lame parameters.
+void read_moduli(const Node& node, int dimension, Material& material) {
+  const bool has_lame = node.has("lambda") || node.has("mu");
+  if (has_lame && (node.has("E") || node.has("nu"))) node.fail("E and nu, or lambda and mu, not both");
+  if (has_lame) {
+    for (const char* key : {"lambda", "mu"})
+      if (!node.has(key)) node[key].fail("both of lambda and mu");
+    const double lambda = read_constant(node["lambda"], 0), mu = read_constant(node["mu"], 0);
+    if (!(mu > 0)) node["mu"].fail("a number > 0");
+    if (!(3 * lambda + 2 * mu > 0)) node["lambda"].fail("a number > -2/3 mu");
+    material.poisson_ratio = lambda / (2 * (lambda + mu));
+    material.youngs_modulus = 2 * mu * (1 + material.poisson_ratio);
+    material.plane_strain = dimension == 2;  // the formula that gives lambda back, as it is used as given
+    return;
+  }
+  for (const char* key : {"E", "nu"})
+    if (!node.has(key)) node[key].fail("a number");
+  material.youngs_modulus = read_constant(node["E"], 0);
+  material.poisson_ratio = read_constant(node["nu"], 0);
+  material.plane_strain = node["plane_strain"].boolean(false);
+  if (!(material.youngs_modulus > 0)) node["E"].fail("a number > 0");
+  if (!(material.poisson_ratio > -1 && material.poisson_ratio < 0.5)) node["nu"].fail("a number of (-1, 0.5)");
+}
+
+Material read_material(const Node& node, int dimension) {
+  if (!node.json().is_object()) node.fail("a material");
+  if (!node.has("type")) node["type"].fail("the material law, \"NeoHookean\"");
+  if (node["type"].string("") != "NeoHookean") node["type"].fail("\"NeoHookean\": other laws are not supported yet");
+  Material material;
+  read_moduli(node, dimension, material);
+  material.density = read_constant(node["rho"], 1);
+  if (!(material.density > 0)) node["rho"].fail("a number > 0");
+  return material;
+}
+
+}  // namespace
+
+std::map<int, Material> read_materials(const Node& root, int dimension, const std::vector<int>& bodies,
+                                       std::vector<std::string>& warnings) {
+  const Node node = root["materials"];
+  if (!node.exists()) node.fail("the materials of the bodies");
+  std::map<int, Material> materials;
+  if (!node.json().is_array()) {  // one for everything, whatever its id
+    for (const int body : bodies) materials[body] = read_material(node, dimension);
+    return materials;
+  }
+  for (const Node& entry : node.items()) {
+    const Material material = read_material(entry, dimension);
+    std::vector<int> ids;
+    for (const Node& id : entry["id"].items()) ids.push_back(id.integer(0));
+    if (!entry.has("id")) ids = {0};
+    for (const int id : ids)
+      if (!materials.insert_or_assign(id, material).second)
+        warnings.push_back(entry.pointer() + ": replaces the material before it of id " + std::to_string(id));
+  }
+  for (const int body : bodies)
+    if (!materials.contains(body))
+      node.fail("no material with the id " + std::to_string(body) + ", which elements of the mesh have", "one for every body");
+  return materials;
+}
+
+}  // namespace itr::scene

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// The parts of a scene that are plain options: time, contact, solver, remeshing, materials, output.
+#pragma once
+
+#include <map>
+
+#include "itr/scene/scene.hpp"
+#include "node.hpp"
+
+namespace itr::scene {
+
+TimeOptions read_time(const Node& root);
+/// The length that PolyFEM multiplies tolerances with: h, or 1 for statics (scene-format §1.5).
+double characteristic_length(const Node& root, const TimeOptions& time);
+
+/// `shortest_edge` of the rest surfaces, obstacles included: dhat shrinks below it unless the scene gives it (§6.1).
+ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<std::string>& warnings);
+NewtonOptions read_newton(const Node& root, double characteristic_length);
+LinearOptions read_linear(const Node& root);
+RemeshOptions read_remesh(const Node& root);
+OutputOptions read_output(const Node& root);
+bool read_lump_mass(const Node& root);
+void check_space(const Node& root);
+
+/// By body id; InputError for a body of `bodies` (ascending, each once) without one.
+std::map<int, Material> read_materials(const Node& root, int dimension, const std::vector<int>& bodies,
+                                       std::vector<std::string>& warnings);
+
+}  // namespace itr::scene

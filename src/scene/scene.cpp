@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#include "itr/scene/scene.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "conditions.hpp"
+#include "geometry.hpp"
+#include "known_keys.hpp"
+#include "merge.hpp"
+#include "options.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+template <int Dim>
+std::vector<int> bodies_of(const Mesh<Dim>& mesh) {
+  std::set<int> bodies;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) bodies.insert(mesh.body(c));
+  return {bodies.begin(), bodies.end()};
+}
+
+/// Of the surfaces that can touch: the bodies' boundary and the obstacles.
+template <int Dim>
+double shortest_surface_edge(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
+  double shortest = std::numeric_limits<double>::infinity();
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    for (int i = 0; i < Dim; ++i)
+      for (int j = 0; j < i; ++j)
+        shortest = std::min(shortest, (mesh.rest(mesh.facet(f)[i]) - mesh.rest(mesh.facet(f)[j])).norm());
+  for (const auto& [a, b] : obstacles.edges) shortest = std::min(shortest, (obstacles.rest[a] - obstacles.rest[b]).norm());
+  return shortest;
+}
+
+template <int Dim>
+Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
+  Setup<Dim> setup;
+  setup.time = read_time(root);
+  setup.newton = read_newton(root, characteristic_length(root, setup.time));
+  setup.remesh = read_remesh(root);
+  setup.linear = read_linear(root);
+  setup.lump_mass = read_lump_mass(root);
+  check_space(root);
+
+  setup.mesh = read_bodies<Dim>(geometries, files, warnings);
+  setup.materials = read_materials(root, Dim, bodies_of(setup.mesh), warnings);
+  read_conditions<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
+  setup.contact = read_contact(root, shortest_surface_edge<Dim>(setup.mesh, setup.obstacles), warnings);
+  return setup;
+}
+
+int read_max_threads(const Node& root) {
+  const Node node = root["solver"]["max_threads"];
+  const bool is_usable = node.exists() && node.json().is_number_integer() && node.json() > 0 && node.json() < 1e6;
+  return is_usable ? node.integer(0) : 0;
+}
+
+std::string read_directory(const Node& root) {
+  const Node node = root["output"]["directory"];
+  return node.exists() && node.json().is_string() ? node.string("") : "";
+}
+
+}  // namespace
+
+Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides) {
+  const Document document = load_document(file, overrides);
+  check_keys(document);
+  const Node root(document);
+  MeshFiles files;
+  const Geometries geometries = list_geometries(root);
+
+  Scene scene;
+  scene.output = read_output(root);
+  scene.max_threads = read_max_threads(root);
+  scene.directory = read_directory(root);
+  if (find_dimension(geometries, files) == 2) scene.setup = read_setup<2>(root, geometries, files, scene.warnings);
+  else scene.setup = read_setup<3>(root, geometries, files, scene.warnings);
+  return scene;
+}
+
+}  // namespace itr::scene

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+
+#include "itr/core/error.hpp"
+#include "itr/mesh/readers.hpp"
+#include "itr/mesh/refine.hpp"
+
+namespace itr {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A file that lives as long as the test.
+class TemporaryFile {
+ public:
+  TemporaryFile(const std::string& name, const std::string& bytes)
+      : path_(fs::path(::testing::TempDir()) / ("itr_readers_" + std::to_string(::getpid()) + "_" + name)) {
+    std::ofstream(path_, std::ios::binary) << bytes;
+  }
+  ~TemporaryFile() { fs::remove(path_); }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+MeshFile read_bytes(const std::string& name, const std::string& bytes) {
+  return read_mesh_file(TemporaryFile(name, bytes).path());
+}
+
+InputError::Parts failure(const std::string& name, const std::string& bytes) {
+  try {
+    read_bytes(name, bytes);
+  } catch (const InputError& error) {
+    return error.parts();
+  }
+  ADD_FAILURE() << "read without an error";
+  return {};
+}
+
+template <typename... Values>
+std::string raw(Values... values) {
+  std::string bytes;
+  (bytes.append(reinterpret_cast<const char*>(&values), sizeof(values)), ...);
+  return bytes;
+}
+
+using std::int32_t;
+using std::uint64_t;
+
+const std::string kText22 =
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 7 \"$odd name\"\n$EndPhysicalNames\n"
+    "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 1 1 0.5\n$EndNodes\n"
+    "$Elements\n4\n1 15 2 0 1 1\n2 1 2 9 1 1 2\n3 2 2 7 1 1 2 3\n4 2 0 2 4 3\n$EndElements\n";
+
+std::string binary22() {
+  std::string bytes = "$MeshFormat\n2.2 1 8\n" + raw(int32_t{1}) + "\n$EndMeshFormat\n$Nodes\n4\n";
+  const double xyz[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int32_t i = 0; i < 4; ++i) bytes += raw(i + 1, xyz[i][0], xyz[i][1], xyz[i][2]);
+  bytes += "\n$EndNodes\n$Elements\n1\n" + raw(int32_t{4}, int32_t{1}, int32_t{2});
+  bytes += raw(int32_t{1}, int32_t{5}, int32_t{1}, int32_t{1}, int32_t{2}, int32_t{3}, int32_t{4});
+  return bytes + "\n$EndElements\n";
+}
+
+const std::string kText41 =
+    "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+    "$Entities\n1 0 1 0\n3 0 0 0 0\n1 0 0 0 1 1 0 2 8 9 1 3\n$EndEntities\n"
+    "$Nodes\n2 3 10 30\n0 3 0 1\n10\n0 0 0\n2 1 1 2\n20\n30\n1 0 0 0.5 0.5\n0 1 0 0.5 0.5\n$EndNodes\n"
+    "$Elements\n1 1 1 1\n2 1 2 1\n1 10 20 30\n$EndElements\n";
+
+std::string binary41() {
+  const auto u = [](uint64_t value) { return value; };
+  std::string bytes = "$MeshFormat\n4.1 1 8\n" + raw(int32_t{1}) + "\n$EndMeshFormat\n$Entities\n";
+  bytes += raw(u(0), u(0), u(1), u(0), int32_t{1}, 0., 0., 0., 1., 1., 0., u(1), int32_t{6}, u(0)) + "\n$EndEntities\n$Nodes\n";
+  bytes += raw(u(1), u(3), u(1), u(3), int32_t{2}, int32_t{1}, int32_t{0}, u(3), u(2), u(1), u(3));
+  bytes += raw(1., 0., 0., 0., 0., 0., 0., 1., 0.) + "\n$EndNodes\n$Elements\n";
+  bytes += raw(u(1), u(1), u(1), u(1), int32_t{2}, int32_t{1}, int32_t{2}, u(1), u(1), u(1), u(2), u(3));
+  return bytes + "\n$EndElements\n";
+}
+
+TEST(MeshReaders, Msh22Text) {
+  const MeshFile mesh = read_bytes("a.msh", kText22);
+
+  EXPECT_EQ(mesh.vertices.size(), 4u);
+  EXPECT_EQ(mesh.vertices[3], Vec<3>(1, 1, 0.5));
+  EXPECT_EQ(mesh.edges, (std::vector<std::array<int, 2>>{{0, 1}}));
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {1, 3, 2}}));
+  EXPECT_EQ(mesh.triangle_body, (std::vector<int>{7, 0}));
+}
+
+TEST(MeshReaders, Msh22Binary) {
+  const MeshFile mesh = read_bytes("a.msh", binary22());
+
+  EXPECT_EQ(mesh.vertices[3], Vec<3>(0, 0, 1));
+  EXPECT_EQ(mesh.tetrahedra, (std::vector<std::array<int, 4>>{{0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.tetrahedron_body, std::vector<int>{5});
+}
+
+TEST(MeshReaders, Msh41TextRenumbersSparseTagsInFileOrder) {
+  const MeshFile mesh = read_bytes("a.msh", kText41);
+
+  EXPECT_EQ(mesh.vertices.size(), 3u);
+  EXPECT_EQ(mesh.vertices[1], Vec<3>(1, 0, 0));
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}}));
+  EXPECT_EQ(mesh.triangle_body, std::vector<int>{8});
+}
+
+TEST(MeshReaders, Msh41BinaryPlacesDenseTags) {
+  const MeshFile mesh = read_bytes("a.MSH", binary41());
+
+  EXPECT_EQ(mesh.vertices[0], Vec<3>(0, 0, 0));  // tag 1, second in the file
+  EXPECT_EQ(mesh.vertices[1], Vec<3>(1, 0, 0));
+  EXPECT_EQ(mesh.triangle_body, std::vector<int>{6});
+}
+
+TEST(MeshReaders, ObjWithRelativeIndicesAndPolylines) {
+  const MeshFile mesh =
+      read_bytes("a.obj", "# comment\nv 0 0\r\nv 1 0 0\nvt 0 0\nv +1e0 1 2 0.1 0.2 0.3\nf 1/1 2//3 -1\nl 1 2 3\ng x\n");
+
+  EXPECT_EQ(mesh.vertices[2], Vec<3>(1, 1, 2));
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}}));
+  EXPECT_EQ(mesh.edges, (std::vector<std::array<int, 2>>{{0, 1}, {1, 2}}));
+}
+
+TEST(MeshReaders, SaysWhereAFileIsWrong) {
+  EXPECT_THROW(read_mesh_file("/no/such/file.msh"), InputError);
+  EXPECT_THROW(read_bytes("a.stl", ""), InputError);
+  EXPECT_EQ(failure("a.obj", "v 0 0\nv 1 x\n").place, "line 2");
+  EXPECT_EQ(failure("a.obj", "v 0 0\nv 1 0\nv 1 1\nv 0 1\nf 1 2 3 4\n").place, "line 5");
+  EXPECT_EQ(failure("a.obj", "v 0 0\nv 1 0\nv 1 1\nf 1 2 9\n").place, "triangle 0");
+  EXPECT_EQ(failure("a.obj", "v 0 0\nv 1 nan\n").place, "vertex 1");
+  EXPECT_EQ(failure("a.obj", "").found, "no vertices");
+  EXPECT_EQ(failure("a.msh", "$MeshFormat\n3 0 8\n$EndMeshFormat\n").place, "line 2");
+  EXPECT_EQ(failure("a.msh", "nonsense").expected, "$MeshFormat");
+}
+
+TEST(MeshReaders, RefusesOtherElementTypes) {
+  std::string text = kText22;
+  text.replace(text.find("3 2 2 7 1 1 2 3"), 15, "3 3 2 7 1 1 2 3");
+
+  EXPECT_NE(failure("a.msh", text).found.find("element 3 of type 3"), std::string::npos);
+}
+
+TEST(MeshReaders, RefusesUnknownNodesAndHugeCounts) {
+  std::string unknown = kText22;
+  unknown.replace(unknown.find("2 4 3\n"), 6, "2 5 3\n");
+  std::string huge = kText22;
+  huge.replace(huge.find("$Nodes\n4"), 8, "$Nodes\n4000000000");
+
+  EXPECT_EQ(failure("a.msh", unknown).found, "node 5");
+  EXPECT_NE(failure("a.msh", huge).found.find("a count of 4000000000"), std::string::npos);
+}
+
+// Every beginning of a file is an InputError (or, where only white space is missing, the mesh): never a crash.
+TEST(MeshReaders, TruncatedFilesAreErrors) {
+  for (const std::string& whole : {kText22, binary22(), kText41, binary41()})
+    for (std::size_t size = 0; size + 14 < whole.size(); ++size) {
+      try {
+        const MeshFile mesh = read_bytes("cut.msh", whole.substr(0, size));
+        EXPECT_TRUE(mesh.triangles.empty() && mesh.tetrahedra.empty()) << size;  // cut between two sections
+      } catch (const InputError&) {
+      }
+    }
+}
+
+TEST(Refine, TriangleIntoFourKeepsAreaTagsAndBody) {
+  Mesh<2> mesh({{0, 0}, {2, 0}, {0, 2}}, {{0, 1, 2}}, {4});
+  mesh.set_facet_tag(mesh.find_facet({0, 1}), 7);
+
+  const Mesh<2> refined = refine_uniformly(mesh);
+
+  EXPECT_EQ(refined.num_cells(), 4);
+  EXPECT_EQ(refined.num_vertices(), 6);
+  EXPECT_EQ(refined.rest(3), Vec<2>(1, 0));  // the first edge that the cell meets
+  EXPECT_DOUBLE_EQ(refined.total_volume(), 2);
+  EXPECT_EQ(refined.body(3), 4);
+  EXPECT_EQ(refined.facet_tag(refined.find_facet({0, 3})), 7);
+  EXPECT_EQ(refined.facet_tag(refined.find_facet({3, 1})), 7);
+  EXPECT_EQ(refined.facet_tag(refined.find_facet({0, 4})), kNoTag);
+  EXPECT_EQ(refined.find_defect(), "");
+}
+
+TEST(Refine, TetrahedronIntoEightOfEqualVolume) {
+  Mesh<3> mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2, 3}}, {2});
+  mesh.set_facet_tag(mesh.find_facet({0, 1, 2}), 3);
+
+  const Mesh<3> once = refine_uniformly(mesh);
+  const Mesh<3> twice = refine_uniformly(once);
+
+  EXPECT_EQ(once.num_cells(), 8);
+  EXPECT_EQ(once.num_vertices(), 10);
+  for (CellId c = 0; c < 8; ++c) EXPECT_NEAR(once.volume(c), mesh.volume(0) / 8, 1e-15);
+  EXPECT_EQ(twice.num_cells(), 64);
+  EXPECT_EQ(twice.num_vertices(), 35);
+  EXPECT_EQ(twice.find_defect(), "");
+  int tagged = 0;
+  for (FacetId f = 0; f < twice.num_facets(); ++f) tagged += twice.facet_tag(f) == 3;
+  EXPECT_EQ(tagged, 16);
+}
+
+TEST(MeshReaders, EveryMeshOfThePaper) {
+  const fs::path folder = fs::path(ITR_SHARED_DIR) / "paper-scenes" / "meshes";
+  if (!fs::exists(folder)) GTEST_SKIP() << "no scenes of the paper at " << folder;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const fs::path& file = entry.path();
+    if ((file.extension() != ".msh" && file.extension() != ".obj") || file.filename() == "cantilever-quad.obj") continue;
+    const MeshFile mesh = read_mesh_file(file);
+    EXPECT_GT(mesh.triangles.size() + mesh.tetrahedra.size() + mesh.edges.size(), 0u) << file;
+  }
+}
+
+}  // namespace
+}  // namespace itr
