@@ -38,11 +38,11 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 fs::path resolve_path(const fs::path& path, const fs::path& root, const fs::path& scene_file) {
   if (path.empty() || path.is_absolute()) return path;
   std::error_code ignored;
-  if (fs::exists(path, ignored)) return path;
   // A root_path that names a folder of somebody else's computer: the scene's own folder is what was meant.
   const fs::path& base = fs::exists(root, ignored) ? root : scene_file;
   const fs::path folder = fs::is_directory(base, ignored) ? base : base.parent_path();
-  return (folder / path).lexically_normal();
+  const fs::path below = (folder / path).lexically_normal();
+  return !fs::exists(below, ignored) && fs::exists(path, ignored) ? path : below;
 }
 
 fs::path Document::resolve(const std::string& path) const { return resolve_path(path, root, file); }

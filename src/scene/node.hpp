@@ -21,7 +21,8 @@ struct Document {
   std::filesystem::path root;  ///< effective root_path
   Json json;
 
-  /// scene-format §1.3: absolute, else relative to the working directory if it exists there, else relative to `root`.
+  /// Absolute, else relative to `root`, else (if only there is such a file) to the working directory. Unlike scene-format
+  /// §1.3 the root comes first: what a scene means must not depend on where the command is run.
   std::filesystem::path resolve(const std::string& path) const;
 };
 

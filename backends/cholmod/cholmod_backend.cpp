@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+// CHOLMOD as a loadable module: supernodal and simplicial Cholesky of the lower triangle.
+#include <cholmod.h>
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <vector>
+
+#include "itr/linear/module_adapter.hpp"
+
+namespace {
+
+template <int Supernodal>
+class Cholmod {
+ public:
+  Cholmod() {
+    cholmod_start(&common_);
+    common_.print = 0;
+    common_.error_handler = nullptr;
+    common_.supernodal = Supernodal;
+    common_.final_ll = 1;
+    common_.quick_return_if_not_posdef = 1;
+  }
+  ~Cholmod() {
+    cholmod_free_factor(&factor_, &common_);
+    cholmod_free_dense(&solution_, &common_);
+    cholmod_free_dense(&workspace_y_, &common_);
+    cholmod_free_dense(&workspace_e_, &common_);
+    cholmod_finish(&common_);
+  }
+  Cholmod(const Cholmod&) = delete;
+  Cholmod& operator=(const Cholmod&) = delete;
+
+  int analyze(const itr_pattern& pattern, int) {
+    const int n = pattern.order;
+    starts_.assign(pattern.column_starts, pattern.column_starts + n + 1);
+    rows_.assign(pattern.row_indices, pattern.row_indices + starts_[n]);
+    values_.assign(rows_.size(), 0.0);
+    matrix_ = {};
+    matrix_.nrow = matrix_.ncol = n;
+    matrix_.nzmax = rows_.size();
+    matrix_.p = starts_.data();
+    matrix_.i = rows_.data();
+    matrix_.x = values_.data();
+    matrix_.stype = -1;  // symmetric, the lower triangle is stored
+    matrix_.itype = CHOLMOD_INT;
+    matrix_.xtype = CHOLMOD_REAL;
+    matrix_.dtype = CHOLMOD_DOUBLE;
+    matrix_.sorted = matrix_.packed = 1;
+    cholmod_free_factor(&factor_, &common_);
+    factor_ = cholmod_analyze(&matrix_, &common_);
+    return status();
+  }
+
+  int factorize(const double* values, size_t count) {
+    std::copy(values, values + count, values_.begin());
+    cholmod_factorize(&matrix_, factor_, &common_);
+    if (common_.status == CHOLMOD_NOT_POSDEF || (factor_ && factor_->minor < factor_->n)) {
+      common_.status = CHOLMOD_OK;
+      return ITR_NOT_POSITIVE_DEFINITE;
+    }
+    return status();
+  }
+
+  int solve(const double* rhs, double* solution, int columns) {
+    cholmod_dense b{};
+    b.nrow = b.d = matrix_.nrow;
+    b.ncol = columns;
+    b.nzmax = b.nrow * b.ncol;
+    b.x = const_cast<double*>(rhs);  // CHOLMOD does not write to it
+    b.xtype = CHOLMOD_REAL;
+    b.dtype = CHOLMOD_DOUBLE;
+    if (!cholmod_solve2(CHOLMOD_A, factor_, &b, nullptr, &solution_, nullptr, &workspace_y_, &workspace_e_, &common_))
+      return status() == ITR_OK ? ITR_FAILED : status();
+    std::copy_n(static_cast<const double*>(solution_->x), b.nzmax, solution);
+    return ITR_OK;
+  }
+
+  const char* message() const {
+    std::snprintf(text_.data(), text_.size(), "CHOLMOD status %d", common_.status);
+    return text_.data();
+  }
+
+ private:
+  int status() const {
+    if (common_.status == CHOLMOD_OUT_OF_MEMORY || common_.status == CHOLMOD_TOO_LARGE) return ITR_OUT_OF_MEMORY;
+    return common_.status >= CHOLMOD_OK && factor_ ? ITR_OK : ITR_FAILED;
+  }
+
+  cholmod_common common_{};
+  cholmod_sparse matrix_{};
+  cholmod_factor* factor_ = nullptr;
+  cholmod_dense* solution_ = nullptr;
+  cholmod_dense *workspace_y_ = nullptr, *workspace_e_ = nullptr;
+  std::vector<int> starts_, rows_;
+  std::vector<double> values_;
+  mutable std::array<char, 64> text_{};
+};
+
+/// Version text; also sets OpenBLAS to one thread, so that results do not depend on the environment.
+const char* version() {
+  static char text[128];
+  const char* blas = "reference BLAS (install libopenblas-dev: it is much faster)";
+  if (auto* set_threads = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"))) set_threads(1);
+  // The module is loaded locally, so its BLAS is searched among its own dependencies.
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<void*>(&version), &info) && info.dli_fname)
+    if (void* self = dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD)) {
+      if (auto* set_threads = reinterpret_cast<void (*)(int)>(dlsym(self, "openblas_set_num_threads"))) {
+        set_threads(1);
+        blas = "OpenBLAS";
+      }
+      dlclose(self);
+    }
+  std::snprintf(text, sizeof text, "CHOLMOD %d.%d.%d, %s", CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION, blas);
+  return text;
+}
+
+}  // namespace
+
+extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
+  using Supernodal = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL>>;
+  using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
+  static const itr_engine engines[] = {Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", 0),
+                                       Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", 0)};
+  static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
+  return &module;
+}

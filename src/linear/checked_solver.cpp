@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: MIT
+// No backend is trusted: input is checked, the residual of every solve is computed, poor ones are refined.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine.hpp"
+
+namespace itr::linear {
+
+const char* to_string(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::ok: return "ok";
+    case Outcome::not_positive_definite: return "not positive definite";
+    case Outcome::singular: return "singular";
+    case Outcome::non_finite: return "not finite";
+    case Outcome::out_of_memory: return "out of memory";
+    case Outcome::not_converged: return "not converged";
+    case Outcome::failed: return "failed";
+  }
+  return "";
+}
+
+namespace {
+
+constexpr int kRefinements = 2;
+
+bool is_finite(std::span<const double> values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+double norm(std::span<const double> v) {
+  double sum = 0;
+  for (const double x : v) sum += x * x;
+  return std::sqrt(sum);
+}
+
+class CheckedSolver final : public Solver {
+ public:
+  CheckedSolver(std::string name, Capabilities capabilities, std::unique_ptr<Engine> engine)
+      : name_(std::move(name)), capabilities_(capabilities), engine_(std::move(engine)) {}
+  std::string_view name() const override { return name_; }
+  Capabilities capabilities() const override { return capabilities_; }
+  std::string message() const override { return message_; }
+
+  Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
+    pattern_ = pattern;
+    values_.clear();
+    ready_ = false;
+    return pattern.order == 0 ? Outcome::ok : note(engine_->analyze(pattern_, hints));
+  }
+
+  Outcome factorize(std::span<const double> values) override {
+    ready_ = false;
+    if (values.size() != pattern_.nonzeros()) return note(Outcome::failed, "the number of values is not that of the pattern");
+    if (!is_finite(values)) return note(Outcome::non_finite, "a matrix entry is not finite");
+    values_.assign(values.begin(), values.end());
+    const Outcome outcome = pattern_.order == 0 ? Outcome::ok : note(engine_->factorize(values));
+    ready_ = outcome == Outcome::ok;
+    return outcome;
+  }
+
+  SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
+    const std::size_t n = pattern_.order;
+    if (!ready_) return {note(Outcome::failed, "no factorisation to solve with"), 1};
+    if (B.size() != n * columns || X.size() != B.size()) return {note(Outcome::failed, "wrong length of a vector"), 1};
+    if (n == 0) return {};
+    if (!is_finite(B)) return {note(Outcome::non_finite, "a right-hand side is not finite"), 1};
+    SolveReport report{engine_->solve(B, X, columns), 0};
+    if (report.outcome != Outcome::ok && report.outcome != Outcome::not_converged) {
+      note(report.outcome);
+      return report;
+    }
+    for (int c = 0; c < columns; ++c)
+      report.relative_residual = std::max(report.relative_residual, refine(B.subspan(c * n, n), X.subspan(c * n, n), asked));
+    if (!is_finite(X)) return {note(Outcome::non_finite, "the solution is not finite"), report.relative_residual};
+    report.outcome = report.relative_residual <= asked ? Outcome::ok : note(Outcome::not_converged, "the asked residual was not reached");
+    return report;
+  }
+
+ private:
+  Outcome note(Outcome outcome, std::string message = {}) {
+    if (outcome != Outcome::ok) message_ = message.empty() ? engine_->message() : std::move(message);
+    if (outcome != Outcome::ok && message_.empty()) message_ = to_string(outcome);
+    return outcome;
+  }
+
+  /// residual = b - A x.
+  void residual(std::span<const double> b, std::span<const double> x) {
+    residual_.assign(b.begin(), b.end());
+    for (int j = 0; j < pattern_.order; ++j)
+      for (int p = pattern_.column_starts[j]; p < pattern_.column_starts[j + 1]; ++p) {
+        const int i = pattern_.row_indices[p];
+        residual_[i] -= values_[p] * x[j];
+        if (i != j) residual_[j] -= values_[p] * x[i];
+      }
+  }
+
+  /// Iterative refinement of one column; returns the relative residual that it ends with.
+  double refine(std::span<const double> b, std::span<double> x, double asked) {
+    const double scale = norm(b);
+    residual(b, x);
+    double now = norm(residual_);
+    if (scale == 0) return now == 0 ? 0 : 1;
+    for (int i = 0; i < kRefinements && now > asked * scale; ++i) {
+      correction_.resize(b.size());
+      if (engine_->solve(residual_, correction_, 1) != Outcome::ok) break;
+      previous_.assign(x.begin(), x.end());
+      for (std::size_t k = 0; k < b.size(); ++k) x[k] += correction_[k];
+      residual(b, x);
+      const double next = norm(residual_);
+      if (!(next < now)) {
+        std::copy(previous_.begin(), previous_.end(), x.begin());
+        break;
+      }
+      now = next;
+    }
+    return now / scale;
+  }
+
+  std::string name_;
+  Capabilities capabilities_;
+  std::unique_ptr<Engine> engine_;
+  SparsityPattern pattern_;
+  std::vector<double> values_, residual_, correction_, previous_;
+  bool ready_ = false;
+  std::string message_;
+};
+
+}  // namespace
+
+std::unique_ptr<Solver> make_checked_solver(std::string name, Capabilities capabilities, std::unique_ptr<Engine> engine) {
+  return std::make_unique<CheckedSolver>(std::move(name), capabilities, std::move(engine));
+}
+
+double self_test_residual(Solver& solver) {
+  // A chain of springs with alternating stiffness, held at one end.
+  constexpr int kOrder = 50;
+  SparsityPattern pattern;
+  pattern.order = kOrder;
+  std::vector<double> values;
+  for (int j = 0; j < kOrder; ++j) {
+    pattern.column_starts.push_back(static_cast<int>(values.size()));
+    pattern.row_indices.push_back(j);
+    values.push_back(j + 1 < kOrder ? 3 + j % 2 : 2);
+    if (j + 1 == kOrder) continue;
+    pattern.row_indices.push_back(j + 1);
+    values.push_back(-1 - j % 2);
+  }
+  pattern.column_starts.push_back(static_cast<int>(values.size()));
+  std::vector<double> b(kOrder), x(kOrder);
+  for (int i = 0; i < kOrder; ++i) b[i] = std::cos(i);
+  if (solver.analyze(pattern, {}) != Outcome::ok || solver.factorize(values) != Outcome::ok) return -1;
+  const SolveReport report = solver.solve(b, x, 1, 1e-10);
+  return report.outcome == Outcome::ok ? report.relative_residual : -1;
+}
+
+}  // namespace itr::linear

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+#include <Eigen/Cholesky>
+#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseLU>
+#include <algorithm>
+#include <cmath>
+
+#include "engine.hpp"
+
+namespace itr::linear {
+
+namespace {
+
+using Sparse = Eigen::SparseMatrix<double>;
+using ConstColumns = Eigen::Map<const Eigen::MatrixXd>;
+using Columns = Eigen::Map<Eigen::MatrixXd>;
+
+constexpr double kSingular = 1e-15;  ///< smallest pivot over the largest, below which a factorisation means nothing
+
+/// Keeps the lower triangle as Eigen's matrix; factorisations of one pattern only copy values.
+class LowerTriangleEngine : public Engine {
+ public:
+  Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints&) override {
+    const std::vector<double> zeros(pattern.nonzeros(), 0.0);
+    matrix_ = Eigen::Map<const Sparse>(pattern.order, pattern.order, static_cast<int>(pattern.nonzeros()),
+                                       pattern.column_starts.data(), pattern.row_indices.data(), zeros.data());
+    return analyze_matrix();
+  }
+  Outcome factorize(std::span<const double> values) override {
+    std::copy(values.begin(), values.end(), matrix_.valuePtr());
+    return factorize_matrix();
+  }
+
+ protected:
+  virtual Outcome analyze_matrix() = 0;
+  virtual Outcome factorize_matrix() = 0;
+  ConstColumns in(std::span<const double> B, int columns) const { return {B.data(), matrix_.rows(), columns}; }
+  Columns out(std::span<double> X, int columns) const { return {X.data(), matrix_.rows(), columns}; }
+  Sparse matrix_;
+};
+
+Outcome check_pivots(const Eigen::VectorXd& pivots) {
+  if (!pivots.allFinite()) return Outcome::singular;
+  const double largest = pivots.cwiseAbs().maxCoeff();
+  return pivots.cwiseAbs().minCoeff() > kSingular * largest ? Outcome::ok : Outcome::singular;
+}
+
+class Ldlt final : public LowerTriangleEngine {
+ public:
+  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
+    out(X, columns) = solver_.solve(in(B, columns));
+    return Outcome::ok;
+  }
+
+ private:
+  Outcome analyze_matrix() override {
+    solver_.analyzePattern(matrix_);
+    return Outcome::ok;
+  }
+  Outcome factorize_matrix() override {
+    solver_.factorize(matrix_);
+    return solver_.info() == Eigen::Success ? check_pivots(solver_.vectorD()) : Outcome::singular;
+  }
+  Eigen::SimplicialLDLT<Sparse> solver_;
+};
+
+class Llt final : public LowerTriangleEngine {
+ public:
+  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
+    out(X, columns) = solver_.solve(in(B, columns));
+    return Outcome::ok;
+  }
+
+ private:
+  Outcome analyze_matrix() override {
+    solver_.analyzePattern(matrix_);
+    return Outcome::ok;
+  }
+  Outcome factorize_matrix() override {
+    solver_.factorize(matrix_);
+    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_positive_definite;
+  }
+  Eigen::SimplicialLLT<Sparse> solver_;
+};
+
+class Lu final : public LowerTriangleEngine {
+ public:
+  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
+    out(X, columns) = solver_.solve(in(B, columns));
+    return Outcome::ok;
+  }
+
+ private:
+  // SparseLU may drop entries that cancel when it is given a pattern of zeros, so it analyses with the first values.
+  Outcome analyze_matrix() override {
+    analyzed_ = false;
+    return Outcome::ok;
+  }
+  Outcome factorize_matrix() override {
+    const Sparse full = matrix_.selfadjointView<Eigen::Lower>();
+    if (!analyzed_) solver_.analyzePattern(full);
+    analyzed_ = true;
+    solver_.factorize(full);
+    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::singular;
+  }
+  Eigen::SparseLU<Sparse> solver_;
+  bool analyzed_ = false;
+};
+
+class ConjugateGradients final : public LowerTriangleEngine {
+ public:
+  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
+    out(X, columns) = solver_.solve(in(B, columns));
+    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_converged;
+  }
+
+ private:
+  Outcome analyze_matrix() override { return Outcome::ok; }
+  Outcome factorize_matrix() override {
+    if ((matrix_.diagonal().array() <= 0).any()) return Outcome::not_positive_definite;
+    solver_.setTolerance(1e-12);
+    solver_.setMaxIterations(std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
+    solver_.compute(matrix_);
+    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::failed;
+  }
+  Eigen::ConjugateGradient<Sparse, Eigen::Lower> solver_;
+};
+
+class Dense final : public LowerTriangleEngine {
+ public:
+  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
+    out(X, columns) = solver_.solve(in(B, columns));
+    return Outcome::ok;
+  }
+
+ private:
+  Outcome analyze_matrix() override { return Outcome::ok; }
+  Outcome factorize_matrix() override {
+    solver_.compute(Eigen::MatrixXd(matrix_));
+    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_positive_definite;
+  }
+  Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_eigen_ldlt() { return std::make_unique<Ldlt>(); }
+std::unique_ptr<Engine> make_eigen_llt() { return std::make_unique<Llt>(); }
+std::unique_ptr<Engine> make_eigen_lu() { return std::make_unique<Lu>(); }
+std::unique_ptr<Engine> make_eigen_cg() { return std::make_unique<ConjugateGradients>(); }
+std::unique_ptr<Engine> make_dense() { return std::make_unique<Dense>(); }
+
+}  // namespace itr::linear

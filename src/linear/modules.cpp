@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include "modules.hpp"
+
+#include <dlfcn.h>
+
+#include <cstdlib>
+#include <sstream>
+
+#include "engine.hpp"
+#include "itr/linear/abi.h"
+
+namespace itr::linear {
+
+namespace {
+
+/// An engine on the other side of the C boundary.
+class ModuleEngine final : public Engine {
+ public:
+  explicit ModuleEngine(const itr_engine& table) : table_(table), self_(table.create()) {}
+  ~ModuleEngine() override {
+    if (self_) table_.destroy(self_);
+  }
+  ModuleEngine(const ModuleEngine&) = delete;
+  ModuleEngine& operator=(const ModuleEngine&) = delete;
+  Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
+    if (!self_) return Outcome::out_of_memory;
+    const itr_pattern view{pattern.order, pattern.column_starts.data(), pattern.row_indices.data()};
+    return outcome(table_.analyze(self_, &view, hints.block_size));
+  }
+  Outcome factorize(std::span<const double> values) override {
+    return self_ ? outcome(table_.factorize(self_, values.data(), values.size())) : Outcome::out_of_memory;
+  }
+  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
+    return self_ ? outcome(table_.solve(self_, B.data(), X.data(), columns)) : Outcome::out_of_memory;
+  }
+  std::string message() const override { return self_ ? table_.message(self_) : "no memory for the solver"; }
+
+ private:
+  static Outcome outcome(int32_t code) { return code >= ITR_OK && code <= ITR_FAILED ? static_cast<Outcome>(code) : Outcome::failed; }
+  const itr_engine& table_;
+  void* self_;
+};
+
+static_assert(static_cast<int>(Outcome::failed) == ITR_FAILED && static_cast<int>(Outcome::singular) == ITR_SINGULAR);
+
+std::vector<ModuleRow> broken(const std::filesystem::path& file, std::string reason) {
+  ModuleRow row;
+  row.info.name = file.stem().string();
+  row.info.reason = std::move(reason);
+  return {row};
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> module_folders() {
+  std::vector<std::filesystem::path> folders;
+  if (const char* path = std::getenv("ITR_BACKEND_PATH")) {
+    std::istringstream list(path);
+    for (std::string folder; std::getline(list, folder, ':');)
+      if (!folder.empty()) folders.emplace_back(folder);
+  }
+#ifdef ITR_INSTALL_BACKEND_DIR
+  folders.emplace_back(ITR_INSTALL_BACKEND_DIR);
+#endif
+#ifdef ITR_BUILD_BACKEND_DIR
+  folders.emplace_back(ITR_BUILD_BACKEND_DIR);
+#endif
+  return folders;
+}
+
+std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
+  void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  if (!handle) {
+    const char* why = dlerror();
+    return broken(file, std::string("does not load: ") + (why ? why : "unknown reason"));
+  }
+  const auto entry = reinterpret_cast<itr_backend_entry>(dlsym(handle, ITR_BACKEND_ENTRY));
+  if (!entry) return broken(file, "is no solver module: it has no " ITR_BACKEND_ENTRY);
+  const itr_module* module = entry();
+  if (!module || module->abi_version != ITR_BACKEND_ABI_VERSION)
+    return broken(file, "has ABI version " + std::to_string(module ? module->abi_version : 0) + ", this library " +
+                            std::to_string(ITR_BACKEND_ABI_VERSION) + ": rebuild it");
+  std::vector<ModuleRow> rows;
+  for (int i = 0; i < module->num_engines; ++i) {
+    const itr_engine& engine = module->engines[i];
+    const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
+                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0};
+    rows.push_back({{engine.name, engine.library_version, engine.license, capabilities, true, ""}, [&engine, capabilities] {
+                      return make_checked_solver(engine.name, capabilities, std::make_unique<ModuleEngine>(engine));
+                    }});
+  }
+  return rows;
+}
+
+}  // namespace itr::linear

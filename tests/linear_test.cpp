@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+// One suite over every solver that is there: right answers against dense long double, failures as the right outcome.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <thread>
+
+#include "itr/core/error.hpp"
+#include "itr/linear/registry.hpp"
+
+namespace itr::linear {
+namespace {
+
+using Dense = Eigen::MatrixXd;
+
+struct System {
+  SparsityPattern pattern;
+  std::vector<double> values;
+  Dense full;
+};
+
+/// Lower triangle of a dense symmetric matrix; exact zeros off the diagonal are not stored.
+System from_dense(const Dense& full) {
+  System system;
+  system.full = full;
+  system.pattern.order = static_cast<int>(full.rows());
+  system.pattern.column_starts.push_back(0);
+  for (int j = 0; j < full.rows(); ++j) {
+    for (int i = j; i < full.rows(); ++i)
+      if (i == j || full(i, j) != 0) {
+        system.pattern.row_indices.push_back(i);
+        system.values.push_back(full(i, j));
+      }
+    system.pattern.column_starts.push_back(static_cast<int>(system.values.size()));
+  }
+  return system;
+}
+
+/// Springs between neighbours of a grid with `dim` unknowns a node, all directions coupled: like elasticity.
+Dense springs(int dim, int side, double stiff) {
+  int nodes = 1;
+  for (int d = 0; d < dim; ++d) nodes *= side;
+  Dense A = Dense::Identity(dim * nodes, dim * nodes) * 0.01;
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  int stride = 1;
+  for (int d = 0; d < dim; ++d, stride *= side)
+    for (int a = 0; a + stride < nodes; ++a) {
+      Eigen::VectorXd g = Eigen::VectorXd::Zero(dim * nodes);
+      for (int c = 0; c < dim; ++c) {
+        const double direction = normal(random);
+        g[dim * a + c] = direction;
+        g[dim * (a + stride) + c] = -direction;
+      }
+      A += (a % 17 == 0 ? stiff : 1.0) * g * g.transpose();
+    }
+  return A;
+}
+
+Dense tridiagonal(int n, double diagonal, double off) {
+  Dense A = Dense::Identity(n, n) * diagonal;
+  for (int i = 0; i + 1 < n; ++i) A(i, i + 1) = A(i + 1, i) = off;
+  return A;
+}
+
+class EverySolver : public ::testing::TestWithParam<std::string> {
+ protected:
+  std::unique_ptr<Solver> solver_ = Registry().create(GetParam());
+
+  void expect_solves(const System& system, double tolerance, int columns = 1, bool analyze = true) {
+    const int n = system.pattern.order;
+    Eigen::MatrixXd B = Eigen::MatrixXd::NullaryExpr(n, columns, [](Eigen::Index i, Eigen::Index j) { return std::cos(1.0 + i + 3 * j); });
+    Eigen::MatrixXd X(n, columns);
+    if (analyze) { ASSERT_EQ(solver_->analyze(system.pattern, {.block_size = 1}), Outcome::ok) << solver_->message(); }
+    ASSERT_EQ(solver_->factorize(system.values), Outcome::ok) << solver_->message();
+    const auto report = solver_->solve({B.data(), std::size_t(B.size())}, {X.data(), std::size_t(X.size())}, columns, tolerance);
+    ASSERT_EQ(report.outcome, Outcome::ok) << report.relative_residual;
+    double worst = 0;
+    for (int c = 0; c < columns; ++c) {
+      const auto residual = (B.col(c).cast<long double>() - system.full.cast<long double>() * X.col(c).cast<long double>()).norm();
+      worst = std::max(worst, double(residual) / B.col(c).norm());
+    }
+    EXPECT_LE(worst, 2 * tolerance);
+    EXPECT_NEAR(report.relative_residual, worst, 1e-3 * worst + 1e-13);  // what it reports is true
+  }
+  bool is_cholesky() const { return !solver_->capabilities().indefinite && !solver_->capabilities().iterative; }
+};
+
+TEST_P(EverySolver, SolvesElasticity) {
+  expect_solves(from_dense(springs(2, 9, 1)), 1e-10);
+  expect_solves(from_dense(springs(3, 4, 1)), 1e-10);
+}
+
+TEST_P(EverySolver, SolvesMassMatrices) { expect_solves(from_dense(tridiagonal(60, 4, 1)), 1e-12); }
+
+TEST_P(EverySolver, ReachesOrReportsStiffSystems) {
+  const System system = from_dense(springs(2, 6, 1e10));
+  std::vector<double> b(system.pattern.order, 1.0), x(system.pattern.order);
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  ASSERT_EQ(solver_->factorize(system.values), Outcome::ok);
+  const auto report = solver_->solve(b, x, 1, 1e-8);
+  const Eigen::Map<Eigen::VectorXd> solution(x.data(), x.size());
+  const double residual = double((Eigen::VectorXd::Ones(x.size()).cast<long double>() -
+                                  system.full.cast<long double>() * solution.cast<long double>()).norm()) / std::sqrt(x.size());
+  EXPECT_NEAR(report.relative_residual, residual, 0.1 * residual + 1e-9);
+  EXPECT_EQ(report.outcome == Outcome::ok, report.relative_residual <= 1e-8);
+}
+
+TEST_P(EverySolver, NeverSolvesIndefiniteSystemsSilently) {
+  Dense A = tridiagonal(20, 4, 1);
+  A(7, 7) = -9;
+  const System system = from_dense(A);
+  if (solver_->capabilities().indefinite) return expect_solves(system, 1e-10);
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  EXPECT_EQ(solver_->factorize(system.values), Outcome::not_positive_definite);
+}
+
+TEST_P(EverySolver, ReportsSingularSystems) {
+  Dense A = tridiagonal(30, 2, -1);
+  A(0, 0) = A(29, 29) = 1;  // a free chain: constants are in the null space
+  const System system = from_dense(A);
+  std::vector<double> b(30, 1.0), x(30);
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  const Outcome outcome = solver_->factorize(system.values);
+  if (outcome == Outcome::ok) {  // round-off hid it: the residual must not
+    EXPECT_NE(solver_->solve(b, x, 1, 1e-8).outcome, Outcome::ok);
+  }
+}
+
+TEST_P(EverySolver, RefusesWhatIsNotFinite) {
+  System system = from_dense(tridiagonal(10, 4, 1));
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  auto broken = system.values;
+  broken[3] = std::nan("");
+  EXPECT_EQ(solver_->factorize(broken), Outcome::non_finite);
+  ASSERT_EQ(solver_->factorize(system.values), Outcome::ok);
+  std::vector<double> b(10, HUGE_VAL), x(10);
+  EXPECT_EQ(solver_->solve(b, x, 1, 1e-8).outcome, Outcome::non_finite);
+}
+
+TEST_P(EverySolver, SolvesEmptyAndSingleSystems) {
+  const System empty = from_dense(Dense(0, 0));
+  ASSERT_EQ(solver_->analyze(empty.pattern, {}), Outcome::ok);
+  ASSERT_EQ(solver_->factorize(empty.values), Outcome::ok);
+  EXPECT_EQ(solver_->solve({}, {}, 1, 1e-8).outcome, Outcome::ok);
+  expect_solves(from_dense(Dense::Constant(1, 1, 3.0)), 1e-14);
+}
+
+TEST_P(EverySolver, ReusesAndChangesPatterns) {
+  System system = from_dense(springs(2, 5, 1));
+  expect_solves(system, 1e-10);
+  for (double& v : system.values) v *= 3;
+  system.full *= 3;
+  expect_solves(system, 1e-10, 1, false);
+  expect_solves(from_dense(tridiagonal(11, 5, 1)), 1e-12);
+}
+
+TEST_P(EverySolver, SolvesSeveralRightHandSides) { expect_solves(from_dense(springs(2, 6, 1)), 1e-10, 5); }
+
+TEST_P(EverySolver, TwoInTwoThreadsDoNotDisturbEachOther) {
+  const auto work = [&](int n) {
+    const auto solver = Registry().create(GetParam());
+    const System system = from_dense(tridiagonal(n, 4, 1));
+    std::vector<double> b(n, 1.0), x(n);
+    for (int i = 0; i < 50; ++i)
+      if (solver->analyze(system.pattern, {}) != Outcome::ok || solver->factorize(system.values) != Outcome::ok ||
+          solver->solve(b, x, 1, 1e-10).outcome != Outcome::ok)
+        return false;
+    return true;
+  };
+  bool first = false, second = false;
+  std::thread a([&] { first = work(100); }), b([&] { second = work(157); });
+  a.join();
+  b.join();
+  EXPECT_TRUE(first && second);
+}
+
+std::vector<std::string> present() {
+  std::vector<std::string> names;
+  for (const auto& info : Registry().list())
+    if (info.available) names.push_back(info.name);
+  return names;
+}
+std::string test_name(const ::testing::TestParamInfo<std::string>& info) {
+  std::string name = info.param;
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  return name;
+}
+INSTANTIATE_TEST_SUITE_P(Present, EverySolver, ::testing::ValuesIn(present()), test_name);
+
+TEST(Registry, NamesOfOthersMapToOurs) {
+  EXPECT_EQ(Registry::canonical_name("eigen"), "eigen:ldlt");
+  EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod:supernodal");
+  EXPECT_EQ(Registry::canonical_name("Eigen::PardisoLLT"), "");
+}
+
+TEST(Registry, UnknownNamesListWhatThereIs) {
+  try {
+    Registry().create("no-such-solver");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(error.parts().expected.find("eigen:ldlt"), std::string::npos);
+    EXPECT_NE(error.parts().expected.find("mumps"), std::string::npos);
+  }
+}
+
+TEST(Registry, AModuleThatDoesNotLoadSaysWhyAndTheRestGoOn) {
+  const auto folder = std::filesystem::temp_directory_path() / "itr_broken_modules";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "itr_backend_broken.so") << "not a library";
+  setenv("ITR_BACKEND_PATH", folder.c_str(), 1);
+  bool told = false;
+  for (const auto& info : Registry().list())
+    if (info.name == "itr_backend_broken") told = !info.available && info.reason.find("does not load") != std::string::npos;
+  unsetenv("ITR_BACKEND_PATH");
+  std::filesystem::remove_all(folder);
+  EXPECT_TRUE(told);
+  EXPECT_GE(self_test_residual(*Registry().create("eigen")), 0);
+}
+
+TEST(Registry, AProgramAddsItsOwn) {
+  Registry registry;
+  registry.add({.name = "mine", .available = true}, [] { return Registry().create("eigen"); });
+  EXPECT_GE(self_test_residual(*registry.create("mine")), 0);
+}
+
+}  // namespace
+}  // namespace itr::linear

@@ -1,0 +1,519 @@
+// SPDX-License-Identifier: MIT
+#include "itr/scene/scene.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "itr/core/error.hpp"
+#include "scene/expression.hpp"
+#include "scene/interpolation.hpp"
+
+namespace itr::scene {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+double evaluate(const std::string& text, double x = 0, double y = 0, double z = 0, double t = 0) {
+  return Expression(text)({x, y, z, t});
+}
+
+TEST(Expression, OperatorsAsTinyexpr) {
+  EXPECT_EQ(evaluate("-2^2"), 4);
+  EXPECT_EQ(evaluate("2^3^2"), 64);
+  EXPECT_EQ(evaluate("2^-1"), 0.5);
+  EXPECT_EQ(evaluate("7 % 4 - 2 * 3 / 4"), 1.5);
+  EXPECT_EQ(evaluate("--1 + +.5e1"), 6);
+  EXPECT_EQ(evaluate("(1, 2) + 1"), 3);
+  EXPECT_EQ(evaluate("x + 10*y + 100*z + 1000*t", 1, 2, 3, 4), 4321);
+}
+
+TEST(Expression, Functions) {
+  EXPECT_EQ(evaluate("log(100)"), 2);
+  EXPECT_NEAR(evaluate("ln(e)"), 1, 1e-15);
+  EXPECT_NEAR(evaluate("sin pi"), 0, 1e-15);
+  EXPECT_EQ(evaluate("if(0, 1, 2)"), 1);
+  EXPECT_EQ(evaluate("if(-1, 1, 2)"), 2);
+  EXPECT_EQ(evaluate("min(3, max(1, 2)) + sign(-4) + sign(0)"), 1);
+  EXPECT_NEAR(evaluate("smooth_abs(-0.3, 5)"), -0.3 * std::tanh(-1.5), 1e-15);
+  EXPECT_NEAR(evaluate("rotate_2D_x(1, 0, pi/2)"), 0, 1e-15);
+  EXPECT_NEAR(evaluate("rotate_2D_y(1, 0, deg2rad(90))"), 1, 1e-15);
+  EXPECT_EQ(evaluate("fac(5) + ncr(5, 2) + npr(5, 2)"), 150);
+  EXPECT_EQ(evaluate("fac(1e9)"), INFINITY);
+  EXPECT_EQ(evaluate("smoothstep(0.5) + compare(1, 2) + half_smoothstep(2)"), 2.5);
+  EXPECT_EQ(evaluate("pi() - pi"), 0);
+  EXPECT_TRUE(Expression("1e6 / 16").is_constant());
+  EXPECT_FALSE(Expression("0 * t").is_constant());
+}
+
+TEST(Expression, RefusesWhatItDoesNotKnow) {
+  for (const char* text : {"", "1 +", "foo(1)", "min(1)", "min(1, 2, 3)", "2 2", "sin()", "(1", "x = 1", "X", "1..2", "if"})
+    EXPECT_THROW(Expression{text}, ExpressionError) << text;
+  EXPECT_THROW(Expression(std::string(100000, '(')), ExpressionError);
+  try {
+    Expression("1 + smoth_abs(t, 1)");
+    FAIL();
+  } catch (const ExpressionError& error) {
+    EXPECT_NE(std::string(error.what()).find("'smoth_abs' at character 5"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("smooth_abs"), std::string::npos);
+  }
+}
+
+Interpolation interpolation(const json& text) {
+  static Document document;  // outlives what is read from it
+  document = {"test.json", "", text};
+  return Interpolation(Node(document));
+}
+
+TEST(Interpolation, Ramps) {
+  EXPECT_EQ(Interpolation()(3), 1);
+  EXPECT_EQ(interpolation({{"type", "linear"}})(3), 3);
+  const Interpolation ramp = interpolation({{"type", "linear_ramp"}, {"from", 1}, {"to", 3}});
+  EXPECT_EQ(ramp(0), 0);
+  EXPECT_EQ(ramp(2.5), 1.5);
+  EXPECT_EQ(ramp(9), 2);
+}
+
+json piecewise(const char* type, const char* extend) {
+  return {{"type", type}, {"points", {0, 1, 3}}, {"values", {0, 2, 1}}, {"extend", extend}};
+}
+
+TEST(Interpolation, PiecesAndTheirExtension) {
+  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "constant"))(0.999), 0);
+  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "constant"))(1), 2);
+  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "constant"))(3), 1);
+  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "repeat"))(3), 0);
+  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "constant"))(2), 1.5);
+  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "extrapolate"))(5), 0);
+  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "extrapolate"))(-1), -2);
+  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "repeat"))(3.5), 1);
+  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "repeat_offset"))(6.5), 3);
+  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "repeat_offset"))(-2), 1);
+}
+
+TEST(Interpolation, CubicIsTwiceDifferentiableWithTheEndsOfItsExtension) {
+  const double h = 1e-4;
+  for (const char* extend : {"constant", "extrapolate", "repeat", "repeat_offset"}) {
+    const Interpolation g = interpolation(piecewise("piecewise_cubic", extend));
+    const auto slope = [&](double t) { return (g(t + h) - g(t - h)) / (2 * h); };
+    const auto curvature = [&](double t) { return (g(t + h) - 2 * g(t) + g(t - h)) / (h * h); };
+    for (const auto& [point, value] : {std::pair{0., 0.}, {1., 2.}, {3. - 1e-12, 1.}}) EXPECT_NEAR(g(point), value, 1e-9);
+    EXPECT_NEAR(slope(1 - 2 * h), slope(1 + 2 * h), 5e-3) << extend;
+    EXPECT_NEAR(curvature(1 - 2 * h), curvature(1 + 2 * h), 1e-2) << extend;
+    const double first = slope(2 * h), last = slope(3 - 2 * h);
+    const bool is_clamped = extend == std::string("constant"), is_natural = extend == std::string("extrapolate");
+    EXPECT_NEAR(last, is_clamped ? 0 : (is_natural ? slope(5) : first), 1e-2) << extend;
+  }
+}
+
+TEST(Interpolation, RefusesPointsThatDoNotFit) {
+  EXPECT_THROW(interpolation({{"type", "cubic"}}), InputError);
+  EXPECT_THROW(interpolation({{"type", "piecewise_linear"}, {"points", {0, 0}}, {"values", {1, 2}}}), InputError);
+  EXPECT_THROW(interpolation({{"type", "piecewise_linear"}, {"points", {0, 1}}, {"values", {1}}}), InputError);
+}
+
+/// A folder with a unit square of two triangles, a line and a tetrahedron, and scenes written into it.
+class SceneTest : public ::testing::Test {
+ protected:
+  SceneTest() : folder_(fs::path(::testing::TempDir()) / ("itr_scene_" + std::to_string(::getpid()))) {
+    fs::create_directories(folder_ / "sub");
+    write("square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 4 3\n");
+    write("line.obj", "v -1 0 0\nv 1 0 0\nl 1 2\n");
+    write("tet.msh",
+          "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+          "$Elements\n1\n1 4 2 3 1 1 2 3 4\n$EndElements\n");
+    write("inverted.msh",
+          "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+          "$Elements\n1\n1 4 2 3 1 2 1 3 4\n$EndElements\n");
+    write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  }
+  ~SceneTest() override { fs::remove_all(folder_); }
+
+  void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / name) << text; }
+
+  /// The least scene, with `changes` merged into it.
+  static json square(const json& changes = json::object()) {
+    json scene = {{"geometry", json::array({{{"mesh", "square.obj"}, {"volume_selection", 1}}})},
+                  {"materials", json::array({{{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}}})},
+                  {"time", {{"dt", 0.1}, {"tend", 1}}}};
+    scene.merge_patch(changes);
+    return scene;
+  }
+
+  Scene read_scene(const json& scene, const std::vector<Override>& overrides = {}) {
+    write("scene.json", scene.dump());
+    return read(folder_ / "scene.json", overrides);
+  }
+  itr::Setup<2> read2(const json& scene, const std::vector<Override>& overrides = {}) {
+    return std::get<itr::Setup<2>>(read_scene(scene, overrides).setup);
+  }
+
+  InputError::Parts failure(const json& scene, const std::vector<Override>& overrides = {}) {
+    try {
+      read_scene(scene, overrides);
+    } catch (const InputError& error) {
+      return error.parts();
+    }
+    ADD_FAILURE() << "read without an error: " << scene;
+    return {};
+  }
+  /// Where a scene with these changes is wrong.
+  std::string wrong_place(const json& changes) { return failure(square(changes)).place; }
+
+  fs::path folder_;
+};
+
+TEST_F(SceneTest, LeastScene) {
+  const Scene scene = read_scene(square());
+  const itr::Setup<2>& setup = std::get<itr::Setup<2>>(scene.setup);
+
+  EXPECT_EQ(setup.mesh.num_vertices(), 4);
+  EXPECT_DOUBLE_EQ(setup.mesh.total_volume(), 1);  // the second triangle is turned round
+  EXPECT_EQ(setup.materials.at(1).density, 1000);
+  EXPECT_EQ(setup.time.steps, 10);
+  EXPECT_FALSE(setup.body_acceleration);
+  EXPECT_FALSE(setup.contact.enabled);
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+TEST_F(SceneTest, CommonPatchAndNull) {
+  write("sub/base.json", square({{"contact", {{"dhat", 0.5}, {"epsv", 0.1}}}, {"time", {{"t0", 0}}}}).dump());
+  const json scene = {{"common", "sub/base.json"},
+                      {"time", {{"dt", 0.2}}},
+                      {"contact", {{"epsv", nullptr}, {"enabled", true}}},
+                      {"patch", json::array({{{"op", "add"}, {"path", "/geometry/0/n_refs"}, {"value", 1}},
+                                             {{"op", "replace"}, {"path", "/materials/0/E"}, {"value", 7}}})}};
+
+  const itr::Setup<2> setup = read2(scene);  // the mesh lies beside the outer file
+
+  EXPECT_EQ(setup.time.steps, 5);
+  EXPECT_EQ(setup.contact.activation_distance, 0.5);
+  EXPECT_EQ(setup.contact.friction_velocity, 1e-3);
+  EXPECT_EQ(setup.mesh.num_vertices(), 9);
+  EXPECT_EQ(setup.materials.at(1).youngs_modulus, 7);
+}
+
+TEST_F(SceneTest, WrongMergesSayWhere) {
+  write("base.json", square().dump());
+  write("loop.json", R"({"common": "scene.json"})");
+  const json bad_patch = json::array({{{"op", "replace"}, {"path", "/geometry/9/mesh"}, {"value", 1}}});
+
+  EXPECT_EQ(failure({{"common", "base.json"}, {"patch", bad_patch}}).place, "/patch/0");
+  EXPECT_EQ(failure({{"common", "missing.json"}}).place, "/common");
+  EXPECT_EQ(failure({{"common", "loop.json"}}).place, "/common");
+  EXPECT_EQ(wrong_place({{"patch", json::array()}}), "/patch");
+}
+
+TEST_F(SceneTest, WrongJsonNamesTheLine) {
+  write("broken.json", "{\n  \"time\": {\n    \"dt\": 0.1,,\n  }\n}\n");
+  try {
+    read(folder_ / "broken.json");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.parts().place, "line 3");
+  }
+  EXPECT_THROW(read(folder_ / "no-such.json"), InputError);
+  EXPECT_THROW(read(folder_), InputError);
+}
+
+TEST_F(SceneTest, OverridesActBeforeValidation) {
+  const itr::Setup<2> setup = read2(square(), {{"/space/remesh/split/max_depth", "5"},
+                                          {"/time/dt", "0.5"},
+                                          {"/geometry/0/n_refs", "1"},
+                                          {"/boundary_conditions/rhs", "[0, 9.81]"}});
+
+  EXPECT_EQ(setup.remesh.split.max_depth, 5);
+  EXPECT_EQ(setup.time.steps, 2);
+  EXPECT_EQ(setup.mesh.num_cells(), 8);
+  EXPECT_EQ(setup.body_acceleration({0, 0}, 0), Vec<2>(0, -9.81));
+  EXPECT_EQ(failure(square(), {{"/time/dt", "fast"}}).place, "--set /time/dt=fast");
+  EXPECT_EQ(failure(square(), {{"time/dt", "1"}}).place, "--set time/dt=1");
+  EXPECT_EQ(failure(square(), {{"/geometry/7/mesh", "1"}}).place, "--set /geometry/7/mesh=1");
+  EXPECT_EQ(failure(square(), {{"/time/dtt", "1"}}).place, "/time/dtt");
+}
+
+TEST_F(SceneTest, UnknownKeysSuggestTheNearest) {
+  const InputError::Parts parts = failure(square({{"contact", {{"friction_coeficient", 0.1}}}}));
+
+  EXPECT_EQ(parts.place, "/contact/friction_coeficient");
+  EXPECT_NE(parts.expected.find("\"friction_coefficient\" perhaps"), std::string::npos) << parts.expected;
+  EXPECT_NE(failure(square({{"dhat", 1}})).expected.find("/contact/dhat"), std::string::npos);
+}
+
+TEST_F(SceneTest, OutputAndSpeedNeverStopAScene) {
+  const Scene scene = read_scene(square(json::parse(R"({
+    "output": {"anything": {"at": ["all"]}, "directory": "out", "paraview": {"skip_frame": 4}},
+    "tests": {"err_l2": 1}, "solver": {"max_threads": 2, "contact": {"CCD": {"broad_phase": "HG"}},
+    "linear": {"solver": ["Eigen::PardisoLLT", "mumps"]}}})")));
+
+  EXPECT_EQ(scene.directory, "out");
+  EXPECT_EQ(scene.output.skip_frames, 4);
+  EXPECT_EQ(scene.max_threads, 2);
+  EXPECT_EQ(std::get<itr::Setup<2>>(scene.setup).linear.solvers, (std::vector<std::string>{"Eigen::PardisoLLT", "mumps"}));
+}
+
+TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
+  const auto material = [](const char* key, const json& value) {
+    json one = {{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}};
+    one[key] = value;
+    return json{{"materials", json::array({one})}};
+  };
+  EXPECT_EQ(wrong_place(material("E", 0)), "/materials/0/E");
+  EXPECT_EQ(wrong_place(material("E", "1e4 * x")), "/materials/0/E");
+  EXPECT_EQ(wrong_place(material("nu", 0.5)), "/materials/0/nu");
+  EXPECT_EQ(wrong_place(material("nu", -1)), "/materials/0/nu");
+  EXPECT_EQ(wrong_place(material("rho", -3)), "/materials/0/rho");
+  EXPECT_EQ(wrong_place(material("type", "Ogden")), "/materials/0/type");
+  EXPECT_EQ(wrong_place(material("id", 2)), "/materials");
+  EXPECT_EQ(wrong_place({{"materials", nullptr}}), "/materials");
+  EXPECT_EQ(wrong_place({{"geometry", nullptr}}), "/geometry");
+  EXPECT_EQ(wrong_place({{"geometry", {{"mesh", "missing.obj"}}}}), "/geometry/mesh");
+  EXPECT_EQ(wrong_place({{"geometry", {{"mesh", "flat.obj"}}}}), "/geometry/mesh");
+  EXPECT_EQ(wrong_place({{"geometry", {{"mesh", "inverted.msh"}}}}), "/geometry/mesh");
+  EXPECT_EQ(wrong_place({{"contact", {{"dhat", 0}}}}), "/contact/dhat");
+  EXPECT_EQ(wrong_place({{"contact", {{"dhat", "x"}}}}), "/contact/dhat");
+  EXPECT_EQ(wrong_place({{"contact", {{"enabled", 1}}}}), "/contact/enabled");
+  EXPECT_EQ(wrong_place({{"time", {{"dt", -0.1}}}}), "/time/dt");
+  EXPECT_EQ(wrong_place({{"time", {{"dt", nullptr}}}}), "/time");
+  EXPECT_EQ(wrong_place({{"time", {{"time_steps", 3}}}}), "/time");
+  EXPECT_EQ(wrong_place({{"time", {{"tend", 0}}}}), "/time/tend");
+  EXPECT_EQ(wrong_place({{"time", {{"integrator", "Euler"}}}}), "/time/integrator");
+  EXPECT_EQ(wrong_place({{"space", {{"discr_order", 2}}}}), "/space/discr_order");
+  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"norm_type", "Linf"}}}}}}), "/solver/nonlinear/norm_type");
+  EXPECT_EQ(wrong_place({{"input", {{"data", {{"state", "a.hdf5"}}}}}}), "/input/data/state");
+}
+
+TEST_F(SceneTest, Integrators) {
+  const auto time = [&](const json& integrator) { return read2(square({{"time", {{"integrator", integrator}}}})).time; };
+
+  EXPECT_EQ(time("ImplicitNewmark").integrator, Integrator::newmark);
+  EXPECT_EQ(time({{"type", "ImplicitNewmark"}, {"beta", 0.3}, {"gamma", 0.6}}).newmark_beta, 0.3);
+  EXPECT_EQ(time("BDF3").bdf_order, 3);
+  EXPECT_EQ(time({{"type", "BDF"}, {"steps", 5}}).bdf_order, 5);
+  EXPECT_EQ(read2(square({{"time", {{"tend", nullptr}, {"time_steps", 7}}}})).time.steps, 7);
+  EXPECT_DOUBLE_EQ(read2(square({{"time", {{"dt", nullptr}, {"time_steps", 4}}}})).time.dt, 0.25);
+  EXPECT_TRUE(read2(square({{"time", nullptr}})).time.is_static);
+}
+
+TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
+  const json nonlinear = {{"x_delta", 1e-3}, {"grad_norm", 1e-7}, {"f_delta", 1e-16}};
+  const itr::Setup<2> dynamic = read2(square({{"solver", {{"nonlinear", nonlinear}}}}));
+  const itr::Setup<2> statics = read2(square({{"solver", {{"nonlinear", nonlinear}}}, {"time", nullptr}}));
+  const json euclidean = {{"norm_type", "Euclidean"}, {"grad_norm_tol", 1e-6}};
+
+  EXPECT_DOUBLE_EQ(dynamic.newton.step_tolerance, 1e-4);
+  EXPECT_DOUBLE_EQ(dynamic.newton.gradient_tolerance, 1e-8);
+  EXPECT_DOUBLE_EQ(dynamic.newton.first_gradient_tolerance, 1e-11);
+  EXPECT_DOUBLE_EQ(statics.newton.step_tolerance, 1e-3);
+  EXPECT_EQ(read2(square({{"solver", {{"nonlinear", euclidean}}}})).newton.gradient_tolerance, 1e-6);
+  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"f_delta", 1e-3}}}}}}), "/solver/nonlinear/f_delta");
+}
+
+TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {
+  const json small = {{"geometry", {{"mesh", "square.obj"}, {"volume_selection", 1}, {"transformation", {{"scale", 1e-4}}}}}};
+  json given = small;
+  given["contact"] = {{"enabled", true}, {"dhat", 1e-3}};
+  json absent = small;
+  absent["contact"] = {{"enabled", true}};
+
+  EXPECT_NEAR(read2(square(absent)).contact.activation_distance, 0.8e-4, 1e-12);
+  EXPECT_EQ(read2(square(given)).contact.activation_distance, 1e-3);
+  EXPECT_EQ(read_scene(square(given)).warnings.size(), 1u);
+  EXPECT_TRUE(read2(square(given)).contact.adaptive_stiffness);
+}
+
+TEST_F(SceneTest, SelectionsOfSurfacesAndVolumes) {
+  const auto tags = [&](const json& selection) {
+    const json geometry = {{"mesh", "square.obj"}, {"volume_selection", 1}, {"surface_selection", selection}};
+    const itr::Setup<2> setup = read2(square({{"geometry", json::array({geometry})}}));
+    std::array<int, 4> result;  // bottom, right, top, left
+    const std::array<std::array<int, 2>, 4> facets = {{{0, 1}, {1, 2}, {2, 3}, {3, 0}}};
+    for (int i = 0; i < 4; ++i) result[i] = setup.mesh.facet_tag(setup.mesh.find_facet(facets[i]));
+    return result;
+  };
+  using Tags = std::array<int, 4>;
+
+  EXPECT_EQ(tags(5), (Tags{5, 5, 5, 5}));
+  EXPECT_EQ(tags({{"threshold", 0.001}}), (Tags{2, 3, 4, 1}));
+  EXPECT_EQ(tags({{"threshold", 0.001}, {"id_offset", 10}}), (Tags{12, 13, 14, 11}));
+  EXPECT_EQ(tags({{"id", 9}, {"axis", "-y"}, {"position", 0.1}}), (Tags{9, kNoTag, kNoTag, kNoTag}));
+  EXPECT_EQ(tags({{"id", 9}, {"axis", 2}, {"position", 0.9}, {"relative", true}}), (Tags{kNoTag, kNoTag, 9, kNoTag}));
+  EXPECT_EQ(tags(json::parse(R"([{"id": 1, "box": [[0.4, -1], [0.6, 0.1]]}, {"id": 2, "center": [1, 0.5], "radius": 0.1},
+                                 {"id": 3, "p1": [0.5, 0.9], "p2": [0.5, 1.1], "radius": 0.1},
+                                 {"id": 4, "normal": [-1, 0], "point": [0.1, 0]}])")),
+            (Tags{1, 2, 3, 4}));
+  EXPECT_EQ(tags(json::parse(R"([{"id": 6, "axis": 1, "position": 0.9}, 8])")), (Tags{8, 6, 8, 8}));
+  EXPECT_EQ(wrong_place({{"geometry", {{"mesh", "square.obj"}, {"surface_selection", {{"id", 1}, {"axis", "w"}}}}}}),
+            "/geometry/surface_selection/axis");
+}
+
+TEST_F(SceneTest, TransformationsScaleRotateTranslate) {
+  const auto point = [&](const json& transformation) -> Vec<2> {
+    return read2(square({{"geometry", {{"mesh", "square.obj"}, {"transformation", transformation}}},
+                         {"materials", {{"type", "NeoHookean"}, {"E", 1}, {"nu", 0}}}}))
+        .mesh.rest(2);
+  };
+  EXPECT_TRUE(point({{"scale", 2}, {"rotation", 90}, {"translation", {1, 0, 7}}}).isApprox(Vec<2>(-1, 2)));
+  EXPECT_TRUE(point({{"dimensions", {3, 4}}, {"scale", 100}}).isApprox(Vec<2>(3, 4)));
+  EXPECT_TRUE(point({{"scale", {-1, 1}}}).isApprox(Vec<2>(-1, 1)));
+
+  json tet = square({{"geometry", {{"mesh", "tet.msh"}, {"transformation", {{"rotation", {0, 90, 90}}}}}}});
+  tet["materials"] = {{"type", "NeoHookean"}, {"E", 1}, {"nu", 0}};
+  const auto z_of_x = [&](const char* mode) -> Vec<3> {
+    tet["geometry"]["transformation"]["rotation_mode"] = mode;
+    return std::get<itr::Setup<3>>(read_scene(tet).setup).mesh.rest(1);
+  };
+  EXPECT_TRUE(z_of_x("xyz").isApprox(Vec<3>(0, 0, -1)));  // about y first: x goes to -z, which z leaves
+  EXPECT_TRUE(z_of_x("zyx").isApprox(Vec<3>(0, 1, 0)));   // about z first: x goes to y, which y leaves
+}
+
+TEST_F(SceneTest, BodiesAreConcatenatedAndCopied) {
+  const itr::Setup<2> setup = read2(square(json::parse(R"({"geometry": [
+      {"mesh": "square.obj", "volume_selection": 1},
+      {"mesh": "missing.obj", "enabled": false},
+      {"mesh": "square.obj", "type": "mesh_array", "volume_selection": [{"id": 2, "axis": 1, "position": 0.5}, 1],
+       "array": {"offset": 1.5, "size": [2, 2, 1], "relative": true}, "transformation": {"translation": [5, 0]},
+       "surface_selection": 3}],
+      "materials": [{"id": [1, 2], "type": "NeoHookean", "E": 1, "nu": 0.3}]})")));
+
+  EXPECT_EQ(setup.mesh.num_vertices(), 20);
+  EXPECT_EQ(setup.mesh.num_cells(), 10);
+  EXPECT_EQ(setup.mesh.rest(8), Vec<2>(5, 1.5));
+  EXPECT_EQ(setup.mesh.rest(12), Vec<2>(6.5, 0));
+  EXPECT_EQ(setup.mesh.body(2), 2);
+  EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({4, 5})), 3);
+  EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({0, 1})), kNoTag);
+  EXPECT_EQ(setup.mesh.find_defect(), "");
+}
+
+TEST_F(SceneTest, ConditionsAndMotions) {
+  const Scene scene = read_scene(square(json::parse(R"json({"geometry": [
+      {"mesh": "square.obj", "volume_selection": 1, "surface_selection": {"threshold": 1e-3}},
+      {"mesh": "line.obj", "is_obstacle": true, "surface_selection": 3, "transformation": {"translation": [0, -1]}},
+      {"mesh": "square.obj", "is_obstacle": true, "surface_selection": 8, "transformation": {"translation": [0, -3]}},
+      {"mesh": "line.obj", "is_obstacle": true, "transformation": {"translation": [0, -5]}}],
+    "boundary_conditions": {"rhs": [0, "9.81 * 2"],
+      "dirichlet_boundary": [{"id": 2, "value": [0, "x*t"], "dimension": [false, true]},
+                             {"id": 4, "value": [1, 1], "dimension": [false, false]},
+                             {"id": 3, "value": [1, 0], "interpolation": {"type": "linear"}},
+                             {"id": 2, "value": [9, 9]}],
+      "neumann_boundary": [{"id": 4, "value": [0, "1e3*t"]}, {"id": 1, "value": [0, 0]}],
+      "obstacle_displacements": [{"id": 8, "value": ["sin(t)", 0]}]},
+    "initial_conditions": {"velocity": [{"id": 1, "value": ["-pi*y", 0]}], "acceleration": "consistent"}})json")));
+  const itr::Setup<2>& setup = std::get<itr::Setup<2>>(scene.setup);
+
+  EXPECT_EQ(setup.body_acceleration({1, 1}, 3), Vec<2>(0, -19.62));
+  ASSERT_EQ(setup.dirichlet.size(), 2u);
+  EXPECT_EQ(setup.dirichlet[0].components, (std::array<bool, 2>{false, true}));
+  EXPECT_EQ(setup.dirichlet[0].displacement({2, 0}, 3), Vec<2>(0, 6));
+  EXPECT_EQ(setup.dirichlet[1].displacement({2, 0}, 3), Vec<2>(3, 0));
+  ASSERT_EQ(setup.neumann.size(), 1u);
+  EXPECT_EQ(setup.neumann[0].traction({0, 0}, 2), Vec<2>(0, 2000));
+  EXPECT_EQ(setup.obstacles.edges.size(), 6u);
+  EXPECT_EQ(setup.obstacles.motion, (std::vector<int>{1, 1, 0, 0, 0, 0, kNone, kNone}));
+  EXPECT_EQ(setup.obstacles.motions[1]({0, 0}, 2), Vec<2>(2, 0));  // by the dirichlet entry with its id
+  EXPECT_TRUE(setup.consistent_initial_acceleration);
+  ASSERT_EQ(setup.initial_velocity.size(), 1u);
+  EXPECT_DOUBLE_EQ(setup.initial_velocity[0].value({0, 1}, 0)[0], -std::numbers::pi);
+  ASSERT_EQ(scene.warnings.size(), 1u) << scene.warnings[0];
+  EXPECT_NE(scene.warnings[0].find("/boundary_conditions/dirichlet_boundary/3"), std::string::npos);
+}
+
+TEST_F(SceneTest, ValuesThatAreNotDefinedAreRefused) {
+  const auto dirichlet = [&](const json& value) {
+    return failure(square({{"geometry", {{"mesh", "square.obj"}, {"volume_selection", 1}, {"surface_selection", 2}}},
+                           {"boundary_conditions", {{"dirichlet_boundary", {{"id", 2}, {"value", value}}}}}}));
+  };
+  EXPECT_EQ(dirichlet({"sqrt(x - 0.5)", 0}).place, "/boundary_conditions/dirichlet_boundary/value");
+  EXPECT_EQ(dirichlet({"sqrt(-1)", 0}).place, "/boundary_conditions/dirichlet_boundary/value/0");
+  EXPECT_EQ(dirichlet({0, "velocity * t"}).place, "/boundary_conditions/dirichlet_boundary/value/1");
+  EXPECT_EQ(dirichlet({0, {1}}).place, "/boundary_conditions/dirichlet_boundary/value/1");
+  EXPECT_EQ(dirichlet(3).place, "/boundary_conditions/dirichlet_boundary/value");
+}
+
+TEST_F(SceneTest, RemeshOptions) {
+  const RemeshOptions options = read2(square({{"space", {{"remesh", json::parse(R"({
+      "enabled": true, "type": "sizing_field", "screening": "predicted-decrease", "sweeps": 2, "history": "interpolated",
+      "split": {"acceptance_tolerance": 0.4}, "collapse": {"rel_max_edge_length": 3}, "swap": {"enabled": true},
+      "smooth": {"max_iters": 4}, "local_relaxation": {"local_mesh_n_ring": 3}})")}}}})).remesh;
+
+  EXPECT_TRUE(options.enabled && options.sizing_field && options.swap.enabled);
+  EXPECT_EQ(options.screening, Screening::predicted_decrease);
+  EXPECT_EQ(options.history, HistoryRule::interpolated);
+  EXPECT_EQ(options.split.acceptance_tolerance, 0.4);
+  EXPECT_EQ(options.collapse.rel_max_edge_length, 3);
+  EXPECT_EQ(options.smooth.max_iterations, 4);
+  EXPECT_EQ(options.local.rings, 3);
+}
+
+// --- the paper's scenes -----------------------------------------------------------------------------------------------
+
+const fs::path kScripts = fs::path(ITR_SHARED_DIR) / "paper-scenes" / "scripts";
+
+int num_vertices(const Scene& scene) {
+  return std::visit([](const auto& s) { return s.mesh.num_vertices() + static_cast<int>(s.obstacles.rest.size()); }, scene.setup);
+}
+
+TEST(PaperScenes, AreReadAndHaveTheVerticesOfTheReferenceRuns) {
+  if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
+  const std::vector<std::pair<const char*, int>> scenes = {
+      {"cantilever/cantilever.json", 81},     {"masticator/h=0.1.json", 249}, {"masticator/h=0.1-noremesh.json", 249},
+      {"masticator/h=0.2.json", 0},           {"masticator/h=0.05.json", 0},  {"ball-wall/2D.json", 141},
+      {"ball-wall/2D-noremesh.json", 141},    {"shake-rod/shake-rod-y.json", 0}, {"spikes2d/spikes2d.json", 676},
+      {"spikes2d/drop-bar.json", 0}};
+  for (const auto& [name, expected] : scenes) {
+    const Scene scene = read(kScripts / name);
+    if (expected > 0) {
+      EXPECT_EQ(num_vertices(scene), expected) << name;
+    }
+    EXPECT_EQ(std::visit([](const auto& s) { return s.mesh.find_defect(); }, scene.setup), "") << name;
+  }
+  for (const auto& entry : fs::directory_iterator(kScripts / "unit-tests"))
+    if (entry.path().extension() == ".json") {
+      EXPECT_NO_THROW(read(entry.path())) << entry.path();
+    }
+}
+
+TEST(PaperScenes, Masticator) {
+  if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
+  const Scene scene = read(kScripts / "masticator" / "h=0.1.json");
+  const auto& setup = std::get<itr::Setup<2>>(scene.setup);
+
+  EXPECT_EQ(setup.time.steps, 200);
+  EXPECT_EQ(setup.materials.at(0).youngs_modulus, 1e4);
+  EXPECT_EQ(setup.contact.barrier_stiffness, 1e3);
+  EXPECT_FALSE(setup.contact.adaptive_stiffness);
+  EXPECT_TRUE(setup.contact.convergent);
+  EXPECT_EQ(setup.contact.friction_iterations, 1000);
+  EXPECT_EQ(setup.remesh.split.acceptance_tolerance, 0.4);
+  EXPECT_EQ(setup.newton.max_iterations, 3000);
+  EXPECT_DOUBLE_EQ(setup.newton.step_tolerance, 1e-3 * 0.05);
+  ASSERT_EQ(setup.obstacles.motions.size(), 2u);
+  const double down = 0.76 * (1 - 4. / 5) * std::tanh(5 * (1 - 4. / 5)) - 0.76;
+  EXPECT_NEAR(setup.obstacles.motions[0]({0, 0.5}, 4)[1], down, 1e-15);
+  EXPECT_NEAR(setup.obstacles.motions[1]({0, 0.5}, 4)[1], -down, 1e-15);
+}
+
+TEST(PaperScenes, BrokenOnesSayWhy) {
+  if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
+  const auto place = [](const char* name) {
+    try {
+      read(kScripts / name);
+    } catch (const InputError& error) {
+      return error.parts().place;
+    }
+    return std::string("nothing wrong");
+  };
+  EXPECT_EQ(place("masticator/2D.json"), "/geometry/0/mesh");
+  EXPECT_EQ(place("spikes3d/drop-ball-noremesh-nref1.json"), "/patch/2");
+  EXPECT_EQ(place("common.json"), "/geometry");
+}
+
+}  // namespace
+}  // namespace itr::scene
