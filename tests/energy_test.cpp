@@ -113,7 +113,8 @@ TYPED_TEST(VolumeTerms, VolumeBarrierGradientMatchesDifferences) {
     VectorX plus = x, minus = x;
     plus[i] += 1e-6;
     minus[i] -= 1e-6;
-    EXPECT_NEAR(gradient[i], (barrier.value(plus, workspace) - barrier.value(minus, workspace)) / 2e-6, 1e-6 * gradient.norm());
+    EXPECT_NEAR(gradient[i], (barrier.value(plus, workspace) - barrier.value(minus, workspace)) / 2e-6,
+                1e-6 * gradient.norm());
   }
   expect_psd(barrier, x);
 }
@@ -124,8 +125,7 @@ TYPED_TEST(VolumeTerms, ElasticityDoesNotSeeRigidMotion) {
   Mat<Dim> rotation = Mat<Dim>::Identity();
   rotation.template topLeftCorner<2, 2>() << std::cos(1.0), -std::sin(1.0), std::sin(1.0), std::cos(1.0);
   VectorX x(Dim * cells.num_vertices);
-  for (int v = 0; v < cells.num_vertices; ++v)
-    x.segment<Dim>(Dim * v) = rotation * cells.rest[v] + 3 * Vec<Dim>::Ones();
+  for (int v = 0; v < cells.num_vertices; ++v) x.segment<Dim>(Dim * v) = rotation * cells.rest[v] + 3 * Vec<Dim>::Ones();
   Workspace workspace;
   const ElasticEnergy<Dim> elastic(cells, kMaterials, 1);
   EXPECT_NEAR(elastic.value(x, workspace), 0, 1e-13);
@@ -196,8 +196,7 @@ TEST_P(Contact, StepIsFreeOfContact) {
     const VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
     Workspace workspace;
     const double step = contact.max_step(scene.x, dx, workspace);
-    for (int i = 1; i <= 200; ++i)
-      EXPECT_GT(contact.min_distance(scene.x + step * i / 200.0 * dx, workspace), 0) << seed;
+    for (int i = 1; i <= 200; ++i) EXPECT_GT(contact.min_distance(scene.x + step * i / 200.0 * dx, workspace), 0) << seed;
   }
 }
 

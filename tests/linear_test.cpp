@@ -74,15 +74,20 @@ class EverySolver : public ::testing::TestWithParam<std::string> {
 
   void expect_solves(const System& system, double tolerance, int columns = 1, bool analyze = true) {
     const int n = system.pattern.order;
-    Eigen::MatrixXd B = Eigen::MatrixXd::NullaryExpr(n, columns, [](Eigen::Index i, Eigen::Index j) { return std::cos(1.0 + i + 3 * j); });
+    Eigen::MatrixXd B =
+        Eigen::MatrixXd::NullaryExpr(n, columns, [](Eigen::Index i, Eigen::Index j) { return std::cos(1.0 + i + 3 * j); });
     Eigen::MatrixXd X(n, columns);
-    if (analyze) { ASSERT_EQ(solver_->analyze(system.pattern, {.block_size = 1}), Outcome::ok) << solver_->message(); }
+    if (analyze) {
+      ASSERT_EQ(solver_->analyze(system.pattern, {.block_size = 1}), Outcome::ok) << solver_->message();
+    }
     ASSERT_EQ(solver_->factorize(system.values), Outcome::ok) << solver_->message();
-    const auto report = solver_->solve({B.data(), std::size_t(B.size())}, {X.data(), std::size_t(X.size())}, columns, tolerance);
+    const auto report =
+        solver_->solve({B.data(), std::size_t(B.size())}, {X.data(), std::size_t(X.size())}, columns, tolerance);
     ASSERT_EQ(report.outcome, Outcome::ok) << report.relative_residual;
     double worst = 0;
     for (int c = 0; c < columns; ++c) {
-      const auto residual = (B.col(c).cast<long double>() - system.full.cast<long double>() * X.col(c).cast<long double>()).norm();
+      const auto residual =
+          (B.col(c).cast<long double>() - system.full.cast<long double>() * X.col(c).cast<long double>()).norm();
       worst = std::max(worst, double(residual) / B.col(c).norm());
     }
     EXPECT_LE(worst, 2 * tolerance);
@@ -106,8 +111,12 @@ TEST_P(EverySolver, ReachesOrReportsStiffSystems) {
   const auto report = solver_->solve(b, x, 1, 1e-8);
   const Eigen::Map<Eigen::VectorXd> solution(x.data(), x.size());
   const double residual = double((Eigen::VectorXd::Ones(x.size()).cast<long double>() -
-                                  system.full.cast<long double>() * solution.cast<long double>()).norm()) / std::sqrt(x.size());
-  EXPECT_NEAR(report.relative_residual, residual, 0.1 * residual + 1e-9);
+                                  system.full.cast<long double>() * solution.cast<long double>())
+                                     .norm()) /
+                          std::sqrt(x.size());
+  // A residual in double precision cannot be known better than to the round-off of A x.
+  const double round_off = 1e-15 * system.full.norm() * solution.norm() / std::sqrt(x.size());
+  EXPECT_NEAR(report.relative_residual, residual, 0.1 * residual + round_off);
   EXPECT_EQ(report.outcome == Outcome::ok, report.relative_residual <= 1e-8);
 }
 
@@ -226,7 +235,10 @@ TEST(Registry, AModuleThatDoesNotLoadSaysWhyAndTheRestGoOn) {
 
 TEST(Registry, AProgramAddsItsOwn) {
   Registry registry;
-  registry.add({.name = "mine", .available = true}, [] { return Registry().create("eigen"); });
+  BackendInfo info;
+  info.name = "mine";
+  info.available = true;
+  registry.add(info, [] { return Registry().create("eigen"); });
   EXPECT_GE(self_test_residual(*registry.create("mine")), 0);
 }
 

@@ -77,7 +77,8 @@ const std::string kText41 =
 std::string binary41() {
   const auto u = [](uint64_t value) { return value; };
   std::string bytes = "$MeshFormat\n4.1 1 8\n" + raw(int32_t{1}) + "\n$EndMeshFormat\n$Entities\n";
-  bytes += raw(u(0), u(0), u(1), u(0), int32_t{1}, 0., 0., 0., 1., 1., 0., u(1), int32_t{6}, u(0)) + "\n$EndEntities\n$Nodes\n";
+  bytes +=
+      raw(u(0), u(0), u(1), u(0), int32_t{1}, 0., 0., 0., 1., 1., 0., u(1), int32_t{6}, u(0)) + "\n$EndEntities\n$Nodes\n";
   bytes += raw(u(1), u(3), u(1), u(3), int32_t{2}, int32_t{1}, int32_t{0}, u(3), u(2), u(1), u(3));
   bytes += raw(1., 0., 0., 0., 0., 0., 0., 1., 0.) + "\n$EndNodes\n$Elements\n";
   bytes += raw(u(1), u(1), u(1), u(1), int32_t{2}, int32_t{1}, int32_t{2}, u(1), u(1), u(1), u(2), u(3));

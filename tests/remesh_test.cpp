@@ -15,8 +15,8 @@
 namespace itr {
 namespace {
 
-/// A unit square of n x n perturbed quadrilaterals with random diagonals; body 1 left of the middle, body 2 right of it; facet
-/// tags 1 to 4 by side.
+/// A unit square of n x n perturbed quadrilaterals with random diagonals; body 1 left of the middle, body 2 right of it;
+/// facet tags 1 to 4 by side.
 Mesh<2> random_mesh(int n, std::mt19937& random) {
   std::uniform_real_distribution<double> noise(-0.25 / n, 0.25 / n);
   std::vector<Vec<2>> rest;
@@ -25,7 +25,8 @@ Mesh<2> random_mesh(int n, std::mt19937& random) {
   for (int j = 0; j <= n; ++j)
     for (int i = 0; i <= n; ++i) {
       const bool inside_x = i > 0 && i < n && 2 * i != n, inside_y = j > 0 && j < n;
-      rest.emplace_back(double(i) / n + (inside_x && inside_y ? noise(random) : 0), double(j) / n + (inside_y && inside_x ? noise(random) : 0));
+      rest.emplace_back(double(i) / n + (inside_x && inside_y ? noise(random) : 0),
+                        double(j) / n + (inside_y && inside_x ? noise(random) : 0));
     }
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
@@ -49,7 +50,8 @@ struct Totals {
     for (int c = 0; c < mesh.cell_slots(); ++c)
       if (mesh.is_cell_alive(c)) area[mesh.body(c)] += mesh.volume(c);
     for (int f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f)) length[mesh.facet_tag(f)] += (mesh.rest(mesh.facet(f)[1]) - mesh.rest(mesh.facet(f)[0])).norm();
+      if (mesh.is_facet_alive(f))
+        length[mesh.facet_tag(f)] += (mesh.rest(mesh.facet(f)[1]) - mesh.rest(mesh.facet(f)[0])).norm();
   }
 };
 
@@ -57,10 +59,14 @@ std::optional<Edit<2>> random_edit(const Mesh<2>& mesh, std::mt19937& random) {
   const auto edges = mesh.edges();
   const EdgeKey edge = edges[random() % edges.size()];
   switch (random() % 4) {
-    case 0: return make_split(mesh, edge);
-    case 1: return make_collapse(mesh, edge);
-    case 2: return make_swap(mesh, edge);
-    default: return make_move(mesh, edge[0], best_shaped_position(mesh, edge[0], 3));
+    case 0:
+      return make_split(mesh, edge);
+    case 1:
+      return make_collapse(mesh, edge);
+    case 2:
+      return make_swap(mesh, edge);
+    default:
+      return make_move(mesh, edge[0], best_shaped_position(mesh, edge[0], 3));
   }
 }
 
@@ -172,8 +178,10 @@ TEST(LocalProblem, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
     Marks marks;
     SurfaceTree tree(scene.mesh, scene.fields, scene.context);
     const auto patch = select_patch(scene.mesh, edit->removed_cells, Vec<2>(0.5, 0.5), 1, {}, marks);
-    LocalProblem before(scene.mesh, scene.fields, scene.context, patch, &*edit, false, HistoryRule::interpolated, tree, scratch);
-    LocalProblem after(scene.mesh, scene.fields, scene.context, patch, &*edit, true, HistoryRule::interpolated, tree, scratch);
+    LocalProblem before(scene.mesh, scene.fields, scene.context, patch, &*edit, false, HistoryRule::interpolated, tree,
+                        scratch);
+    LocalProblem after(scene.mesh, scene.fields, scene.context, patch, &*edit, true, HistoryRule::interpolated, tree,
+                       scratch);
     const double local = after.value() - before.value();
     const double global_before = global_energy(scene.mesh, scene.fields, scene.context);
     Mesh<2> changed = scene.mesh;

@@ -224,9 +224,9 @@ TEST_F(SceneTest, WrongJsonNamesTheLine) {
 
 TEST_F(SceneTest, OverridesActBeforeValidation) {
   const itr::Setup<2> setup = read2(square(), {{"/space/remesh/split/max_depth", "5"},
-                                          {"/time/dt", "0.5"},
-                                          {"/geometry/0/n_refs", "1"},
-                                          {"/boundary_conditions/rhs", "[0, 9.81]"}});
+                                               {"/time/dt", "0.5"},
+                                               {"/geometry/0/n_refs", "1"},
+                                               {"/boundary_conditions/rhs", "[0, 9.81]"}});
 
   EXPECT_EQ(setup.remesh.split.max_depth, 5);
   EXPECT_EQ(setup.time.steps, 2);
@@ -316,7 +316,8 @@ TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
 }
 
 TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {
-  const json small = {{"geometry", {{"mesh", "square.obj"}, {"volume_selection", 1}, {"transformation", {{"scale", 1e-4}}}}}};
+  const json small = {
+      {"geometry", {{"mesh", "square.obj"}, {"volume_selection", 1}, {"transformation", {{"scale", 1e-4}}}}}};
   json given = small;
   given["contact"] = {{"enabled", true}, {"dhat", 1e-3}};
   json absent = small;
@@ -441,7 +442,8 @@ TEST_F(SceneTest, RemeshOptions) {
   const RemeshOptions options = read2(square({{"space", {{"remesh", json::parse(R"({
       "enabled": true, "type": "sizing_field", "screening": "predicted-decrease", "sweeps": 2, "history": "interpolated",
       "split": {"acceptance_tolerance": 0.4}, "collapse": {"rel_max_edge_length": 3}, "swap": {"enabled": true},
-      "smooth": {"max_iters": 4}, "local_relaxation": {"local_mesh_n_ring": 3}})")}}}})).remesh;
+      "smooth": {"max_iters": 4}, "local_relaxation": {"local_mesh_n_ring": 3}})")}}}}))
+                                    .remesh;
 
   EXPECT_TRUE(options.enabled && options.sizing_field && options.swap.enabled);
   EXPECT_EQ(options.screening, Screening::predicted_decrease);
@@ -457,15 +459,16 @@ TEST_F(SceneTest, RemeshOptions) {
 const fs::path kScripts = fs::path(ITR_SHARED_DIR) / "paper-scenes" / "scripts";
 
 int num_vertices(const Scene& scene) {
-  return std::visit([](const auto& s) { return s.mesh.num_vertices() + static_cast<int>(s.obstacles.rest.size()); }, scene.setup);
+  return std::visit([](const auto& s) { return s.mesh.num_vertices() + static_cast<int>(s.obstacles.rest.size()); },
+                    scene.setup);
 }
 
 TEST(PaperScenes, AreReadAndHaveTheVerticesOfTheReferenceRuns) {
   if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
   const std::vector<std::pair<const char*, int>> scenes = {
-      {"cantilever/cantilever.json", 81},     {"masticator/h=0.1.json", 249}, {"masticator/h=0.1-noremesh.json", 249},
-      {"masticator/h=0.2.json", 0},           {"masticator/h=0.05.json", 0},  {"ball-wall/2D.json", 141},
-      {"ball-wall/2D-noremesh.json", 141},    {"shake-rod/shake-rod-y.json", 0}, {"spikes2d/spikes2d.json", 676},
+      {"cantilever/cantilever.json", 81},  {"masticator/h=0.1.json", 249},    {"masticator/h=0.1-noremesh.json", 249},
+      {"masticator/h=0.2.json", 0},        {"masticator/h=0.05.json", 0},     {"ball-wall/2D.json", 141},
+      {"ball-wall/2D-noremesh.json", 141}, {"shake-rod/shake-rod-y.json", 0}, {"spikes2d/spikes2d.json", 676},
       {"spikes2d/drop-bar.json", 0}};
   for (const auto& [name, expected] : scenes) {
     const Scene scene = read(kScripts / name);

@@ -55,7 +55,10 @@ Setup<2> impact() {
   setup.obstacles.rest = {{-1, -0.01}, {1, -0.011}};
   setup.obstacles.edges = {{0, 1}};
   setup.obstacles.motion = {kNone, kNone};
-  setup.contact = {.enabled = true, .activation_distance = 2e-3, .convergent = true, .barrier_stiffness = 1e4,
+  setup.contact = {.enabled = true,
+                   .activation_distance = 2e-3,
+                   .convergent = true,
+                   .barrier_stiffness = 1e4,
                    .friction_coefficient = 0.2};
   setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(0.3, -2); }});
   setup.newton.step_tolerance = 1e-7;
@@ -79,7 +82,8 @@ Vec<2> momentum(const Simulation<2>& simulation) {
   const CellSet<2> cells = whole_mesh(state.mesh, simulation.setup().obstacles.rest);
   const VectorX& v = state.history.v[0];
   VectorX product = VectorX::Zero(v.size());
-  InertiaEnergy<2>(cells, simulation.setup().materials, MassKind::consistent, VectorX::Zero(v.size())).add_mass_product(v, product);
+  InertiaEnergy<2>(cells, simulation.setup().materials, MassKind::consistent, VectorX::Zero(v.size()))
+      .add_mass_product(v, product);
   Vec<2> sum = Vec<2>::Zero();
   for (int i = 0; i < state.mesh.vertex_slots(); ++i) sum += product.segment<2>(2 * i);
   return sum;
@@ -116,7 +120,8 @@ TEST_P(Integrators, KeepMomentumThroughRemeshing) {
   setup.time = GetParam();
   setup.time.dt = 0.01;
   setup.time.steps = 8;
-  setup.initial_velocity.push_back({1, [](const Vec<2>& X, double) { return Vec<2>(1 + 8 * X[1] * X[1], 40 * X[0] * X[1] - 0.5); }});
+  setup.initial_velocity.push_back(
+      {1, [](const Vec<2>& X, double) { return Vec<2>(1 + 8 * X[1] * X[1], 40 * X[0] * X[1] - 0.5); }});
   enable_remeshing(setup);
   linear::Registry registry;
   Simulation<2> simulation(setup, registry);
@@ -134,7 +139,9 @@ TEST_P(Integrators, KeepMomentumThroughRemeshing) {
 }
 
 std::string integrator_name(const ::testing::TestParamInfo<TimeOptions>& info) {
-  return info.param.integrator == Integrator::newmark ? "newmark" : info.param.integrator == Integrator::bdf ? "bdf2" : "euler";
+  return info.param.integrator == Integrator::newmark ? "newmark"
+         : info.param.integrator == Integrator::bdf   ? "bdf2"
+                                                      : "euler";
 }
 INSTANTIATE_TEST_SUITE_P(All, Integrators,
                          ::testing::Values(TimeOptions{.integrator = Integrator::implicit_euler},

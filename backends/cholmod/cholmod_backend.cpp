@@ -114,7 +114,8 @@ const char* version() {
       }
       dlclose(self);
     }
-  std::snprintf(text, sizeof text, "CHOLMOD %d.%d.%d, %s", CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION, blas);
+  std::snprintf(text, sizeof text, "CHOLMOD %d.%d.%d, %s", CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION,
+                blas);
   return text;
 }
 

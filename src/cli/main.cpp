@@ -59,7 +59,8 @@ int dispatch(int argc, char** argv) {
   run->add_option("-o,--output", options.directory, "result folder (default: the scene's, or results/<scene>)");
   run->add_option("--solver", options.solver, "linear solver, see `itr solvers`");
   run->add_option("--threads", options.threads, "number of threads (0: all)")->check(CLI::NonNegativeNumber);
-  run->add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")->allow_extra_args(false);
+  run->add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
+      ->allow_extra_args(false);
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();

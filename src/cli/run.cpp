@@ -22,17 +22,23 @@ void on_interrupt(int) { interrupted = 1; }
 Logger make_logger() {
   return Logger([](LogLevel level, std::string_view message) {
     switch (level) {
-      case LogLevel::debug: spdlog::debug("{}", message); break;
-      case LogLevel::info: spdlog::info("{}", message); break;
-      case LogLevel::warning: spdlog::warn("{}", message); break;
+      case LogLevel::debug:
+        spdlog::debug("{}", message);
+        break;
+      case LogLevel::info:
+        spdlog::info("{}", message);
+        break;
+      case LogLevel::warning:
+        spdlog::warn("{}", message);
+        break;
     }
   });
 }
 
 void show_progress(const StepReport& report, int steps) {
-  const std::string line = fmt::format("step {}/{}  t = {:.6g} s  {} vertices  {} Newton iterations  total {:.6g} J  {:.3g} s",
-                                       report.step, steps, report.t, report.vertices, report.newton_iterations,
-                                       report.energy.total, report.seconds.total);
+  const std::string line =
+      fmt::format("step {}/{}  t = {:.6g} s  {} vertices  {} Newton iterations  total {:.6g} J  {:.3g} s", report.step,
+                  steps, report.t, report.vertices, report.newton_iterations, report.energy.total, report.seconds.total);
   if (isatty(STDOUT_FILENO)) {
     fmt::print("\r\033[K{}", line);
     std::fflush(stdout);
@@ -42,7 +48,8 @@ void show_progress(const StepReport& report, int steps) {
 }
 
 template <int Dim>
-int simulate(Setup<Dim> setup, const scene::Scene& scene, const std::string& directory, const RunOptions& options, int threads) {
+int simulate(Setup<Dim> setup, const scene::Scene& scene, const std::string& directory, const RunOptions& options,
+             int threads) {
   linear::Registry registry;
   Simulation<Dim> simulation(std::move(setup), registry, make_logger());
   output::Writer writer(directory, scene.output, {options.scene.string(), simulation.solver_name(), threads});

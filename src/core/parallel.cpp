@@ -16,14 +16,14 @@ struct ThreadLimit::Impl {
 };
 
 ThreadLimit::ThreadLimit(int threads) {
-  if (threads > 0)
-    impl_.reset(new Impl{tbb::global_control(tbb::global_control::max_allowed_parallelism, threads)});
+  if (threads > 0) impl_.reset(new Impl{tbb::global_control(tbb::global_control::max_allowed_parallelism, threads)});
 }
 ThreadLimit::~ThreadLimit() = default;
 
 int num_threads() {
-  return static_cast<int>(std::min<std::size_t>(
-      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism), tbb::this_task_arena::max_concurrency()));
+  return static_cast<int>(
+      std::min<std::size_t>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism),
+                            tbb::this_task_arena::max_concurrency()));
 }
 
 void parallel_blocks(std::size_t n, std::size_t block, const std::function<void(std::size_t, std::size_t)>& body) {

@@ -83,8 +83,8 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
   }
 }
 
-#define ITR_INSTANTIATE(Dim)          \
-  template class InertiaEnergy<Dim>;  \
+#define ITR_INSTANTIATE(Dim)         \
+  template class InertiaEnergy<Dim>; \
   template std::vector<double> element_densities<Dim>(const CellSet<Dim>&, const std::map<int, Material>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -72,8 +72,8 @@ bool SparseAssembler::finish() {
                               (p < end && pattern_.row_indices[p] < overflow_[next].row);
         const int row = take_old ? pattern_.row_indices[p] : overflow_[next].row;
         const double value = take_old ? values_[p++] : overflow_[next++].value;
-        const bool same_row = static_cast<int>(grown.row_indices.size()) > grown.column_starts.back() &&
-                              grown.row_indices.back() == row;
+        const bool same_row =
+            static_cast<int>(grown.row_indices.size()) > grown.column_starts.back() && grown.row_indices.back() == row;
         if (same_row) {
           values.back() += value;
         } else {

@@ -50,9 +50,7 @@ double point_edge_ccd(const Vec<Dim>& p0, const Vec<Dim>& a0, const Vec<Dim>& b0
   subtract_mean<Dim>(d);
   const double speed = d[0].norm() + std::max(d[1].norm(), d[2].norm());
   return advance(
-      [&](double t) {
-        return std::sqrt(point_edge_distance_squared<Dim>(p0 + t * d[0], a0 + t * d[1], b0 + t * d[2]));
-      },
+      [&](double t) { return std::sqrt(point_edge_distance_squared<Dim>(p0 + t * d[0], a0 + t * d[1], b0 + t * d[2])); },
       speed, options);
 }
 

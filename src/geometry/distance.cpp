@@ -87,9 +87,12 @@ Mat<3 * Dim> point_line_distance_squared_hessian(const Vec<Dim>& p, const Vec<Di
 template <int Dim>
 double point_edge_distance_squared(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b) {
   switch (closest_feature_on_edge<Dim>(p, a, b)) {
-    case EdgeFeature::vertex0: return (p - a).squaredNorm();
-    case EdgeFeature::vertex1: return (p - b).squaredNorm();
-    case EdgeFeature::interior: return point_line_distance_squared<Dim>(p, a, b);
+    case EdgeFeature::vertex0:
+      return (p - a).squaredNorm();
+    case EdgeFeature::vertex1:
+      return (p - b).squaredNorm();
+    case EdgeFeature::interior:
+      return point_line_distance_squared<Dim>(p, a, b);
   }
   return 0;
 }
@@ -119,14 +122,14 @@ double edge_edge_distance_squared(const Vec<3>& a0, const Vec<3>& a1, const Vec<
                    point_edge_distance_squared<3>(b0, a0, a1), point_edge_distance_squared<3>(b1, a0, a1)});
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                            \
-  template EdgeFeature closest_feature_on_edge<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);                 \
-  template double point_point_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&);                                  \
-  template Vec<2 * Dim> point_point_distance_squared_gradient<Dim>(const Vec<Dim>&, const Vec<Dim>&);                   \
-  template Mat<2 * Dim> point_point_distance_squared_hessian<Dim>();                                                    \
-  template double point_line_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);                  \
-  template Vec<3 * Dim> point_line_distance_squared_gradient<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);   \
-  template Mat<3 * Dim> point_line_distance_squared_hessian<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);    \
+#define ITR_INSTANTIATE(Dim)                                                                                          \
+  template EdgeFeature closest_feature_on_edge<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);               \
+  template double point_point_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&);                                \
+  template Vec<2 * Dim> point_point_distance_squared_gradient<Dim>(const Vec<Dim>&, const Vec<Dim>&);                 \
+  template Mat<2 * Dim> point_point_distance_squared_hessian<Dim>();                                                  \
+  template double point_line_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);                \
+  template Vec<3 * Dim> point_line_distance_squared_gradient<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&); \
+  template Mat<3 * Dim> point_line_distance_squared_hessian<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);  \
   template double point_edge_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

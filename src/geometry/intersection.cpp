@@ -54,15 +54,20 @@ void keep_positive(const Tet& tet, const std::array<double, 4>& f, std::vector<T
     kept.push_back({p[0], q[0], q[1], q[2]});
   };
   switch (inside) {
-    case 4: kept.push_back(tet); break;
+    case 4:
+      kept.push_back(tet);
+      break;
     case 3:
       prism({tet[in[0]], tet[in[1]], tet[in[2]]}, {cut(in[0], out[0]), cut(in[1], out[0]), cut(in[2], out[0])});
       break;
     case 2:
       prism({tet[in[0]], cut(in[0], out[0]), cut(in[0], out[1])}, {tet[in[1]], cut(in[1], out[0]), cut(in[1], out[1])});
       break;
-    case 1: kept.push_back({tet[in[0]], cut(in[0], out[0]), cut(in[0], out[1]), cut(in[0], out[2])}); break;
-    default: break;
+    case 1:
+      kept.push_back({tet[in[0]], cut(in[0], out[0]), cut(in[0], out[1]), cut(in[0], out[2])});
+      break;
+    default:
+      break;
   }
 }
 

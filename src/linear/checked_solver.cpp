@@ -10,13 +10,20 @@ namespace itr::linear {
 
 const char* to_string(Outcome outcome) {
   switch (outcome) {
-    case Outcome::ok: return "ok";
-    case Outcome::not_positive_definite: return "not positive definite";
-    case Outcome::singular: return "singular";
-    case Outcome::non_finite: return "not finite";
-    case Outcome::out_of_memory: return "out of memory";
-    case Outcome::not_converged: return "not converged";
-    case Outcome::failed: return "failed";
+    case Outcome::ok:
+      return "ok";
+    case Outcome::not_positive_definite:
+      return "not positive definite";
+    case Outcome::singular:
+      return "singular";
+    case Outcome::non_finite:
+      return "not finite";
+    case Outcome::out_of_memory:
+      return "out of memory";
+    case Outcome::not_converged:
+      return "not converged";
+    case Outcome::failed:
+      return "failed";
   }
   return "";
 }
@@ -52,7 +59,8 @@ class CheckedSolver final : public Solver {
 
   Outcome factorize(std::span<const double> values) override {
     ready_ = false;
-    if (values.size() != pattern_.nonzeros()) return note(Outcome::failed, "the number of values is not that of the pattern");
+    if (values.size() != pattern_.nonzeros())
+      return note(Outcome::failed, "the number of values is not that of the pattern");
     if (!is_finite(values)) return note(Outcome::non_finite, "a matrix entry is not finite");
     values_.assign(values.begin(), values.end());
     const Outcome outcome = pattern_.order == 0 ? Outcome::ok : note(engine_->factorize(values));
@@ -71,10 +79,15 @@ class CheckedSolver final : public Solver {
       note(report.outcome);
       return report;
     }
-    for (int c = 0; c < columns; ++c)
-      report.relative_residual = std::max(report.relative_residual, refine(B.subspan(c * n, n), X.subspan(c * n, n), asked));
-    if (!is_finite(X)) return {note(Outcome::non_finite, "the solution is not finite"), report.relative_residual};
-    report.outcome = report.relative_residual <= asked ? Outcome::ok : note(Outcome::not_converged, "the asked residual was not reached");
+    bool finite = true;
+    for (int c = 0; c < columns; ++c) {
+      const double residual = refine(B.subspan(c * n, n), X.subspan(c * n, n), asked);
+      finite = finite && std::isfinite(residual);  // std::max would swallow a NaN
+      report.relative_residual = std::max(report.relative_residual, residual);
+    }
+    if (!finite || !is_finite(X)) return {note(Outcome::non_finite, "the solution is not finite"), report.relative_residual};
+    report.outcome =
+        report.relative_residual <= asked ? Outcome::ok : note(Outcome::not_converged, "the asked residual was not reached");
     return report;
   }
 

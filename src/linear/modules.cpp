@@ -36,7 +36,9 @@ class ModuleEngine final : public Engine {
   std::string message() const override { return self_ ? table_.message(self_) : "no memory for the solver"; }
 
  private:
-  static Outcome outcome(int32_t code) { return code >= ITR_OK && code <= ITR_FAILED ? static_cast<Outcome>(code) : Outcome::failed; }
+  static Outcome outcome(int32_t code) {
+    return code >= ITR_OK && code <= ITR_FAILED ? static_cast<Outcome>(code) : Outcome::failed;
+  }
   const itr_engine& table_;
   void* self_;
 };

@@ -10,7 +10,7 @@
 namespace itr::linear {
 
 struct ModuleRow {
-  BackendInfo info;       ///< not available: `reason` says why, the name is the file's
+  BackendInfo info;  ///< not available: `reason` says why, the name is the file's
   SolverFactory factory;
 };
 

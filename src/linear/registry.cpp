@@ -21,8 +21,8 @@ struct Row {
 };
 
 Row built_in(std::string name, Capabilities capabilities, std::unique_ptr<Engine> (*make)()) {
-  const std::string version = "Eigen " + std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
-                              std::to_string(EIGEN_MINOR_VERSION);
+  const std::string version = "Eigen " + std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) +
+                              "." + std::to_string(EIGEN_MINOR_VERSION);
   return {{name, version, "MPL-2.0", capabilities, true, ""},
           [name, capabilities, make] { return make_checked_solver(name, capabilities, make()); }};
 }
@@ -61,7 +61,8 @@ struct Registry::Impl {
         if (entry.path().extension() == ".so") files.insert(entry.path());
       for (const auto& file : files)
         for (auto& row : load_module(file))
-          if (const Row* present = find(row.info.name); !present) rows.push_back({std::move(row.info), std::move(row.factory)});
+          if (const Row* present = find(row.info.name); !present)
+            rows.push_back({std::move(row.info), std::move(row.factory)});
     }
     for (const auto& [name, reason] : known_absent())
       if (!find(name)) rows.push_back({{name, "", "", {}, false, reason}, nullptr});
@@ -90,7 +91,9 @@ std::vector<BackendInfo> Registry::list() {
   impl_->search();
   std::vector<BackendInfo> infos;
   for (const Row& row : impl_->rows) infos.push_back(row.info);
-  const auto group = [](const BackendInfo& info) { return info.name.rfind("eigen", 0) == 0 ? 0 : info.name == "dense" ? 1 : 2; };
+  const auto group = [](const BackendInfo& info) {
+    return info.name.rfind("eigen", 0) == 0 ? 0 : info.name == "dense" ? 1 : 2;
+  };
   std::stable_sort(infos.begin(), infos.end(), [&](const BackendInfo& a, const BackendInfo& b) {
     return std::pair(group(a), a.name) < std::pair(group(b), b.name);
   });

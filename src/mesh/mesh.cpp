@@ -51,7 +51,8 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
         throw InputError({"", place(), "vertex index " + std::to_string(v), "0 to " + std::to_string(vertex_slots() - 1)});
     add_cell(cells[c], body[c]);
     if (!(volume_.back() > 0))
-      throw InputError({"", place(), "rest volume " + std::to_string(volume_.back()), "a positive one (not degenerate or inverted)"});
+      throw InputError(
+          {"", place(), "rest volume " + std::to_string(volume_.back()), "a positive one (not degenerate or inverted)"});
     for (int k = 0; k <= Dim; ++k) {
       const Facet facet = opposite_facet<Dim>(cells[c], k);
       auto& entry = facets.try_emplace(sorted(facet), 0, facet).first->second;

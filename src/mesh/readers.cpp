@@ -49,7 +49,8 @@ MeshFile read_mesh_file(const fs::path& file) {
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
   if (ending != ".msh" && ending != ".obj")
-    throw InputError({file.string(), "", "a name that ends in '" + ending + "'", ".msh or .obj (others are not supported yet)"});
+    throw InputError(
+        {file.string(), "", "a name that ends in '" + ending + "'", ".msh or .obj (others are not supported yet)"});
   const std::string bytes = read_bytes(file);
   MeshFile mesh = ending == ".msh" ? read_msh(bytes, file) : read_obj(bytes, file);
   check(mesh, file);

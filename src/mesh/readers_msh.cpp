@@ -36,7 +36,7 @@ class Cursor {
   }
 
   std::int64_t small() { return binary ? raw<std::int32_t>() : text<std::int64_t>(); }  ///< C int
-  std::int64_t size() {                                                                  ///< C size_t
+  std::int64_t size() {                                                                 ///< C size_t
     const std::int64_t value = binary ? raw<std::int64_t>() : text<std::int64_t>();
     if (value < 0) fail("the number " + std::to_string(value), "one >= 0");
     return value;
@@ -242,10 +242,18 @@ class MshReader {
 
   void read_element(std::int64_t type, std::int64_t number, int body) {
     switch (type) {
-      case 15: read_node_tags<1>(); return;
-      case 1: edges_.push_back(read_node_tags<2>()); return;
-      case 2: triangles_.push_back(read_node_tags<3>()), mesh_.triangle_body.push_back(body); return;
-      case 4: tetrahedra_.push_back(read_node_tags<4>()), mesh_.tetrahedron_body.push_back(body); return;
+      case 15:
+        read_node_tags<1>();
+        return;
+      case 1:
+        edges_.push_back(read_node_tags<2>());
+        return;
+      case 2:
+        triangles_.push_back(read_node_tags<3>()), mesh_.triangle_body.push_back(body);
+        return;
+      case 4:
+        tetrahedra_.push_back(read_node_tags<4>()), mesh_.tetrahedron_body.push_back(body);
+        return;
       default:
         in_.fail("element " + std::to_string(number) + " of type " + std::to_string(type),
                  "1 (line), 2 (triangle), 4 (tetrahedron) or 15 (point)");
@@ -268,7 +276,8 @@ class MshReader {
     index.reserve(tags_.size());
     for (std::int64_t i = 0; i < n; ++i)
       if (!index.emplace(tags_[i], static_cast<int>(is_dense ? tags_[i] - 1 : i)).second)
-        throw InputError({file_.string(), "$Nodes", "node " + std::to_string(tags_[i]) + " twice", "different node numbers"});
+        throw InputError(
+            {file_.string(), "$Nodes", "node " + std::to_string(tags_[i]) + " twice", "different node numbers"});
     if (is_dense) sort_vertices();
     renumber(edges_, mesh_.edges, index);
     renumber(triangles_, mesh_.triangles, index);
@@ -289,7 +298,8 @@ class MshReader {
       for (std::size_t k = 0; k < N; ++k) {
         const auto found = index.find(from[i][k]);
         if (found == index.end())
-          throw InputError({file_.string(), "$Elements", "node " + std::to_string(from[i][k]), "a node of the $Nodes section"});
+          throw InputError(
+              {file_.string(), "$Elements", "node " + std::to_string(from[i][k]), "a node of the $Nodes section"});
         to[i][k] = found->second;
       }
   }

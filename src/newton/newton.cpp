@@ -11,11 +11,16 @@ namespace itr {
 
 const char* to_string(Termination termination) {
   switch (termination) {
-    case Termination::gradient: return "gradient below tolerance";
-    case Termination::step: return "step below tolerance";
-    case Termination::iterations: return "out of iterations";
-    case Termination::no_descent: return "no step lowers the energy";
-    case Termination::infeasible: return "not feasible";
+    case Termination::gradient:
+      return "gradient below tolerance";
+    case Termination::step:
+      return "step below tolerance";
+    case Termination::iterations:
+      return "out of iterations";
+    case Termination::no_descent:
+      return "no step lowers the energy";
+    case Termination::infeasible:
+      return "not feasible";
   }
   return "";
 }
@@ -33,8 +38,8 @@ namespace {
 
 constexpr double kArmijo = 1e-4;
 constexpr int kIterationsPerFallback = 5;  ///< iterations with the projected Hessian before the true one is tried again
-constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
-constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
+constexpr double kLeastPenalty = 1e-8;     ///< force by length and stiffness: above the round-off of a body at rest
+constexpr double kRelaxBelow = 0.1;        ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 class Minimizer {
  public:
@@ -230,8 +235,8 @@ class Minimizer {
   double model_curvature_ = 0;
   double remaining_l1_ = 0;
   double penalty_ = 0;
-  bool moving_ = false;      ///< held dofs are not yet at their targets
-  bool relaxing_ = false;    ///< this iteration leaves them where they are
+  bool moving_ = false;    ///< held dofs are not yet at their targets
+  bool relaxing_ = false;  ///< this iteration leaves them where they are
   bool relax_next_ = false;
   bool projected_ = false;
   int psd_iterations_ = 0;

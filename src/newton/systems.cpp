@@ -26,9 +26,7 @@ linear::SolveReport DenseSystem::solve(const VectorX& rhs, VectorX& solution) {
   return {solution.allFinite() ? linear::Outcome::ok : linear::Outcome::non_finite, 0};
 }
 
-double DenseSystem::diagonal_scale() const {
-  return hessian_.rows() > 0 ? hessian_.diagonal().cwiseAbs().maxCoeff() : 0;
-}
+double DenseSystem::diagonal_scale() const { return hessian_.rows() > 0 ? hessian_.diagonal().cwiseAbs().maxCoeff() : 0; }
 
 SparseSystem::SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, std::span<const int> stencils,
                            int stencil_size)

@@ -27,9 +27,9 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
                                                    problem.scaling);
   const ElasticEnergy<Dim> inversion(problem.cells, problem.materials, 1);
   const VolumeBarrier<Dim> volume(problem.cells, kVolumeActivation, 1);
-  const bool reachable = inversion.max_step(interpolant, way, workspace) == 1 && volume.value(projected, workspace) == 0 &&
-                         (!contact || (contact->max_step(interpolant, way, workspace) == 1 &&
-                                       contact->active(projected, workspace).empty()));
+  const bool reachable =
+      inversion.max_step(interpolant, way, workspace) == 1 && volume.value(projected, workspace) == 0 &&
+      (!contact || (contact->max_step(interpolant, way, workspace) == 1 && contact->active(projected, workspace).empty()));
   if (reachable) return projected;
 
   report.used_barriers = true;
@@ -46,7 +46,8 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
                                                   kVolumeStiffness * stiffness * problem.scaling));
   if (contact) energy.add(contact);
   std::vector<int> stencils;
-  for (const auto& element : problem.cells.elements) stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
+  for (const auto& element : problem.cells.elements)
+    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
   SparseSystem system(solver, dofs, Dim, stencils, Dim + 1);
   NewtonOptions options;
   options.max_iterations = 100;

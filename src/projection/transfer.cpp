@@ -86,7 +86,8 @@ class MassOperator {
   MassOperator(const TransferMesh<Dim>& mesh, std::span<const char> fixed) : mesh_(mesh), fixed_(fixed) {
     diagonal_ = VectorX::Zero(static_cast<Eigen::Index>(mesh.rest.size()));
     for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
-      share_.push_back(mesh.density[c] * simplex_volume<Dim>(corners<Dim>(mesh, static_cast<int>(c))) / ((Dim + 1) * (Dim + 2)));
+      share_.push_back(mesh.density[c] * simplex_volume<Dim>(corners<Dim>(mesh, static_cast<int>(c))) /
+                       ((Dim + 1) * (Dim + 2)));
       for (const int v : mesh.cells[c]) diagonal_[v] += 2 * share_[c];
     }
   }
@@ -110,8 +111,8 @@ class MassOperator {
   VectorX diagonal_;
 };
 
-/// Jacobi-preconditioned conjugate gradients from zero until the residual no longer falls. The preconditioned consistent mass
-/// matrix has eigenvalues in [1/2, (Dim + 2) / 2] whatever the mesh (Wathen 1987), so some dozens of iterations do.
+/// Jacobi-preconditioned conjugate gradients from zero until the residual no longer falls. The preconditioned consistent
+/// mass matrix has eigenvalues in [1/2, (Dim + 2) / 2] whatever the mesh (Wathen 1987), so some dozens of iterations do.
 template <int Dim>
 VectorX solve_mass(const MassOperator<Dim>& mass, VectorX residual, TransferReport& report) {
   constexpr int kMaxIterations = 200;
@@ -165,8 +166,7 @@ MatrixX touched_cross_mass_product(const TransferMesh<Dim>& old_mesh, const Tran
       const int o = touched.old_cells[hit];
       const Mat<Dim + 1> block = old_mesh.density[o] * cross_mass<Dim>(p, corners<Dim>(old_mesh, o), pieces);
       for (int i = 0; i <= Dim; ++i)
-        for (int j = 0; j <= Dim; ++j)
-          product.row(new_mesh.cells[c][i]) += block(i, j) * u_old.row(old_mesh.cells[o][j]);
+        for (int j = 0; j <= Dim; ++j) product.row(new_mesh.cells[c][i]) += block(i, j) * u_old.row(old_mesh.cells[o][j]);
     }
   }
   return product;
@@ -200,21 +200,21 @@ MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& n
   const MassOperator<Dim> mass(new_mesh, fixed);
   MatrixX u_new = u_bar;
   for (Eigen::Index k = 0; k < u_bar.cols(); ++k) u_new.col(k) += solve_mass<Dim>(mass, residual.col(k), report);
-  // ||u_new - u_old||^2 = ||u_bar - u_old||^2 - ||u_new - u_bar||^2 on the touched cells, by the orthogonality of the projection.
+  // ||u_new - u_old||^2 = ||u_bar - u_old||^2 - ||u_new - u_bar||^2 on the touched cells, by the orthogonality of the
+  // projection.
   MatrixX old_squares = MatrixX::Zero(u_old.rows(), u_old.cols());
   add_mass_product(old_mesh, touched.old_cells, u_old, old_squares);
-  report.l2_error_squared = u_old.cwiseProduct(old_squares).sum() +
-                            u_bar.cwiseProduct(represented - 2 * transferred).sum() -
+  report.l2_error_squared = u_old.cwiseProduct(old_squares).sum() + u_bar.cwiseProduct(represented - 2 * transferred).sum() -
                             (u_new - u_bar).cwiseProduct(residual).sum();
   return u_new;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                           \
-  template MatrixX touched_cross_mass_product<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&,                 \
-                                                   const TouchedCells&, const MatrixX&);                               \
-  template void patch_cross_mass<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, MatrixX&);                   \
-  template MatrixX project_l2<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, const TouchedCells&,            \
-                                   const MatrixX&, const MatrixX&, std::span<const char>, TransferReport&);
+#define ITR_INSTANTIATE(Dim)                                                                                                \
+  template MatrixX touched_cross_mass_product<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, const TouchedCells&, \
+                                                   const MatrixX&);                                                         \
+  template void patch_cross_mass<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, MatrixX&);                        \
+  template MatrixX project_l2<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, const TouchedCells&, const MatrixX&, \
+                                   const MatrixX&, std::span<const char>, TransferReport&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -11,9 +11,9 @@ namespace {
 
 /// dJ/dx at the element's vertices, stacked: cofactor of F times the shape gradients.
 template <int Dim>
-Vec<Dim * (Dim + 1)> volume_gradient(const Mat<Dim>& F, double J, const Mat<Dim>& inverse_edges) {
+Vec<Dim*(Dim + 1)> volume_gradient(const Mat<Dim>& F, double J, const Mat<Dim>& inverse_edges) {
   const Mat<Dim> columns = J * F.inverse().transpose() * inverse_edges.transpose();
-  Vec<Dim * (Dim + 1)> gradient;
+  Vec<Dim*(Dim + 1)> gradient;
   gradient.template head<Dim>() = -columns.rowwise().sum();
   for (int k = 0; k < Dim; ++k) gradient.template segment<Dim>(Dim * (k + 1)) = columns.col(k);
   return gradient;
@@ -41,7 +41,8 @@ void VolumeBarrier<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
     const double slope = (1 - r) * (2 * std::log(r) - 1 / r + 1) / activation_;
     const auto local = volume_gradient<Dim>(F, J, element.inverse_edges);
     for (int k = 0; k <= Dim; ++k)
-      gradient.segment<Dim>(Dim * element.vertices[k]) += scale_ * element.volume * slope * local.template segment<Dim>(Dim * k);
+      gradient.segment<Dim>(Dim * element.vertices[k]) +=
+          scale_ * element.volume * slope * local.template segment<Dim>(Dim * k);
   }
 }
 
@@ -54,7 +55,7 @@ void VolumeBarrier<Dim>::add_hessian(ConstVectorView x, PsdProjection, HessianSi
     if (r >= 1) continue;
     const double curvature = ((1 / r + 2) / r - 2 * std::log(r) - 3) / (activation_ * activation_);
     const auto local = volume_gradient<Dim>(F, J, element.inverse_edges);
-    const Mat<Dim * (Dim + 1)> block = scale_ * element.volume * curvature * local * local.transpose();
+    const Mat<Dim*(Dim + 1)> block = scale_ * element.volume * curvature * local * local.transpose();
     sink.add<Dim>(element.vertices, block.data());
   }
 }

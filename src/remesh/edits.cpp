@@ -108,7 +108,8 @@ Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   for (const FacetId f : mesh.facets_of(a)) {
     if (!holds(mesh.facet(f), b)) continue;
     edit.removed_facets.push_back(f);
-    for (const int end : {a, b}) edit.inserted_facets.push_back({replaced(mesh.facet(f), end, kNewVertex), mesh.facet_tag(f)});
+    for (const int end : {a, b})
+      edit.inserted_facets.push_back({replaced(mesh.facet(f), end, kNewVertex), mesh.facet_tag(f)});
   }
   typename Edit<Dim>::Value value{kNewVertex, 0.5 * (mesh.rest(a) + mesh.rest(b))};
   value.num_parents = 2;
@@ -210,7 +211,8 @@ Vec<2> best_shaped_position(const Mesh<2>& mesh, VertexId vertex, int max_iterat
   Mat<2> reference;
   reference << 1, 0.5, 0, half_root3;
   const Mat<2> inverse_reference = reference.inverse();
-  // With the moving vertex first, the edge matrix is E - X (1 1): J = E R^-1 is affine in X, tr(J^T J) quadratic, det J affine.
+  // With the moving vertex first, the edge matrix is E - X (1 1): J = E R^-1 is affine in X, tr(J^T J) quadratic, det J
+  // affine.
   const auto measure = [&](const Vec<2>& X, Vec<2>* gradient, Mat<2>* hessian) {
     double sum = 0;
     for (const CellId c : mesh.cells_of(vertex)) {
@@ -229,7 +231,8 @@ Vec<2> best_shaped_position(const Mesh<2>& mesh, VertexId vertex, int max_iterat
       cofactor << J(1, 1), -J(1, 0), -J(0, 1), J(0, 0);
       const Vec<2> dn = 2 * J * row, dd = cofactor * row;
       *gradient += dn / det - numerator * dd / (det * det);
-      *hessian += 2 * row.squaredNorm() / det * Mat<2>::Identity() - (dn * dd.transpose() + dd * dn.transpose()) / (det * det) +
+      *hessian += 2 * row.squaredNorm() / det * Mat<2>::Identity() -
+                  (dn * dd.transpose() + dd * dn.transpose()) / (det * det) +
                   2 * numerator * dd * dd.transpose() / (det * det * det);
     }
     return sum;

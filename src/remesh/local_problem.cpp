@@ -116,7 +116,8 @@ int LocalProblem::local(VertexId v) {
 }
 
 bool LocalProblem::is_removed_facet(FacetId f) const {
-  return apply_edit_ && std::find(edit_->removed_facets.begin(), edit_->removed_facets.end(), f) != edit_->removed_facets.end();
+  return apply_edit_ &&
+         std::find(edit_->removed_facets.begin(), edit_->removed_facets.end(), f) != edit_->removed_facets.end();
 }
 
 void LocalProblem::add_cells(const std::vector<CellId>& patch) {
@@ -289,7 +290,8 @@ void LocalProblem::add_terms(HistoryRule history) {
   cells_.num_vertices = static_cast<int>(global_.size());
   x_ = gather(fields_.x, context_.obstacles.x);
   if (context_.has_inertia) {
-    auto inertia = std::make_shared<InertiaEnergy<2>>(cells_, context_.materials, context_.mass, gather(fields_.predictor, {}));
+    auto inertia =
+        std::make_shared<InertiaEnergy<2>>(cells_, context_.materials, context_.mass, gather(fields_.predictor, {}));
     const bool nested = !apply_edit_ || edit_->kind == Edit<2>::Kind::split;
     if (!nested && history == HistoryRule::function) add_unrepresented_history(*inertia);
     energy_.add(std::move(inertia));
@@ -298,7 +300,8 @@ void LocalProblem::add_terms(HistoryRule history) {
   if (!context_.loads.empty())
     energy_.add(std::make_shared<LoadEnergy<2>>(cells_, context_.materials, context_.loads, context_.scaling));
   if (!has_surface_) return;
-  contact_ = std::make_shared<ContactEnergy<2>>(surface_, context_.contact, context_.contact.barrier_stiffness, context_.scaling);
+  contact_ =
+      std::make_shared<ContactEnergy<2>>(surface_, context_.contact, context_.contact.barrier_stiffness, context_.scaling);
   touches_contact_ = contact_->has_candidates(x_, workspace_);
   energy_.add(contact_);
   std::vector<std::pair<int, Box<2>>> bounds;
@@ -352,7 +355,8 @@ void LocalProblem::add_unrepresented_history(InertiaEnergy<2>& inertia) const {
     MatrixX product = MatrixX::Zero(values.rows(), values.cols());
     for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
       const auto& cell = mesh.cells[c];
-      const double mass = mesh.density[c] * simplex_volume<2>({mesh.rest[cell[0]], mesh.rest[cell[1]], mesh.rest[cell[2]]}) / 12;
+      const double mass =
+          mesh.density[c] * simplex_volume<2>({mesh.rest[cell[0]], mesh.rest[cell[1]], mesh.rest[cell[2]]}) / 12;
       const Eigen::RowVector2d total = values.row(cell[0]) + values.row(cell[1]) + values.row(cell[2]);
       for (const int v : cell) product.row(v) += mass * (total + values.row(v));
     }

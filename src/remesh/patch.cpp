@@ -14,7 +14,8 @@ namespace {
 bool meets_disc(const Mesh<2>& mesh, CellId c, const Vec<2>& center, double radius_squared) {
   const auto& cell = mesh.cell(c);
   for (int k = 0; k < 3; ++k)
-    if (point_edge_distance_squared<2>(center, mesh.rest(cell[k]), mesh.rest(cell[(k + 1) % 3])) <= radius_squared) return true;
+    if (point_edge_distance_squared<2>(center, mesh.rest(cell[k]), mesh.rest(cell[(k + 1) % 3])) <= radius_squared)
+      return true;
   const Vec<2> weights = mesh.inverse_rest_edges(c) * (center - mesh.rest(cell[0]));
   return weights[0] >= 0 && weights[1] >= 0 && weights.sum() <= 1;
 }

@@ -20,7 +20,9 @@ class Thresholds {
     top_ = std::max(std::min(low + range * s, energies[index]), std::min(1e-12, options.split.acceptance_tolerance));
     bottom_ = low + range * options.collapse.culling_threshold;
   }
-  Rank operator()(double energy) const { return energy >= top_ ? Rank::top : energy <= bottom_ ? Rank::bottom : Rank::middle; }
+  Rank operator()(double energy) const {
+    return energy >= top_ ? Rank::top : energy <= bottom_ ? Rank::bottom : Rank::middle;
+  }
 
  private:
   double top_ = 0, bottom_ = 0;
@@ -33,14 +35,16 @@ std::vector<double> cell_energies(const Mesh<2>& mesh, const RemeshFields<2>& fi
     if (!mesh.is_cell_alive(c)) continue;
     const Material& material = context.materials.at(mesh.body(c));
     const CellSet<2>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
-    energies[c] = context.scaling * mesh.volume(c) *
-                  neo_hookean_density<2>(deformation_gradient<2>(element, fields.x), {material.lame_mu(), material.lame_lambda(2)});
+    energies[c] =
+        context.scaling * mesh.volume(c) *
+        neo_hookean_density<2>(deformation_gradient<2>(element, fields.x), {material.lame_mu(), material.lame_lambda(2)});
   }
   return energies;
 }
 
 /// Contact energy (stiffness left out) of each vertex: its share of the pairs that it is part of.
-std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context) {
+std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFields<2>& fields,
+                                            const StepContext<2>& context) {
   const auto& obstacles = context.obstacles;
   const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.x.size());
   std::vector<double> energies(total, 0);
@@ -107,7 +111,7 @@ EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const S
   ranks.reserve(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const Rank a = by_elastic(elastic[i]), b = touching ? by_contact(contact[i]) : a;
-    ranks[edges[i]] = a == Rank::top || b == Rank::top                 ? Rank::top
+    ranks[edges[i]] = a == Rank::top || b == Rank::top         ? Rank::top
                       : a == Rank::bottom && b == Rank::bottom ? Rank::bottom
                                                                : Rank::middle;
   }

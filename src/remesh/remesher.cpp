@@ -28,7 +28,11 @@ EdgeKey key(VertexId a, VertexId b) { return {std::min(a, b), std::max(a, b)}; }
 class Remesher {
  public:
   Remesher(Mesh<2>& mesh, RemeshFields<2>& fields, const StepContext<2>& context, const RemeshOptions& options)
-      : mesh_(mesh), fields_(fields), context_(context), options_(options), tree_(mesh, fields, context),
+      : mesh_(mesh),
+        fields_(fields),
+        context_(context),
+        options_(options),
+        tree_(mesh, fields, context),
         total_volume_(mesh.total_volume()) {}
 
   RemeshReport run() {
@@ -79,10 +83,10 @@ class Remesher {
     return it == depth_.end() ? 0 : it->second;
   }
   double rest_length(const EdgeKey& e) const { return (mesh_.rest(e[0]) - mesh_.rest(e[1])).norm(); }
-  double length(const EdgeKey& e) const {
-    return (fields_.x.segment<2>(2 * e[0]) - fields_.x.segment<2>(2 * e[1])).norm();
+  double length(const EdgeKey& e) const { return (fields_.x.segment<2>(2 * e[0]) - fields_.x.segment<2>(2 * e[1])).norm(); }
+  bool exists(const EdgeKey& e) const {
+    return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty();
   }
-  bool exists(const EdgeKey& e) const { return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty(); }
   bool is_surface(const EdgeKey& e) const { return mesh_.find_facet({e[0], e[1]}) != kNone; }
 
   std::vector<EdgeKey> edges_of(const std::vector<CellId>& cells) const {
@@ -167,7 +171,8 @@ class Remesher {
     if (one_ring) local.rings = 1, local.relative_volume = 0;
     std::vector<CellId> patch = select_patch(mesh_, edit.removed_cells, center, total_volume_, local, patch_marks_);
     const auto build = [&](bool apply) {
-      return std::make_unique<LocalProblem>(mesh_, fields_, context_, patch, &edit, apply, options_.history, tree_, scratch_);
+      return std::make_unique<LocalProblem>(mesh_, fields_, context_, patch, &edit, apply, options_.history, tree_,
+                                            scratch_);
     };
     auto before = build(false);
     const double energy_before = before->value();
@@ -240,8 +245,8 @@ class Remesher {
   }
 
   void collapse() {
-    const double longest = std::min(options_.collapse.abs_max_edge_length,
-                                    options_.collapse.rel_max_edge_length * context_.shortest_edge);
+    const double longest =
+        std::min(options_.collapse.abs_max_edge_length, options_.collapse.rel_max_edge_length * context_.shortest_edge);
     const auto is_candidate = [&](const EdgeKey& e) {
       return rank(e) == Rank::bottom || rest_length(e) < kTinyEdge * context_.shortest_edge;
     };
@@ -251,7 +256,8 @@ class Remesher {
     while (const auto edge = queue.pop()) {
       if (!exists(*edge) || rest_length(*edge) > longest || depth(*edge) >= options_.collapse.max_depth) continue;
       const auto around = mesh_.cells_of_edge(*edge);
-      if (std::all_of(around.begin(), around.end(), [&](CellId c) { return mesh_.volume(c) > longest * longest / 2; })) continue;
+      if (std::all_of(around.begin(), around.end(), [&](CellId c) { return mesh_.volume(c) > longest * longest / 2; }))
+        continue;
       ++report_.collapses.tried;
       const auto edit = make_collapse(mesh_, *edge);
       if (!edit) continue;

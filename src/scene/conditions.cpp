@@ -148,8 +148,10 @@ class ConditionReader {
     const int tag = read_condition_id(node["id"]);
     const bool is_on_facets = tag > 0 && facet_tags_.contains(tag);
     if (!is_on_facets && !obstacle_ids_.contains(tag)) warn_unused(node);
-    if (!seen.insert(tag).second) warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
-    else if (is_on_facets) tags.push_back(tag);
+    if (!seen.insert(tag).second)
+      warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
+    else if (is_on_facets)
+      tags.push_back(tag);
     return tags;
   }
 
@@ -192,7 +194,8 @@ class ConditionReader {
 }  // namespace
 
 template <int Dim>
-void read_conditions(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup, std::vector<std::string>& warnings) {
+void read_conditions(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
+                     std::vector<std::string>& warnings) {
   ConditionReader<Dim>(root, setup, warnings).read(std::move(obstacles));
 }
 

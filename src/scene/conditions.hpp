@@ -2,13 +2,14 @@
 // `boundary_conditions`, `initial_conditions` and the motion of obstacles (scene-format §4).
 #pragma once
 
-#include "itr/simulation/setup.hpp"
 #include "geometry.hpp"
+#include "itr/simulation/setup.hpp"
 
 namespace itr::scene {
 
 /// Fills the conditions and the obstacles of a setup whose mesh and time are read.
 template <int Dim>
-void read_conditions(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup, std::vector<std::string>& warnings);
+void read_conditions(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
+                     std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

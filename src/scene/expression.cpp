@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kDeepest = 200;       ///< nesting: the parser recurses
-constexpr int kStackOnFrame = 32;   ///< deeper programs take their stack from the heap
+constexpr int kDeepest = 200;      ///< nesting: the parser recurses
+constexpr int kStackOnFrame = 32;  ///< deeper programs take their stack from the heap
 
 double factorial(double a) {
   if (!(a >= 0)) return kNaN;
@@ -175,7 +175,8 @@ class ExpressionParser {
 
   void name() {
     const std::size_t begin = position_;
-    while (position_ < text_.size() && (is_letter(text_[position_]) || is_digit(text_[position_]) || text_[position_] == '_'))
+    while (position_ < text_.size() &&
+           (is_letter(text_[position_]) || is_digit(text_[position_]) || text_[position_] == '_'))
       ++position_;
     const std::string_view word = text_.substr(begin, position_ - begin);
     if (variable(word)) return;
@@ -264,19 +265,45 @@ double Expression::operator()(const Variables& variables) const {
   double* top = on_heap.empty() ? on_frame.data() : on_heap.data();  // one past the last number
   for (const Instruction& instruction : program_) {
     switch (instruction.code) {
-      case Code::number: *top++ = instruction.number; break;
-      case Code::x: *top++ = variables.x; break;
-      case Code::y: *top++ = variables.y; break;
-      case Code::z: *top++ = variables.z; break;
-      case Code::t: *top++ = variables.t; break;
-      case Code::negate: top[-1] = -top[-1]; break;
-      case Code::add: --top, top[-1] += top[0]; break;
-      case Code::subtract: --top, top[-1] -= top[0]; break;
-      case Code::multiply: --top, top[-1] *= top[0]; break;
-      case Code::divide: --top, top[-1] /= top[0]; break;
-      case Code::modulo: --top, top[-1] = std::fmod(top[-1], top[0]); break;
-      case Code::power: --top, top[-1] = std::pow(top[-1], top[0]); break;
-      case Code::drop: --top; break;
+      case Code::number:
+        *top++ = instruction.number;
+        break;
+      case Code::x:
+        *top++ = variables.x;
+        break;
+      case Code::y:
+        *top++ = variables.y;
+        break;
+      case Code::z:
+        *top++ = variables.z;
+        break;
+      case Code::t:
+        *top++ = variables.t;
+        break;
+      case Code::negate:
+        top[-1] = -top[-1];
+        break;
+      case Code::add:
+        --top, top[-1] += top[0];
+        break;
+      case Code::subtract:
+        --top, top[-1] -= top[0];
+        break;
+      case Code::multiply:
+        --top, top[-1] *= top[0];
+        break;
+      case Code::divide:
+        --top, top[-1] /= top[0];
+        break;
+      case Code::modulo:
+        --top, top[-1] = std::fmod(top[-1], top[0]);
+        break;
+      case Code::power:
+        --top, top[-1] = std::pow(top[-1], top[0]);
+        break;
+      case Code::drop:
+        --top;
+        break;
       case Code::call:
         top -= instruction.arity;
         *top = kFunctions[instruction.function].call(top);

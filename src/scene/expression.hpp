@@ -34,7 +34,7 @@ class Expression {
   struct Instruction {
     Code code;
     unsigned char arity = 0;
-    int function = 0;   ///< index into the table of functions
+    int function = 0;  ///< index into the table of functions
     double number = 0;
   };
 

@@ -39,8 +39,10 @@ Component read_component(const Node& node) {
     component.constant = node.number(0);
   } else if (node.json().is_string()) {
     Expression expression = parse_expression(node);
-    if (expression.is_constant()) component.constant = expression({});
-    else component.expression = std::move(expression);
+    if (expression.is_constant())
+      component.constant = expression({});
+    else
+      component.expression = std::move(expression);
   } else {
     node.fail("a number or an expression");
   }
@@ -86,7 +88,8 @@ ValueFunction<Dim> read_function(const Node& value, const Node& interpolation, d
 }
 
 template <int Dim>
-void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t, const Node& value) {
+void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t,
+                   const Node& value) {
   for (const Vec<Dim>& X : points) {
     if (!function(X, t).hasNaN()) continue;
     std::ostringstream place;

@@ -12,8 +12,8 @@ namespace itr::scene {
 
 namespace {
 
-constexpr double kFlat = 1e-5;            ///< least extent in z of a surface that is no 2D mesh [m], PolyFEM's
-constexpr double kLeastShape = 1e-13;     ///< cells with less volume, relative to longest edge^Dim, are degenerate
+constexpr double kFlat = 1e-5;         ///< least extent in z of a surface that is no 2D mesh [m], PolyFEM's
+constexpr double kLeastShape = 1e-13;  ///< cells with less volume, relative to longest edge^Dim, are degenerate
 constexpr std::size_t kMostCells = 200'000'000;
 
 /// Bodies as they are collected, before one mesh is made of them.
@@ -45,7 +45,8 @@ double longest_edge(const std::vector<Vec<Dim>>& points, const typename Mesh<Dim
   return longest;
 }
 
-/// Triangles are turned to positive area; tetrahedra only if the transformation is a mirror: a file with inverted ones is wrong.
+/// Triangles are turned to positive area; tetrahedra only if the transformation is a mirror: a file with inverted ones is
+/// wrong.
 template <int Dim>
 void orient_cells(const Node& geometry, const std::vector<Vec<Dim>>& points, bool is_mirror,
                   std::vector<typename Mesh<Dim>::Cell>& cells) {

@@ -109,10 +109,14 @@ double Interpolation::outside(double t) const {
 
 double Interpolation::operator()(double t) const {
   switch (kind_) {
-    case Kind::none: return 1;
-    case Kind::linear: return t;
-    case Kind::linear_ramp: return std::clamp(t, from_, to_) - from_;
-    default: break;
+    case Kind::none:
+      return 1;
+    case Kind::linear:
+      return t;
+    case Kind::linear_ramp:
+      return std::clamp(t, from_, to_) - from_;
+    default:
+      break;
   }
   if (t < points_.front() || t >= points_.back()) return outside(t);
   const auto after = std::upper_bound(points_.begin(), points_.end(), t);

@@ -23,7 +23,7 @@ class Interpolation {
  private:
   void read_points(const Node& node);
   void fit_spline();
-  double inside(double t, std::size_t i) const;      ///< on [points_i, points_i+1]
+  double inside(double t, std::size_t i) const;  ///< on [points_i, points_i+1]
   double slope(double t, std::size_t i) const;
   double outside(double t) const;
 

@@ -90,17 +90,20 @@ constexpr Group kGroups[] = {
     {"/solver/nonlinear", Role::only, "solver=\"Newton\" allow_out_of_iterations=false"},
     {"/solver/nonlinear", Role::read, "max_iterations f_delta"},
     {"/solver/nonlinear", Role::read, "x_delta grad_norm"},
-    {"/solver/nonlinear", Role::read, "x_delta_tol grad_norm_tol rel_grad_norm_tol rel_x_delta_tol newton_decrement_tol norm_type"},
+    {"/solver/nonlinear", Role::read,
+     "x_delta_tol grad_norm_tol rel_grad_norm_tol rel_x_delta_tol newton_decrement_tol norm_type"},
     {"/solver/nonlinear", Role::ignored, "iterations_per_strategy use_grad_norm"},
     {"/solver/nonlinear/advanced", Role::read, "first_grad_norm_tol f_delta f_delta_tol"},
-    {"/solver/nonlinear/advanced", Role::ignored, "f_delta_step_tol derivative_along_delta_x_tol apply_gradient_fd gradient_fd_eps"},
+    {"/solver/nonlinear/advanced", Role::ignored,
+     "f_delta_step_tol derivative_along_delta_x_tol apply_gradient_fd gradient_fd_eps"},
     {"/solver/nonlinear/line_search", Role::read, "method"},
     {"/solver/nonlinear/line_search", Role::ignored,
      "use_grad_norm_tol min_step_size max_step_size_iter min_step_size_final max_step_size_iter_final "
      "default_init_step_size step_ratio Armijo RobustArmijo"},
     {"/solver/nonlinear/Newton", Role::read, "use_psd_projection"},
     {"/solver/nonlinear/Newton", Role::ignored,
-     "force_psd_projection residual_tolerance reg_weight_min reg_weight_max reg_weight_inc use_psd_projection_in_regularized"},
+     "force_psd_projection residual_tolerance reg_weight_min reg_weight_max reg_weight_inc "
+     "use_psd_projection_in_regularized"},
 
     {"/solver/advanced", Role::read, "lump_mass_matrix"},
     {"/solver/advanced", Role::only,
@@ -175,8 +178,10 @@ const KeyTable& key_table() {
 [[noreturn]] void refuse_unknown(const Node& parent, const std::string& key, const std::set<std::string>& known) {
   std::vector<std::string> names(known.begin(), known.end());
   std::string expected;
-  if (const std::string near = nearest_name(key, names); !near.empty()) expected = "\"" + near + "\" perhaps; ";
-  else if (const std::string place = key_table().place_of(key); !place.empty()) expected = "it at " + place + " perhaps; ";
+  if (const std::string near = nearest_name(key, names); !near.empty())
+    expected = "\"" + near + "\" perhaps; ";
+  else if (const std::string place = key_table().place_of(key); !place.empty())
+    expected = "it at " + place + " perhaps; ";
   expected += "known here:";
   for (const auto& name : names) expected += " " + name;
   parent[key].fail("an unknown key", expected);

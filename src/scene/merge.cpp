@@ -68,7 +68,8 @@ Json apply_common(Json args, const fs::path& file, std::vector<fs::path> chain) 
   const fs::path base_file = resolve_path(common, string_member(args, "root_path", file), file);
   const fs::path identity = fs::weakly_canonical(base_file);
   if (std::find(chain.begin(), chain.end(), identity) != chain.end())
-    throw InputError({file.string(), "/common", "'" + common + "', which is being merged already", "no cycle of common files"});
+    throw InputError(
+        {file.string(), "/common", "'" + common + "', which is being merged already", "no cycle of common files"});
   chain.push_back(identity);
 
   Json base = parse(read_text(base_file, file.string(), "/common"), base_file);
@@ -93,7 +94,8 @@ Json apply_common(Json args, const fs::path& file, std::vector<fs::path> chain) 
 Json& descend(Json& parent, const std::string& token, const Override& override) {
   if (parent.is_null()) parent = Json::object();
   if (parent.is_object()) return parent[token];
-  if (!parent.is_array()) refuse_override(override, abbreviate(parent) + " above '" + token + "'", "an object or a list there");
+  if (!parent.is_array())
+    refuse_override(override, abbreviate(parent) + " above '" + token + "'", "an object or a list there");
   if (token == "-") return parent.emplace_back();
   const bool is_index = !token.empty() && token.size() < 9 && token.find_first_not_of("0123456789") == std::string::npos;
   const std::size_t index = is_index ? std::stoul(token) : parent.size() + 1;
@@ -125,7 +127,8 @@ void apply_override(Json& args, const Override& override) {
 /// A null is as good as absent in every place of the format.
 void remove_null_members(Json& json) {
   if (json.is_object())
-    for (auto member = json.begin(); member != json.end();) member = member->is_null() ? json.erase(member) : std::next(member);
+    for (auto member = json.begin(); member != json.end();)
+      member = member->is_null() ? json.erase(member) : std::next(member);
   if (json.is_structured())
     for (auto& child : json) remove_null_members(child);
 }

@@ -50,9 +50,12 @@ fs::path Document::resolve(const std::string& path) const { return resolve_path(
 std::string escape_token(std::string_view token) {
   std::string escaped;
   for (const char c : token) {
-    if (c == '~') escaped += "~0";
-    else if (c == '/') escaped += "~1";
-    else escaped += c;
+    if (c == '~')
+      escaped += "~0";
+    else if (c == '/')
+      escaped += "~1";
+    else
+      escaped += c;
   }
   return escaped;
 }
@@ -86,7 +89,9 @@ Node Node::operator[](std::string_view key) const {
   return Node(*document_, member, pointer_ + "/" + escape_token(key));
 }
 
-Node Node::at(std::size_t index) const { return Node(*document_, &json_->at(index), pointer_ + "/" + std::to_string(index)); }
+Node Node::at(std::size_t index) const {
+  return Node(*document_, &json_->at(index), pointer_ + "/" + std::to_string(index));
+}
 
 std::vector<Node> Node::items() const {
   std::vector<Node> nodes;

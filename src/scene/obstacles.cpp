@@ -61,7 +61,8 @@ std::vector<std::array<int, N - 1>> boundary_of(const std::vector<std::array<int
 
 /// A point that only the cells of a solid use is used if it is on their boundary.
 template <typename Cells, typename Facets>
-std::vector<char> find_used(std::size_t num_points, const Cells& solid, const Facets& boundary, const std::vector<Edge>& edges) {
+std::vector<char> find_used(std::size_t num_points, const Cells& solid, const Facets& boundary,
+                            const std::vector<Edge>& edges) {
   std::vector<char> is_used(num_points, true);
   for (const auto& cell : solid)
     for (const int v : cell) is_used[v] = false;
@@ -118,8 +119,9 @@ template <int Dim>
 void check_lengths(const Node& geometry, const Surface& surface, const std::vector<Vec<Dim>>& points) {
   for (const auto& [a, b] : surface.edges)
     if (!((points[a] - points[b]).norm() > 0))
-      geometry["mesh"].fail("an obstacle edge of length 0 (vertices " + std::to_string(a) + " and " + std::to_string(b) + ")",
-                            "no degenerate obstacles");
+      geometry["mesh"].fail(
+          "an obstacle edge of length 0 (vertices " + std::to_string(a) + " and " + std::to_string(b) + ")",
+          "no degenerate obstacles");
 }
 
 int read_obstacle_id(const Node& node) {

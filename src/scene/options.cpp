@@ -35,8 +35,7 @@ void read_integrator(const Node& node, TimeOptions& options) {
 /// Two of tend, dt, time_steps; a third must agree with them.
 void read_steps(const Node& time, TimeOptions& options) {
   const Node tend = time["tend"], dt = time["dt"], steps = time["time_steps"];
-  if (tend.exists() + dt.exists() + steps.exists() < 2)
-    time.fail(abbreviate(time.json()), "two of tend, dt and time_steps");
+  if (tend.exists() + dt.exists() + steps.exists() < 2) time.fail(abbreviate(time.json()), "two of tend, dt and time_steps");
   if (tend.exists() && !(tend.number(0) > options.t0)) tend.fail("a time after t0 = " + std::to_string(options.t0));
   const double duration = tend.number(0) - options.t0;
   options.steps = steps.integer_at_least(1, 1);
@@ -90,9 +89,11 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   options.activation_distance = contact["dhat"].positive(1e-3);
   const double share = contact["dhat_percentage"].positive(0.8);
   if (options.enabled && options.activation_distance > shortest_edge) {
-    if (!contact.has("dhat")) options.activation_distance = share * shortest_edge;
-    else warnings.push_back(contact["dhat"].pointer() + ": longer than the shortest edge of the surfaces, " +
-                            std::to_string(shortest_edge));
+    if (!contact.has("dhat"))
+      options.activation_distance = share * shortest_edge;
+    else
+      warnings.push_back(contact["dhat"].pointer() + ": longer than the shortest edge of the surfaces, " +
+                         std::to_string(shortest_edge));
   }
   options.convergent = contact["use_convergent_formulation"].boolean(false);
   options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
@@ -135,8 +136,9 @@ void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& 
 /// scene-format §7.3, as far as it says the same as §7.2: in the Euclidean norm, without relative tests.
 void read_main_tolerances(const Node& nonlinear, const Node& present, NewtonOptions& options) {
   for (const char* key : {"x_delta", "grad_norm"})
-    if (nonlinear.has(key)) nonlinear[key].fail(std::string("\"") + key + "\" beside " + present.pointer(),
-                                                "one vocabulary of tolerances, not two");
+    if (nonlinear.has(key))
+      nonlinear[key].fail(std::string("\"") + key + "\" beside " + present.pointer(),
+                          "one vocabulary of tolerances, not two");
   const Node norm = nonlinear["norm_type"];
   if (norm.choice({"L2", "Linf", "Euclidean"}, 0) != 2)
     present.fail("x_delta and grad_norm, or norm_type \"Euclidean\": the norms L2 and Linf are not supported yet");
@@ -156,13 +158,15 @@ NewtonOptions read_newton(const Node& root, double characteristic_length) {
   NewtonOptions options;
   options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, 500);
   const Node main_key = find_main_key(nonlinear);
-  if (main_key.exists()) read_main_tolerances(nonlinear, main_key, options);
-  else read_paper_tolerances(nonlinear, characteristic_length, options);
+  if (main_key.exists())
+    read_main_tolerances(nonlinear, main_key, options);
+  else
+    read_paper_tolerances(nonlinear, characteristic_length, options);
   check_energy_tolerance(nonlinear["f_delta"]);
   check_energy_tolerance(nonlinear["advanced"]["f_delta"]);
   check_energy_tolerance(nonlinear["advanced"]["f_delta_tol"]);
-  options.line_search = static_cast<LineSearch>(
-      nonlinear["line_search"]["method"].choice({"Backtracking", "Armijo", "RobustArmijo"}, static_cast<int>(options.line_search)));
+  options.line_search = static_cast<LineSearch>(nonlinear["line_search"]["method"].choice(
+      {"Backtracking", "Armijo", "RobustArmijo"}, static_cast<int>(options.line_search)));
   options.project_to_psd = nonlinear["Newton"]["use_psd_projection"].boolean(true);
   return options;
 }
@@ -181,7 +185,8 @@ RemeshOptions read_remesh(const Node& root) {
   RemeshOptions options;
   options.enabled = node["enabled"].boolean(false);
   options.sizing_field = node["type"].choice({"physics", "sizing_field"}, 0) == 1;
-  options.screening = static_cast<Screening>(node["screening"].choice({"energy-percentile", "predicted-decrease", "none"}, 0));
+  options.screening =
+      static_cast<Screening>(node["screening"].choice({"energy-percentile", "predicted-decrease", "none"}, 0));
   options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));
   options.sweeps = node["sweeps"].integer_at_least(1, 1);
 
@@ -287,7 +292,8 @@ std::map<int, Material> read_materials(const Node& root, int dimension, const st
   }
   for (const int body : bodies)
     if (!materials.contains(body))
-      node.fail("no material with the id " + std::to_string(body) + ", which elements of the mesh have", "one for every body");
+      node.fail("no material with the id " + std::to_string(body) + ", which elements of the mesh have",
+                "one for every body");
   return materials;
 }
 

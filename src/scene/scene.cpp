@@ -75,8 +75,10 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   scene.output = read_output(root);
   scene.max_threads = read_max_threads(root);
   scene.directory = read_directory(root);
-  if (find_dimension(geometries, files) == 2) scene.setup = read_setup<2>(root, geometries, files, scene.warnings);
-  else scene.setup = read_setup<3>(root, geometries, files, scene.warnings);
+  if (find_dimension(geometries, files) == 2)
+    scene.setup = read_setup<2>(root, geometries, files, scene.warnings);
+  else
+    scene.setup = read_setup<3>(root, geometries, files, scene.warnings);
   return scene;
 }
 

@@ -34,13 +34,20 @@ typename Selection<Dim>::Rule Selection<Dim>::read_rule(const Node& node) const 
   }
   const int id = read_id(node["id"], 0);
   Test test;
-  if (node.has("box")) test = read_box(node);
-  else if (node.has("center")) test = read_sphere(node);
-  else if (node.has("radius")) test = read_cylinder(node);
-  else if (node.has("axis")) test = read_axis(node);
-  else if (node.has("normal")) test = read_plane(node);
-  else if (node.json().size() == 1) test = [](const Vec<Dim>&) { return true; };
-  else node.fail("box, threshold, center, radius, axis or normal, beside the id");
+  if (node.has("box"))
+    test = read_box(node);
+  else if (node.has("center"))
+    test = read_sphere(node);
+  else if (node.has("radius"))
+    test = read_cylinder(node);
+  else if (node.has("axis"))
+    test = read_axis(node);
+  else if (node.has("normal"))
+    test = read_plane(node);
+  else if (node.json().size() == 1)
+    test = [](const Vec<Dim>&) { return true; };
+  else
+    node.fail("box, threshold, center, radius, axis or normal, beside the id");
   return [test, id](const Vec<Dim>& p, int) { return test(p) ? std::optional(id) : std::nullopt; };
 }
 
@@ -52,12 +59,18 @@ typename Selection<Dim>::Rule Selection<Dim>::read_threshold(const Node& node) c
   return [box = box_, threshold, offset](const Vec<Dim>& p, int) {
     const auto is_near = [&](double a, double b) { return std::abs(a - b) < threshold; };
     int side = 7;
-    if (is_near(p[0], box.min()[0])) side = 1;
-    else if (is_near(p[1], box.min()[1])) side = 2;
-    else if (is_near(p[0], box.max()[0])) side = 3;
-    else if (is_near(p[1], box.max()[1])) side = 4;
-    else if (Dim == 3 && is_near(p[Dim - 1], box.min()[Dim - 1])) side = 5;
-    else if (Dim == 3 && is_near(p[Dim - 1], box.max()[Dim - 1])) side = 6;
+    if (is_near(p[0], box.min()[0]))
+      side = 1;
+    else if (is_near(p[1], box.min()[1]))
+      side = 2;
+    else if (is_near(p[0], box.max()[0]))
+      side = 3;
+    else if (is_near(p[1], box.max()[1]))
+      side = 4;
+    else if (Dim == 3 && is_near(p[Dim - 1], box.min()[Dim - 1]))
+      side = 5;
+    else if (Dim == 3 && is_near(p[Dim - 1], box.max()[Dim - 1]))
+      side = 6;
     return std::optional(side + offset);
   };
 }

@@ -74,13 +74,17 @@ void transfer_history(const Setup<2>& setup, const Mesh<2>& old_mesh, const Hist
 
   const CellSet<2> cells = whole_mesh(mesh, setup.obstacles.rest);
   const CollisionSurface surface = collision_surface(mesh, setup.obstacles);
-  const SafeProjectionProblem<2> problem{cells,   setup.contact.enabled ? &surface : nullptr,
-                                         setup.materials, setup.contact,
-                                         scaling, vertices_near(mesh, touched.new_cells, cells.num_vertices),
+  const SafeProjectionProblem<2> problem{cells,
+                                         setup.contact.enabled ? &surface : nullptr,
+                                         setup.materials,
+                                         setup.contact,
+                                         scaling,
+                                         vertices_near(mesh, touched.new_cells, cells.num_vertices),
                                          held};
   for (std::size_t i = 0; i < history.x.size(); ++i) {
     SafeProjectionReport safe;
-    history.x[i] = project_safely(problem, history.x[i], project(old_history.x[i], history.x[i], held_vertices), solver, safe);
+    history.x[i] =
+        project_safely(problem, history.x[i], project(old_history.x[i], history.x[i], held_vertices), solver, safe);
     if (!safe.converged) logger.debug("safe projection stopped after " + std::to_string(safe.iterations) + " iterations");
   }
 }

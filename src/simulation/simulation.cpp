@@ -78,7 +78,8 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);
   state.history.x = {std::move(x)};
   state.history.v = {sample(setup.initial_velocity, state.mesh, obstacles)};
-  if (setup.time.integrator == Integrator::newmark) state.history.a = {sample(setup.initial_acceleration, state.mesh, obstacles)};
+  if (setup.time.integrator == Integrator::newmark)
+    state.history.a = {sample(setup.initial_acceleration, state.mesh, obstacles)};
   return state;
 }
 
@@ -98,7 +99,8 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, lin
   if (const auto loads = loads_at(setup, state.t); !loads.empty())
     force -= LoadEnergy<Dim>(cells, setup.materials, loads, 1).forces();
   std::vector<int> stencils;
-  for (const auto& element : cells.elements) stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
+  for (const auto& element : cells.elements)
+    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
   SparseSystem system(solver, dofs, Dim, stencils, Dim + 1);
   PrescribedMotion motion;
   VectorX rhs(dofs.num_unknowns), solution;
@@ -146,7 +148,8 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
     set_consistent_acceleration(impl_->setup, impl_->state, *impl_->solver);
   impl_->shortest_edge = std::numeric_limits<double>::infinity();
   const auto& mesh = impl_->state.mesh;
-  for (const auto& [a, b] : mesh.edges()) impl_->shortest_edge = std::min(impl_->shortest_edge, (mesh.rest(a) - mesh.rest(b)).norm());
+  for (const auto& [a, b] : mesh.edges())
+    impl_->shortest_edge = std::min(impl_->shortest_edge, (mesh.rest(a) - mesh.rest(b)).norm());
 }
 
 template <int Dim>

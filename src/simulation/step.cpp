@@ -72,7 +72,8 @@ RemeshFields<2> make_fields(const Setup<2>& setup, const State<2>& state, const 
   const TimeIntegrator integrator(setup.time);
   RemeshFields<2> fields;
   fields.x = head_of(x, dofs);
-  if (!setup.time.quasistatic && !setup.time.is_static) fields.predictor = head_of(integrator.predictor(state.history), dofs);
+  if (!setup.time.quasistatic && !setup.time.is_static)
+    fields.predictor = head_of(integrator.predictor(state.history), dofs);
   if (setup.contact.enabled) fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
   for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
   for (const auto& past : state.history.v) fields.past_rates.push_back(head_of(past, dofs));
@@ -105,7 +106,8 @@ RemeshReport remesh_and_project(const Setup<2>& setup, double shortest_edge, con
   const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
     VectorX field(2 * state.mesh.vertex_slots() + obstacle_dofs);
     for (std::size_t v = 0; v < renumbering.vertex.size(); ++v)
-      if (renumbering.vertex[v] != kNone) field.segment<2>(2 * renumbering.vertex[v]) = slots.segment<2>(2 * static_cast<int>(v));
+      if (renumbering.vertex[v] != kNone)
+        field.segment<2>(2 * renumbering.vertex[v]) = slots.segment<2>(2 * static_cast<int>(v));
     field.tail(obstacle_dofs) = with_obstacles.tail(obstacle_dofs);
     return field;
   };

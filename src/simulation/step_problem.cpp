@@ -12,8 +12,7 @@ namespace itr {
 template <int Dim>
 Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
   Loads<Dim> loads;
-  if (setup.body_acceleration)
-    loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) { return f(X, t); };
+  if (setup.body_acceleration) loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) { return f(X, t); };
   for (const auto& condition : setup.neumann)
     loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const Vec<Dim>& X) { return f(X, t); });
   return loads;
@@ -108,7 +107,8 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
   }
   std::vector<int> stencils;
   stencils.reserve(cells_.elements.size() * (Dim + 1));
-  for (const auto& element : cells_.elements) stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
+  for (const auto& element : cells_.elements)
+    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
   system_ = std::make_unique<SparseSystem>(solver, dofs_, Dim, stencils, Dim + 1);
 }
 
@@ -178,11 +178,11 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   return least;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                        \
-  template class StepProblem<Dim>;                                                                  \
-  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                                     \
-  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&);        \
-  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double);               \
+#define ITR_INSTANTIATE(Dim)                                                                 \
+  template class StepProblem<Dim>;                                                           \
+  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                              \
+  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&); \
+  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double);        \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -67,7 +67,8 @@ double TimeIntegrator::velocity_rate(const History& history) const {
 VectorX TimeIntegrator::velocity_reference(const History& history) const {
   if (options_.integrator == Integrator::newmark) {
     const double beta = options_.newmark_beta, gamma = options_.newmark_gamma, h = options_.dt;
-    return history.x[0] - ((1 - gamma / beta) * history.v[0] + (1 - gamma / (2 * beta)) * h * history.a[0]) * (beta * h / gamma);
+    return history.x[0] -
+           ((1 - gamma / beta) * history.v[0] + (1 - gamma / (2 * beta)) * h * history.a[0]) * (beta * h / gamma);
   }
   const int k = order(history);
   return combine(bdf(k), k, history.x);

@@ -19,10 +19,10 @@ std::string join(const Values&... values) {
 
 }  // namespace itr::detail
 
-#define ITR_CHECK(condition, ...)                                                                                \
-  do {                                                                                                           \
-    if (!(condition)) [[unlikely]]                                                                               \
-      ::itr::detail::check_failed(#condition, __FILE__, __LINE__, ::itr::detail::join(__VA_ARGS__));             \
+#define ITR_CHECK(condition, ...)                                                                    \
+  do {                                                                                               \
+    if (!(condition)) [[unlikely]]                                                                   \
+      ::itr::detail::check_failed(#condition, __FILE__, __LINE__, ::itr::detail::join(__VA_ARGS__)); \
   } while (false)
 
 #ifdef ITR_ENABLE_AUDIT

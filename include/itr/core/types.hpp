@@ -18,9 +18,9 @@ using MatrixX = Eigen::MatrixXd;
 using ConstVectorView = Eigen::Ref<const Eigen::VectorXd>;
 using VectorView = Eigen::Ref<Eigen::VectorXd>;
 
-using VertexId = int;  ///< index of a vertex slot of a mesh, or of a vertex of a local problem
-using CellId = int;    ///< index of a cell (triangle in 2D, tetrahedron in 3D)
-using FacetId = int;   ///< index of a boundary facet (edge in 2D, triangle in 3D)
+using VertexId = int;                     ///< index of a vertex slot of a mesh, or of a vertex of a local problem
+using CellId = int;                       ///< index of a cell (triangle in 2D, tetrahedron in 3D)
+using FacetId = int;                      ///< index of a boundary facet (edge in 2D, triangle in 3D)
 using EdgeKey = std::array<VertexId, 2>;  ///< an edge by its vertices, smaller id first
 
 inline constexpr int kNone = -1;  ///< "no such id", "not an unknown"

@@ -10,7 +10,7 @@ struct Material {
   MaterialLaw law = MaterialLaw::neo_hookean;
   double youngs_modulus = 1e5;  ///< E [Pa]
   double poisson_ratio = 0.3;
-  double density = 1;        ///< rho [kg/m^3]; 2D: [kg/m^2]
+  double density = 1;         ///< rho [kg/m^3]; 2D: [kg/m^2]
   bool plane_strain = false;  ///< 2D: lambda = E nu / ((1 + nu)(1 - 2 nu)) instead of nu E / (1 - nu^2)
 
   double lame_mu() const { return youngs_modulus / (2 * (1 + poisson_ratio)); }

@@ -14,15 +14,15 @@ struct CellSet {
   struct Element {
     std::array<int, Dim + 1> vertices;  ///< local ids
     int body;
-    double volume;            ///< rest volume [m^Dim]
-    Mat<Dim> inverse_edges;   ///< inverse of the matrix of rest edges
+    double volume;           ///< rest volume [m^Dim]
+    Mat<Dim> inverse_edges;  ///< inverse of the matrix of rest edges
   };
   struct BoundaryFacet {
     std::array<int, Dim> vertices;  ///< local ids
     int tag;
   };
-  int num_vertices = 0;            ///< length of fields / Dim; may exceed the cells' vertices (obstacles)
-  std::vector<Vec<Dim>> rest;      ///< per local vertex
+  int num_vertices = 0;        ///< length of fields / Dim; may exceed the cells' vertices (obstacles)
+  std::vector<Vec<Dim>> rest;  ///< per local vertex
   std::vector<Element> elements;
   std::vector<BoundaryFacet> facets;
 };

@@ -3,8 +3,8 @@
 #pragma once
 
 #include <functional>
-#include <span>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "itr/core/types.hpp"
@@ -47,8 +47,8 @@ class Bvh {
  private:
   struct Node {
     Box<Dim> box;
-    int first = 0;   ///< leaf: first entry of leaves_; else: index of the right child (the left one follows its parent)
-    int count = 0;   ///< leaf: number of entries; else 0
+    int first = 0;  ///< leaf: first entry of leaves_; else: index of the right child (the left one follows its parent)
+    int count = 0;  ///< leaf: number of entries; else 0
   };
   std::vector<Node> nodes_;
   std::vector<int> leaves_;           ///< indices of boxes in tree order

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * The boundary between the library and loadable solver modules: plain C, no Eigen types, no exceptions, no virtual tables.
- * A module exports one function, itr_backend_module, that returns its table. Strings belong to the module and live as long as
- * it is loaded. All functions are called by one thread at a time for one instance.
+ * A module exports one function, itr_backend_module, that returns its table. Strings belong to the module and live as long
+ * as it is loaded. All functions are called by one thread at a time for one instance.
  */
 #ifndef ITR_LINEAR_ABI_H
 #define ITR_LINEAR_ABI_H
@@ -30,11 +30,11 @@ typedef struct itr_pattern {
 } itr_pattern;
 
 typedef struct itr_engine {
-  const char* name;            /* "cholmod:supernodal" */
+  const char* name; /* "cholmod:supernodal" */
   const char* library_version;
   const char* license;
   uint32_t capabilities;
-  void* (*create)(void);       /* NULL where memory is out */
+  void* (*create)(void); /* NULL where memory is out */
   void (*destroy)(void* self);
   int32_t (*analyze)(void* self, const itr_pattern* pattern, int32_t block_size);
   int32_t (*factorize)(void* self, const double* values, size_t count);

@@ -57,11 +57,11 @@ class SparseSystem final : public NewtonSystem {
 };
 
 enum class Termination {
-  gradient,        ///< gradient norm below tolerance
-  step,            ///< full Newton step below tolerance
-  iterations,      ///< out of iterations
-  no_descent,      ///< no direction or no step that lowers the energy, and the gradient is not small
-  infeasible       ///< the start is not feasible or a number is not finite
+  gradient,    ///< gradient norm below tolerance
+  step,        ///< full Newton step below tolerance
+  iterations,  ///< out of iterations
+  no_descent,  ///< no direction or no step that lowers the energy, and the gradient is not small
+  infeasible   ///< the start is not feasible or a number is not finite
 };
 const char* to_string(Termination termination);
 
@@ -69,9 +69,9 @@ struct NewtonSummary {
   Termination termination = Termination::iterations;
   bool converged() const { return termination == Termination::gradient || termination == Termination::step; }
   int iterations = 0;
-  double energy = 0;         ///< at the end
-  double gradient_norm = 0;  ///< over the unknowns, at the last evaluation
-  double step_norm = 0;      ///< of the last full step
+  double energy = 0;           ///< at the end
+  double gradient_norm = 0;    ///< over the unknowns, at the last evaluation
+  double step_norm = 0;        ///< of the last full step
   double linear_residual = 0;  ///< worst relative residual of the linear solves
   double assembly_seconds = 0, linear_seconds = 0, line_search_seconds = 0, ccd_seconds = 0;
   std::string message;  ///< what stopped it, where it did not converge

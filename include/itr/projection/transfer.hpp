@@ -13,9 +13,9 @@ namespace itr {
 /// A mesh as the transfer sees it: rest positions, cells, density of each cell.
 template <int Dim>
 struct TransferMesh {
-  std::span<const Vec<Dim>> rest;                       ///< [m]
-  std::span<const std::array<int, Dim + 1>> cells;      ///< positive volumes
-  std::span<const double> density;                      ///< [kg/m^Dim] a cell
+  std::span<const Vec<Dim>> rest;                   ///< [m]
+  std::span<const std::array<int, Dim + 1>> cells;  ///< positive volumes
+  std::span<const double> density;                  ///< [kg/m^Dim] a cell
 };
 
 /// The cells by which the two meshes differ; they cover the same region on both sides. All other cells stand in both with
@@ -26,7 +26,7 @@ struct TouchedCells {
 };
 
 struct TransferReport {
-  int iterations = 0;          ///< of the conjugate gradients
+  int iterations = 0;  ///< of the conjugate gradients
   double relative_residual = 0;
   double l2_error_squared = 0;  ///< sum over columns of ||u_new - u_old||^2 in the density-weighted norm
 };

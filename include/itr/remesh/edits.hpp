@@ -9,13 +9,13 @@
 
 namespace itr {
 
-/// Splits an edge at its midpoint: every incident cell and boundary facet becomes two. Fields of the new vertex are the means
-/// of the ends.
+/// Splits an edge at its midpoint: every incident cell and boundary facet becomes two. Fields of the new vertex are the
+/// means of the ends.
 template <int Dim>
 Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
 
-/// Collapses an edge of a triangle mesh where that keeps the domain, its tags and material interfaces: an edge with one end on
-/// the boundary or an interface goes to that end, an interior edge to its midpoint, a boundary edge only along straight
+/// Collapses an edge of a triangle mesh where that keeps the domain, its tags and material interfaces: an edge with one end
+/// on the boundary or an interface goes to that end, an interior edge to its midpoint, a boundary edge only along straight
 /// stretches of one tag. Empty where the topology or the rest shape forbids it.
 std::optional<Edit<2>> make_collapse(const Mesh<2>& mesh, const EdgeKey& edge);
 

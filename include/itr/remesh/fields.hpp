@@ -52,15 +52,15 @@ struct StepContext {
   MassKind mass = MassKind::consistent;
   double scaling = 1;  ///< alpha h^2 [s^2]
   ContactOptions contact;
-  double velocity_rate = 1;                                ///< [1/s]
+  double velocity_rate = 1;                              ///< [1/s]
   std::map<int, std::array<bool, Dim>> held_components;  ///< by facet tag
   NewtonOptions newton;
   double shortest_edge = 0;  ///< of the initial mesh [m]
 
   struct ObstacleGeometry {
     std::vector<Vec<Dim>> rest;
-    std::vector<Vec<Dim>> x;                   ///< now [m]
-    std::vector<Vec<Dim>> velocity_reference;  ///< [m]
+    std::vector<Vec<Dim>> x;                    ///< now [m]
+    std::vector<Vec<Dim>> velocity_reference;   ///< [m]
     std::vector<std::vector<Vec<Dim>>> past_x;  ///< one a past position
     std::vector<std::array<int, 2>> edges;
     std::vector<double> area;  ///< by vertex, as in CollisionSurface

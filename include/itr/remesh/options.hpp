@@ -5,8 +5,8 @@
 namespace itr {
 
 enum class Screening {
-  energy_percentile,    ///< the paper's culling of edges by energy
-  predicted_decrease,   ///< by the second-order estimate of what one new vertex gains
+  energy_percentile,   ///< the paper's culling of edges by energy
+  predicted_decrease,  ///< by the second-order estimate of what one new vertex gains
   none
 };
 
@@ -20,8 +20,8 @@ struct SplitOptions {
   bool enabled = true;
   double acceptance_tolerance = 1e-3;  ///< least energy decrease [J]
   double culling_threshold = 0.95;
-  int max_depth = 3;                ///< generations of one edge a step
-  double min_edge_length = 1e-6;    ///< shorter rest edges are not split [m]
+  int max_depth = 3;              ///< generations of one edge a step
+  double min_edge_length = 1e-6;  ///< shorter rest edges are not split [m]
 };
 
 struct CollapseOptions {
@@ -46,9 +46,9 @@ struct SmoothOptions {
 };
 
 struct LocalRelaxationOptions {
-  int rings = 2;                  ///< rings of cells around the operation
-  double relative_volume = 0.01;  ///< least share of the total rest volume
-  int max_iterations = 1;         ///< Newton iterations before the decision
+  int rings = 2;                   ///< rings of cells around the operation
+  double relative_volume = 0.01;   ///< least share of the total rest volume
+  int max_iterations = 1;          ///< Newton iterations before the decision
   int max_contact_iterations = 4;  ///< the same where the patch touches contact
 };
 

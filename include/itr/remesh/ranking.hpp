@@ -17,8 +17,8 @@ struct EdgeKeyHash {
 enum class Rank : char { bottom, middle, top };
 using EdgeRanks = std::unordered_map<EdgeKey, Rank, EdgeKeyHash>;
 
-/// scene-format §8.2: elastic energy of an edge = mean over incident cells, contact energy = mean over its ends; top if either
-/// is among the tops, bottom only if both are at the bottom.
+/// scene-format §8.2: elastic energy of an edge = mean over incident cells, contact energy = mean over its ends; top if
+/// either is among the tops, bottom only if both are at the bottom.
 EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
                      const RemeshOptions& options);
 

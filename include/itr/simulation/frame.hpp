@@ -42,9 +42,9 @@ struct StepReport {
 /// The state after a step on its own mesh. References are valid during the observer's call only.
 template <int Dim>
 struct FrameView {
-  const Mesh<Dim>& mesh;  ///< compact: no dead slots
-  ConstVectorView x;      ///< positions of the bodies' vertices, interleaved [m]
-  ConstVectorView v;      ///< velocities [m/s]
+  const Mesh<Dim>& mesh;                       ///< compact: no dead slots
+  ConstVectorView x;                           ///< positions of the bodies' vertices, interleaved [m]
+  ConstVectorView v;                           ///< velocities [m/s]
   const std::vector<double>& elastic_density;  ///< elastic energy by rest volume, a cell [J/m^3]
   const std::vector<Vec<Dim>>& obstacle_x;     ///< obstacle positions now [m]
   const std::vector<std::array<int, 2>>& obstacle_edges;

@@ -25,10 +25,10 @@ using SpaceTimeFunction = std::function<Vec<Dim>(const Vec<Dim>& X, double t)>;
 /// Collision-only geometry that moves as prescribed: no unknowns.
 template <int Dim>
 struct Obstacles {
-  std::vector<Vec<Dim>> rest;                 ///< vertices [m]
-  std::vector<std::array<int, 2>> edges;      ///< 2D: surface edges; 3D: edges of faces and codimensional edges
-  std::vector<std::array<int, 3>> triangles;  ///< 3D only
-  std::vector<int> motion;                    ///< per vertex: index into `motions`, or kNone for a fixed one
+  std::vector<Vec<Dim>> rest;                   ///< vertices [m]
+  std::vector<std::array<int, 2>> edges;        ///< 2D: surface edges; 3D: edges of faces and codimensional edges
+  std::vector<std::array<int, 3>> triangles;    ///< 3D only
+  std::vector<int> motion;                      ///< per vertex: index into `motions`, or kNone for a fixed one
   std::vector<SpaceTimeFunction<Dim>> motions;  ///< displacement from rest [m]
 };
 
@@ -36,7 +36,7 @@ struct Obstacles {
 template <int Dim>
 struct DirichletCondition {
   int tag = 0;
-  std::array<bool, Dim> components{};  ///< which are prescribed
+  std::array<bool, Dim> components{};   ///< which are prescribed
   SpaceTimeFunction<Dim> displacement;  ///< from rest [m]
 };
 

@@ -21,7 +21,7 @@ struct State {
   Mesh<Dim> mesh;   ///< compact
   History history;  ///< history.x[0] is the present
   int step = 0;
-  double t = 0;     ///< [s]
+  double t = 0;  ///< [s]
 };
 
 struct StepResult {

@@ -22,8 +22,8 @@ Loads<Dim> loads_at(const Setup<Dim>& setup, double t);
 template <int Dim>
 CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles);
 
-/// Which dofs are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two conditions the
-/// one with the larger tag wins.
+/// Which dofs are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two conditions
+/// the one with the larger tag wins.
 template <int Dim>
 struct HeldDofs {
   std::vector<char> held;

@@ -29,9 +29,7 @@ void clamp_to_psd(Mat<Size>& block) {
   block = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-bool same_features(const ContactStencil& p, const ContactStencil& q) {
-  return p.a == q.a && p.b1 == q.b1 && p.b2 == q.b2;
-}
+bool same_features(const ContactStencil& p, const ContactStencil& q) { return p.a == q.a && p.b1 == q.b1 && p.b2 == q.b2; }
 
 /// Sorts by features and sums the weights of equal ones; drops those that cancel.
 void merge(std::vector<ContactStencil>& stencils) {
@@ -150,9 +148,15 @@ std::vector<ContactStencil> ContactEnergy<Dim>::active(ConstVectorView x, Worksp
     if (point_edge_distance_squared<Dim>(p, a, b) >= Dhat) continue;
     const double weight = convergent_ ? surface_.area[v] / 2 * weight_scale_ : 1;
     switch (closest_feature_on_edge<Dim>(p, a, b)) {
-      case EdgeFeature::vertex0: stencils.push_back({std::min(v, e0), std::max(v, e0), kNone, weight}); break;
-      case EdgeFeature::vertex1: stencils.push_back({std::min(v, e1), std::max(v, e1), kNone, weight}); break;
-      case EdgeFeature::interior: stencils.push_back({v, std::min(e0, e1), std::max(e0, e1), weight}); break;
+      case EdgeFeature::vertex0:
+        stencils.push_back({std::min(v, e0), std::max(v, e0), kNone, weight});
+        break;
+      case EdgeFeature::vertex1:
+        stencils.push_back({std::min(v, e1), std::max(v, e1), kNone, weight});
+        break;
+      case EdgeFeature::interior:
+        stencils.push_back({v, std::min(e0, e1), std::max(e0, e1), weight});
+        break;
     }
     if (!convergent_) continue;
     for (const int q : {e0, e1})

@@ -61,8 +61,7 @@ EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters
   const double c = lame.mu - lame.lambda * std::log(F.determinant());
   Mat<Dim> stretch;
   for (int i = 0; i < Dim; ++i)
-    for (int j = 0; j < Dim; ++j)
-      stretch(i, j) = lame.lambda / (s[i] * s[j]) + (i == j ? lame.mu + c / (s[i] * s[i]) : 0);
+    for (int j = 0; j < Dim; ++j) stretch(i, j) = lame.lambda / (s[i] * s[j]) + (i == j ? lame.mu + c / (s[i] * s[i]) : 0);
   Eigen::SelfAdjointEigenSolver<Mat<Dim>> solver;
   if constexpr (Dim == 2) {
     solver.computeDirect(stretch);
@@ -87,9 +86,9 @@ EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters
   return system;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                            \
-  template double neo_hookean_density<Dim>(const Mat<Dim>&, const LameParameters&);     \
-  template Mat<Dim> neo_hookean_stress<Dim>(const Mat<Dim>&, const LameParameters&);    \
+#define ITR_INSTANTIATE(Dim)                                                         \
+  template double neo_hookean_density<Dim>(const Mat<Dim>&, const LameParameters&);  \
+  template Mat<Dim> neo_hookean_stress<Dim>(const Mat<Dim>&, const LameParameters&); \
   template EigenSystem<Dim> neo_hookean_eigensystem<Dim>(const Mat<Dim>&, const LameParameters&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

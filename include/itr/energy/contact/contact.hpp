@@ -11,9 +11,9 @@ namespace itr {
 
 /// One active pair: vertex-vertex (b2 = kNone) or vertex-edge. Distances are to the closest feature.
 struct ContactStencil {
-  int a = kNone;                 ///< vertex
-  int b1 = kNone, b2 = kNone;    ///< the other vertex, or the edge, b1 < b2
-  double weight = 0;             ///< area weights and corrections included; may be negative
+  int a = kNone;               ///< vertex
+  int b1 = kNone, b2 = kNone;  ///< the other vertex, or the edge, b1 < b2
+  double weight = 0;           ///< area weights and corrections included; may be negative
   int size() const { return b2 == kNone ? 2 : 3; }
   std::array<int, 3> vertices() const { return {a, b1, b2}; }
 };
@@ -23,8 +23,8 @@ struct ContactStencil {
 template <int Dim>
 struct ContactCandidates {
   const CollisionSurface* surface = nullptr;
-  std::vector<Box<Dim>> boxes;             ///< one a surface vertex
-  std::vector<std::array<int, 3>> pairs;   ///< vertex, edge ends
+  std::vector<Box<Dim>> boxes;            ///< one a surface vertex
+  std::vector<std::array<int, 3>> pairs;  ///< vertex, edge ends
 };
 
 /// scale * kappa * sum of weight * b(D), b(D) = -(D - dhat^2)^2 ln(D / dhat^2) of the squared distance D below dhat^2.

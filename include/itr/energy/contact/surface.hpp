@@ -13,8 +13,8 @@ namespace itr {
 struct CollisionSurface {
   std::vector<int> vertices;              ///< those on the surface
   std::vector<std::array<int, 2>> edges;  ///< surface edges, smaller id first, ascending
-  std::vector<double> area;               ///< by problem vertex: half the rest lengths of the incident edges (1: codimensional)
-  std::vector<int> degree;                ///< by problem vertex: incident edges on the *whole* surface
+  std::vector<double> area;  ///< by problem vertex: half the rest lengths of the incident edges (1: codimensional)
+  std::vector<int> degree;   ///< by problem vertex: incident edges on the *whole* surface
   /// By problem vertex: whether pairs with it count. False for obstacles, and around a patch for vertices whose contacts
   /// the patch cannot change.
   std::vector<char> counts;

@@ -3,9 +3,9 @@
 
 #include <map>
 
+#include "itr/energy/elastic/neo_hookean.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/energy/material.hpp"
-#include "itr/energy/elastic/neo_hookean.hpp"
 #include "itr/fem/cell_set.hpp"
 
 namespace itr {
