@@ -31,6 +31,7 @@ const char* to_string(Outcome outcome) {
 namespace {
 
 constexpr int kRefinements = 2;
+constexpr double kUnitRoundOff = 1.1e-16;
 
 bool is_finite(std::span<const double> values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
@@ -98,13 +99,15 @@ class CheckedSolver final : public Solver {
     return outcome;
   }
 
-  /// residual = b - A x.
+  /// residual = b - A x; also the largest product in it, whose round-off bounds how well the residual is known.
   void residual(std::span<const double> b, std::span<const double> x) {
     residual_.assign(b.begin(), b.end());
+    largest_product_ = 0;
     for (int j = 0; j < pattern_.order; ++j)
       for (int p = pattern_.column_starts[j]; p < pattern_.column_starts[j + 1]; ++p) {
         const int i = pattern_.row_indices[p];
         residual_[i] -= values_[p] * x[j];
+        largest_product_ = std::max(largest_product_, std::abs(values_[p] * x[j]));
         if (i != j) residual_[j] -= values_[p] * x[i];
       }
   }
@@ -128,7 +131,7 @@ class CheckedSolver final : public Solver {
       }
       now = next;
     }
-    return now / scale;
+    return std::max(now, kUnitRoundOff * largest_product_) / scale;
   }
 
   std::string name_;
@@ -136,6 +139,7 @@ class CheckedSolver final : public Solver {
   std::unique_ptr<Engine> engine_;
   SparsityPattern pattern_;
   std::vector<double> values_, residual_, correction_, previous_;
+  double largest_product_ = 0;
   bool ready_ = false;
   std::string message_;
 };
