@@ -21,6 +21,9 @@ class Cholmod {
     common_.error_handler = nullptr;
     common_.supernodal = Supernodal;
     common_.final_ll = 1;
+    common_.nmethods = 1;  // AMD alone: also trying METIS costs more than it saves at our sizes
+    common_.method[0].ordering = CHOLMOD_AMD;
+    common_.postorder = 1;
     common_.quick_return_if_not_posdef = 1;
   }
   ~Cholmod() {

@@ -38,6 +38,7 @@ void parallel_blocks(std::size_t n, std::size_t block, const std::function<void(
 }
 
 double parallel_sum(std::size_t n, std::size_t block, const std::function<double(std::size_t, std::size_t)>& body) {
+  if (n <= block) return n > 0 ? body(0, n) : 0;
   std::vector<double> partial((n + block - 1) / block, 0.0);
   parallel_blocks(n, block, [&](std::size_t begin, std::size_t end) { partial[begin / block] = body(begin, end); });
   double sum = 0;

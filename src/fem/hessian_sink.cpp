@@ -42,14 +42,22 @@ void SparseAssembler::reset(const DofMap& dofs, int dim, std::span<const int> st
 void SparseAssembler::begin() {
   values_.assign(pattern_.nonzeros(), 0.0);
   overflow_.clear();
+  last_ = kNone;
 }
 
 void SparseAssembler::add(int row, int column, double value) {
+  // Rows of one vertex follow each other, so the next entry is often right behind the last.
+  const int next = last_ + 1;
+  if (next > pattern_.column_starts[column] && next < pattern_.column_starts[column + 1] &&
+      pattern_.row_indices[next] == row) {
+    values_[last_ = next] += value;
+    return;
+  }
   const auto first = pattern_.row_indices.begin() + pattern_.column_starts[column];
   const auto last = pattern_.row_indices.begin() + pattern_.column_starts[column + 1];
   const auto it = std::lower_bound(first, last, row);
   if (it != last && *it == row)
-    values_[it - pattern_.row_indices.begin()] += value;
+    values_[last_ = static_cast<int>(it - pattern_.row_indices.begin())] += value;
   else
     overflow_.push_back({column, row, value});
 }

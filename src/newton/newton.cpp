@@ -50,8 +50,8 @@ class Minimizer {
   NewtonSummary run() {
     value_ = timed_value(x_);
     if (!std::isfinite(value_)) return stop(Termination::infeasible, "the energy at the start is not finite");
-    compute_gradient();
     for (summary_.iterations = 0; summary_.iterations < options_.max_iterations; ++summary_.iterations) {
+      compute_gradient();
       compute_remaining();
       const double tolerance = summary_.iterations == 0 ? options_.first_gradient_tolerance : options_.gradient_tolerance;
       if (!moving_ && summary_.gradient_norm < tolerance) return stop(Termination::gradient);
@@ -202,7 +202,6 @@ class Minimizer {
       x_.swap(candidate_);
       value_ = value;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
-      compute_gradient();
       return true;
     }
     return false;

@@ -90,6 +90,11 @@ std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFie
 EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
                      const RemeshOptions& options) {
   const auto edges = mesh.edges();
+  if (options.screening != Screening::energy_percentile) {  // every edge may be split and collapsed
+    EdgeRanks ranks;
+    for (const EdgeKey& edge : edges) ranks[edge] = Rank::top;
+    return ranks;
+  }
   const auto of_cells = cell_energies(mesh, fields, context);
   const auto of_vertices = vertex_contact_energies(mesh, fields, context);
   std::vector<double> elastic, contact;

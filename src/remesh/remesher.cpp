@@ -14,6 +14,7 @@
 #include "itr/remesh/edits.hpp"
 #include "itr/remesh/local_problem.hpp"
 #include "itr/remesh/patch.hpp"
+#include "itr/remesh/prediction.hpp"
 #include "itr/remesh/ranking.hpp"
 
 namespace itr {
@@ -86,6 +87,19 @@ class Remesher {
   double length(const EdgeKey& e) const { return (fields_.x.segment<2>(2 * e[0]) - fields_.x.segment<2>(2 * e[1])).norm(); }
   bool exists(const EdgeKey& e) const {
     return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty();
+  }
+  /// Whether contact can act on an edge's ends, so that the bulk terms do not tell what a split gains.
+  bool is_in_contact(const EdgeKey& e) {
+    if (!context_.contact.enabled || (!mesh_.is_boundary(e[0]) && !mesh_.is_boundary(e[1]))) return false;
+    Box<2> box;
+    for (const int v : e) box.include(Vec<2>(fields_.x.segment<2>(2 * v)));
+    near_.clear();
+    tree_.query(box.inflated(context_.contact.activation_distance), near_);
+    return std::any_of(near_.begin(), near_.end(), [&](int hit) {
+      if (hit < 0) return true;
+      const auto& f = mesh_.facet(hit);
+      return f[0] != e[0] && f[0] != e[1] && f[1] != e[0] && f[1] != e[1];
+    });
   }
   bool is_surface(const EdgeKey& e) const { return mesh_.find_facet({e[0], e[1]}) != kNone; }
 
@@ -233,6 +247,9 @@ class Remesher {
           continue;
         }
       }
+      if (options_.screening != Screening::none && !is_in_contact(*edge) &&
+          predicted_split_gain(mesh_, fields_, context_, *edge) < context_.scaling * options_.split.acceptance_tolerance)
+        continue;
       ++report_.splits.tried;
       const auto edit = make_split(mesh_, *edge);
       const auto patch = attempt(edit, edit.value->rest, options_.split.acceptance_tolerance, false);
@@ -248,7 +265,8 @@ class Remesher {
     const double longest =
         std::min(options_.collapse.abs_max_edge_length, options_.collapse.rel_max_edge_length * context_.shortest_edge);
     const auto is_candidate = [&](const EdgeKey& e) {
-      return rank(e) == Rank::bottom || rest_length(e) < kTinyEdge * context_.shortest_edge;
+      return options_.screening != Screening::energy_percentile || rank(e) == Rank::bottom ||
+             rest_length(e) < kTinyEdge * context_.shortest_edge;
     };
     Queue queue;
     for (const EdgeKey& edge : mesh_.edges())
@@ -345,6 +363,7 @@ class Remesher {
   EdgeRanks ranks_;
   std::unordered_map<EdgeKey, int, EdgeKeyHash> depth_;
   LocalScratch scratch_;
+  std::vector<int> near_;
   Marks patch_marks_;
   RemeshReport report_;
 };

@@ -42,6 +42,7 @@ class SparseAssembler {
   linear::SparsityPattern pattern_;
   std::vector<double> values_;
   std::vector<Entry> overflow_;
+  int last_ = kNone;  ///< entry that was added to last
   bool changed_ = false;
 };
 

@@ -74,6 +74,40 @@ double first_inversion(const Mat<3>& E, const Mat<3>& D) {
   return first_root(E.determinant(), b, c, D.determinant());
 }
 
+template <int Dim>
+using ShapeGradients = Eigen::Matrix<double, Dim, Dim + 1>;
+template <int Dim>
+using ElementBlock = Mat<Dim*(Dim + 1)>;
+
+/// weight * d2W/dx2 in terms of h_i = F^-T grad phi_i: no decomposition is needed.
+template <int Dim>
+void exact_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const LameParameters& lame, double weight,
+                 ElementBlock<Dim>& block) {
+  const double J = F.determinant();
+  const ShapeGradients<Dim> h = F.inverse().transpose() * gradients;
+  const double c = weight * (lame.mu - lame.lambda * std::log(J)), mu = weight * lame.mu, lambda = weight * lame.lambda;
+  for (int i = 0; i <= Dim; ++i)
+    for (int j = 0; j <= Dim; ++j) {
+      Mat<Dim> pair = c * h.col(j) * h.col(i).transpose() + lambda * h.col(i) * h.col(j).transpose();
+      pair.diagonal().array() += mu * gradients.col(i).dot(gradients.col(j));
+      block.template block<Dim, Dim>(Dim * i, Dim * j) = pair;
+    }
+}
+
+/// The same with negative eigenvalues left out.
+template <int Dim>
+void clamped_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const LameParameters& lame, double weight,
+                   ElementBlock<Dim>& block) {
+  const auto system = neo_hookean_eigensystem<Dim>(F, lame);
+  block.setZero();
+  for (std::size_t k = 0; k < system.values.size(); ++k) {
+    if (system.values[k] <= 0) continue;
+    Vec<Dim*(Dim + 1)> w;
+    for (int v = 0; v <= Dim; ++v) w.template segment<Dim>(Dim * v) = system.modes[k] * gradients.col(v);
+    block.noalias() += (weight * system.values[k]) * w * w.transpose();
+  }
+}
+
 }  // namespace
 
 template <int Dim>
@@ -124,16 +158,12 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
     parallel_blocks(count, 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const auto& element = cells_.elements[start + i];
-        const auto system = neo_hookean_eigensystem<Dim>(deformation_gradient<Dim>(element, x), lame(element.body));
+        const Mat<Dim> F = deformation_gradient<Dim>(element, x);
         const auto gradients = shape_gradients<Dim>(element.inverse_edges);
-        auto& block = blocks[i];
-        block.setZero();
-        for (std::size_t k = 0; k < system.values.size(); ++k) {
-          if (psd == PsdProjection::clamp && system.values[k] <= 0) continue;
-          Vec<kDofs> w;
-          for (int v = 0; v <= Dim; ++v) w.template segment<Dim>(Dim * v) = system.modes[k] * gradients.col(v);
-          block.noalias() += (scale_ * element.volume * system.values[k]) * w * w.transpose();
-        }
+        if (psd == PsdProjection::clamp)
+          clamped_block<Dim>(F, gradients, lame(element.body), scale_ * element.volume, blocks[i]);
+        else
+          exact_block<Dim>(F, gradients, lame(element.body), scale_ * element.volume, blocks[i]);
       }
     });
     for (std::size_t i = 0; i < count; ++i) sink.add<Dim>(cells_.elements[start + i].vertices, blocks[i].data());
