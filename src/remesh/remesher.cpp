@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <set>
 #include <unordered_map>
@@ -113,28 +114,6 @@ class Remesher {
     return edges;
   }
 
-  /// Energy of the cells at an edge, contact left out, by their rest volume: what splits are ordered by.
-  double energy_density(const EdgeKey& edge) {
-    double energy = 0, volume = 0;
-    for (const CellId c : mesh_.cells_of_edge(edge)) {
-      const CellSet<2>::Element element{mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c)};
-      const Material& m = context_.materials.at(element.body);
-      volume += element.volume;
-      energy += context_.scaling * element.volume *
-                neo_hookean_density<2>(deformation_gradient<2>(element, fields_.x), {m.lame_mu(), m.lame_lambda(2)});
-      if (!context_.has_inertia) continue;
-      Vec<2> total = Vec<2>::Zero();
-      double squares = 0;
-      for (const int v : element.vertices) {
-        const Vec<2> d = fields_.x.segment<2>(2 * v) - fields_.predictor.segment<2>(2 * v);
-        total += d;
-        squares += d.squaredNorm();
-      }
-      energy += m.density * element.volume / 24 * (total.squaredNorm() + squares);
-    }
-    return energy / volume;
-  }
-
   /// Orientation of the inserted cells in every stored configuration, at interpolated values.
   bool is_valid_in_all_configurations(const Edit<2>& edit) const {
     const auto valid_in = [&](const VectorX& field) {
@@ -234,9 +213,14 @@ class Remesher {
   }
 
   void split() {
+    // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the
+    // same with fewer vertices: verification/paper.)
     Queue queue;
-    for (const auto& [edge, r] : ranks_)
-      if (r == Rank::top) queue.push(edge, energy_density(edge));
+    const auto push = [&](const EdgeKey& edge) {
+      if (rank(edge) == Rank::top && depth(edge) < options_.split.max_depth)
+        queue.push(edge, predicted_split_gain(mesh_, fields_, context_, edge));
+    };
+    for (const EdgeKey& edge : mesh_.edges()) push(edge);
     while (const auto edge = queue.pop()) {
       if (!exists(*edge) || depth(*edge) >= options_.split.max_depth || rest_length(*edge) < options_.split.min_edge_length)
         continue;
@@ -255,8 +239,7 @@ class Remesher {
       const auto patch = attempt(edit, edit.value->rest, options_.split.acceptance_tolerance, false);
       if (!patch) continue;
       ++report_.splits.accepted;
-      for (const EdgeKey& near : edges_of(*patch))
-        if (rank(near) == Rank::top && depth(near) < options_.split.max_depth) queue.push(near, energy_density(near));
+      for (const EdgeKey& near : edges_of(*patch)) push(near);
     }
     depth_.clear();
   }
