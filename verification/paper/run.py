@@ -1,0 +1,125 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""Runs the paper's 2D scenes one after another on one thread and writes the table of README.md beside this file.
+
+python3 verification/paper/run.py [--itr build/release/bin/itr] [--shared ../shared] [--results DIR] [--case NAME]...
+
+Figures of the reference implementation are those of shared/reference-runs.md (its faster column). Every run is certified.
+"""
+import argparse
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+
+# name, scene, extra arguments, reference: seconds a step, energy gained by remeshing [J], MB
+CASES = [
+    ("cantilever", "cantilever/cantilever.json", [], (0.373, 61118, 35)),
+    ("cantilever, tolerance 104", "cantilever/cantilever.json", ["/space/remesh/split/acceptance_tolerance=104"], None),
+    ("cantilever, swaps and smoothing", "cantilever/cantilever.json",
+     ["/space/remesh/swap/enabled=true", "/space/remesh/smooth/enabled=true"], None),
+    ("cantilever, uniform n_refs 4", "cantilever/cantilever.json",
+     ["/space/remesh/enabled=false", "/geometry/0/n_refs=4"], (0.0145, None, 32)),
+    ("masticator h=0.1 to t=4", "masticator/h=0.1.json", ["/time/tend=4"], (None, 298, None)),
+    ("masticator h=0.1", "masticator/h=0.1.json", [], (1.40, None, 48)),
+    ("masticator h=0.1 fixed mesh", "masticator/h=0.1-noremesh.json", [], (0.0584, None, 40)),
+    ("masticator h=0.2", "masticator/h=0.2.json", [], None),
+    ("masticator h=0.05 fixed mesh", "masticator/h=0.05.json", [], None),
+    ("masticator h=0.05", "masticator/h=0.05.json", ["/space/remesh/enabled=true"], None),
+    ("ball-wall 2D to t=0.0024", "ball-wall/2D.json", ["/time/tend=0.0024"], (1.33, 47.2, 202)),
+    ("ball-wall 2D", "ball-wall/2D.json", [], None),
+    ("ball-wall 2D Newmark", "ball-wall/2D.json", ['/time/integrator="ImplicitNewmark"'], None),
+    ("ball-wall 2D BDF2", "ball-wall/2D.json", ['/time/integrator="BDF2"'], None),
+    ("ball-wall 2D fixed mesh to t=0.0024", "ball-wall/2D-noremesh.json", ["/time/tend=0.0024"], (0.0949, None, 186)),
+    ("ball-wall 2D fixed mesh", "ball-wall/2D-noremesh.json", [], None),
+    ("shake-rod-y", "shake-rod/shake-rod-y.json", [], None),
+    ("spikes2d", "spikes2d/spikes2d.json", [], None),
+    ("1-square-dbc", "unit-tests/1-square-dbc.json", [], (0.12, None, 35)),
+    ("1-square-dbc fixed mesh", "unit-tests/1-square-dbc-noremesh.json", [], None),
+    ("1-square-rotating", "unit-tests/1-square-rotating.json", [], None),
+    ("1-square-rotating fixed mesh", "unit-tests/1-square-rotating-noremesh.json", [], None),
+    ("1-square-stretch", "unit-tests/1-square-stretch.json", [], None),
+    ("sliding", "unit-tests/sliding.json", [], None),
+    ("sliding fixed mesh", "unit-tests/sliding-noremesh.json", [], None),
+]
+
+
+def run(case, options):
+    name, scene, sets, reference = case
+    folder = options.results / name.replace(" ", "_").replace("=", "").replace(",", "").replace(".", "")
+    command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--threads", "1"]
+    for assignment in sets:
+        command += ["--set", assignment]
+    status = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
+    certified = subprocess.run([str(options.itr), "certify", str(folder)], stdout=subprocess.DEVNULL).returncode == 0
+    lines = [json.loads(line) for line in open(folder / "steps.jsonl")]
+    steps = lines[1:]
+    last = steps[-1]
+    total = sum(s["seconds"]["total"] for s in steps)
+    # Writing a frame is not part of a step's work in the reference's figures.
+    per_step = (total - sum(s["seconds"]["output"] for s in steps)) / len(steps)
+    parts = sum(v for s in steps for k, v in s["seconds"].items() if k != "total")
+    row = {
+        "case": name, "scene": scene, "set": " ".join(sets), "finished": status == 0, "certified": certified, "steps": len(steps),
+        "seconds_per_step": per_step, "remesh_share": sum(s["seconds"]["remesh"] for s in steps) / total,
+        "parts_over_total": parts / total,
+        "newton": sum(s["newton_iterations"] for s in steps), "vertices_first": lines[0]["vertices"], "vertices": last["vertices"],
+        "energy_total": last["energy"]["total"],
+        "gain": sum(s["energy_before_remesh"] - s["energy"]["total"] for s in steps),
+        "trials": sum(s[k]["tried"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
+        "accepted": sum(s[k]["accepted"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
+        "microseconds_per_trial": 1e6 * sum(s["seconds"]["remesh"] for s in steps)
+        / max(1, sum(s[k]["tried"] for s in steps for k in ("splits", "collapses", "swaps", "smooths"))),
+        "peak_rss_mb": last["peak_rss_mb"],
+        "reference_seconds": reference[0] if reference else None, "reference_gain": reference[1] if reference else None,
+        "reference_mb": reference[2] if reference else None,
+    }
+    ratio = f"{row['reference_seconds'] / per_step:8.1f}x" if row["reference_seconds"] else " " * 9
+    print(f"{name:38} {'ok' if status == 0 else 'STOPPED':8}{'certified' if certified else 'NOT CERTIFIED':14}"
+          f"{per_step:9.4f} s/step {ratio}  {row['vertices']:5} vertices  {row['energy_total']:12.6g} J  gain {row['gain']:.4g} J",
+          flush=True)
+    return row
+
+
+def table(rows):
+    def cell(value, form):
+        return "" if value is None else format(value, form)
+
+    lines = ["| scene | end | s/step | reference | ratio | vertices | energy, last step [J] | gained by remeshing [J] | reference "
+             "| trials / accepted | µs a trial | remeshing | MB (reference) |", "|" + "---|" * 13]
+    for r in rows:
+        ratio = r["reference_seconds"] / r["seconds_per_step"] if r["reference_seconds"] else None
+        end = ("finished" if r["finished"] else "stopped") + (", certified" if r["certified"] else ", NOT CERTIFIED")
+        lines.append(
+            f"| {r['case']} | {r['steps']} steps, {end} | {r['seconds_per_step']:.4f} | {cell(r['reference_seconds'], '.4g')} "
+            f"| {cell(ratio, '.0f')} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
+            f"| {cell(r['reference_gain'], '.4g')} | {r['trials']} / {r['accepted']} "
+            f"| {r['microseconds_per_trial'] if r['trials'] else 0:.0f} | {100 * r['remesh_share']:.0f} % "
+            f"| {r['peak_rss_mb']:.0f} ({cell(r['reference_mb'], '.0f')}) |")
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--itr", type=pathlib.Path, default=ROOT / "build/release/bin/itr")
+    parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared")
+    parser.add_argument("--results", type=pathlib.Path, default=ROOT / "results/paper")
+    parser.add_argument("--case", action="append")
+    options = parser.parse_args()
+    cases = [c for c in CASES if not options.case or c[0] in options.case]
+    rows = [run(case, options) for case in cases]
+    if not options.case:
+        with open(HERE / "results.csv", "w", newline="") as file:
+            writer = csv.DictWriter(file, rows[0].keys())
+            writer.writeheader()
+            writer.writerows(rows)
+        (HERE / "table.md").write_text(table(rows) + "\n")
+    return 0 if all(r["finished"] and r["certified"] for r in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
