@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// ccd_queries FOLDER...: runs our continuous collision detection on the queries of all CSV files below the folders and
+// compares with the known answers. Ends with status 1 on a missed collision, on a time of 0 for a query that starts
+// separated, or above 2 % false positives; with status 2 if there is nothing to run or a file is malformed.
+//
+// A query is 8 rows of x numerator, x denominator, y.., y.., z.., z.., answer.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "itr/geometry/ccd.hpp"
+#include "itr/geometry/predicates.hpp"
+
+namespace {
+
+using itr::Vec;
+
+constexpr double kMostFalsePositives = 0.02;  ///< of all queries
+
+struct Query {
+  std::array<Vec<3>, 8> points;  ///< four at t = 0, then four at t = 1
+  bool collides = false;
+};
+
+struct Tally {
+  long queries = 0, misses = 0, false_positives = 0, zeros = 0;
+  double seconds = 0;
+  void add(const Tally& other) {
+    queries += other.queries;
+    misses += other.misses;
+    false_positives += other.false_positives;
+    zeros += other.zeros;
+    seconds += other.seconds;
+  }
+};
+
+/// The queries come from doubles, so numerator and power-of-two denominator are exact in long double and so is the quotient.
+double read_quotient(const char*& text) {
+  char* end = nullptr;
+  const long double numerator = std::strtold(text, &end);
+  if (end == text || *end != ',') throw std::runtime_error("expected a numerator and a comma");
+  text = end + 1;
+  const long double denominator = std::strtold(text, &end);
+  if (end == text || *end != ',' || denominator == 0) throw std::runtime_error("expected a denominator and a comma");
+  text = end + 1;
+  return static_cast<double>(numerator / denominator);
+}
+
+std::vector<Query> read_queries(const std::filesystem::path& path) {
+  std::ifstream in(path);
+  std::vector<Query> queries;
+  std::string line;
+  int row = 0;
+  for (; std::getline(in, line); ++row) {
+    if (row % 8 == 0) queries.emplace_back();
+    const char* text = line.c_str();
+    for (int c = 0; c < 3; ++c) queries.back().points[row % 8][c] = read_quotient(text);
+    if (*text != '0' && *text != '1') throw std::runtime_error("expected the answer 0 or 1");
+    queries.back().collides = *text == '1';
+  }
+  if (row == 0 || row % 8 != 0) throw std::runtime_error("expected 8 rows a query");
+  return queries;
+}
+
+Vec<2> drop(const Vec<3>& p, int axis) { return {p[(axis + 1) % 3], p[(axis + 2) % 3]}; }
+
+/// Whether p is in the closed triangle, which may be degenerate. Exact.
+bool in_triangle(const Vec<2>& p, const Vec<2>& a, const Vec<2>& b, const Vec<2>& c) {
+  const auto [low, high] = std::minmax({itr::orientation(a, b, p), itr::orientation(b, c, p), itr::orientation(c, a, p)});
+  if (low < 0 && high > 0) return false;
+  return (p.array() >= a.cwiseMin(b).cwiseMin(c).array()).all() && (p.array() <= a.cwiseMax(b).cwiseMax(c).array()).all();
+}
+
+/// Whether the primitives are apart at t = 0. Exact, and independent of the floating-point distances under test: coplanar
+/// primitives meet if and only if their projections along all three axes do, because one of these is injective.
+bool starts_separated(const Query& query, bool edges) {
+  const auto& q = query.points;
+  if (itr::orientation(q[0], q[1], q[2], q[3]) != 0) return true;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec<2> a = drop(q[0], axis), b = drop(q[1], axis), c = drop(q[2], axis), d = drop(q[3], axis);
+    if (!(edges ? itr::segments_intersect(a, b, c, d) : in_triangle(a, b, c, d))) return true;
+  }
+  return false;
+}
+
+double time_of(const Query& query, bool edges, const itr::CcdOptions& options) {
+  const auto& q = query.points;
+  return edges ? itr::edge_edge_ccd(q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], options)
+               : itr::point_triangle_ccd(q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], options);
+}
+
+Tally run(const std::vector<Query>& queries, bool edges) {
+  itr::CcdOptions options;
+  options.min_separation_ratio = 1e-6;
+  std::vector<double> times(queries.size());
+  const auto start = std::chrono::steady_clock::now();
+  for (std::size_t i = 0; i < queries.size(); ++i) times[i] = time_of(queries[i], edges, options);
+  Tally tally;
+  tally.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  tally.queries = static_cast<long>(queries.size());
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    const bool found = !(times[i] >= 1);
+    tally.misses += queries[i].collides && !found;
+    tally.false_positives += !queries[i].collides && found;
+    tally.zeros += !(times[i] > 0) && starts_separated(queries[i], edges);
+  }
+  return tally;
+}
+
+/// Nothing if the path does not say which kind of query the file holds.
+std::optional<bool> holds_edges(const std::filesystem::path& path) {
+  if (path.string().find("edge-edge") != std::string::npos) return true;
+  if (path.string().find("vertex-face") != std::string::npos) return false;
+  return std::nullopt;
+}
+
+std::vector<std::filesystem::path> csv_files(const char* folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (entry.path().extension() == ".csv") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+void print(const char* name, const Tally& t) {
+  std::printf("%-12s %8ld queries %6ld misses %6ld false positives %6ld zero when separated %8.0f ns a query\n", name,
+              t.queries, t.misses, t.false_positives, t.zeros, t.queries > 0 ? 1e9 * t.seconds / t.queries : 0.0);
+}
+
+int run_folders(int count, char** folders) {
+  Tally kinds[2], total;
+  for (int i = 0; i < count; ++i) {
+    for (const auto& file : csv_files(folders[i])) {
+      const auto edges = holds_edges(file);
+      if (!edges) continue;
+      try {
+        const Tally tally = run(read_queries(file), *edges);
+        if (tally.misses + tally.zeros > 0) print(file.c_str(), tally);
+        kinds[*edges].add(tally);
+      } catch (const std::runtime_error& error) {
+        throw std::runtime_error(file.string() + ": " + error.what());
+      }
+    }
+  }
+  total.add(kinds[0]);
+  total.add(kinds[1]);
+  print("vertex-face", kinds[0]);
+  print("edge-edge", kinds[1]);
+  print("all", total);
+  if (total.queries == 0) throw std::runtime_error("found no queries");
+  const bool too_many = total.false_positives > kMostFalsePositives * total.queries;
+  return total.misses > 0 || total.zeros > 0 || too_many ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: ccd_queries FOLDER...\n");
+    return 2;
+  }
+  try {
+    return run_folders(argc - 1, argv + 1);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "ccd_queries: %s\n", error.what());
+    return 2;
+  }
+}
