@@ -113,6 +113,7 @@ void HessianSink::add(std::span<const int> vertices, const double* block) {
     for (int i = 0; i < n; ++i) {
       const int row = unknown[i];
       const double value = block[n * j + i];
+      if (value == 0) continue;  // half of a mass block
       if (column == kNone) {
         if (!motion_) continue;
         const double product = value * motion_->step[dof[j]];

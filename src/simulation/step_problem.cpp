@@ -9,6 +9,21 @@
 
 namespace itr {
 
+namespace {
+
+constexpr double kFixedPoint = 1e-12;      ///< rounds of lagging that move nothing by more than this are over [m]
+constexpr std::size_t kLongestCycle = 16;  ///< rounds that are remembered
+constexpr double kSameState = 1e-3;        ///< of a solve's step tolerance: states nearer than that are one
+
+/// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
+bool has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance) {
+  if ((x - previous.back()).lpNorm<Eigen::Infinity>() <= kFixedPoint) return true;
+  return std::any_of(previous.begin(), previous.end() - 1,
+                     [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
+}
+
+}  // namespace
+
 template <int Dim>
 Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
   Loads<Dim> loads;
@@ -134,7 +149,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
   if (!lagging) return summary;
   const int rounds = setup_.contact.friction_iterations;
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
-  VectorX previous = lagged_x;
+  std::vector<VectorX> previous = {lagged_x};  // newest last
   for (int round = 1; summary.converged(); ++round) {
     const EnergySum relagged = energy(x);
     VectorX gradient = VectorX::Zero(x.size());
@@ -143,9 +158,10 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
     if (std::sqrt(norm) <= tolerance) break;
-    if ((x - previous).template lpNorm<Eigen::Infinity>() <= 1e-12) break;
+    if (has_recurred(x, previous, setup_.newton.step_tolerance)) break;
     if (rounds >= 0 && round >= std::max(1, rounds)) break;
-    previous = x;
+    if (previous.size() == kLongestCycle) previous.erase(previous.begin());
+    previous.push_back(x);
     NewtonSummary next = minimize(relagged, x, dofs_, held_.target, *system_, setup_.newton, workspace_);
     next.add_effort(summary);
     summary = next;
