@@ -11,6 +11,8 @@ namespace itr {
 
 namespace {
 
+constexpr double kCloseEnough = 0.1;  ///< of the gap: nearer to it than this, the contact is reached
+
 /// Additive advancement. `distance(t)` is the distance of the primitives at time t; `speed` bounds the rate at which it can
 /// fall. Each step covers nine tenths of what is safe, so t converges geometrically to a contact and never passes it.
 template <typename Distance>
@@ -21,10 +23,9 @@ double advance(const Distance& distance, double speed, const CcdOptions& options
   const double gap = options.min_separation_ratio * start;
   if (start - gap > speed) return 1;
   double t = 0, now = start;
-  const double least_advance = 0.1 * (start - gap) / speed;  // below this fraction of the first step the contact is reached
   for (int i = 0; i < options.max_iterations; ++i) {
     const double step = 0.9 * (now - gap) / speed;
-    if (i > 0 && step < 1e-3 * least_advance) break;
+    if (i > 0 && now - gap < kCloseEnough * gap) break;
     t += step;
     if (t >= 1) return 1;
     now = distance(t);
