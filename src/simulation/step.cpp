@@ -158,12 +158,19 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
   };
 
   VectorX x = next.history.x[0];
-  auto problem = std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+  const auto make_problem = [&] {
+    const ScopedTimer timer(report.seconds.assembly);
+    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+  };
+  auto problem = make_problem();
   NewtonSummary summary = problem->solve(x, next.history.x[0]);
   add_seconds(summary, report.seconds);
   report.newton_iterations = summary.iterations;
   if (!summary.converged()) return fail(summary);
-  report.energy_before_remesh = problem->report(x).total;
+  {
+    const ScopedTimer timer(report.seconds.assembly);
+    report.energy_before_remesh = problem->report(x).total;
+  }
 
   if constexpr (Dim == 2) {
     if (setup.remesh.enabled) {
@@ -176,7 +183,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
       report.swaps = {remeshed.swaps.tried, remeshed.swaps.accepted};
       report.smooths = {remeshed.smooths.tried, remeshed.smooths.accepted};
       if (remeshed.changed()) {
-        problem = std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+        problem = make_problem();
         const VectorX lagged = x;
         summary = problem->solve(x, lagged);
         add_seconds(summary, report.seconds);
@@ -186,19 +193,22 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
                          "), keeping the mesh as it was");
           next = unchanged;
           x = solution;
-          problem = std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+          problem = make_problem();
         }
       }
     }
   }
 
   ITR_AUDIT(find_violation(setup, next.mesh, x).empty(), find_violation(setup, next.mesh, x));
-  report.energy = problem->report(x);
-  report.vertices = next.mesh.num_vertices();
-  report.elements = next.mesh.num_cells();
-  report.unknowns = problem->dofs().num_unknowns;
-  report.min_distance = problem->min_distance(x);
-  report.min_volume_ratio = min_volume_ratio(problem->cells(), x);
+  {
+    const ScopedTimer timer(report.seconds.assembly);
+    report.energy = problem->report(x);
+    report.vertices = next.mesh.num_vertices();
+    report.elements = next.mesh.num_cells();
+    report.unknowns = problem->dofs().num_unknowns;
+    report.min_distance = problem->min_distance(x);
+    report.min_volume_ratio = min_volume_ratio(problem->cells(), x);
+  }
   TimeIntegrator(setup.time).push(std::move(x), next.history);
   state = std::move(next);
   report.peak_rss_mb = peak_rss_mb();

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Runs the paper's 2D scenes one after another on one thread and writes the table of README.md beside this file.
+"""Runs the paper's 2D scenes one after another on one thread writes results.csv beside this file and prints the table of README.md.
 
 python3 verification/paper/run.py [--itr build/release/bin/itr] [--shared ../shared] [--results DIR] [--case NAME]...
 
@@ -117,7 +117,7 @@ def main():
             writer = csv.DictWriter(file, rows[0].keys())
             writer.writeheader()
             writer.writerows(rows)
-        (HERE / "table.md").write_text(table(rows) + "\n")
+        print(table(rows))
     return 0 if all(r["finished"] and r["certified"] for r in rows) else 1
 
 
