@@ -46,14 +46,22 @@ Outcome check_pivots(const Eigen::VectorXd& pivots) {
   return pivots.cwiseAbs().minCoeff() > kSingular * largest ? Outcome::ok : Outcome::singular;
 }
 
-class Ldlt final : public LowerTriangleEngine {
+/// What all of Eigen's solvers share: they hold their factors and solve for columns.
+template <typename EigenSolver>
+class EigenEngine : public LowerTriangleEngine {
  public:
   Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
     out(X, columns) = solver_.solve(in(B, columns));
-    return Outcome::ok;
+    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_converged;
   }
 
- private:
+ protected:
+  Outcome analyze_matrix() override { return Outcome::ok; }
+  Outcome success_or(Outcome failure) const { return solver_.info() == Eigen::Success ? Outcome::ok : failure; }
+  EigenSolver solver_;
+};
+
+class Ldlt final : public EigenEngine<Eigen::SimplicialLDLT<Sparse>> {
   Outcome analyze_matrix() override {
     solver_.analyzePattern(matrix_);
     return Outcome::ok;
@@ -62,36 +70,20 @@ class Ldlt final : public LowerTriangleEngine {
     solver_.factorize(matrix_);
     return solver_.info() == Eigen::Success ? check_pivots(solver_.vectorD()) : Outcome::singular;
   }
-  Eigen::SimplicialLDLT<Sparse> solver_;
 };
 
-class Llt final : public LowerTriangleEngine {
- public:
-  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
-    out(X, columns) = solver_.solve(in(B, columns));
-    return Outcome::ok;
-  }
-
- private:
+class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {
   Outcome analyze_matrix() override {
     solver_.analyzePattern(matrix_);
     return Outcome::ok;
   }
   Outcome factorize_matrix() override {
     solver_.factorize(matrix_);
-    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_positive_definite;
+    return success_or(Outcome::not_positive_definite);
   }
-  Eigen::SimplicialLLT<Sparse> solver_;
 };
 
-class Lu final : public LowerTriangleEngine {
- public:
-  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
-    out(X, columns) = solver_.solve(in(B, columns));
-    return Outcome::ok;
-  }
-
- private:
+class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
   // SparseLU may drop entries that cancel when it is given a pattern of zeros, so it analyses with the first values.
   Outcome analyze_matrix() override {
     analyzed_ = false;
@@ -102,45 +94,26 @@ class Lu final : public LowerTriangleEngine {
     if (!analyzed_) solver_.analyzePattern(full);
     analyzed_ = true;
     solver_.factorize(full);
-    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::singular;
+    return success_or(Outcome::singular);
   }
-  Eigen::SparseLU<Sparse> solver_;
   bool analyzed_ = false;
 };
 
-class ConjugateGradients final : public LowerTriangleEngine {
- public:
-  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
-    out(X, columns) = solver_.solve(in(B, columns));
-    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_converged;
-  }
-
- private:
-  Outcome analyze_matrix() override { return Outcome::ok; }
+class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Sparse, Eigen::Lower>> {
   Outcome factorize_matrix() override {
     if ((matrix_.diagonal().array() <= 0).any()) return Outcome::not_positive_definite;
     solver_.setTolerance(1e-12);
     solver_.setMaxIterations(std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
     solver_.compute(matrix_);
-    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::failed;
+    return success_or(Outcome::failed);
   }
-  Eigen::ConjugateGradient<Sparse, Eigen::Lower> solver_;
 };
 
-class Dense final : public LowerTriangleEngine {
- public:
-  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
-    out(X, columns) = solver_.solve(in(B, columns));
-    return Outcome::ok;
-  }
-
- private:
-  Outcome analyze_matrix() override { return Outcome::ok; }
+class Dense final : public EigenEngine<Eigen::LLT<Eigen::MatrixXd, Eigen::Lower>> {
   Outcome factorize_matrix() override {
     solver_.compute(Eigen::MatrixXd(matrix_));
-    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_positive_definite;
+    return success_or(Outcome::not_positive_definite);
   }
-  Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver_;
 };
 
 }  // namespace

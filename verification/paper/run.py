@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Runs the paper's 2D scenes one after another on one thread writes results.csv beside this file and prints the table of README.md.
+"""Runs the paper's 2D scenes one after another on one thread, writes results.csv and prints the table of README.md.
 
 python3 verification/paper/run.py [--itr build/release/bin/itr] [--shared ../shared] [--results DIR] [--case NAME]...
 
