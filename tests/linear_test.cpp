@@ -2,6 +2,9 @@
 // One suite over every solver that is there: right answers against dense long double, failures as the right outcome.
 #include <gtest/gtest.h>
 
+#include <dlfcn.h>
+#include <link.h>
+
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstdlib>
@@ -92,6 +95,13 @@ class EverySolver : public ::testing::TestWithParam<std::string> {
     }
     EXPECT_LE(worst, 2 * tolerance);
     EXPECT_NEAR(report.relative_residual, worst, 1e-3 * worst + 1e-13);  // what it reports is true
+    if (n == 0) return;
+    // The error that this residual allows, against the dense solution in long double.
+    const Eigen::Matrix<long double, -1, -1> inverse = system.full.cast<long double>().partialPivLu().inverse();
+    for (int c = 0; c < columns; ++c) {
+      const auto error = (X.col(c).cast<long double>() - inverse * B.col(c).cast<long double>()).norm();
+      EXPECT_LE(double(error), 2 * tolerance * double(inverse.norm()) * B.col(c).norm());
+    }
   }
   bool is_cholesky() const { return !solver_->capabilities().indefinite && !solver_->capabilities().iterative; }
 };
@@ -141,6 +151,52 @@ TEST_P(EverySolver, ReportsSingularSystems) {
   }
 }
 
+TEST_P(EverySolver, DoesNotTakeSoftBesideStiffForSingular) {
+  Dense A = Dense::Zero(9, 9);
+  for (int i = 0; i < 9; i += 3) A.block(i, i, 3, 3) = tridiagonal(3, 4, 1) * std::pow(10.0, 3 * (i - 3));
+  const System system = from_dense(A);
+  const Eigen::VectorXd b = A * Eigen::VectorXd::Ones(9);
+  std::vector<double> x(9);
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  ASSERT_EQ(solver_->factorize(system.values), Outcome::ok) << solver_->message();
+  ASSERT_EQ(solver_->solve({b.data(), 9}, x, 1, 1e-8).outcome, Outcome::ok) << solver_->message();
+  if (solver_->capabilities().iterative) return;  // the residual of the whole says nothing about the soft part
+  for (const double value : x) EXPECT_NEAR(value, 1, 1e-12);
+}
+
+TEST_P(EverySolver, GoesOnAfterAFailedFactorization) {
+  const System good = from_dense(tridiagonal(20, 4, 1));
+  const std::vector<double> zeros(good.values.size(), 0.0);
+  ASSERT_EQ(solver_->analyze(good.pattern, {}), Outcome::ok);
+  const Outcome outcome = solver_->factorize(zeros);
+  EXPECT_TRUE(outcome == Outcome::singular || outcome == Outcome::not_positive_definite) << to_string(outcome);
+  EXPECT_FALSE(solver_->message().empty());
+  EXPECT_EQ(solver_->message().find("status 0"), std::string::npos) << solver_->message();
+  std::vector<double> b(20, 1.0), x(20);
+  EXPECT_EQ(solver_->solve(b, x, 1, 1e-8).outcome, Outcome::failed);  // there is nothing to solve with
+  expect_solves(good, 1e-12, 1, false);
+}
+
+TEST_P(EverySolver, MeasuresResidualsWhoseSquaresLeaveTheRangeOfDouble) {
+  const System system = from_dense(tridiagonal(20, 4, 1));
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  ASSERT_EQ(solver_->factorize(system.values), Outcome::ok);
+  for (const double size : {1e-190, 1e190}) {
+    std::vector<double> b(20, size), x(20, 0.0);
+    const auto report = solver_->solve(b, x, 1, 1e-10);
+    if (solver_->capabilities().iterative) {  // may give up there, but must not claim success
+      if (report.outcome != Outcome::ok) continue;
+    }
+    EXPECT_EQ(report.outcome, Outcome::ok) << size << ": " << solver_->message();
+    for (int i = 0; i < 20; ++i) {
+      const double Ax = 4 * x[i] + (i > 0 ? x[i - 1] : 0) + (i < 19 ? x[i + 1] : 0);
+      EXPECT_NEAR(Ax / size, 1, 1e-9);
+    }
+    EXPECT_LE(report.relative_residual, 1e-10);
+    EXPECT_GT(report.relative_residual, 0);
+  }
+}
+
 TEST_P(EverySolver, RefusesWhatIsNotFinite) {
   System system = from_dense(tridiagonal(10, 4, 1));
   ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
@@ -169,7 +225,10 @@ TEST_P(EverySolver, ReusesAndChangesPatterns) {
   expect_solves(from_dense(tridiagonal(11, 5, 1)), 1e-12);
 }
 
-TEST_P(EverySolver, SolvesSeveralRightHandSides) { expect_solves(from_dense(springs(2, 6, 1)), 1e-10, 5); }
+TEST_P(EverySolver, SolvesSeveralRightHandSidesAndNone) {
+  expect_solves(from_dense(springs(2, 6, 1)), 1e-10, 5);
+  EXPECT_EQ(solver_->solve({}, {}, 0, 1e-10).outcome, Outcome::ok);
+}
 
 TEST_P(EverySolver, TwoInTwoThreadsDoNotDisturbEachOther) {
   const auto work = [&](int n) {
@@ -203,10 +262,30 @@ std::string test_name(const ::testing::TestParamInfo<std::string>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(Present, EverySolver, ::testing::ValuesIn(present()), test_name);
 
+// Sanitizers end the program at such a request.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST(Solver, ReportsThatMemoryIsOut) {
+  constexpr int kOrder = 5'000'000;  // dense: more bytes than a process can address, whatever the system overcommits
+  SparsityPattern pattern;
+  pattern.order = kOrder;
+  for (int i = 0; i <= kOrder; ++i) pattern.column_starts.push_back(i);
+  pattern.row_indices.assign(pattern.column_starts.begin(), pattern.column_starts.end() - 1);
+  const std::vector<double> ones(kOrder, 1.0);
+  const auto solver = Registry().create("dense");
+  ASSERT_EQ(solver->analyze(pattern, {}), Outcome::ok);
+  EXPECT_EQ(solver->factorize(ones), Outcome::out_of_memory);
+}
+#endif
+
 TEST(Registry, NamesOfOthersMapToOurs) {
+  EXPECT_EQ(Registry::canonical_name(""), "eigen:ldlt");
   EXPECT_EQ(Registry::canonical_name("eigen"), "eigen:ldlt");
+  EXPECT_EQ(Registry::canonical_name("cholmod"), "cholmod:supernodal");
+  EXPECT_EQ(Registry::canonical_name("Eigen::SimplicialLDLT"), "eigen:ldlt");
+  EXPECT_EQ(Registry::canonical_name("Eigen::SparseLU"), "eigen:lu");
   EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod:supernodal");
-  EXPECT_EQ(Registry::canonical_name("Eigen::PardisoLLT"), "");
+  for (const char* name : {"Eigen::PardisoLLT", "Eigen::AccelerateLDLT", "Hypre", "AMGCL", "Trilinos"})
+    EXPECT_EQ(Registry::canonical_name(name), "") << name;
 }
 
 TEST(Registry, UnknownNamesListWhatThereIs) {
@@ -219,18 +298,55 @@ TEST(Registry, UnknownNamesListWhatThereIs) {
   }
 }
 
-TEST(Registry, AModuleThatDoesNotLoadSaysWhyAndTheRestGoOn) {
-  const auto folder = std::filesystem::temp_directory_path() / "itr_broken_modules";
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "itr_backend_broken.so") << "not a library";
-  setenv("ITR_BACKEND_PATH", folder.c_str(), 1);
-  bool told = false;
+/// A folder of modules that only this process uses.
+class ModuleFolder {
+ public:
+  ModuleFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "itr_modules_XXXXXX").string();
+    path_ = mkdtemp(name.data());
+    setenv("ITR_BACKEND_PATH", path_.c_str(), 1);
+  }
+  ~ModuleFolder() {
+    unsetenv("ITR_BACKEND_PATH");
+    std::error_code error;
+    std::filesystem::remove_all(path_, error);
+  }
+  ModuleFolder(const ModuleFolder&) = delete;
+  ModuleFolder& operator=(const ModuleFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string reason_of(const std::string& name) {
   for (const auto& info : Registry().list())
-    if (info.name == "itr_backend_broken") told = !info.available && info.reason.find("does not load") != std::string::npos;
-  unsetenv("ITR_BACKEND_PATH");
-  std::filesystem::remove_all(folder);
-  EXPECT_TRUE(told);
+    if (info.name == name && !info.available) return info.reason;
+  return "no such row, or it is there";
+}
+
+TEST(Registry, AModuleThatDoesNotLoadSaysWhyAndTheRestGoOn) {
+  const ModuleFolder folder;
+  std::ofstream(folder.path() / "itr_backend_broken.so") << "not a library";
+  EXPECT_NE(reason_of("itr_backend_broken").find("does not load"), std::string::npos);
   EXPECT_GE(self_test_residual(*Registry().create("eigen")), 0);
+}
+
+TEST(Registry, ASolverWhoseModuleDoesNotLoadIsNotCalledMissing) {
+  const ModuleFolder folder;
+  std::ofstream(folder.path() / "itr_backend_umfpack.so") << "not a library";
+  EXPECT_NE(reason_of("umfpack").find("does not load"), std::string::npos) << reason_of("umfpack");
+}
+
+TEST(Registry, ALibraryThatIsNoModuleSaysSo) {
+  void* handle = dlopen("libm.so.6", RTLD_NOW);
+  ASSERT_TRUE(handle);
+  link_map* map = nullptr;
+  ASSERT_EQ(dlinfo(handle, RTLD_DI_LINKMAP, &map), 0);
+  const ModuleFolder folder;
+  std::filesystem::create_symlink(map->l_name, folder.path() / "itr_backend_other.so");
+  EXPECT_NE(reason_of("itr_backend_other").find("is no solver module"), std::string::npos);
+  dlclose(handle);
 }
 
 TEST(Registry, AProgramAddsItsOwn) {

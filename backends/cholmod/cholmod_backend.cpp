@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <string_view>
 #include <vector>
 
 #include "itr/linear/module_adapter.hpp"
@@ -62,6 +63,8 @@ class Cholmod {
     cholmod_factorize(&matrix_, factor_, &common_);
     if (common_.status == CHOLMOD_NOT_POSDEF || (factor_ && factor_->minor < factor_->n)) {
       common_.status = CHOLMOD_OK;
+      std::snprintf(text_.data(), text_.size(), "not positive definite at pivot %zu of %zu", factor_ ? factor_->minor : 0,
+                    matrix_.nrow);
       return ITR_NOT_POSITIVE_DEFINITE;
     }
     return status();
@@ -81,13 +84,11 @@ class Cholmod {
     return ITR_OK;
   }
 
-  const char* message() const {
-    std::snprintf(text_.data(), text_.size(), "CHOLMOD status %d", common_.status);
-    return text_.data();
-  }
+  const char* message() const { return text_.data(); }
 
  private:
-  int status() const {
+  int status() {
+    std::snprintf(text_.data(), text_.size(), "CHOLMOD status %d", common_.status);
     if (common_.status == CHOLMOD_OUT_OF_MEMORY || common_.status == CHOLMOD_TOO_LARGE) return ITR_OUT_OF_MEMORY;
     return common_.status >= CHOLMOD_OK && factor_ ? ITR_OK : ITR_FAILED;
   }
@@ -99,13 +100,13 @@ class Cholmod {
   cholmod_dense *workspace_y_ = nullptr, *workspace_e_ = nullptr;
   std::vector<int> starts_, rows_;
   std::vector<double> values_;
-  mutable std::array<char, 64> text_{};
+  std::array<char, 96> text_{};
 };
 
 /// Version text; also sets OpenBLAS to one thread, so that results do not depend on the environment.
 const char* version() {
-  static char text[128];
-  const char* blas = "reference BLAS (install libopenblas-dev: it is much faster)";
+  static char text[160];
+  char blas[96] = "reference BLAS (install libopenblas-dev: it is much faster)";
   if (auto* set_threads = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"))) set_threads(1);
   // The module is loaded locally, so its BLAS is searched among its own dependencies.
   Dl_info info{};
@@ -113,12 +114,17 @@ const char* version() {
     if (void* self = dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD)) {
       if (auto* set_threads = reinterpret_cast<void (*)(int)>(dlsym(self, "openblas_set_num_threads"))) {
         set_threads(1);
-        blas = "OpenBLAS";
+        // "OpenBLAS 0.3.21 NO_LAPACKE ...": the name and the version.
+        const auto config = reinterpret_cast<char* (*)()>(dlsym(self, "openblas_get_config"));
+        const std::string_view words = config ? config() : "OpenBLAS";
+        const auto end = words.find(' ', words.find(' ') + 1);
+        std::snprintf(blas, sizeof blas, "%.*s", static_cast<int>(std::min(end, words.size())), words.data());
       }
       dlclose(self);
     }
-  std::snprintf(text, sizeof text, "CHOLMOD %d.%d.%d, %s", CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION,
-                blas);
+  int loaded[3] = {};  // of the library, which may be newer than the header
+  cholmod_version(loaded);
+  std::snprintf(text, sizeof text, "CHOLMOD %d.%d.%d, %s", loaded[0], loaded[1], loaded[2], blas);
   return text;
 }
 

@@ -2,6 +2,7 @@
 // No backend is trusted: input is checked, the residual of every solve is computed, poor ones are refined.
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <utility>
 
 #include "engine.hpp"
@@ -40,7 +41,14 @@ bool is_finite(std::span<const double> values) {
 double norm(std::span<const double> v) {
   double sum = 0;
   for (const double x : v) sum += x * x;
-  return std::sqrt(sum);
+  if (sum > 1e-280 && std::isfinite(sum)) return std::sqrt(sum);
+  // The squares left the range of double: a residual over such a norm would be 0 or not a number, whatever the solution.
+  double largest = 0;
+  for (const double x : v) largest = std::isnan(x) ? x : std::max(largest, std::abs(x));
+  if (largest == 0 || !std::isfinite(largest)) return largest;
+  sum = 0;
+  for (const double x : v) sum += (x / largest) * (x / largest);
+  return largest * std::sqrt(sum);
 }
 
 class CheckedSolver final : public Solver {
@@ -52,10 +60,12 @@ class CheckedSolver final : public Solver {
   std::string message() const override { return message_; }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
-    pattern_ = pattern;
-    values_.clear();
     ready_ = false;
-    return pattern.order == 0 ? Outcome::ok : note(engine_->analyze(pattern_, hints));
+    return guarded([&] {
+      pattern_ = pattern;
+      values_.clear();
+      return pattern.order == 0 ? Outcome::ok : note(engine_->analyze(pattern_, hints));
+    });
   }
 
   Outcome factorize(std::span<const double> values) override {
@@ -63,8 +73,10 @@ class CheckedSolver final : public Solver {
     if (values.size() != pattern_.nonzeros())
       return note(Outcome::failed, "the number of values is not that of the pattern");
     if (!is_finite(values)) return note(Outcome::non_finite, "a matrix entry is not finite");
-    values_.assign(values.begin(), values.end());
-    const Outcome outcome = pattern_.order == 0 ? Outcome::ok : note(engine_->factorize(values));
+    const Outcome outcome = guarded([&] {
+      values_.assign(values.begin(), values.end());
+      return pattern_.order == 0 ? Outcome::ok : note(engine_->factorize(values));
+    });
     ready_ = outcome == Outcome::ok;
     return outcome;
   }
@@ -72,9 +84,21 @@ class CheckedSolver final : public Solver {
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
     const std::size_t n = pattern_.order;
     if (!ready_) return {note(Outcome::failed, "no factorisation to solve with"), 1};
-    if (B.size() != n * columns || X.size() != B.size()) return {note(Outcome::failed, "wrong length of a vector"), 1};
-    if (n == 0) return {};
+    if (columns < 0 || B.size() != n * columns || X.size() != B.size())
+      return {note(Outcome::failed, "wrong length of a vector"), 1};
+    if (n == 0 || columns == 0) return {};
     if (!is_finite(B)) return {note(Outcome::non_finite, "a right-hand side is not finite"), 1};
+    SolveReport report{Outcome::ok, 1};
+    report.outcome = guarded([&] {
+      report = solve_checked(B, X, columns, asked);
+      return report.outcome;
+    });
+    return report;
+  }
+
+ private:
+  SolveReport solve_checked(std::span<const double> B, std::span<double> X, int columns, double asked) {
+    const std::size_t n = pattern_.order;
     SolveReport report{engine_->solve(B, X, columns), 0};
     if (report.outcome != Outcome::ok && report.outcome != Outcome::not_converged) {
       note(report.outcome);
@@ -92,7 +116,16 @@ class CheckedSolver final : public Solver {
     return report;
   }
 
- private:
+  /// Exceptions end here: large systems do run out of memory, and Newton has an answer to that.
+  template <typename F>
+  Outcome guarded(F&& f) {
+    try {
+      return f();
+    } catch (const std::bad_alloc&) {
+      return note(Outcome::out_of_memory, "out of memory");
+    }
+  }
+
   Outcome note(Outcome outcome, std::string message = {}) {
     if (outcome != Outcome::ok) message_ = message.empty() ? engine_->message() : std::move(message);
     if (outcome != Outcome::ok && message_.empty()) message_ = to_string(outcome);

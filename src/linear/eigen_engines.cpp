@@ -16,7 +16,7 @@ using Sparse = Eigen::SparseMatrix<double>;
 using ConstColumns = Eigen::Map<const Eigen::MatrixXd>;
 using Columns = Eigen::Map<Eigen::MatrixXd>;
 
-constexpr double kSingular = 1e-15;  ///< smallest pivot over the largest, below which a factorisation means nothing
+constexpr double kSingular = 1e-15;  ///< pivot over the largest entry of its row, below which it is round-off
 
 /// Keeps the lower triangle as Eigen's matrix; factorisations of one pattern only copy values.
 class LowerTriangleEngine : public Engine {
@@ -40,10 +40,23 @@ class LowerTriangleEngine : public Engine {
   Sparse matrix_;
 };
 
-Outcome check_pivots(const Eigen::VectorXd& pivots) {
-  if (!pivots.allFinite()) return Outcome::singular;
-  const double largest = pivots.cwiseAbs().maxCoeff();
-  return pivots.cwiseAbs().minCoeff() > kSingular * largest ? Outcome::ok : Outcome::singular;
+/// Each pivot against its own row of the lower triangle `matrix`: against the largest pivot of all, a soft body beside a
+/// very stiff one would pass for singular although the factorisation is accurate.
+Outcome check_pivots(const Sparse& matrix, const Eigen::SimplicialLDLT<Sparse>& factors) {
+  Eigen::VectorXd row_scale = Eigen::VectorXd::Zero(matrix.rows());
+  for (int j = 0; j < matrix.outerSize(); ++j)
+    for (Sparse::InnerIterator entry(matrix, j); entry; ++entry) {
+      const double size = std::abs(entry.value());
+      row_scale[j] = std::max(row_scale[j], size);
+      row_scale[entry.row()] = std::max(row_scale[entry.row()], size);
+    }
+  const auto pivots = factors.vectorD();
+  const auto& place = factors.permutationP().indices();
+  for (Eigen::Index i = 0; i < row_scale.size(); ++i) {
+    const double pivot = std::abs(pivots[place[i]]);
+    if (!std::isfinite(pivot) || pivot <= kSingular * row_scale[i]) return Outcome::singular;
+  }
+  return Outcome::ok;
 }
 
 /// What all of Eigen's solvers share: they hold their factors and solve for columns.
@@ -68,7 +81,7 @@ class Ldlt final : public EigenEngine<Eigen::SimplicialLDLT<Sparse>> {
   }
   Outcome factorize_matrix() override {
     solver_.factorize(matrix_);
-    return solver_.info() == Eigen::Success ? check_pivots(solver_.vectorD()) : Outcome::singular;
+    return solver_.info() == Eigen::Success ? check_pivots(matrix_, solver_) : Outcome::singular;
   }
 };
 

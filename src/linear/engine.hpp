@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What stands behind a Solver: one factorisation, no residuals. CheckedSolver (checked_solver.hpp) adds what all engines
+// What stands behind a Solver: one factorisation, no residuals. CheckedSolver (checked_solver.cpp) adds what all engines
 // need: finite input, trivial orders, achieved residuals, refinement.
 #pragma once
 

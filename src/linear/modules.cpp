@@ -2,6 +2,7 @@
 #include "modules.hpp"
 
 #include <dlfcn.h>
+#include <link.h>
 
 #include <cstdlib>
 #include <sstream>
@@ -52,6 +53,17 @@ std::vector<ModuleRow> broken(const std::filesystem::path& file, std::string rea
   return {row};
 }
 
+/// The file that this code was loaded from: the shared library, or the program that it is linked into.
+std::filesystem::path own_file() {
+  Dl_info info{};
+  link_map* map = nullptr;
+  if (!dladdr1(reinterpret_cast<void*>(&own_file), &info, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP) || !map)
+    return {};
+  std::error_code error;
+  // A program's own entry has no name, and info.dli_fname is only what its caller typed.
+  return std::filesystem::canonical(map->l_name[0] ? map->l_name : "/proc/self/exe", error);
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> module_folders() {
@@ -60,6 +72,11 @@ std::vector<std::filesystem::path> module_folders() {
     std::istringstream list(path);
     for (std::string folder; std::getline(list, folder, ':');)
       if (!folder.empty()) folders.emplace_back(folder);
+  }
+  // Beside the library, or in the lib folder of the program's prefix: an install tree may have been moved.
+  if (const auto file = own_file(); !file.empty()) {
+    folders.push_back(file.parent_path() / "itr" / "backends");
+    folders.push_back(file.parent_path().parent_path() / "lib" / "itr" / "backends");
   }
 #ifdef ITR_INSTALL_BACKEND_DIR
   folders.emplace_back(ITR_INSTALL_BACKEND_DIR);

@@ -64,8 +64,13 @@ struct Registry::Impl {
           if (const Row* present = find(row.info.name); !present)
             rows.push_back({std::move(row.info), std::move(row.factory)});
     }
-    for (const auto& [name, reason] : known_absent())
-      if (!find(name)) rows.push_back({{name, "", "", {}, false, reason}, nullptr});
+    for (const auto& [name, usual_reason] : known_absent()) {
+      if (find(name)) continue;
+      const std::string module = "itr_backend_" + name.substr(0, name.find(':'));
+      const Row* found = find(module);  // a row of that name is a file that is there and does not load
+      rows.push_back(
+          {{name, "", "", {}, false, found ? "module " + module + " " + found->info.reason : usual_reason}, nullptr});
+    }
   }
 };
 
@@ -117,7 +122,9 @@ std::string Registry::canonical_name(const std::string& name) {
   const auto it = kAliases.find(name);
   if (it != kAliases.end()) return it->second;
   // Other programs' solvers that we have no equal of.
-  if (name.rfind("Eigen::", 0) == 0 || name == "Pardiso" || name == "Hypre" || name == "AMGCL" || name == "MAS") return {};
+  if (name.rfind("Eigen::", 0) == 0 || name == "Pardiso" || name == "Hypre" || name == "AMGCL" || name == "MAS" ||
+      name == "Trilinos" || name == "cuSolverDN")
+    return {};
   return name;
 }
 
