@@ -294,6 +294,7 @@ TEST_F(SceneTest, Integrators) {
 
   EXPECT_EQ(time("ImplicitNewmark").integrator, Integrator::newmark);
   EXPECT_EQ(time({{"type", "ImplicitNewmark"}, {"beta", 0.3}, {"gamma", 0.6}}).newmark_beta, 0.3);
+  EXPECT_EQ(time({{"type", "ImplicitNewmark"}, {"energy_growth_limit", 0.2}}).energy_growth_limit, 0.2);
   EXPECT_EQ(time("BDF3").bdf_order, 3);
   EXPECT_EQ(time({{"type", "BDF"}, {"steps", 5}}).bdf_order, 5);
   EXPECT_EQ(read2(square({{"time", {{"tend", nullptr}, {"time_steps", 7}}}})).time.steps, 7);

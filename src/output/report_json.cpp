@@ -61,12 +61,13 @@ std::string versions_json() {
 /// What a step's line and the summary have in common.
 std::string common_members(const StepReport& r) {
   return fmt::format(
-      R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"energy":{},"energy_before_remesh":{},)"
+      R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"damped_steps":{},"energy":{},"energy_before_remesh":{},)"
       R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"min_distance":{},"min_volume_ratio":{},"seconds":{},)"
       R"("peak_rss_mb":{})",
-      r.vertices, r.elements, r.unknowns, r.newton_iterations, energy_json(r.energy), number(r.energy_before_remesh),
-      count_json(r.splits), count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), number(r.min_distance),
-      number(r.min_volume_ratio), seconds_json(r.seconds), number(r.peak_rss_mb));
+      r.vertices, r.elements, r.unknowns, r.newton_iterations, r.damped_steps, energy_json(r.energy),
+      number(r.energy_before_remesh), count_json(r.splits), count_json(r.collapses), count_json(r.swaps),
+      count_json(r.smooths), number(r.min_distance), number(r.min_volume_ratio), seconds_json(r.seconds),
+      number(r.peak_rss_mb));
 }
 
 OperationCount operator+(const OperationCount& a, const OperationCount& b) {
@@ -89,6 +90,7 @@ void Totals::add(const StepReport& report) {
   const bool is_first = before.vertices == 0;
   total_ = report;
   total_.newton_iterations += before.newton_iterations;
+  total_.damped_steps += before.damped_steps;
   total_.splits = before.splits + report.splits;
   total_.collapses = before.collapses + report.collapses;
   total_.swaps = before.swaps + report.swaps;

@@ -69,7 +69,7 @@ constexpr Group kGroups[] = {
     {"/initial_conditions/acceleration/*", Role::read, "id value"},
 
     {"/time", Role::read, "t0 tend dt time_steps integrator quasistatic"},
-    {"/time/integrator", Role::read, "type steps beta gamma"},
+    {"/time/integrator", Role::read, "type steps beta gamma energy_growth_limit"},
 
     {"/contact", Role::read, "enabled dhat dhat_percentage epsv friction_coefficient use_convergent_formulation"},
     {"/contact", Role::only, "use_area_weighting=true use_improved_max_operator=true use_physical_barrier=true"},

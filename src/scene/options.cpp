@@ -28,6 +28,7 @@ void read_integrator(const Node& node, TimeOptions& options) {
   }
   options.newmark_beta = node["beta"].positive(0.25);
   options.newmark_gamma = node["gamma"].positive(0.5);
+  options.energy_growth_limit = node["energy_growth_limit"].positive(options.energy_growth_limit);
   if (options.newmark_beta > 0.5) node["beta"].fail("a number of (0, 0.5]");
   if (options.newmark_gamma > 1) node["gamma"].fail("a number of (0, 1]");
 }

@@ -123,6 +123,20 @@ RemeshReport remesh_and_project(const Setup<2>& setup, double shortest_edge, con
   return report;
 }
 
+/// Whether a step of the trapezoidal rule, solved to x, stays within TimeOptions::energy_growth_limit. Books what it
+/// creates.
+template <int Dim>
+bool keeps_energy(const Setup<Dim>& setup, StepProblem<Dim>& problem, const NewtonSummary& summary, const VectorX& x,
+                  State<Dim>& state) {
+  const History& history = state.history;
+  if (!std::isfinite(setup.time.energy_growth_limit) || !TimeIntegrator(setup.time).is_trapezoidal(history)) return true;
+  if (!summary.converged()) return false;
+  const double created = state.created_energy + problem.created_energy(history, x);
+  if (created > setup.time.energy_growth_limit * problem.mechanical_energy(history.x[0], history.v[0])) return false;
+  state.created_energy = created;
+  return true;
+}
+
 /// The invariants: exact, on every configuration that the state holds.
 template <int Dim>
 std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
@@ -163,9 +177,21 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
     return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
   };
   auto problem = make_problem();
-  NewtonSummary summary = problem->solve(x, next.history.x[0]);
-  add_seconds(summary, report.seconds);
-  report.newton_iterations = summary.iterations;
+  const auto solve = [&](const VectorX& lagged) {
+    const NewtonSummary summary = problem->solve(x, lagged);
+    add_seconds(summary, report.seconds);
+    report.newton_iterations += summary.iterations;
+    return summary;
+  };
+  NewtonSummary summary = solve(state.history.x[0]);
+  if (!keeps_energy(setup, *problem, summary, x, next)) {
+    next.history.damp_next = true;
+    x = state.history.x[0];
+    problem = make_problem();
+    summary = solve(state.history.x[0]);
+    report.damped_steps = 1;
+    next.created_energy = std::max(0.0, next.created_energy + problem->created_energy(next.history, x));
+  }
   if (!summary.converged()) return fail(summary);
   {
     const ScopedTimer timer(report.seconds.assembly);
@@ -184,10 +210,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
       report.smooths = {remeshed.smooths.tried, remeshed.smooths.accepted};
       if (remeshed.changed()) {
         problem = make_problem();
-        const VectorX lagged = x;
-        summary = problem->solve(x, lagged);
-        add_seconds(summary, report.seconds);
-        report.newton_iterations += summary.iterations;
+        summary = solve(VectorX(x));
         if (!summary.converged()) {
           logger.warning("step " + std::to_string(next.step) + ": the remeshed step did not converge (" + summary.message +
                          "), keeping the mesh as it was");

@@ -183,6 +183,39 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
 }
 
 template <int Dim>
+double StepProblem<Dim>::created_energy(const History& history, const VectorX& x) {
+  const VectorX &x0 = history.x[0], &v0 = history.v[0];
+  const bool trapezoidal = TimeIntegrator(setup_.time).is_trapezoidal(history);
+  double rise = 0;
+  VectorX gradient = VectorX::Zero(x.size());  // twice the mean over the step
+  const auto add = [&](const Energy& term) {
+    rise += term.value(x, workspace_) - term.value(x0, workspace_);
+    term.add_gradient(x, gradient, workspace_);
+    term.add_gradient(trapezoidal ? x0 : x, gradient, workspace_);
+  };
+  add(*elastic_);
+  if (contact_) add(*contact_);
+  const double created = (rise - 0.5 * gradient.dot(x - x0)) / scaling_;
+  if (trapezoidal) return created;
+  const VectorX change = TimeIntegrator(setup_.time).velocity(x, history) - v0;
+  return created - 0.5 * change.dot(momentum(change));
+}
+
+template <int Dim>
+VectorX StepProblem<Dim>::momentum(const VectorX& v) const {
+  VectorX result = VectorX::Zero(v.size());
+  if (inertia_) inertia_->add_mass_product(v, result);
+  return result;
+}
+
+template <int Dim>
+double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
+  double energy = elastic_->value(x, workspace_) / scaling_;
+  if (contact_) energy += contact_->value(x, workspace_) / scaling_;
+  return energy + 0.5 * v.dot(momentum(v));
+}
+
+template <int Dim>
 double StepProblem<Dim>::min_distance(const VectorX& x) {
   return contact_ ? contact_->min_distance(x, workspace_) : std::numeric_limits<double>::infinity();
 }

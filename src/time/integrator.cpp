@@ -36,6 +36,14 @@ VectorX combine(const BdfRow& row, int order, const std::vector<VectorX>& past) 
 
 }  // namespace
 
+bool TimeIntegrator::is_newmark(const History& history) const {
+  return options_.integrator == Integrator::newmark && !history.damp_next;
+}
+
+bool TimeIntegrator::is_trapezoidal(const History& history) const {
+  return is_newmark(history) && !options_.quasistatic && options_.newmark_beta == 0.25 && options_.newmark_gamma == 0.5;
+}
+
 int TimeIntegrator::depth() const { return options_.integrator == Integrator::bdf ? options_.bdf_order : 1; }
 
 int TimeIntegrator::order(const History& history) const {
@@ -44,8 +52,7 @@ int TimeIntegrator::order(const History& history) const {
 
 VectorX TimeIntegrator::predictor(const History& history) const {
   const double h = options_.dt;
-  if (options_.integrator == Integrator::newmark)
-    return history.x[0] + h * history.v[0] + h * h * (0.5 - options_.newmark_beta) * history.a[0];
+  if (is_newmark(history)) return history.x[0] + h * history.v[0] + h * h * (0.5 - options_.newmark_beta) * history.a[0];
   const int k = order(history);
   return combine(bdf(k), k, history.x) + bdf(k).b * h * combine(bdf(k), k, history.v);
 }
@@ -53,19 +60,19 @@ VectorX TimeIntegrator::predictor(const History& history) const {
 double TimeIntegrator::scaling(const History& history) const {
   if (options_.is_static) return 1;
   const double h = options_.dt;
-  if (options_.integrator == Integrator::newmark) return options_.newmark_beta * h * h;
+  if (is_newmark(history)) return options_.newmark_beta * h * h;
   const double b = bdf(order(history)).b;
   return b * b * h * h;
 }
 
 double TimeIntegrator::velocity_rate(const History& history) const {
   if (options_.is_static) return 1;
-  if (options_.integrator == Integrator::newmark) return options_.newmark_gamma / (options_.newmark_beta * options_.dt);
+  if (is_newmark(history)) return options_.newmark_gamma / (options_.newmark_beta * options_.dt);
   return 1 / (bdf(order(history)).b * options_.dt);
 }
 
 VectorX TimeIntegrator::velocity_reference(const History& history) const {
-  if (options_.integrator == Integrator::newmark) {
+  if (is_newmark(history)) {
     const double beta = options_.newmark_beta, gamma = options_.newmark_gamma, h = options_.dt;
     return history.x[0] -
            ((1 - gamma / beta) * history.v[0] + (1 - gamma / (2 * beta)) * h * history.a[0]) * (beta * h / gamma);
@@ -80,7 +87,7 @@ VectorX TimeIntegrator::velocity(const VectorX& x, const History& history) const
 
 VectorX TimeIntegrator::acceleration(const VectorX& v, const History& history) const {
   const double h = options_.dt;
-  if (options_.integrator == Integrator::newmark)
+  if (is_newmark(history))
     return (v - history.v[0] - (1 - options_.newmark_gamma) * h * history.a[0]) / (options_.newmark_gamma * h);
   const int k = order(history);
   return (v - combine(bdf(k), k, history.v)) / (bdf(k).b * h);
@@ -93,6 +100,7 @@ void TimeIntegrator::push(VectorX x, History& history) const {
     past.insert(past.begin(), std::move(newest));
     past.resize(std::min<std::size_t>(past.size(), depth()));
   };
+  history.damp_next = false;
   push_front(history.x, std::move(x));
   push_front(history.v, std::move(v));
   if (uses_acceleration()) push_front(history.a, std::move(a));

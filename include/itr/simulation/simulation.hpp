@@ -21,7 +21,8 @@ struct State {
   Mesh<Dim> mesh;   ///< compact
   History history;  ///< history.x[0] is the present
   int step = 0;
-  double t = 0;  ///< [s]
+  double t = 0;               ///< [s]
+  double created_energy = 0;  ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 
 struct StepResult {

@@ -44,6 +44,11 @@ class StepProblem {
 
   EnergyReport report(const VectorX& x);
   double min_distance(const VectorX& x);
+  /// What the integrator (the trapezoidal rule or implicit Euler) adds to the mechanical energy by a step to x [J]: its work
+  /// is a mean of the forces at both ends times the way, the potential's is the integral along it. Friction and loads aside.
+  double created_energy(const History& history, const VectorX& x);
+  /// Kinetic, elastic and contact energy [J].
+  double mechanical_energy(const VectorX& x, const VectorX& v);
   const DofMap& dofs() const { return dofs_; }
   const CellSet<Dim>& cells() const { return cells_; }
   const CollisionSurface& surface() const { return surface_; }
@@ -51,6 +56,7 @@ class StepProblem {
 
  private:
   EnergySum energy(const VectorX& lagged_x);
+  VectorX momentum(const VectorX& v) const;
 
   const Setup<Dim>& setup_;
   CellSet<Dim> cells_;

@@ -15,6 +15,8 @@ struct History {
   std::vector<VectorX> x;  ///< [m]
   std::vector<VectorX> v;  ///< [m/s]
   std::vector<VectorX> a;  ///< [m/s^2]
+  /// Newmark only: the next step is one of implicit Euler, which dissipates (see TimeOptions::energy_growth_limit).
+  bool damp_next = false;
 };
 
 class TimeIntegrator {
@@ -25,6 +27,8 @@ class TimeIntegrator {
   int order(const History& history) const;
   /// How many past states need to be kept.
   int depth() const;
+  /// Whether the next step is one of the trapezoidal rule: no dissipation, so a bad step can create energy.
+  bool is_trapezoidal(const History& history) const;
   bool uses_acceleration() const { return options_.integrator == Integrator::newmark; }
 
   /// x-hat: where the body flies without forces [m].
@@ -42,6 +46,8 @@ class TimeIntegrator {
   void push(VectorX x, History& history) const;
 
  private:
+  bool is_newmark(const History& history) const;
+
   TimeOptions options_;
 };
 
