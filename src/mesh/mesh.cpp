@@ -32,6 +32,15 @@ typename MeshTypes<Dim>::Facet opposite_facet(const typename MeshTypes<Dim>::Cel
   }
 }
 
+/// Whether the order of distinct ids is an even permutation of ascending order.
+template <std::size_t N>
+bool is_even(const std::array<int, N>& ids) {
+  bool even = true;
+  for (std::size_t i = 0; i < N; ++i)
+    for (std::size_t j = i + 1; j < N; ++j) even = even != (ids[i] > ids[j]);
+  return even;
+}
+
 void erase_value(std::vector<int>& list, int value) { list.erase(std::find(list.begin(), list.end(), value)); }
 
 }  // namespace
@@ -50,9 +59,9 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
       if (v < 0 || v >= vertex_slots())
         throw InputError({"", place(), "vertex index " + std::to_string(v), "0 to " + std::to_string(vertex_slots() - 1)});
     add_cell(cells[c], body[c]);
-    if (!(volume_.back() > 0))
-      throw InputError(
-          {"", place(), "rest volume " + std::to_string(volume_.back()), "a positive one (not degenerate or inverted)"});
+    if (!(volume_.back() > 0 && std::isfinite(volume_.back())))
+      throw InputError({"", place(), "rest volume " + std::to_string(volume_.back()),
+                        "a positive, finite one (not degenerate or inverted)"});
     for (int k = 0; k <= Dim; ++k) {
       const Facet facet = opposite_facet<Dim>(cells[c], k);
       auto& entry = facets.try_emplace(sorted(facet), 0, facet).first->second;
@@ -64,10 +73,15 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
 }
 
 template <int Dim>
-void Mesh<Dim>::update_geometry(CellId c) {
+Mat<Dim> Mesh<Dim>::rest_edges(CellId c) const {
   std::array<Vec<Dim>, Dim + 1> p;
   for (int k = 0; k <= Dim; ++k) p[k] = rest_[cells_[c][k]];
-  const Mat<Dim> edges = edge_matrix<Dim>(p);
+  return edge_matrix<Dim>(p);
+}
+
+template <int Dim>
+void Mesh<Dim>::update_geometry(CellId c) {
+  const Mat<Dim> edges = rest_edges(c);
   volume_[c] = simplex_volume<Dim>(edges);
   inverse_edges_[c] = edges.inverse();
 }
@@ -229,6 +243,7 @@ std::string Mesh<Dim>::find_defect() const {
     if (!is_cell_alive(c)) continue;
     ++alive;
     if (!(volume_[c] > 0)) return "cell " + std::to_string(c) + " has rest volume " + std::to_string(volume_[c]);
+    if (volume_[c] != simplex_volume<Dim>(rest_edges(c))) return "cell " + std::to_string(c) + " has an outdated volume";
     for (const int v : cells_[c]) {
       if (!vertex_alive_[v]) return "cell " + std::to_string(c) + " uses dead vertex " + std::to_string(v);
       if (std::count(cells_of_[v].begin(), cells_of_[v].end(), c) != 1) return "adjacency of vertex " + std::to_string(v);
@@ -245,7 +260,7 @@ std::string Mesh<Dim>::find_defect() const {
     ++boundary;
     const FacetId f = find_facet(key);
     if (f == kNone) return "boundary facet at vertex " + std::to_string(key[0]) + " is missing";
-    if (Dim == 2 && facets_[f] != entry.second) return "facet " + std::to_string(f) + " is oriented inward";
+    if (is_even(facets_[f]) != is_even(entry.second)) return "facet " + std::to_string(f) + " is oriented inward";
   }
   if (boundary != num_facets_) return "a facet that is not on the boundary";
   return {};

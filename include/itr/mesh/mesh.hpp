@@ -125,6 +125,7 @@ class Mesh {
   void add_facet(const Facet& facet, int tag);
   void remove_cell(CellId c);
   void remove_facet(FacetId f);
+  Mat<Dim> rest_edges(CellId c) const;
   void update_geometry(CellId c);
 
   int num_vertices_ = 0, num_cells_ = 0, num_facets_ = 0;
