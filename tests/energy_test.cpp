@@ -101,6 +101,153 @@ TYPED_TEST(VolumeTerms, DerivativesMatchDifferences) {
   }
 }
 
+/// All laws, with the same moduli of small strains (E = 100, nu = 0.4) in the dimension.
+template <int Dim>
+std::vector<Material> all_laws() {
+  const Material base = {.youngs_modulus = 100, .poisson_ratio = 0.4, .density = 3};
+  std::vector<Material> laws(6, base);
+  laws[1].law = MaterialLaw::linear;
+  laws[2].law = MaterialLaw::saint_venant_kirchhoff;
+  laws[3].law = MaterialLaw::fixed_corotated;
+  const double mu = base.lame_mu(), bulk = base.lame_lambda(Dim) + 2 * mu / Dim;
+  laws[4].law = laws[5].law = MaterialLaw::mooney_rivlin;
+  const double c2 = 0.1 * mu, c1 = mu / 2 - (Dim == 3 ? c2 : 0);
+  laws[4].mooney_rivlin = {.c1 = c1, .c2 = c2, .log_k = bulk};
+  const double c3 = 0.2 * mu;
+  laws[5].mooney_rivlin = {.c1 = c1 + (Dim == 2 ? c3 : 0), .c2 = c2, .c3 = c3, .volume_d = bulk / 2};
+  return laws;
+}
+
+template <int Dim>
+using Flat = Mat<Dim * Dim>;
+
+template <int Dim>
+Flat<Dim> matrix_of(const EigenSystem<Dim>& system) {
+  Flat<Dim> H = Flat<Dim>::Zero();
+  for (std::size_t k = 0; k < system.values.size(); ++k) {
+    const Eigen::Map<const Vec<Dim * Dim>> mode(system.modes[k].data());
+    H += system.values[k] * mode * mode.transpose();
+  }
+  return H;
+}
+
+template <int Dim>
+Mat<Dim> random_upright(std::mt19937& random, double amount) {
+  std::normal_distribution<double> normal(0, amount);
+  Mat<Dim> F;
+  do F = Mat<Dim>::Identity() + Mat<Dim>::NullaryExpr([&] { return normal(random); });
+  while (F.determinant() < 0.1);
+  return F;
+}
+
+TYPED_TEST(VolumeTerms, AllLawsMatchDifferences) {
+  constexpr int Dim = TypeParam::value;
+  const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});
+  std::mt19937 random(17);
+  for (const Material& material : all_laws<Dim>())
+    for (int i = 0; i < 10; ++i) {
+      SCOPED_TRACE(static_cast<int>(material.law));
+      const VectorX x = perturbed(cells, random, 0.1);
+      const ElasticEnergy<Dim> elastic(cells, {{1, material}}, 0.3);
+      expect_derivatives(elastic, x, 1e-6, 1e-7);
+      expect_psd(elastic, x);
+    }
+}
+
+TYPED_TEST(VolumeTerms, ProjectionClampsTheEigenvaluesOfTheExactHessian) {
+  constexpr int Dim = TypeParam::value;
+  std::mt19937 random(5);
+  int indefinite = 0;
+  for (const Material& material : all_laws<Dim>())
+    for (int i = 0; i < 30; ++i) {
+      SCOPED_TRACE(static_cast<int>(material.law));
+      const Mat<Dim> F = random_upright<Dim>(random, 0.4);
+      const ElasticModuli moduli = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
+      EigenSystem<Dim> system = elastic_eigensystem<Dim>(F, moduli);
+      const Flat<Dim> H = matrix_of<Dim>(system);
+      Flat<Dim> differences;
+      for (int k = 0; k < Dim * Dim; ++k) {
+        Mat<Dim> plus = F, minus = F;
+        plus.data()[k] += 1e-6;
+        minus.data()[k] -= 1e-6;
+        const Mat<Dim> column = (elastic_stress<Dim>(plus, moduli) - elastic_stress<Dim>(minus, moduli)) / 2e-6;
+        differences.col(k) = Eigen::Map<const Vec<Dim * Dim>>(column.data());
+      }
+      ASSERT_LE((H - differences).norm(), 1e-6 * H.norm());
+
+      const Eigen::SelfAdjointEigenSolver<Flat<Dim>> eigen(H);
+      if (eigen.eigenvalues()[0] < -1e-3 * H.norm()) ++indefinite;
+      const Flat<Dim> clamped =
+          eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
+      for (double& value : system.values) value = std::max(value, 0.0);
+      EXPECT_LE((matrix_of<Dim>(system) - clamped).norm(), 1e-12 * H.norm());
+
+      // And that is what an element's projected block is made of.
+      Mesh<Dim> mesh = two_cells<Dim>();
+      std::vector<Vec<Dim>> corners;
+      for (int k = 0; k <= Dim; ++k) corners.push_back(mesh.rest(mesh.cell(0)[k]));
+      typename Mesh<Dim>::Cell cell;
+      for (int k = 0; k <= Dim; ++k) cell[k] = k;
+      const CellSet<Dim> one = whole_mesh(Mesh<Dim>(corners, {cell}, {1}), {});
+      MatrixX B = MatrixX::Zero(Dim * Dim, Dim * (Dim + 1));
+      VectorX x(Dim * (Dim + 1));
+      for (int v = 0; v <= Dim; ++v) {
+        x.segment<Dim>(Dim * v) = F * one.rest[v];
+        for (int j = 0; j < Dim; ++j) {
+          const double slope =
+              v == 0 ? -one.elements[0].inverse_edges.col(j).sum() : one.elements[0].inverse_edges(v - 1, j);
+          for (int c = 0; c < Dim; ++c) B(Dim * j + c, Dim * v + c) = slope;
+        }
+      }
+      const MatrixX expected = one.elements[0].volume * B.transpose() * clamped * B;
+      const ElasticEnergy<Dim> elastic(one, {{1, material}}, 1);
+      EXPECT_LE((hessian_of(elastic, x, PsdProjection::clamp) - expected).norm(), 1e-10 * (1 + expected.norm()));
+    }
+  EXPECT_GT(indefinite, 10);
+}
+
+TYPED_TEST(VolumeTerms, AllLawsAreLinearElasticityAtSmallStrains) {
+  constexpr int Dim = TypeParam::value;
+  const Mat<Dim> identity = Mat<Dim>::Identity();
+  const auto laws = all_laws<Dim>();
+  const Flat<Dim> linear =
+      matrix_of<Dim>(elastic_eigensystem<Dim>(identity, elastic_moduli<Dim>(laws[1], Vec<Dim>::Zero())));
+  Mat<Dim> rotation = identity;
+  rotation.template topLeftCorner<2, 2>() << std::cos(1.0), -std::sin(1.0), std::sin(1.0), std::cos(1.0);
+  for (const Material& material : laws) {
+    SCOPED_TRACE(static_cast<int>(material.law));
+    const ElasticModuli moduli = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
+    EXPECT_LE((matrix_of<Dim>(elastic_eigensystem<Dim>(identity, moduli)) - linear).norm(), 1e-12 * linear.norm());
+    EXPECT_NEAR(elastic_density<Dim>(identity, moduli), 0, 1e-12);
+    EXPECT_LE(elastic_stress<Dim>(identity, moduli).norm(), 1e-12);
+    EXPECT_TRUE(std::isinf(elastic_density<Dim>(-Vec<Dim>::Unit(0).asDiagonal().toDenseMatrix(), moduli)));
+    if (material.law == MaterialLaw::linear) continue;
+    EXPECT_NEAR(elastic_density<Dim>(rotation, moduli), 0, 1e-12);
+    EXPECT_LE(elastic_stress<Dim>(rotation, moduli).norm(), 1e-12);
+  }
+}
+
+TYPED_TEST(VolumeTerms, ModuliThatVaryAreThoseOfEachElement) {
+  constexpr int Dim = TypeParam::value;
+  const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});
+  std::mt19937 random(2);
+  const VectorX x = perturbed(cells, random, 0.1);
+  Material varying = kMaterials.at(1);
+  varying.youngs_modulus_at = [](const Vec<3>& X) { return 100 * (1 + X[0]); };
+  Workspace workspace;
+  double sum = 0;
+  for (std::size_t e = 0; e < 2; ++e) {
+    CellSet<Dim> one = cells;
+    one.elements = {cells.elements[e]};
+    Material constant = kMaterials.at(1);
+    constant.youngs_modulus = 100 * (1 + rest_barycenter(cells, cells.elements[e])[0]);
+    sum += ElasticEnergy<Dim>(one, {{1, constant}}, 1).value(x, workspace);
+  }
+  const ElasticEnergy<Dim> elastic(cells, {{1, varying}}, 1);
+  EXPECT_NEAR(elastic.value(x, workspace), sum, 1e-12 * sum);
+  expect_derivatives(elastic, x, 1e-6, 1e-7);
+}
+
 TYPED_TEST(VolumeTerms, VolumeBarrierGradientMatchesDifferences) {
   constexpr int Dim = TypeParam::value;
   const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});

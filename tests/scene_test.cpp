@@ -258,6 +258,28 @@ TEST_F(SceneTest, OutputAndSpeedNeverStopAScene) {
   EXPECT_EQ(std::get<itr::Setup<2>>(scene.setup).linear.solvers, (std::vector<std::string>{"Eigen::PardisoLLT", "mumps"}));
 }
 
+TEST_F(SceneTest, MaterialsOfAllLaws) {
+  const auto material = [&](const char* text) { return read2(square({{"materials", json::parse(text)}})).materials.at(1); };
+  const auto linear = material(R"({"type": "HookeLinearElasticity", "E": 3, "nu": 0.25})");
+  EXPECT_EQ(linear.law, MaterialLaw::linear);
+  EXPECT_DOUBLE_EQ(linear.lame_lambda(2), 0.25 * 3 / (1 - 0.0625));
+  EXPECT_EQ(linear.density, 1);
+  EXPECT_DOUBLE_EQ(material(R"({"type": "SaintVenant", "E": 3, "nu": 0.25, "plane_strain": true})").lame_lambda(2), 1.2);
+  const auto lame = material(R"({"type": "FixedCorotational", "lambda": "2*x + 1", "mu": 3})");
+  EXPECT_EQ(lame.law, MaterialLaw::fixed_corotated);
+  const Vec<3> X(0.25, 0, 0);
+  const double E = lame.youngs_modulus_at(X), nu = lame.poisson_ratio_at(X);
+  EXPECT_NEAR(lame.lame_lambda(E, nu, 2), 1.5, 1e-14);
+  EXPECT_NEAR(Material::lame_mu(E, nu), 3, 1e-14);
+  const auto graded = material(R"({"type": "NeoHookean", "E": "2 + 3*compare(0.5, x) + 0", "nu": 0.3, "rho": "1 + y"})");
+  EXPECT_EQ(graded.youngs_modulus, 5);
+  EXPECT_EQ(graded.youngs_modulus_at({0.1, 0, 0}), 2);
+  EXPECT_EQ(graded.density_at({0.1, 0.5, 0}), 1.5);
+  const auto mooney = material(R"({"type": "MooneyRivlin3Param", "c1": 4, "c2": 2, "c3": 1, "d1": 50})");
+  EXPECT_EQ(mooney.mooney_rivlin.volume_d, 50);
+  EXPECT_DOUBLE_EQ(mooney.youngs_modulus, 9 * 100 * 6 / (300 + 6.));
+}
+
 TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
   const auto material = [](const char* key, const json& value) {
     json one = {{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}};
@@ -265,7 +287,13 @@ TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
     return json{{"materials", json::array({one})}};
   };
   EXPECT_EQ(wrong_place(material("E", 0)), "/materials/0/E");
-  EXPECT_EQ(wrong_place(material("E", "1e4 * x")), "/materials/0/E");
+  EXPECT_EQ(wrong_place(material("E", "1e4 * (x - 0.5)")), "/materials/0/E");
+  EXPECT_EQ(wrong_place(material("E", "1e4 * t")), "/materials/0/E");
+  EXPECT_EQ(wrong_place(material("rho", "1 / (x - x)")), "/materials/0/rho");
+  EXPECT_EQ(wrong_place(material("c1", 1)), "/materials/0/c1");
+  EXPECT_EQ(wrong_place({{"materials", {{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 1}}}}), "/materials/k");
+  EXPECT_EQ(wrong_place({{"materials", {{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 1}, {"k", -1}}}}), "/materials/k");
+  EXPECT_EQ(wrong_place({{"materials", {{"type", "SaintVenant"}, {"E", 1}, {"nu", 0.6}}}}), "/materials/nu");
   EXPECT_EQ(wrong_place(material("nu", 0.5)), "/materials/0/nu");
   EXPECT_EQ(wrong_place(material("nu", -1)), "/materials/0/nu");
   EXPECT_EQ(wrong_place(material("rho", -3)), "/materials/0/rho");

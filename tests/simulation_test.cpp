@@ -204,6 +204,51 @@ TEST(Simulation, NewmarkIsLeftAloneWhereItKeepsEnergy) {
   }
 }
 
+
+/// A body of two materials, one of them `law` with moduli that vary, remeshed as it deforms.
+class Laws : public ::testing::TestWithParam<MaterialLaw> {};
+
+TEST_P(Laws, KeepMomentumThroughRemeshing) {
+  auto setup = free_square(4);
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  std::vector<int> bodies;
+  for (int v = 0; v < setup.mesh.vertex_slots(); ++v) rest.push_back(setup.mesh.rest(v));
+  for (int c = 0; c < setup.mesh.cell_slots(); ++c) {
+    cells.push_back(setup.mesh.cell(c));
+    bodies.push_back(c < setup.mesh.cell_slots() / 2 ? 1 : 2);
+  }
+  setup.mesh = Mesh<2>(rest, cells, bodies);
+  Material& material = setup.materials[2] = setup.materials[1];
+  material.law = GetParam();
+  if (GetParam() == MaterialLaw::mooney_rivlin)
+    material.mooney_rivlin = {.c1 = 1500, .c2 = 300, .log_k = 1e4};
+  else
+    material.youngs_modulus_at = [](const Vec<3>& X) { return 1e4 * (1 + 5 * X[0]); };
+  setup.initial_velocity.push_back(
+      {1, [](const Vec<2>& X, double) { return Vec<2>(1 + 8 * X[1] * X[1], 40 * X[0] * X[1] - 0.5); }});
+  enable_remeshing(setup);
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const Vec<2> start = momentum(simulation);
+  int splits = 0, coarsenings = 0;
+  while (!simulation.finished()) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    splits += result.report.splits.accepted;
+    coarsenings += result.report.collapses.accepted + result.report.swaps.accepted + result.report.smooths.accepted;
+    EXPECT_LE((momentum(simulation) - start).norm(), 1e-10 * start.norm()) << "step " << simulation.state().step;
+    expect_valid(simulation);
+  }
+  EXPECT_GT(splits, 0);
+  EXPECT_GT(coarsenings, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Laws,
+                         ::testing::Values(MaterialLaw::neo_hookean, MaterialLaw::linear,
+                                           MaterialLaw::saint_venant_kirchhoff, MaterialLaw::fixed_corotated,
+                                           MaterialLaw::mooney_rivlin));
+
 TEST(Simulation, ImpactWithRemeshingNeverIntersects) {
   auto setup = impact();
   setup.time.steps = 30;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/inertia.hpp"
 
+#include "itr/energy/elastic/laws.hpp"
+
 namespace itr {
 
 namespace {
@@ -18,7 +20,8 @@ template <int Dim>
 std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
   std::vector<double> densities;
   densities.reserve(cells.elements.size());
-  for (const auto& element : cells.elements) densities.push_back(materials.at(element.body).density);
+  for (const auto& element : cells.elements)
+    densities.push_back(mass_density<Dim>(materials.at(element.body), rest_barycenter(cells, element)));
   return densities;
 }
 

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "itr/energy/elastic/laws.hpp"
+
 namespace itr {
 
 namespace {
@@ -42,9 +44,10 @@ LoadEnergy<Dim>::LoadEnergy(const CellSet<Dim>& cells, const std::map<int, Mater
                             double scale)
     : forces_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
   if (loads.acceleration)
-    for (const auto& element : cells.elements)
-      add_forces<Dim>(element.vertices, cells, materials.at(element.body).density * element.volume, loads.acceleration,
-                      forces_);
+    for (const auto& element : cells.elements) {
+      const double density = mass_density<Dim>(materials.at(element.body), rest_barycenter(cells, element));
+      add_forces<Dim>(element.vertices, cells, density * element.volume, loads.acceleration, forces_);
+    }
   for (const auto& facet : cells.facets)
     for (const auto& [tag, traction] : loads.tractions)
       if (tag == facet.tag) add_forces<Dim>(facet.vertices, cells, facet_area(facet.vertices, cells), traction, forces_);

@@ -7,14 +7,45 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/energy/elastic/neo_hookean.hpp"
+#include "itr/energy/elastic/laws.hpp"
 #include "itr/fem/cell_set.hpp"
 
 namespace itr {
 
 namespace {
 constexpr double kPatchOverVertex = 4;  ///< what a patch gains over its new vertex, times 1 / (1 - 2 nu)
-}
+
+/// d2W/dF2 applied to motions of one vertex: the matrix of v -> v . d2W : (v x gradient).
+class DirectionalStiffness {
+ public:
+  DirectionalStiffness(const Mat<2>& F, const ElasticModuli& moduli) : moduli_(moduli) {
+    if (moduli.law != MaterialLaw::neo_hookean) {
+      system_ = elastic_eigensystem<2>(F, moduli);
+      return;
+    }
+    inverse_transposed_ = F.inverse().transpose();
+    factor_ = moduli.lame.mu - moduli.lame.lambda * std::log(F.determinant()) + moduli.lame.lambda;
+  }
+  Mat<2> operator()(const Vec<2>& gradient) const {
+    if (moduli_.law == MaterialLaw::neo_hookean) {
+      const Vec<2> h = inverse_transposed_ * gradient;
+      return moduli_.lame.mu * gradient.squaredNorm() * Mat<2>::Identity() + factor_ * h * h.transpose();
+    }
+    Mat<2> sum = Mat<2>::Zero();
+    for (std::size_t k = 0; k < system_.values.size(); ++k) {
+      const Vec<2> w = system_.modes[k] * gradient;
+      sum += system_.values[k] * w * w.transpose();
+    }
+    return sum;
+  }
+
+ private:
+  const ElasticModuli& moduli_;
+  EigenSystem<2> system_;
+  Mat<2> inverse_transposed_;
+  double factor_ = 0;
+};
+}  // namespace
 
 double predicted_split_gain(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
                             const EdgeKey& edge) {
@@ -30,19 +61,17 @@ double predicted_split_gain(const Mesh<2>& mesh, const RemeshFields<2>& fields, 
     if (at_b == kNone) continue;
     const double V = mesh.volume(c);
     const Material& material = context.materials.at(mesh.body(c));
-    const LameParameters lame{material.lame_mu(), material.lame_lambda(2)};
+    const Vec<2> barycenter = (mesh.rest(cell[0]) + mesh.rest(cell[1]) + mesh.rest(cell[2])) / 3;
+    const ElasticModuli moduli = elastic_moduli<2>(material, barycenter);
     factor = std::max(factor, kPatchOverVertex / (1 - 2 * material.poisson_ratio));
     const CellSet<2>::Element element{cell, mesh.body(c), V, mesh.inverse_rest_edges(c)};
-    const Mat<2> F = deformation_gradient<2>(element, fields.x), P = neo_hookean_stress<2>(F, lame);
-    const Mat<2> inverse_transposed = F.inverse().transpose();
-    const double c_plus_lambda = lame.mu - lame.lambda * std::log(F.determinant()) + lame.lambda;
+    const Mat<2> F = deformation_gradient<2>(element, fields.x), P = elastic_stress<2>(F, moduli);
+    const DirectionalStiffness stiffness(F, moduli);
     for (const int k : {at_a, at_b}) {
       const Vec<2> gradient = k == 0 ? Vec<2>(-element.inverse_edges.colwise().sum().transpose())
                                      : Vec<2>(element.inverse_edges.row(k - 1).transpose());
-      const Vec<2> h = inverse_transposed * gradient;
       g += context.scaling * V * P * gradient;
-      H += context.scaling * 2 * V *
-           (lame.mu * gradient.squaredNorm() * Mat<2>::Identity() + c_plus_lambda * h * h.transpose());
+      H += context.scaling * 2 * V * stiffness(gradient);
     }
     if (context.has_inertia) {
       const auto off = [&](int v) { return Vec<2>(fields.x.segment<2>(2 * v) - fields.predictor.segment<2>(2 * v)); };

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "itr/energy/elastic/neo_hookean.hpp"
+#include "itr/energy/elastic/laws.hpp"
 
 namespace itr {
 
@@ -35,9 +35,9 @@ std::vector<double> cell_energies(const Mesh<2>& mesh, const RemeshFields<2>& fi
     if (!mesh.is_cell_alive(c)) continue;
     const Material& material = context.materials.at(mesh.body(c));
     const CellSet<2>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
-    energies[c] =
-        context.scaling * mesh.volume(c) *
-        neo_hookean_density<2>(deformation_gradient<2>(element, fields.x), {material.lame_mu(), material.lame_lambda(2)});
+    const Vec<2> barycenter = (mesh.rest(mesh.cell(c)[0]) + mesh.rest(mesh.cell(c)[1]) + mesh.rest(mesh.cell(c)[2])) / 3;
+    energies[c] = context.scaling * mesh.volume(c) *
+                  elastic_density<2>(deformation_gradient<2>(element, fields.x), elastic_moduli<2>(material, barycenter));
   }
   return energies;
 }

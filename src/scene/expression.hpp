@@ -27,6 +27,7 @@ class Expression {
 
   double operator()(const Variables& variables) const;
   bool is_constant() const { return !uses_space_ && !uses_time_; }
+  bool uses_time() const { return uses_time_; }
 
  private:
   friend class ExpressionParser;

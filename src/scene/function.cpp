@@ -52,13 +52,15 @@ Component read_component(const Node& node) {
 
 }  // namespace
 
-double read_constant(const Node& node, double fallback) {
-  if (!node.exists() || !node.json().is_string()) return node.number(fallback);
-  const Expression expression = parse_expression(node);
-  if (!expression.is_constant()) node.fail("a constant: values that vary are not supported yet");
+ScalarValue read_scalar(const Node& node, double fallback) {
+  if (!node.exists() || !node.json().is_string()) return {node.number(fallback), {}};
+  Expression expression = parse_expression(node);
+  if (expression.uses_time()) node.fail(abbreviate(node.json()), "a value that does not change with time");
+  if (!expression.is_constant())
+    return {0, [e = std::move(expression)](const Vec<3>& X) { return e({X[0], X[1], X[2], 0}); }};
   const double value = expression({});
   if (!std::isfinite(value)) node.fail("an expression with a finite value");
-  return value;
+  return {value, {}};
 }
 
 template <int Dim>

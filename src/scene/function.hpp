@@ -7,8 +7,13 @@
 
 namespace itr::scene {
 
-/// A number, or an expression without variables.
-double read_constant(const Node& node, double fallback);
+/// A number, or an expression of rest position.
+struct ScalarValue {
+  double constant = 0;
+  SpaceFunction function;  ///< empty for a constant
+  double operator()(const Vec<3>& X) const { return function ? function(X) : constant; }
+};
+ScalarValue read_scalar(const Node& node, double fallback);
 
 template <int Dim>
 struct ValueFunction {

@@ -50,9 +50,9 @@ constexpr Group kGroups[] = {
     {"/geometry/*/volume_selection/*", Role::refused, "file"},
     {"/geometry/*", Role::refused, "height point normal fps mesh_sequence"},
 
-    {"/materials/*", Role::read, "type id E nu lambda mu rho plane_strain"},
+    {"/materials/*", Role::read, "type id E nu lambda mu rho plane_strain c1 c2 c3 d1 k"},
     {"/materials/*", Role::only, "phi=0 psi=0"},
-    {"/materials/*", Role::refused, "c1 c2 c3 d1 k elasticity_tensor alphas mus Ds models"},
+    {"/materials/*", Role::refused, "elasticity_tensor alphas mus Ds models"},
 
     {"/boundary_conditions", Role::read, "rhs"},
     {"/boundary_conditions", Role::only,

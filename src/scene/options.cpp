@@ -5,8 +5,6 @@
 #include <array>
 #include <cmath>
 
-#include "function.hpp"
-
 namespace itr::scene {
 
 namespace {
@@ -232,70 +230,6 @@ void check_space(const Node& root) {
     const Node order = entry.json().is_object() ? entry["order"] : entry;
     if (order.integer_at_least(1, 1) != 1) order.fail("1: higher orders are not supported yet");
   }
-}
-
-namespace {
-
-/// E and nu, given or from the Lame parameters.
-void read_moduli(const Node& node, int dimension, Material& material) {
-  const bool has_lame = node.has("lambda") || node.has("mu");
-  if (has_lame && (node.has("E") || node.has("nu"))) node.fail("E and nu, or lambda and mu, not both");
-  if (has_lame) {
-    for (const char* key : {"lambda", "mu"})
-      if (!node.has(key)) node[key].fail("both of lambda and mu");
-    const double lambda = read_constant(node["lambda"], 0), mu = read_constant(node["mu"], 0);
-    if (!(mu > 0)) node["mu"].fail("a number > 0");
-    if (!(3 * lambda + 2 * mu > 0)) node["lambda"].fail("a number > -2/3 mu");
-    material.poisson_ratio = lambda / (2 * (lambda + mu));
-    material.youngs_modulus = 2 * mu * (1 + material.poisson_ratio);
-    material.plane_strain = dimension == 2;  // the formula that gives lambda back, as it is used as given
-    return;
-  }
-  for (const char* key : {"E", "nu"})
-    if (!node.has(key)) node[key].fail("a number");
-  material.youngs_modulus = read_constant(node["E"], 0);
-  material.poisson_ratio = read_constant(node["nu"], 0);
-  material.plane_strain = node["plane_strain"].boolean(false);
-  if (!(material.youngs_modulus > 0)) node["E"].fail("a number > 0");
-  if (!(material.poisson_ratio > -1 && material.poisson_ratio < 0.5)) node["nu"].fail("a number of (-1, 0.5)");
-}
-
-Material read_material(const Node& node, int dimension) {
-  if (!node.json().is_object()) node.fail("a material");
-  if (!node.has("type")) node["type"].fail("the material law, \"NeoHookean\"");
-  if (node["type"].string("") != "NeoHookean") node["type"].fail("\"NeoHookean\": other laws are not supported yet");
-  Material material;
-  read_moduli(node, dimension, material);
-  material.density = read_constant(node["rho"], 1);
-  if (!(material.density > 0)) node["rho"].fail("a number > 0");
-  return material;
-}
-
-}  // namespace
-
-std::map<int, Material> read_materials(const Node& root, int dimension, const std::vector<int>& bodies,
-                                       std::vector<std::string>& warnings) {
-  const Node node = root["materials"];
-  if (!node.exists()) node.fail("the materials of the bodies");
-  std::map<int, Material> materials;
-  if (!node.json().is_array()) {  // one for everything, whatever its id
-    for (const int body : bodies) materials[body] = read_material(node, dimension);
-    return materials;
-  }
-  for (const Node& entry : node.items()) {
-    const Material material = read_material(entry, dimension);
-    std::vector<int> ids;
-    for (const Node& id : entry["id"].items()) ids.push_back(id.integer(0));
-    if (!entry.has("id")) ids = {0};
-    for (const int id : ids)
-      if (!materials.insert_or_assign(id, material).second)
-        warnings.push_back(entry.pointer() + ": replaces the material before it of id " + std::to_string(id));
-  }
-  for (const int body : bodies)
-    if (!materials.contains(body))
-      node.fail("no material with the id " + std::to_string(body) + ", which elements of the mesh have",
-                "one for every body");
-  return materials;
 }
 
 }  // namespace itr::scene

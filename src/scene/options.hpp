@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The parts of a scene that are plain options: time, contact, solver, remeshing, materials, output.
+// The parts of a scene that are plain options: time, contact, solver, remeshing, output.
 #pragma once
-
-#include <map>
 
 #include "itr/scene/scene.hpp"
 #include "node.hpp"
@@ -21,9 +19,5 @@ RemeshOptions read_remesh(const Node& root);
 OutputOptions read_output(const Node& root);
 bool read_lump_mass(const Node& root);
 void check_space(const Node& root);
-
-/// By body id; InputError for a body of `bodies` (ascending, each once) without one.
-std::map<int, Material> read_materials(const Node& root, int dimension, const std::vector<int>& bodies,
-                                       std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

@@ -3,24 +3,17 @@
 
 #include <algorithm>
 #include <limits>
-#include <set>
 
 #include "conditions.hpp"
 #include "geometry.hpp"
 #include "known_keys.hpp"
+#include "materials.hpp"
 #include "merge.hpp"
 #include "options.hpp"
 
 namespace itr::scene {
 
 namespace {
-
-template <int Dim>
-std::vector<int> bodies_of(const Mesh<Dim>& mesh) {
-  std::set<int> bodies;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) bodies.insert(mesh.body(c));
-  return {bodies.begin(), bodies.end()};
-}
 
 /// Of the surfaces that can touch: the bodies' boundary and the obstacles.
 template <int Dim>
@@ -45,8 +38,13 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   check_space(root);
 
   setup.mesh = read_bodies<Dim>(geometries, files, warnings);
-  setup.materials = read_materials(root, Dim, bodies_of(setup.mesh), warnings);
+  setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
+  if (setup.remesh.enabled)
+    for (const auto& [body, material] : setup.materials)
+      if (material.density_at)
+        root["materials"].fail("a density that varies in space (id " + std::to_string(body) + ")",
+                               "constant densities where the mesh changes: others are not supported yet");
   setup.contact = read_contact(root, shortest_surface_edge<Dim>(setup.mesh, setup.obstacles), warnings);
   return setup;
 }

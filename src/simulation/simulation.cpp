@@ -210,8 +210,8 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
   const CellSet<Dim> cells = whole_mesh(state.mesh, {});
   for (const auto& element : cells.elements) {
     const Material& material = impl_->setup.materials.at(element.body);
-    data.elastic_density.push_back(neo_hookean_density<Dim>(deformation_gradient<Dim>(element, data.x),
-                                                            {material.lame_mu(), material.lame_lambda(Dim)}));
+    data.elastic_density.push_back(elastic_density<Dim>(deformation_gradient<Dim>(element, data.x),
+                                                        elastic_moduli<Dim>(material, rest_barycenter(cells, element))));
   }
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));

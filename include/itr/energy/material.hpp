@@ -1,21 +1,45 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
+
+#include "itr/core/types.hpp"
+
 namespace itr {
 
-enum class MaterialLaw { neo_hookean };
+/// Stored-energy densities; their formulas are in energy/elastic/laws.hpp.
+enum class MaterialLaw { neo_hookean, linear, saint_venant_kirchhoff, fixed_corotated, mooney_rivlin };
+
+/// A scalar function of rest position X [m]; in 2D X_3 = 0. Empty: none.
+using SpaceFunction = std::function<double(const Vec<3>& X)>;
+
+/// Coefficients of the Mooney-Rivlin laws. Two- and three-term forms leave the others 0.
+struct MooneyRivlinModuli {
+  double c1 = 0;        ///< of the first isochoric invariant [Pa]
+  double c2 = 0;        ///< of the second [Pa]
+  double c3 = 0;        ///< of their product [Pa]
+  double log_k = 0;     ///< k of k/2 (ln J)^2 [Pa]
+  double volume_d = 0;  ///< d of d (J - 1)^2 [Pa]
+};
 
 /// What a body is made of. In 2D all is per unit thickness.
 struct Material {
   MaterialLaw law = MaterialLaw::neo_hookean;
-  double youngs_modulus = 1e5;  ///< E [Pa]
-  double poisson_ratio = 0.3;
-  double density = 1;         ///< rho [kg/m^3]; 2D: [kg/m^2]
-  bool plane_strain = false;  ///< 2D: lambda = E nu / ((1 + nu)(1 - 2 nu)) instead of nu E / (1 - nu^2)
+  double youngs_modulus = 1e5;  ///< E [Pa]; of small strains where the law has other moduli; the largest where it varies
+  double poisson_ratio = 0.3;   ///< as for E
+  double density = 1;           ///< rho [kg/m^3]; 2D: [kg/m^2]
+  bool plane_strain = false;    ///< 2D: lambda = E nu / ((1 + nu)(1 - 2 nu)) instead of nu E / (1 - nu^2)
+  MooneyRivlinModuli mooney_rivlin{};
 
-  double lame_mu() const { return youngs_modulus / (2 * (1 + poisson_ratio)); }
-  double lame_lambda(int dim) const {
-    const double E = youngs_modulus, nu = poisson_ratio;
+  /// Where they are there, they take the place of the constants above; sampled at an element's rest barycentre.
+  SpaceFunction youngs_modulus_at{}, poisson_ratio_at{}, density_at{};
+
+  double lame_mu() const { return lame_mu(youngs_modulus, poisson_ratio); }
+  double lame_lambda(int dim) const { return lame_lambda(youngs_modulus, poisson_ratio, dim); }
+  bool has_varying_moduli() const { return youngs_modulus_at || poisson_ratio_at; }
+
+  static double lame_mu(double E, double nu) { return E / (2 * (1 + nu)); }
+  double lame_lambda(double E, double nu, int dim) const {
     return dim == 2 && !plane_strain ? nu * E / (1 - nu * nu) : E * nu / ((1 + nu) * (1 - 2 * nu));
   }
 };

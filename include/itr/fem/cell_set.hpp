@@ -31,6 +31,13 @@ struct CellSet {
 template <int Dim>
 CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra);
 
+template <int Dim>
+Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const int v : element.vertices) sum += cells.rest[v];
+  return sum / (Dim + 1);
+}
+
 /// Deformation gradient of an element at interleaved positions x.
 template <int Dim>
 Mat<Dim> deformation_gradient(const typename CellSet<Dim>::Element& element, ConstVectorView x) {

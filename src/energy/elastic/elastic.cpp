@@ -94,14 +94,13 @@ void exact_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const 
     }
 }
 
-/// The same with negative eigenvalues left out.
+/// The same for any law; `psd` leaves out negative eigenvalues.
 template <int Dim>
-void clamped_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const LameParameters& lame, double weight,
-                   ElementBlock<Dim>& block) {
-  const auto system = neo_hookean_eigensystem<Dim>(F, lame);
+void block_of_modes(const EigenSystem<Dim>& system, const ShapeGradients<Dim>& gradients, double weight, PsdProjection psd,
+                    ElementBlock<Dim>& block) {
   block.setZero();
   for (std::size_t k = 0; k < system.values.size(); ++k) {
-    if (system.values[k] <= 0) continue;
+    if (system.values[k] == 0 || (psd == PsdProjection::clamp && system.values[k] < 0)) continue;
     Vec<Dim*(Dim + 1)> w;
     for (int v = 0; v <= Dim; ++v) w.template segment<Dim>(Dim * v) = system.modes[k] * gradients.col(v);
     block.noalias() += (weight * system.values[k]) * w * w.transpose();
@@ -113,16 +112,25 @@ void clamped_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, cons
 template <int Dim>
 ElasticEnergy<Dim>::ElasticEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale)
     : cells_(cells), scale_(scale) {
-  for (const auto& [body, material] : materials)
-    lame_.emplace_back(body, LameParameters{material.lame_mu(), material.lame_lambda(Dim)});
+  bool varies = false;
+  for (const auto& [body, material] : materials) {
+    varies = varies || material.has_varying_moduli();
+    if (!material.has_varying_moduli()) by_body_.emplace_back(body, elastic_moduli<Dim>(material, Vec<Dim>::Zero()));
+  }
+  if (!varies) return;
+  by_element_.reserve(cells.elements.size());
+  for (const auto& element : cells.elements)
+    by_element_.push_back(elastic_moduli<Dim>(materials.at(element.body), rest_barycenter(cells, element)));
 }
 
 template <int Dim>
-const LameParameters& ElasticEnergy<Dim>::lame(int body) const {
-  for (const auto& entry : lame_)
+const ElasticModuli& ElasticEnergy<Dim>::moduli(std::size_t e) const {
+  if (!by_element_.empty()) return by_element_[e];
+  const int body = cells_.elements[e].body;
+  for (const auto& entry : by_body_)
     if (entry.first == body) return entry.second;
   ITR_CHECK(false, "no material for body", body);
-  return lame_.front().second;
+  return by_body_.front().second;
 }
 
 template <int Dim>
@@ -131,7 +139,7 @@ double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
            double sum = 0;
            for (std::size_t e = begin; e < end; ++e) {
              const auto& element = cells_.elements[e];
-             sum += element.volume * neo_hookean_density<Dim>(deformation_gradient<Dim>(element, x), lame(element.body));
+             sum += element.volume * elastic_density<Dim>(deformation_gradient<Dim>(element, x), moduli(e));
            }
            return sum;
          });
@@ -139,8 +147,9 @@ double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
 
 template <int Dim>
 void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
-  for (const auto& element : cells_.elements) {
-    const Mat<Dim> P = neo_hookean_stress<Dim>(deformation_gradient<Dim>(element, x), lame(element.body));
+  for (std::size_t e = 0; e < cells_.elements.size(); ++e) {
+    const auto& element = cells_.elements[e];
+    const Mat<Dim> P = elastic_stress<Dim>(deformation_gradient<Dim>(element, x), moduli(e));
     const Mat<Dim> forces = scale_ * element.volume * P * element.inverse_edges.transpose();
     for (int k = 0; k < Dim; ++k) {
       gradient.segment<Dim>(Dim * element.vertices[k + 1]) += forces.col(k);
@@ -160,10 +169,11 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
         const auto& element = cells_.elements[start + i];
         const Mat<Dim> F = deformation_gradient<Dim>(element, x);
         const auto gradients = shape_gradients<Dim>(element.inverse_edges);
-        if (psd == PsdProjection::clamp)
-          clamped_block<Dim>(F, gradients, lame(element.body), scale_ * element.volume, blocks[i]);
+        const ElasticModuli& here = moduli(start + i);
+        if (here.law == MaterialLaw::neo_hookean && psd == PsdProjection::none)
+          exact_block<Dim>(F, gradients, here.lame, scale_ * element.volume, blocks[i]);
         else
-          exact_block<Dim>(F, gradients, lame(element.body), scale_ * element.volume, blocks[i]);
+          block_of_modes<Dim>(elastic_eigensystem<Dim>(F, here), gradients, scale_ * element.volume, psd, blocks[i]);
       }
     });
     for (std::size_t i = 0; i < count; ++i) sink.add<Dim>(cells_.elements[start + i].vertices, blocks[i].data());

@@ -6,40 +6,12 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
 
+#include "isotropic.hpp"
+
 namespace itr {
-
-namespace {
-
-template <int Dim>
-struct RotationSvd {
-  Mat<Dim> U, V;
-  Vec<Dim> s;
-};
-
-RotationSvd<2> svd(const Mat<2>& F) {
-  const double e = (F(0, 0) + F(1, 1)) / 2, f = (F(0, 0) - F(1, 1)) / 2;
-  const double g = (F(1, 0) + F(0, 1)) / 2, h = (F(1, 0) - F(0, 1)) / 2;
-  const double q = std::hypot(e, h), r = std::hypot(f, g);
-  const double a1 = std::atan2(g, f), a2 = std::atan2(h, e);
-  const double phi = (a2 + a1) / 2, theta = (a2 - a1) / 2;
-  const double cp = std::cos(phi), sp = std::sin(phi), ct = std::cos(theta), st = std::sin(theta);
-  RotationSvd<2> result;
-  result.U << cp, -sp, sp, cp;
-  result.V << ct, st, -st, ct;
-  result.s << q + r, F.determinant() / (q + r);  // the quotient keeps a small singular value accurate
-  return result;
-}
-
-RotationSvd<3> svd(const Mat<3>& F) {
-  const Eigen::JacobiSVD<Mat<3>> jacobi(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return {jacobi.matrixU(), jacobi.matrixV(), jacobi.singularValues()};
-}
-
-}  // namespace
 
 template <int Dim>
 double neo_hookean_density(const Mat<Dim>& F, const LameParameters& lame) {
@@ -57,7 +29,7 @@ Mat<Dim> neo_hookean_stress(const Mat<Dim>& F, const LameParameters& lame) {
 
 template <int Dim>
 EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters& lame) {
-  const auto [U, V, s] = svd(F);
+  const auto [U, V, s] = singular_values(F);
   const double c = lame.mu - lame.lambda * std::log(F.determinant());
   Mat<Dim> stretch;
   for (int i = 0; i < Dim; ++i)

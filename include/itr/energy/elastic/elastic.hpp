@@ -3,9 +3,8 @@
 
 #include <map>
 
-#include "itr/energy/elastic/neo_hookean.hpp"
+#include "itr/energy/elastic/laws.hpp"
 #include "itr/energy/energy.hpp"
-#include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
 
 namespace itr {
@@ -24,10 +23,11 @@ class ElasticEnergy final : public Energy {
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override;
 
  private:
-  const LameParameters& lame(int body) const;
+  const ElasticModuli& moduli(std::size_t e) const;
 
   const CellSet<Dim>& cells_;
-  std::vector<std::pair<int, LameParameters>> lame_;  ///< by body; few, searched linearly
+  std::vector<std::pair<int, ElasticModuli>> by_body_;  ///< few, searched linearly
+  std::vector<ElasticModuli> by_element_;               ///< empty unless moduli vary in space
   double scale_;
 };
 

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Isotropic densities as functions of four invariants of F: what they share is the way from derivatives by invariants to
+// the eigensystem of d2W/dF2 (after Smith et al. 2019, "Analytic eigensystems for isotropic distortion energies").
+#pragma once
+
+#include "itr/energy/elastic/laws.hpp"
+
+namespace itr {
+
+/// Derivatives of W by (a, q, t, J) = (tr C, tr C^2, sum s_i, det F) with C = F^T F.
+struct InvariantDerivatives {
+  enum Index { a, q, t, J };
+  Vec<4> first = Vec<4>::Zero();
+  Mat<4> second = Mat<4>::Zero();
+};
+
+template <int Dim>
+double saint_venant_density(const Mat<Dim>& F, const LameParameters& lame);
+template <int Dim>
+Mat<Dim> saint_venant_stress(const Mat<Dim>& F, const LameParameters& lame);
+template <int Dim>
+InvariantDerivatives saint_venant_derivatives(const Vec<Dim>& s, const LameParameters& lame);
+
+template <int Dim>
+double fixed_corotated_density(const Mat<Dim>& F, const LameParameters& lame);
+template <int Dim>
+Mat<Dim> fixed_corotated_stress(const Mat<Dim>& F, const LameParameters& lame);
+template <int Dim>
+InvariantDerivatives fixed_corotated_derivatives(const Vec<Dim>& s, const LameParameters& lame);
+
+template <int Dim>
+double mooney_rivlin_density(const Mat<Dim>& F, const MooneyRivlinModuli& moduli);
+template <int Dim>
+Mat<Dim> mooney_rivlin_stress(const Mat<Dim>& F, const MooneyRivlinModuli& moduli);
+template <int Dim>
+InvariantDerivatives mooney_rivlin_derivatives(const Vec<Dim>& s, const MooneyRivlinModuli& moduli);
+
+/// F = U diag(s) V^T with s >= 0, for det F > 0 (in 2D the smaller singular value has the sign of det F).
+template <int Dim>
+struct SingularValues {
+  Mat<Dim> U, V;
+  Vec<Dim> s;
+};
+SingularValues<2> singular_values(const Mat<2>& F);
+SingularValues<3> singular_values(const Mat<3>& F);
+
+/// Modes and values: d of scaling, with the eigenvalues of d2W/ds_i ds_j, and a symmetric and a skew one for each pair.
+template <int Dim>
+EigenSystem<Dim> isotropic_eigensystem(const SingularValues<Dim>& svd, const InvariantDerivatives& W);
+
+}  // namespace itr

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/elastic/laws.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+
+#include "isotropic.hpp"
+#include "itr/core/check.hpp"
+
+namespace itr {
+
+namespace {
+
+template <int Dim>
+Vec<3> in_space(const Vec<Dim>& X) {
+  Vec<3> point = Vec<3>::Zero();
+  point.template head<Dim>() = X;
+  return point;
+}
+
+template <int Dim>
+Mat<Dim> small_strain(const Mat<Dim>& F) {
+  return 0.5 * (F + F.transpose()) - Mat<Dim>::Identity();
+}
+
+/// The Hessian of the linear law does not depend on F: traces, symmetric shears, and nothing for rotations.
+template <int Dim>
+EigenSystem<Dim> linear_eigensystem(const LameParameters& lame) {
+  EigenSystem<Dim> system;
+  int k = 0;
+  system.values[k] = 2 * lame.mu + Dim * lame.lambda;
+  system.modes[k++] = Mat<Dim>::Identity() / std::sqrt(double(Dim));
+  for (int i = 1; i < Dim; ++i) {  // (1, -1, 0) / sqrt 2, (1, 1, -2) / sqrt 6
+    Vec<Dim> diagonal = Vec<Dim>::Zero();
+    diagonal.head(i).setOnes();
+    diagonal[i] = -i;
+    system.values[k] = 2 * lame.mu;
+    system.modes[k++] = Mat<Dim>(diagonal.normalized().asDiagonal());
+  }
+  for (int i = 0; i < Dim; ++i)
+    for (int j = i + 1; j < Dim; ++j)
+      for (const double sign : {1.0, -1.0}) {
+        Mat<Dim> mode = Mat<Dim>::Zero();
+        mode(i, j) = std::sqrt(0.5);
+        mode(j, i) = sign * mode(i, j);
+        system.values[k] = sign > 0 ? 2 * lame.mu : 0;
+        system.modes[k++] = mode;
+      }
+  return system;
+}
+
+}  // namespace
+
+template <int Dim>
+ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
+  double E = material.youngs_modulus, nu = material.poisson_ratio;
+  if (material.youngs_modulus_at) E = material.youngs_modulus_at(in_space<Dim>(X));
+  if (material.poisson_ratio_at) nu = material.poisson_ratio_at(in_space<Dim>(X));
+  return {material.law, {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)}, material.mooney_rivlin};
+}
+
+template <int Dim>
+double mass_density(const Material& material, const Vec<Dim>& X) {
+  return material.density_at ? material.density_at(in_space<Dim>(X)) : material.density;
+}
+
+template <int Dim>
+double elastic_density(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  if (moduli.law == MaterialLaw::neo_hookean) return neo_hookean_density<Dim>(F, moduli.lame);
+  if (!(F.determinant() > 0)) return std::numeric_limits<double>::infinity();
+  const LameParameters& lame = moduli.lame;
+  switch (moduli.law) {
+    case MaterialLaw::linear: {
+      const Mat<Dim> e = small_strain<Dim>(F);
+      return lame.mu * e.squaredNorm() + lame.lambda / 2 * e.trace() * e.trace();
+    }
+    case MaterialLaw::saint_venant_kirchhoff:
+      return saint_venant_density<Dim>(F, lame);
+    case MaterialLaw::fixed_corotated:
+      return fixed_corotated_density<Dim>(F, lame);
+    default:
+      return mooney_rivlin_density<Dim>(F, moduli.mooney_rivlin);
+  }
+}
+
+template <int Dim>
+Mat<Dim> elastic_stress(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  const LameParameters& lame = moduli.lame;
+  switch (moduli.law) {
+    case MaterialLaw::neo_hookean:
+      return neo_hookean_stress<Dim>(F, lame);
+    case MaterialLaw::linear: {
+      const Mat<Dim> e = small_strain<Dim>(F);
+      return 2 * lame.mu * e + lame.lambda * e.trace() * Mat<Dim>::Identity();
+    }
+    case MaterialLaw::saint_venant_kirchhoff:
+      return saint_venant_stress<Dim>(F, lame);
+    case MaterialLaw::fixed_corotated:
+      return fixed_corotated_stress<Dim>(F, lame);
+    default:
+      return mooney_rivlin_stress<Dim>(F, moduli.mooney_rivlin);
+  }
+}
+
+template <int Dim>
+EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  if (moduli.law == MaterialLaw::neo_hookean) return neo_hookean_eigensystem<Dim>(F, moduli.lame);
+  if (moduli.law == MaterialLaw::linear) return linear_eigensystem<Dim>(moduli.lame);
+  const SingularValues<Dim> svd = singular_values(F);
+  switch (moduli.law) {
+    case MaterialLaw::saint_venant_kirchhoff:
+      return isotropic_eigensystem<Dim>(svd, saint_venant_derivatives<Dim>(svd.s, moduli.lame));
+    case MaterialLaw::fixed_corotated:
+      return isotropic_eigensystem<Dim>(svd, fixed_corotated_derivatives<Dim>(svd.s, moduli.lame));
+    default:
+      return isotropic_eigensystem<Dim>(svd, mooney_rivlin_derivatives<Dim>(svd.s, moduli.mooney_rivlin));
+  }
+}
+
+#define ITR_INSTANTIATE(Dim)                                                    \
+  template ElasticModuli elastic_moduli<Dim>(const Material&, const Vec<Dim>&); \
+  template double mass_density<Dim>(const Material&, const Vec<Dim>&);          \
+  template double elastic_density<Dim>(const Mat<Dim>&, const ElasticModuli&);  \
+  template Mat<Dim> elastic_stress<Dim>(const Mat<Dim>&, const ElasticModuli&); \
+  template EigenSystem<Dim> elastic_eigensystem<Dim>(const Mat<Dim>&, const ElasticModuli&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

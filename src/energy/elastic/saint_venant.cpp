@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#include "isotropic.hpp"
+
+namespace itr {
+
+namespace {
+
+/// Green's strain from the displacement gradient: without the cancellation of (F^T F - I) / 2 at small strains.
+template <int Dim>
+Mat<Dim> green_strain(const Mat<Dim>& F) {
+  const Mat<Dim> H = F - Mat<Dim>::Identity();
+  return 0.5 * (H + H.transpose() + H.transpose() * H);
+}
+
+}  // namespace
+
+template <int Dim>
+double saint_venant_density(const Mat<Dim>& F, const LameParameters& lame) {
+  const Mat<Dim> E = green_strain<Dim>(F);
+  return lame.mu * E.squaredNorm() + lame.lambda / 2 * E.trace() * E.trace();
+}
+
+template <int Dim>
+Mat<Dim> saint_venant_stress(const Mat<Dim>& F, const LameParameters& lame) {
+  const Mat<Dim> E = green_strain<Dim>(F);
+  return F * (2 * lame.mu * E + lame.lambda * E.trace() * Mat<Dim>::Identity());
+}
+
+/// W = mu/4 (q - 2 a + d) + lambda/8 (a - d)^2.
+template <int Dim>
+InvariantDerivatives saint_venant_derivatives(const Vec<Dim>& s, const LameParameters& lame) {
+  using I = InvariantDerivatives;
+  I W;
+  W.first[I::a] = -lame.mu / 2 + lame.lambda / 4 * (s.squaredNorm() - Dim);
+  W.first[I::q] = lame.mu / 4;
+  W.second(I::a, I::a) = lame.lambda / 4;
+  return W;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                          \
+  template double saint_venant_density<Dim>(const Mat<Dim>&, const LameParameters&);  \
+  template Mat<Dim> saint_venant_stress<Dim>(const Mat<Dim>&, const LameParameters&); \
+  template InvariantDerivatives saint_venant_derivatives<Dim>(const Vec<Dim>&, const LameParameters&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: MIT
+#include "materials.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "function.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+/// How the laws are called, and which keys beside type, id and rho they have.
+struct LawName {
+  const char* type;
+  MaterialLaw law;
+  std::vector<std::string> keys;
+};
+const std::vector<std::string> kLinearKeys = {"E", "nu", "lambda", "mu", "plane_strain"};
+const std::vector<LawName> kLaws = {
+    {"NeoHookean", MaterialLaw::neo_hookean, kLinearKeys},
+    {"LinearElasticity", MaterialLaw::linear, kLinearKeys},
+    {"HookeLinearElasticity", MaterialLaw::linear, kLinearKeys},  // from E and nu its C is that of the Lame parameters
+    {"SaintVenant", MaterialLaw::saint_venant_kirchhoff, kLinearKeys},
+    {"FixedCorotational", MaterialLaw::fixed_corotated, kLinearKeys},
+    {"MooneyRivlin", MaterialLaw::mooney_rivlin, {"c1", "c2", "k"}},
+    {"MooneyRivlin3Param", MaterialLaw::mooney_rivlin, {"c1", "c2", "c3", "d1"}},
+};
+
+/// A scalar of a material and what it must be.
+struct Requirement {
+  Node node;
+  ScalarValue value;
+  bool (*is_met)(double);
+  const char* expected;
+
+  void check(const Vec<3>& X) const {
+    const double here = value(X);
+    if (std::isfinite(here) && is_met(here)) return;
+    if (!value.function) node.fail(expected);
+    std::ostringstream found;
+    found << abbreviate(node.json()) << ", which is " << here << " at X = (" << X.transpose() << ")";
+    node.fail(found.str(), expected);
+  }
+};
+
+bool is_positive(double value) { return value > 0; }
+bool is_poisson_ratio(double value) { return value > -1 && value < 0.5; }
+
+class MaterialReader {
+ public:
+  MaterialReader(const Node& node, int dimension) : node_(node), dimension_(dimension) {
+    if (!node.json().is_object()) node.fail("a material");
+    std::vector<std::string> types;
+    for (const LawName& law : kLaws) types.push_back(law.type);
+    if (!node.has("type")) node["type"].fail("the material law");
+    const LawName& law = kLaws[node["type"].choice(types, 0)];
+    refuse_keys_of_others(law);
+    material_.law = law.law;
+    if (law.law == MaterialLaw::mooney_rivlin)
+      read_mooney_rivlin();
+    else if (node.has("lambda") || node.has("mu"))
+      read_lame();
+    else
+      read_moduli();
+    require("rho", read_scalar(node["rho"], 1), is_positive, "a number > 0");
+    material_.density = requirements_.back().value.constant;
+    material_.density_at = requirements_.back().value.function;
+  }
+
+  /// At the barycenters of the elements that have the material.
+  Material checked(const std::vector<Vec<3>>& points) {
+    for (const Requirement& requirement : requirements_)
+      if (requirement.value.function)
+        for (const Vec<3>& X : points) requirement.check(X);
+    const auto largest = [&](const SpaceFunction& f, double constant) {
+      if (!f) return constant;
+      double most = -1;
+      for (const Vec<3>& X : points) most = std::max(most, f(X));
+      return most;
+    };
+    Material material = material_;
+    material.youngs_modulus = largest(material.youngs_modulus_at, material.youngs_modulus);
+    material.poisson_ratio = largest(material.poisson_ratio_at, material.poisson_ratio);
+    material.density = largest(material.density_at, material.density);
+    return material;
+  }
+
+ private:
+  void refuse_keys_of_others(const LawName& law) const {
+    for (const LawName& other : kLaws)
+      for (const std::string& key : other.keys)
+        if (node_.has(key) && std::find(law.keys.begin(), law.keys.end(), key) == law.keys.end())
+          node_[key].fail("a modulus that " + std::string(law.type) + " does not have", "no such key");
+  }
+
+  /// The value must meet `is_met`: at once if it is constant, else wherever it is used.
+  void require(const char* key, ScalarValue value, bool (*is_met)(double), const char* expected) {
+    requirements_.push_back({node_[key], std::move(value), is_met, expected});
+    if (!requirements_.back().value.function) requirements_.back().check(Vec<3>::Zero());
+  }
+
+  ScalarValue read_required(const char* key) const {
+    if (!node_.has(key)) node_[key].fail("a number");
+    return read_scalar(node_[key], 0);
+  }
+
+  double read_number(const char* key) const {
+    const ScalarValue value = read_required(key);
+    if (value.function) node_[key].fail("a constant: E, nu, lambda, mu and rho may vary");
+    return value.constant;
+  }
+
+  void read_moduli() {
+    const ScalarValue E = read_required("E"), nu = read_required("nu");
+    material_.youngs_modulus = E.constant;
+    material_.poisson_ratio = nu.constant;
+    material_.youngs_modulus_at = E.function;
+    material_.poisson_ratio_at = nu.function;
+    material_.plane_strain = node_["plane_strain"].boolean(false);
+    require("E", E, is_positive, "a number > 0");
+    require("nu", nu, is_poisson_ratio, "a number of (-1, 0.5)");
+  }
+
+  void read_lame() {
+    if (node_.has("E") || node_.has("nu")) node_.fail("E and nu, or lambda and mu, not both");
+    for (const char* key : {"lambda", "mu"})
+      if (!node_.has(key)) node_[key].fail("both of lambda and mu");
+    const ScalarValue lambda = read_required("lambda"), mu = read_required("mu");
+    require("mu", mu, is_positive, "a number > 0");
+    // Of 3 lambda + 2 mu over mu, so that the check has one value to show.
+    const auto bulk = [lambda, mu](const Vec<3>& X) { return 3 * lambda(X) + 2 * mu(X); };
+    const auto poisson = [lambda, mu](const Vec<3>& X) { return lambda(X) / (2 * (lambda(X) + mu(X))); };
+    const auto young = [mu, poisson](const Vec<3>& X) { return 2 * mu(X) * (1 + poisson(X)); };
+    const bool varies = lambda.function || mu.function;
+    require("lambda", {bulk(Vec<3>::Zero()), varies ? SpaceFunction(bulk) : SpaceFunction()}, is_positive,
+            "3 lambda + 2 mu > 0");
+    material_.plane_strain = dimension_ == 2;  // the formula that gives lambda back, as it is used as given
+    if (varies) {
+      material_.youngs_modulus_at = young;
+      material_.poisson_ratio_at = poisson;
+    } else {
+      material_.youngs_modulus = young(Vec<3>::Zero());
+      material_.poisson_ratio = poisson(Vec<3>::Zero());
+    }
+  }
+
+  /// Moduli, and the E and nu of small strains: those of shear 2 (c1 + c2) and bulk k + 2 d1.
+  void read_mooney_rivlin() {
+    MooneyRivlinModuli& m = material_.mooney_rivlin;
+    const bool has_three = node_["type"].string("") == "MooneyRivlin3Param";
+    m.c1 = read_number("c1");
+    m.c2 = read_number("c2");
+    (has_three ? m.volume_d : m.log_k) = read_number(has_three ? "d1" : "k");
+    if (has_three) m.c3 = read_number("c3");
+    const double shear = 2 * (dimension_ == 3 ? m.c1 + m.c2 : m.c1 - m.c3), bulk = m.log_k + 2 * m.volume_d;
+    if (!(shear > 0)) node_["c1"].fail(dimension_ == 3 ? "c1 + c2 > 0" : "c1 - c3 > 0 (in 2D the second invariant is 1)");
+    if (!(bulk > 0)) node_[has_three ? "d1" : "k"].fail("a number > 0");
+    material_.youngs_modulus = 9 * bulk * shear / (3 * bulk + shear);
+    material_.poisson_ratio = (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear));
+  }
+
+  Node node_;
+  int dimension_;
+  Material material_;
+  std::vector<Requirement> requirements_;
+};
+
+/// Barycenters of a body's elements.
+template <int Dim>
+std::map<int, std::vector<Vec<3>>> barycenters_by_body(const Mesh<Dim>& mesh) {
+  std::map<int, std::vector<Vec<3>>> points;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    Vec<3> sum = Vec<3>::Zero();
+    for (const int v : mesh.cell(c)) sum.template head<Dim>() += mesh.rest(v);
+    points[mesh.body(c)].push_back(sum / (Dim + 1));
+  }
+  return points;
+}
+
+}  // namespace
+
+template <int Dim>
+std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, std::vector<std::string>& warnings) {
+  const Node node = root["materials"];
+  if (!node.exists()) node.fail("the materials of the bodies");
+  const auto points = barycenters_by_body(mesh);
+  std::map<int, Material> materials;
+  if (!node.json().is_array()) {  // one for everything, whatever its id
+    MaterialReader reader(node, Dim);
+    for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body);
+    return materials;
+  }
+  for (const Node& entry : node.items()) {
+    MaterialReader reader(entry, Dim);
+    std::vector<int> ids;
+    for (const Node& id : entry["id"].items()) ids.push_back(id.integer(0));
+    if (!entry.has("id")) ids = {0};
+    for (const int id : ids) {
+      const auto of_body = points.find(id);
+      const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second);
+      if (!materials.insert_or_assign(id, material).second)
+        warnings.push_back(entry.pointer() + ": replaces the material before it of id " + std::to_string(id));
+    }
+  }
+  for (const auto& [body, of_body] : points)
+    if (!materials.contains(body))
+      node.fail("no material with the id " + std::to_string(body) + ", which elements of the mesh have",
+                "one for every body");
+  return materials;
+}
+
+template std::map<int, Material> read_materials(const Node&, const Mesh<2>&, std::vector<std::string>&);
+template std::map<int, Material> read_materials(const Node&, const Mesh<3>&, std::vector<std::string>&);
+
+}  // namespace itr::scene

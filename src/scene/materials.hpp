@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// `materials` of a scene (scene-format §3).
+#pragma once
+
+#include <map>
+
+#include "itr/scene/scene.hpp"
+#include "node.hpp"
+
+namespace itr::scene {
+
+/// By body id. InputError for a body of the mesh without one, and for moduli or densities out of range; those that vary are
+/// looked at in every element.
+template <int Dim>
+std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, std::vector<std::string>& warnings);
+
+}  // namespace itr::scene
