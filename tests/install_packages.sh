@@ -11,6 +11,7 @@ packages=(
   libsuitesparse-dev libopenblas-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
   python3 python3-h5py python3-matplotlib python3-numpy python3-pil
+  python3-dolfinx python3-meshio python3-scipy
 )
 
 missing=()

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""The reference: finite elements by FEniCSx on the mesh and in the vertex numbering of ours."""
+import logging
+
+import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
+import ufl
+from dolfinx import fem, mesh
+from dolfinx.fem import petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+logging.disable(logging.INFO)  # the form compiler tells of every file that it compiles
+
+
+def lame(E, nu, dim, plane_strain=False):
+    """mu and lambda of a scene's material (scene-format, section 3.2)."""
+    return E / (2 * (1 + nu)), nu * E / (1 - nu**2) if dim == 2 and not plane_strain else E * nu / ((1 + nu) * (1 - 2 * nu))
+
+
+def neo_hookean(F, mu, lmbda, dim):
+    J = ufl.det(F)
+    return mu / 2 * (ufl.tr(F.T * F) - dim - 2 * ufl.ln(J)) + lmbda / 2 * ufl.ln(J)**2
+
+
+def create_domain(points, cells):
+    """The mesh in dolfinx, and for each of its local vertices the index in `points`."""
+    dim = points.shape[1]
+    element = ufl.VectorElement("Lagrange", {2: "triangle", 3: "tetrahedron"}[dim], 1)
+    domain = mesh.create_mesh(MPI.COMM_SELF, np.asarray(cells, dtype=np.int64), np.ascontiguousarray(points, dtype=float),
+                              ufl.Mesh(element))
+    return domain, np.array(domain.geometry.input_global_indices)
+
+
+def to_csr(matrix):
+    indptr, indices, values = matrix.getValuesCSR()
+    return scipy.sparse.csr_matrix((values, indices, indptr), shape=matrix.getSize())
+
+
+class Space:
+    """P1 vectors on a mesh. Arrays are n x dim in the order of `points`; matrices act on them flattened."""
+
+    def __init__(self, points, cells):
+        self.dim = points.shape[1]
+        self.num_vertices = len(points)
+        self.domain, self.original = create_domain(points, cells)
+        self.V = fem.VectorFunctionSpace(self.domain, ("Lagrange", 1))
+        # A P1 dof sits at a vertex; both maps list a cell's vertices in one order.
+        geometry, dofs = self.domain.geometry.dofmap, self.V.dofmap
+        vertex_of_dof = np.empty(self.num_vertices, dtype=int)
+        for cell in range(len(cells)):
+            vertex_of_dof[dofs.cell_dofs(cell)] = self.original[geometry.links(cell)]
+        self.vertex_of_dof = vertex_of_dof
+        block = np.arange(self.dim)
+        self.rows = (self.dim * vertex_of_dof[:, None] + block).ravel()  # our flat index of each dolfinx dof
+
+    def matrix(self, form):
+        assembled = petsc.assemble_matrix(fem.form(form))
+        assembled.assemble()
+        return self.renumbered(assembled)
+
+    def renumbered(self, assembled):
+        coo = to_csr(assembled).tocoo()
+        assembled.destroy()
+        return scipy.sparse.csr_matrix((coo.data, (self.rows[coo.row], self.rows[coo.col])), shape=coo.shape)
+
+    def to_ours(self, values):
+        flat = np.empty(self.dim * self.num_vertices)
+        flat[self.rows] = values
+        return flat
+
+    def mass(self, density=1.0):
+        u, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
+        return self.matrix(fem.Constant(self.domain, PETSc.ScalarType(density)) * ufl.inner(u, v) * ufl.dx)
+
+
+class Body(Space):
+    """A hyperelastic body: internal forces and their tangent, consistent forces of loads.
+
+    `density(F, *parameters, dim)` is the strain energy density in UFL; `sides` names facets by predicates of coordinates.
+    """
+
+    def __init__(self, points, cells, law, parameters, rho=1.0, sides=None):
+        super().__init__(points, cells)
+        self.rho = rho
+        constants = [fem.Constant(self.domain, PETSc.ScalarType(p)) for p in parameters]
+        self.u = fem.Function(self.V)
+        F = ufl.Identity(self.dim) + ufl.grad(self.u)
+        energy = law(F, *constants, self.dim) * ufl.dx(metadata={"quadrature_degree": 1})  # constant in a cell
+        test = ufl.TestFunction(self.V)
+        gradient = ufl.derivative(energy, self.u, test)
+        self.energy_form = fem.form(energy)
+        self.force_form = fem.form(gradient)
+        self.tangent_form = fem.form(ufl.derivative(gradient, self.u))
+        self.test = test
+        self.X = ufl.SpatialCoordinate(self.domain)
+        facets, tags = [], []
+        for tag, predicate in (sides or {}).items():
+            found = mesh.locate_entities_boundary(self.domain, self.dim - 1, predicate)
+            facets.append(found)
+            tags.append(np.full(len(found), tag, dtype=np.int32))
+        if facets:
+            facets, tags = np.concatenate(facets), np.concatenate(tags)
+            order = np.argsort(facets)
+            marked = mesh.meshtags(self.domain, self.dim - 1, facets[order], tags[order])
+            self.ds = ufl.Measure("ds", domain=self.domain, subdomain_data=marked)
+        self.mass_matrix = self.mass(rho)
+
+    def set_displacement(self, u):
+        self.u.x.array[:] = np.asarray(u).ravel()[self.rows]
+
+    def energy(self, u):
+        self.set_displacement(u)
+        return fem.assemble_scalar(self.energy_form)
+
+    def internal_force(self, u):
+        self.set_displacement(u)
+        return self.to_ours(fem.assemble_vector(self.force_form).array)
+
+    def tangent(self, u):
+        self.set_displacement(u)
+        assembled = petsc.assemble_matrix(self.tangent_form)
+        assembled.assemble()
+        return self.renumbered(assembled)
+
+    def load(self, form):
+        """A compiled linear form: call `load()()` again when its constants change."""
+        compiled = fem.form(form)
+        return lambda: self.to_ours(fem.assemble_vector(compiled).array)
+
+    def solve(self, forces, held, targets, u, inertia=0.0, predictor=None):
+        """u with inertia * M (u - predictor) + internal forces = forces, where held dofs (flags) have their targets.
+        Newton from `u` until steps are round-off."""
+        u = np.array(u, dtype=float).ravel()
+        u[held] = targets[held]
+        free = np.flatnonzero(~held)
+        smallest = np.inf
+        for _ in range(60):
+            residual = self.internal_force(u) - forces
+            tangent = self.tangent(u)
+            if inertia:
+                residual += inertia * (self.mass_matrix @ (u - predictor))
+                tangent = tangent + inertia * self.mass_matrix
+            step = scipy.sparse.linalg.spsolve(tangent[free][:, free].tocsc(), -residual[free])
+            size = np.abs(step).max()
+            u[free] += step
+            scale = max(np.abs(u).max(), 1e-300)
+            if size < 1e-15 * scale or (size < 1e-11 * scale and size >= smallest):
+                return u
+            smallest = min(smallest, size)
+        raise RuntimeError(f"the reference's Newton did not converge: last step {size:.3g}")
+
+
+def dirichlet_vertices(points, predicate):
+    return np.flatnonzero(predicate(points.T))

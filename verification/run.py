@@ -1,0 +1,95 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""Runs the verification suite: every file of verification/cases is a case with a quantity, a reference and a tolerance.
+
+python3 verification/run.py [--quick] [--case NAME]... [--build build/release] [--report DIR]
+
+A full run, or one of some cases, brings verification/report up to date; --quick writes into BUILD/verification, so that it
+never replaces figures of a full run. Exit status: 0 passed, 1 a case failed; with --skip-status N, N where nothing failed
+and a case could not run for want of a package.
+"""
+import argparse
+import importlib
+import importlib.util
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+
+SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's, which python3-dolfinx and its like are for
+if importlib.util.find_spec("dolfinx") is None and os.path.exists(SYSTEM_PYTHON) and "ITR_REEXECUTED" not in os.environ:
+    os.execve(SYSTEM_PYTHON, [SYSTEM_PYTHON, *sys.argv], {**os.environ, "ITR_REEXECUTED": "1"})
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+from harness.report import write_report  # noqa: E402
+from harness.suite import Context, load_cases, run_case, save_json  # noqa: E402
+
+ROOT = HERE.parent
+
+
+def versions(build):
+    """Of the programs and packages that the figures come from."""
+    found = {"python": sys.version.split()[0]}
+    for name in ("dolfinx", "numpy", "scipy", "h5py", "meshio", "matplotlib"):
+        if importlib.util.find_spec(name):
+            found[name] = importlib.import_module(name).__version__
+    commit = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True, text=True)
+    found["itr"] = commit.stdout.strip() or str(build)
+    return found
+
+
+def parse():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="smaller and fewer cases: minutes instead of hours")
+    parser.add_argument("--case", action="append", metavar="NAME", help="only this one; may be given again")
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared", help="folder of the paper's scenes")
+    parser.add_argument("--report", type=pathlib.Path, help="folder of the report")
+    parser.add_argument("--skip-status", type=int, default=0)
+    return parser.parse_args()
+
+
+def main():
+    options = parse()
+    build = options.build.resolve()
+    report = (options.report or (build / "verification" if options.quick else HERE / "report")).resolve()
+    report.mkdir(parents=True, exist_ok=True)
+    cases = load_cases()
+    chosen = options.case or list(cases)
+    if unknown := [name for name in chosen if name not in cases]:
+        sys.exit(f"no such case: {', '.join(unknown)}; there are: {', '.join(cases)}")
+
+    stored = report / "results.json"
+    entries = json.loads(stored.read_text())["cases"] if stored.exists() else {}
+    ran = {}
+    for name in chosen:
+        folder = build / "verification-runs" / name
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        print(f"{name}", flush=True)
+        start = time.perf_counter()
+        ran[name] = run_case(cases[name], Context(folder, report, build, options.shared, options.quick, name))
+        print(f"  {ran[name]['status']} in {time.perf_counter() - start:.1f} s"
+              + (f": {ran[name]['message']}" if ran[name]["message"] else ""), flush=True)
+    # A case that could not run keeps the figures of when it could.
+    entries.update({name: entry for name, entry in ran.items() if entry["status"] != "skipped" or name not in entries})
+    entries = {name: entries[name] for name in cases if name in entries}
+    found = versions(build)
+    save_json(stored, {"versions": found, "cases": entries})
+    write_report(report, json.loads(stored.read_text())["cases"], found)
+
+    by_status = {status: [n for n, e in ran.items() if e["status"] == status] for status in ("passed", "failed", "skipped")}
+    print("; ".join(f"{len(names)} {status}" + (f" ({', '.join(names)})" if names and status != "passed" else "")
+                    for status, names in by_status.items()) + f"; report in {report}")
+    if by_status["failed"]:
+        return 1
+    unable = [name for name in by_status["skipped"] if ran[name]["message"].startswith("not installed")]
+    return options.skip_status if unable else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
