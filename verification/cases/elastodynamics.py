@@ -4,7 +4,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from harness.dynamics import integrate
-from harness.fenicsx import Body, lame, neo_hookean
+from harness.fenicsx import Body
+from harness.materials import lame, neo_hookean
 from harness.scenes import box_mesh, run_scene, scene, write_mesh
 from harness.suite import Result
 from petsc4py import PETSc

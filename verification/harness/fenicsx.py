@@ -14,16 +14,6 @@ from petsc4py import PETSc
 logging.disable(logging.INFO)  # the form compiler tells of every file that it compiles
 
 
-def lame(E, nu, dim, plane_strain=False):
-    """mu and lambda of a scene's material (scene-format, section 3.2)."""
-    return E / (2 * (1 + nu)), nu * E / (1 - nu**2) if dim == 2 and not plane_strain else E * nu / ((1 + nu) * (1 - 2 * nu))
-
-
-def neo_hookean(F, mu, lmbda, dim):
-    J = ufl.det(F)
-    return mu / 2 * (ufl.tr(F.T * F) - dim - 2 * ufl.ln(J)) + lmbda / 2 * ufl.ln(J)**2
-
-
 def create_domain(points, cells):
     """The mesh in dolfinx, and for each of its local vertices the index in `points`."""
     dim = points.shape[1]
@@ -55,6 +45,14 @@ class Space:
         block = np.arange(self.dim)
         self.rows = (self.dim * vertex_of_dof[:, None] + block).ravel()  # our flat index of each dolfinx dof
 
+    def coefficient(self, values):
+        """A number, or one value a cell in our order, as something that forms take."""
+        if np.ndim(values) == 0:
+            return fem.Constant(self.domain, PETSc.ScalarType(values))
+        function = fem.Function(fem.FunctionSpace(self.domain, ("DG", 0)))
+        function.x.array[:] = np.asarray(values)[self.domain.topology.original_cell_index]
+        return function
+
     def matrix(self, form):
         assembled = petsc.assemble_matrix(fem.form(form))
         assembled.assemble()
@@ -72,19 +70,20 @@ class Space:
 
     def mass(self, density=1.0):
         u, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
-        return self.matrix(fem.Constant(self.domain, PETSc.ScalarType(density)) * ufl.inner(u, v) * ufl.dx)
+        return self.matrix(self.coefficient(density) * ufl.inner(u, v) * ufl.dx)
 
 
 class Body(Space):
     """A hyperelastic body: internal forces and their tangent, consistent forces of loads.
 
-    `density(F, *parameters, dim)` is the strain energy density in UFL; `sides` names facets by predicates of coordinates.
+    `law(F, *parameters, dim)` is the strain energy density in UFL; `parameters` and `rho` are numbers, or arrays of one
+    value a cell; `sides` names facets by predicates of coordinates.
     """
 
     def __init__(self, points, cells, law, parameters, rho=1.0, sides=None):
         super().__init__(points, cells)
         self.rho = rho
-        constants = [fem.Constant(self.domain, PETSc.ScalarType(p)) for p in parameters]
+        constants = [self.coefficient(p) for p in parameters]
         self.u = fem.Function(self.V)
         F = ufl.Identity(self.dim) + ufl.grad(self.u)
         energy = law(F, *constants, self.dim) * ufl.dx(metadata={"quadrature_degree": 1})  # constant in a cell

@@ -82,13 +82,16 @@ class Run:
         return Frame(max((self.folder / "frames").glob("*.h5")))
 
 
+def write_scene(context, name, content):
+    path = context.folder / f"{name}.json"
+    path.write_text(json.dumps(content, indent=1))
+    return path
+
+
 def run_scene(context, name, content, *overrides):
     """Runs a scene (a dictionary, or the path of a file) and returns the Run. Overrides are "/json/pointer=value"."""
     folder = context.folder / name
-    path = content
-    if isinstance(content, dict):
-        path = context.folder / f"{name}.json"
-        path.write_text(json.dumps(content, indent=1))
+    path = write_scene(context, name, content) if isinstance(content, dict) else content
     arguments = [argument for override in overrides for argument in ("--set", override)]
     context.call("itr", "run", path, "-o", folder, "--threads", 1, *arguments)
     if not (folder / "summary.json").exists():
