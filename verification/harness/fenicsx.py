@@ -28,6 +28,31 @@ def to_csr(matrix):
     return scipy.sparse.csr_matrix((values, indices, indptr), shape=matrix.getSize())
 
 
+def scalar_mass(points, cells, density):
+    """P1 mass matrix with one density a cell, in the numbering of `points`."""
+    domain, original = create_domain(points, cells)
+    V = fem.FunctionSpace(domain, ("Lagrange", 1))
+    rho = fem.Function(fem.FunctionSpace(domain, ("DG", 0)))
+    rho.x.array[:] = np.asarray(density)[domain.topology.original_cell_index]
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    assembled = petsc.assemble_matrix(fem.form(rho * u * v * ufl.dx))
+    assembled.assemble()
+    vertex = vertices_of_dofs(domain, original, V)
+    coo = to_csr(assembled).tocoo()
+    assembled.destroy()
+    return scipy.sparse.csr_matrix((coo.data, (vertex[coo.row], vertex[coo.col])), shape=coo.shape)
+
+
+def vertices_of_dofs(domain, original, V):
+    """For each P1 dof (block) the index of its vertex in our order: both maps list a cell's vertices in one order."""
+    cells = domain.topology.index_map(domain.topology.dim).size_local
+    dofs = V.dofmap.list.array.reshape(cells, -1)
+    nodes = domain.geometry.dofmap.array.reshape(cells, -1)
+    vertex = np.empty(len(original), dtype=int)
+    vertex[dofs] = original[nodes]
+    return vertex
+
+
 class Space:
     """P1 vectors on a mesh. Arrays are n x dim in the order of `points`; matrices act on them flattened."""
 
@@ -36,12 +61,7 @@ class Space:
         self.num_vertices = len(points)
         self.domain, self.original = create_domain(points, cells)
         self.V = fem.VectorFunctionSpace(self.domain, ("Lagrange", 1))
-        # A P1 dof sits at a vertex; both maps list a cell's vertices in one order.
-        geometry, dofs = self.domain.geometry.dofmap, self.V.dofmap
-        vertex_of_dof = np.empty(self.num_vertices, dtype=int)
-        for cell in range(len(cells)):
-            vertex_of_dof[dofs.cell_dofs(cell)] = self.original[geometry.links(cell)]
-        self.vertex_of_dof = vertex_of_dof
+        vertex_of_dof = vertices_of_dofs(self.domain, self.original, self.V)
         block = np.arange(self.dim)
         self.rows = (self.dim * vertex_of_dof[:, None] + block).ravel()  # our flat index of each dolfinx dof
 
