@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The density-weighted L2 projection on nested meshes (refined and coarsened locally) and on unrelated ones."""
 import numpy as np
-import scipy.sparse.linalg
 from harness import probe
-from harness.fenicsx import scalar_mass
-from harness.refinement import common_refinement, evaluation, refine_some, volumes
+from harness.projection import Projection
+from harness.refinement import refine_some
 from harness.scenes import box_mesh, oriented, scene, write_mesh
 from harness.suite import Result
 
@@ -16,19 +15,6 @@ NEEDS = ("dolfinx", "meshio", "scipy")
 
 RHO = [900.0, 7800.0]
 SIZE = {2: [1.0, 0.7], 3: [1.0, 0.7, 0.8]}
-
-
-def reference(old, new, density, field):
-    """The projection of `field` (a row a vertex), with `density` given by cell of the old and of the new mesh."""
-    pieces, in_old, in_new = common_refinement(*old, *new)
-    d = pieces.shape[2]
-    soup_points, soup_cells = pieces.reshape(-1, d), np.arange((d + 1) * len(pieces)).reshape(-1, d + 1)
-    soup = scalar_mass(soup_points, soup_cells, density[0][in_old])
-    to_old = evaluation(*old, np.repeat(in_old, d + 1), soup_points)
-    to_new = evaluation(*new, np.repeat(in_new, d + 1), soup_points)
-    mass = scalar_mass(*new, density[1])
-    covered = volumes(pieces).sum() / volumes(new[0][new[1]]).sum()
-    return scipy.sparse.linalg.spsolve(mass.tocsc(), to_new.T @ (soup @ (to_old @ field))), mass, soup, to_old, covered
 
 
 def meshes(dim, quick):
@@ -62,12 +48,12 @@ def results(context):
             old, new = (mesh[:2] for mesh in pair)
             field = np.random.default_rng(7).standard_normal((len(old[0]), dim))
             ours = probe.project(context, words, *contents, field)
-            expected, mass, soup, to_old, covered = reference(old, new, density, field)
+            projection = Projection(old, new, *density)
+            expected = projection(field)
+            assert abs(projection.covered - 1) < 1e-12, projection.covered
             note = f"{len(old[0])} -> {len(new[0])} vertices"
-            assert abs(covered - 1) < 1e-12, covered
             yield Result(f"{dim}D, {name}, values", float(np.abs(ours - expected).max() / np.abs(expected).max()),
                          TOLERANCE, note=note)
-            momentum = np.ones(len(soup.indptr) - 1) @ (soup @ (to_old @ field))
-            change = np.ones(len(new[0])) @ (mass @ ours) - momentum
-            scale = np.ones(len(soup.indptr) - 1) @ (soup @ np.abs(to_old @ field))
+            change = projection.integral_new(ours) - projection.integral_old(field)
+            scale = projection.integral_old(np.abs(field))
             yield Result(f"{dim}D, {name}, momentum", float(np.abs(change / scale).max()), TOLERANCE)
