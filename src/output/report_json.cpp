@@ -61,13 +61,12 @@ std::string versions_json() {
 /// What a step's line and the summary have in common.
 std::string common_members(const StepReport& r) {
   return fmt::format(
-      R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"damped_steps":{},"energy":{},"energy_before_remesh":{},)"
+      R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"energy":{},"energy_before_remesh":{},)"
       R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"min_distance":{},"min_volume_ratio":{},"seconds":{},)"
       R"("peak_rss_mb":{})",
-      r.vertices, r.elements, r.unknowns, r.newton_iterations, r.damped_steps, energy_json(r.energy),
-      number(r.energy_before_remesh), count_json(r.splits), count_json(r.collapses), count_json(r.swaps),
-      count_json(r.smooths), number(r.min_distance), number(r.min_volume_ratio), seconds_json(r.seconds),
-      number(r.peak_rss_mb));
+      r.vertices, r.elements, r.unknowns, r.newton_iterations, energy_json(r.energy), number(r.energy_before_remesh),
+      count_json(r.splits), count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), number(r.min_distance),
+      number(r.min_volume_ratio), seconds_json(r.seconds), number(r.peak_rss_mb));
 }
 
 OperationCount operator+(const OperationCount& a, const OperationCount& b) {
@@ -104,11 +103,12 @@ void Totals::add(const StepReport& report) {
 }
 
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {
-  return fmt::format(R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"t":{},{},)"
-                     R"("energy_decrease_by_remeshing":{},"norms":{}}})"
-                     "\n",
-                     json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(),
-                     total_.step, number(total_.t), common_members(total_), number(energy_decrease_), norms_json(norms));
+  return fmt::format(
+      R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"damped_steps":{},"t":{},{},)"
+      R"("energy_decrease_by_remeshing":{},"norms":{}}})"
+      "\n",
+      json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(), total_.step,
+      total_.damped_steps, number(total_.t), common_members(total_), number(energy_decrease_), norms_json(norms));
 }
 
 }  // namespace itr::output

@@ -185,6 +185,8 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
   };
   NewtonSummary summary = solve(state.history.x[0]);
   if (!keeps_energy(setup, *problem, summary, x, next)) {
+    logger.warning("step " + std::to_string(next.step) +
+                   ": Newmark would create energy here, implicit Euler takes this step");
     next.history.damp_next = true;
     x = state.history.x[0];
     problem = make_problem();
