@@ -26,28 +26,132 @@ Vec<Dim> random_point(std::mt19937& random, double scale = 1) {
   return Vec<Dim>::NullaryExpr([&] { return coordinate(random); });
 }
 
-TYPED_TEST(Geometry, LineDistanceDerivativesMatchDifferences) {
+template <int Dim>
+std::vector<PairKind> pair_kinds() {
+  std::vector<PairKind> kinds = {PairKind::vertex_vertex, PairKind::edge_vertex};
+  if (Dim == 3) kinds.insert(kinds.end(), {PairKind::face_vertex, PairKind::edge_edge});
+  return kinds;
+}
+
+template <int Dim>
+std::array<Vec<Dim>, 4> random_pair(std::mt19937& random) {
+  return {random_point<Dim>(random), random_point<Dim>(random), random_point<Dim>(random), random_point<Dim>(random)};
+}
+
+TYPED_TEST(Geometry, PairDistanceDerivativesMatchDifferences) {
   constexpr int Dim = TypeParam::value;
   std::mt19937 random(1);
+  for (int i = 0; i < 100; ++i)
+    for (const PairKind kind : pair_kinds<Dim>()) {
+      const auto x = random_pair<Dim>(random);
+      const int dofs = Dim * pair_size(kind);
+      const auto gradient = [&](const std::array<Vec<Dim>, 4>& y) {
+        const PairDistance<Dim> pair = pair_distance<Dim>(kind, y.data());
+        VectorX result(dofs);
+        for (int k = 0; k < dofs; ++k) result[k] = 2 * pair.coefficients[k / Dim] * pair.separation[k % Dim];
+        return result;
+      };
+      const MatrixX hessian = pair_distance_hessian<Dim>(kind, x.data()).topLeftCorner(dofs, dofs);
+      const double h = 1e-6;
+      for (int k = 0; k < dofs; ++k) {
+        auto plus = x, minus = x;
+        plus[k / Dim][k % Dim] += h;
+        minus[k / Dim][k % Dim] -= h;
+        const double up = pair_distance<Dim>(kind, plus.data()).squared,
+                     down = pair_distance<Dim>(kind, minus.data()).squared;
+        EXPECT_NEAR(gradient(x)[k], (up - down) / (2 * h), 1e-6 * (1 + gradient(x).norm()));
+        EXPECT_LE((hessian.col(k) - (gradient(plus) - gradient(minus)) / (2 * h)).norm(), 1e-5 * (1 + hessian.norm()));
+      }
+    }
+}
+
+TEST(Geometry3, EdgeCrossDerivativesMatchDifferences) {
+  std::mt19937 random(6);
   for (int i = 0; i < 50; ++i) {
-    Vec<3 * Dim> x;
-    x << random_point<Dim>(random), random_point<Dim>(random), random_point<Dim>(random);
-    const auto value = [](const Vec<3 * Dim>& y) {
-      return point_line_distance_squared<Dim>(y.template head<Dim>(), y.template segment<Dim>(Dim), y.template tail<Dim>());
-    };
-    const auto gradient = [](const Vec<3 * Dim>& y) {
-      return point_line_distance_squared_gradient<Dim>(y.template head<Dim>(), y.template segment<Dim>(Dim),
-                                                       y.template tail<Dim>());
-    };
-    const Mat<3 * Dim> hessian = point_line_distance_squared_hessian<Dim>(
-        x.template head<Dim>(), x.template segment<Dim>(Dim), x.template tail<Dim>());
+    const auto x = random_pair<3>(random);
+    const CrossSquared cross = edge_cross_squared_with_gradient(x.data());
+    EXPECT_NEAR(cross.value, edge_cross_squared(x.data()), 1e-13);
+    const Mat<12> hessian = edge_cross_squared_hessian(x.data());
     const double h = 1e-6;
-    for (int k = 0; k < 3 * Dim; ++k) {
-      const Vec<3 *Dim> plus = x + h * Vec<3 * Dim>::Unit(k), minus = x - h * Vec<3 * Dim>::Unit(k);
-      EXPECT_NEAR(gradient(x)[k], (value(plus) - value(minus)) / (2 * h), 1e-6 * (1 + gradient(x).norm()));
-      EXPECT_LE((hessian.col(k) - (gradient(plus) - gradient(minus)) / (2 * h)).norm(), 1e-5 * (1 + hessian.norm()));
+    for (int k = 0; k < 12; ++k) {
+      auto plus = x, minus = x;
+      plus[k / 3][k % 3] += h;
+      minus[k / 3][k % 3] -= h;
+      EXPECT_NEAR(cross.gradient[k], (edge_cross_squared(plus.data()) - edge_cross_squared(minus.data())) / (2 * h), 1e-6);
+      const Vec<12> difference = (edge_cross_squared_with_gradient(plus.data()).gradient -
+                                  edge_cross_squared_with_gradient(minus.data()).gradient) /
+                                 (2 * h);
+      EXPECT_LE((hessian.col(k) - difference).norm(), 1e-6);
     }
   }
+}
+
+/// Least squared distance over a grid of points of both primitives, refined around its best.
+double sampled_distance_squared(PairKind kind, const std::array<Vec<3>, 4>& x) {
+  const auto at = [&](double s, double t) -> double {
+    if (kind == PairKind::edge_edge) return (x[0] + s * (x[1] - x[0]) - x[2] - t * (x[3] - x[2])).squaredNorm();
+    if (s + t > 1) return HUGE_VAL;
+    return (x[1] + s * (x[2] - x[1]) + t * (x[3] - x[1]) - x[0]).squaredNorm();
+  };
+  double best = HUGE_VAL, s0 = 0.5, t0 = 0.5, width = 0.5;
+  for (int level = 0; level < 12; ++level, width *= 0.3) {
+    const double s = s0, t = t0;
+    for (int i = -10; i <= 10; ++i)
+      for (int j = -10; j <= 10; ++j) {
+        const double u = std::clamp(s + width * i / 10, 0.0, 1.0), v = std::clamp(t + width * j / 10, 0.0, 1.0);
+        if (at(u, v) < best) best = at(u, v), s0 = u, t0 = v;
+      }
+  }
+  return best;
+}
+
+TEST(Geometry3, PairDistanceIsTheLeastOverAllPoints) {
+  std::mt19937 random(7);
+  for (int i = 0; i < 500; ++i)
+    for (const PairKind kind : {PairKind::face_vertex, PairKind::edge_edge}) {
+      auto x = random_pair<3>(random);
+      if (i % 5 == 0) x[3] = x[2] + (x[1] - x[0]) + 1e-9 * random_point<3>(random);  // nearly parallel edges, slivers
+      if (i % 7 == 0) x[3] = x[2];                                                   // degenerate
+      const double squared = pair_distance_squared<3>(kind, x.data());
+      EXPECT_NEAR(std::sqrt(squared), std::sqrt(sampled_distance_squared(kind, x)), 2e-4) << i;
+      const ClosestFeatures closest = closest_features<3>(kind, x.data());
+      std::array<Vec<3>, 4> features;
+      for (int k = 0; k < pair_size(closest.kind); ++k) features[k] = x[closest.local[k]];
+      EXPECT_NEAR(pair_distance<3>(closest.kind, features.data()).squared, squared, 1e-12) << i;
+    }
+}
+
+struct NamedPair {
+  const char* name;
+  PairKind kind;
+  std::array<Vec<3>, 4> x;
+  double distance;
+};
+
+TEST(Geometry3, DegeneratePairs) {
+  using V = Vec<3>;
+  const double tiny = 1e-12;
+  const NamedPair pairs[] = {
+      {"parallel edges side by side", PairKind::edge_edge, {V(0, 0, 0), V(1, 0, 0), V(0.2, 1, 0), V(0.8, 1, 0)}, 1},
+      {"antiparallel edges", PairKind::edge_edge, {V(0, 0, 0), V(1, 0, 0), V(0.8, 1, 0), V(0.2, 1, 0)}, 1},
+      {"parallel edges one after the other", PairKind::edge_edge, {V(0, 0, 0), V(1, 0, 0), V(4, 4, 0), V(5, 4, 0)}, 5},
+      {"nearly parallel edges", PairKind::edge_edge, {V(0, 0, 0), V(1, 0, 0), V(0.2, 1, 0), V(0.8, 1, tiny)}, 1},
+      {"collinear edges apart", PairKind::edge_edge, {V(0, 0, 0), V(1, 0, 0), V(3, 0, 0), V(4, 0, 0)}, 2},
+      {"collinear edges that overlap", PairKind::edge_edge, {V(0, 0, 0), V(2, 0, 0), V(1, 0, 0), V(4, 0, 0)}, 0},
+      {"coincident edges", PairKind::edge_edge, {V(0, 0, 0), V(1, 2, 3), V(0, 0, 0), V(1, 2, 3)}, 0},
+      {"crossing edges that touch", PairKind::edge_edge, {V(-1, 0, 0), V(1, 0, 0), V(0, -1, 0), V(0, 1, 0)}, 0},
+      {"an edge of no length", PairKind::edge_edge, {V(0.5, 2, 0), V(0.5, 2, 0), V(0, 0, 0), V(1, 0, 0)}, 2},
+      {"two edges of no length", PairKind::edge_edge, {V(0, 0, 0), V(0, 0, 0), V(0, 3, 4), V(0, 3, 4)}, 5},
+      {"vertex over a triangle", PairKind::face_vertex, {V(0.2, 0.2, 3), V(0, 0, 0), V(1, 0, 0), V(0, 1, 0)}, 3},
+      {"vertex in the triangle", PairKind::face_vertex, {V(0.2, 0.2, 0), V(0, 0, 0), V(1, 0, 0), V(0, 1, 0)}, 0},
+      {"vertex on a corner", PairKind::face_vertex, {V(1, 0, 0), V(0, 0, 0), V(1, 0, 0), V(0, 1, 0)}, 0},
+      {"vertex beside, in the plane", PairKind::face_vertex, {V(0.5, -2, 0), V(0, 0, 0), V(1, 0, 0), V(0, 1, 0)}, 2},
+      {"collinear triangle", PairKind::face_vertex, {V(0.5, 2, 0), V(0, 0, 0), V(1, 0, 0), V(3, 0, 0)}, 2},
+      {"triangle of one point", PairKind::face_vertex, {V(3, 4, 0), V(0, 0, 0), V(0, 0, 0), V(0, 0, 0)}, 5},
+      {"sliver triangle", PairKind::face_vertex, {V(0.5, 0, 2), V(0, 0, 0), V(1, 0, 0), V(0.5, tiny, 0)}, 2},
+  };
+  for (const auto& pair : pairs)
+    EXPECT_NEAR(std::sqrt(pair_distance_squared<3>(pair.kind, pair.x.data())), pair.distance, 1e-7) << pair.name;
 }
 
 TYPED_TEST(Geometry, SegmentDistanceIsTheLeastOverItsPoints) {
@@ -110,6 +214,28 @@ TYPED_TEST(Geometry, CollisionTimesAreNeverLateAndNeverZero) {
     }
   }
   EXPECT_GT(collisions, 50);
+}
+
+TEST(Ccd, IsNeverLateAndNeverZeroFor3DPairs) {
+  std::mt19937 random(8);
+  int collisions = 0;
+  for (int i = 0; i < 1000; ++i)
+    for (const PairKind kind : {PairKind::face_vertex, PairKind::edge_edge}) {
+      auto x = random_pair<3>(random), y = random_pair<3>(random);
+      if (i % 4 == 0) x[3] = x[2] + (x[1] - x[0]), y[3] = y[2] + (y[1] - y[0]);  // parallel edges at both ends
+      if (i % 11 == 0) x[3] = x[2], y[3] = y[2];                                 // degenerate
+      const auto now = [&](double t) {
+        std::array<Vec<3>, 4> p;
+        for (int k = 0; k < 4; ++k) p[k] = x[k] + t * (y[k] - x[k]);
+        return std::sqrt(pair_distance_squared<3>(kind, p.data()));
+      };
+      const double toi = kind == PairKind::face_vertex ? point_triangle_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3])
+                                                       : edge_edge_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]);
+      EXPECT_GT(toi, 0);
+      collisions += toi < 1;
+      for (int k = 0; k <= 100; ++k) EXPECT_GE(now(toi * k / 100), 0.2 * now(0) * (1 - 1e-9)) << i;
+    }
+  EXPECT_GT(collisions, 100);
 }
 
 TEST(Ccd, StopsAtAFastThinObstacleAndLetsSlidingPass) {

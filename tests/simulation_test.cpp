@@ -97,7 +97,7 @@ void expect_valid(const Simulation<2>& simulation) {
   for (const VectorX& x : state.history.x) {
     EXPECT_EQ(find_inverted<2>(state.mesh, x), kNone);
     const CollisionSurface surface = collision_surface(state.mesh, simulation.setup().obstacles);
-    EXPECT_FALSE(find_intersection(x, surface.edges, surface.counts)) << "step " << state.step;
+    EXPECT_FALSE(find_intersection<2>(surface, x)) << "step " << state.step;
   }
 }
 
@@ -203,7 +203,6 @@ TEST(Simulation, NewmarkIsLeftAloneWhereItKeepsEnergy) {
     EXPECT_EQ(step.report.damped_steps, 0);
   }
 }
-
 
 /// A body of two materials, one of them `law` with moduli that vary, remeshed as it deforms.
 class Laws : public ::testing::TestWithParam<MaterialLaw> {};

@@ -44,6 +44,32 @@ std::optional<std::array<int, 2>> find_intersection(ConstVectorView x, std::span
   return std::nullopt;
 }
 
+std::optional<std::array<int, 2>> find_intersection(ConstVectorView x, std::span<const std::array<int, 2>> edges,
+                                                    std::span<const std::array<int, 3>> triangles,
+                                                    std::span<const char> counts) {
+  const auto at = [&](int v) { return Vec<3>(x.segment<3>(3 * v)); };
+  std::vector<Box<3>> boxes(edges.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    for (const int v : edges[e]) boxes[e].include(at(v));
+  const Bvh<3> tree(boxes);
+  std::vector<int> hits;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const auto [a, b, c] = triangles[t];
+    Box<3> box;
+    for (const int v : triangles[t]) box.include(at(v));
+    hits.clear();
+    tree.query(box, hits);
+    std::sort(hits.begin(), hits.end());
+    for (const int e : hits) {
+      const auto [p, q] = edges[e];
+      if (p == a || p == b || p == c || q == a || q == b || q == c) continue;
+      if (!counts[a] && !counts[b] && !counts[c] && !counts[p] && !counts[q]) continue;
+      if (segment_intersects_triangle(at(p), at(q), at(a), at(b), at(c))) return std::array{e, static_cast<int>(t)};
+    }
+  }
+  return std::nullopt;
+}
+
 template <int Dim>
 CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView x) {
   for (int c = 0; c < mesh.cell_slots(); ++c)

@@ -79,8 +79,8 @@ std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFie
   const ContactEnergy<2> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {
-    const double share = context.scaling * s.weight * contact.barrier(contact.squared_distance(s, x)) / s.size();
-    for (int k = 0; k < s.size(); ++k) energies[s.vertices()[k]] += share;
+    const double share = context.scaling * contact.pair_energy(s, x) / s.size();
+    for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += share;
   }
   return energies;
 }

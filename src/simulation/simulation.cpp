@@ -30,26 +30,27 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   if (setup.remesh.enabled && setup.remesh.sizing_field)
     refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
   if constexpr (Dim == 3) {
-    if (setup.contact.enabled) refuse("/contact/enabled", "contact in 3D, which is not supported yet");
     if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing in 3D, which is not supported yet");
   }
 }
 
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
-  if constexpr (Dim == 2) {
-    if (!setup.contact.enabled) return;
-    const CollisionSurface surface = collision_surface(state.mesh, setup.obstacles);
-    const VectorX& x = state.history.x[0];
-    const auto pair = find_intersection(x, surface.edges, surface.counts);
-    if (!pair) return;
-    const auto edge = [&](int e) {
-      const auto [a, b] = surface.edges[e];
-      return describe<2>(x.segment<2>(2 * a)) + "-" + describe<2>(x.segment<2>(2 * b));
-    };
-    throw InputError({"", "initial state", "surfaces that intersect: edges " + edge((*pair)[0]) + " and " + edge((*pair)[1]),
-                      "surfaces that do not touch"});
-  }
+  if (!setup.contact.enabled) return;
+  const CollisionSurface surface = collision_surface(state.mesh, setup.obstacles);
+  const VectorX& x = state.history.x[0];
+  const auto corners = [&](const auto& primitive) {
+    std::string text;
+    for (const int v : primitive) text += (text.empty() ? "" : "-") + describe<Dim>(x.segment<Dim>(Dim * v));
+    return text;
+  };
+  const auto pair = find_intersection<Dim>(surface, x);
+  if (!pair) return;
+  const auto [first, second] = *pair;
+  const std::string found =
+      "edge " + corners(surface.edges[first]) + " and " +
+      (Dim == 2 ? "edge " + corners(surface.edges[second]) : "triangle " + corners(surface.triangles[second]));
+  throw InputError({"", "initial state", "surfaces that intersect: " + found, "surfaces that do not touch"});
 }
 
 /// Value of the first condition that names the body of one of the vertex's cells; the last cell's body wins.

@@ -141,12 +141,7 @@ bool keeps_energy(const Setup<Dim>& setup, StepProblem<Dim>& problem, const Newt
 template <int Dim>
 std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
   if (find_inverted<Dim>(mesh, x) != kNone) return "an inverted cell";
-  if constexpr (Dim == 2) {
-    if (setup.contact.enabled) {
-      const CollisionSurface surface = collision_surface(mesh, setup.obstacles);
-      if (find_intersection(x, surface.edges, surface.counts)) return "an intersection";
-    }
-  }
+  if (setup.contact.enabled && find_intersection<Dim>(collision_surface(mesh, setup.obstacles), x)) return "an intersection";
   return {};
 }
 

@@ -36,37 +36,27 @@ Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
 template <int Dim>
 CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
   const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.rest.size());
-  CollisionSurface surface;
-  surface.area.assign(total, 0);
-  surface.degree.assign(total, 0);
-  surface.counts.assign(total, 0);
-  std::vector<char> used(total, 0);
-  const auto rest = [&](int v) { return v < bodies ? mesh.rest(v) : obstacles.rest[v - bodies]; };
-  const auto add_edge = [&](int a, int b) {
-    surface.edges.push_back({std::min(a, b), std::max(a, b)});
-    const double length = (rest(b) - rest(a)).norm();
-    for (const int v : {a, b}) {
-      surface.area[v] += length / 2;
-      ++surface.degree[v];
-      used[v] = 1;
-    }
-  };
-  for (int f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f))
-      for (int k = 0; k < Dim; ++k)
-        if (Dim == 3 || k == 0) add_edge(mesh.facet(f)[k], mesh.facet(f)[(k + 1) % Dim]);
-  for (int v = 0; v < bodies; ++v) surface.counts[v] = used[v];
-  for (const auto& [a, b] : obstacles.edges) add_edge(bodies + a, bodies + b);
-  for (int v = bodies; v < total; ++v)
-    if (!used[v]) {
-      used[v] = 1;
-      surface.area[v] = 1;
-    }
-  for (int v = 0; v < total; ++v)
-    if (used[v]) surface.vertices.push_back(v);
-  std::sort(surface.edges.begin(), surface.edges.end());
-  surface.edges.erase(std::unique(surface.edges.begin(), surface.edges.end()), surface.edges.end());
-  return surface;
+  std::vector<Vec<Dim>> rest;
+  rest.reserve(total);
+  for (int v = 0; v < bodies; ++v) rest.push_back(mesh.rest(v));
+  rest.insert(rest.end(), obstacles.rest.begin(), obstacles.rest.end());
+  std::vector<std::array<int, 2>> edges;
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<char> counts(total, 0);
+  for (int f = 0; f < mesh.facet_slots(); ++f) {
+    if (!mesh.is_facet_alive(f)) continue;
+    const auto& facet = mesh.facet(f);
+    for (const int v : facet) counts[v] = 1;
+    if constexpr (Dim == 2)
+      edges.push_back(facet);
+    else
+      triangles.push_back(facet);
+  }
+  for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
+  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
+  std::vector<int> points(obstacles.rest.size());
+  std::iota(points.begin(), points.end(), bodies);
+  return make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
 }
 
 template <int Dim>

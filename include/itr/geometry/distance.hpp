@@ -1,44 +1,68 @@
 // SPDX-License-Identifier: MIT
-// Squared distances between points, edges and triangles, and where the closest points are.
+// Squared distances [m^2] between points, edges and triangles: which features are closest, and derivatives.
 //
-// All of these return *squared* distances [m^2]. Derivatives are with respect to the stacked positions of the arguments in
-// their order.
+// A pair of primitives is reduced to its closest features: then the distance is that between the points, lines or planes
+// that they span, a smooth function. Derivatives are with respect to the stacked positions of the pair.
 #pragma once
+
+#include <span>
 
 #include "itr/core/types.hpp"
 
 namespace itr {
 
-/// Which part of an edge is closest to a point.
-enum class EdgeFeature { vertex0, vertex1, interior };
+/// Order of the positions: (p, q), (p, a, b), (p, a, b, c), (a0, a1, b0, b1).
+enum class PairKind : unsigned char { vertex_vertex, edge_vertex, face_vertex, edge_edge };
 
-/// For the segment a b and the point p. A degenerate edge counts as vertex0.
-template <int Dim>
-EdgeFeature closest_feature_on_edge(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b);
+constexpr int pair_size(PairKind kind) {
+  return kind == PairKind::vertex_vertex ? 2 : kind == PairKind::edge_vertex ? 3 : 4;
+}
 
-/// |p - q|^2.
-template <int Dim>
-double point_point_distance_squared(const Vec<Dim>& p, const Vec<Dim>& q);
-template <int Dim>
-Vec<2 * Dim> point_point_distance_squared_gradient(const Vec<Dim>& p, const Vec<Dim>& q);
-template <int Dim>
-Mat<2 * Dim> point_point_distance_squared_hessian();
+/// The closest features of a pair: of `kind`, between the positions `local` of the pair (pair_size(kind) of them).
+struct ClosestFeatures {
+  PairKind kind;
+  std::array<signed char, 4> local;
+  bool operator==(const ClosestFeatures&) const = default;
+};
 
-/// Squared distance of p to the *line* through a and b (the caller has found that the interior is closest).
+/// `x`: the positions of the pair. Of equally close features the first in a fixed order is taken. Degenerate edges count as
+/// their first vertex, degenerate triangles as their edges, parallel edges as one edge and a vertex of the other.
 template <int Dim>
-double point_line_distance_squared(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b);
+ClosestFeatures closest_features(PairKind kind, const Vec<Dim>* x);
+
+/// A pair whose own features are closest: distance between point, line or plane.
 template <int Dim>
-Vec<3 * Dim> point_line_distance_squared_gradient(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b);
+struct PairDistance {
+  double squared = 0;               ///< [m^2]
+  Vec<Dim> separation;              ///< r = sum of coefficient * position: from one closest point to the other [m]
+  Vec<4> coefficients{0, 0, 0, 0};  ///< they sum to 0; the gradient of the squared distance is 2 * coefficient * r
+};
 template <int Dim>
-Mat<3 * Dim> point_line_distance_squared_hessian(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b);
+PairDistance<Dim> pair_distance(PairKind kind, const Vec<Dim>* x);
+
+/// Hessian of the squared distance of such a pair, in the leading Dim * pair_size(kind) rows and columns.
+template <int Dim>
+Mat<4 * Dim> pair_distance_hessian(PairKind kind, const Vec<Dim>* x);
+
+/// Squared distance of a pair, whatever its closest features.
+template <int Dim>
+double pair_distance_squared(PairKind kind, const Vec<Dim>* x);
 
 /// Squared distance of p to the segment a b.
 template <int Dim>
 double point_edge_distance_squared(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b);
-
 /// Squared distance of two segments in 3D (parallel, collinear and degenerate ones included).
 double edge_edge_distance_squared(const Vec<3>& a0, const Vec<3>& a1, const Vec<3>& b0, const Vec<3>& b1);
 /// Squared distance of p to the triangle a b c.
 double point_triangle_distance_squared(const Vec<3>& p, const Vec<3>& a, const Vec<3>& b, const Vec<3>& c);
+
+/// |u x v|^2 of the edges u = a1 - a0, v = b1 - b0: 0 where they are parallel. Positions (a0, a1, b0, b1).
+struct CrossSquared {
+  double value;
+  Vec<12> gradient;
+};
+double edge_cross_squared(const Vec<3>* x);
+CrossSquared edge_cross_squared_with_gradient(const Vec<3>* x);
+Mat<12> edge_cross_squared_hessian(const Vec<3>* x);
 
 }  // namespace itr

@@ -13,6 +13,10 @@ namespace itr {
 /// neither has a vertex with `counts` are skipped. Positions interleaved.
 std::optional<std::array<int, 2>> find_intersection(ConstVectorView positions, std::span<const std::array<int, 2>> edges,
                                                     std::span<const char> counts);
+/// The same in space: the first edge and triangle (indices).
+std::optional<std::array<int, 2>> find_intersection(ConstVectorView positions, std::span<const std::array<int, 2>> edges,
+                                                    std::span<const std::array<int, 3>> triangles,
+                                                    std::span<const char> counts);
 
 /// The first cell (index among alive ids) that is not positively oriented at these positions, decided exactly; kNone: none.
 template <int Dim>

@@ -4,50 +4,112 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
-#include <tuple>
 
+#include "candidates.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/geometry/ccd.hpp"
-#include "itr/geometry/distance.hpp"
 
 namespace itr {
 
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t kBlock = 64;
+constexpr std::size_t kBatch = 1024;  ///< local Hessians that are held at a time
+
+/// The active pairs of the positions that were asked for last.
+struct ActiveCache {
+  const void* owner = nullptr;
+  VectorX x;
+  std::vector<ContactStencil> stencils;
+};
 
 template <int Dim>
-Vec<Dim> at(ConstVectorView x, int v) {
-  return x.segment<Dim>(Dim * v);
+using Positions = std::array<Vec<Dim>, 4>;
+
+template <int Dim>
+Positions<Dim> gather(const std::array<int, 4>& vertices, int size, ConstVectorView x) {
+  Positions<Dim> p;
+  for (int k = 0; k < size; ++k) p[k] = x.segment<Dim>(Dim * vertices[k]);
+  return p;
 }
 
-template <int Size>
-void clamp_to_psd(Mat<Size>& block) {
-  const Eigen::SelfAdjointEigenSolver<Mat<Size>> eigen(block);
-  if (eigen.eigenvalues()[0] >= 0) return;
-  block = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
+/// The features of a mollified pair whose distance counts.
+template <int Dim>
+Positions<Dim> closest_of(const ContactStencil& s, const Positions<Dim>& p) {
+  Positions<Dim> closest;
+  for (int k = 0; k < pair_size(s.closest.kind); ++k) closest[k] = p[s.closest.local[k]];
+  return closest;
 }
 
-bool same_features(const ContactStencil& p, const ContactStencil& q) { return p.a == q.a && p.b1 == q.b1 && p.b2 == q.b2; }
-
-/// Sorts by features and sums the weights of equal ones; drops those that cancel.
-void merge(std::vector<ContactStencil>& stencils) {
-  std::stable_sort(stencils.begin(), stencils.end(), [](const ContactStencil& p, const ContactStencil& q) {
-    return std::tie(p.a, p.b1, p.b2) < std::tie(q.a, q.b1, q.b2);
-  });
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < stencils.size();) {
-    ContactStencil sum = stencils[i];
-    double magnitude = std::abs(sum.weight);
-    for (++i; i < stencils.size() && same_features(stencils[i], sum); ++i) {
-      sum.weight += stencils[i].weight;
-      magnitude += std::abs(stencils[i].weight);
-    }
-    if (std::abs(sum.weight) > 1e-14 * magnitude) stencils[kept++] = sum;
+/// m(s) = (2 - s / eps) s / eps below eps, and its derivatives.
+struct Mollifier {
+  double value = 1, first = 0, second = 0;
+  Mollifier(double s, double eps) {
+    if (s >= eps) return;
+    value = (2 - s / eps) * (s / eps);
+    first = 2 / eps * (1 - s / eps);
+    second = -2 / (eps * eps);
   }
-  stencils.resize(kept);
+};
+
+/// Orthonormal basis of what is orthogonal to (1, ..., 1): columns of Helmert's matrix.
+template <int N>
+Eigen::Matrix<double, N, N - 1> helmert() {
+  Eigen::Matrix<double, N, N - 1> basis = Eigen::Matrix<double, N, N - 1>::Zero();
+  for (int k = 1; k < N; ++k) {
+    basis.col(k - 1).head(k).setConstant(1 / std::sqrt(k * (k + 1.0)));
+    basis(k, k - 1) = -k / std::sqrt(k * (k + 1.0));
+  }
+  return basis;
 }
+
+/// Leaves out the negative eigenvalues of a block that translations do not feel: Dim of its eigenvalues are zero, and the
+/// decomposition is that much smaller.
+template <int Dim, int N>
+void clamp_to_psd(Mat<Dim * N>& block) {
+  static const Eigen::Matrix<double, Dim * N, Dim*(N - 1)> basis = [] {
+    Eigen::Matrix<double, Dim * N, Dim*(N - 1)> b = Eigen::Matrix<double, Dim * N, Dim*(N - 1)>::Zero();
+    const auto small = helmert<N>();
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j + 1 < N; ++j) b.template block<Dim, Dim>(Dim * i, Dim * j) = small(i, j) * Mat<Dim>::Identity();
+    return b;
+  }();
+  const Mat<Dim*(N - 1)> reduced = basis.transpose() * block * basis;
+  const Eigen::SelfAdjointEigenSolver<Mat<Dim*(N - 1)>> eigen(reduced);
+  if (eigen.eigenvalues()[0] >= 0) return;
+  const Eigen::Matrix<double, Dim * N, Dim*(N - 1)> modes = basis * eigen.eigenvectors();
+  block = modes * eigen.eigenvalues().cwiseMax(0).asDiagonal() * modes.transpose();
+}
+
+/// Gradient of the squared distance of a pair's own features.
+template <int Dim>
+Vec<4 * Dim> squared_distance_gradient(const PairDistance<Dim>& pair) {
+  Vec<4 * Dim> gradient;
+  for (int k = 0; k < 4; ++k) gradient.template segment<Dim>(Dim * k) = 2 * pair.coefficients[k] * pair.separation;
+  return gradient;
+}
+
+/// b(D) of the features that count, its gradient and Hessian, spread to the vertices of the mollified pair.
+struct SpreadDistance {
+  double D;
+  Vec<12> gradient = Vec<12>::Zero();
+  Mat<12> hessian = Mat<12>::Zero();
+  SpreadDistance(const ContactStencil& s, const Positions<3>& p, bool with_hessian) {
+    const Positions<3> closest = closest_of<3>(s, p);
+    const int size = pair_size(s.closest.kind);
+    const auto pair = pair_distance<3>(s.closest.kind, closest.data());
+    D = pair.squared;
+    for (int i = 0; i < size; ++i) gradient.segment<3>(3 * s.closest.local[i]) = 2 * pair.coefficients[i] * pair.separation;
+    if (!with_hessian) return;
+    const Mat<12> H = pair_distance_hessian<3>(s.closest.kind, closest.data());
+    for (int i = 0; i < size; ++i)
+      for (int j = 0; j < size; ++j)
+        hessian.block<3, 3>(3 * s.closest.local[i], 3 * s.closest.local[j]) = H.block<3, 3>(3 * i, 3 * j);
+  }
+};
 
 }  // namespace
 
@@ -58,8 +120,7 @@ ContactEnergy<Dim>::ContactEnergy(const CollisionSurface& surface, const Contact
       dhat_(options.activation_distance),
       convergent_(options.convergent),
       stiffness_(stiffness),
-      scale_(scale),
-      weight_scale_(options.convergent ? 1 / (dhat_ * dhat_ * dhat_) : 1) {}
+      scale_(scale) {}
 
 template <int Dim>
 double ContactEnergy<Dim>::barrier(double D) const {
@@ -82,166 +143,208 @@ double ContactEnergy<Dim>::barrier_second(double D) const {
 }
 
 template <int Dim>
-const std::vector<std::array<int, 3>>& ContactEnergy<Dim>::candidates(ConstVectorView x, const VectorX* dx,
-                                                                      Workspace& workspace) const {
-  auto& cache = workspace.get<ContactCandidates<Dim>>();
-  const std::size_t n = surface_.vertices.size();
-  bool valid = cache.surface == &surface_ && cache.boxes.size() == n;
-  for (std::size_t i = 0; valid && i < n; ++i) {
-    const Vec<Dim> p = at<Dim>(x, surface_.vertices[i]);
-    valid = cache.boxes[i].contains(p) && (!dx || cache.boxes[i].contains(p + at<Dim>(*dx, surface_.vertices[i])));
-  }
-  if (valid) return cache.pairs;
-
-  // Boxes hold the motion and some room around it, so that the list serves a whole line search and often the next one.
-  double motion = 0;
-  if (dx)
-    for (const int v : surface_.vertices) motion = std::max(motion, at<Dim>(*dx, v).norm());
-  const double room = 0.5 * dhat_ + 0.25 * motion;
-  cache.surface = &surface_;
-  cache.boxes.assign(n, {});
-  std::vector<Box<Dim>> reach(surface_.area.size());
-  for (std::size_t i = 0; i < n; ++i) {
-    const int v = surface_.vertices[i];
-    cache.boxes[i].include(at<Dim>(x, v));
-    if (dx) cache.boxes[i].include(at<Dim>(x, v) + at<Dim>(*dx, v));
-    cache.boxes[i] = cache.boxes[i].inflated(room);
-    reach[v] = cache.boxes[i].inflated(dhat_ / 2);
-  }
-  std::vector<Box<Dim>> edge_boxes(surface_.edges.size());
-  for (std::size_t e = 0; e < edge_boxes.size(); ++e)
-    for (const int v : surface_.edges[e]) edge_boxes[e].include(reach[v]);
-  cache.pairs.clear();
-  const auto consider = [&](int v, int e) {
-    const auto [e0, e1] = surface_.edges[e];
-    if (v != e0 && v != e1 && counts(v, e0, e1)) cache.pairs.push_back({v, e0, e1});
-  };
-  if (n * edge_boxes.size() < 4096) {
-    for (const int v : surface_.vertices)
-      for (std::size_t e = 0; e < edge_boxes.size(); ++e)
-        if (reach[v].overlaps(edge_boxes[e])) consider(v, static_cast<int>(e));
-  } else {
-    const Bvh<Dim> tree(edge_boxes);
-    std::vector<int> hits;
-    for (const int v : surface_.vertices) {
-      hits.clear();
-      tree.query(reach[v], hits);
-      for (const int e : hits) consider(v, e);
-    }
-  }
-  return cache.pairs;
+const std::vector<ContactStencil>& ContactEnergy<Dim>::active(ConstVectorView x, Workspace& workspace) const {
+  auto& cache = workspace.get<ActiveCache>();
+  if (cache.owner == this && cache.x.size() == x.size() &&
+      std::memcmp(cache.x.data(), x.data(), sizeof(double) * x.size()) == 0)
+    return cache.stencils;
+  cache.stencils = find_active(x, workspace);
+  cache.x = x;
+  cache.owner = this;
+  return cache.stencils;
 }
 
 template <int Dim>
-double ContactEnergy<Dim>::squared_distance(const ContactStencil& s, ConstVectorView x) const {
-  if (s.b2 == kNone) return point_point_distance_squared<Dim>(at<Dim>(x, s.a), at<Dim>(x, s.b1));
-  return point_line_distance_squared<Dim>(at<Dim>(x, s.a), at<Dim>(x, s.b1), at<Dim>(x, s.b2));
-}
-
-template <int Dim>
-std::vector<ContactStencil> ContactEnergy<Dim>::active(ConstVectorView x, Workspace& workspace) const {
-  const double Dhat = dhat_ * dhat_;
-  std::vector<ContactStencil> stencils;
-  std::vector<std::array<int, 2>> corners;  // vertex pairs within reach, each once: where edges' regions overlap
-  for (const auto& [v, e0, e1] : candidates(x, nullptr, workspace)) {
-    const Vec<Dim> p = at<Dim>(x, v), a = at<Dim>(x, e0), b = at<Dim>(x, e1);
-    if (point_edge_distance_squared<Dim>(p, a, b) >= Dhat) continue;
-    const double weight = convergent_ ? surface_.area[v] / 2 * weight_scale_ : 1;
-    switch (closest_feature_on_edge<Dim>(p, a, b)) {
-      case EdgeFeature::vertex0:
-        stencils.push_back({std::min(v, e0), std::max(v, e0), kNone, weight});
-        break;
-      case EdgeFeature::vertex1:
-        stencils.push_back({std::min(v, e1), std::max(v, e1), kNone, weight});
-        break;
-      case EdgeFeature::interior:
-        stencils.push_back({v, std::min(e0, e1), std::max(e0, e1), weight});
-        break;
-    }
-    if (!convergent_) continue;
-    for (const int q : {e0, e1})
-      if ((surface_.counts[v] || surface_.counts[q]) && point_point_distance_squared<Dim>(p, at<Dim>(x, q)) < Dhat)
-        corners.push_back({std::min(v, q), std::max(v, q)});
-  }
-  std::sort(corners.begin(), corners.end());
-  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
-  for (const auto& [i, j] : corners) {
-    const bool adjacent = std::binary_search(surface_.edges.begin(), surface_.edges.end(), std::array{i, j});
-    const auto correct = [&](int vertex, int corner) {  // the corner's edges count the vertex n times
-      const int n = surface_.degree[corner] - (adjacent ? 1 : 0);
-      if (n > 1) stencils.push_back({i, j, kNone, (1 - n) * surface_.area[vertex] / 2 * weight_scale_});
-    };
-    correct(i, j);
-    correct(j, i);
-  }
-  merge(stencils);
-  return stencils;
+bool ContactEnergy<Dim>::has_candidates(ConstVectorView x, Workspace& workspace) const {
+  auto& candidates = workspace.get<ContactCandidates<Dim>>();
+  candidates.update(surface_, x, nullptr, dhat_);
+  return !candidates.empty();
 }
 
 template <int Dim>
 double ContactEnergy<Dim>::min_distance(ConstVectorView x, Workspace& workspace) const {
+  auto& candidates = workspace.get<ContactCandidates<Dim>>();
+  candidates.update(surface_, x, nullptr, dhat_);
   double smallest = kInfinity;
-  for (const auto& [v, e0, e1] : candidates(x, nullptr, workspace))
-    smallest = std::min(smallest, point_edge_distance_squared<Dim>(at<Dim>(x, v), at<Dim>(x, e0), at<Dim>(x, e1)));
+  const auto look = [&](PairKind kind, const std::array<int, 4>& vertices) {
+    const auto p = gather<Dim>(vertices, pair_size(kind), x);
+    smallest = std::min(smallest, pair_distance_squared<Dim>(kind, p.data()));
+  };
+  for (const auto& [v, e] : candidates.vertex_edges())
+    look(PairKind::edge_vertex, {v, surface_.edges[e][0], surface_.edges[e][1], kNone});
+  for (const auto& [v, f] : candidates.vertex_triangles()) {
+    const auto& t = surface_.triangles[f];
+    look(PairKind::face_vertex, {v, t[0], t[1], t[2]});
+  }
+  for (const auto& [e, f] : candidates.edge_edges()) {
+    const auto &a = surface_.edges[e], &b = surface_.edges[f];
+    look(PairKind::edge_edge, {a[0], a[1], b[0], b[1]});
+  }
   return std::sqrt(smallest);
 }
 
 template <int Dim>
-double ContactEnergy<Dim>::value(ConstVectorView x, Workspace& workspace) const {
-  double sum = 0;
-  for (const auto& s : active(x, workspace)) {
-    const double b = barrier(squared_distance(s, x));
-    if (!std::isfinite(b)) return kInfinity;  // whatever the sign of its weight
-    sum += s.weight * b;
+PairDistance<Dim> ContactEnergy<Dim>::distance(const ContactStencil& s, ConstVectorView x) const {
+  const auto p = gather<Dim>(s.vertices, s.size(), x);
+  return s.is_mollified() ? pair_distance<Dim>(s.closest.kind, closest_of<Dim>(s, p).data())
+                          : pair_distance<Dim>(s.kind, p.data());
+}
+
+template <int Dim>
+double ContactEnergy<Dim>::pair_energy(const ContactStencil& s, ConstVectorView x) const {
+  double b = barrier(distance(s, x).squared);
+  if constexpr (Dim == 3) {
+    if (s.is_mollified() && b > 0 && std::isfinite(b))
+      b *= Mollifier(edge_cross_squared(gather<3>(s.vertices, 4, x).data()), s.mollifier_threshold).value;
   }
-  return scale_ * stiffness_ * sum;
+  return stiffness_ * s.weight * b;
+}
+
+template <int Dim>
+double ContactEnergy<Dim>::value(ConstVectorView x, Workspace& workspace) const {
+  const auto& stencils = active(x, workspace);
+  return scale_ * parallel_sum(stencils.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+           double sum = 0;
+           for (std::size_t i = begin; i < end; ++i) {
+             const double energy = pair_energy(stencils[i], x);
+             if (!std::isfinite(energy)) return kInfinity;  // whatever the sign of its weight
+             sum += energy;
+           }
+           return sum;
+         });
 }
 
 template <int Dim>
 void ContactEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
   for (const auto& s : active(x, workspace)) {
-    const double factor = scale_ * stiffness_ * s.weight * barrier_first(squared_distance(s, x));
-    const auto scatter = [&](const auto& local) {
-      for (int k = 0; k < s.size(); ++k)
-        gradient.segment<Dim>(Dim * s.vertices()[k]) += factor * local.template segment<Dim>(Dim * k);
-    };
-    if (s.b2 == kNone)
-      scatter(point_point_distance_squared_gradient<Dim>(at<Dim>(x, s.a), at<Dim>(x, s.b1)));
-    else
-      scatter(point_line_distance_squared_gradient<Dim>(at<Dim>(x, s.a), at<Dim>(x, s.b1), at<Dim>(x, s.b2)));
+    const auto p = gather<Dim>(s.vertices, s.size(), x);
+    const double factor = scale_ * stiffness_ * s.weight;
+    Vec<4 * Dim> local;
+    if (s.is_mollified()) {
+      if constexpr (Dim == 3) {
+        const SpreadDistance q(s, p, false);
+        const CrossSquared cross = edge_cross_squared_with_gradient(p.data());
+        const Mollifier m(cross.value, s.mollifier_threshold);
+        local = factor * (m.first * barrier(q.D) * cross.gradient + m.value * barrier_first(q.D) * q.gradient);
+      }
+    } else {
+      const auto pair = pair_distance<Dim>(s.kind, p.data());
+      local = factor * barrier_first(pair.squared) * squared_distance_gradient<Dim>(pair);
+    }
+    for (int k = 0; k < s.size(); ++k) gradient.segment<Dim>(Dim * s.vertices[k]) += local.template segment<Dim>(Dim * k);
   }
 }
 
 template <int Dim>
 void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
-  for (const auto& s : active(x, workspace)) {
-    const double D = squared_distance(s, x), factor = scale_ * stiffness_ * s.weight;
-    const auto add = [&](const auto& gradient, const auto& hessian) {
-      constexpr int kSize = std::decay_t<decltype(gradient)>::RowsAtCompileTime;
-      Mat<kSize> block = factor * (barrier_second(D) * gradient * gradient.transpose() + barrier_first(D) * hessian);
-      if (psd == PsdProjection::clamp) clamp_to_psd<kSize>(block);
-      const auto vertices = s.vertices();
-      sink.add<Dim>(std::span(vertices.data(), s.size()), block.data());
-    };
-    if (s.b2 == kNone)
-      add(point_point_distance_squared_gradient<Dim>(at<Dim>(x, s.a), at<Dim>(x, s.b1)),
-          point_point_distance_squared_hessian<Dim>());
-    else
-      add(point_line_distance_squared_gradient<Dim>(at<Dim>(x, s.a), at<Dim>(x, s.b1), at<Dim>(x, s.b2)),
-          point_line_distance_squared_hessian<Dim>(at<Dim>(x, s.a), at<Dim>(x, s.b1), at<Dim>(x, s.b2)));
+  const auto& stencils = active(x, workspace);
+  const auto block_of = [&](const ContactStencil& s) -> Mat<4 * Dim> {
+    const auto p = gather<Dim>(s.vertices, s.size(), x);
+    const double factor = scale_ * stiffness_ * s.weight;
+    if (s.is_mollified()) {
+      if constexpr (Dim == 3) {
+        const SpreadDistance q(s, p, true);
+        const CrossSquared cross = edge_cross_squared_with_gradient(p.data());
+        const Mollifier m(cross.value, s.mollifier_threshold);
+        const double b = barrier(q.D), b1 = barrier_first(q.D), b2 = barrier_second(q.D);
+        const Mat<12> mixed = cross.gradient * q.gradient.transpose();
+        return factor * (b * (m.second * cross.gradient * cross.gradient.transpose() +
+                              m.first * edge_cross_squared_hessian(p.data())) +
+                         m.first * b1 * (mixed + mixed.transpose()) +
+                         m.value * (b2 * q.gradient * q.gradient.transpose() + b1 * q.hessian));
+      }
+    }
+    const auto pair = pair_distance<Dim>(s.kind, p.data());
+    const Vec<4 * Dim> gradient = squared_distance_gradient<Dim>(pair);
+    return factor * (barrier_second(pair.squared) * gradient * gradient.transpose() +
+                     barrier_first(pair.squared) * pair_distance_hessian<Dim>(s.kind, p.data()));
+  };
+  const auto project = [&](Mat<4 * Dim>& block, auto size) {
+    constexpr int kDofs = Dim * size();
+    Mat<kDofs> part = block.template topLeftCorner<kDofs, kDofs>();
+    if (psd == PsdProjection::clamp) clamp_to_psd<Dim, size()>(part);
+    std::copy(part.data(), part.data() + part.size(), block.data());  // packed: what the sink reads
+  };
+  std::vector<Mat<4 * Dim>> blocks(std::min(kBatch, stencils.size()));
+  for (std::size_t first = 0; first < stencils.size(); first += kBatch) {
+    const std::size_t count = std::min(kBatch, stencils.size() - first);
+    parallel_blocks(count, kBlock, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const ContactStencil& s = stencils[first + i];
+        blocks[i] = block_of(s);
+        if (s.size() == 2)
+          project(blocks[i], std::integral_constant<int, 2>());
+        else if (s.size() == 3)
+          project(blocks[i], std::integral_constant<int, 3>());
+        else
+          project(blocks[i], std::integral_constant<int, 4>());
+      }
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      const ContactStencil& s = stencils[first + i];
+      sink.add<Dim>(std::span(s.vertices.data(), s.size()), blocks[i].data());
+    }
   }
 }
 
 template <int Dim>
 double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
   const VectorX motion = dx;
-  double step = 1;
-  for (const auto& [v, e0, e1] : candidates(x, &motion, workspace)) {
-    const Vec<Dim> p = at<Dim>(x, v), a = at<Dim>(x, e0), b = at<Dim>(x, e1);
-    // Later pairs are only asked about the part of the way that earlier ones left over.
-    step *= point_edge_ccd<Dim>(p, a, b, p + step * at<Dim>(dx, v), a + step * at<Dim>(dx, e0), b + step * at<Dim>(dx, e1));
+  auto& candidates = workspace.get<ContactCandidates<Dim>>();
+  candidates.update(surface_, x, &motion, dhat_);
+  const auto start = [&](int v) -> Vec<Dim> { return x.segment<Dim>(Dim * v); };
+  // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
+  // the number of threads.
+  const auto least_over = [&](const auto& pairs, const auto& ccd) {
+    std::vector<double> steps((pairs.size() + kBatch - 1) / kBatch, 1.0);
+    parallel_blocks(pairs.size(), kBatch, [&](std::size_t begin, std::size_t end) {
+      double step = 1;
+      for (std::size_t i = begin; i < end; ++i) step *= ccd(pairs[i], step);
+      steps[begin / kBatch] = step;
+    });
+    double least = 1;
+    for (const double step : steps) least = std::min(least, step);
+    return least;
+  };
+  const auto end_of = [&](int v, double step) -> Vec<Dim> { return start(v) + step * motion.segment<Dim>(Dim * v); };
+  if constexpr (Dim == 2) {
+    return least_over(candidates.vertex_edges(), [&](const std::array<int, 2>& pair, double step) {
+      const auto [a, b] = surface_.edges[pair[1]];
+      const int v = pair[0];
+      return point_edge_ccd<2>(start(v), start(a), start(b), end_of(v, step), end_of(a, step), end_of(b, step));
+    });
+  } else {
+    const auto apart = [](const Box<3>& p, const Box<3>& q) { return !p.overlaps(q); };
+    const double of_triangles = least_over(candidates.vertex_triangles(), [&](const std::array<int, 2>& pair, double step) {
+      const int v = pair[0];
+      const auto [a, b, c] = surface_.triangles[pair[1]];
+      const Vec<3> p[] = {start(v), start(a), start(b), start(c)};
+      const Vec<3> q[] = {end_of(v, step), end_of(a, step), end_of(b, step), end_of(c, step)};
+      Box<3> of_vertex, of_triangle;
+      for (int k = 0; k < 4; ++k) {
+        Box<3>& box = k == 0 ? of_vertex : of_triangle;
+        box.include(p[k]);
+        box.include(q[k]);
+      }
+      if (apart(of_vertex, of_triangle)) return 1.0;
+      return point_triangle_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]);
+    });
+    const double of_edges = least_over(candidates.edge_edges(), [&](const std::array<int, 2>& pair, double step) {
+      const auto [a, b] = surface_.edges[pair[0]];
+      const auto [c, d] = surface_.edges[pair[1]];
+      const Vec<3> p[] = {start(a), start(b), start(c), start(d)};
+      const Vec<3> q[] = {end_of(a, step), end_of(b, step), end_of(c, step), end_of(d, step)};
+      Box<3> first, second;
+      for (int k = 0; k < 4; ++k) {
+        Box<3>& box = k < 2 ? first : second;
+        box.include(p[k]);
+        box.include(q[k]);
+      }
+      if (apart(first, second)) return 1.0;
+      return edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]);
+    });
+    return std::min(of_triangles, of_edges);
   }
-  return step;
 }
 
 template class ContactEnergy<2>;

@@ -7,8 +7,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "itr/geometry/distance.hpp"
-
 namespace itr {
 
 namespace {
@@ -32,18 +30,12 @@ FrictionEnergy<Dim>::FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVect
                                     const ContactOptions& options, VelocityRule velocity, double scale)
     : velocity_(std::move(velocity)), epsv_(options.friction_velocity), scale_(scale) {
   for (const auto& s : contact.active(x, workspace)) {
-    Pair pair{s.vertices(), s.size(), {1, -1, 0}, {}, 0};
-    const Vec<Dim> p = x.segment<Dim>(Dim * s.a), a = x.segment<Dim>(Dim * s.b1);
-    Vec<Dim> normal = p - a;
-    if (s.b2 != kNone) {
-      const Vec<Dim> edge = x.segment<Dim>(Dim * s.b2) - a;
-      const double t = normal.dot(edge) / edge.squaredNorm();
-      pair.coefficients = {1, t - 1, -t};
-      normal -= t * edge;
-    }
-    const double D = contact.squared_distance(s, x), distance = std::sqrt(D);
-    pair.tangents = tangent_basis(Vec<Dim>(normal / distance));
-    pair.force = options.friction_coefficient * s.weight * contact.stiffness() * -contact.barrier_first(D) * 2 * distance;
+    if (s.is_mollified()) continue;
+    const PairDistance<Dim> q = contact.distance(s, x);
+    const double distance = std::sqrt(q.squared);
+    Pair pair{s.vertices, s.size(), q.coefficients, tangent_basis(Vec<Dim>(q.separation / distance)), 0};
+    pair.force =
+        options.friction_coefficient * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
     pairs_.push_back(pair);
   }
 }
@@ -76,6 +68,7 @@ void FrictionEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, W
 
 template <int Dim>
 void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 4 * Dim, 4 * Dim> block;
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
     const double y = v.norm(), isotropic = f1_over_y(y, epsv_);
@@ -84,16 +77,12 @@ void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
     if (y > 0) inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
     if (psd == PsdProjection::clamp && pair.force < 0) continue;
     const Mat<Dim> world = scale_ * velocity_.rate * pair.force * pair.tangents * inner * pair.tangents.transpose();
-    Mat<3 * Dim> block = Mat<3 * Dim>::Zero();
+    const int dofs = Dim * pair.size;
+    block.resize(dofs, dofs);
     for (int i = 0; i < pair.size; ++i)
       for (int j = 0; j < pair.size; ++j)
         block.template block<Dim, Dim>(Dim * i, Dim * j) = pair.coefficients[i] * pair.coefficients[j] * world;
-    if (pair.size == 2) {
-      const Mat<2 * Dim> two = block.template topLeftCorner<2 * Dim, 2 * Dim>();
-      sink.add<Dim>(std::span(pair.vertices.data(), 2), two.data());
-    } else {
-      sink.add<Dim>(std::span(pair.vertices.data(), 3), block.data());
-    }
+    sink.add<Dim>(std::span(pair.vertices.data(), pair.size), block.data());
   }
 }
 

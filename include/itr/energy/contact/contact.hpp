@@ -1,37 +1,35 @@
 // SPDX-License-Identifier: MIT
-// Contact barrier of IPC between vertices and edges, in both forms of scene-format §6.3 and §6.4.
+// Contact barrier of IPC (Li et al. 2020) between surface primitives, in both forms of scene-format §6.3 and §6.4: vertices
+// and edges in 2D, vertices and triangles, edges and edges in 3D.
 #pragma once
 
 #include "itr/energy/contact/options.hpp"
 #include "itr/energy/contact/surface.hpp"
 #include "itr/energy/energy.hpp"
-#include "itr/geometry/bvh.hpp"
+#include "itr/geometry/distance.hpp"
 
 namespace itr {
 
-/// One active pair: vertex-vertex (b2 = kNone) or vertex-edge. Distances are to the closest feature.
+/// One active pair of features, reduced to those that are closest (except for nearly parallel edges, which stay edges).
 struct ContactStencil {
-  int a = kNone;               ///< vertex
-  int b1 = kNone, b2 = kNone;  ///< the other vertex, or the edge, b1 < b2
-  double weight = 0;           ///< area weights and corrections included; may be negative
-  int size() const { return b2 == kNone ? 2 : 3; }
-  std::array<int, 3> vertices() const { return {a, b1, b2}; }
+  PairKind kind = PairKind::vertex_vertex;
+  std::array<int, 4> vertices{kNone, kNone, kNone, kNone};
+  double weight = 0;  ///< area weights and corrections included; may be negative
+  /// Nearly parallel edges only: |u x v|^2 below which the pair fades out [m^4], and the features whose distance counts.
+  double mollifier_threshold = 0;
+  ClosestFeatures closest{};
+
+  int size() const { return pair_size(kind); }
+  bool is_mollified() const { return mollifier_threshold > 0; }
 };
 
-/// Vertex-edge pairs that can come within reach while every vertex stays in its box: valid for many evaluations. A
-/// workspace serves one surface: a new or changed surface needs a new workspace.
-template <int Dim>
-struct ContactCandidates {
-  const CollisionSurface* surface = nullptr;
-  std::vector<Box<Dim>> boxes;            ///< one a surface vertex
-  std::vector<std::array<int, 3>> pairs;  ///< vertex, edge ends
-};
-
-/// scale * kappa * sum of weight * b(D), b(D) = -(D - dhat^2)^2 ln(D / dhat^2) of the squared distance D below dhat^2.
+/// scale * kappa * sum of weight * m * b(D), b(D) = -(D - dhat^2)^2 ln(D / dhat^2) of the squared distance D below dhat^2, m
+/// the mollifier of nearly parallel edges.
 template <int Dim>
 class ContactEnergy final : public Energy {
  public:
-  /// `surface` must outlive this. `scale` is alpha h^2.
+  /// `surface` must outlive this. `scale` is alpha h^2. A workspace serves one surface: a new or changed surface needs a new
+  /// workspace.
   ContactEnergy(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale);
   std::string_view name() const override { return "contact"; }
   double value(ConstVectorView x, Workspace& workspace) const override;
@@ -40,31 +38,31 @@ class ContactEnergy final : public Energy {
   /// Time of impact by conservative CCD; feasible: no pair touches.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
 
-  /// Active pairs at x, merged and sorted.
-  std::vector<ContactStencil> active(ConstVectorView x, Workspace& workspace) const;
+  /// Active pairs at x, merged and sorted. Valid until the next call with this workspace.
+  const std::vector<ContactStencil>& active(ConstVectorView x, Workspace& workspace) const;
   /// Smallest distance [m] over counted pairs nearer than the candidates reach; infinity where there are none.
   double min_distance(ConstVectorView x, Workspace& workspace) const;
   /// Whether any counted pair is near enough to x to be looked at.
-  bool has_candidates(ConstVectorView x, Workspace& workspace) const { return !candidates(x, nullptr, workspace).empty(); }
-  double squared_distance(const ContactStencil& stencil, ConstVectorView x) const;
+  bool has_candidates(ConstVectorView x, Workspace& workspace) const;
+  /// What a pair adds to the energy of `scale` 1 [J].
+  double pair_energy(const ContactStencil& stencil, ConstVectorView x) const;
+  /// Distance of the pair's closest features.
+  PairDistance<Dim> distance(const ContactStencil& stencil, ConstVectorView x) const;
   /// b(D) and its derivatives with respect to D.
   double barrier(double squared_distance) const;
   double barrier_first(double squared_distance) const;
   double barrier_second(double squared_distance) const;
   double stiffness() const { return stiffness_; }
-  /// Factor on weights: 1 / dhat^3 in the convergent form.
-  double weight_scale() const { return weight_scale_; }
+  void set_stiffness(double stiffness) { stiffness_ = stiffness; }
 
  private:
-  const std::vector<std::array<int, 3>>& candidates(ConstVectorView x, const VectorX* dx, Workspace& workspace) const;
-  bool counts(int v, int e0, int e1) const { return surface_.counts[v] || surface_.counts[e0] || surface_.counts[e1]; }
+  std::vector<ContactStencil> find_active(ConstVectorView x, Workspace& workspace) const;
 
   const CollisionSurface& surface_;
   double dhat_;
   bool convergent_;
   double stiffness_;
   double scale_;
-  double weight_scale_;
 };
 
 }  // namespace itr

@@ -27,9 +27,9 @@ class FrictionEnergy final : public Energy {
  private:
   static constexpr int kTangents = Dim - 1;
   struct Pair {
-    std::array<int, 3> vertices;
+    std::array<int, 4> vertices;
     int size;
-    std::array<double, 3> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
+    Vec<4> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
     Eigen::Matrix<double, Dim, kTangents> tangents;
     double force;  ///< mu * normal force * weight [N]
   };

@@ -2,22 +2,55 @@
 #pragma once
 
 #include <array>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "itr/core/types.hpp"
 
 namespace itr {
 
+/// For each of n things a list of ids.
+struct Adjacency {
+  std::vector<int> offset = {0};  ///< n + 1
+  std::vector<int> id;
+  std::span<const int> operator[](int i) const { return std::span(id).subspan(offset[i], offset[i + 1] - offset[i]); }
+};
+
 /// The primitives that can touch: surfaces of all bodies, and obstacles. Vertices carry the ids of the problem they are part
-/// of (the whole scene or a patch), and the per-vertex arrays have one entry for every vertex of that problem.
+/// of (the whole scene or a patch), and the per-vertex arrays have one entry for every vertex of that problem. What is said
+/// of a vertex's or an edge's neighbours refers to the *whole* surface, also where only a part of it is here.
 struct CollisionSurface {
-  std::vector<int> vertices;              ///< those on the surface
-  std::vector<std::array<int, 2>> edges;  ///< surface edges, smaller id first, ascending
-  std::vector<double> area;  ///< by problem vertex: half the rest lengths of the incident edges (1: codimensional)
-  std::vector<int> degree;   ///< by problem vertex: incident edges on the *whole* surface
+  std::vector<int> vertices;                  ///< those on the surface, ascending
+  std::vector<std::array<int, 2>> edges;      ///< surface edges, smaller id first, ascending
+  std::vector<std::array<int, 3>> triangles;  ///< 3D only
+  /// By problem vertex: half the rest lengths of the incident edges (2D), a third of the rest areas of the incident
+  /// triangles (3D; half the edges where there is none); 1 where there are neither.
+  std::vector<double> area;
+  std::vector<int> degree;  ///< by problem vertex: incident edges
   /// By problem vertex: whether pairs with it count. False for obstacles, and around a patch for vertices whose contacts
   /// the patch cannot change.
   std::vector<char> counts;
+
+  // 3D only.
+  std::vector<std::array<int, 3>> triangle_edges;  ///< of corners (0 1), (1 2), (2 0)
+  std::vector<double> edge_area;                   ///< a third of the incident triangles' rest areas, or the rest length
+  std::vector<double> edge_length_squared;         ///< at rest [m^2]
+  Adjacency vertex_edges;                          ///< edges at a vertex
+  Adjacency edge_opposites;                        ///< by edge: the third vertices of its triangles
+  std::vector<char> on_open_boundary;              ///< by problem vertex: has an edge with one triangle
 };
+
+/// The surface with these primitives (edges of the triangles are added) and codimensional `points`. `rest`: positions of all
+/// vertices of the problem [m]; `counts` as in CollisionSurface.
+template <int Dim>
+CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
+                                        std::span<const int> points, std::span<const Vec<Dim>> rest,
+                                        std::vector<char> counts);
+
+/// The first two edges (2D), or the first edge and triangle (3D), that share a point without sharing a vertex and of which
+/// one counts: indices, decided exactly.
+template <int Dim>
+std::optional<std::array<int, 2>> find_intersection(const CollisionSurface& surface, ConstVectorView x);
 
 }  // namespace itr

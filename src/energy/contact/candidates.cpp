@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+#include "candidates.hpp"
+
+#include <algorithm>
+
+#include "itr/core/parallel.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr std::size_t kBlock = 128;
+constexpr std::size_t kFewPairs = 4096;  ///< so many are looked at one by one: cheaper than a tree
+
+template <int Dim>
+Vec<Dim> at(ConstVectorView x, int v) {
+  return x.segment<Dim>(Dim * v);
+}
+
+template <int Dim, std::size_t N>
+std::vector<Box<Dim>> boxes_of(const std::vector<std::array<int, N>>& primitives,
+                               const std::vector<Box<Dim>>& vertex_boxes) {
+  std::vector<Box<Dim>> boxes(primitives.size());
+  for (std::size_t i = 0; i < primitives.size(); ++i)
+    for (const int v : primitives[i]) boxes[i].include(vertex_boxes[v]);
+  return boxes;
+}
+
+/// Calls find(i, pairs) for i < n, which appends to `pairs`; the pairs come in the order of i.
+template <typename Find>
+std::vector<std::array<int, 2>> collect(std::size_t n, const Find& find) {
+  std::vector<std::vector<std::array<int, 2>>> found((n + kBlock - 1) / kBlock);
+  parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) find(static_cast<int>(i), found[begin / kBlock]);
+  });
+  std::vector<std::array<int, 2>> all;
+  for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
+  return all;
+}
+
+template <int Dim>
+void update_tree(bool keep, const std::vector<Box<Dim>>& boxes, Bvh<Dim>& tree) {
+  if (keep && tree.size() == static_cast<int>(boxes.size()))
+    tree.refit(boxes);
+  else
+    tree.build(boxes);
+}
+
+bool counts(const CollisionSurface& surface, int v) { return surface.counts[v]; }
+template <std::size_t N>
+bool counts(const CollisionSurface& surface, const std::array<int, N>& primitive) {
+  return std::any_of(primitive.begin(), primitive.end(), [&](int v) { return surface.counts[v]; });
+}
+
+template <std::size_t N>
+bool contains(const std::array<int, N>& primitive, int v) {
+  return std::find(primitive.begin(), primitive.end(), v) != primitive.end();
+}
+
+/// (vertex, primitive) for all that overlap, share no vertex, and of which one counts.
+template <int Dim, std::size_t N>
+std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
+                                             const std::vector<std::array<int, N>>& primitives,
+                                             const std::vector<Box<Dim>>& vertex_boxes, const std::vector<Box<Dim>>& boxes,
+                                             bool keep_tree, Bvh<Dim>& tree) {
+  const auto matters = [&](int v, int i) {
+    return !contains(primitives[i], v) && (counts(surface, v) || counts(surface, primitives[i]));
+  };
+  std::vector<std::array<int, 2>> pairs;
+  if (surface.vertices.size() * primitives.size() < kFewPairs) {
+    for (const int v : surface.vertices)
+      for (std::size_t i = 0; i < primitives.size(); ++i)
+        if (vertex_boxes[v].overlaps(boxes[i]) && matters(v, static_cast<int>(i))) pairs.push_back({v, static_cast<int>(i)});
+    return pairs;
+  }
+  update_tree(keep_tree, boxes, tree);
+  Box<Dim> counting;  // what does not count only meets what does
+  for (std::size_t i = 0; i < primitives.size(); ++i)
+    if (counts(surface, primitives[i])) counting.include(boxes[i]);
+  return collect(surface.vertices.size(), [&](int k, std::vector<std::array<int, 2>>& found) {
+    const int v = surface.vertices[k];
+    if (!counts(surface, v) && !vertex_boxes[v].overlaps(counting)) return;
+    std::vector<int> hits;
+    tree.query(vertex_boxes[v], hits);
+    for (const int i : hits)
+      if (matters(v, i)) found.push_back({v, i});
+  });
+}
+
+template <int Dim>
+std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes,
+                                           bool keep_tree, Bvh<Dim>& tree) {
+  const auto& edges = surface.edges;
+  const bool few = edges.size() * edges.size() < kFewPairs;
+  if (!few) update_tree(keep_tree, boxes, tree);
+  return collect(edges.size(), [&](int e, std::vector<std::array<int, 2>>& found) {
+    if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
+    const auto consider = [&](int f) {
+      const bool both = counts(surface, edges[f]);
+      if (both ? f <= e : f == e) return;
+      if (contains(edges[e], edges[f][0]) || contains(edges[e], edges[f][1])) return;
+      found.push_back({std::min(e, f), std::max(e, f)});
+    };
+    if (few) {
+      for (std::size_t f = 0; f < edges.size(); ++f)
+        if (boxes[e].overlaps(boxes[f])) consider(static_cast<int>(f));
+      return;
+    }
+    std::vector<int> hits;
+    tree.query(boxes[e], hits);
+    for (const int f : hits) consider(f);
+  });
+}
+
+}  // namespace
+
+template <int Dim>
+bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx) const {
+  if (surface_ != &surface || boxes_.size() != surface.vertices.size()) return false;
+  for (std::size_t i = 0; i < boxes_.size(); ++i) {
+    const Vec<Dim> p = at<Dim>(x, surface.vertices[i]);
+    if (!boxes_[i].contains(p)) return false;
+    if (dx && !boxes_[i].contains(p + at<Dim>(*dx, surface.vertices[i]))) return false;
+  }
+  return true;
+}
+
+template <int Dim>
+void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx,
+                                         double reach) {
+  // Room around the motion, so that the pairs serve a whole line search and often the next one.
+  double motion = 0;
+  if (dx)
+    for (const int v : surface.vertices) motion = std::max(motion, at<Dim>(*dx, v).norm());
+  const double room = 0.5 * reach + 0.25 * motion;
+  boxes_.assign(surface.vertices.size(), {});
+  reach_.resize(surface.area.size());
+  for (std::size_t i = 0; i < boxes_.size(); ++i) {
+    const int v = surface.vertices[i];
+    boxes_[i].include(at<Dim>(x, v));
+    if (dx) boxes_[i].include(at<Dim>(x, v) + at<Dim>(*dx, v));
+    boxes_[i] = boxes_[i].inflated(room);
+    reach_[v] = boxes_[i].inflated(reach / 2);
+  }
+}
+
+template <int Dim>
+void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach) {
+  if (holds(surface, x, dx)) return;
+  const bool keep_trees = surface_ == &surface;
+  build_boxes(surface, x, dx, reach);
+  surface_ = &surface;
+  const auto edge_boxes = boxes_of<Dim>(surface.edges, reach_);
+  if constexpr (Dim == 2) {
+    vertex_edges_ = vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes, keep_trees, edge_tree_);
+  } else {
+    const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);
+    vertex_triangles_ = vertex_pairs<Dim>(surface, surface.triangles, reach_, triangle_boxes, keep_trees, triangle_tree_);
+    edge_edges_ = edge_pairs<Dim>(surface, edge_boxes, keep_trees, edge_tree_);
+  }
+}
+
+template class ContactCandidates<2>;
+template class ContactCandidates<3>;
+
+}  // namespace itr

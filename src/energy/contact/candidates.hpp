@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Broad phase: pairs of primitives that can come within reach while every vertex stays in its box.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "itr/energy/contact/surface.hpp"
+#include "itr/geometry/bvh.hpp"
+
+namespace itr {
+
+/// Valid for many evaluations: the boxes hold a motion and some room around it. Kept in a Workspace.
+template <int Dim>
+class ContactCandidates {
+ public:
+  using Pairs = std::vector<std::array<int, 2>>;
+
+  /// Makes the pairs hold for x and, where it is given, for the motion by dx. `reach`: pairs that come nearer than this
+  /// count.
+  void update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
+
+  const Pairs& vertex_edges() const { return vertex_edges_; }          ///< (vertex, edge); 2D
+  const Pairs& vertex_triangles() const { return vertex_triangles_; }  ///< (vertex, triangle); 3D
+  const Pairs& edge_edges() const { return edge_edges_; }              ///< smaller index first where both count; 3D
+  bool empty() const { return vertex_edges_.empty() && vertex_triangles_.empty() && edge_edges_.empty(); }
+
+ private:
+  bool holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx) const;
+  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
+
+  const CollisionSurface* surface_ = nullptr;
+  std::vector<Box<Dim>> boxes_;  ///< one a surface vertex: while it stays in there, the pairs hold
+  std::vector<Box<Dim>> reach_;  ///< by problem vertex, half the reach around its box
+  Bvh<Dim> edge_tree_, triangle_tree_;
+  Pairs vertex_edges_, vertex_triangles_, edge_edges_;
+};
+
+}  // namespace itr
