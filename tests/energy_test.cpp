@@ -8,6 +8,7 @@
 
 #include "itr/core/parallel.hpp"
 #include "itr/energy/contact/friction.hpp"
+#include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/energy/load.hpp"
@@ -546,6 +547,61 @@ TEST(Contact3, HasTheSameBitsForOneAndTwoThreads) {
     return result;
   };
   EXPECT_TRUE((run(1).array() == run(2).array()).all());
+}
+
+TEST(AdaptiveStiffness, BalancesTheBarrierAndStaysInItsBounds) {
+  const ContactScene3 scene(3, false, 0.3, 0.02);
+  Workspace workspace;
+  const ContactEnergy<3> contact(scene.surface, scene.options, 1, 1);
+  const VectorX barrier = gradient_of(contact, scene.x);
+  const double mass = 2, scale = 0.25, Dhat = 0.04;
+  const AdaptiveStiffness<3> adaptive(scene.surface, scene.options, mass, scale);
+  Vec<3> low = scene.x.head<3>(), high = low;
+  for (Eigen::Index i = 0; i < scene.x.size(); i += 3) {
+    low = low.cwiseMin(scene.x.segment<3>(i));
+    high = high.cwiseMax(scene.x.segment<3>(i));
+  }
+  const double d0 = std::pow(1e-8 * (high - low).norm(), 2), r = Dhat / d0;
+  const double least = 1e11 * mass / (4 * d0 * ((r + 2) * r - 2 * std::log(d0 / Dhat) - 3));
+  BarrierStiffness stiffness;
+  adaptive.initialize(scene.x, -7 * least * barrier, stiffness, workspace);
+  EXPECT_NEAR(stiffness.value * scale, 7 * least, 1e-10 * least);
+  EXPECT_NEAR(stiffness.largest * scale, 100 * least, 1e-10 * least);
+  adaptive.initialize(scene.x, barrier, stiffness, workspace);  // pulls the same way as the barrier
+  EXPECT_NEAR(stiffness.value * scale, least, 1e-10 * least);
+  adaptive.initialize(scene.x, -1e9 * least * barrier, stiffness, workspace);
+  EXPECT_NEAR(stiffness.value * scale, 100 * least, 1e-8 * least);
+
+  // In the convergent form the force at x is that of the plain one: the energies are made equal there.
+  auto options = scene.options;
+  options.convergent = true;
+  const ContactEnergy<3> convergent(scene.surface, options, 1, 1);
+  BarrierStiffness other;
+  AdaptiveStiffness<3>(scene.surface, options, mass, scale).initialize(scene.x, -7 * least * barrier, other, workspace);
+  EXPECT_NEAR(other.value * convergent.value(scene.x, workspace) * scale, 7 * least * contact.value(scene.x, workspace),
+              1e-10 * least * contact.value(scene.x, workspace));
+}
+
+TEST(AdaptiveStiffness, DoublesWhileTinyGapsClose) {
+  const std::vector<Vec<2>> rest = {{0, 1}, {-1, 0}, {1, 0}};
+  const CollisionSurface surface = make_collision_surface<2>({{1, 2}}, {}, std::vector<int>{0}, rest, {1, 0, 0});
+  const ContactOptions options{.enabled = true, .activation_distance = 0.1};
+  const AdaptiveStiffness<2> adaptive(surface, options, 1, 1);
+  Workspace workspace;
+  BarrierStiffness stiffness{.value = 1, .largest = 3};
+  const auto update = [&](double gap) {
+    VectorX x(6);
+    x << 0, gap, -1, 0, 1, 0;
+    return adaptive.update(x, stiffness, workspace);
+  };
+  EXPECT_FALSE(update(1e-3));
+  EXPECT_FALSE(update(1.5e-9));  // small now, but was large before
+  EXPECT_TRUE(update(1e-9));
+  EXPECT_EQ(stiffness.value, 2);
+  EXPECT_FALSE(update(1.2e-9));  // opening
+  EXPECT_TRUE(update(1e-9));
+  EXPECT_EQ(stiffness.value, 3);  // the largest
+  EXPECT_FALSE(update(0.5e-9));
 }
 
 }  // namespace

@@ -44,8 +44,15 @@ constexpr double kRelaxBelow = 0.1;        ///< a step blocked to less than this
 class Minimizer {
  public:
   Minimizer(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
-            const NewtonOptions& options, Workspace& workspace)
-      : energy_(energy), x_(x), dofs_(dofs), target_(target), system_(system), options_(options), workspace_(workspace) {}
+            const NewtonOptions& options, Workspace& workspace, const std::function<bool(const VectorX&)>& after_step)
+      : energy_(energy),
+        x_(x),
+        dofs_(dofs),
+        target_(target),
+        system_(system),
+        options_(options),
+        workspace_(workspace),
+        after_step_(after_step) {}
 
   NewtonSummary run() {
     value_ = timed_value(x_);
@@ -65,6 +72,7 @@ class Minimizer {
         }
         return stop(Termination::no_descent, "the line search found no step");
       }
+      if (after_step_ && after_step_(x_)) value_ = timed_value(x_);
     }
     return stop(Termination::iterations, "no convergence in " + std::to_string(options_.max_iterations) + " iterations");
   }
@@ -226,6 +234,7 @@ class Minimizer {
   NewtonSystem& system_;
   const NewtonOptions& options_;
   Workspace& workspace_;
+  const std::function<bool(const VectorX&)>& after_step_;
 
   NewtonSummary summary_;
   double value_ = 0;
@@ -245,8 +254,9 @@ class Minimizer {
 }  // namespace
 
 NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
-                       const NewtonOptions& options, Workspace& workspace) {
-  return Minimizer(energy, x, dofs, target, system, options, workspace).run();
+                       const NewtonOptions& options, Workspace& workspace,
+                       const std::function<bool(const VectorX&)>& after_step) {
+  return Minimizer(energy, x, dofs, target, system, options, workspace, after_step).run();
 }
 
 }  // namespace itr

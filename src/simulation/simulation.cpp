@@ -25,8 +25,9 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   const auto refuse = [](const char* place, const char* found) {
     throw InputError({"", place, found, "something that this version supports"});
   };
-  if (setup.contact.enabled && setup.contact.adaptive_stiffness)
-    refuse("/solver/contact/barrier_stiffness", "adaptive stiffness, which is not supported yet (give a number)");
+  if (setup.remesh.enabled && setup.contact.enabled && setup.contact.adaptive_stiffness)
+    refuse("/solver/contact/barrier_stiffness",
+           "adaptive stiffness with remeshing, which is not supported yet (give a number)");
   if (setup.remesh.enabled && setup.remesh.sizing_field)
     refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
   if constexpr (Dim == 3) {
@@ -166,7 +167,7 @@ StepReport Simulation<Dim>::initial_report() const {
   report.t = state.t;
   report.vertices = state.mesh.num_vertices();
   report.elements = state.mesh.num_cells();
-  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->solver);
+  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->solver, state.stiffness);
   report.unknowns = problem.dofs().num_unknowns;
   report.energy = problem.report(state.history.x[0]);
   report.energy_before_remesh = report.energy.total;

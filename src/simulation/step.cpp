@@ -169,7 +169,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
   VectorX x = next.history.x[0];
   const auto make_problem = [&] {
     const ScopedTimer timer(report.seconds.assembly);
-    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver);
+    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver, state.stiffness);
   };
   auto problem = make_problem();
   const auto solve = [&](const VectorX& lagged) {
@@ -229,6 +229,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
     report.min_distance = problem->min_distance(x);
     report.min_volume_ratio = min_volume_ratio(problem->cells(), x);
   }
+  next.stiffness = problem->stiffness();
   TimeIntegrator(setup.time).push(std::move(x), next.history);
   state = std::move(next);
   report.peak_rss_mb = peak_rss_mb();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 namespace itr {
 
@@ -92,11 +93,12 @@ HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t
 
 template <int Dim>
 StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
-                              linear::Solver& solver)
+                              linear::Solver& solver, const BarrierStiffness& stiffness)
     : setup_(setup),
       cells_(whole_mesh(mesh, setup.obstacles.rest)),
       held_(held_dofs(setup, mesh, t)),
-      dofs_(DofMap::from_held(held_.held)) {
+      dofs_(DofMap::from_held(held_.held)),
+      stiffness_(stiffness) {
   const TimeIntegrator integrator(setup.time);
   scaling_ = integrator.scaling(history);
   if (!setup.time.quasistatic && !setup.time.is_static)
@@ -107,7 +109,10 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
     loads_ = std::make_shared<LoadEnergy<Dim>>(cells_, setup.materials, loads, scaling_);
   if (setup.contact.enabled) {
     surface_ = collision_surface(mesh, setup.obstacles);
-    contact_ = std::make_shared<ContactEnergy<Dim>>(surface_, setup.contact, setup.contact.barrier_stiffness, scaling_);
+    if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
+    contact_ = std::make_shared<ContactEnergy<Dim>>(surface_, setup.contact, stiffness_.value, scaling_);
+    if (setup.contact.adaptive_stiffness)
+      adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_, setup.contact, average_mass(), scaling_);
     velocity_ = {integrator.velocity_rate(history), integrator.velocity_reference(history)};
   }
   std::vector<int> stencils;
@@ -132,9 +137,59 @@ EnergySum StepProblem<Dim>::energy(const VectorX& lagged_x) {
   return sum;
 }
 
+/// Sum of all entries of the mass matrix by its number of rows, obstacles' included; 1 where there is none [kg].
+template <int Dim>
+double StepProblem<Dim>::average_mass() const {
+  const Eigen::Index rows = held_.target.size();
+  return inertia_ ? momentum(VectorX::Ones(rows)).sum() / static_cast<double>(rows) : 1;
+}
+
+/// Balances the barrier against the other terms at x. At obstacles the reference implementation's gradient is their
+/// prescribed displacement (scene-format §6.5): it is part of its schedule.
+template <int Dim>
+void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
+  VectorX gradient = VectorX::Zero(x.size());
+  if (inertia_) inertia_->add_gradient(x, gradient, workspace_);
+  elastic_->add_gradient(x, gradient, workspace_);
+  if (loads_) loads_->add_gradient(x, gradient, workspace_);
+  const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
+  for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
+    gradient.template segment<Dim>(bodies + Dim * o) =
+        -scaling_ * (held_.target.template segment<Dim>(bodies + Dim * o) - setup_.obstacles.rest[o]);
+  adaptive_->initialize(x, gradient, stiffness_, workspace_);
+  contact_->set_stiffness(stiffness_.value);
+}
+
+/// x with held dofs at their targets, where the straight way there is free.
+template <int Dim>
+VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
+  VectorX start = x;
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    if (dofs_.unknown[i] == kNone) start[i] = held_.target[i];
+  const bool free = std::isfinite(elastic_->value(start, workspace_)) && contact_->max_step(x, start - x, workspace_) == 1;
+  return free ? start : x;
+}
+
+/// One solve with the friction that `sum` has, from where the stiffness balances the terms.
+template <int Dim>
+NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x) {
+  if (!adaptive_) return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_);
+  initialize_stiffness(start_of_solve(x));
+  bool is_first = true;
+  const auto update = [&](const VectorX& iterate) {
+    if (std::exchange(is_first, false) || setup_.time.is_static) return false;
+    const bool changed = adaptive_->update(iterate, stiffness_, workspace_);
+    if (changed) contact_->set_stiffness(stiffness_.value);
+    return changed;
+  };
+  return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_, update);
+}
+
 template <int Dim>
 NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
-  NewtonSummary summary = minimize(energy(lagged_x), x, dofs_, held_.target, *system_, setup_.newton, workspace_);
+  const bool is_first_step = std::isinf(stiffness_.largest);
+  if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
+  NewtonSummary summary = minimize_lagged(energy(lagged_x), x);
   const bool lagging = contact_ && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
   if (!lagging) return summary;
   const int rounds = setup_.contact.friction_iterations;
@@ -152,7 +207,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
     if (rounds >= 0 && round >= std::max(1, rounds)) break;
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
     previous.push_back(x);
-    NewtonSummary next = minimize(relagged, x, dofs_, held_.target, *system_, setup_.newton, workspace_);
+    NewtonSummary next = minimize_lagged(relagged, x);
     next.add_effort(summary);
     summary = next;
   }

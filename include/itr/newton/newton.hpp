@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <functional>
 #include <string>
 
 #include "itr/energy/energy.hpp"
@@ -82,7 +83,9 @@ struct NewtonSummary {
 /// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as
 /// x; empty: they stay), as far in each iteration as feasibility allows, by an exact-penalty merit function (Nocedal &
 /// Wright 2006, §18.3); convergence is tested only once they are there. x stays feasible throughout.
+/// `after_step`, where given, is called with each accepted iterate and says whether it changed the energy.
 NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
-                       const NewtonOptions& options, Workspace& workspace);
+                       const NewtonOptions& options, Workspace& workspace,
+                       const std::function<bool(const VectorX&)>& after_step = {});
 
 }  // namespace itr

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "itr/core/log.hpp"
+#include "itr/energy/contact/stiffness.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/simulation/frame.hpp"
@@ -21,8 +22,9 @@ struct State {
   Mesh<Dim> mesh;   ///< compact
   History history;  ///< history.x[0] is the present
   int step = 0;
-  double t = 0;               ///< [s]
-  double created_energy = 0;  ///< balance of Newmark's steps, see StepProblem::created_energy [J]
+  double t = 0;                ///< [s]
+  BarrierStiffness stiffness;  ///< where it is adaptive
+  double created_energy = 0;   ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 
 struct StepResult {

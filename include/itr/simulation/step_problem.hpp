@@ -4,6 +4,7 @@
 
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/contact/friction.hpp"
+#include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/energy/load.hpp"
@@ -35,8 +36,10 @@ HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t
 template <int Dim>
 class StepProblem {
  public:
-  /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this.
-  StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, linear::Solver& solver);
+  /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
+  /// `stiffness`, which the barrier starts from where it is adaptive.
+  StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, linear::Solver& solver,
+              const BarrierStiffness& stiffness = {});
 
   /// Solves from x (feasible) in place, with lagging rounds of friction. The friction of the first round is lagged at
   /// `lagged_x`.
@@ -49,6 +52,7 @@ class StepProblem {
   double created_energy(const History& history, const VectorX& x);
   /// Kinetic, elastic and contact energy [J].
   double mechanical_energy(const VectorX& x, const VectorX& v);
+  const BarrierStiffness& stiffness() const { return stiffness_; }
   const DofMap& dofs() const { return dofs_; }
   const CellSet<Dim>& cells() const { return cells_; }
   const CollisionSurface& surface() const { return surface_; }
@@ -56,7 +60,11 @@ class StepProblem {
 
  private:
   EnergySum energy(const VectorX& lagged_x);
+  NewtonSummary minimize_lagged(const EnergySum& sum, VectorX& x);
+  void initialize_stiffness(const VectorX& x);
+  VectorX start_of_solve(const VectorX& x);
   VectorX momentum(const VectorX& v) const;
+  double average_mass() const;
 
   const Setup<Dim>& setup_;
   CellSet<Dim> cells_;
@@ -71,6 +79,8 @@ class StepProblem {
   std::shared_ptr<LoadEnergy<Dim>> loads_;
   std::shared_ptr<ContactEnergy<Dim>> contact_;
   std::shared_ptr<FrictionEnergy<Dim>> friction_;
+  std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
+  BarrierStiffness stiffness_;
   std::unique_ptr<SparseSystem> system_;
 };
 
