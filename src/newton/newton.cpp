@@ -39,7 +39,9 @@ namespace {
 constexpr double kArmijo = 1e-4;
 constexpr int kIterationsPerFallback = 5;  ///< iterations with the projected Hessian before the true one is tried again
 constexpr double kLeastPenalty = 1e-8;     ///< force by length and stiffness: above the round-off of a body at rest
-constexpr double kRelaxBelow = 0.1;        ///< a step blocked to less than this lets the bodies relax before held dofs go on
+constexpr double kStraight = 0.8;          ///< of the slope: an energy that falls by more over a full step hardly curves
+constexpr int kMostDoublings = 12;
+constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 class Minimizer {
  public:
@@ -207,12 +209,35 @@ class Minimizer {
       if (!std::isfinite(value)) continue;
       const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
       if (!acceptable(merit_change, value, step, merit_slope, advancing)) continue;
-      x_.swap(candidate_);
-      value_ = value;
+      const bool straight = !advancing && step == 1 && value - value_ < kStraight * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
+      accept(value);
+      if (straight) go_on();
       return true;
     }
     return false;
+  }
+
+  void accept(double value) {
+    x_.swap(candidate_);
+    value_ = value;
+  }
+
+  /// Where the energy fell in a straight line over a full step (the projected Hessian is much stiffer than the true one, as
+  /// near a saddle), steps of twice the length follow as long as they lower it: Newton would leave with hundreds of equal
+  /// ones.
+  void go_on() {
+    for (int k = 0; k < kMostDoublings; ++k) {
+      step_ *= 2;
+      {
+        const ScopedTimer timer(summary_.ccd_seconds);
+        if (energy_.max_step(x_, step_, workspace_) < 1) return;
+      }
+      candidate_ = x_ + step_;
+      const double value = timed_value(candidate_);
+      if (!(value < value_)) return;
+      accept(value);
+    }
   }
 
   bool acceptable(double change, double value, double step, double slope, bool advancing) {
