@@ -65,6 +65,23 @@ TYPED_TEST(Geometry, PairDistanceDerivativesMatchDifferences) {
     }
 }
 
+TYPED_TEST(Geometry, PairDistanceRangeHoldsTheHessian) {
+  constexpr int Dim = TypeParam::value;
+  std::mt19937 random(2);
+  for (int i = 0; i < 100; ++i)
+    for (const PairKind kind : pair_kinds<Dim>()) {
+      const auto x = random_pair<Dim>(random);
+      const PairDistance<Dim> pair = pair_distance<Dim>(kind, x.data());
+      const auto basis = pair_distance_range<Dim>(kind, pair);
+      const MatrixX hessian = pair_distance_hessian<Dim>(kind, x.data());
+      const MatrixX onto = basis * basis.transpose();
+      EXPECT_LE((onto * hessian * onto - hessian).norm(), 1e-12 * (1 + hessian.norm()));
+      const MatrixX gram = basis.transpose() * basis;
+      EXPECT_LE((gram - MatrixX(gram.diagonal().asDiagonal())).norm(), 1e-12);
+      for (const double length : gram.diagonal()) EXPECT_LE(std::min(std::abs(length), std::abs(length - 1)), 1e-12);
+    }
+}
+
 TEST(Geometry3, EdgeCrossDerivativesMatchDifferences) {
   std::mt19937 random(6);
   for (int i = 0; i < 50; ++i) {

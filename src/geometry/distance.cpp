@@ -210,6 +210,25 @@ Mat<4 * Dim> pair_distance_hessian(PairKind kind, const Vec<Dim>* x) {
 }
 
 template <int Dim>
+Eigen::Matrix<double, 4 * Dim, Dim + 2> pair_distance_range(PairKind kind, const PairDistance<Dim>& pair) {
+  Eigen::Matrix<double, 4 * Dim, Dim + 2> basis = Eigen::Matrix<double, 4 * Dim, Dim + 2>::Zero();
+  const Vec<4> c = pair.coefficients.normalized();
+  for (int i = 0; i < 4; ++i)
+    for (int d = 0; d < Dim; ++d) basis(Dim * i + d, d) = c[i];
+  // X_k = C_k (x) r + c (x) J_k: what is new in it is the part of C_k that is orthogonal to c and to the others'.
+  Eigen::Matrix<double, 4, 2> C = parameter_slopes(kind);
+  const Vec<Dim> r = pair.separation.normalized();
+  for (int k = 0; k < 2; ++k) {
+    C.col(k) -= c * c.dot(C.col(k));
+    if (k == 1) C.col(1) -= C.col(0) * C.col(0).dot(C.col(1));
+    const double length = C.col(k).norm();
+    if (length > 0) C.col(k) /= length;
+    for (int i = 0; i < 4; ++i) basis.template block<Dim, 1>(Dim * i, Dim + k) = C(i, k) * r;
+  }
+  return basis;
+}
+
+template <int Dim>
 double pair_distance_squared(PairKind kind, const Vec<Dim>* x) {
   switch (kind) {
     case PairKind::vertex_vertex:
@@ -282,11 +301,12 @@ Mat<12> edge_cross_squared_hessian(const Vec<3>* x) {
   return hessian;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                   \
-  template ClosestFeatures closest_features<Dim>(PairKind, const Vec<Dim>*);   \
-  template PairDistance<Dim> pair_distance<Dim>(PairKind, const Vec<Dim>*);    \
-  template Mat<4 * Dim> pair_distance_hessian<Dim>(PairKind, const Vec<Dim>*); \
-  template double pair_distance_squared<Dim>(PairKind, const Vec<Dim>*);       \
+#define ITR_INSTANTIATE(Dim)                                                                                     \
+  template ClosestFeatures closest_features<Dim>(PairKind, const Vec<Dim>*);                                     \
+  template PairDistance<Dim> pair_distance<Dim>(PairKind, const Vec<Dim>*);                                      \
+  template Mat<4 * Dim> pair_distance_hessian<Dim>(PairKind, const Vec<Dim>*);                                   \
+  template Eigen::Matrix<double, 4 * Dim, Dim + 2> pair_distance_range<Dim>(PairKind, const PairDistance<Dim>&); \
+  template double pair_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                         \
   template double point_edge_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

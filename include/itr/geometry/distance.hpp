@@ -44,6 +44,11 @@ PairDistance<Dim> pair_distance(PairKind kind, const Vec<Dim>* x);
 template <int Dim>
 Mat<4 * Dim> pair_distance_hessian(PairKind kind, const Vec<Dim>* x);
 
+/// Orthonormal columns (or zero ones) that span the range of that Hessian and the gradient, in the leading rows: no more
+/// than coefficients (x) e_d and, for each parameter of the closest points, one more direction along the separation.
+template <int Dim>
+Eigen::Matrix<double, 4 * Dim, Dim + 2> pair_distance_range(PairKind kind, const PairDistance<Dim>& pair);
+
 /// Squared distance of a pair, whatever its closest features.
 template <int Dim>
 double pair_distance_squared(PairKind kind, const Vec<Dim>* x);

@@ -55,33 +55,27 @@ struct Mollifier {
   }
 };
 
-/// Orthonormal basis of what is orthogonal to (1, ..., 1): columns of Helmert's matrix.
-template <int N>
-Eigen::Matrix<double, N, N - 1> helmert() {
-  Eigen::Matrix<double, N, N - 1> basis = Eigen::Matrix<double, N, N - 1>::Zero();
-  for (int k = 1; k < N; ++k) {
-    basis.col(k - 1).head(k).setConstant(1 / std::sqrt(k * (k + 1.0)));
-    basis(k, k - 1) = -k / std::sqrt(k * (k + 1.0));
-  }
-  return basis;
+/// Leaves out the negative eigenvalues of a block whose range the orthonormal (or zero) columns of `basis` span: the
+/// eigenproblem is as small as that range.
+template <int Size, int Rank>
+void clamp_to_psd(const Eigen::Matrix<double, Size, Rank>& basis, Mat<Size>& block) {
+  const Mat<Rank> reduced = basis.transpose() * block * basis;
+  const Eigen::SelfAdjointEigenSolver<Mat<Rank>> eigen(reduced);
+  if (eigen.eigenvalues()[0] >= 0) return;
+  const Eigen::Matrix<double, Size, Rank> modes = basis * eigen.eigenvectors();
+  block.noalias() = modes * eigen.eigenvalues().cwiseMax(0).asDiagonal() * modes.transpose();
 }
 
-/// Leaves out the negative eigenvalues of a block that translations do not feel: Dim of its eigenvalues are zero, and the
-/// decomposition is that much smaller.
-template <int Dim, int N>
-void clamp_to_psd(Mat<Dim * N>& block) {
-  static const Eigen::Matrix<double, Dim * N, Dim*(N - 1)> basis = [] {
-    Eigen::Matrix<double, Dim * N, Dim*(N - 1)> b = Eigen::Matrix<double, Dim * N, Dim*(N - 1)>::Zero();
-    const auto small = helmert<N>();
-    for (int i = 0; i < N; ++i)
-      for (int j = 0; j + 1 < N; ++j) b.template block<Dim, Dim>(Dim * i, Dim * j) = small(i, j) * Mat<Dim>::Identity();
+/// What is orthogonal to translations of four vertices: columns of Helmert's matrix (x) I.
+const Eigen::Matrix<double, 12, 9>& relative_motions() {
+  static const Eigen::Matrix<double, 12, 9> basis = [] {
+    Eigen::Matrix<double, 12, 9> b = Eigen::Matrix<double, 12, 9>::Zero();
+    for (int k = 1; k < 4; ++k)
+      for (int i = 0; i <= k; ++i)
+        b.block<3, 3>(3 * i, 3 * (k - 1)) = (i < k ? 1 : -k) / std::sqrt(k * (k + 1.0)) * Mat<3>::Identity();
     return b;
   }();
-  const Mat<Dim*(N - 1)> reduced = basis.transpose() * block * basis;
-  const Eigen::SelfAdjointEigenSolver<Mat<Dim*(N - 1)>> eigen(reduced);
-  if (eigen.eigenvalues()[0] >= 0) return;
-  const Eigen::Matrix<double, Dim * N, Dim*(N - 1)> modes = basis * eigen.eigenvectors();
-  block = modes * eigen.eigenvalues().cwiseMax(0).asDiagonal() * modes.transpose();
+  return basis;
 }
 
 /// Gradient of the squared distance of a pair's own features.
@@ -238,9 +232,11 @@ void ContactEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 template <int Dim>
 void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
   const auto& stencils = active(x, workspace);
-  const auto block_of = [&](const ContactStencil& s) -> Mat<4 * Dim> {
+  const bool clamp = psd == PsdProjection::clamp;
+  const auto block_of = [&](const ContactStencil& s) {
     const auto p = gather<Dim>(s.vertices, s.size(), x);
     const double factor = scale_ * stiffness_ * s.weight;
+    Mat<4 * Dim> block;
     if (s.is_mollified()) {
       if constexpr (Dim == 3) {
         const SpreadDistance q(s, p, true);
@@ -248,22 +244,26 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
         const Mollifier m(cross.value, s.mollifier_threshold);
         const double b = barrier(q.D), b1 = barrier_first(q.D), b2 = barrier_second(q.D);
         const Mat<12> mixed = cross.gradient * q.gradient.transpose();
-        return factor * (b * (m.second * cross.gradient * cross.gradient.transpose() +
-                              m.first * edge_cross_squared_hessian(p.data())) +
-                         m.first * b1 * (mixed + mixed.transpose()) +
-                         m.value * (b2 * q.gradient * q.gradient.transpose() + b1 * q.hessian));
+        block =
+            factor *
+            (b * (m.second * cross.gradient * cross.gradient.transpose() + m.first * edge_cross_squared_hessian(p.data())) +
+             m.first * b1 * (mixed + mixed.transpose()) +
+             m.value * (b2 * q.gradient * q.gradient.transpose() + b1 * q.hessian));
+        if (clamp) clamp_to_psd<12, 9>(relative_motions(), block);
+        return block;
       }
     }
     const auto pair = pair_distance<Dim>(s.kind, p.data());
     const Vec<4 * Dim> gradient = squared_distance_gradient<Dim>(pair);
-    return factor * (barrier_second(pair.squared) * gradient * gradient.transpose() +
-                     barrier_first(pair.squared) * pair_distance_hessian<Dim>(s.kind, p.data()));
+    block = factor * (barrier_second(pair.squared) * gradient * gradient.transpose() +
+                      barrier_first(pair.squared) * pair_distance_hessian<Dim>(s.kind, p.data()));
+    if (clamp) clamp_to_psd<4 * Dim, Dim + 2>(pair_distance_range<Dim>(s.kind, pair), block);
+    return block;
   };
-  const auto project = [&](Mat<4 * Dim>& block, auto size) {
-    constexpr int kDofs = Dim * size();
-    Mat<kDofs> part = block.template topLeftCorner<kDofs, kDofs>();
-    if (psd == PsdProjection::clamp) clamp_to_psd<Dim, size()>(part);
-    std::copy(part.data(), part.data() + part.size(), block.data());  // packed: what the sink reads
+  // The sink reads the rows and columns of the pair's vertices alone.
+  const auto pack = [](int size, Mat<4 * Dim>& block) {
+    const int n = Dim * size;
+    for (int j = 1; j < n; ++j) std::copy_n(block.data() + 4 * Dim * j, n, block.data() + n * j);
   };
   std::vector<Mat<4 * Dim>> blocks(std::min(kBatch, stencils.size()));
   for (std::size_t first = 0; first < stencils.size(); first += kBatch) {
@@ -272,12 +272,7 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
       for (std::size_t i = begin; i < end; ++i) {
         const ContactStencil& s = stencils[first + i];
         blocks[i] = block_of(s);
-        if (s.size() == 2)
-          project(blocks[i], std::integral_constant<int, 2>());
-        else if (s.size() == 3)
-          project(blocks[i], std::integral_constant<int, 3>());
-        else
-          project(blocks[i], std::integral_constant<int, 4>());
+        pack(s.size(), blocks[i]);
       }
     });
     for (std::size_t i = 0; i < count; ++i) {

@@ -107,6 +107,17 @@ void block_of_modes(const EigenSystem<Dim>& system, const ShapeGradients<Dim>& g
   }
 }
 
+/// Takes modes out of a block that has them.
+template <int Dim>
+void remove_modes(const NegativeModes<Dim>& negative, const ShapeGradients<Dim>& gradients, double weight,
+                  ElementBlock<Dim>& block) {
+  for (int k = 0; k < negative.count; ++k) {
+    Vec<Dim*(Dim + 1)> w;
+    for (int v = 0; v <= Dim; ++v) w.template segment<Dim>(Dim * v) = negative.modes[k] * gradients.col(v);
+    block.noalias() -= (weight * negative.values[k]) * w * w.transpose();
+  }
+}
+
 }  // namespace
 
 template <int Dim>
@@ -170,10 +181,13 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
         const Mat<Dim> F = deformation_gradient<Dim>(element, x);
         const auto gradients = shape_gradients<Dim>(element.inverse_edges);
         const ElasticModuli& here = moduli(start + i);
-        if (here.law == MaterialLaw::neo_hookean && psd == PsdProjection::none)
+        if (here.law == MaterialLaw::neo_hookean) {
           exact_block<Dim>(F, gradients, here.lame, scale_ * element.volume, blocks[i]);
-        else
+          if (psd == PsdProjection::clamp)
+            remove_modes<Dim>(neo_hookean_negative_modes<Dim>(F, here.lame), gradients, scale_ * element.volume, blocks[i]);
+        } else {
           block_of_modes<Dim>(elastic_eigensystem<Dim>(F, here), gradients, scale_ * element.volume, psd, blocks[i]);
+        }
       }
     });
     for (std::size_t i = 0; i < count; ++i) sink.add<Dim>(cells_.elements[start + i].vertices, blocks[i].data());

@@ -2,7 +2,8 @@
 #include "isotropic.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
 
 namespace itr {
@@ -22,8 +23,21 @@ SingularValues<2> singular_values(const Mat<2>& F) {
 }
 
 SingularValues<3> singular_values(const Mat<3>& F) {
-  const Eigen::JacobiSVD<Mat<3>> jacobi(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return {jacobi.matrixU(), jacobi.matrixV(), jacobi.singularValues()};
+  // V from F^T F, then F V = U diag(s): the two large columns give U, which keeps it a rotation to round-off, and the
+  // determinant gives the small singular value, which the squares in F^T F would lose.
+  const Eigen::SelfAdjointEigenSolver<Mat<3>> squares(Mat<3>(F.transpose() * F));
+  SingularValues<3> result;
+  result.V = squares.eigenvectors().rowwise().reverse();
+  if (result.V.determinant() < 0) result.V.col(2) = -result.V.col(2);
+  Vec<3> first = F * result.V.col(0), second = F * result.V.col(1);
+  result.s[0] = first.norm();
+  first /= result.s[0];
+  second -= first.dot(second) * first;
+  result.s[1] = second.norm();
+  second /= result.s[1];
+  result.s[2] = F.determinant() / (result.s[0] * result.s[1]);
+  result.U << first, second, first.cross(second);
+  return result;
 }
 
 template <int Dim>

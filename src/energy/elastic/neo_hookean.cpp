@@ -27,41 +27,80 @@ Mat<Dim> neo_hookean_stress(const Mat<Dim>& F, const LameParameters& lame) {
   return lame.mu * F + (lame.lambda * std::log(F.determinant()) - lame.mu) * inverse_transposed;
 }
 
+namespace {
+
+/// d2W / ds_i ds_j of the singular values; c = mu - lambda ln J.
 template <int Dim>
-EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters& lame) {
-  const auto [U, V, s] = singular_values(F);
-  const double c = lame.mu - lame.lambda * std::log(F.determinant());
+Eigen::SelfAdjointEigenSolver<Mat<Dim>> decompose_stretch(const Vec<Dim>& s, const LameParameters& lame, double c) {
   Mat<Dim> stretch;
   for (int i = 0; i < Dim; ++i)
     for (int j = 0; j < Dim; ++j) stretch(i, j) = lame.lambda / (s[i] * s[j]) + (i == j ? lame.mu + c / (s[i] * s[i]) : 0);
   Eigen::SelfAdjointEigenSolver<Mat<Dim>> solver;
-  if constexpr (Dim == 2) {
+  if constexpr (Dim == 2)
     solver.computeDirect(stretch);
-  } else {
+  else
     solver.compute(stretch);
-  }
+  return solver;
+}
+
+/// Calls visit(value, mode) for the symmetric and the skew mode of each pair.
+template <int Dim, typename Visit>
+void visit_pairs(const SingularValues<Dim>& svd, double mu, double c, const Visit& visit) {
+  const double half = std::sqrt(0.5);
+  for (int i = 0; i < Dim; ++i)
+    for (int j = i + 1; j < Dim; ++j)
+      for (const double sign : {1.0, -1.0})
+        visit(mu + sign * c / (svd.s[i] * svd.s[j]), [&, i, j, sign] {
+          return Mat<Dim>(half * svd.U.col(i) * svd.V.col(j).transpose() +
+                          sign * half * svd.U.col(j) * svd.V.col(i).transpose());
+        });
+}
+
+}  // namespace
+
+template <int Dim>
+EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters& lame) {
+  const SingularValues<Dim> svd = singular_values(F);
+  const double c = lame.mu - lame.lambda * std::log(F.determinant());
+  const auto stretch = decompose_stretch<Dim>(svd.s, lame, c);
   EigenSystem<Dim> system;
   int k = 0;
   for (; k < Dim; ++k) {
-    system.values[k] = solver.eigenvalues()[k];
-    system.modes[k] = U * solver.eigenvectors().col(k).asDiagonal() * V.transpose();
+    system.values[k] = stretch.eigenvalues()[k];
+    system.modes[k] = svd.U * stretch.eigenvectors().col(k).asDiagonal() * svd.V.transpose();
   }
-  const double half = std::sqrt(0.5);
-  for (int i = 0; i < Dim; ++i)
-    for (int j = i + 1; j < Dim; ++j) {
-      const Mat<Dim> first = half * U.col(i) * V.col(j).transpose(), second = half * U.col(j) * V.col(i).transpose();
-      system.values[k] = lame.mu + c / (s[i] * s[j]);
-      system.modes[k++] = first + second;
-      system.values[k] = lame.mu - c / (s[i] * s[j]);
-      system.modes[k++] = first - second;
-    }
+  visit_pairs<Dim>(svd, lame.mu, c, [&](double value, const auto& mode) {
+    system.values[k] = value;
+    system.modes[k++] = mode();
+  });
   return system;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                         \
-  template double neo_hookean_density<Dim>(const Mat<Dim>&, const LameParameters&);  \
-  template Mat<Dim> neo_hookean_stress<Dim>(const Mat<Dim>&, const LameParameters&); \
-  template EigenSystem<Dim> neo_hookean_eigensystem<Dim>(const Mat<Dim>&, const LameParameters&);
+template <int Dim>
+NegativeModes<Dim> neo_hookean_negative_modes(const Mat<Dim>& F, const LameParameters& lame) {
+  const SingularValues<Dim> svd = singular_values(F);
+  const double c = lame.mu - lame.lambda * std::log(F.determinant());
+  NegativeModes<Dim> negative;
+  if (c < 0) {  // else the stretches are a sum of positive terms
+    const auto stretch = decompose_stretch<Dim>(svd.s, lame, c);
+    for (int k = 0; k < Dim && stretch.eigenvalues()[k] < 0; ++k) {
+      negative.values[negative.count] = stretch.eigenvalues()[k];
+      negative.modes[negative.count++] = svd.U * stretch.eigenvectors().col(k).asDiagonal() * svd.V.transpose();
+    }
+  }
+  visit_pairs<Dim>(svd, lame.mu, c, [&](double value, const auto& mode) {
+    if (value >= 0) return;
+    negative.values[negative.count] = value;
+    negative.modes[negative.count++] = mode();
+  });
+  return negative;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                      \
+  template double neo_hookean_density<Dim>(const Mat<Dim>&, const LameParameters&);               \
+  template Mat<Dim> neo_hookean_stress<Dim>(const Mat<Dim>&, const LameParameters&);              \
+  template EigenSystem<Dim> neo_hookean_eigensystem<Dim>(const Mat<Dim>&, const LameParameters&); \
+  template NegativeModes<Dim> neo_hookean_negative_modes<Dim>(const Mat<Dim>&, const LameParameters&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

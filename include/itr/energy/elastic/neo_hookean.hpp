@@ -27,4 +27,14 @@ struct EigenSystem {
 template <int Dim>
 EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters& lame);
 
+/// Only the modes with negative eigenvalues, which a projection takes out: there are few.
+template <int Dim>
+struct NegativeModes {
+  int count = 0;
+  std::array<double, Dim * Dim> values;
+  std::array<Mat<Dim>, Dim * Dim> modes;
+};
+template <int Dim>
+NegativeModes<Dim> neo_hookean_negative_modes(const Mat<Dim>& F, const LameParameters& lame);
+
 }  // namespace itr

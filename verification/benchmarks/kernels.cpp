@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+// Time of one item of each kernel: element, contact pair, broad phase, collision query, assembly. They measure, and assert
+// nothing. Arguments are numbers of threads where a kernel runs in parallel.
+#include <benchmark/benchmark.h>
+
+#include <Eigen/LU>
+
+#include <random>
+
+#include "itr/core/parallel.hpp"
+#include "itr/energy/contact/contact.hpp"
+#include "itr/energy/elastic/elastic.hpp"
+#include "itr/energy/inertia.hpp"
+#include "itr/geometry/ccd.hpp"
+#include "itr/mesh/mesh.hpp"
+#include "itr/newton/newton.hpp"
+
+namespace {
+
+using namespace itr;
+
+const std::map<int, Material> kMaterials = {{1, {.youngs_modulus = 1e5, .poisson_ratio = 0.4, .density = 1000}}};
+
+/// A cube of n^3 cells of six tetrahedra each.
+Mesh<3> make_cube(int n) {
+  std::vector<Vec<3>> rest;
+  std::vector<std::array<int, 4>> cells;
+  const auto id = [n](int i, int j, int k) { return (k * (n + 1) + j) * (n + 1) + i; };
+  for (int k = 0; k <= n; ++k)
+    for (int j = 0; j <= n; ++j)
+      for (int i = 0; i <= n; ++i) rest.emplace_back(Vec<3>(i, j, k) / n);
+  constexpr int kOrders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i)
+        for (const auto& order : kOrders) {
+          std::array<int, 3> at{i, j, k};
+          std::array<int, 4> cell{id(i, j, k)};
+          for (int step = 0; step < 3; ++step) {
+            ++at[order[step]];
+            cell[step + 1] = id(at[0], at[1], at[2]);
+          }
+          Mat<3> edges;
+          for (int c = 0; c < 3; ++c) edges.col(c) = rest[cell[c + 1]] - rest[cell[0]];
+          if (edges.determinant() < 0) std::swap(cell[2], cell[3]);
+          cells.push_back(cell);
+        }
+  return {rest, cells, std::vector<int>(cells.size(), 1)};
+}
+
+/// A compressed and perturbed cube.
+struct Cube {
+  Mesh<3> mesh;
+  CellSet<3> cells;
+  VectorX x;
+  explicit Cube(int n) : mesh(make_cube(n)), cells(whole_mesh(mesh, {})), x(3 * cells.num_vertices) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> noise(-0.05 / n, 0.05 / n);
+    for (int v = 0; v < cells.num_vertices; ++v)
+      for (int c = 0; c < 3; ++c) x[3 * v + c] = (c == 0 ? 0.7 : 1.1) * cells.rest[v][c] + noise(random);
+  }
+};
+
+/// Two rough sheets of n x n squares each, nearer than dhat = 0.02.
+struct Sheets {
+  CollisionSurface surface;
+  VectorX x;
+  ContactOptions options{.enabled = true, .activation_distance = 0.02, .convergent = true};
+  explicit Sheets(int n) {
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> noise(-0.002, 0.002);
+    std::vector<Vec<3>> rest;
+    std::vector<std::array<int, 3>> triangles;
+    for (int sheet = 0; sheet < 2; ++sheet)
+      for (int i = 0; i <= n; ++i)
+        for (int j = 0; j <= n; ++j) {
+          const int v = static_cast<int>(rest.size());
+          const double c = sheet ? 0.8 : 1, s = sheet ? 0.6 : 0, a = 0.1 * i, b = 0.1 * j;
+          rest.emplace_back(c * a - s * b, s * a + c * b, 0.012 * sheet);
+          if (i == n || j == n) continue;
+          triangles.push_back({v, v + n + 1, v + n + 2});
+          triangles.push_back({v, v + n + 2, v + 1});
+        }
+    x.resize(3 * static_cast<Eigen::Index>(rest.size()));
+    for (std::size_t v = 0; v < rest.size(); ++v)
+      x.segment<3>(3 * v) = rest[v] + Vec<3>(noise(random), noise(random), noise(random));
+    surface = make_collision_surface<3>({}, triangles, {}, rest, std::vector<char>(rest.size(), 1));
+  }
+};
+
+/// Takes blocks and forgets them: the time of the kernel without the matrix.
+struct NoUnknowns {
+  DofMap dofs;
+  MatrixX none;
+  HessianSink sink;
+  explicit NoUnknowns(Eigen::Index n) : dofs{std::vector<int>(n, kNone), 0}, sink(dofs, none) {}
+};
+
+void ElementEnergy(benchmark::State& state) {
+  const Cube cube(12);
+  const ElasticEnergy<3> elastic(cube.cells, kMaterials, 1);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  Workspace workspace;
+  for (auto _ : state) benchmark::DoNotOptimize(elastic.value(cube.x, workspace));
+  state.SetItemsProcessed(state.iterations() * static_cast<long>(cube.cells.elements.size()));
+}
+
+void ElementGradient(benchmark::State& state) {
+  const Cube cube(12);
+  const ElasticEnergy<3> elastic(cube.cells, kMaterials, 1);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  Workspace workspace;
+  VectorX gradient = VectorX::Zero(cube.x.size());
+  for (auto _ : state) elastic.add_gradient(cube.x, gradient, workspace);
+  state.SetItemsProcessed(state.iterations() * static_cast<long>(cube.cells.elements.size()));
+}
+
+void ElementHessian(benchmark::State& state) {
+  const Cube cube(12);
+  const ElasticEnergy<3> elastic(cube.cells, kMaterials, 1);
+  const ThreadLimit limit(static_cast<int>(state.range(1)));
+  Workspace workspace;
+  NoUnknowns nowhere(cube.x.size());
+  for (auto _ : state)
+    elastic.add_hessian(cube.x, state.range(0) ? PsdProjection::clamp : PsdProjection::none, nowhere.sink, workspace);
+  state.SetItemsProcessed(state.iterations() * static_cast<long>(cube.cells.elements.size()));
+}
+
+void Assembly(benchmark::State& state) {
+  const Cube cube(12);
+  EnergySum sum;
+  sum.add(std::make_shared<ElasticEnergy<3>>(cube.cells, kMaterials, 1));
+  sum.add(std::make_shared<InertiaEnergy<3>>(cube.cells, kMaterials, MassKind::consistent, cube.x));
+  const DofMap dofs = DofMap::from_held(std::vector<char>(cube.x.size(), 0));
+  std::vector<int> stencils;
+  for (const auto& element : cube.cells.elements)
+    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
+  SparseAssembler assembler;
+  assembler.reset(dofs, 3, stencils, 4);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  Workspace workspace;
+  for (auto _ : state) {
+    assembler.begin();
+    HessianSink sink(dofs, assembler);
+    sum.add_hessian(cube.x, PsdProjection::clamp, sink, workspace);
+    assembler.finish();
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<long>(cube.cells.elements.size()));
+}
+
+void PairEnergy(benchmark::State& state) {
+  const Sheets sheets(20);
+  const ContactEnergy<3> contact(sheets.surface, sheets.options, 1, 1);
+  const ThreadLimit limit(1);
+  Workspace workspace;
+  const auto count = static_cast<long>(contact.active(sheets.x, workspace).size());
+  for (auto _ : state) benchmark::DoNotOptimize(contact.value(sheets.x, workspace));
+  state.SetItemsProcessed(state.iterations() * count);
+}
+
+void PairHessian(benchmark::State& state) {
+  const Sheets sheets(20);
+  const ContactEnergy<3> contact(sheets.surface, sheets.options, 1, 1);
+  const ThreadLimit limit(static_cast<int>(state.range(1)));
+  Workspace workspace;
+  const auto count = static_cast<long>(contact.active(sheets.x, workspace).size());
+  NoUnknowns nowhere(sheets.x.size());
+  for (auto _ : state)
+    contact.add_hessian(sheets.x, state.range(0) ? PsdProjection::clamp : PsdProjection::none, nowhere.sink, workspace);
+  state.SetItemsProcessed(state.iterations() * count);
+}
+
+/// From nothing: boxes, trees, candidates. Items are vertices and edges.
+void BroadPhase(benchmark::State& state) {
+  const Sheets sheets(60);
+  const ContactEnergy<3> contact(sheets.surface, sheets.options, 1, 1);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  for (auto _ : state) {
+    Workspace workspace;
+    benchmark::DoNotOptimize(contact.has_candidates(sheets.x, workspace));
+  }
+  state.SetItemsProcessed(state.iterations() *
+                          static_cast<long>(sheets.surface.vertices.size() + sheets.surface.edges.size()));
+}
+
+/// Active pairs of new positions whose candidates are known. Items are active pairs.
+void ActiveSet(benchmark::State& state) {
+  const Sheets sheets(60);
+  const ContactEnergy<3> contact(sheets.surface, sheets.options, 1, 1);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  Workspace workspace;
+  const auto count = static_cast<long>(contact.active(sheets.x, workspace).size());
+  VectorX x = sheets.x;
+  for (auto _ : state) {
+    x[0] = x[0] == sheets.x[0] ? sheets.x[0] + 1e-9 : sheets.x[0];
+    benchmark::DoNotOptimize(contact.active(x, workspace).size());
+  }
+  state.SetItemsProcessed(state.iterations() * count);
+}
+
+/// A motion that brings many pairs near each other; candidates known. Items are surface primitives.
+void StepLimit(benchmark::State& state) {
+  const Sheets sheets(60);
+  const ContactEnergy<3> contact(sheets.surface, sheets.options, 1, 1);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> noise(-0.004, 0.004);
+  const VectorX dx = VectorX::NullaryExpr(sheets.x.size(), [&] { return noise(random); });
+  Workspace workspace;
+  for (auto _ : state) benchmark::DoNotOptimize(contact.max_step(sheets.x, dx, workspace));
+  state.SetItemsProcessed(state.iterations() *
+                          static_cast<long>(sheets.surface.vertices.size() + sheets.surface.edges.size()));
+}
+
+template <bool kEdges>
+void CcdQuery(benchmark::State& state) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  constexpr int kQueries = 1000;
+  std::vector<std::array<Vec<3>, 8>> queries(kQueries);
+  for (auto& query : queries)
+    for (auto& p : query) p = Vec<3>::NullaryExpr([&] { return unit(random); });
+  for (auto _ : state)
+    for (const auto& [a, b, c, d, e, f, g, h] : queries)
+      benchmark::DoNotOptimize(kEdges ? edge_edge_ccd(a, b, c, d, e, f, g, h) : point_triangle_ccd(a, b, c, d, e, f, g, h));
+  state.SetItemsProcessed(state.iterations() * kQueries);
+}
+
+BENCHMARK(ElementEnergy)->Arg(1)->Arg(2)->UseRealTime();
+BENCHMARK(ElementGradient)->Arg(1)->Arg(2)->UseRealTime();
+BENCHMARK(ElementHessian)->ArgNames({"psd", "threads"})->Args({0, 1})->Args({1, 1})->Args({1, 2})->UseRealTime();
+BENCHMARK(Assembly)->Arg(1)->Arg(2)->UseRealTime();
+BENCHMARK(PairEnergy)->UseRealTime();
+BENCHMARK(PairHessian)->ArgNames({"psd", "threads"})->Args({0, 1})->Args({1, 1})->Args({1, 2})->UseRealTime();
+BENCHMARK(BroadPhase)->Arg(1)->Arg(2)->UseRealTime();
+BENCHMARK(ActiveSet)->Arg(1)->Arg(2)->UseRealTime();
+BENCHMARK(StepLimit)->Arg(1)->Arg(2)->UseRealTime();
+BENCHMARK(CcdQuery<false>)->UseRealTime();
+BENCHMARK(CcdQuery<true>)->UseRealTime();
+
+}  // namespace
+
+BENCHMARK_MAIN();
