@@ -80,10 +80,7 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
   for (int i = 0; i <= Dim; ++i)
     for (int j = 0; j <= Dim; ++j)
       for (int c = 0; c < Dim; ++c) unit(Dim * i + c, Dim * j + c) = mass_share<Dim>(kind_, i == j);
-  for (std::size_t e = 0; e < mass_.size(); ++e) {
-    const Mat<kDofs> block = mass_[e] * unit;
-    sink.add<Dim>(cells_.elements[e].vertices, block.data());
-  }
+  sink.add_constant_elements<Dim>(cells_, this, [&](std::size_t e, Mat<kDofs>& block) { block = mass_[e] * unit; });
 }
 
 #define ITR_INSTANTIATE(Dim)         \

@@ -13,30 +13,102 @@ DofMap DofMap::from_held(const std::vector<char>& held) {
   return map;
 }
 
-void SparseAssembler::reset(const DofMap& dofs, int dim, std::span<const int> stencils, int stencil_size) {
-  const int n = dofs.num_unknowns;
-  std::vector<std::vector<int>> columns(n);
-  std::vector<int> unknowns;
-  for (std::size_t s = 0; s < stencils.size(); s += stencil_size) {
-    unknowns.clear();
-    for (int k = 0; k < stencil_size; ++k)
-      for (int c = 0; c < dim; ++c)
-        if (const int u = dofs.unknown[dim * stencils[s + k] + c]; u != kNone) unknowns.push_back(u);
-    for (const int j : unknowns)
-      for (const int i : unknowns)
-        if (i >= j) columns[j].push_back(i);
-  }
-  pattern_.order = n;
+void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
+  *this = {};
+  unknown_ = dofs.unknown;
+  stencils_ = std::move(stencils);
+  stencil_size_ = stencil_size;
+  dim_ = dim;
+  const std::size_t num_vertices = unknown_.size() / dim;
+  std::vector<std::vector<int>> neighbors(num_vertices);  // and the vertex itself: without cells it still has a diagonal
+  for (std::size_t v = 0; v < num_vertices; ++v) neighbors[v].push_back(static_cast<int>(v));
+  for (std::size_t s = 0; s < stencils_.size(); s += stencil_size)
+    for (int i = 0; i < stencil_size; ++i)
+      for (int j = 0; j < stencil_size; ++j)
+        if (stencils_[s + j] > stencils_[s + i]) neighbors[stencils_[s + i]].push_back(stencils_[s + j]);
+  pattern_.order = dofs.num_unknowns;
   pattern_.column_starts.assign(1, 0);
-  pattern_.row_indices.clear();
-  for (int j = 0; j < n; ++j) {
-    columns[j].push_back(j);  // a vertex without cells still has a diagonal
-    std::sort(columns[j].begin(), columns[j].end());
-    columns[j].erase(std::unique(columns[j].begin(), columns[j].end()), columns[j].end());
-    pattern_.row_indices.insert(pattern_.row_indices.end(), columns[j].begin(), columns[j].end());
-    pattern_.column_starts.push_back(static_cast<int>(pattern_.row_indices.size()));
+  for (std::size_t v = 0; v < num_vertices; ++v) {
+    auto& around = neighbors[v];
+    std::sort(around.begin(), around.end());
+    around.erase(std::unique(around.begin(), around.end()), around.end());
+    for (int c = 0; c < dim; ++c) {
+      const int column = unknown_[dim * v + c];
+      if (column == kNone) continue;
+      for (const int w : around)
+        for (int d = 0; d < dim; ++d)
+          if (const int row = unknown_[dim * w + d]; row >= column) pattern_.row_indices.push_back(row);
+      pattern_.column_starts.push_back(static_cast<int>(pattern_.row_indices.size()));
+    }
   }
+  base_ = pattern_;
+  gathers_.resize((num_stencils() + kBatch - 1) / kBatch);
   changed_ = true;
+}
+
+const SparseAssembler::Gather& SparseAssembler::gather(std::size_t batch) {
+  Gather& result = gathers_[batch];
+  if (!result.offset.empty()) return result;
+  const std::size_t first = batch * kBatch, count = std::min(kBatch, num_stencils() - first);
+  const int side = dim_ * stencil_size_;
+  std::vector<std::pair<int, int>> entries;  // entry of the base, number of the blocks
+  entries.reserve(count * side * (side + 1) / 2);
+  std::vector<int> unknown(side);
+  for (std::size_t s = 0; s < count; ++s) {
+    const int* vertices = &stencils_[(first + s) * stencil_size_];
+    for (int i = 0; i < side; ++i) unknown[i] = unknown_[dim_ * vertices[i / dim_] + i % dim_];
+    for (int j = 0; j < side; ++j) {
+      if (unknown[j] == kNone) continue;
+      const auto begin = base_.row_indices.begin() + base_.column_starts[unknown[j]];
+      const auto end = base_.row_indices.begin() + base_.column_starts[unknown[j] + 1];
+      for (int i = 0; i < side; ++i) {
+        if (unknown[i] < unknown[j]) continue;  // above the diagonal, or held
+        const auto at = std::lower_bound(begin, end, unknown[i]) - base_.row_indices.begin();
+        entries.emplace_back(static_cast<int>(at), static_cast<int>((s * side + j) * side + i));
+      }
+    }
+  }
+  std::sort(entries.begin(), entries.end());
+  for (std::size_t k = 0; k < entries.size(); ++k) {
+    if (k == 0 || entries[k].first != entries[k - 1].first) {
+      result.nonzero.push_back(entries[k].first);
+      result.offset.push_back(static_cast<int>(k));
+    }
+    result.source.push_back(entries[k].second);
+  }
+  result.offset.push_back(static_cast<int>(entries.size()));
+  return result;
+}
+
+void SparseAssembler::add_batch(std::size_t first, const double* blocks) {
+  constexpr std::size_t kEntriesPerTask = 2048;
+  const Gather& list = gather(first / kBatch);
+  parallel_blocks(list.nonzero.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      double sum = 0;
+      for (int i = list.offset[k]; i < list.offset[k + 1]; ++i) sum += blocks[list.source[i]];
+      values_[place(list.nonzero[k])] += sum;
+    }
+  });
+}
+
+bool SparseAssembler::add_kept(const void* key) {
+  if (kept_key_ != key || key == nullptr) return false;
+  for (std::size_t k = 0; k < kept_.size(); ++k) values_[place(static_cast<int>(k))] += kept_[k];
+  return true;
+}
+
+void SparseAssembler::begin_keeping() {
+  others_ = values_;
+  std::fill(values_.begin(), values_.end(), 0.0);
+}
+
+void SparseAssembler::end_keeping(const void* key) {
+  kept_key_ = key;
+  kept_.resize(base_.row_indices.size());
+  for (std::size_t k = 0; k < kept_.size(); ++k) kept_[k] = values_[place(static_cast<int>(k))];
+  values_ = others_;
+  add_kept(key);
 }
 
 void SparseAssembler::begin() {
@@ -69,6 +141,7 @@ bool SparseAssembler::finish() {
     });
     linear::SparsityPattern grown;
     std::vector<double> values;
+    std::vector<int> moved(pattern_.row_indices.size());  // to where in the grown pattern
     grown.order = pattern_.order;
     grown.column_starts.push_back(0);
     std::size_t next = 0;
@@ -79,7 +152,7 @@ bool SparseAssembler::finish() {
         const bool take_old = next == overflow_.size() || overflow_[next].column != j ||
                               (p < end && pattern_.row_indices[p] < overflow_[next].row);
         const int row = take_old ? pattern_.row_indices[p] : overflow_[next].row;
-        const double value = take_old ? values_[p++] : overflow_[next++].value;
+        const double value = take_old ? values_[p] : overflow_[next++].value;
         const bool same_row =
             static_cast<int>(grown.row_indices.size()) > grown.column_starts.back() && grown.row_indices.back() == row;
         if (same_row) {
@@ -88,8 +161,14 @@ bool SparseAssembler::finish() {
           grown.row_indices.push_back(row);
           values.push_back(value);
         }
+        if (take_old) moved[p++] = static_cast<int>(grown.row_indices.size()) - 1;
       }
       grown.column_starts.push_back(static_cast<int>(grown.row_indices.size()));
+    }
+    if (place_.empty()) {
+      place_ = std::move(moved);
+    } else {
+      for (int& at : place_) at = moved[at];
     }
     pattern_ = std::move(grown);
     values_ = std::move(values);
@@ -99,39 +178,68 @@ bool SparseAssembler::finish() {
   return std::exchange(changed_, false);
 }
 
+namespace {
+constexpr int kMaxDofs = 12;
+}
+
 template <int Dim>
 void HessianSink::add(std::span<const int> vertices, const double* block) {
   const int n = Dim * static_cast<int>(vertices.size());
-  constexpr int kMaxDofs = 12;
-  int dof[kMaxDofs], unknown[kMaxDofs];
-  for (int i = 0; i < n; ++i) {
-    dof[i] = Dim * vertices[i / Dim] + i % Dim;
-    unknown[i] = dofs_.unknown[dof[i]];
-  }
+  int unknown[kMaxDofs];
+  for (int i = 0; i < n; ++i) unknown[i] = dofs_.unknown[Dim * vertices[i / Dim] + i % Dim];
   for (int j = 0; j < n; ++j) {
     const int column = unknown[j];
+    if (column == kNone) continue;
     for (int i = 0; i < n; ++i) {
       const int row = unknown[i];
       const double value = block[n * j + i];
-      if (value == 0) continue;  // half of a mass block
-      if (column == kNone) {
-        if (!motion_) continue;
-        const double product = value * motion_->step[dof[j]];
-        if (row == kNone)
-          motion_->curvature += motion_->step[dof[i]] * product;
-        else
-          motion_->coupling[row] += product;
-      } else if (row >= column) {  // kNone is below every unknown
-        if (dense_)
-          (*dense_)(row, column) += value;
-        else
-          sparse_->add(row, column, value);
-      }
+      if (row < column || value == 0) continue;  // kNone is below every unknown; half of a mass block is zero
+      if (dense_)
+        (*dense_)(row, column) += value;
+      else
+        sparse_->add(row, column, value);
+    }
+  }
+  if (motion_) add_motion<Dim>(vertices, block);
+}
+
+template <int Dim>
+void HessianSink::add_motion(std::span<const int> vertices, const double* block) {
+  const int n = Dim * static_cast<int>(vertices.size());
+  for (int j = 0; j < n; ++j) {
+    const int dof = Dim * vertices[j / Dim] + j % Dim;
+    if (dofs_.unknown[dof] != kNone) continue;
+    for (int i = 0; i < n; ++i) {
+      const int other = Dim * vertices[i / Dim] + i % Dim;
+      const double product = block[n * j + i] * motion_->step[dof];
+      if (const int row = dofs_.unknown[other]; row != kNone)
+        motion_->coupling[row] += product;
+      else
+        motion_->curvature += motion_->step[other] * product;
     }
   }
 }
 
-template void HessianSink::add<2>(std::span<const int>, const double*);
-template void HessianSink::add<3>(std::span<const int>, const double*);
+template <int Dim>
+void HessianSink::add_batch(const CellSet<Dim>& cells, std::size_t first, std::span<const Mat<Dim*(Dim + 1)>> blocks) {
+  const bool is_base = sparse_ && sparse_->num_stencils() == cells.elements.size();
+  if (is_base) sparse_->add_batch(first, blocks.data()->data());
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const auto& vertices = cells.elements[first + i].vertices;
+    if (!is_base)
+      add<Dim>(vertices, blocks[i].data());
+    else if (motion_)
+      add_motion<Dim>(vertices, blocks[i].data());
+    else
+      break;
+  }
+}
+
+#define ITR_INSTANTIATE(Dim)                                                \
+  template void HessianSink::add<Dim>(std::span<const int>, const double*); \
+  template void HessianSink::add_batch<Dim>(const CellSet<Dim>&, std::size_t, std::span<const Mat<Dim*(Dim + 1)>>);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr

@@ -31,7 +31,7 @@ double DenseSystem::diagonal_scale() const { return hessian_.rows() > 0 ? hessia
 SparseSystem::SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, std::span<const int> stencils,
                            int stencil_size)
     : solver_(solver), dim_(dim) {
-  assembler_.reset(dofs, dim, stencils, stencil_size);
+  assembler_.reset(dofs, dim, {stencils.begin(), stencils.end()}, stencil_size);
 }
 
 void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,

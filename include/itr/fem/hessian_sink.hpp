@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Where the Hessian blocks of stencils go: a dense matrix for patches, a sparse one with a reusable pattern for the mesh.
-// Blocks are added in the order of the calls, by one thread, so the sums have the same bits for any number of threads.
+// What is added to an entry is added in an order that does not depend on the number of threads, so the bits do not either.
 #pragma once
 
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "itr/core/parallel.hpp"
 #include "itr/core/types.hpp"
+#include "itr/fem/cell_set.hpp"
 #include "itr/linear/solver.hpp"
 
 namespace itr {
@@ -24,11 +27,25 @@ struct DofMap {
 /// contacts add to it. The pattern (and with it a solver's analysis) stays as long as nothing new appears.
 class SparseAssembler {
  public:
+  /// Stencils that are gathered at a time: what their blocks add to an entry is listed once, and summed entry by entry.
+  static constexpr std::size_t kBatch = 512;
+
   /// Base pattern: all pairs of unknowns of the vertices of one stencil. `stencils` holds `stencil_size` vertices each.
-  void reset(const DofMap& dofs, int dim, std::span<const int> stencils, int stencil_size);
+  void reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size);
   void begin();
   /// Adds to entry (row, column), row >= column.
   void add(int row, int column, double value);
+  std::size_t num_stencils() const { return stencils_.size() / stencil_size_; }
+  /// Adds the blocks (column-major, side dim * stencil_size) of base stencils from `first`, a multiple of kBatch, to the end
+  /// of its batch.
+  void add_batch(std::size_t first, const double* blocks);
+
+  /// A part of the matrix that is the same each time: adds what was kept under `key`, if it was.
+  bool add_kept(const void* key);
+  /// What is added between the two (to entries of the base pattern only) is kept under `key`, until the next reset.
+  void begin_keeping();
+  void end_keeping(const void* key);
+
   /// Takes in entries that the pattern did not have. Returns whether the pattern changed since the last call.
   bool finish();
   const linear::SparsityPattern& pattern() const { return pattern_; }
@@ -39,11 +56,27 @@ class SparseAssembler {
     int column, row;
     double value;
   };
+  /// Of a batch: for entry `nonzero[k]` of the base, the numbers `source[offset[k]..offset[k + 1])` of the blocks.
+  struct Gather {
+    std::vector<int> nonzero, offset, source;
+  };
+  const Gather& gather(std::size_t batch);
+  int place(int base_nonzero) const { return place_.empty() ? base_nonzero : place_[base_nonzero]; }
+
   linear::SparsityPattern pattern_;
   std::vector<double> values_;
   std::vector<Entry> overflow_;
   int last_ = kNone;  ///< entry that was added to last
   bool changed_ = false;
+
+  std::vector<int> unknown_;  ///< per dof
+  std::vector<int> stencils_;
+  int stencil_size_ = 1, dim_ = 1;
+  linear::SparsityPattern base_;
+  std::vector<int> place_;  ///< of the base's entries in the present pattern; empty: the same
+  std::vector<Gather> gathers_;
+  std::vector<double> kept_, others_;  ///< by the base's entries; what was there before begin_keeping
+  const void* kept_key_ = nullptr;
 };
 
 /// A step that held dofs are made to take, and what it does to the Newton system of the unknowns.
@@ -68,7 +101,38 @@ class HessianSink {
   template <int Dim>
   void add(std::span<const int> vertices, const double* block);
 
+  /// Adds a block for each element; `fill(e, block)` may be called at the same time for several of them.
+  template <int Dim, typename Fill>
+  void add_elements(const CellSet<Dim>& cells, const Fill& fill) {
+    using Block = Mat<Dim*(Dim + 1)>;
+    const std::size_t n = cells.elements.size();
+    std::vector<Block> blocks(std::min(n, SparseAssembler::kBatch));
+    for (std::size_t first = 0; first < n; first += SparseAssembler::kBatch) {
+      const std::size_t count = std::min(SparseAssembler::kBatch, n - first);
+      parallel_blocks(count, kElementsPerTask, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) fill(first + i, blocks[i]);
+      });
+      add_batch<Dim>(cells, first, std::span<const Block>(blocks).first(count));
+    }
+  }
+  /// The same where the blocks are those of the last time with this key.
+  template <int Dim, typename Fill>
+  void add_constant_elements(const CellSet<Dim>& cells, const void* key, const Fill& fill) {
+    if (!sparse_ || motion_) return add_elements<Dim>(cells, fill);
+    if (sparse_->add_kept(key)) return;
+    sparse_->begin_keeping();
+    add_elements<Dim>(cells, fill);
+    sparse_->end_keeping(key);
+  }
+
  private:
+  static constexpr std::size_t kElementsPerTask = 64;
+
+  template <int Dim>
+  void add_batch(const CellSet<Dim>& cells, std::size_t first, std::span<const Mat<Dim*(Dim + 1)>> blocks);
+  template <int Dim>
+  void add_motion(std::span<const int> vertices, const double* block);
+
   const DofMap& dofs_;
   MatrixX* dense_ = nullptr;
   SparseAssembler* sparse_ = nullptr;

@@ -171,27 +171,20 @@ void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 
 template <int Dim>
 void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
-  constexpr int kDofs = Dim * (Dim + 1);
-  std::vector<Mat<kDofs>> blocks(std::min(cells_.elements.size(), kBlock * 16));
-  for (std::size_t start = 0; start < cells_.elements.size(); start += blocks.size()) {
-    const std::size_t count = std::min(blocks.size(), cells_.elements.size() - start);
-    parallel_blocks(count, 64, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto& element = cells_.elements[start + i];
-        const Mat<Dim> F = deformation_gradient<Dim>(element, x);
-        const auto gradients = shape_gradients<Dim>(element.inverse_edges);
-        const ElasticModuli& here = moduli(start + i);
-        if (here.law == MaterialLaw::neo_hookean) {
-          exact_block<Dim>(F, gradients, here.lame, scale_ * element.volume, blocks[i]);
-          if (psd == PsdProjection::clamp)
-            remove_modes<Dim>(neo_hookean_negative_modes<Dim>(F, here.lame), gradients, scale_ * element.volume, blocks[i]);
-        } else {
-          block_of_modes<Dim>(elastic_eigensystem<Dim>(F, here), gradients, scale_ * element.volume, psd, blocks[i]);
-        }
-      }
-    });
-    for (std::size_t i = 0; i < count; ++i) sink.add<Dim>(cells_.elements[start + i].vertices, blocks[i].data());
-  }
+  sink.add_elements<Dim>(cells_, [&](std::size_t e, ElementBlock<Dim>& block) {
+    const auto& element = cells_.elements[e];
+    const Mat<Dim> F = deformation_gradient<Dim>(element, x);
+    const auto gradients = shape_gradients<Dim>(element.inverse_edges);
+    const double weight = scale_ * element.volume;
+    const ElasticModuli& here = moduli(e);
+    if (here.law == MaterialLaw::neo_hookean) {
+      exact_block<Dim>(F, gradients, here.lame, weight, block);
+      if (psd == PsdProjection::clamp)
+        remove_modes<Dim>(neo_hookean_negative_modes<Dim>(F, here.lame), gradients, weight, block);
+    } else {
+      block_of_modes<Dim>(elastic_eigensystem<Dim>(F, here), gradients, weight, psd, block);
+    }
+  });
 }
 
 template <int Dim>
