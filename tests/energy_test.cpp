@@ -9,9 +9,11 @@
 #include "itr/core/parallel.hpp"
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/contact/stiffness.hpp"
+#include "itr/energy/damping.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/energy/load.hpp"
+#include "itr/energy/pressure.hpp"
 #include "itr/projection/volume_barrier.hpp"
 
 namespace itr {
@@ -288,6 +290,66 @@ TYPED_TEST(VolumeTerms, ModuliThatVaryAreThoseOfEachElement) {
   const ElasticEnergy<Dim> elastic(cells, {{1, varying}}, 1);
   EXPECT_NEAR(elastic.value(x, workspace), sum, 1e-12 * sum);
   expect_derivatives(elastic, x, 1e-6, 1e-7);
+}
+
+/// Area times outward normal of a facet over the number of its corners.
+Vec<2> area_share(const Vec<2>& a, const Vec<2>& b) { return {(b - a)[1] / 2, -(b - a)[0] / 2}; }
+Vec<3> area_share(const Vec<3>& a, const Vec<3>& b, const Vec<3>& c) { return (b - a).cross(c - a) / 6; }
+
+TYPED_TEST(VolumeTerms, PressurePushesAlongInwardNormalsOfTheDeformedSurface) {
+  constexpr int Dim = TypeParam::value;
+  CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});
+  std::mt19937 random(11);
+  for (const bool is_closed : {true, false}) {
+    for (auto& facet : cells.facets) facet.tag = 5;
+    if (!is_closed) cells.facets.back().tag = 6;
+    Loads<Dim> loads;
+    loads.pressures.emplace_back(5, [](const Vec<Dim>&) { return 2.5; });
+    const VectorX lagged = perturbed(cells, random, 0.1);
+    const PressureEnergy<Dim> energy(cells, loads, lagged, 0.3);
+    VectorX expected = VectorX::Zero(lagged.size());
+    for (const auto& facet : cells.facets) {
+      if (facet.tag != 5) continue;
+      std::array<Vec<Dim>, Dim> p;
+      for (int k = 0; k < Dim; ++k) p[k] = vertex_of<Dim>(lagged, facet.vertices[k]);
+      const Vec<Dim> share = std::apply([](const auto&... corner) { return area_share(corner...); }, p);
+      for (const int v : facet.vertices) vertex_of<Dim>(expected, v) += 0.3 * 2.5 * share;  // the gradient: minus the force
+    }
+    EXPECT_LE((gradient_of(energy, lagged) - expected).norm(), 1e-13);
+    EXPECT_EQ(energy.is_lagged(all_free(lagged.size())), !is_closed);
+    for (int i = 0; i < 5; ++i) {
+      const VectorX x = perturbed(cells, random, 0.1);
+      expect_derivatives(energy, x, 1e-5, 1e-8);
+      expect_psd(energy, x);
+      if (!is_closed) continue;
+      Vec<Dim> resultant = Vec<Dim>::Zero();
+      const VectorX gradient = gradient_of(energy, x);
+      for (int v = 0; v < cells.num_vertices; ++v) resultant += vertex_of<Dim>(gradient, v);
+      EXPECT_LE(resultant.norm(), 1e-13);
+    }
+    Workspace workspace;
+    VectorX rest(lagged.size());
+    for (int v = 0; v < cells.num_vertices; ++v) vertex_of<Dim>(rest, v) = cells.rest[v];
+    EXPECT_NEAR(energy.value(rest, workspace), 0, 1e-14);
+  }
+}
+
+TYPED_TEST(VolumeTerms, DampingIsTheStiffnessTimesVelocity) {
+  constexpr int Dim = TypeParam::value;
+  const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});
+  std::mt19937 random(13);
+  const VectorX lagged = perturbed(cells, random, 0.2), reference = perturbed(cells, random, 0.1);
+  const ElasticEnergy<Dim> elastic(cells, kMaterials, 0.25);
+  Workspace workspace;
+  const DampingEnergy<Dim> energy(elastic, lagged, 0.02, {8, reference}, workspace);
+  const MatrixX K = hessian_of(elastic, lagged, PsdProjection::clamp);
+  for (int i = 0; i < 5; ++i) {
+    const VectorX x = perturbed(cells, random, 0.1), v = 8 * (x - reference);
+    EXPECT_NEAR(energy.value(x, workspace), 0.02 / (2 * 8) * v.dot(K * v), 1e-12 * v.dot(K * v));
+    EXPECT_LE((gradient_of(energy, x) - 0.02 * K * v).norm(), 1e-12 * (K * v).norm());
+    expect_derivatives(energy, x, 1e-5, 1e-7);
+    expect_psd(energy, x);
+  }
 }
 
 TYPED_TEST(VolumeTerms, VolumeBarrierGradientMatchesDifferences) {

@@ -28,6 +28,7 @@ MAY_USE = {
 # What describes a simulation as plain values: open to `scene`, and all that simulation/setup.hpp is made of.
 OPTIONS = {
     "energy/contact/options.hpp",
+    "energy/damping_options.hpp",
     "energy/material.hpp",
     "newton/options.hpp",
     "output/options.hpp",

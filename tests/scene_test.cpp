@@ -455,6 +455,27 @@ TEST_F(SceneTest, ConditionsAndMotions) {
   EXPECT_NE(scene.warnings[0].find("/boundary_conditions/dirichlet_boundary/3"), std::string::npos);
 }
 
+TEST_F(SceneTest, PressureAndDamping) {
+  const auto setup = read2(square(json::parse(R"json({
+    "geometry": [{"mesh": "square.obj", "volume_selection": 1, "surface_selection": {"threshold": 1e-3}}],
+    "boundary_conditions": {"pressure_boundary": [{"id": 3, "value": "100*x", "interpolation": {"type": "linear"}},
+                                                  {"id": 1, "value": 0}]},
+    "solver": {"rayleigh_damping": [{"form": "elasticity", "stiffness": 0.01, "lagging_iterations": 3},
+                                    {"form": "contact", "stiffness_ratio": 0.5}]}})json")));
+  ASSERT_EQ(setup.pressure.size(), 1u);
+  EXPECT_EQ(setup.pressure[0].tag, 3);
+  EXPECT_EQ(setup.pressure[0].pressure({0.5, 0}, 2), 100);
+  ASSERT_EQ(setup.damping.size(), 2u);
+  EXPECT_EQ(setup.damping[0].coefficient, 0.01);
+  EXPECT_EQ(setup.damping[0].lagging_rounds, 3);
+  EXPECT_EQ(setup.damping[1].term, DampingOptions::Term::contact);
+  EXPECT_NEAR(setup.damping[1].coefficient, 0.75 * 0.5 * 1e-3, 1e-18);
+  const auto damping = [](const json& entry) { return json{{"solver", {{"rayleigh_damping", json::array({entry})}}}}; };
+  EXPECT_EQ(wrong_place(damping({{"form", "elasticity"}})), "/solver/rayleigh_damping/0");
+  EXPECT_EQ(wrong_place(damping({{"stiffness", 1}})), "/solver/rayleigh_damping/0/form");
+  EXPECT_EQ(wrong_place(damping({{"form", "inertia"}, {"stiffness", 1}})), "/solver/rayleigh_damping/0/form");
+}
+
 TEST_F(SceneTest, ValuesThatAreNotDefinedAreRefused) {
   const auto dirichlet = [&](const json& value) {
     return failure(square({{"geometry", {{"mesh", "square.obj"}, {"volume_selection", 1}, {"surface_selection", 2}}},

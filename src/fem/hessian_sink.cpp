@@ -185,8 +185,15 @@ constexpr int kMaxDofs = 12;
 template <int Dim>
 void HessianSink::add(std::span<const int> vertices, const double* block) {
   const int n = Dim * static_cast<int>(vertices.size());
+  if (blocks_) {
+    BlockList::Block kept{{}, static_cast<int>(vertices.size()), blocks_->values.size()};
+    std::copy(vertices.begin(), vertices.end(), kept.vertices.begin());
+    blocks_->blocks.push_back(kept);
+    blocks_->values.insert(blocks_->values.end(), block, block + n * n);
+    return;
+  }
   int unknown[kMaxDofs];
-  for (int i = 0; i < n; ++i) unknown[i] = dofs_.unknown[Dim * vertices[i / Dim] + i % Dim];
+  for (int i = 0; i < n; ++i) unknown[i] = dofs_->unknown[Dim * vertices[i / Dim] + i % Dim];
   for (int j = 0; j < n; ++j) {
     const int column = unknown[j];
     if (column == kNone) continue;
@@ -208,11 +215,11 @@ void HessianSink::add_motion(std::span<const int> vertices, const double* block)
   const int n = Dim * static_cast<int>(vertices.size());
   for (int j = 0; j < n; ++j) {
     const int dof = Dim * vertices[j / Dim] + j % Dim;
-    if (dofs_.unknown[dof] != kNone) continue;
+    if (dofs_->unknown[dof] != kNone) continue;
     for (int i = 0; i < n; ++i) {
       const int other = Dim * vertices[i / Dim] + i % Dim;
       const double product = block[n * j + i] * motion_->step[dof];
-      if (const int row = dofs_.unknown[other]; row != kNone)
+      if (const int row = dofs_->unknown[other]; row != kNone)
         motion_->coupling[row] += product;
       else
         motion_->curvature += motion_->step[other] * product;

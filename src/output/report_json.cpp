@@ -30,8 +30,9 @@ std::string json_string(std::string_view text) {
 }
 
 std::string energy_json(const EnergyReport& e) {
-  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},"total":{}}})", number(e.inertia),
-                     number(e.elastic), number(e.body), number(e.contact), number(e.friction), number(e.total));
+  const std::string damping = e.damping == 0 ? "" : fmt::format(R"("damping":{},)", number(e.damping));
+  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},{}"total":{}}})", number(e.inertia),
+                     number(e.elastic), number(e.body), number(e.contact), number(e.friction), damping, number(e.total));
 }
 
 std::string count_json(const OperationCount& count) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "itr/energy/pressure.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/geometry/predicates.hpp"
 #include "itr/projection/transfer.hpp"
@@ -75,7 +76,7 @@ LocalProblem::LocalProblem(const Mesh<2>& mesh, const RemeshFields<2>& fields, c
   scratch_.known.clear(mesh.vertex_slots());
   scratch_.local_of.resize(mesh.vertex_slots());
   add_cells(patch);
-  if (!context.loads.tractions.empty()) add_traction_facets();
+  if (!context.loads.tractions.empty() || !context.loads.pressures.empty()) add_loaded_facets();
   hold_vertices();
   if (context.contact.enabled) add_surface(surface_tree);
   add_terms(history);
@@ -146,7 +147,7 @@ void LocalProblem::add_cells(const std::vector<CellId>& patch) {
   }
 }
 
-void LocalProblem::add_traction_facets() {
+void LocalProblem::add_loaded_facets() {
   const std::size_t count = global_.size();
   for (std::size_t i = 0; i < count; ++i) {
     const VertexId v = global_[i];
@@ -296,24 +297,37 @@ void LocalProblem::add_terms(HistoryRule history) {
     if (!nested && history == HistoryRule::function) add_unrepresented_history(*inertia);
     energy_.add(std::move(inertia));
   }
-  energy_.add(std::make_shared<ElasticEnergy<2>>(cells_, context_.materials, context_.scaling));
-  if (!context_.loads.empty())
+  const auto elastic = std::make_shared<ElasticEnergy<2>>(cells_, context_.materials, context_.scaling);
+  energy_.add(elastic);
+  add_damping(DampingOptions::Term::elastic, *elastic);
+  if (context_.loads.has_dead_loads())
     energy_.add(std::make_shared<LoadEnergy<2>>(cells_, context_.materials, context_.loads, context_.scaling));
+  if (!context_.loads.pressures.empty())
+    energy_.add(std::make_shared<PressureEnergy<2>>(cells_, context_.loads, x_, context_.scaling));
   if (!has_surface_) return;
   contact_ =
       std::make_shared<ContactEnergy<2>>(surface_, context_.contact, context_.contact.barrier_stiffness, context_.scaling);
   touches_contact_ = contact_->has_candidates(x_, workspace_);
   energy_.add(contact_);
+  add_damping(DampingOptions::Term::contact, *contact_);
   std::vector<std::pair<int, Box<2>>> bounds;
   for (std::size_t i = 0; i < bounds_.size(); ++i)
     if (surface_.counts[i]) bounds.emplace_back(static_cast<int>(i), bounds_[i]);
   energy_.add(std::make_shared<MotionBound>(bounds));
   if (!touches_contact_ || context_.contact.friction_coefficient == 0 || context_.contact.friction_iterations == 0) return;
-  auto friction = std::make_shared<FrictionEnergy<2>>(
-      *contact_, x_, workspace_, context_.contact,
-      VelocityRule{context_.velocity_rate, gather(fields_.velocity_reference, context_.obstacles.velocity_reference)},
-      context_.scaling);
+  auto friction =
+      std::make_shared<FrictionEnergy<2>>(*contact_, x_, workspace_, context_.contact, velocity_rule(), context_.scaling);
   if (!friction->empty()) energy_.add(std::move(friction));
+}
+
+VelocityRule LocalProblem::velocity_rule() const {
+  return {context_.velocity_rate, gather(fields_.velocity_reference, context_.obstacles.velocity_reference)};
+}
+
+void LocalProblem::add_damping(DampingOptions::Term term, const Energy& damped) {
+  for (const DampingOptions& options : context_.damping)
+    if (options.term == term)
+      energy_.add(std::make_shared<DampingEnergy<2>>(damped, x_, options.coefficient, velocity_rule(), workspace_));
 }
 
 void LocalProblem::add_unrepresented_history(InertiaEnergy<2>& inertia) const {

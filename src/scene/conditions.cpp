@@ -25,6 +25,7 @@ class ConditionReader {
     read_body_acceleration();
     read_dirichlet();
     read_neumann();
+    read_pressure();
     read_motions(geometry);
     setup_.obstacles = std::move(geometry.obstacles);
     setup_.initial_displacement = read_initial("solution");
@@ -71,6 +72,20 @@ class ConditionReader {
       for (const int tag : tags_of(node, seen)) {
         check_defined<Dim>(value.function, vertices_with(tag), setup_.time.t0, node["value"]);
         if (!value.is_zero) setup_.neumann.push_back({tag, value.function});
+      }
+    }
+  }
+
+  void read_pressure() {
+    std::set<int> seen;
+    for (const Node& node : boundary_["pressure_boundary"].items()) {
+      const ScalarFunction<Dim> value = read_scalar_function<Dim>(node["value"], node["interpolation"]);
+      const Function as_vector = [f = value.function](const Vec<Dim>& X, double t) {
+        return Vec<Dim>::Constant(f(X, t)).eval();
+      };
+      for (const int tag : tags_of(node, seen)) {
+        check_defined<Dim>(as_vector, vertices_with(tag), setup_.time.t0, node["value"]);
+        if (!value.is_zero) setup_.pressure.push_back({tag, value.function});
       }
     }
   }

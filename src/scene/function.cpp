@@ -90,6 +90,18 @@ ValueFunction<Dim> read_function(const Node& value, const Node& interpolation, d
 }
 
 template <int Dim>
+ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpolation) {
+  if (!value.exists()) value.fail("a number or an expression");
+  const std::vector<Node> scales = interpolation.items();
+  if (scales.size() > 1) interpolation.fail("one entry: the value has one component");
+  Component component = read_component(value);
+  if (!scales.empty()) component.scale = Interpolation(scales[0]);
+  if (component.is_constant())
+    return {[constant = component.constant](const Vec<Dim>&, double) { return constant; }, component.constant == 0};
+  return {[component](const Vec<Dim>& X, double t) { return component({X[0], X[1], Dim == 3 ? X[Dim - 1] : 0, t}); }, false};
+}
+
+template <int Dim>
 void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t,
                    const Node& value) {
   for (const Vec<Dim>& X : points) {
@@ -102,6 +114,8 @@ void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec
 
 template ValueFunction<2> read_function(const Node&, const Node&, double);
 template ValueFunction<3> read_function(const Node&, const Node&, double);
+template ScalarFunction<2> read_scalar_function(const Node&, const Node&);
+template ScalarFunction<3> read_scalar_function(const Node&, const Node&);
 template void check_defined(const SpaceTimeFunction<2>&, const std::vector<Vec<2>>&, double, const Node&);
 template void check_defined(const SpaceTimeFunction<3>&, const std::vector<Vec<3>>&, double, const Node&);
 

@@ -25,6 +25,15 @@ struct ValueFunction {
 template <int Dim>
 ValueFunction<Dim> read_function(const Node& value, const Node& interpolation, double sign = 1);
 
+/// One component of that: `value` is a number or an expression.
+template <int Dim>
+struct ScalarFunction {
+  std::function<double(const Vec<Dim>& X, double t)> function;
+  bool is_zero = false;  ///< the constant 0
+};
+template <int Dim>
+ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpolation);
+
 /// Throws InputError at `value` if the function has no value (NaN) at one of the points at time t.
 template <int Dim>
 void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t, const Node& value);

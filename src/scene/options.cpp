@@ -223,6 +223,22 @@ OutputOptions read_output(const Node& root) {
   return options;
 }
 
+std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& time) {
+  std::vector<DampingOptions> damping;
+  for (const Node& node : root["solver"]["rayleigh_damping"].items()) {
+    DampingOptions options;
+    options.term = static_cast<DampingOptions::Term>(node["form"].choice({"elasticity", "contact"}, 0));
+    if (!node.has("form")) node["form"].fail("\"elasticity\" or \"contact\"");
+    const Node stiffness = node["stiffness"], ratio = node["stiffness_ratio"];
+    if (stiffness.exists() == ratio.exists()) node.fail(abbreviate(node.json()), "one of stiffness and stiffness_ratio");
+    const double h = time.dt;
+    options.coefficient = stiffness.exists() ? stiffness.non_negative(0) : 0.75 * ratio.non_negative(0) * h * h * h;
+    options.lagging_rounds = node["lagging_iterations"].integer_at_least(1, 1);
+    if (options.coefficient > 0) damping.push_back(options);
+  }
+  return damping;
+}
+
 bool read_lump_mass(const Node& root) { return root["solver"]["advanced"]["lump_mass_matrix"].boolean(false); }
 
 void check_space(const Node& root) {

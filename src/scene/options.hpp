@@ -17,6 +17,7 @@ NewtonOptions read_newton(const Node& root, double characteristic_length);
 LinearOptions read_linear(const Node& root);
 RemeshOptions read_remesh(const Node& root);
 OutputOptions read_output(const Node& root);
+std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& time);
 bool read_lump_mass(const Node& root);
 void check_space(const Node& root);
 

@@ -34,6 +34,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.newton = read_newton(root, characteristic_length(root, setup.time));
   setup.remesh = read_remesh(root);
   setup.linear = read_linear(root);
+  setup.damping = read_damping(root, setup.time);
   setup.lump_mass = read_lump_mass(root);
   check_space(root);
 

@@ -98,8 +98,10 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, lin
   VectorX force = VectorX::Zero(a.size());
   Workspace workspace;
   ElasticEnergy<Dim>(cells, setup.materials, 1).add_gradient(state.history.x[0], force, workspace);
-  if (const auto loads = loads_at(setup, state.t); !loads.empty())
+  if (const auto loads = loads_at(setup, state.t); loads.has_dead_loads())
     force -= LoadEnergy<Dim>(cells, setup.materials, loads, 1).forces();
+  if (const auto loads = loads_at(setup, state.t); !loads.pressures.empty())
+    PressureEnergy<Dim>(cells, loads, state.history.x[0], 1).add_gradient(state.history.x[0], force, workspace);
   std::vector<int> stencils;
   for (const auto& element : cells.elements)
     stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());

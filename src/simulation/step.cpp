@@ -49,6 +49,7 @@ StepContext<2> make_context(const Setup<2>& setup, const State<2>& state, const 
   context.mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
   context.scaling = problem.scaling();
   context.contact = setup.contact;
+  if (!setup.time.is_static) context.damping = setup.damping;
   context.velocity_rate = integrator.velocity_rate(state.history);
   for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
   context.newton = setup.newton;
@@ -74,7 +75,8 @@ RemeshFields<2> make_fields(const Setup<2>& setup, const State<2>& state, const 
   fields.x = head_of(x, dofs);
   if (!setup.time.quasistatic && !setup.time.is_static)
     fields.predictor = head_of(integrator.predictor(state.history), dofs);
-  if (setup.contact.enabled) fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
+  if (setup.contact.enabled || !setup.damping.empty())
+    fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
   for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
   for (const auto& past : state.history.v) fields.past_rates.push_back(head_of(past, dofs));
   for (const auto& past : state.history.a) fields.past_rates.push_back(head_of(past, dofs));

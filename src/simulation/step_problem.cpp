@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kFixedPoint = 1e-12;      ///< rounds of lagging that move nothing by more than this are over [m]
 constexpr std::size_t kLongestCycle = 16;  ///< rounds that are remembered
+constexpr int kPressureRounds = 50;        ///< most, where pressure has no potential
 constexpr double kSameState = 1e-3;        ///< of a solve's step tolerance: states nearer than that are one
 
 /// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
@@ -31,6 +32,8 @@ Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
   if (setup.body_acceleration) loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) { return f(X, t); };
   for (const auto& condition : setup.neumann)
     loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const Vec<Dim>& X) { return f(X, t); });
+  for (const auto& condition : setup.pressure)
+    loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const Vec<Dim>& X) { return f(X, t); });
   return loads;
 }
 
@@ -95,6 +98,7 @@ template <int Dim>
 StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
                               linear::Solver& solver, const BarrierStiffness& stiffness)
     : setup_(setup),
+      loads_at_end_(loads_at(setup, t)),
       cells_(whole_mesh(mesh, setup.obstacles.rest)),
       held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
@@ -105,16 +109,16 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
     inertia_ = std::make_shared<InertiaEnergy<Dim>>(
         cells_, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent, integrator.predictor(history));
   elastic_ = std::make_shared<ElasticEnergy<Dim>>(cells_, setup.materials, scaling_);
-  if (const auto loads = loads_at(setup, t); !loads.empty())
-    loads_ = std::make_shared<LoadEnergy<Dim>>(cells_, setup.materials, loads, scaling_);
+  if (loads_at_end_.has_dead_loads())
+    loads_ = std::make_shared<LoadEnergy<Dim>>(cells_, setup.materials, loads_at_end_, scaling_);
   if (setup.contact.enabled) {
     surface_ = collision_surface(mesh, setup.obstacles);
     if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
     contact_ = std::make_shared<ContactEnergy<Dim>>(surface_, setup.contact, stiffness_.value, scaling_);
     if (setup.contact.adaptive_stiffness)
       adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_, setup.contact, average_mass(), scaling_);
-    velocity_ = {integrator.velocity_rate(history), integrator.velocity_reference(history)};
   }
+  velocity_ = {integrator.velocity_rate(history), integrator.velocity_reference(history)};
   std::vector<int> stencils;
   stencils.reserve(cells_.elements.size() * (Dim + 1));
   for (const auto& element : cells_.elements)
@@ -130,9 +134,22 @@ EnergySum StepProblem<Dim>::energy(const VectorX& lagged_x) {
   if (loads_) sum.add(loads_);
   if (contact_) sum.add(contact_);
   friction_.reset();
-  if (contact_ && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0) {
+  if (has_friction()) {
     friction_ = std::make_shared<FrictionEnergy<Dim>>(*contact_, lagged_x, workspace_, setup_.contact, velocity_, scaling_);
     if (!friction_->empty()) sum.add(friction_);
+  }
+  pressure_.reset();
+  if (!loads_at_end_.pressures.empty()) {
+    pressure_ = std::make_shared<PressureEnergy<Dim>>(cells_, loads_at_end_, lagged_x, scaling_);
+    if (!pressure_->empty()) sum.add(pressure_);
+  }
+  damping_.clear();
+  for (const DampingOptions& options : setup_.damping) {
+    const Energy* damped = elastic_.get();
+    if (options.term == DampingOptions::Term::contact) damped = contact_.get();
+    if (!damped || setup_.time.is_static) continue;
+    damping_.push_back(std::make_shared<DampingEnergy<Dim>>(*damped, lagged_x, options.coefficient, velocity_, workspace_));
+    sum.add(damping_.back());
   }
   return sum;
 }
@@ -152,6 +169,7 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   if (inertia_) inertia_->add_gradient(x, gradient, workspace_);
   elastic_->add_gradient(x, gradient, workspace_);
   if (loads_) loads_->add_gradient(x, gradient, workspace_);
+  if (pressure_) pressure_->add_gradient(x, gradient, workspace_);
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
   for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
     gradient.template segment<Dim>(bodies + Dim * o) =
@@ -186,30 +204,47 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x
 }
 
 template <int Dim>
+bool StepProblem<Dim>::has_friction() const {
+  return contact_ && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
+}
+
+/// How often the step may be solved, each time with what is lagged at the solution before.
+template <int Dim>
+int StepProblem<Dim>::most_rounds() const {
+  int rounds = 1;
+  if (has_friction())
+    rounds = setup_.contact.friction_iterations < 0 ? std::numeric_limits<int>::max() : setup_.contact.friction_iterations;
+  if (!damping_.empty())
+    for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
+  if (pressure_ && pressure_->is_lagged(dofs_)) rounds = std::max(rounds, kPressureRounds);
+  return rounds;
+}
+
+template <int Dim>
 NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
   const bool is_first_step = std::isinf(stiffness_.largest);
   if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
   NewtonSummary summary = minimize_lagged(energy(lagged_x), x);
-  const bool lagging = contact_ && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
-  if (!lagging) return summary;
-  const int rounds = setup_.contact.friction_iterations;
+  const int rounds = most_rounds();
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
   std::vector<VectorX> previous = {lagged_x};  // newest last
-  for (int round = 1; summary.converged(); ++round) {
+  for (int round = 1; summary.converged() && (round < rounds || has_friction()); ++round) {
     const EnergySum relagged = energy(x);
     VectorX gradient = VectorX::Zero(x.size());
     relagged.add_gradient(x, gradient, workspace_);
     double norm = 0;
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
-    if (std::sqrt(norm) <= tolerance) break;
+    if (has_friction() && std::sqrt(norm) <= tolerance) break;
     if (has_recurred(x, previous, setup_.newton.step_tolerance)) break;
-    if (rounds >= 0 && round >= std::max(1, rounds)) break;
+    if (round >= rounds) break;
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
     previous.push_back(x);
     NewtonSummary next = minimize_lagged(relagged, x);
+    const bool is_fixed_point = next.converged() && next.iterations == 0;
     next.add_effort(summary);
     summary = next;
+    if (is_fixed_point) break;
   }
   return summary;
 }
@@ -220,10 +255,11 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
   const auto value = [&](const auto& term) { return term ? term->value(x, workspace_) / scaling_ : 0.0; };
   report.inertia = value(inertia_);
   report.elastic = value(elastic_);
-  report.body = value(loads_);
+  report.body = value(loads_) + value(pressure_);
   report.contact = value(contact_);
   report.friction = value(friction_);
-  report.total = report.inertia + report.elastic + report.body + report.contact + report.friction;
+  for (const auto& term : damping_) report.damping += value(term);
+  report.total = report.inertia + report.elastic + report.body + report.contact + report.friction + report.damping;
   return report;
 }
 

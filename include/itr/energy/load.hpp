@@ -15,10 +15,12 @@ template <int Dim>
 struct Loads {
   std::function<Vec<Dim>(const Vec<Dim>& X)> acceleration;  ///< body force by mass [m/s^2]; empty: none
   std::vector<std::pair<int, std::function<Vec<Dim>(const Vec<Dim>& X)>>> tractions;  ///< by facet tag [N/m^(Dim-1)]
-  bool empty() const { return !acceleration && tractions.empty(); }
+  std::vector<std::pair<int, std::function<double(const Vec<Dim>& X)>>> pressures;    ///< the same, see PressureEnergy
+  bool has_dead_loads() const { return acceleration || !tractions.empty(); }
 };
 
-/// -scale * f . (x - X) with the consistent nodal forces f of body force and tractions: minus the work done from rest.
+/// -scale * f . (x - X) with the consistent nodal forces f of body force and tractions, the dead loads: minus the work done
+/// from rest.
 template <int Dim>
 class LoadEnergy final : public Energy {
  public:

@@ -3,6 +3,7 @@
 // What is added to an entry is added in an order that does not depend on the number of threads, so the bits do not either.
 #pragma once
 
+#include <array>
 #include <span>
 #include <utility>
 #include <vector>
@@ -86,14 +87,29 @@ struct PrescribedMotion {
   double curvature = 0;  ///< out: step_D^T H_DD step_D
 };
 
+/// Blocks of stencils kept as they came, over all dofs: a Hessian to use again without assembling it.
+struct BlockList {
+  struct Block {
+    std::array<int, 4> vertices;
+    int size;           ///< number of vertices
+    std::size_t first;  ///< of its values, column-major
+  };
+  std::vector<Block> blocks;
+  std::vector<double> values;
+  std::span<const int> vertices(const Block& block) const {
+    return {block.vertices.data(), static_cast<std::size_t>(block.size)};
+  }
+};
+
 class HessianSink {
  public:
-  HessianSink(const DofMap& dofs, MatrixX& dense) : dofs_(dofs), dense_(&dense) {}
-  HessianSink(const DofMap& dofs, SparseAssembler& sparse) : dofs_(dofs), sparse_(&sparse) {}
+  HessianSink(const DofMap& dofs, MatrixX& dense) : dofs_(&dofs), dense_(&dense) {}
+  HessianSink(const DofMap& dofs, SparseAssembler& sparse) : dofs_(&dofs), sparse_(&sparse) {}
+  explicit HessianSink(BlockList& blocks) : blocks_(&blocks) {}
 
   /// Collects `motion.coupling` and `motion.curvature` along with the blocks.
   void set_motion(PrescribedMotion& motion) {
-    motion.coupling.setZero(dofs_.num_unknowns);
+    motion.coupling.setZero(dofs_->num_unknowns);
     motion.curvature = 0;
     if (motion.step.size() > 0) motion_ = &motion;
   }
@@ -133,9 +149,10 @@ class HessianSink {
   template <int Dim>
   void add_motion(std::span<const int> vertices, const double* block);
 
-  const DofMap& dofs_;
+  const DofMap* dofs_ = nullptr;  ///< null where blocks are kept
   MatrixX* dense_ = nullptr;
   SparseAssembler* sparse_ = nullptr;
+  BlockList* blocks_ = nullptr;
   PrescribedMotion* motion_ = nullptr;
 };
 

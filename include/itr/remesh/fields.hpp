@@ -7,6 +7,7 @@
 
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/contact/options.hpp"
+#include "itr/energy/damping.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/energy/load.hpp"
 #include "itr/energy/material.hpp"
@@ -19,9 +20,9 @@ namespace itr {
 /// Interleaved fields over the vertex slots of a mesh.
 template <int Dim>
 struct RemeshFields {
-  VectorX x;                            ///< positions [m]
-  VectorX predictor;                    ///< x-hat [m]; empty where there is no inertia
-  VectorX velocity_reference;           ///< positions of no velocity [m], for friction; empty where there is none
+  VectorX x;                   ///< positions [m]
+  VectorX predictor;           ///< x-hat [m]; empty where there is no inertia
+  VectorX velocity_reference;  ///< positions of no velocity [m], for friction and damping; empty where there is none
   std::vector<VectorX> past_positions;  ///< must stay free of inversion and intersection
   std::vector<VectorX> past_rates;      ///< velocities and accelerations
 
@@ -52,6 +53,7 @@ struct StepContext {
   MassKind mass = MassKind::consistent;
   double scaling = 1;  ///< alpha h^2 [s^2]
   ContactOptions contact;
+  std::vector<DampingOptions> damping;
   double velocity_rate = 1;                              ///< [1/s]
   std::map<int, std::array<bool, Dim>> held_components;  ///< by facet tag
   NewtonOptions newton;

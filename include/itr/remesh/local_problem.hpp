@@ -85,12 +85,14 @@ class LocalProblem {
  private:
   int local(VertexId v);
   void add_cells(const std::vector<CellId>& patch);
-  void add_traction_facets();
+  void add_loaded_facets();
   void hold_vertices();
   void add_surface(SurfaceTree& tree);
   void weigh_surface();
   VectorX gather(const VectorX& field, const std::vector<Vec<2>>& obstacle_values) const;
   void add_terms(HistoryRule history);
+  VelocityRule velocity_rule() const;
+  void add_damping(DampingOptions::Term term, const Energy& damped);
   void add_unrepresented_history(InertiaEnergy<2>& inertia) const;
   Vec<2> rest_position(VertexId v) const;
   Vec<2> field_value(const VectorX& field, const std::vector<Vec<2>>& obstacle_values, VertexId v) const;

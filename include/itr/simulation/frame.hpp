@@ -13,7 +13,7 @@ namespace itr {
 
 /// Terms of the incremental potential divided by alpha h^2 [J], after the last solve of the step.
 struct EnergyReport {
-  double inertia = 0, elastic = 0, body = 0, contact = 0, friction = 0, total = 0;
+  double inertia = 0, elastic = 0, body = 0, contact = 0, friction = 0, damping = 0, total = 0;
 };
 
 struct OperationCount {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "itr/energy/contact/options.hpp"
+#include "itr/energy/damping_options.hpp"
 #include "itr/energy/material.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/newton/options.hpp"
@@ -47,6 +48,13 @@ struct NeumannCondition {
   SpaceTimeFunction<Dim> traction;
 };
 
+/// Pressure on the deformed boundary facets with a tag, along their inward normals [N/m^2] (2D: [N/m]).
+template <int Dim>
+struct PressureCondition {
+  int tag = 0;
+  std::function<double(const Vec<Dim>& X, double t)> pressure;
+};
+
 template <int Dim>
 struct InitialCondition {
   int body = 0;
@@ -64,6 +72,7 @@ struct Setup {
   std::map<int, Material> materials;  ///< by body id; every body of the mesh has one
   std::vector<DirichletCondition<Dim>> dirichlet;
   std::vector<NeumannCondition<Dim>> neumann;
+  std::vector<PressureCondition<Dim>> pressure;
   SpaceTimeFunction<Dim> body_acceleration;  ///< acts along +: gravity is (0, -9.81) [m/s^2]; empty: none
   std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
   bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
@@ -73,6 +82,7 @@ struct Setup {
   NewtonOptions newton;
   RemeshOptions remesh;
   LinearOptions linear;
+  std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   bool lump_mass = false;
 };
 

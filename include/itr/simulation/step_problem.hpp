@@ -5,9 +5,11 @@
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/contact/stiffness.hpp"
+#include "itr/energy/damping.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/energy/load.hpp"
+#include "itr/energy/pressure.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/simulation/frame.hpp"
 #include "itr/simulation/setup.hpp"
@@ -41,8 +43,8 @@ class StepProblem {
   StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, linear::Solver& solver,
               const BarrierStiffness& stiffness = {});
 
-  /// Solves from x (feasible) in place, with lagging rounds of friction. The friction of the first round is lagged at
-  /// `lagged_x`.
+  /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
+  /// the first round they are lagged at `lagged_x`.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x);
 
   EnergyReport report(const VectorX& x);
@@ -63,10 +65,13 @@ class StepProblem {
   NewtonSummary minimize_lagged(const EnergySum& sum, VectorX& x);
   void initialize_stiffness(const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
+  bool has_friction() const;
+  int most_rounds() const;
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;
 
   const Setup<Dim>& setup_;
+  Loads<Dim> loads_at_end_;
   CellSet<Dim> cells_;
   CollisionSurface surface_;
   HeldDofs<Dim> held_;
@@ -81,6 +86,8 @@ class StepProblem {
   std::shared_ptr<FrictionEnergy<Dim>> friction_;
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
+  std::shared_ptr<PressureEnergy<Dim>> pressure_;
+  std::vector<std::shared_ptr<DampingEnergy<Dim>>> damping_;
   std::unique_ptr<SparseSystem> system_;
 };
 

@@ -2,14 +2,9 @@
 #pragma once
 
 #include "itr/energy/contact/contact.hpp"
+#include "itr/energy/velocity_rule.hpp"
 
 namespace itr {
-
-/// How velocities follow from positions within a step: v = rate * (x - reference).
-struct VelocityRule {
-  double rate = 1;    ///< dv/dx [1/s]
-  VectorX reference;  ///< [m]
-};
 
 /// Smoothed Coulomb friction with normal forces, tangents and closest points lagged at the positions where it was made
 /// (scene-format §6.7). A new lag is a new object.

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "itr/energy/damping_options.hpp"
+#include "itr/energy/energy.hpp"
+#include "itr/energy/velocity_rule.hpp"
+
+namespace itr {
+
+/// coefficient / (2 rate) * v^T K v with K the Hessian of another term at the positions where this was made, projected to be
+/// positive semi-definite: it only ever takes energy out. A new lag is a new object.
+template <int Dim>
+class DampingEnergy final : public Energy {
+ public:
+  /// K is taken with the scale (alpha h^2) that `damped` has.
+  DampingEnergy(const Energy& damped, ConstVectorView lagged_x, double coefficient, VelocityRule velocity,
+                Workspace& workspace);
+  std::string_view name() const override { return "damping"; }
+  double value(ConstVectorView x, Workspace&) const override;
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
+
+ private:
+  /// f(block, its matrix, velocities of its vertices) for each block.
+  template <typename F>
+  void for_each(ConstVectorView x, F&& f) const;
+
+  BlockList stiffness_;
+  double coefficient_;
+  VelocityRule velocity_;
+};
+
+}  // namespace itr
