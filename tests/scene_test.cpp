@@ -313,7 +313,8 @@ TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
   EXPECT_EQ(wrong_place({{"time", {{"tend", 0}}}}), "/time/tend");
   EXPECT_EQ(wrong_place({{"time", {{"integrator", "Euler"}}}}), "/time/integrator");
   EXPECT_EQ(wrong_place({{"space", {{"discr_order", 2}}}}), "/space/discr_order");
-  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"norm_type", "Linf"}}}}}}), "/solver/nonlinear/norm_type");
+  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"norm_type", "L1"}}}}}}), "/solver/nonlinear/norm_type");
+  EXPECT_EQ(wrong_place({{"time", {{"step_cuts", -1}}}}), "/time/step_cuts");
   EXPECT_EQ(wrong_place({{"input", {{"data", {{"state", "a.hdf5"}}}}}}), "/input/data/state");
 }
 
@@ -331,7 +332,7 @@ TEST_F(SceneTest, Integrators) {
 }
 
 TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
-  const json nonlinear = {{"x_delta", 1e-3}, {"grad_norm", 1e-7}, {"f_delta", 1e-16}};
+  const json nonlinear = {{"x_delta", 1e-3}, {"grad_norm", 1e-7}, {"f_delta", 1e-3}};
   const itr::Setup<2> dynamic = read2(square({{"solver", {{"nonlinear", nonlinear}}}}));
   const itr::Setup<2> statics = read2(square({{"solver", {{"nonlinear", nonlinear}}}, {"time", nullptr}}));
   const json euclidean = {{"norm_type", "Euclidean"}, {"grad_norm_tol", 1e-6}};
@@ -341,7 +342,31 @@ TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
   EXPECT_DOUBLE_EQ(dynamic.newton.first_gradient_tolerance, 1e-11);
   EXPECT_DOUBLE_EQ(statics.newton.step_tolerance, 1e-3);
   EXPECT_EQ(read2(square({{"solver", {{"nonlinear", euclidean}}}})).newton.gradient_tolerance, 1e-6);
-  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"f_delta", 1e-3}}}}}}), "/solver/nonlinear/f_delta");
+  EXPECT_DOUBLE_EQ(dynamic.newton.energy_tolerance, 1e-4);
+  EXPECT_EQ(dynamic.newton.norm, NewtonNorm::euclidean);
+}
+
+TEST_F(SceneTest, TolerancesOfMainCarryTheScalesOfTheScene) {
+  const auto newton = [&](const json& nonlinear, const json& advanced = json::object()) {
+    return read2(square({{"solver", {{"nonlinear", nonlinear}, {"advanced", advanced}}}})).newton;
+  };
+  const double L = std::sqrt(2.0);  // of the unit square
+
+  const NewtonOptions l2 = newton({{"x_delta_tol", 1e-4}, {"grad_norm_tol", 1e-8}, {"newton_decrement_tol", 1e-9}});
+  EXPECT_EQ(l2.norm, NewtonNorm::l2);
+  EXPECT_DOUBLE_EQ(l2.gradient_tolerance, 1e-8 * 1e4 * L);
+  EXPECT_DOUBLE_EQ(l2.first_gradient_tolerance, 1e-12 * 1e4 * L);
+  EXPECT_DOUBLE_EQ(l2.step_tolerance, 1e-4 * L * L);
+  EXPECT_DOUBLE_EQ(l2.relative_gradient_tolerance, 1e-10);
+  EXPECT_DOUBLE_EQ(l2.decrement_tolerance, 1e-9);
+  const NewtonOptions linf = newton({{"norm_type", "Linf"}, {"x_delta_tol", 1e-4}, {"rel_x_delta_tol", 1e-3}},
+                                    {{"characteristic_length", 3}, {"characteristic_force_density", 10}});
+  EXPECT_EQ(linf.norm, NewtonNorm::linf);
+  EXPECT_DOUBLE_EQ(linf.gradient_tolerance, 1e-10 * 10);
+  EXPECT_DOUBLE_EQ(linf.step_tolerance, 1e-4 * 3);
+  EXPECT_DOUBLE_EQ(linf.relative_step_tolerance, 1e-3);
+  EXPECT_EQ(newton(json::object()).norm, NewtonNorm::l2);  // no key of either vocabulary
+  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"x_delta", 1}, {"x_delta_tol", 1}}}}}}), "/solver/nonlinear/x_delta");
 }
 
 TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {

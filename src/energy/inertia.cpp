@@ -83,8 +83,22 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
   sink.add_constant_elements<Dim>(cells_, this, [&](std::size_t e, Mat<kDofs>& block) { block = mass_[e] * unit; });
 }
 
-#define ITR_INSTANTIATE(Dim)         \
-  template class InertiaEnergy<Dim>; \
+template <int Dim>
+VectorX unit_mass_diagonal(const CellSet<Dim>& cells) {
+  VectorX diagonal = VectorX::Zero(Dim * cells.num_vertices);
+  for (const auto& element : cells.elements)
+    for (const int v : element.vertices)
+      diagonal.segment<Dim>(Dim * v).array() += 2 * element.volume / ((Dim + 1) * (Dim + 2));
+  const auto used = (diagonal.array() > 0).count();
+  const double mean = used > 0 ? diagonal.sum() / static_cast<double>(used) : 1;
+  for (double& entry : diagonal)
+    if (entry == 0) entry = mean;
+  return diagonal;
+}
+
+#define ITR_INSTANTIATE(Dim)                                     \
+  template class InertiaEnergy<Dim>;                             \
+  template VectorX unit_mass_diagonal<Dim>(const CellSet<Dim>&); \
   template std::vector<double> element_densities<Dim>(const CellSet<Dim>&, const std::map<int, Material>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <sstream>
 #include <utility>
 
 #include "itr/core/timer.hpp"
@@ -15,6 +17,12 @@ const char* to_string(Termination termination) {
       return "gradient below tolerance";
     case Termination::step:
       return "step below tolerance";
+    case Termination::decrement:
+      return "Newton decrement below tolerance";
+    case Termination::energy:
+      return "energy change below tolerance";
+    case Termination::round_off:
+      return "converged to round-off, not to the tolerance";
     case Termination::iterations:
       return "out of iterations";
     case Termination::no_descent:
@@ -38,6 +46,8 @@ namespace {
 
 constexpr double kArmijo = 1e-4;
 constexpr int kIterationsPerFallback = 5;  ///< iterations with the projected Hessian before the true one is tried again
+constexpr double kRoundOff = 1e-9;         ///< relative change of energy below which slopes tell more
+constexpr double kUnresolved = 1e-14;      ///< relative change of energy that a sum of many terms does not resolve
 constexpr double kLeastPenalty = 1e-8;     ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;          ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostDoublings = 12;
@@ -46,7 +56,7 @@ constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets 
 class Minimizer {
  public:
   Minimizer(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
-            const NewtonOptions& options, Workspace& workspace, const std::function<bool(const VectorX&)>& after_step)
+            const NewtonOptions& options, Workspace& workspace, const NewtonExtras& extras)
       : energy_(energy),
         x_(x),
         dofs_(dofs),
@@ -54,7 +64,7 @@ class Minimizer {
         system_(system),
         options_(options),
         workspace_(workspace),
-        after_step_(after_step) {}
+        extras_(extras) {}
 
   NewtonSummary run() {
     value_ = timed_value(x_);
@@ -62,25 +72,47 @@ class Minimizer {
     for (summary_.iterations = 0; summary_.iterations < options_.max_iterations; ++summary_.iterations) {
       compute_gradient();
       compute_remaining();
-      const double tolerance = summary_.iterations == 0 ? options_.first_gradient_tolerance : options_.gradient_tolerance;
-      if (!moving_ && summary_.gradient_norm < tolerance) return stop(Termination::gradient);
+      if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
+      if (!moving_ && has_small_gradient()) return stop(Termination::gradient);
       if (!compute_direction()) return stop(Termination::no_descent, "the Newton system has no descent direction");
-      if (!moving_ && summary_.step_norm < options_.step_tolerance) return stop(Termination::step);
-      if (!line_search() && !retry_projected()) {
+      if (!moving_ && has_small_step()) return stop(Termination::step);
+      if (!moving_ && -0.5 * free_dot(step_, gradient_) < options_.decrement_tolerance) return stop(Termination::decrement);
+      const double before = value_;
+      const bool found = line_search() || retry_projected();
+      if (found && has_stalled(before)) return stop(Termination::energy);
+      if (!found) {
         if (moving_ && !relaxing_) {  // held dofs are blocked: let the bodies give way first
           relax_next_ = true;
-          if (++blocked_ > kMaxBlocked) return stop(Termination::no_descent, "held vertices cannot reach their targets");
+          if (++blocked_ > kMaxBlocked) return stop(Termination::no_descent, describe_way_left());
           continue;
         }
+        if (-0.5 * free_dot(step_, gradient_) < kUnresolved * std::abs(value_)) return stop(Termination::round_off);
         return stop(Termination::no_descent, "the line search found no step");
       }
-      if (after_step_ && after_step_(x_)) value_ = timed_value(x_);
+      if (extras_.after_step && extras_.after_step(x_)) value_ = timed_value(x_);
     }
-    return stop(Termination::iterations, "no convergence in " + std::to_string(options_.max_iterations) + " iterations");
+    return stop(Termination::iterations, "no convergence in " + std::to_string(options_.max_iterations) + " iterations" +
+                                             (moving_ ? ", " + describe_way_left() : ""));
   }
 
  private:
   static constexpr int kMaxBlocked = 50;
+  static constexpr double kLeastProgress = 0.99;
+
+  /// Whether held dofs have hardly come nearer to their targets in many iterations: something is in their way for good.
+  bool is_stuck() {
+    if (!moving_ || summary_.iterations % kMaxBlocked != 0) return false;
+    return remaining_l1_ > kLeastProgress * std::exchange(remaining_before_, remaining_l1_);
+  }
+
+  std::string describe_way_left() const {
+    double longest = 0;
+    for (Eigen::Index i = 0; i < x_.size(); ++i)
+      if (dofs_.unknown[i] == kNone) longest = std::max(longest, std::abs(target_[i] - x_[i]));
+    std::ostringstream text;
+    text << "held vertices cannot reach their targets, up to " << longest << " m are left";
+    return text.str();
+  }
 
   NewtonSummary stop(Termination termination, std::string message = {}) {
     summary_.termination = termination;
@@ -108,9 +140,55 @@ class Minimizer {
     return sum;
   }
 
+  /// Over the unknowns, in the options' norm.
+  template <typename Weighted>
+  double norm(const VectorX& field, Weighted&& weighted) const {
+    double sum = 0, largest = 0;
+    for (Eigen::Index i = 0; i < field.size(); ++i) {
+      if (dofs_.unknown[i] == kNone) continue;
+      const double entry = weighted(field[i], i);
+      sum += entry * entry;
+      largest = std::max(largest, std::abs(entry));
+    }
+    return options_.norm == NewtonNorm::linf ? largest : std::sqrt(sum);
+  }
+
+  double weight(Eigen::Index i) const { return (*extras_.norm_weights)[i]; }
+
+  double gradient_norm() const {
+    return norm(gradient_, [&](double g, Eigen::Index i) {
+      if (options_.norm == NewtonNorm::euclidean) return g;
+      return options_.norm == NewtonNorm::l2 ? g / std::sqrt(weight(i)) : g / weight(i);
+    });
+  }
+
+  double step_norm() const {
+    return norm(step_,
+                [&](double p, Eigen::Index i) { return options_.norm == NewtonNorm::l2 ? p * std::sqrt(weight(i)) : p; });
+  }
+
   void compute_gradient() {
     gradient_ = gradient_at(x_);
-    summary_.gradient_norm = std::sqrt(free_dot(gradient_, gradient_));
+    summary_.gradient_norm = gradient_norm();
+  }
+
+  bool has_small_gradient() {
+    if (first_gradient_ < 0) first_gradient_ = summary_.gradient_norm;
+    const bool is_first = summary_.iterations == 0;
+    return summary_.gradient_norm < (is_first ? options_.first_gradient_tolerance : options_.gradient_tolerance) ||
+           (!is_first && summary_.gradient_norm < options_.relative_gradient_tolerance * first_gradient_);
+  }
+
+  bool has_small_step() {
+    if (first_step_ < 0) first_step_ = summary_.step_norm;
+    return summary_.step_norm < options_.step_tolerance ||
+           (summary_.iterations > 0 && summary_.step_norm < options_.relative_step_tolerance * first_step_);
+  }
+
+  /// Counts the steps in a row that hardly changed the energy.
+  bool has_stalled(double before) {
+    stalled_ = !moving_ && std::abs(value_ - before) < options_.energy_tolerance ? stalled_ + 1 : 0;
+    return stalled_ >= options_.energy_steps && options_.energy_tolerance > 0;
   }
 
   /// What is left of the way of the held dofs.
@@ -173,7 +251,7 @@ class Minimizer {
     model_curvature_ = solution.dot(rhs) + 2 * solution.dot(motion_.coupling) + motion_.curvature;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = solution[dofs_.unknown[i]];
-    summary_.step_norm = solution.norm();
+    summary_.step_norm = step_norm();
     return true;
   }
 
@@ -249,6 +327,10 @@ class Minimizer {
     const VectorX gradient = gradient_at(candidate_);
     const double before = free_dot(step_, gradient_), after = free_dot(step_, gradient);
     const double mean = step / 2 * (before + after), spread = step / 2 * std::abs(after - before);
+    // That form refuses full steps to the minimum of a quadratic; where energies say nothing at all, a slope that shrinks
+    // will do.
+    if (std::abs(value - value_) <= kRoundOff * std::abs(value_) && std::abs(after) <= 0.5 * std::abs(before))
+      return mean <= kArmijo * step * slope;
     return mean + spread <= kArmijo * step * slope;
   }
 
@@ -259,7 +341,7 @@ class Minimizer {
   NewtonSystem& system_;
   const NewtonOptions& options_;
   Workspace& workspace_;
-  const std::function<bool(const VectorX&)>& after_step_;
+  const NewtonExtras& extras_;
 
   NewtonSummary summary_;
   double value_ = 0;
@@ -267,6 +349,7 @@ class Minimizer {
   PrescribedMotion motion_;  ///< asked of the held dofs in this iteration
   double model_curvature_ = 0;
   double remaining_l1_ = 0;
+  double remaining_before_ = std::numeric_limits<double>::infinity();  ///< kMaxBlocked iterations ago
   double penalty_ = 0;
   bool moving_ = false;    ///< held dofs are not yet at their targets
   bool relaxing_ = false;  ///< this iteration leaves them where they are
@@ -274,14 +357,15 @@ class Minimizer {
   bool projected_ = false;
   int psd_iterations_ = 0;
   int blocked_ = 0;
+  double first_gradient_ = -1, first_step_ = -1;  ///< norms with the held dofs in place; below 0: not there yet
+  int stalled_ = 0;
 };
 
 }  // namespace
 
 NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
-                       const NewtonOptions& options, Workspace& workspace,
-                       const std::function<bool(const VectorX&)>& after_step) {
-  return Minimizer(energy, x, dofs, target, system, options, workspace, after_step).run();
+                       const NewtonOptions& options, Workspace& workspace, const NewtonExtras& extras) {
+  return Minimizer(energy, x, dofs, target, system, options, workspace, extras).run();
 }
 
 }  // namespace itr

@@ -91,6 +91,7 @@ void Totals::add(const StepReport& report) {
   total_ = report;
   total_.newton_iterations += before.newton_iterations;
   total_.damped_steps += before.damped_steps;
+  total_.cut_steps += before.cut_steps;
   total_.splits = before.splits + report.splits;
   total_.collapses = before.collapses + report.collapses;
   total_.swaps = before.swaps + report.swaps;
@@ -105,11 +106,12 @@ void Totals::add(const StepReport& report) {
 
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {
   return fmt::format(
-      R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"damped_steps":{},"t":{},{},)"
+      R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"damped_steps":{},"cut_steps":{},"t":{},{},)"
       R"("energy_decrease_by_remeshing":{},"norms":{}}})"
       "\n",
       json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(), total_.step,
-      total_.damped_steps, number(total_.t), common_members(total_), number(energy_decrease_), norms_json(norms));
+      total_.damped_steps, total_.cut_steps, number(total_.t), common_members(total_), number(energy_decrease_),
+      norms_json(norms));
 }
 
 }  // namespace itr::output

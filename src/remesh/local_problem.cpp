@@ -389,7 +389,9 @@ void LocalProblem::add_unrepresented_history(InertiaEnergy<2>& inertia) const {
 NewtonSummary LocalProblem::relax(int max_iterations) {
   NewtonOptions options = context_.newton;
   options.max_iterations = max_iterations;
-  return minimize(energy_, x_, dofs_, VectorX(), system_, options, workspace_);
+  if (options.norm == NewtonNorm::euclidean) return minimize(energy_, x_, dofs_, VectorX(), system_, options, workspace_);
+  const VectorX weights = unit_mass_diagonal(cells_);
+  return minimize(energy_, x_, dofs_, VectorX(), system_, options, workspace_, {.norm_weights = &weights});
 }
 
 bool LocalProblem::is_free_of_intersections() const {

@@ -70,7 +70,7 @@ constexpr Group kGroups[] = {
     {"/initial_conditions/acceleration", Role::read, "*"},  // also the word "consistent"
     {"/initial_conditions/acceleration/*", Role::read, "id value"},
 
-    {"/time", Role::read, "t0 tend dt time_steps integrator quasistatic"},
+    {"/time", Role::read, "t0 tend dt time_steps integrator quasistatic step_cuts"},
     {"/time/integrator", Role::read, "type steps beta gamma energy_growth_limit"},
 
     {"/contact", Role::read, "enabled dhat dhat_percentage epsv friction_coefficient use_convergent_formulation"},
@@ -82,8 +82,8 @@ constexpr Group kGroups[] = {
     {"/solver/rayleigh_damping/*", Role::read, "form stiffness stiffness_ratio lagging_iterations"},
     {"/solver/linear", Role::read, "solver"},
     {"/solver/linear", Role::ignored, "precond enable_overwrite_solver max_iter tolerance Eigen AMGCL Hypre Pardiso MUMPS"},
-    {"/solver/contact", Role::read, "barrier_stiffness friction_iterations friction_convergence_tol"},
-    {"/solver/contact", Role::only, "initial_barrier_stiffness=1"},
+    {"/solver/contact", Role::read,
+     "barrier_stiffness initial_barrier_stiffness friction_iterations friction_convergence_tol"},
     // Any conservative CCD leads to the same converged solutions, and so does any way to the Dirichlet values: their
     // elimination in the end is exact.
     {"/solver/contact/CCD", Role::ignored, "broad_phase tolerance max_iterations"},
@@ -93,11 +93,10 @@ constexpr Group kGroups[] = {
     {"/solver/nonlinear", Role::read, "max_iterations f_delta"},
     {"/solver/nonlinear", Role::read, "x_delta grad_norm"},
     {"/solver/nonlinear", Role::read,
-     "x_delta_tol grad_norm_tol rel_grad_norm_tol rel_x_delta_tol newton_decrement_tol norm_type"},
+     "x_delta_tol grad_norm_tol rel_grad_norm_tol rel_x_delta_tol newton_decrement_tol norm_type first_grad_norm_tol"},
     {"/solver/nonlinear", Role::ignored, "iterations_per_strategy use_grad_norm"},
-    {"/solver/nonlinear/advanced", Role::read, "first_grad_norm_tol f_delta f_delta_tol"},
-    {"/solver/nonlinear/advanced", Role::ignored,
-     "f_delta_step_tol derivative_along_delta_x_tol apply_gradient_fd gradient_fd_eps"},
+    {"/solver/nonlinear/advanced", Role::read, "first_grad_norm_tol f_delta f_delta_tol f_delta_step_tol"},
+    {"/solver/nonlinear/advanced", Role::ignored, "derivative_along_delta_x_tol apply_gradient_fd gradient_fd_eps"},
     {"/solver/nonlinear/line_search", Role::read, "method"},
     {"/solver/nonlinear/line_search", Role::ignored,
      "use_grad_norm_tol min_step_size max_step_size_iter min_step_size_final max_step_size_iter_final "
@@ -110,7 +109,8 @@ constexpr Group kGroups[] = {
     {"/solver/advanced", Role::read, "lump_mass_matrix"},
     {"/solver/advanced", Role::only,
      "lagged_regularization_weight=0 lagged_regularization_iterations=1 check_inversion=\"Discrete\""},
-    {"/solver/advanced", Role::ignored, "cache_size characteristic_length characteristic_force_density"},
+    {"/solver/advanced", Role::read, "characteristic_length characteristic_force_density"},
+    {"/solver/advanced", Role::ignored, "cache_size"},
 
     {"/space", Role::read, "discr_order"},
     {"/space/advanced", Role::only,

@@ -10,6 +10,7 @@ namespace itr::scene {
 namespace {
 
 constexpr double kMostSteps = 1e9;
+constexpr int kMostCuts = 20;
 
 void read_integrator(const Node& node, TimeOptions& options) {
   const bool is_object = node.exists() && node.json().is_object();
@@ -72,6 +73,8 @@ TimeOptions read_time(const Node& root) {
   }
   options.t0 = time["t0"].number(0);
   options.quasistatic = time["quasistatic"].boolean(false);
+  options.step_cuts = time["step_cuts"].integer_at_least(0, 0);
+  if (options.step_cuts > kMostCuts) time["step_cuts"].fail("at most " + std::to_string(kMostCuts));
   read_steps(time, options);
   read_integrator(time["integrator"], options);
   return options;
@@ -99,6 +102,7 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   options.friction_velocity = contact["epsv"].positive(1e-3);
   const Node stiffness = solver["barrier_stiffness"];
   options.adaptive_stiffness = !stiffness.exists() || stiffness.json() == "adaptive";
+  options.barrier_stiffness = solver["initial_barrier_stiffness"].positive(1);
   if (!options.adaptive_stiffness) {
     if (!stiffness.json().is_number()) stiffness.fail("a number > 0, or \"adaptive\"");
     options.barrier_stiffness = stiffness.positive(1);
@@ -110,60 +114,74 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
 
 namespace {
 
+constexpr const char* kPaperKeys[] = {"x_delta", "grad_norm", "f_delta"};
 constexpr const char* kMainKeys[] = {"x_delta_tol",     "grad_norm_tol",        "rel_grad_norm_tol",
                                      "rel_x_delta_tol", "newton_decrement_tol", "norm_type"};
 
-/// Energy differences between iterates are not tested; a scene that asks for no more than rounding loses nothing.
-void check_energy_tolerance(const Node& node) {
-  constexpr double kTiny = 1e-10;
-  if (node.non_negative(0) > kTiny) node.fail("at most 1e-10: stopping by energy differences is not supported yet");
+template <std::size_t N>
+Node find_any(const Node& node, const char* const (&keys)[N]) {
+  for (const char* key : keys)
+    if (node.has(key)) return node[key];
+  return node[keys[0]];
 }
 
-Node find_main_key(const Node& nonlinear) {
-  for (const char* key : kMainKeys)
-    if (nonlinear.has(key)) return nonlinear[key];
-  return nonlinear["x_delta_tol"];
+/// At either of the two places where PolyFEM has had it.
+Node first_gradient_node(const Node& nonlinear) {
+  return nonlinear.has("first_grad_norm_tol") ? nonlinear["first_grad_norm_tol"]
+                                              : nonlinear["advanced"]["first_grad_norm_tol"];
 }
 
-/// scene-format §7.2: tolerances in the paper's sense.
+/// scene-format §7.2: tolerances in the paper's sense, Euclidean norms times h.
 void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& options) {
+  const Node advanced = nonlinear["advanced"];
   options.step_tolerance = length * nonlinear["x_delta"].non_negative(0);
   options.gradient_tolerance = length * nonlinear["grad_norm"].non_negative(1e-8);
-  options.first_gradient_tolerance = length * nonlinear["advanced"]["first_grad_norm_tol"].non_negative(1e-10);
+  options.first_gradient_tolerance = length * first_gradient_node(nonlinear).non_negative(1e-10);
+  const Node energy = advanced.has("f_delta") ? advanced["f_delta"] : nonlinear["f_delta"];
+  options.energy_tolerance = length * energy.non_negative(0);
+  options.energy_steps = advanced["f_delta_step_tol"].integer_at_least(1, 100);
 }
 
-/// scene-format §7.3, as far as it says the same as §7.2: in the Euclidean norm, without relative tests.
-void read_main_tolerances(const Node& nonlinear, const Node& present, NewtonOptions& options) {
-  for (const char* key : {"x_delta", "grad_norm"})
-    if (nonlinear.has(key))
-      nonlinear[key].fail(std::string("\"") + key + "\" beside " + present.pointer(),
-                          "one vocabulary of tolerances, not two");
-  const Node norm = nonlinear["norm_type"];
-  if (norm.choice({"L2", "Linf", "Euclidean"}, 0) != 2)
-    present.fail("x_delta and grad_norm, or norm_type \"Euclidean\": the norms L2 and Linf are not supported yet");
-  for (const char* key : {"rel_grad_norm_tol", "rel_x_delta_tol", "newton_decrement_tol"}) {
-    constexpr double kTiny = 1e-10;  // the default of the first: to stop there or a little later is the same
-    if (nonlinear[key].non_negative(0) > kTiny) nonlinear[key].fail("at most 1e-10: relative tests are not supported yet");
+/// scene-format §7.3: norms that do not depend on the mesh, tolerances times the scene's scales.
+void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptions& options) {
+  const Node nonlinear = root["solver"]["nonlinear"], advanced = root["solver"]["advanced"];
+  const Node given_length = advanced["characteristic_length"];
+  const double given = given_length.number(-1), length = given > 0 ? given : scale.diagonal;
+  const double force = advanced["characteristic_force_density"].positive(1e4);
+  options.norm = std::array{NewtonNorm::l2, NewtonNorm::linf,
+                            NewtonNorm::euclidean}[nonlinear["norm_type"].choice({"L2", "Linf", "Euclidean"}, 0)];
+  double gradient_scale = 1, step_scale = 1;
+  if (options.norm == NewtonNorm::l2) {
+    const double root_of_volume = std::pow(length, 0.5 * scale.dimension);
+    gradient_scale = force * root_of_volume;
+    step_scale = length * root_of_volume;
+  } else if (options.norm == NewtonNorm::linf) {
+    gradient_scale = force;
+    step_scale = length;
   }
-  options.step_tolerance = nonlinear["x_delta_tol"].non_negative(0);
-  options.gradient_tolerance = nonlinear["grad_norm_tol"].non_negative(1e-10);
-  options.first_gradient_tolerance = nonlinear["advanced"]["first_grad_norm_tol"].non_negative(1e-12);
+  options.step_tolerance = step_scale * nonlinear["x_delta_tol"].non_negative(0);
+  options.gradient_tolerance = gradient_scale * nonlinear["grad_norm_tol"].non_negative(1e-10);
+  options.first_gradient_tolerance = gradient_scale * first_gradient_node(nonlinear).non_negative(1e-12);
+  options.relative_gradient_tolerance = nonlinear["rel_grad_norm_tol"].non_negative(1e-10);
+  options.relative_step_tolerance = nonlinear["rel_x_delta_tol"].non_negative(0);
+  options.decrement_tolerance = nonlinear["newton_decrement_tol"].non_negative(0);
+  options.energy_tolerance = nonlinear["advanced"]["f_delta_tol"].non_negative(0);
+  options.energy_steps = nonlinear["advanced"]["f_delta_step_tol"].integer_at_least(1, 100);
 }
 
 }  // namespace
 
-NewtonOptions read_newton(const Node& root, double characteristic_length) {
+NewtonOptions read_newton(const Node& root, double characteristic_length, const SceneScale& scale) {
   const Node nonlinear = root["solver"]["nonlinear"];
   NewtonOptions options;
   options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, 500);
-  const Node main_key = find_main_key(nonlinear);
-  if (main_key.exists())
-    read_main_tolerances(nonlinear, main_key, options);
-  else
+  const Node paper_key = find_any(nonlinear, kPaperKeys), main_key = find_any(nonlinear, kMainKeys);
+  if (paper_key.exists() && main_key.exists())
+    paper_key.fail("it beside " + main_key.pointer(), "one vocabulary of tolerances, not two");
+  if (paper_key.exists() || nonlinear["advanced"].has("f_delta"))
     read_paper_tolerances(nonlinear, characteristic_length, options);
-  check_energy_tolerance(nonlinear["f_delta"]);
-  check_energy_tolerance(nonlinear["advanced"]["f_delta"]);
-  check_energy_tolerance(nonlinear["advanced"]["f_delta_tol"]);
+  else
+    read_main_tolerances(root, scale, options);
   options.line_search = static_cast<LineSearch>(nonlinear["line_search"]["method"].choice(
       {"Backtracking", "Armijo", "RobustArmijo"}, static_cast<int>(options.line_search)));
   options.project_to_psd = nonlinear["Newton"]["use_psd_projection"].boolean(true);

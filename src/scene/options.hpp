@@ -13,7 +13,13 @@ double characteristic_length(const Node& root, const TimeOptions& time);
 
 /// `shortest_edge` of the rest surfaces, obstacles included: dhat shrinks below it unless the scene gives it (§6.1).
 ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<std::string>& warnings);
-NewtonOptions read_newton(const Node& root, double characteristic_length);
+/// Extent of the bodies at rest, which tolerances are relative to.
+struct SceneScale {
+  int dimension = 2;
+  double diagonal = 1;  ///< of the bounding box [m]
+};
+/// The tolerances of the paper's vocabulary if one of its keys is there, else those of PolyFEM's main branch.
+NewtonOptions read_newton(const Node& root, double characteristic_length, const SceneScale& scale);
 LinearOptions read_linear(const Node& root);
 RemeshOptions read_remesh(const Node& root);
 OutputOptions read_output(const Node& root);

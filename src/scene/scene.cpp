@@ -10,6 +10,7 @@
 #include "materials.hpp"
 #include "merge.hpp"
 #include "options.hpp"
+#include "transformation.hpp"
 
 namespace itr::scene {
 
@@ -28,10 +29,16 @@ double shortest_surface_edge(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstac
 }
 
 template <int Dim>
+double body_diagonal(const Mesh<Dim>& mesh) {
+  std::vector<Vec<Dim>> points;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) points.push_back(mesh.rest(v));
+  return bounding_box<Dim>(points).diagonal().norm();
+}
+
+template <int Dim>
 Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
   Setup<Dim> setup;
   setup.time = read_time(root);
-  setup.newton = read_newton(root, characteristic_length(root, setup.time));
   setup.remesh = read_remesh(root);
   setup.linear = read_linear(root);
   setup.damping = read_damping(root, setup.time);
@@ -39,6 +46,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   check_space(root);
 
   setup.mesh = read_bodies<Dim>(geometries, files, warnings);
+  setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
   if (setup.remesh.enabled)

@@ -181,7 +181,7 @@ StepReport Simulation<Dim>::initial_report() const {
 
 template <int Dim>
 StepResult Simulation<Dim>::advance() {
-  return take_step(impl_->setup, impl_->shortest_edge, *impl_->solver, impl_->logger, impl_->state);
+  return take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->solver, impl_->logger, impl_->state);
 }
 
 template <int Dim>

@@ -158,7 +158,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
   State<Dim> next = state;
   next.step = state.step + 1;
   next.t = setup.time.t0 + next.step * setup.time.dt;
-  const double t = setup.time.is_static ? 1 : next.t;
+  const double t = next.t;
   report.step = next.step;
   report.t = next.t;
   const auto fail = [&](const NewtonSummary& summary) {
@@ -239,7 +239,78 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
   return result;
 }
 
-template StepResult take_step<2>(const Setup<2>&, double, linear::Solver&, const Logger&, State<2>&);
-template StepResult take_step<3>(const Setup<3>&, double, linear::Solver&, const Logger&, State<3>&);
+namespace {
+
+OperationCount operator+(const OperationCount& a, const OperationCount& b) {
+  return {a.tried + b.tried, a.accepted + b.accepted};
+}
+
+/// Adds the effort of what came before `report` within one step.
+void add_effort(const StepReport& before, StepReport& report) {
+  report.newton_iterations += before.newton_iterations;
+  report.damped_steps += before.damped_steps;
+  report.splits = report.splits + before.splits;
+  report.collapses = report.collapses + before.collapses;
+  report.swaps = report.swaps + before.swaps;
+  report.smooths = report.smooths + before.smooths;
+  StepSeconds& s = report.seconds;
+  const StepSeconds& b = before.seconds;
+  s = {s.assembly + b.assembly, s.linear_solve + b.linear_solve, s.line_search + b.line_search, s.ccd + b.ccd,
+       s.remesh + b.remesh,     s.projection + b.projection,     s.output + b.output,           s.total + b.total};
+}
+
+/// The step from `state` on as two of half its length.
+template <int Dim>
+Setup<Dim> halved(const Setup<Dim>& setup, const State<Dim>& state) {
+  Setup<Dim> half = setup;
+  half.time.t0 = state.t;
+  half.time.dt = setup.time.dt / 2;
+  half.time.steps = 2;
+  --half.time.step_cuts;
+  if (half.time.integrator == Integrator::bdf) half.time.integrator = Integrator::implicit_euler;
+  if (half.newton.norm == NewtonNorm::euclidean && !half.time.is_static) {  // tolerances go with the step
+    half.newton.step_tolerance /= 2;
+    half.newton.gradient_tolerance /= 2;
+    half.newton.first_gradient_tolerance /= 2;
+  }
+  return half;
+}
+
+}  // namespace
+
+template <int Dim>
+StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, linear::Solver& solver, const Logger& logger,
+                              State<Dim>& state) {
+  StepResult whole = take_step(setup, shortest_edge, solver, logger, state);
+  if (whole.ok || setup.time.step_cuts == 0) return whole;
+  const Setup<Dim> half = halved(setup, state);
+  logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
+                 "), cutting it into two of " + std::to_string(half.time.dt) + " s");
+  State<Dim> part = state;
+  part.step = 0;
+  if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);
+  StepReport effort = whole.report;
+  int parts = 0;
+  for (int i = 0; i < 2; ++i) {
+    StepResult result = take_step_in_parts(half, shortest_edge, solver, logger, part);
+    add_effort(effort, result.report);
+    if (!result.ok) return result;
+    effort = result.report;
+    parts += std::max(1, result.report.cut_steps);
+  }
+  whole = {.report = effort};
+  whole.report.cut_steps = parts;
+  whole.report.step = part.step = state.step + 1;
+  whole.report.t = part.t = setup.time.t0 + part.step * setup.time.dt;
+  state = std::move(part);
+  return whole;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                  \
+  template StepResult take_step<Dim>(const Setup<Dim>&, double, linear::Solver&, const Logger&, State<Dim>&); \
+  template StepResult take_step_in_parts<Dim>(const Setup<Dim>&, double, linear::Solver&, const Logger&, State<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr

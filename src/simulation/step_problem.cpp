@@ -188,19 +188,23 @@ VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
   return free ? start : x;
 }
 
-/// One solve with the friction that `sum` has, from where the stiffness balances the terms.
+/// One solve with what `sum` has lagged. Adaptive stiffness balances the terms before held dofs move: so it is in the
+/// regression values of peers' scenes.
 template <int Dim>
 NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x) {
-  if (!adaptive_) return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_);
-  initialize_stiffness(start_of_solve(x));
+  if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
+  NewtonExtras extras{.norm_weights = &norm_weights_};
+  if (!adaptive_) return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_, extras);
+  initialize_stiffness(x);
+  x = start_of_solve(x);
   bool is_first = true;
-  const auto update = [&](const VectorX& iterate) {
+  extras.after_step = [&](const VectorX& iterate) {
     if (std::exchange(is_first, false) || setup_.time.is_static) return false;
     const bool changed = adaptive_->update(iterate, stiffness_, workspace_);
     if (changed) contact_->set_stiffness(stiffness_.value);
     return changed;
   };
-  return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_, update);
+  return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_, extras);
 }
 
 template <int Dim>

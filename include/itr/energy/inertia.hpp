@@ -42,4 +42,8 @@ class InertiaEnergy final : public Energy {
 template <int Dim>
 std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials);
 
+/// Diagonal of the consistent mass matrix of unit density, by dof. Where it is zero, its mean.
+template <int Dim>
+VectorX unit_mass_diagonal(const CellSet<Dim>& cells);
+
 }  // namespace itr

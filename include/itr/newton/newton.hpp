@@ -60,6 +60,9 @@ class SparseSystem final : public NewtonSystem {
 enum class Termination {
   gradient,    ///< gradient norm below tolerance
   step,        ///< full Newton step below tolerance
+  decrement,   ///< Newton decrement below tolerance
+  energy,      ///< energy does not change any more
+  round_off,   ///< what a full step would gain is below the round-off of the energy
   iterations,  ///< out of iterations
   no_descent,  ///< no direction or no step that lowers the energy, and the gradient is not small
   infeasible   ///< the start is not feasible or a number is not finite
@@ -68,11 +71,11 @@ const char* to_string(Termination termination);
 
 struct NewtonSummary {
   Termination termination = Termination::iterations;
-  bool converged() const { return termination == Termination::gradient || termination == Termination::step; }
+  bool converged() const { return termination <= Termination::round_off; }
   int iterations = 0;
   double energy = 0;           ///< at the end
-  double gradient_norm = 0;    ///< over the unknowns, at the last evaluation
-  double step_norm = 0;        ///< of the last full step
+  double gradient_norm = 0;    ///< over the unknowns, at the last evaluation, in the options' norm
+  double step_norm = 0;        ///< of the last full step, in the options' norm
   double linear_residual = 0;  ///< worst relative residual of the linear solves
   double assembly_seconds = 0, linear_seconds = 0, line_search_seconds = 0, ccd_seconds = 0;
   std::string message;  ///< what stopped it, where it did not converge
@@ -80,12 +83,17 @@ struct NewtonSummary {
   void add_effort(const NewtonSummary& other);
 };
 
+/// What a solve may be given beside its options.
+struct NewtonExtras {
+  const VectorX* norm_weights = nullptr;  ///< D of NewtonNorm by dof; may be null for the Euclidean one
+  /// Called with each accepted iterate; says whether it changed the energy.
+  std::function<bool(const VectorX& x)> after_step{};
+};
+
 /// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as
 /// x; empty: they stay), as far in each iteration as feasibility allows, by an exact-penalty merit function (Nocedal &
 /// Wright 2006, §18.3); convergence is tested only once they are there. x stays feasible throughout.
-/// `after_step`, where given, is called with each accepted iterate and says whether it changed the energy.
 NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
-                       const NewtonOptions& options, Workspace& workspace,
-                       const std::function<bool(const VectorX&)>& after_step = {});
+                       const NewtonOptions& options, Workspace& workspace, const NewtonExtras& extras = {});
 
 }  // namespace itr

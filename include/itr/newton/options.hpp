@@ -5,13 +5,27 @@ namespace itr {
 
 enum class LineSearch { backtracking, armijo, robust_armijo };
 
-/// When a solve has converged, and how it searches. The tolerances of the paper's vocabulary (scene-format §7.2) are already
-/// multiplied by the characteristic length (h, or 1 for statics) when they stand here.
+/// How gradients g and steps p are measured, with D the diagonal of the mass matrix of unit density: the last two do not
+/// depend on the mesh.
+enum class NewtonNorm {
+  euclidean,  ///< sqrt(g.g), sqrt(p.p)
+  l2,         ///< sqrt(g.g/D), sqrt(p.Dp)
+  linf        ///< max |g/D|, max |p|
+};
+
+/// When a solve has converged, and how it searches. Tolerances are those of the scene (scene-format §7.2, §7.3) already
+/// multiplied by what its vocabulary multiplies them with; 0 turns a test off.
 struct NewtonOptions {
   int max_iterations = 500;
-  double step_tolerance = 0;                ///< stop when the full step has an L2 norm below it [m]; 0: off
-  double gradient_tolerance = 1e-8;         ///< stop when the gradient has an L2 norm below it
+  NewtonNorm norm = NewtonNorm::euclidean;
+  double step_tolerance = 0;                ///< stop when the full step has a norm below it
+  double gradient_tolerance = 1e-8;         ///< stop when the gradient has a norm below it
   double first_gradient_tolerance = 1e-10;  ///< the same before the first iteration
+  double relative_step_tolerance = 0;       ///< of the norm of the solve's first full step
+  double relative_gradient_tolerance = 0;   ///< of the norm of the solve's first gradient
+  double decrement_tolerance = 0;           ///< stop when the Newton decrement -p.g / 2 is below it [J s^2]
+  double energy_tolerance = 0;              ///< stop after `energy_steps` steps in a row that change less [J s^2]
+  int energy_steps = 100;
   LineSearch line_search = LineSearch::robust_armijo;
   bool project_to_psd = true;  ///< project the Hessian of every stencil to positive semi-definite
 };

@@ -13,6 +13,11 @@ template <int Dim>
 StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solver& solver, const Logger& logger,
                      State<Dim>& state);
 
+/// That, with a step whose solve fails cut into smaller ones, as TimeOptions::step_cuts allows and `logger` is told.
+template <int Dim>
+StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, linear::Solver& solver, const Logger& logger,
+                              State<Dim>& state);
+
 /// Most memory that this process has held [MB].
 double peak_rss_mb();
 

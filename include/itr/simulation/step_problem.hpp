@@ -86,6 +86,7 @@ class StepProblem {
   std::shared_ptr<FrictionEnergy<Dim>> friction_;
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
+  VectorX norm_weights_;  ///< of NewtonNorm, once needed
   std::shared_ptr<PressureEnergy<Dim>> pressure_;
   std::vector<std::shared_ptr<DampingEnergy<Dim>>> damping_;
   std::unique_ptr<SparseSystem> system_;

@@ -15,10 +15,13 @@ struct TimeOptions {
   /// this part of the mechanical energy is taken by implicit Euler instead. Infinity: never.
   double energy_growth_limit = 0.05;
   bool quasistatic = false;  ///< no inertia
-  bool is_static = false;    ///< one equilibrium at t = 1; alpha = 1
-  double t0 = 0;             ///< [s]
-  double dt = 1;             ///< h [s]
-  int steps = 1;             ///< number of steps
+  bool is_static = false;    ///< one equilibrium at t0 + dt, 1 by default; alpha = 1
+  /// A step whose solve fails is cut into two of half its length, and these again, so many times; 0: the simulation stops.
+  /// In BDF the smaller steps are of implicit Euler, and the order grows again from 1 after them.
+  int step_cuts = 0;
+  double t0 = 0;  ///< [s]
+  double dt = 1;  ///< h [s]
+  int steps = 1;  ///< number of steps
 };
 
 }  // namespace itr

@@ -9,7 +9,7 @@ struct ContactOptions {
   double activation_distance = 1e-3;  ///< dhat [m]: the barrier acts below it
   bool convergent = false;            ///< area weights, duplicate-region correction, 1/dhat^3: kappa is a pressure [Pa]
   double barrier_stiffness = 1;       ///< kappa
-  bool adaptive_stiffness = false;    ///< kappa by the schedule of scene-format §6.5
+  bool adaptive_stiffness = false;    ///< kappa by the schedule of scene-format §6.5, from barrier_stiffness on
   double friction_coefficient = 0;    ///< mu
   double friction_velocity = 1e-3;    ///< eps_v [m/s]: below it friction is smoothed
   int friction_iterations = 1;        ///< most lagging rounds a step; negative: no limit; 0: no friction
