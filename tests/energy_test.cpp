@@ -334,6 +334,20 @@ TYPED_TEST(VolumeTerms, PressurePushesAlongInwardNormalsOfTheDeformedSurface) {
   }
 }
 
+TYPED_TEST(VolumeTerms, UnitMassDiagonalIsThatOfTheConsistentMass) {
+  constexpr int Dim = TypeParam::value;
+  const Vec<Dim> obstacle = Vec<Dim>::Zero();
+  const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {obstacle});
+  const std::map<int, Material> unit = {{1, {.density = 1}}};
+  const VectorX zero = VectorX::Zero(Dim * cells.num_vertices);
+  const VectorX mass =
+      hessian_of(InertiaEnergy<Dim>(cells, unit, MassKind::consistent, zero), zero, PsdProjection::none).diagonal();
+  const Eigen::Index bodies = zero.size() - Dim;
+  const VectorX diagonal = unit_mass_diagonal(cells);
+  EXPECT_LE((diagonal - mass).head(bodies).norm(), 1e-15);
+  EXPECT_NEAR(diagonal[bodies], mass.head(bodies).mean(), 1e-15);
+}
+
 TYPED_TEST(VolumeTerms, DampingIsTheStiffnessTimesVelocity) {
   constexpr int Dim = TypeParam::value;
   const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});

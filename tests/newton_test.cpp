@@ -61,12 +61,70 @@ TEST(Newton, CallsBackAfterEachStepAndTakesInAChangedEnergy) {
   options.gradient_tolerance = options.first_gradient_tolerance = 0;
   Workspace workspace;
   int calls = 0;
-  const NewtonSummary summary = minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace, [&](const VectorX&) {
+  const NewtonExtras extras{.after_step = [&](const VectorX&) {
     ++calls;
     return true;
-  });
+  }};
+  const NewtonSummary summary = minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace, extras);
   EXPECT_TRUE(summary.converged());
   EXPECT_EQ(calls, summary.iterations);
+}
+
+TEST(Newton, MeasuresGradientsAndStepsInTheNormOfItsOptions) {
+  const VectorX start = VectorX::LinSpaced(4, 1.5, 3.0), weights = VectorX::LinSpaced(4, 1.0, 4.0);
+  const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+  Workspace workspace;
+  VectorX gradient = VectorX::Zero(4);
+  DoubleWell(1).add_gradient(start, gradient, workspace);
+  const auto summary_of = [&](NewtonOptions options) {
+    VectorX x = start;
+    DenseSystem system;
+    return minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace, {.norm_weights = &weights});
+  };
+  const auto gradient_norm = [&](NewtonNorm norm) {
+    const NewtonSummary summary = summary_of({.norm = norm, .first_gradient_tolerance = 1e300});
+    EXPECT_EQ(summary.termination, Termination::gradient);
+    return summary.gradient_norm;
+  };
+  EXPECT_DOUBLE_EQ(gradient_norm(NewtonNorm::euclidean), gradient.norm());
+  EXPECT_DOUBLE_EQ(gradient_norm(NewtonNorm::l2), std::sqrt((gradient.array().square() / weights.array()).sum()));
+  EXPECT_DOUBLE_EQ(gradient_norm(NewtonNorm::linf), (gradient.array() / weights.array()).abs().maxCoeff());
+  const auto step_norm = [&](NewtonNorm norm) {
+    const NewtonSummary summary = summary_of({.norm = norm, .step_tolerance = 1e300});
+    EXPECT_EQ(summary.termination, Termination::step);
+    return summary.step_norm;
+  };
+  const double euclidean = step_norm(NewtonNorm::euclidean);
+  EXPECT_GT(step_norm(NewtonNorm::l2), euclidean);  // weights of 1 to 4
+  EXPECT_LT(step_norm(NewtonNorm::l2), 2 * euclidean);
+  EXPECT_LE(step_norm(NewtonNorm::linf), euclidean);
+}
+
+TEST(Newton, StopsByEachTestAndNamesIt) {
+  const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+  const auto stop = [&](NewtonOptions options) {
+    VectorX x = VectorX::LinSpaced(4, 1.5, 3.0);
+    DenseSystem system;
+    Workspace workspace;
+    const NewtonSummary summary = minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace);
+    EXPECT_TRUE(summary.converged());
+    EXPECT_GT(summary.iterations, 0);
+    EXPECT_LT((x.array() - 1).abs().maxCoeff(), 0.1);
+    return summary.termination;
+  };
+  NewtonOptions none;
+  none.gradient_tolerance = none.first_gradient_tolerance = 0;
+  const auto with = [&](auto member, auto value) {
+    NewtonOptions options = none;
+    options.*member = value;
+    return options;
+  };
+  EXPECT_EQ(stop(with(&NewtonOptions::relative_gradient_tolerance, 1e-3)), Termination::gradient);
+  EXPECT_EQ(stop(with(&NewtonOptions::relative_step_tolerance, 1e-3)), Termination::step);
+  EXPECT_EQ(stop(with(&NewtonOptions::decrement_tolerance, 1e-6)), Termination::decrement);
+  NewtonOptions by_energy = with(&NewtonOptions::energy_tolerance, 1e-6);
+  by_energy.energy_steps = 1;
+  EXPECT_EQ(stop(by_energy), Termination::energy);
 }
 
 }  // namespace
