@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "itr/scene/scene.hpp"
+#include "itr/simulation/step_problem.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -478,6 +479,22 @@ TEST_F(SceneTest, ConditionsAndMotions) {
   EXPECT_DOUBLE_EQ(setup.initial_velocity[0].value({0, 1}, 0)[0], -std::numbers::pi);
   ASSERT_EQ(scene.warnings.size(), 1u) << scene.warnings[0];
   EXPECT_NE(scene.warnings[0].find("/boundary_conditions/dirichlet_boundary/3"), std::string::npos);
+}
+
+TEST_F(SceneTest, SelectedPointsAreHeld) {
+  const json scene = square(json::parse(R"json({
+    "geometry": [{"mesh": "square.obj", "volume_selection": 1, "surface_selection": {"threshold": 1e-3},
+                  "point_selection": [{"id": 9, "box": [[0.5, 0.5], [2, 2]]}]}],
+    "boundary_conditions": {"dirichlet_boundary": [{"id": 9, "value": ["t", 0]}, {"id": 3, "value": [5, 5]}]}})json"));
+  const auto setup = read2(scene);
+  EXPECT_EQ(setup.point_tags, (std::vector<int>{kNoTag, kNoTag, 9, kNoTag}));
+  const HeldDofs<2> held = held_dofs(setup, setup.mesh, 2);
+  EXPECT_EQ(held.held, (std::vector<char>{0, 0, 1, 1, 1, 1, 0, 0}));
+  EXPECT_EQ(held.target.segment<2>(2), Vec<2>(6, 5));  // its facet is of the right side
+  EXPECT_EQ(held.target.segment<2>(4), Vec<2>(3, 1));  // points win
+  json remeshed = scene;
+  remeshed["space"]["remesh"]["enabled"] = true;
+  EXPECT_EQ(wrong_place(remeshed), "/geometry");
 }
 
 TEST_F(SceneTest, PressureAndDamping) {

@@ -17,6 +17,7 @@ class ConditionReader {
   ConditionReader(const Node& root, Setup<Dim>& setup, std::vector<std::string>& warnings)
       : boundary_(root["boundary_conditions"]), initial_(root["initial_conditions"]), setup_(setup), warnings_(warnings) {
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
+    facet_tags_.insert(setup_.point_tags.begin(), setup_.point_tags.end());
     for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c) bodies_.insert(setup_.mesh.body(c));
   }
 
@@ -184,6 +185,8 @@ class ConditionReader {
     std::set<int> vertices;
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f)
       if (setup_.mesh.facet_tag(f) == tag) vertices.insert(setup_.mesh.facet(f).begin(), setup_.mesh.facet(f).end());
+    for (std::size_t v = 0; v < setup_.point_tags.size(); ++v)
+      if (setup_.point_tags[v] == tag) vertices.insert(static_cast<int>(v));
     return points(std::move(vertices));
   }
 
@@ -203,7 +206,8 @@ class ConditionReader {
   Node boundary_, initial_;
   Setup<Dim>& setup_;
   std::vector<std::string>& warnings_;
-  std::set<int> facet_tags_, bodies_, obstacle_ids_;
+  std::set<int> facet_tags_;  ///< and those of points
+  std::set<int> bodies_, obstacle_ids_;
 };
 
 }  // namespace

@@ -23,6 +23,7 @@ struct Collected {
   std::vector<typename Mesh<Dim>::Cell> cells;
   std::vector<int> body;
   std::vector<std::pair<typename Mesh<Dim>::Facet, int>> tagged;
+  std::vector<int> point_tags;  ///< by vertex, inner ones included
 };
 
 const std::vector<std::array<int, 3>>& cells_of(const MeshFile& file, const Vec<2>&) { return file.triangles; }
@@ -113,6 +114,7 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, C
     return (sum / static_cast<double>(vertices.size())).eval();
   };
   const Selection<Dim> volumes(geometry["volume_selection"], box), surfaces(geometry["surface_selection"], box);
+  const Selection<Dim> points(geometry["point_selection"], box);
   std::vector<int> body(mesh.num_cells()), tag(mesh.num_facets());
   for (CellId c = 0; c < mesh.num_cells(); ++c)
     body[c] = volumes(barycenter(mesh.cell(c)), mesh.body(c)).value_or(mesh.body(c));
@@ -124,7 +126,10 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, C
       for (int& v : vertices) v += first;
       return vertices;
     };
-    for (VertexId v = 0; v < mesh.num_vertices(); ++v) all.rest.push_back(mesh.rest(v) + shift);
+    for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
+      all.rest.push_back(mesh.rest(v) + shift);
+      all.point_tags.push_back(points(mesh.rest(v)).value_or(kNoTag));
+    }
     for (CellId c = 0; c < mesh.num_cells(); ++c) all.cells.push_back(shifted(mesh.cell(c)));
     all.body.insert(all.body.end(), body.begin(), body.end());
     for (FacetId f = 0; f < mesh.num_facets(); ++f)
@@ -198,12 +203,20 @@ int find_dimension(const Geometries& geometries, MeshFiles& files) {
 }
 
 template <int Dim>
-Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
+BodyGeometry<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
   Collected<Dim> all;
   for (const Node& geometry : geometries.bodies) read_body<Dim>(geometry, files.get(geometry), all, warnings);
-  Mesh<Dim> mesh = make_mesh<Dim>(geometries.bodies.front(), std::move(all.rest), std::move(all.cells), std::move(all.body));
+  BodyGeometry<Dim> bodies;
+  Mesh<Dim>& mesh = bodies.mesh;
+  mesh = make_mesh<Dim>(geometries.bodies.front(), std::move(all.rest), std::move(all.cells), std::move(all.body));
   for (const auto& [facet, tag] : all.tagged) mesh.set_facet_tag(mesh.find_facet(facet), tag);
-  return mesh;
+  bool is_selected = false;
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
+    if (!mesh.is_boundary(v)) all.point_tags[v] = kNoTag;
+    is_selected = is_selected || all.point_tags[v] != kNoTag;
+  }
+  if (is_selected) bodies.point_tags = std::move(all.point_tags);
+  return bodies;
 }
 
 template <int Dim>
@@ -233,8 +246,8 @@ std::vector<Vec<Dim>> points_of(const MeshFile& file) {
   return points;
 }
 
-template Mesh<2> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
-template Mesh<3> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template BodyGeometry<2> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template BodyGeometry<3> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
 template std::vector<Vec<2>> read_copies(const Node&, const Vec<2>&);
 template std::vector<Vec<3>> read_copies(const Node&, const Vec<3>&);
 template std::vector<Vec<2>> points_of(const MeshFile&);

@@ -31,7 +31,12 @@ int find_dimension(const Geometries& geometries, MeshFiles& files);
 
 /// All bodies in one mesh, transformed, refined, with body ids and facet tags.
 template <int Dim>
-Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings);
+struct BodyGeometry {
+  Mesh<Dim> mesh;
+  std::vector<int> point_tags;  ///< see Setup
+};
+template <int Dim>
+BodyGeometry<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings);
 
 template <int Dim>
 struct ObstacleGeometry {

@@ -36,7 +36,7 @@ constexpr Group kGroups[] = {
 
     {"/geometry/*", Role::read, "mesh type enabled is_obstacle extract n_refs"},
     {"/geometry/*", Role::only, "unit=\"\""},
-    {"/geometry/*", Role::refused, "point_selection curve_selection"},
+    {"/geometry/*", Role::refused, "curve_selection"},
     {"/geometry/*/array", Role::read, "offset size relative"},
     {"/geometry/*/transformation", Role::read, "translation rotation rotation_mode scale dimensions"},
     {"/geometry/*/advanced", Role::read, "normalize_mesh refinement_location"},
@@ -48,6 +48,10 @@ constexpr Group kGroups[] = {
     {"/geometry/*/surface_selection/*", Role::only, "boundary_only=true"},
     {"/geometry/*/surface_selection/*", Role::refused, "file"},
     {"/geometry/*/volume_selection/*", Role::refused, "file"},
+    {"/geometry/*/point_selection", Role::read, "*"},
+    {"/geometry/*/point_selection/*", Role::read, kSelectionKeys},
+    {"/geometry/*/point_selection/*", Role::only, "boundary_only=true"},
+    {"/geometry/*/point_selection/*", Role::refused, "file"},
     {"/geometry/*", Role::refused, "height point normal fps mesh_sequence"},
 
     {"/materials/*", Role::read, "type id E nu lambda mu rho plane_strain c1 c2 c3 d1 k"},

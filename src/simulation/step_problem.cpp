@@ -72,18 +72,21 @@ HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t
     if (std::none_of(by_tag.begin(), by_tag.end(), [&](const auto* c) { return c->tag == condition.tag; }))
       by_tag.push_back(&condition);
   std::sort(by_tag.begin(), by_tag.end(), [](const auto* a, const auto* b) { return a->tag < b->tag; });
-  for (const auto* condition : by_tag)
-    for (int f = 0; f < mesh.facet_slots(); ++f) {
-      if (!mesh.is_facet_alive(f) || mesh.facet_tag(f) != condition->tag) continue;
-      for (const int v : mesh.facet(f)) {
-        const Vec<Dim> target = mesh.rest(v) + condition->displacement(mesh.rest(v), t);
-        for (int c = 0; c < Dim; ++c) {
-          if (!condition->components[c]) continue;
-          result.held[Dim * v + c] = 1;
-          result.target[Dim * v + c] = target[c];
-        }
-      }
+  const auto hold = [&](int v, const DirichletCondition<Dim>& condition) {
+    const Vec<Dim> target = mesh.rest(v) + condition.displacement(mesh.rest(v), t);
+    for (int c = 0; c < Dim; ++c) {
+      if (!condition.components[c]) continue;
+      result.held[Dim * v + c] = 1;
+      result.target[Dim * v + c] = target[c];
     }
+  };
+  for (const auto* condition : by_tag)
+    for (int f = 0; f < mesh.facet_slots(); ++f)
+      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
+        for (const int v : mesh.facet(f)) hold(v, *condition);
+  for (const auto* condition : by_tag)
+    for (std::size_t v = 0; v < setup.point_tags.size(); ++v)
+      if (setup.point_tags[v] != kNoTag && setup.point_tags[v] == condition->tag) hold(static_cast<int>(v), *condition);
   for (int o = 0; o < total - bodies; ++o) {
     const Vec<Dim>& X = setup.obstacles.rest[o];
     const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];

@@ -71,6 +71,9 @@ struct Setup {
   Obstacles<Dim> obstacles;
   std::map<int, Material> materials;  ///< by body id; every body of the mesh has one
   std::vector<DirichletCondition<Dim>> dirichlet;
+  /// By vertex of `mesh`: Dirichlet conditions with this tag hold it, whatever its facets say; kNoTag or empty: none. Not
+  /// with remeshing.
+  std::vector<int> point_tags;
   std::vector<NeumannCondition<Dim>> neumann;
   std::vector<PressureCondition<Dim>> pressure;
   SpaceTimeFunction<Dim> body_acceleration;  ///< acts along +: gravity is (0, -9.81) [m/s^2]; empty: none
