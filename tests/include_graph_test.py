@@ -30,6 +30,7 @@ OPTIONS = {
     "energy/contact/options.hpp",
     "energy/damping_options.hpp",
     "energy/material.hpp",
+    "linear/options.hpp",
     "newton/options.hpp",
     "output/options.hpp",
     "remesh/options.hpp",

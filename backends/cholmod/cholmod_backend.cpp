@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 // CHOLMOD as a loadable module: supernodal and simplicial Cholesky of the lower triangle.
 #include <cholmod.h>
-#include <dlfcn.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "../common/blas.hpp"
 #include "itr/linear/module_adapter.hpp"
 
 namespace {
@@ -37,7 +38,18 @@ class Cholmod {
   Cholmod(const Cholmod&) = delete;
   Cholmod& operator=(const Cholmod&) = delete;
 
-  int analyze(const itr_pattern& pattern, int) {
+  int set_option(std::string_view key, std::string_view value) {
+    static constexpr std::pair<std::string_view, int> kOrderings[] = {
+        {"amd", CHOLMOD_AMD}, {"metis", CHOLMOD_METIS}, {"natural", CHOLMOD_NATURAL}};
+    for (const auto& [name, ordering] : kOrderings)
+      if (key == "ordering" && value == name) {
+        common_.method[0].ordering = ordering;
+        return ITR_OK;
+      }
+    return ITR_FAILED;
+  }
+
+  int analyze(const itr_pattern& pattern, const itr_hints&) {
     const int n = pattern.order;
     starts_.assign(pattern.column_starts, pattern.column_starts + n + 1);
     rows_.assign(pattern.row_indices, pattern.row_indices + starts_[n]);
@@ -84,6 +96,15 @@ class Cholmod {
     return ITR_OK;
   }
 
+  itr_statistics statistics() const {
+    itr_statistics result{};
+    if (!factor_) return result;
+    result.factor_nonzeros = common_.lnz;
+    result.factor_bytes = result.largest_bytes =
+        factor_->is_super ? 8.0 * factor_->xsize + 4.0 * factor_->ssize : 12.0 * factor_->nzmax;
+    result.flops = common_.fl;
+    return result;
+  }
   const char* message() const { return text_.data(); }
 
  private:
@@ -103,28 +124,11 @@ class Cholmod {
   std::array<char, 96> text_{};
 };
 
-/// Version text; also sets OpenBLAS to one thread, so that results do not depend on the environment.
 const char* version() {
   static char text[160];
-  char blas[96] = "reference BLAS (install libopenblas-dev: it is much faster)";
-  if (auto* set_threads = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"))) set_threads(1);
-  // The module is loaded locally, so its BLAS is searched among its own dependencies.
-  Dl_info info{};
-  if (dladdr(reinterpret_cast<void*>(&version), &info) && info.dli_fname)
-    if (void* self = dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD)) {
-      if (auto* set_threads = reinterpret_cast<void (*)(int)>(dlsym(self, "openblas_set_num_threads"))) {
-        set_threads(1);
-        // "OpenBLAS 0.3.21 NO_LAPACKE ...": the name and the version.
-        const auto config = reinterpret_cast<char* (*)()>(dlsym(self, "openblas_get_config"));
-        const std::string_view words = config ? config() : "OpenBLAS";
-        const auto end = words.find(' ', words.find(' ') + 1);
-        std::snprintf(blas, sizeof blas, "%.*s", static_cast<int>(std::min(end, words.size())), words.data());
-      }
-      dlclose(self);
-    }
   int loaded[3] = {};  // of the library, which may be newer than the header
   cholmod_version(loaded);
-  std::snprintf(text, sizeof text, "CHOLMOD %d.%d.%d, %s", loaded[0], loaded[1], loaded[2], blas);
+  std::snprintf(text, sizeof text, "CHOLMOD %d.%d.%d, %s", loaded[0], loaded[1], loaded[2], itr::backends::pin_blas());
   return text;
 }
 
@@ -133,8 +137,9 @@ const char* version() {
 extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
   using Supernodal = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL>>;
   using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
-  static const itr_engine engines[] = {Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", 0),
-                                       Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", 0)};
+  constexpr const char* kOptions = "ordering=amd|metis|natural";
+  static const itr_engine engines[] = {Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", 0, kOptions),
+                                       Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", 0, kOptions)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
   return &module;
 }

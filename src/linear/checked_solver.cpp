@@ -5,7 +5,8 @@
 #include <new>
 #include <utility>
 
-#include "engine.hpp"
+#include "itr/linear/engine.hpp"
+#include "itr/linear/registry.hpp"
 
 namespace itr::linear {
 
@@ -57,6 +58,7 @@ class CheckedSolver final : public Solver {
       : name_(std::move(name)), capabilities_(capabilities), engine_(std::move(engine)) {}
   std::string_view name() const override { return name_; }
   Capabilities capabilities() const override { return capabilities_; }
+  Statistics statistics() const override { return engine_->statistics(); }
   std::string message() const override { return message_; }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {

@@ -4,9 +4,10 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseLU>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
-#include "engine.hpp"
+#include "eigen_engines.hpp"
 
 namespace itr::linear {
 
@@ -21,6 +22,8 @@ constexpr double kSingular = 1e-15;  ///< pivot over the largest entry of its ro
 /// Keeps the lower triangle as Eigen's matrix; factorisations of one pattern only copy values.
 class LowerTriangleEngine : public Engine {
  public:
+  bool set_option(const std::string&, const std::string&) override { return false; }
+  std::string message() const override { return {}; }
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints&) override {
     const std::vector<double> zeros(pattern.nonzeros(), 0.0);
     matrix_ = Eigen::Map<const Sparse>(pattern.order, pattern.order, static_cast<int>(pattern.nonzeros()),
@@ -37,6 +40,8 @@ class LowerTriangleEngine : public Engine {
   virtual Outcome factorize_matrix() = 0;
   ConstColumns in(std::span<const double> B, int columns) const { return {B.data(), matrix_.rows(), columns}; }
   Columns out(std::span<double> X, int columns) const { return {X.data(), matrix_.rows(), columns}; }
+  /// Of factors stored as values with 32-bit row indices.
+  static Statistics sparse_factor(double nonzeros) { return {nonzeros, 12 * nonzeros, 12 * nonzeros}; }
   Sparse matrix_;
 };
 
@@ -83,6 +88,7 @@ class Ldlt final : public EigenEngine<Eigen::SimplicialLDLT<Sparse>> {
     solver_.factorize(matrix_);
     return solver_.info() == Eigen::Success ? check_pivots(matrix_, solver_) : Outcome::singular;
   }
+  Statistics statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
 };
 
 class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {
@@ -94,6 +100,7 @@ class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {
     solver_.factorize(matrix_);
     return success_or(Outcome::not_positive_definite);
   }
+  Statistics statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
 };
 
 class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
@@ -109,23 +116,50 @@ class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
     solver_.factorize(full);
     return success_or(Outcome::singular);
   }
+  Statistics statistics() const override { return sparse_factor(double(solver_.nnzL()) + double(solver_.nnzU())); }
   bool analyzed_ = false;
 };
 
 class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Sparse, Eigen::Lower>> {
+ public:
+  bool set_option(const std::string& key, const std::string& value) override {
+    double number = 0;
+    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+    if (error != std::errc() || end != value.data() + value.size() || !(number > 0)) return false;
+    if (key == "tolerance" && number < 1)
+      tolerance_ = number;
+    else if (key == "max_iterations" && number >= 1 && number < 1e9)
+      max_iterations_ = static_cast<int>(number);
+    else
+      return false;
+    return true;
+  }
+
+ private:
   Outcome factorize_matrix() override {
     if ((matrix_.diagonal().array() <= 0).any()) return Outcome::not_positive_definite;
-    solver_.setTolerance(1e-12);
-    solver_.setMaxIterations(std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
+    solver_.setTolerance(tolerance_);
+    solver_.setMaxIterations(max_iterations_ > 0 ? max_iterations_ : std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
     solver_.compute(matrix_);
     return success_or(Outcome::failed);
   }
+  Statistics statistics() const override {
+    Statistics statistics;
+    if (matrix_.rows() > 0) statistics.iterations = static_cast<int>(solver_.iterations());
+    return statistics;
+  }
+  double tolerance_ = 1e-12;
+  int max_iterations_ = 0;  ///< 0: by the size
 };
 
 class Dense final : public EigenEngine<Eigen::LLT<Eigen::MatrixXd, Eigen::Lower>> {
   Outcome factorize_matrix() override {
     solver_.compute(Eigen::MatrixXd(matrix_));
     return success_or(Outcome::not_positive_definite);
+  }
+  Statistics statistics() const override {
+    const double n = static_cast<double>(matrix_.rows()), bytes = 8 * n * n;
+    return {n * (n + 1) / 2, bytes, bytes, n * n * n / 3};
   }
 };
 

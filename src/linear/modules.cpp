@@ -7,8 +7,7 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "engine.hpp"
-#include "itr/linear/abi.h"
+#include "itr/linear/engine.hpp"
 
 namespace itr::linear {
 
@@ -23,16 +22,26 @@ class ModuleEngine final : public Engine {
   }
   ModuleEngine(const ModuleEngine&) = delete;
   ModuleEngine& operator=(const ModuleEngine&) = delete;
+  bool set_option(const std::string& key, const std::string& value) override {
+    return self_ && table_.set_option(self_, key.c_str(), value.c_str()) == ITR_OK;
+  }
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
     if (!self_) return Outcome::out_of_memory;
     const itr_pattern view{pattern.order, pattern.column_starts.data(), pattern.row_indices.data()};
-    return outcome(table_.analyze(self_, &view, hints.block_size));
+    const itr_hints help{hints.block_size, hints.dofs.empty() ? nullptr : hints.dofs.data(),
+                         hints.coordinates.empty() ? nullptr : hints.coordinates.data()};
+    return outcome(table_.analyze(self_, &view, &help));
   }
   Outcome factorize(std::span<const double> values) override {
     return self_ ? outcome(table_.factorize(self_, values.data(), values.size())) : Outcome::out_of_memory;
   }
   Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
     return self_ ? outcome(table_.solve(self_, B.data(), X.data(), columns)) : Outcome::out_of_memory;
+  }
+  Statistics statistics() const override {
+    itr_statistics s{};
+    if (self_) table_.statistics(self_, &s);
+    return {s.factor_nonzeros, s.factor_bytes, s.largest_bytes, s.flops, static_cast<int>(s.iterations)};
   }
   std::string message() const override { return self_ ? table_.message(self_) : "no memory for the solver"; }
 
@@ -104,9 +113,13 @@ std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
     const itr_engine& engine = module->engines[i];
     const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
                                     (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0};
-    rows.push_back({{engine.name, engine.library_version, engine.license, capabilities, true, ""}, [&engine, capabilities] {
-                      return make_checked_solver(engine.name, capabilities, std::make_unique<ModuleEngine>(engine));
-                    }});
+    rows.push_back({{engine.name, engine.library_version, engine.license, engine.options, capabilities, true, ""},
+                    [&engine, capabilities](const SolverOptions& options) {
+                      auto instance = std::make_unique<ModuleEngine>(engine);
+                      apply_options(*instance, engine.name, engine.options, options);
+                      return make_checked_solver(engine.name, capabilities, std::move(instance));
+                    },
+                    &engine});
   }
   return rows;
 }

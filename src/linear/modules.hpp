@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "itr/linear/abi.h"
 #include "itr/linear/registry.hpp"
 
 namespace itr::linear {
@@ -12,6 +13,7 @@ namespace itr::linear {
 struct ModuleRow {
   BackendInfo info;  ///< not available: `reason` says why, the name is the file's
   SolverFactory factory;
+  const itr_engine* engine = nullptr;
 };
 
 /// Folders in which modules are looked for: ITR_BACKEND_PATH, the install tree, the build tree.

@@ -7,8 +7,9 @@
 #include <set>
 #include <utility>
 
-#include "engine.hpp"
+#include "eigen_engines.hpp"
 #include "itr/core/error.hpp"
+#include "itr/linear/choice.hpp"
 #include "modules.hpp"
 
 namespace itr::linear {
@@ -18,31 +19,39 @@ namespace {
 struct Row {
   BackendInfo info;
   SolverFactory factory;
+  const itr_engine* engine = nullptr;  ///< of a module
 };
 
-Row built_in(std::string name, Capabilities capabilities, std::unique_ptr<Engine> (*make)()) {
+Row built_in(const std::string& name, Capabilities capabilities, std::unique_ptr<Engine> (*make)(),
+             const std::string& options = "") {
   const std::string version = "Eigen " + std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) +
                               "." + std::to_string(EIGEN_MINOR_VERSION);
-  return {{name, version, "MPL-2.0", capabilities, true, ""},
-          [name, capabilities, make] { return make_checked_solver(name, capabilities, make()); }};
+  return {{name, version, "MPL-2.0", options, capabilities, true, ""}, [=](const SolverOptions& asked) {
+            auto engine = make();
+            apply_options(*engine, name, options, asked);
+            return make_checked_solver(name, capabilities, std::move(engine));
+          }};
 }
 
-/// Solvers that we know of and that are not built into every copy, with what brings them.
-const std::map<std::string, std::string>& known_absent() {
-  static const std::map<std::string, std::string> kReasons = {
-      {"cholmod:supernodal", "module itr_backend_cholmod not found: install libsuitesparse-dev and rebuild"},
-      {"cholmod:simplicial", "module itr_backend_cholmod not found: install libsuitesparse-dev and rebuild"},
-      {"umfpack", "this version has no module for it yet"},
-      {"mumps", "this version has no module for it yet"},
-      {"amesos2:klu2", "this version has no module for it yet"},
-      {"amesos2:tacho", "this version has no module for it yet"},
-      {"belos:muelu", "this version has no module for it yet"}};
-  return kReasons;
-}
+/// A solver that is not built into every copy, with what brings it.
+struct Known {
+  const char* name;
+  const char* module;
+  const char* packages;
+};
+constexpr Known kKnown[] = {{"cholmod:supernodal", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
+                            {"cholmod:simplicial", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
+                            {"umfpack", "itr_backend_umfpack", "libsuitesparse-dev libopenblas-dev"},
+                            {"mumps", "itr_backend_mumps", "libmumps-dev libopenmpi-dev"},
+                            {"mumps:spd", "itr_backend_mumps", "libmumps-dev libopenmpi-dev"},
+                            {"amesos2:klu2", "itr_backend_trilinos", "trilinos-all-dev"},
+                            {"amesos2:tacho", "itr_backend_trilinos", "trilinos-all-dev"},
+                            {"belos:muelu", "itr_backend_trilinos", "trilinos-all-dev"}};
 
 }  // namespace
 
 struct Registry::Impl {
+  std::vector<std::filesystem::path> folders;
   std::vector<Row> rows;
   bool searched = false;
 
@@ -54,7 +63,7 @@ struct Registry::Impl {
   /// Looks for modules, once. The first folder that has an engine wins.
   void search() {
     if (std::exchange(searched, true)) return;
-    for (const auto& folder : module_folders()) {
+    for (const auto& folder : folders) {
       std::error_code error;
       std::set<std::filesystem::path> files;
       for (const auto& entry : std::filesystem::directory_iterator(folder, error))
@@ -62,23 +71,63 @@ struct Registry::Impl {
       for (const auto& file : files)
         for (auto& row : load_module(file))
           if (const Row* present = find(row.info.name); !present)
-            rows.push_back({std::move(row.info), std::move(row.factory)});
+            rows.push_back({std::move(row.info), std::move(row.factory), row.engine});
     }
-    for (const auto& [name, usual_reason] : known_absent()) {
-      if (find(name)) continue;
-      const std::string module = "itr_backend_" + name.substr(0, name.find(':'));
-      const Row* found = find(module);  // a row of that name is a file that is there and does not load
-      rows.push_back(
-          {{name, "", "", {}, false, found ? "module " + module + " " + found->info.reason : usual_reason}, nullptr});
+    for (const Known& known : kKnown) {
+      if (find(known.name)) continue;
+      const Row* broken = find(known.module);  // a row of that name is a file that is there and does not load
+      rows.push_back({{known.name,
+                       "",
+                       "",
+                       "",
+                       {},
+                       false,
+                       std::string("module ") + known.module +
+                           (broken ? " " + broken->info.reason
+                                   : " not found: install " + std::string(known.packages) + " and rebuild")},
+                      nullptr});
     }
+  }
+
+  /// The row of a name of ours, searching for modules where it is not built in.
+  Row* find_anywhere(const std::string& name) {
+    if (Row* row = find(name)) return row;
+    search();
+    return find(name);
+  }
+
+  [[noreturn]] void refuse(const std::string& asked, const Row* row) {
+    search();
+    std::string present, absent;
+    for (const Row& other : rows) {
+      std::string& names = other.info.available ? present : absent;
+      names += (names.empty() ? "" : ", ") + other.info.name;
+    }
+    throw InputError({"", "linear solver", "\"" + asked + "\"" + (row ? ", which is absent: " + row->info.reason : ""),
+                      "auto or one of " + present + " (absent: " + (absent.empty() ? "none" : absent) + ")"});
+  }
+
+  const itr_engine& mpi_engine(const std::string& asked) {
+    search();
+    const Row* row = find(canonical_name(asked));
+    if (!row || !row->info.available) refuse(asked, row);
+    if (row->engine && row->engine->connect) return *row->engine;
+    std::string able;
+    for (const Row& other : rows)
+      if (other.engine && other.engine->connect) able += (able.empty() ? "" : ", ") + other.info.name;
+    throw InputError({"", "linear solver", "\"" + asked + "\", which does not use MPI, on several MPI ranks",
+                      able.empty() ? "one rank: no solver that is there uses MPI" : "one rank, or one of " + able});
   }
 };
 
-Registry::Registry() : impl_(std::make_unique<Impl>()) {
+Registry::Registry() : Registry(module_folders()) {}
+
+Registry::Registry(std::vector<std::filesystem::path> folders) : impl_(std::make_unique<Impl>()) {
+  impl_->folders = std::move(folders);
   impl_->rows.push_back(built_in("eigen:ldlt", {.indefinite = true}, make_eigen_ldlt));
   impl_->rows.push_back(built_in("eigen:llt", {}, make_eigen_llt));
   impl_->rows.push_back(built_in("eigen:lu", {.indefinite = true}, make_eigen_lu));
-  impl_->rows.push_back(built_in("eigen:cg", {.iterative = true}, make_eigen_cg));
+  impl_->rows.push_back(built_in("eigen:cg", {.iterative = true}, make_eigen_cg, "tolerance=NUMBER max_iterations=NUMBER"));
   impl_->rows.push_back(built_in("dense", {}, make_dense));
 }
 Registry::~Registry() = default;
@@ -128,18 +177,37 @@ std::string Registry::canonical_name(const std::string& name) {
   return name;
 }
 
-std::unique_ptr<Solver> Registry::create(const std::string& asked) {
-  const std::string name = canonical_name(asked);
-  if (!impl_->find(name)) impl_->search();
-  const Row* row = impl_->find(name);
-  if (row && row->info.available) return row->factory();
-  std::string present, absent;
-  for (const auto& info : list()) {
-    std::string& names = info.available ? present : absent;
-    names += (names.empty() ? "" : ", ") + info.name;
-  }
-  throw InputError({"", "linear solver", "\"" + asked + "\"" + (row ? ", which is absent: " + row->info.reason : ""),
-                    "one of " + present + " (absent: " + absent + ")"});
+BackendInfo Registry::find(const std::string& asked) {
+  const Row* row = impl_->find_anywhere(canonical_name(asked));
+  if (!row) impl_->refuse(asked, nullptr);
+  return row->info;
+}
+
+std::unique_ptr<Solver> Registry::create(const std::string& asked, const SolverOptions& options) {
+  if (asked == "auto" && options.empty()) return make_auto_solver(*this, false, {});
+  const Row* row = impl_->find_anywhere(canonical_name(asked));
+  if (!row || !row->info.available) impl_->refuse(asked, row);
+  return row->factory(options);
+}
+
+void Registry::connect(const std::string& name, const void* communicator) {
+  const itr_engine& engine = impl_->mpi_engine(name);
+  if (engine.connect(communicator) != ITR_OK)
+    throw InputError({"", "linear solver", "\"" + name + "\": MPI cannot be used", "an MPI that the module can initialise"});
+}
+
+void Registry::disconnect(const std::string& name) { impl_->mpi_engine(name).disconnect(); }
+
+void Registry::serve(const std::string& name, const void* communicator) {
+  if (impl_->mpi_engine(name).serve(communicator) != ITR_OK)
+    throw InputError({"", "linear solver", "\"" + name + "\": rank 0 is gone", "ranks that end together"});
+}
+
+void apply_options(Engine& engine, const std::string& name, const std::string& known, const SolverOptions& options) {
+  for (const auto& [key, value] : options)
+    if (!engine.set_option(key, value))
+      throw InputError({"", "linear solver " + name, "the option " + key + "=" + value,
+                        known.empty() ? "no option: it has none" : "one of " + known});
 }
 
 }  // namespace itr::linear

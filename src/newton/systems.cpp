@@ -40,12 +40,22 @@ void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjecti
   HessianSink sink(dofs, assembler_);
   sink.set_motion(motion);
   energy.add_hessian(x, psd, sink, workspace);
-  if (assembler_.finish()) pattern_changed_ = true;
+  if (!assembler_.finish()) return;
+  pattern_changed_ = true;
+  dofs_.clear();
+  coordinates_.clear();
+  for (int i = 0; i < static_cast<int>(dofs.unknown.size()); ++i) {
+    if (dofs.unknown[i] == kNone) continue;
+    dofs_.push_back(i);
+    const auto node = x.segment(i - i % dim_, dim_);
+    coordinates_.insert(coordinates_.end(), node.begin(), node.end());
+  }
 }
 
 linear::Outcome SparseSystem::factorize(double shift) {
   if (pattern_changed_) {
-    const auto outcome = solver_.analyze(assembler_.pattern(), {.block_size = dim_});
+    const auto outcome =
+        solver_.analyze(assembler_.pattern(), {.block_size = dim_, .dofs = dofs_, .coordinates = coordinates_});
     if (outcome != linear::Outcome::ok) return outcome;
     pattern_changed_ = false;
   }

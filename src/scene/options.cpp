@@ -189,11 +189,23 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
 }
 
 LinearOptions read_linear(const Node& root) {
+  const Node node = root["solver"]["linear"];
   LinearOptions options;
   std::vector<std::string> names;
-  for (const Node& node : root["solver"]["linear"]["solver"].items())
-    if (const std::string name = node.string(""); !name.empty()) names.push_back(name);
+  for (const Node& name : node["solver"].items())
+    if (!name.string("").empty()) names.push_back(name.string(""));
   if (!names.empty()) options.solvers = names;
+  for (const Node& name : node["fallback"].items()) options.fallback.push_back(name.string(""));
+  const Node of_solvers = node["options"];
+  if (!of_solvers.exists()) return options;
+  if (!of_solvers.json().is_object()) of_solvers.fail("an object of solver names");
+  for (const auto& [solver, values] : of_solvers.json().items()) {
+    if (!values.is_object()) of_solvers[solver].fail("an object of option names");
+    for (const auto& [key, value] : values.items()) {
+      if (!value.is_string() && !value.is_number()) of_solvers[solver][key].fail("a text or a number");
+      options.options[solver][key] = value.is_string() ? value.get<std::string>() : value.dump();
+    }
+  }
   return options;
 }
 

@@ -6,6 +6,7 @@
 
 #include "itr/core/error.hpp"
 #include "itr/core/timer.hpp"
+#include "itr/linear/choice.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/simulation/step.hpp"
 
@@ -116,19 +117,6 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, lin
     if (dofs.unknown[i] != kNone) a[i] = solution[dofs.unknown[i]];
 }
 
-std::unique_ptr<linear::Solver> create_solver(const LinearOptions& options, linear::Registry& registry) {
-  const auto rows = registry.list();
-  for (const auto& asked : options.solvers) {
-    const std::string name = linear::Registry::canonical_name(asked);
-    const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return r.name == name && r.available; });
-    if (row != rows.end()) return registry.create(name);
-  }
-  // Names of other programs' solvers that we have no equal of fall back to the default; a wrong name is an error.
-  for (const auto& asked : options.solvers)
-    if (asked.find("Eigen::") != 0 && !asked.empty()) return registry.create(asked);
-  return registry.create("eigen");
-}
-
 }  // namespace
 
 template <int Dim>
@@ -145,7 +133,7 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   refuse_unsupported(setup);
   impl_->setup = std::move(setup);
   impl_->logger = std::move(logger);
-  impl_->solver = create_solver(impl_->setup.linear, registry);
+  impl_->solver = linear::choose_solver(impl_->setup.linear, !impl_->setup.newton.project_to_psd, registry, impl_->logger);
   impl_->state = initial_state(impl_->setup);
   refuse_intersections(impl_->setup, impl_->state);
   if (impl_->setup.consistent_initial_acceleration && !impl_->state.history.a.empty())

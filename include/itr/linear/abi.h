@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * The boundary between the library and loadable solver modules: plain C, no Eigen types, no exceptions, no virtual tables.
  * A module exports one function, itr_backend_module, that returns its table. Strings belong to the module and live as long
- * as it is loaded. All functions are called by one thread at a time for one instance.
+ * as it is loaded. All functions are called by one thread at a time for one instance, by any thread for different ones.
  */
 #ifndef ITR_LINEAR_ABI_H
 #define ITR_LINEAR_ABI_H
@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define ITR_BACKEND_ABI_VERSION 1
+#define ITR_BACKEND_ABI_VERSION 2
 #define ITR_BACKEND_ENTRY "itr_backend_module"
 
 /* Outcomes, as itr::linear::Outcome. */
@@ -29,18 +29,46 @@ typedef struct itr_pattern {
   const int32_t* row_indices;
 } itr_pattern;
 
+/* What may help an analysis. */
+typedef struct itr_hints {
+  int32_t block_size;        /* unknowns a node where none is held: the dimension; 1: nothing is known */
+  const int32_t* dofs;       /* order: block_size * node + component of each unknown, ascending; or NULL */
+  const double* coordinates; /* block_size * order: position of each unknown's node [m]; or NULL */
+} itr_hints;
+
+/* What the last factorisation and solve took; zero where the library does not tell. */
+typedef struct itr_statistics {
+  double factor_nonzeros;
+  double factor_bytes;  /* summed over the ranks */
+  double largest_bytes; /* of any one rank */
+  double flops;         /* of the factorisation */
+  double iterations;    /* of the last solve */
+} itr_statistics;
+
 typedef struct itr_engine {
   const char* name; /* "cholmod:supernodal" */
   const char* library_version;
   const char* license;
   uint32_t capabilities;
+  const char* options;   /* what set_option takes: "ordering=amd|metis tolerance=NUMBER", separated by spaces; may be "" */
   void* (*create)(void); /* NULL where memory is out */
   void (*destroy)(void* self);
-  int32_t (*analyze)(void* self, const itr_pattern* pattern, int32_t block_size);
+  /* Before analyze. ITR_FAILED for a key or a value that is not in `options`. */
+  int32_t (*set_option)(void* self, const char* key, const char* value);
+  int32_t (*analyze)(void* self, const itr_pattern* pattern, const itr_hints* hints);
   int32_t (*factorize)(void* self, const double* values, size_t count);
   /* One right-hand side after another, columns of length `order`. */
   int32_t (*solve)(void* self, const double* rhs, double* solution, int32_t columns);
+  void (*statistics)(void* self, itr_statistics* out);
   const char* (*message)(void* self);
+  /* Only with ITR_MPI, else NULL. `communicator` points to an MPI_Comm of the caller, who has initialised MPI; NULL: the
+   * module initialises MPI where nobody has, takes all ranks of the launch, and finalises what it initialised.
+   * On rank 0: instances created from now on use all ranks; disconnect lets the others return from serve. Call it after
+   * the last instance is gone. */
+  int32_t (*connect)(const void* communicator);
+  void (*disconnect)(void);
+  /* On the other ranks: takes part in rank 0's factorisations until it disconnects. */
+  int32_t (*serve)(const void* communicator);
 } itr_engine;
 
 typedef struct itr_module {

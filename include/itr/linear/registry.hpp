@@ -3,12 +3,13 @@
 // build tree, and factories that a program registers itself. Absent ones stay in the table with the reason.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "itr/linear/solver.hpp"
+#include "itr/linear/engine.hpp"
 
 namespace itr::linear {
 
@@ -16,18 +17,22 @@ struct BackendInfo {
   std::string name;             ///< "cholmod:supernodal"
   std::string library_version;  ///< "CHOLMOD 3.0.14, OpenBLAS 0.3.21"
   std::string license;
+  std::string options;  ///< that create() takes: "ordering=amd|metis tolerance=NUMBER"
   Capabilities capabilities;
   bool available = false;
   std::string reason;  ///< where absent: why, and the package to install
 };
 
-using SolverFactory = std::function<std::unique_ptr<Solver>()>;
+/// Throws InputError for options that the solver does not have (see apply_options).
+using SolverFactory = std::function<std::unique_ptr<Solver>(const SolverOptions&)>;
 
 /// An ordinary object: make one per program or per simulation. Loading a module twice is harmless (modules stay loaded).
 class Registry {
  public:
   /// Knows the built-in solvers; searches for modules on first use of a name that is not built in, or on list().
   Registry();
+  /// Searches in these folders instead.
+  explicit Registry(std::vector<std::filesystem::path> folders);
   ~Registry();
   Registry(Registry&&) noexcept;
   Registry& operator=(Registry&&) noexcept;
@@ -39,13 +44,28 @@ class Registry {
   /// Our name for a name of ours or of PolyFEM's ("cholmod" -> "cholmod:supernodal", "Eigen::SimplicialLDLT" ->
   /// "eigen:ldlt"); empty where there is no equal.
   static std::string canonical_name(const std::string& name);
-  /// A new solver. Throws InputError (lists present and absent ones) if there is none of that name or it does not load.
-  std::unique_ptr<Solver> create(const std::string& name);
+  /// A new solver; "auto" picks at each analysis (choice.hpp). Throws InputError (lists present and absent ones) if there is
+  /// none of that name or it does not load, and for options that it does not have.
+  std::unique_ptr<Solver> create(const std::string& name, const SolverOptions& options = {});
+  /// The row of a name or alias, present or absent. Throws InputError if there is none.
+  BackendInfo find(const std::string& name);
+
+  /// On rank 0: solvers of that backend created from now on factorise over all ranks of `communicator`, a pointer to an
+  /// MPI_Comm of a program that has initialised MPI, or null for all ranks of the launch (then the module initialises MPI
+  /// where nobody has, and finalises what it initialised). Throws InputError if the backend does not use MPI.
+  void connect(const std::string& name, const void* communicator = nullptr);
+  /// On rank 0, after the last of those solvers is gone: lets the other ranks go on.
+  void disconnect(const std::string& name);
+  /// On every other rank: takes part in rank 0's factorisations until it disconnects.
+  void serve(const std::string& name, const void* communicator = nullptr);
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Hands options to an engine of the solver `name`. Throws InputError that lists `known` where it refuses one.
+void apply_options(Engine& engine, const std::string& name, const std::string& known, const SolverOptions& options);
 
 /// Relative residual that a solver reaches on a small elasticity-like test matrix; negative where it fails.
 double self_test_residual(Solver& solver);

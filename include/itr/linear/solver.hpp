@@ -4,6 +4,7 @@
 // A symmetric matrix of order n is stored as its lower triangle with the diagonal, by columns, rows ascending.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -41,9 +42,22 @@ struct Capabilities {
 
 /// What may help an analysis; all optional.
 struct AnalyzeHints {
-  int block_size = 1;                        ///< unknowns that belong together (the dimension)
-  std::span<const double> coordinates = {};  ///< block_size values an unknown block [m]
+  int block_size = 1;                        ///< unknowns a node where none is held: the dimension; 1: nothing is known
+  std::span<const int> dofs = {};            ///< of each unknown: block_size * node + component, ascending
+  std::span<const double> coordinates = {};  ///< block_size of each unknown: where its node is [m]
 };
+
+/// What the last factorisation and solve took; zero where the library does not tell.
+struct Statistics {
+  double factor_nonzeros = 0;
+  double factor_bytes = 0;   ///< summed over MPI ranks
+  double largest_bytes = 0;  ///< of any one rank
+  double flops = 0;          ///< of the factorisation
+  int iterations = 0;        ///< of the last solve
+};
+
+/// Options of a backend by name, as `itr solvers` lists them: {"ordering", "metis"}.
+using SolverOptions = std::map<std::string, std::string>;
 
 struct SolveReport {
   Outcome outcome = Outcome::ok;
@@ -63,6 +77,7 @@ class Solver {
   /// Solves A X = B for `columns` right-hand sides, columns of length n one after another. Refines until the relative
   /// residual is at most `asked_residual` or no longer falls; reports what was achieved.
   virtual SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked_residual) = 0;
+  virtual Statistics statistics() const = 0;
   virtual std::string message() const = 0;  ///< details of the last outcome that was not ok
 };
 

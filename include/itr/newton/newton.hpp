@@ -55,6 +55,8 @@ class SparseSystem final : public NewtonSystem {
   SparseAssembler assembler_;
   bool pattern_changed_ = true;
   int dim_;
+  std::vector<int> dofs_;            ///< of each unknown
+  std::vector<double> coordinates_;  ///< of each unknown's node when the pattern changed, dim each [m]
 };
 
 enum class Termination {

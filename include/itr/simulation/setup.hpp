@@ -12,6 +12,7 @@
 #include "itr/energy/contact/options.hpp"
 #include "itr/energy/damping_options.hpp"
 #include "itr/energy/material.hpp"
+#include "itr/linear/options.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/newton/options.hpp"
 #include "itr/remesh/options.hpp"
@@ -59,10 +60,6 @@ template <int Dim>
 struct InitialCondition {
   int body = 0;
   SpaceTimeFunction<Dim> value;  ///< evaluated at t = 0
-};
-
-struct LinearOptions {
-  std::vector<std::string> solvers = {"eigen"};  ///< the first one that there is; canonical names or aliases
 };
 
 template <int Dim>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What stands behind a Solver: one factorisation, no residuals. CheckedSolver (checked_solver.cpp) adds what all engines
-// need: finite input, trivial orders, achieved residuals, refinement.
+// What a program implements to bring its own solver: one factorisation, no residuals. make_checked_solver adds what all
+// engines need: finite input, trivial orders, achieved residuals, refinement.
 #pragma once
 
 #include <memory>
@@ -14,17 +14,15 @@ namespace itr::linear {
 class Engine {
  public:
   virtual ~Engine() = default;
+  /// False where the engine has no such option, or not with that value.
+  virtual bool set_option(const std::string& key, const std::string& value) = 0;
   virtual Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) = 0;
   virtual Outcome factorize(std::span<const double> values) = 0;
+  /// B and X hold columns of length n one after another and do not overlap.
   virtual Outcome solve(std::span<const double> B, std::span<double> X, int columns) = 0;
-  virtual std::string message() const { return {}; }
+  virtual Statistics statistics() const = 0;
+  virtual std::string message() const = 0;  ///< of the last outcome that was not ok; may be empty
 };
-
-std::unique_ptr<Engine> make_eigen_ldlt();
-std::unique_ptr<Engine> make_eigen_llt();
-std::unique_ptr<Engine> make_eigen_lu();
-std::unique_ptr<Engine> make_eigen_cg();
-std::unique_ptr<Engine> make_dense();
 
 /// The Solver that users see, over an engine.
 std::unique_ptr<Solver> make_checked_solver(std::string name, Capabilities capabilities, std::unique_ptr<Engine> engine);

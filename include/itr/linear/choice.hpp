@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// From what a scene asks for to a solver: the first one that is there, one that picks by itself, one with others behind it.
+#pragma once
+
+#include <memory>
+
+#include "itr/core/log.hpp"
+#include "itr/linear/options.hpp"
+#include "itr/linear/registry.hpp"
+
+namespace itr::linear {
+
+/// What decides for one solver over another.
+struct MatrixTraits {
+  int order = 0;
+  std::size_t nonzeros = 0;  ///< of the lower triangle
+  int block_size = 1;        ///< 2: a 2D mesh, 3: a 3D mesh, 1: unknown
+  bool may_be_indefinite = false;
+  double memory_bytes = 0;  ///< that factors may take; 0: half of this machine's
+};
+
+struct Pick {
+  std::string name;
+  std::string reason;  ///< "3D and large: supernodal factorisation"
+};
+
+/// What `auto` takes among the solvers that are there. A pure function of its arguments but for `memory_bytes` = 0.
+Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& rows);
+
+/// Bytes that the factors of such a matrix take with a nested-dissection ordering, fitted to verification/solvers.
+double estimate_factor_bytes(const MatrixTraits& traits);
+
+/// Picks at each analysis, and tells the logger when the pick changes. `registry` must outlive it.
+std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger);
+
+/// The solver that `options` ask for. Throws InputError for unknown names (present or absent is told), for options that a
+/// solver does not have, and where none of `solvers` is there. Other programs' names that we have no equal of
+/// ("Eigen::PardisoLDLT") are passed over. `registry` must outlive the solver.
+std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
+                                      Logger logger);
+
+}  // namespace itr::linear

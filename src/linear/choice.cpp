@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: MIT
+#include "itr/linear/choice.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "itr/core/error.hpp"
+
+namespace itr::linear {
+
+namespace {
+
+// Where one solver overtakes another, from verification/solvers/results.csv.
+constexpr int kDenseBelow = 60;
+constexpr std::size_t kSupernodalAbove2d = 60'000, kSupernodalAbove3d = 20'000;  // nonzeros of the lower triangle
+
+double half_of_memory() {
+  return 0.5 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+/// Solvers that throw nothing away: what a decorator forwards to the one that answers now.
+class Forwarding : public Solver {
+ public:
+  Capabilities capabilities() const override { return current().capabilities(); }
+  Statistics statistics() const override { return current().statistics(); }
+  std::string message() const override { return current().message(); }
+
+ protected:
+  virtual const Solver& current() const = 0;
+};
+
+class AutoSolver final : public Forwarding {
+ public:
+  AutoSolver(Registry& registry, bool may_be_indefinite, Logger logger)
+      : registry_(registry), rows_(registry.list()), may_be_indefinite_(may_be_indefinite), logger_(std::move(logger)) {
+    pick({});
+  }
+  std::string_view name() const override { return "auto"; }
+
+  Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
+    pick({pattern.order, pattern.nonzeros(), hints.block_size, may_be_indefinite_});
+    return solver_->analyze(pattern, hints);
+  }
+  Outcome factorize(std::span<const double> values) override { return solver_->factorize(values); }
+  SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
+    return solver_->solve(B, X, columns, asked);
+  }
+
+ private:
+  const Solver& current() const override { return *solver_; }
+
+  void pick(const MatrixTraits& traits) {
+    Pick picked = pick_solver(traits, rows_);
+    if (solver_ && picked.name == solver_->name()) return;
+    solver_ = registry_.create(picked.name);
+    if (traits.order > 0)
+      logger_.info("linear solver: auto takes " + picked.name + " for " + std::to_string(traits.order) +
+                   " unknowns: " + picked.reason);
+  }
+
+  Registry& registry_;
+  std::vector<BackendInfo> rows_;
+  bool may_be_indefinite_;
+  Logger logger_;
+  std::unique_ptr<Solver> solver_;
+};
+
+/// Does the failure say something about the solver, so that another one may succeed?
+bool is_solvers_fault(Outcome outcome) {
+  return outcome == Outcome::out_of_memory || outcome == Outcome::not_converged || outcome == Outcome::failed ||
+         outcome == Outcome::singular;
+}
+
+/// One solver with others behind it. A matrix goes down the list until one copes; the next analysis starts at the top.
+class FallbackSolver final : public Forwarding {
+ public:
+  using Make = std::function<std::unique_ptr<Solver>()>;
+  FallbackSolver(std::unique_ptr<Solver> first, std::vector<Make> others, Logger logger)
+      : others_(std::move(others)), logger_(std::move(logger)) {
+    solvers_.push_back(std::move(first));
+  }
+  std::string_view name() const override { return solvers_[0]->name(); }
+
+  Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
+    pattern_ = pattern;
+    block_size_ = hints.block_size;
+    dofs_.assign(hints.dofs.begin(), hints.dofs.end());
+    coordinates_.assign(hints.coordinates.begin(), hints.coordinates.end());
+    values_.clear();
+    active_ = 0;
+    Outcome outcome = solvers_[0]->analyze(pattern_, hints);
+    while (is_solvers_fault(outcome) && advance(outcome)) outcome = analyze_active();
+    return outcome;
+  }
+
+  Outcome factorize(std::span<const double> values) override {
+    values_.assign(values.begin(), values.end());
+    Outcome outcome = solvers_[active_]->factorize(values_);
+    while (is_solvers_fault(outcome) && advance(outcome)) outcome = prepare_active();
+    return outcome;
+  }
+
+  SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
+    SolveReport report = solvers_[active_]->solve(B, X, columns, asked);
+    std::vector<double> other(X.size());
+    while (is_solvers_fault(report.outcome) && advance(report.outcome)) {
+      if (prepare_active() != Outcome::ok) continue;
+      const SolveReport next = solvers_[active_]->solve(B, other, columns, asked);
+      // The better of two poor answers is kept.
+      if (next.outcome != Outcome::ok && next.relative_residual >= report.relative_residual) continue;
+      std::copy(other.begin(), other.end(), X.begin());
+      report = next;
+    }
+    return report;
+  }
+
+ private:
+  const Solver& current() const override { return *solvers_[active_]; }
+
+  /// To the next solver, if there is one.
+  bool advance(Outcome outcome) {
+    if (active_ == others_.size()) return false;
+    const Solver& failed = *solvers_[active_];
+    if (++active_ == solvers_.size()) solvers_.push_back(others_[active_ - 1]());
+    logger_.warning("linear solver " + std::string(failed.name()) + ": " + to_string(outcome) + " (" + failed.message() +
+                    "); falling back to " + std::string(solvers_[active_]->name()));
+    return true;
+  }
+  Outcome analyze_active() {
+    return solvers_[active_]->analyze(pattern_, {.block_size = block_size_, .dofs = dofs_, .coordinates = coordinates_});
+  }
+  Outcome prepare_active() {
+    const Outcome outcome = analyze_active();
+    return outcome == Outcome::ok ? solvers_[active_]->factorize(values_) : outcome;
+  }
+
+  std::vector<Make> others_;
+  Logger logger_;
+  std::vector<std::unique_ptr<Solver>> solvers_;  ///< those that were needed so far
+  std::size_t active_ = 0;
+  SparsityPattern pattern_;
+  int block_size_ = 1;
+  std::vector<int> dofs_;
+  std::vector<double> coordinates_, values_;
+};
+
+}  // namespace
+
+double estimate_factor_bytes(const MatrixTraits& traits) {
+  const double n = traits.order, entries = 8;
+  if (traits.block_size == 3) return entries * std::max(double(traits.nonzeros), 6.0 * std::pow(n, 4.0 / 3));
+  return entries * std::max(double(traits.nonzeros), 6.0 * n * std::log2(std::max(2.0, n)));
+}
+
+Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& rows) {
+  const auto is_there = [&](const char* name) {
+    return std::any_of(rows.begin(), rows.end(), [&](const BackendInfo& row) { return row.name == name && row.available; });
+  };
+  const bool is_3d = traits.block_size == 3;
+  const double memory = traits.memory_bytes > 0 ? traits.memory_bytes : half_of_memory();
+  if (!traits.may_be_indefinite && estimate_factor_bytes(traits) > memory) {
+    const char* why = "its factors would not fit into the memory";
+    if (is_there("belos:muelu")) return {"belos:muelu", why};
+    return {"eigen:cg", why + std::string(", and belos:muelu is not there")};
+  }
+  if (traits.order <= kDenseBelow && !traits.may_be_indefinite) return {"dense", "tiny"};
+  const bool is_large = traits.nonzeros > (is_3d ? kSupernodalAbove3d : kSupernodalAbove2d);
+  if (!is_large) return {"eigen:ldlt", "small, so nothing is gained by dense blocks"};
+  if (traits.may_be_indefinite) {
+    for (const char* name : {"mumps", "umfpack"})
+      if (is_there(name)) return {name, "large, and it may be indefinite"};
+    return {"eigen:ldlt", "it may be indefinite, and neither mumps nor umfpack is there"};
+  }
+  for (const char* name : {"cholmod:supernodal", "mumps:spd"})
+    if (is_there(name)) return {name, "large: dense blocks of the factor pay"};
+  return {"eigen:ldlt", "neither cholmod nor mumps is there"};
+}
+
+std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger) {
+  return std::make_unique<AutoSolver>(registry, may_be_indefinite, std::move(logger));
+}
+
+std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
+                                      Logger logger) {
+  std::map<std::string, SolverOptions> options_of;
+  for (const auto& [name, values] : options.options) options_of[registry.find(name).name] = values;
+  const auto make = [&registry, options_of, may_be_indefinite, logger](const std::string& name) {
+    if (name == "auto") return make_auto_solver(registry, may_be_indefinite, logger);
+    const auto found = options_of.find(Registry::canonical_name(name));
+    return registry.create(name, found == options_of.end() ? SolverOptions() : found->second);
+  };
+  // Options are checked now, also those of solvers that may never run.
+  for (const auto& [name, values] : options_of)
+    if (registry.find(name).available) registry.create(name, values);
+
+  std::vector<FallbackSolver::Make> others;
+  for (const auto& name : options.fallback) {
+    if (name != "auto") {
+      const BackendInfo info = registry.find(name);
+      if (!info.available) {
+        logger.warning("linear solver: the fallback " + name + " is absent: " + info.reason);
+        continue;
+      }
+    }
+    others.push_back([make, name] { return make(name); });
+  }
+
+  std::string chosen;
+  for (const auto& name : options.solvers) {
+    const bool has_no_equal = Registry::canonical_name(name).empty();
+    if (has_no_equal || !(name == "auto" || registry.find(name).available)) continue;
+    chosen = name;
+    break;
+  }
+  if (chosen.empty()) {  // names of ours that are absent are errors, others' only mean the default
+    for (const auto& name : options.solvers)
+      if (!Registry::canonical_name(name).empty()) registry.create(name);
+    chosen = "eigen";
+  }
+  auto solver = make(chosen);
+  if (others.empty()) return solver;
+  return std::make_unique<FallbackSolver>(std::move(solver), std::move(others), logger);
+}
+
+}  // namespace itr::linear
