@@ -9,6 +9,9 @@ packages=(
   libeigen3-dev libtbb-dev libhdf5-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
   libcgal-dev libgmp-dev libmpfr-dev
   libsuitesparse-dev libopenblas-dev
+  libmumps-dev libopenmpi-dev openmpi-bin
+  libtrilinos-{amesos2,tpetra,shylu,teuchos,kokkos,kokkos-kernels,epetra,epetraext,triutils,zoltan,trilinosss}-dev
+  libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
   python3 python3-h5py python3-matplotlib python3-numpy python3-pil
   python3-dolfinx python3-meshio python3-scipy

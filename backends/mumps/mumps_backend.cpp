@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: MIT
+// MUMPS as a loadable module: multifrontal L D L^T (or L L^T) over the ranks of an MPI communicator. Rank 0 owns the matrix;
+// the others wait for commands and take part. Without connect() an instance works on its own rank alone.
+#include <dmumps_c.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <map>
+#include <mutex>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "../common/blas.hpp"
+#include "../common/mpi_session.hpp"
+#include "itr/linear/module_adapter.hpp"
+
+namespace {
+
+// MUMPS numbers its parameters from one, as its manual does.
+template <typename Struct>
+auto& icntl(Struct& mumps, int i) {
+  return mumps.icntl[i - 1];
+}
+template <typename Struct>
+auto infog(const Struct& mumps, int i) {
+  return mumps.infog[i - 1];
+}
+/// Large counts are stored as negative millions.
+double count(MUMPS_INT n) { return n >= 0 ? n : -1e6 * n; }
+
+constexpr int kInit = -1, kEnd = -2, kAnalyze = 1, kFactorize = 2, kSolve = 3;
+
+/// What rank 0 sends: a job of MUMPS for one instance.
+struct Command {
+  int job = 0;  ///< 0: the session is over
+  int instance = 0;
+  int symmetry = 0;  ///< with kInit
+};
+constexpr int kCommandTag = 71;
+constexpr int kCommandSize = 3;
+
+/// MUMPS is not re-entrant; everything below and every call of it happens under this lock.
+std::mutex lock;
+
+struct Session {
+  MPI_Comm communicator = MPI_COMM_NULL;  ///< of rank 0 and those who serve; null: not connected
+  int ranks = 1;
+  int number = 0;  ///< grows with each connect: instances of an older one are void
+  int instances = 0;
+} session;
+
+void send(const Command& command) {
+  for (int rank = 1; rank < session.ranks; ++rank)
+    MPI_Send(&command, kCommandSize, MPI_INT, rank, kCommandTag, session.communicator);
+}
+
+void run(DMUMPS_STRUC_C& mumps, int job) {
+  mumps.job = job;
+  dmumps_c(&mumps);
+}
+
+void init(DMUMPS_STRUC_C& mumps, int symmetry, MPI_Comm communicator) {
+  mumps = {};
+  mumps.par = 1;  // rank 0 factorises too
+  mumps.sym = symmetry;
+  mumps.comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(communicator));
+  run(mumps, kInit);
+  for (const int stream : {1, 2, 3}) icntl(mumps, stream) = -1;  // says nothing, on any rank
+  icntl(mumps, 4) = 0;
+}
+
+template <int Symmetry>  // 1: positive definite, 2: general
+class Mumps {
+ public:
+  Mumps() = default;
+  ~Mumps() {
+    const std::scoped_lock guard(lock);
+    end();
+  }
+  Mumps(const Mumps&) = delete;
+  Mumps& operator=(const Mumps&) = delete;
+
+  int set_option(std::string_view key, std::string_view value) {
+    static constexpr std::pair<std::string_view, int> kOrderings[] = {{"auto", 7},   {"amd", 0},  {"amf", 2},
+                                                                      {"scotch", 3}, {"pord", 4}, {"qamd", 6}};
+    for (const auto& [name, ordering] : kOrderings)
+      if (key == "ordering" && value == name) {
+        ordering_ = ordering;
+        return ITR_OK;
+      }
+    return ITR_FAILED;
+  }
+
+  int analyze(const itr_pattern& pattern, const itr_hints&) {
+    const std::scoped_lock guard(lock);
+    if (!start()) return ITR_FAILED;
+    rows_.clear();
+    columns_.clear();
+    for (int j = 0; j < pattern.order; ++j)
+      for (int p = pattern.column_starts[j]; p < pattern.column_starts[j + 1]; ++p) {
+        rows_.push_back(pattern.row_indices[p] + 1);
+        columns_.push_back(j + 1);
+      }
+    mumps_.n = pattern.order;
+    mumps_.nnz = static_cast<MUMPS_INT8>(rows_.size());
+    mumps_.irn = rows_.data();
+    mumps_.jcn = columns_.data();
+    icntl(mumps_, 7) = ordering_;
+    icntl(mumps_, 14) = kMemoryMargin;
+    return job(kAnalyze);
+  }
+
+  int factorize(const double* values, size_t length) {
+    const std::scoped_lock guard(lock);
+    if (!is_alive()) return gone();
+    values_.assign(values, values + length);
+    mumps_.a = values_.data();
+    int outcome = job(kFactorize);
+    // Delayed pivots may need more room than the analysis foresaw.
+    for (icntl(mumps_, 14) = kMemoryMargin; is_short_of_workspace() && icntl(mumps_, 14) < kMostMemoryMargin;) {
+      icntl(mumps_, 14) *= 3;
+      outcome = job(kFactorize);
+    }
+    if (outcome == ITR_OK && Symmetry == 1 && infog(mumps_, 12) > 0) {
+      std::snprintf(text_.data(), text_.size(), "%d pivots are not positive", infog(mumps_, 12));
+      return ITR_NOT_POSITIVE_DEFINITE;
+    }
+    return outcome;
+  }
+
+  int solve(const double* rhs, double* solution, int columns) {
+    const std::scoped_lock guard(lock);
+    if (!is_alive()) return gone();
+    std::copy(rhs, rhs + static_cast<size_t>(columns) * mumps_.n, solution);
+    mumps_.rhs = solution;
+    mumps_.nrhs = columns;
+    mumps_.lrhs = mumps_.n;
+    return job(kSolve);
+  }
+
+  itr_statistics statistics() const {
+    itr_statistics result{};
+    if (session_ < 0) return result;
+    result.factor_nonzeros = count(infog(mumps_, 29));
+    result.largest_bytes = 1e6 * infog(mumps_, 21);
+    result.factor_bytes = 1e6 * infog(mumps_, 22);
+    result.flops = mumps_.rinfog[2];
+    return result;
+  }
+  const char* message() const { return text_.data(); }
+
+ private:
+  static constexpr int kMemoryMargin = 30, kMostMemoryMargin = 1000;  ///< of the estimate [%]
+
+  bool is_alive() const { return session_ == session.number && itr::backends::mpi_is_running(); }
+  int gone() {
+    std::snprintf(text_.data(), text_.size(), "the MPI ranks of this solver are gone");
+    return ITR_FAILED;
+  }
+  bool is_short_of_workspace() const { return infog(mumps_, 1) == -9 || infog(mumps_, 1) == -8; }
+
+  /// A fresh instance on all ranks: MUMPS keeps something of the last matrix otherwise.
+  bool start() {
+    end();
+    if (!itr::backends::ensure_mpi()) {
+      std::snprintf(text_.data(), text_.size(), "MPI does not run and cannot be started again");
+      return false;
+    }
+    session_ = session.number;
+    is_shared_ = session.communicator != MPI_COMM_NULL;
+    instance_ = ++session.instances;
+    if (is_shared_) send({kInit, instance_, Symmetry});
+    init(mumps_, Symmetry, is_shared_ ? session.communicator : MPI_COMM_SELF);
+    return infog(mumps_, 1) >= 0;
+  }
+  void end() {
+    if (session_ >= 0 && is_alive()) {
+      if (is_shared_) send({kEnd, instance_, 0});
+      run(mumps_, kEnd);
+    }
+    session_ = -1;
+  }
+
+  int job(int number) {
+    if (is_shared_) send({number, instance_, 0});
+    run(mumps_, number);
+    const int status = infog(mumps_, 1);
+    std::snprintf(text_.data(), text_.size(), "MUMPS status %d (%d)", status, infog(mumps_, 2));
+    if (status >= 0) return ITR_OK;
+    switch (status) {
+      case -6:  // structurally
+      case -10:
+        return ITR_SINGULAR;
+      case -40:
+        return ITR_NOT_POSITIVE_DEFINITE;
+      case -5:
+      case -7:
+      case -8:
+      case -9:
+      case -13:
+      case -19:
+        return ITR_OUT_OF_MEMORY;
+      default:
+        return ITR_FAILED;
+    }
+  }
+
+  DMUMPS_STRUC_C mumps_{};
+  int session_ = -1;  ///< -1: not started
+  int instance_ = 0;
+  bool is_shared_ = false;
+  int ordering_ = 7;
+  std::vector<MUMPS_INT> rows_, columns_;
+  std::vector<double> values_;
+  std::array<char, 96> text_{};
+};
+
+/// Collective over rank 0 and those who serve.
+bool join(const void* communicator) {
+  if (communicator ? !itr::backends::mpi_is_running() : !itr::backends::ensure_mpi()) return false;
+  if (session.communicator != MPI_COMM_NULL) return false;
+  const MPI_Comm all = communicator ? *static_cast<const MPI_Comm*>(communicator) : MPI_COMM_WORLD;
+  if (MPI_Comm_dup(all, &session.communicator) != MPI_SUCCESS) return false;  // our messages do not meet the caller's
+  MPI_Comm_size(session.communicator, &session.ranks);
+  ++session.number;
+  return true;
+}
+
+void leave() {
+  MPI_Comm_free(&session.communicator);
+  session.communicator = MPI_COMM_NULL;
+  session.ranks = 1;
+  ++session.number;
+}
+
+void disconnect() {
+  const std::scoped_lock guard(lock);
+  if (session.communicator == MPI_COMM_NULL || !itr::backends::mpi_is_running()) return;
+  send({});
+  leave();
+}
+
+int connect(const void* communicator) {
+  const std::scoped_lock guard(lock);
+  if (!join(communicator)) return ITR_FAILED;
+  // A program that ends without a word must not leave the others waiting.
+  static const int registered = std::atexit(disconnect);
+  return registered == 0 ? ITR_OK : ITR_FAILED;
+}
+
+/// Waits without burning the core that rank 0 may be using.
+Command next_command() {
+  using namespace std::chrono_literals;
+  constexpr auto kLongest = 200us;
+  auto pause = 5us;
+  for (int there = 0;; pause = std::min(2 * pause, kLongest)) {
+    MPI_Iprobe(0, kCommandTag, session.communicator, &there, MPI_STATUS_IGNORE);
+    if (there) break;
+    std::this_thread::sleep_for(pause);
+  }
+  Command command;
+  MPI_Recv(&command, kCommandSize, MPI_INT, 0, kCommandTag, session.communicator, MPI_STATUS_IGNORE);
+  return command;
+}
+
+int serve(const void* communicator) {
+  const std::scoped_lock guard(lock);
+  if (!join(communicator)) return ITR_FAILED;
+  std::map<int, DMUMPS_STRUC_C> instances;
+  for (Command command = next_command(); command.job != 0; command = next_command()) {
+    DMUMPS_STRUC_C& mumps = instances[command.instance];
+    if (command.job == kInit)
+      init(mumps, command.symmetry, session.communicator);
+    else
+      run(mumps, command.job);
+    if (command.job == kEnd) instances.erase(command.instance);
+  }
+  leave();
+  return ITR_OK;
+}
+
+template <int Symmetry>
+itr_engine row(const char* name, const char* version, uint32_t capabilities) {
+  itr_engine engine = itr::linear::ModuleAdapter<Mumps<Symmetry>>::row(name, version, "CeCILL-C", capabilities,
+                                                                       "ordering=auto|amd|amf|scotch|pord|qamd");
+  engine.connect = connect;
+  engine.disconnect = disconnect;
+  engine.serve = serve;
+  return engine;
+}
+
+const char* version() {
+  static char text[256], mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+  int length = 0;
+  MPI_Get_library_version(mpi, &length);
+  const std::string_view words = mpi;  // "Open MPI v4.1.4, package: ..."
+  const auto end = static_cast<int>(std::min(words.find_first_of(",\n"), words.size()));
+  std::snprintf(text, sizeof text, "MUMPS %s, %.*s, %s", MUMPS_VERSION, std::min(end, 40), mpi, itr::backends::pin_blas());
+  return text;
+}
+
+}  // namespace
+
+extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
+  static const char* const text = version();
+  static const itr_engine engines[] = {row<2>("mumps", text, ITR_INDEFINITE | ITR_MPI), row<1>("mumps:spd", text, ITR_MPI)};
+  static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
+  return &module;
+}
