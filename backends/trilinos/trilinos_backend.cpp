@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#include <Trilinos_version.h>
+#include <Kokkos_Core.hpp>
+#include <Teuchos_DefaultMpiComm.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+
+#include "../common/blas.hpp"
+#include "../common/mpi_session.hpp"
+#include "trilinos.hpp"
+
+namespace itr::backends {
+
+std::mutex& trilinos_lock() {
+  static std::mutex* const lock = new std::mutex;  // outlives every engine that is destroyed at exit
+  return *lock;
+}
+
+bool trilinos_is_running() { return Kokkos::is_initialized() && mpi_is_running(); }
+
+bool ensure_trilinos() {
+  if (!ensure_mpi()) return false;
+  if (Kokkos::is_initialized()) return true;
+  Kokkos::InitArguments arguments;
+  arguments.num_threads = 1;
+  arguments.disable_warnings = true;
+  Kokkos::initialize(arguments);
+  std::atexit([] {  // before MPI's, which was registered before
+    if (Kokkos::is_initialized()) Kokkos::finalize();
+  });
+  return true;
+}
+
+RCP<const Map> make_map(int order) {
+  const auto self = Teuchos::rcp(new Teuchos::MpiComm<int>(MPI_COMM_SELF));
+  return Teuchos::rcp(new Map(order, 0, self));
+}
+
+RCP<Matrix> make_matrix(const RCP<const Map>& map, const FullMatrix& full) {
+  const auto entries = static_cast<Teuchos_Ordinal>(full.indices.size());
+  Teuchos::ArrayRCP<size_t> starts(static_cast<Teuchos_Ordinal>(full.starts.size()));
+  Teuchos::ArrayRCP<int> indices(entries);
+  Teuchos::ArrayRCP<double> values(entries);
+  std::copy(full.starts.begin(), full.starts.end(), starts.begin());
+  std::copy(full.indices.begin(), full.indices.end(), indices.begin());
+  std::copy(full.values.begin(), full.values.end(), values.begin());
+  const auto matrix = Teuchos::rcp(new Matrix(map, map, starts, indices, values));
+  matrix->fillComplete(map, map);
+  return matrix;
+}
+
+void set_values(Matrix& matrix, const FullMatrix& full) {
+  matrix.resumeFill();
+  for (int i = 0; i < full.order; ++i) {
+    const int first = full.starts[i], count = full.starts[i + 1] - first;
+    matrix.replaceLocalValues(i, count, &full.values[first], &full.indices[first]);
+  }
+  matrix.fillComplete(matrix.getDomainMap(), matrix.getRangeMap());
+}
+
+RCP<Vectors> make_vectors(const RCP<const Map>& map, int columns) { return Teuchos::rcp(new Vectors(map, columns)); }
+
+}  // namespace itr::backends
+
+extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
+  using namespace itr::backends;
+  static char version[160];
+  if (!version[0]) std::snprintf(version, sizeof version, "Trilinos %s, %s", TRILINOS_VERSION_STRING, pin_blas());
+  static const itr_engine engines[] = {klu2_row(version), tacho_row(version),
+#ifdef ITR_HAS_MUELU
+                                       muelu_row(version)
+#endif
+  };
+  static const itr_module module{ITR_BACKEND_ABI_VERSION, sizeof engines / sizeof engines[0], engines};
+  return &module;
+}
