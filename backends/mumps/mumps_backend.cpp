@@ -166,8 +166,8 @@ class Mumps {
   /// A fresh instance on all ranks: MUMPS keeps something of the last matrix otherwise.
   bool start() {
     end();
-    if (!itr::backends::ensure_mpi()) {
-      std::snprintf(text_.data(), text_.size(), "MPI does not run and cannot be started again");
+    if (!itr::backends::mpi_is_running()) {
+      std::snprintf(text_.data(), text_.size(), "MPI does not run");
       return false;
     }
     session_ = session.number;
@@ -221,7 +221,7 @@ class Mumps {
 
 /// Collective over rank 0 and those who serve.
 bool join(const void* communicator) {
-  if (communicator ? !itr::backends::mpi_is_running() : !itr::backends::ensure_mpi()) return false;
+  if (itr::backends::prepare_mpi(communicator == nullptr) != ITR_OK) return false;
   if (session.communicator != MPI_COMM_NULL) return false;
   const MPI_Comm all = communicator ? *static_cast<const MPI_Comm*>(communicator) : MPI_COMM_WORLD;
   if (MPI_Comm_dup(all, &session.communicator) != MPI_SUCCESS) return false;  // our messages do not meet the caller's
@@ -287,6 +287,7 @@ template <int Symmetry>
 itr_engine row(const char* name, const char* version, uint32_t capabilities) {
   itr_engine engine = itr::linear::ModuleAdapter<Mumps<Symmetry>>::row(name, version, "CeCILL-C", capabilities,
                                                                        "ordering=auto|amd|amf|scotch|pord|qamd");
+  engine.prepare_mpi = itr::backends::prepare_mpi;
   engine.connect = connect;
   engine.disconnect = disconnect;
   engine.serve = serve;

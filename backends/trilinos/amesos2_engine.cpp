@@ -38,7 +38,7 @@ class Amesos2Engine {
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {
     const std::scoped_lock guard(trilinos_lock());
-    if (!ensure_trilinos()) return fail("MPI does not run and cannot be started again");
+    if (!start_kokkos()) return fail("MPI does not run");
     reset();
     full_.set_pattern(pattern);
     map_ = make_map(full_.order);
@@ -115,10 +115,11 @@ class Amesos2Engine {
 }  // namespace
 
 itr_engine klu2_row(const char* version) {
-  return linear::ModuleAdapter<Amesos2Engine<Kind::klu2>>::row("amesos2:klu2", version, "LGPL-2.1+", ITR_INDEFINITE, "");
+  return on_mpi(
+      linear::ModuleAdapter<Amesos2Engine<Kind::klu2>>::row("amesos2:klu2", version, "LGPL-2.1+", ITR_INDEFINITE, ""));
 }
 itr_engine tacho_row(const char* version) {
-  return linear::ModuleAdapter<Amesos2Engine<Kind::tacho>>::row("amesos2:tacho", version, "BSD-3-Clause", 0, "");
+  return on_mpi(linear::ModuleAdapter<Amesos2Engine<Kind::tacho>>::row("amesos2:tacho", version, "BSD-3-Clause", 0, ""));
 }
 
 }  // namespace itr::backends

@@ -58,7 +58,7 @@ class Muelu {
 
   int analyze(const itr_pattern& pattern, const itr_hints& hints) {
     const std::scoped_lock guard(trilinos_lock());
-    if (!ensure_trilinos()) return fail(ITR_FAILED, "MPI does not run and cannot be started again");
+    if (!start_kokkos()) return fail(ITR_FAILED, "MPI does not run");
     reset();
     fill_up(pattern, hints);
     const itr_pattern padded{static_cast<int32_t>(starts_.size() - 1), starts_.data(), rows_.data()};
@@ -248,8 +248,8 @@ class Muelu {
 }  // namespace
 
 itr_engine muelu_row(const char* version) {
-  return linear::ModuleAdapter<Muelu>::row("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE,
-                                           "tolerance=NUMBER max_iterations=NUMBER");
+  return on_mpi(linear::ModuleAdapter<Muelu>::row("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE,
+                                                  "tolerance=NUMBER max_iterations=NUMBER"));
 }
 
 }  // namespace itr::backends

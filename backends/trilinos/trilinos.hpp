@@ -21,10 +21,9 @@ using Teuchos::RCP;
 /// Kokkos is not re-entrant: every call into Trilinos, destructors included, happens under this.
 std::mutex& trilinos_lock();
 
-/// Starts MPI and Kokkos where nobody has; both are finalised at exit by whoever started them. False where MPI cannot
-/// start.
-bool ensure_trilinos();
-/// False after Kokkos was finalised: what is left of an engine must not be touched then.
+/// Starts Kokkos where nobody has, finalised at exit by whoever started it. False where MPI does not run.
+bool start_kokkos();
+/// False after Kokkos or MPI was finalised: what is left of an engine must not be touched then.
 bool trilinos_is_running();
 
 /// Rows 0 .. order-1, all on this rank (MPI_COMM_SELF: on two ranks klu2 of Trilinos 13.2 was wrong and tacho crashed).
@@ -34,7 +33,8 @@ RCP<Matrix> make_matrix(const RCP<const Map>& map, const FullMatrix& full);
 void set_values(Matrix& matrix, const FullMatrix& full);
 RCP<Vectors> make_vectors(const RCP<const Map>& map, int columns);
 
-/// Rows of the module's table.
+/// Rows of the module's table. All need MPI, if only on their own rank: Debian's Trilinos is built on it.
+itr_engine on_mpi(itr_engine engine);
 itr_engine klu2_row(const char* version);
 itr_engine tacho_row(const char* version);
 itr_engine muelu_row(const char* version);

@@ -19,8 +19,8 @@ std::mutex& trilinos_lock() {
 
 bool trilinos_is_running() { return Kokkos::is_initialized() && mpi_is_running(); }
 
-bool ensure_trilinos() {
-  if (!ensure_mpi()) return false;
+bool start_kokkos() {
+  if (!mpi_is_running()) return false;
   if (Kokkos::is_initialized()) return true;
   Kokkos::InitArguments arguments;
   arguments.num_threads = 1;
@@ -60,6 +60,11 @@ void set_values(Matrix& matrix, const FullMatrix& full) {
 }
 
 RCP<Vectors> make_vectors(const RCP<const Map>& map, int columns) { return Teuchos::rcp(new Vectors(map, columns)); }
+
+itr_engine on_mpi(itr_engine engine) {
+  engine.prepare_mpi = prepare_mpi;
+  return engine;
+}
 
 }  // namespace itr::backends
 

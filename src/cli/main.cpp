@@ -8,6 +8,7 @@
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
+#include "ranks.hpp"
 #include "run.hpp"
 
 namespace {
@@ -21,21 +22,28 @@ scene::Override parse_override(const std::string& text) {
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
+std::string self_test(linear::Registry& registry, const std::string& name) {
+  const auto solver = registry.create(name);
+  const double residual = linear::self_test_residual(*solver);
+  return residual >= 0 ? fmt::format("self-test residual {:.1e}", residual) : "self-test FAILED: " + solver->message();
+}
+
 int list_solvers() {
   linear::Registry registry;
+  registry.allow_mpi_start();
   for (const auto& row : registry.list()) {
     if (!row.available) {
       fmt::print("{:22} absent: {}\n", row.name, row.reason);
       continue;
     }
-    const auto solver = registry.create(row.name);
     std::string abilities = "SPD";
     if (row.capabilities.indefinite) abilities += ", indefinite";
     if (row.capabilities.iterative) abilities += ", iterative";
     if (row.capabilities.threads) abilities += ", threads";
     if (row.capabilities.mpi) abilities += ", MPI";
-    fmt::print("{:22} {}; {}; {}; self-test residual {:.1e}\n", row.name, row.library_version, abilities, row.license,
-               linear::self_test_residual(*solver));
+    fmt::print("{:22} {}; {}; {}; {}\n", row.name, row.library_version, abilities, row.license,
+               self_test(registry, row.name));
+    if (!row.options.empty()) fmt::print("{:22}   options: {}\n", "", row.options);
   }
   return cli::done;
 }
@@ -72,6 +80,8 @@ int dispatch(int argc, char** argv) {
     app.exit(error);
     return cli::bad_input;
   }
+  if (!*run && cli::this_launch().ranks > 1)
+    throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
   for (const auto& text : sets) options.overrides.push_back(parse_override(text));
@@ -83,10 +93,13 @@ int dispatch(int argc, char** argv) {
 int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("itr"));
   spdlog::set_pattern("%v");
+  // All ranks read the scene and see the same mistakes; one of them says so.
+  const bool speaks = itr::cli::this_launch().rank == 0;
+  if (!speaks) spdlog::set_level(spdlog::level::off);
   try {
     return dispatch(argc, argv);
   } catch (const itr::InputError& error) {
-    fmt::print(stderr, "itr: {}\n", error.what());
+    if (speaks) fmt::print(stderr, "itr: {}\n", error.what());
     return itr::cli::bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "itr: internal error: {}\n", error.what());

@@ -9,8 +9,10 @@
 
 #include "itr/core/parallel.hpp"
 #include "itr/core/timer.hpp"
+#include "itr/linear/choice.hpp"
 #include "itr/output/writer.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "ranks.hpp"
 
 namespace itr::cli {
 
@@ -49,8 +51,7 @@ void show_progress(const StepReport& report, int steps) {
 
 template <int Dim>
 int simulate(Setup<Dim> setup, const scene::Scene& scene, const std::string& directory, const RunOptions& options,
-             int threads) {
-  linear::Registry registry;
+             int threads, linear::Registry& registry) {
   Simulation<Dim> simulation(std::move(setup), registry, make_logger());
   output::Writer writer(directory, scene.output, {options.scene.string(), simulation.solver_name(), threads});
   double output_seconds = 0;
@@ -99,10 +100,15 @@ int run(const RunOptions& options) {
   if (directory.empty()) directory = (std::filesystem::path("results") / options.scene.stem()).string();
   const int threads = options.threads >= 0 ? options.threads : scene.max_threads;
   const ThreadLimit limit(threads);
+  linear::Registry registry;
+  registry.allow_mpi_start();
   return std::visit(
       [&](auto& setup) {
         if (!options.solver.empty()) setup.linear.solvers = {options.solver};
-        return simulate(std::move(setup), scene, directory, options, num_threads());
+        const std::string solver = linear::choose_name(setup.linear, registry);
+        if (this_launch().rank > 0) return serve(registry, solver);
+        const RankSession session(registry, solver);
+        return simulate(std::move(setup), scene, directory, options, num_threads(), registry);
       },
       scene.setup);
 }

@@ -32,10 +32,17 @@ class Forwarding : public Solver {
   virtual const Solver& current() const = 0;
 };
 
+/// Those that would be refused because MPI does not run count as absent.
+std::vector<BackendInfo> ready_rows(Registry& registry) {
+  std::vector<BackendInfo> rows = registry.list();
+  for (BackendInfo& row : rows) row.available = registry.is_ready(row.name);
+  return rows;
+}
+
 class AutoSolver final : public Forwarding {
  public:
   AutoSolver(Registry& registry, bool may_be_indefinite, Logger logger)
-      : registry_(registry), rows_(registry.list()), may_be_indefinite_(may_be_indefinite), logger_(std::move(logger)) {
+      : registry_(registry), rows_(ready_rows(registry)), may_be_indefinite_(may_be_indefinite), logger_(std::move(logger)) {
     pick({});
   }
   std::string_view name() const override { return "auto"; }
@@ -183,6 +190,18 @@ std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefin
   return std::make_unique<AutoSolver>(registry, may_be_indefinite, std::move(logger));
 }
 
+std::string choose_name(const LinearOptions& options, Registry& registry) {
+  for (const auto& asked : options.solvers) {
+    if (asked == "auto") return asked;
+    const std::string name = Registry::canonical_name(asked);
+    if (!name.empty() && registry.find(name).available) return name;
+  }
+  // Names of ours that are absent are errors, others' only mean the default.
+  for (const auto& asked : options.solvers)
+    if (!Registry::canonical_name(asked).empty()) registry.create(asked);
+  return Registry::canonical_name("eigen");
+}
+
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
                                       Logger logger) {
   std::map<std::string, SolverOptions> options_of;
@@ -194,7 +213,7 @@ std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_
   };
   // Options are checked now, also those of solvers that may never run.
   for (const auto& [name, values] : options_of)
-    if (registry.find(name).available) registry.create(name, values);
+    if (registry.is_ready(name)) registry.create(name, values);
 
   std::vector<FallbackSolver::Make> others;
   for (const auto& name : options.fallback) {
@@ -204,23 +223,12 @@ std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_
         logger.warning("linear solver: the fallback " + name + " is absent: " + info.reason);
         continue;
       }
+      if (!registry.is_ready(name)) registry.create(name);  // says why: now, not in the middle of a step
     }
     others.push_back([make, name] { return make(name); });
   }
 
-  std::string chosen;
-  for (const auto& name : options.solvers) {
-    const bool has_no_equal = Registry::canonical_name(name).empty();
-    if (has_no_equal || !(name == "auto" || registry.find(name).available)) continue;
-    chosen = name;
-    break;
-  }
-  if (chosen.empty()) {  // names of ours that are absent are errors, others' only mean the default
-    for (const auto& name : options.solvers)
-      if (!Registry::canonical_name(name).empty()) registry.create(name);
-    chosen = "eigen";
-  }
-  auto solver = make(chosen);
+  auto solver = make(choose_name(options, registry));
   if (others.empty()) return solver;
   return std::make_unique<FallbackSolver>(std::move(solver), std::move(others), logger);
 }

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <map>
+#include <mutex>
 #include <set>
 #include <utility>
 
@@ -54,6 +55,7 @@ struct Registry::Impl {
   std::vector<std::filesystem::path> folders;
   std::vector<Row> rows;
   bool searched = false;
+  bool may_start_mpi = false;
 
   Row* find(const std::string& name) {
     const auto it = std::find_if(rows.begin(), rows.end(), [&](const Row& row) { return row.info.name == name; });
@@ -105,6 +107,13 @@ struct Registry::Impl {
     }
     throw InputError({"", "linear solver", "\"" + asked + "\"" + (row ? ", which is absent: " + row->info.reason : ""),
                       "auto or one of " + present + " (absent: " + (absent.empty() ? "none" : absent) + ")"});
+  }
+
+  /// Starts MPI where that is allowed and needed.
+  bool has_its_mpi(const Row& row) const {
+    static std::mutex start;  // one for all modules of the process
+    const std::scoped_lock guard(start);
+    return !row.engine || !row.engine->prepare_mpi || row.engine->prepare_mpi(may_start_mpi) == ITR_OK;
   }
 
   const itr_engine& mpi_engine(const std::string& asked) {
@@ -187,7 +196,18 @@ std::unique_ptr<Solver> Registry::create(const std::string& asked, const SolverO
   if (asked == "auto" && options.empty()) return make_auto_solver(*this, false, {});
   const Row* row = impl_->find_anywhere(canonical_name(asked));
   if (!row || !row->info.available) impl_->refuse(asked, row);
+  if (!impl_->has_its_mpi(*row))
+    throw InputError({"", "linear solver", "\"" + asked + "\", which runs on MPI, and MPI is not initialised",
+                      "MPI_Init before it, or Registry::allow_mpi_start()"});
   return row->factory(options);
+}
+
+void Registry::allow_mpi_start() { impl_->may_start_mpi = true; }
+
+bool Registry::is_ready(const std::string& name) {
+  const Row* row = impl_->find_anywhere(canonical_name(name));
+  if (!row || !row->info.available) return false;
+  return impl_->may_start_mpi || impl_->has_its_mpi(*row);
 }
 
 void Registry::connect(const std::string& name, const void* communicator) {

@@ -61,6 +61,9 @@ typedef struct itr_engine {
   int32_t (*solve)(void* self, const double* rhs, double* solution, int32_t columns);
   void (*statistics)(void* self, itr_statistics* out);
   const char* (*message)(void* self);
+  /* Only where the library behind runs on MPI, be it on one rank; else NULL. ITR_OK where MPI runs. Where nobody has
+   * initialised it: with may_start initialises it, to be finalised at exit, else ITR_FAILED. */
+  int32_t (*prepare_mpi)(int32_t may_start);
   /* Only with ITR_MPI, else NULL. `communicator` points to an MPI_Comm of the caller, who has initialised MPI; NULL: the
    * module initialises MPI where nobody has, takes all ranks of the launch, and finalises what it initialised.
    * On rank 0: instances created from now on use all ranks; disconnect lets the others return from serve. Call it after

@@ -33,9 +33,13 @@ double estimate_factor_bytes(const MatrixTraits& traits);
 /// Picks at each analysis, and tells the logger when the pick changes. `registry` must outlive it.
 std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger);
 
-/// The solver that `options` ask for. Throws InputError for unknown names (present or absent is told), for options that a
-/// solver does not have, and where none of `solvers` is there. Other programs' names that we have no equal of
-/// ("Eigen::PardisoLDLT") are passed over. `registry` must outlive the solver.
+/// The solver that stands first: a name of ours or "auto". Throws InputError for unknown names (present or absent is told)
+/// and where none of `solvers` is there. Other programs' names that we have no equal of ("Eigen::PardisoLDLT") are passed
+/// over.
+std::string choose_name(const LinearOptions& options, Registry& registry);
+
+/// The solver that `options` ask for, with its fallbacks behind it. Throws InputError as choose_name, and for options that
+/// a solver does not have. `registry` must outlive the solver.
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
                                       Logger logger);
 

@@ -26,8 +26,8 @@ class ModuleAdapter {
  public:
   static itr_engine row(const char* name, const char* library_version, const char* license, uint32_t capabilities,
                         const char* options) {
-    return {name,    library_version, license, capabilities, options, create,  destroy, set_option,
-            analyze, factorize,       solve,   statistics,   message, nullptr, nullptr, nullptr};
+    return {name,      library_version, license,    capabilities, options, create,  destroy, set_option, analyze,
+            factorize, solve,           statistics, message,      nullptr, nullptr, nullptr, nullptr};
   }
 
  private:

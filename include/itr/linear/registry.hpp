@@ -45,10 +45,17 @@ class Registry {
   /// "eigen:ldlt"); empty where there is no equal.
   static std::string canonical_name(const std::string& name);
   /// A new solver; "auto" picks at each analysis (choice.hpp). Throws InputError (lists present and absent ones) if there is
-  /// none of that name or it does not load, and for options that it does not have.
+  /// none of that name or it does not load, for options that it does not have, and for MPI that it needs and that does not
+  /// run.
   std::unique_ptr<Solver> create(const std::string& name, const SolverOptions& options = {});
   /// The row of a name or alias, present or absent. Throws InputError if there is none.
   BackendInfo find(const std::string& name);
+
+  /// Lets solvers that run on MPI, be it on one rank, initialise it where nobody has; it is finalised at exit. This is the
+  /// program's word, never the library's: without it, and before the program's own MPI_Init, create() refuses them.
+  void allow_mpi_start();
+  /// Is that solver there, and does MPI run, or may it be started, where the solver needs it?
+  bool is_ready(const std::string& name);
 
   /// On rank 0: solvers of that backend created from now on factorise over all ranks of `communicator`, a pointer to an
   /// MPI_Comm of a program that has initialised MPI, or null for all ranks of the launch (then the module initialises MPI
