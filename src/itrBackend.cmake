@@ -3,9 +3,7 @@
 function(itr_add_backend name)
   set(target itr_backend_${name})
   add_library(${target} MODULE ${ARGN})
-  target_compile_features(${target} PRIVATE cxx_std_20)
-  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include)
-  target_link_libraries(${target} PRIVATE ${CMAKE_DL_LIBS})
+  target_link_libraries(${target} PRIVATE itr::module ${CMAKE_DL_LIBS})
   if(NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
     target_link_options(${target} PRIVATE LINKER:-z,defs)  # what is missing is seen here, not when a user loads it
   endif()

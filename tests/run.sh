@@ -8,7 +8,7 @@ export DEBIAN_FRONTEND=noninteractive
 bash tests/install_packages.sh
 
 if command -v clang-format >/dev/null; then
-  find include src backends tests -name '*.[ch]pp' -print0 | xargs -0 clang-format --dry-run -Werror
+  find include src backends tests examples -name '*.[ch]pp' -print0 | xargs -0 clang-format --dry-run -Werror
 fi
 
 cmake --preset release
