@@ -10,7 +10,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <numeric>
 #include <random>
+#include <sstream>
 #include <thread>
 
 #include "itr/core/error.hpp"
@@ -78,17 +81,113 @@ Registry full_registry() {
   return registry;
 }
 
-class EverySolver : public ::testing::TestWithParam<std::string> {
- protected:
-  std::unique_ptr<Solver> solver_ = full_registry().create(GetParam());
+/// A matrix with what Newton tells of it.
+struct Elastic : System {
+  int block_size = 1;
+  std::vector<int> dofs;
+  std::vector<double> coordinates;
+  AnalyzeHints hints() const { return {.block_size = block_size, .dofs = dofs, .coordinates = coordinates}; }
+};
 
-  void expect_solves(const System& system, double tolerance, int columns = 1, bool analyze = true) {
+/// Linear elasticity on a grid of `side`^dim nodes, each cell cut into dim! simplices along its diagonal (Kuhn). Nodes on
+/// the first face are held, those on the last one in their first component only.
+Elastic elasticity(int dim, int side, double poisson_ratio) {
+  const double mu = 1 / (2 * (1 + poisson_ratio)), lambda = poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio));
+  const double h = 1.0 / (side - 1);
+  int nodes = 1;
+  for (int d = 0; d < dim; ++d) nodes *= side;
+  const auto grid = [&](int node) {
+    Eigen::VectorXi index(dim);
+    for (int d = 0; d < dim; ++d, node /= side) index[d] = node % side;
+    return index;
+  };
+  const auto node_at = [&](const Eigen::VectorXi& index) {
+    int node = 0;
+    for (int d = dim - 1; d >= 0; --d) node = node * side + index[d];
+    return node;
+  };
+  Elastic result;
+  result.block_size = dim;
+  std::vector<int> unknown(dim * nodes, -1);
+  for (int i = 0; i < dim * nodes; ++i) {
+    const Eigen::VectorXi index = grid(i / dim);
+    if (index[0] == 0 || (index[0] == side - 1 && i % dim == 0)) continue;
+    unknown[i] = static_cast<int>(result.dofs.size());
+    result.dofs.push_back(i);
+    for (int d = 0; d < dim; ++d) result.coordinates.push_back(h * index[d]);
+  }
+  std::map<std::pair<int, int>, double> entries;  // (column, row) of the lower triangle
+  for (int cell = 0; cell < nodes; ++cell) {
+    if ((grid(cell).array() == side - 1).any()) continue;
+    std::vector<int> order(dim);
+    std::iota(order.begin(), order.end(), 0);
+    do {
+      std::vector<int> corner = {cell};
+      Eigen::VectorXi index = grid(cell);
+      Dense edges(dim, dim);
+      for (int k = 0; k < dim; ++k) {
+        ++index[order[k]];
+        corner.push_back(node_at(index));
+        edges.col(k) = h * (index - grid(cell)).cast<double>();
+      }
+      Dense gradients(dim, dim + 1);  // of the shape functions
+      gradients.rightCols(dim) = edges.inverse().transpose();
+      gradients.col(0) = -gradients.rightCols(dim).rowwise().sum();
+      const double volume = std::abs(edges.determinant()) / (dim == 2 ? 2 : 6);
+      for (int a = 0; a <= dim; ++a)
+        for (int b = 0; b <= dim; ++b) {
+          const Eigen::VectorXd p = gradients.col(a), q = gradients.col(b);
+          const Dense block =
+              volume * (lambda * p * q.transpose() + mu * q * p.transpose() + mu * p.dot(q) * Dense::Identity(dim, dim));
+          for (int i = 0; i < dim; ++i)
+            for (int j = 0; j < dim; ++j) {
+              const int row = unknown[dim * corner[a] + i], column = unknown[dim * corner[b] + j];
+              if (column >= 0 && row >= column) entries[{column, row}] += block(i, j);
+            }
+        }
+    } while (std::next_permutation(order.begin(), order.end()));
+  }
+  const int n = static_cast<int>(result.dofs.size());
+  result.pattern.order = n;
+  result.pattern.column_starts.assign(n + 1, 0);
+  result.full = Dense::Zero(n, n);
+  for (const auto& [place, value] : entries) {
+    ++result.pattern.column_starts[place.first + 1];
+    result.pattern.row_indices.push_back(place.second);
+    result.values.push_back(value);
+    result.full(place.first, place.second) = result.full(place.second, place.first) = value;
+  }
+  for (int j = 0; j < n; ++j) result.pattern.column_starts[j + 1] += result.pattern.column_starts[j];
+  return result;
+}
+
+/// One solver, as it comes or with one of its orderings.
+struct Case {
+  BackendInfo info;
+  SolverOptions options;
+};
+void PrintTo(const Case& which, std::ostream* out) {
+  *out << which.info.name;
+  for (const auto& [key, value] : which.options) *out << " " << key << "=" << value;
+}
+
+class EverySolver : public ::testing::TestWithParam<Case> {
+ protected:
+  void SetUp() override {
+    const BackendInfo& info = GetParam().info;
+    if (!info.available) GTEST_SKIP() << info.name << " is absent: " << info.reason;
+    solver_ = create();
+  }
+  static std::unique_ptr<Solver> create() { return full_registry().create(GetParam().info.name, GetParam().options); }
+  std::unique_ptr<Solver> solver_;
+
+  void expect_solves(const System& system, double tolerance, int columns = 1, bool analyze = true, AnalyzeHints hints = {}) {
     const int n = system.pattern.order;
     Eigen::MatrixXd B =
         Eigen::MatrixXd::NullaryExpr(n, columns, [](Eigen::Index i, Eigen::Index j) { return std::cos(1.0 + i + 3 * j); });
     Eigen::MatrixXd X(n, columns);
     if (analyze) {
-      ASSERT_EQ(solver_->analyze(system.pattern, {.block_size = 1}), Outcome::ok) << solver_->message();
+      ASSERT_EQ(solver_->analyze(system.pattern, hints), Outcome::ok) << solver_->message();
     }
     ASSERT_EQ(solver_->factorize(system.values), Outcome::ok) << solver_->message();
     const auto report =
@@ -116,6 +215,12 @@ class EverySolver : public ::testing::TestWithParam<std::string> {
 TEST_P(EverySolver, SolvesElasticity) {
   expect_solves(from_dense(springs(2, 9, 1)), 1e-10);
   expect_solves(from_dense(springs(3, 4, 1)), 1e-10);
+  for (const double poisson_ratio : {0.3, 0.49})
+    for (const auto& [dim, side] : {std::pair{2, 12}, std::pair{3, 5}}) {
+      const Elastic system = elasticity(dim, side, poisson_ratio);
+      expect_solves(system, 1e-9, 1, true, system.hints());
+      expect_solves(system, 1e-9);  // without hints
+    }
 }
 
 TEST_P(EverySolver, SolvesMassMatrices) { expect_solves(from_dense(tridiagonal(60, 4, 1)), 1e-12); }
@@ -239,7 +344,7 @@ TEST_P(EverySolver, SolvesSeveralRightHandSidesAndNone) {
 
 TEST_P(EverySolver, TwoInTwoThreadsDoNotDisturbEachOther) {
   const auto work = [&](int n) {
-    const auto solver = full_registry().create(GetParam());
+    const auto solver = create();
     const System system = from_dense(tridiagonal(n, 4, 1));
     std::vector<double> b(n, 1.0), x(n);
     for (int i = 0; i < 50; ++i)
@@ -255,19 +360,46 @@ TEST_P(EverySolver, TwoInTwoThreadsDoNotDisturbEachOther) {
   EXPECT_TRUE(first && second);
 }
 
-std::vector<std::string> present() {
-  std::vector<std::string> names;
-  for (const auto& info : Registry().list())
-    if (info.available) names.push_back(info.name);
-  return names;
+/// All rows of the table; present ones also with each ordering that they list.
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const auto& info : full_registry().list()) {
+    all.push_back({info, {}});
+    std::istringstream options(info.options);
+    for (std::string option; options >> option;) {
+      if (option.rfind("ordering=", 0) != 0) continue;
+      std::istringstream values(option.substr(option.find('=') + 1));
+      for (std::string value; std::getline(values, value, '|');) all.push_back({info, {{"ordering", value}}});
+    }
+  }
+  return all;
 }
-std::string test_name(const ::testing::TestParamInfo<std::string>& info) {
-  std::string name = info.param;
+std::string test_name(const ::testing::TestParamInfo<Case>& info) {
+  std::string name = ::testing::PrintToString(info.param);
   for (char& c : name)
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
   return name;
 }
-INSTANTIATE_TEST_SUITE_P(Present, EverySolver, ::testing::ValuesIn(present()), test_name);
+INSTANTIATE_TEST_SUITE_P(Table, EverySolver, ::testing::ValuesIn(cases()), test_name);
+
+TEST(Muelu, NeedsNotMoreIterationsOnFinerMeshesAndFewerWithRigidModes) {
+  Registry registry = full_registry();
+  if (const auto info = registry.find("belos:muelu"); !info.available) GTEST_SKIP() << info.reason;
+  const auto iterations = [&](const Elastic& system, const AnalyzeHints& hints) {
+    const auto solver = registry.create("belos:muelu");
+    const std::vector<double> b(system.pattern.order, 1.0);
+    std::vector<double> x(b.size());
+    EXPECT_EQ(solver->analyze(system.pattern, hints), Outcome::ok);
+    EXPECT_EQ(solver->factorize(system.values), Outcome::ok) << solver->message();
+    EXPECT_EQ(solver->solve(b, x, 1, 1e-9).outcome, Outcome::ok) << solver->message();
+    return solver->statistics().iterations;
+  };
+  const Elastic coarse = elasticity(2, 24, 0.3), fine = elasticity(2, 48, 0.3);
+  const int on_coarse = iterations(coarse, coarse.hints()), on_fine = iterations(fine, fine.hints());
+  EXPECT_GT(on_coarse, 0);
+  EXPECT_LE(on_fine, 1.5 * on_coarse);
+  EXPECT_LT(on_fine, iterations(fine, {.block_size = 2, .dofs = fine.dofs}));
+}
 
 // Sanitizers end the program at such a request.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -293,6 +425,41 @@ TEST(Registry, NamesOfOthersMapToOurs) {
   EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod:supernodal");
   for (const char* name : {"Eigen::PardisoLLT", "Eigen::AccelerateLDLT", "Hypre", "AMGCL", "Trilinos"})
     EXPECT_EQ(Registry::canonical_name(name), "") << name;
+}
+
+TEST(Registry, RefusesOptionsThatASolverDoesNotHave) {
+  Registry registry = full_registry();
+  for (const auto& info : registry.list()) {
+    if (!info.available) continue;
+    try {
+      registry.create(info.name, {{"no-such-option", "1"}});
+      ADD_FAILURE() << info.name;
+    } catch (const InputError& error) {
+      EXPECT_NE(error.parts().place.find(info.name), std::string::npos);
+      EXPECT_NE(error.parts().found.find("no-such-option=1"), std::string::npos);
+    }
+  }
+  EXPECT_THROW(registry.create("eigen:cg", {{"tolerance", "2"}}), InputError);
+  EXPECT_THROW(registry.create("eigen:cg", {{"tolerance", "1e-9x"}}), InputError);
+  EXPECT_NO_THROW(registry.create("eigen:cg", {{"tolerance", "1e-9"}, {"max_iterations", "77"}}));
+}
+
+TEST(Registry, NeverStartsMpiWithoutTheProgramsWord) {
+  Registry registry;
+  const std::string name = "mumps";
+  if (!registry.find(name).available) GTEST_SKIP() << registry.find(name).reason;
+  if (registry.is_ready(name)) GTEST_SKIP() << "another test of this process has started MPI";
+  EXPECT_THROW(registry.create(name), InputError);
+  EXPECT_FALSE(registry.is_ready(name));
+  registry.allow_mpi_start();
+  EXPECT_TRUE(registry.is_ready(name));
+  EXPECT_GE(self_test_residual(*registry.create(name)), 0);
+}
+
+TEST(Registry, RefusesRanksForASolverWithoutMpi) {
+  Registry registry;
+  EXPECT_THROW(registry.connect("eigen"), InputError);
+  EXPECT_THROW(registry.serve("dense"), InputError);
 }
 
 TEST(Registry, UnknownNamesListWhatThereIs) {

@@ -85,8 +85,13 @@ class Mumps {
   Mumps& operator=(const Mumps&) = delete;
 
   int set_option(std::string_view key, std::string_view value) {
-    static constexpr std::pair<std::string_view, int> kOrderings[] = {{"auto", 7},   {"amd", 0},  {"amf", 2},
-                                                                      {"scotch", 3}, {"pord", 4}, {"qamd", 6}};
+    static constexpr std::pair<std::string_view, int> kOrderings[] = {{"auto", kAuto},
+#ifdef ITR_MUMPS_HAS_SCOTCH
+                                                                      {"scotch", kScotch},
+#endif
+                                                                      {"amd", 0},
+                                                                      {"amf", kAmf},
+                                                                      {"qamd", 6}};
     for (const auto& [name, ordering] : kOrderings)
       if (key == "ordering" && value == name) {
         ordering_ = ordering;
@@ -109,7 +114,7 @@ class Mumps {
     mumps_.nnz = static_cast<MUMPS_INT8>(rows_.size());
     mumps_.irn = rows_.data();
     mumps_.jcn = columns_.data();
-    icntl(mumps_, 7) = ordering_;
+    icntl(mumps_, 7) = ordering_ != kAuto ? ordering_ : pattern.order < kScotchFrom ? kAmf : kScotch;
     icntl(mumps_, 14) = kMemoryMargin;
     return job(kAnalyze);
   }
@@ -154,6 +159,14 @@ class Mumps {
   const char* message() const { return text_.data(); }
 
  private:
+  // MUMPS's own choice may be PORD, which ends the process on some graphs.
+  static constexpr int kAuto = -1, kAmf = 2;
+#ifdef ITR_MUMPS_HAS_SCOTCH
+  static constexpr int kScotch = 3;
+#else
+  static constexpr int kScotch = kAmf;
+#endif
+  static constexpr int kScotchFrom = 5000;                            ///< unknowns
   static constexpr int kMemoryMargin = 30, kMostMemoryMargin = 1000;  ///< of the estimate [%]
 
   bool is_alive() const { return session_ == session.number && itr::backends::mpi_is_running(); }
@@ -213,7 +226,7 @@ class Mumps {
   int session_ = -1;  ///< -1: not started
   int instance_ = 0;
   bool is_shared_ = false;
-  int ordering_ = 7;
+  int ordering_ = kAuto;
   std::vector<MUMPS_INT> rows_, columns_;
   std::vector<double> values_;
   std::array<char, 96> text_{};
@@ -283,10 +296,15 @@ int serve(const void* communicator) {
   return ITR_OK;
 }
 
+#ifdef ITR_MUMPS_HAS_SCOTCH
+constexpr const char* kOptions = "ordering=auto|amd|amf|qamd|scotch";
+#else
+constexpr const char* kOptions = "ordering=auto|amd|amf|qamd";
+#endif
+
 template <int Symmetry>
 itr_engine row(const char* name, const char* version, uint32_t capabilities) {
-  itr_engine engine = itr::linear::ModuleAdapter<Mumps<Symmetry>>::row(name, version, "CeCILL-C", capabilities,
-                                                                       "ordering=auto|amd|amf|scotch|pord|qamd");
+  itr_engine engine = itr::linear::ModuleAdapter<Mumps<Symmetry>>::row(name, version, "CeCILL-C", capabilities, kOptions);
   engine.prepare_mpi = itr::backends::prepare_mpi;
   engine.connect = connect;
   engine.disconnect = disconnect;

@@ -74,7 +74,7 @@ class Minimizer {
       compute_remaining();
       if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
       if (!moving_ && has_small_gradient()) return stop(Termination::gradient);
-      if (!compute_direction()) return stop(Termination::no_descent, "the Newton system has no descent direction");
+      if (!compute_direction()) return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
       if (!moving_ && has_small_step()) return stop(Termination::step);
       if (!moving_ && -0.5 * free_dot(step_, gradient_) < options_.decrement_tolerance) return stop(Termination::decrement);
       const double before = value_;
@@ -215,7 +215,7 @@ class Minimizer {
       if (try_direction(PsdProjection::clamp, 0)) return true;
     }
     double shift = 1e-10 * std::max(system_.diagonal_scale(), 1e-300);
-    for (int attempt = 0; attempt < 12; ++attempt, shift *= 10)
+    for (int attempt = 0; attempt < 12 && is_curable(outcome_); ++attempt, shift *= 10)
       if (factor_and_solve(shift)) return true;
     return false;
   }
@@ -237,13 +237,15 @@ class Minimizer {
       model_curvature_ = motion_.curvature;
       return true;
     }
-    if (system_.factorize(shift) != linear::Outcome::ok) return false;
+    outcome_ = system_.factorize(shift);
+    if (outcome_ != linear::Outcome::ok) return give_reason();
     VectorX rhs = -motion_.coupling, solution;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
     const auto report = system_.solve(rhs, solution);
-    if ((report.outcome != linear::Outcome::ok && report.outcome != linear::Outcome::not_converged) || !solution.allFinite())
-      return false;
+    outcome_ = report.outcome;
+    if ((outcome_ != linear::Outcome::ok && outcome_ != linear::Outcome::not_converged) || !solution.allFinite())
+      return give_reason();
     summary_.linear_residual = std::max(summary_.linear_residual, report.relative_residual);
     if (solution.dot(rhs) < 0) return false;  // not the minimiser of a convex model
     step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
@@ -253,6 +255,17 @@ class Minimizer {
       if (dofs_.unknown[i] != kNone) step_[i] = solution[dofs_.unknown[i]];
     summary_.step_norm = step_norm();
     return true;
+  }
+
+  bool give_reason() {
+    failure_ = std::string(" (linear solve: ") + to_string(outcome_) + ", " + system_.message() + ")";
+    return false;
+  }
+
+  /// Whether a shift of the Hessian may help.
+  static bool is_curable(linear::Outcome outcome) {
+    return outcome != linear::Outcome::non_finite && outcome != linear::Outcome::out_of_memory &&
+           outcome != linear::Outcome::failed;
   }
 
   /// A failed search along the true Newton direction is tried once more along the projected one.
@@ -344,6 +357,8 @@ class Minimizer {
   const NewtonExtras& extras_;
 
   NewtonSummary summary_;
+  linear::Outcome outcome_ = linear::Outcome::ok;  ///< of the last linear solve
+  std::string failure_;                            ///< why the last one failed that did
   double value_ = 0;
   VectorX gradient_, step_, candidate_;
   PrescribedMotion motion_;  ///< asked of the held dofs in this iteration

@@ -73,6 +73,8 @@ linear::SolveReport SparseSystem::solve(const VectorX& rhs, VectorX& solution) {
                        {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kAskedResidual);
 }
 
+std::string SparseSystem::message() const { return std::string(solver_.name()) + ": " + solver_.message(); }
+
 double SparseSystem::diagonal_scale() const {
   double scale = 0;
   for (int j = 0; j < assembler_.pattern().order; ++j)

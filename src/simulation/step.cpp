@@ -2,6 +2,7 @@
 // One time step: solve -> remesh -> project the history -> solve again (paper Algorithm 1).
 #include "itr/simulation/step.hpp"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -22,6 +23,8 @@ double peak_rss_mb() {
 }
 
 namespace {
+
+constexpr double kPoorResidual = 1e-6;  ///< of a linear solve, relative: a hundred times what Newton asks for
 
 void add_seconds(const NewtonSummary& summary, StepSeconds& seconds) {
   seconds.assembly += summary.assembly_seconds;
@@ -178,6 +181,11 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
     const NewtonSummary summary = problem->solve(x, lagged);
     add_seconds(summary, report.seconds);
     report.newton_iterations += summary.iterations;
+    if (summary.linear_residual > kPoorResidual)
+      logger.warning(
+          fmt::format("step {}: linear solves by {} reached a relative residual of {:.1e} only; another solver, or a "
+                      "`fallback`, may do better",
+                      next.step, solver.name(), summary.linear_residual));
     return summary;
   };
   NewtonSummary summary = solve(state.history.x[0]);

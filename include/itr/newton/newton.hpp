@@ -23,6 +23,8 @@ class NewtonSystem {
   /// Factorises Hessian + shift * I.
   virtual linear::Outcome factorize(double shift) = 0;
   virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
+  /// Who failed and why, after an outcome that was not ok.
+  virtual std::string message() const = 0;
   /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
   virtual double diagonal_scale() const = 0;
 };
@@ -33,6 +35,7 @@ class DenseSystem final : public NewtonSystem {
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  std::string message() const override { return "dense Cholesky"; }
   double diagonal_scale() const override;
 
  private:
@@ -48,6 +51,7 @@ class SparseSystem final : public NewtonSystem {
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  std::string message() const override;
   double diagonal_scale() const override;
 
  private:
