@@ -61,9 +61,8 @@ class AutoSolver final : public Forwarding {
 
   void pick(const MatrixTraits& traits) {
     Pick picked = pick_solver(traits, rows_);
-    if (solver_ && picked.name == solver_->name()) return;
-    solver_ = registry_.create(picked.name);
-    if (traits.order > 0)
+    if (!solver_ || picked.name != solver_->name()) solver_ = registry_.create(picked.name);
+    if (traits.order > 0 && std::exchange(told_, picked.name) != picked.name)
       logger_.info("linear solver: auto takes " + picked.name + " for " + std::to_string(traits.order) +
                    " unknowns: " + picked.reason);
   }
@@ -73,6 +72,7 @@ class AutoSolver final : public Forwarding {
   bool may_be_indefinite_;
   Logger logger_;
   std::unique_ptr<Solver> solver_;
+  std::string told_;  ///< the last pick that the logger knows
 };
 
 /// Does the failure say something about the solver, so that another one may succeed?
