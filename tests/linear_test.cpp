@@ -382,25 +382,6 @@ std::string test_name(const ::testing::TestParamInfo<Case>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(Table, EverySolver, ::testing::ValuesIn(cases()), test_name);
 
-TEST(Muelu, NeedsNotMoreIterationsOnFinerMeshesAndFewerWithRigidModes) {
-  Registry registry = full_registry();
-  if (const auto info = registry.find("belos:muelu"); !info.available) GTEST_SKIP() << info.reason;
-  const auto iterations = [&](const Elastic& system, const AnalyzeHints& hints) {
-    const auto solver = registry.create("belos:muelu");
-    const std::vector<double> b(system.pattern.order, 1.0);
-    std::vector<double> x(b.size());
-    EXPECT_EQ(solver->analyze(system.pattern, hints), Outcome::ok);
-    EXPECT_EQ(solver->factorize(system.values), Outcome::ok) << solver->message();
-    EXPECT_EQ(solver->solve(b, x, 1, 1e-9).outcome, Outcome::ok) << solver->message();
-    return solver->statistics().iterations;
-  };
-  const Elastic coarse = elasticity(2, 24, 0.3), fine = elasticity(2, 48, 0.3);
-  const int on_coarse = iterations(coarse, coarse.hints()), on_fine = iterations(fine, fine.hints());
-  EXPECT_GT(on_coarse, 0);
-  EXPECT_LE(on_fine, 1.5 * on_coarse);
-  EXPECT_LT(on_fine, iterations(fine, {.block_size = 2, .dofs = fine.dofs}));
-}
-
 // Sanitizers end the program at such a request.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(Solver, ReportsThatMemoryIsOut) {
@@ -532,6 +513,25 @@ TEST(Registry, AProgramAddsItsOwn) {
   info.available = true;
   registry.add(info, [](const SolverOptions&) { return Registry().create("eigen"); });
   EXPECT_GE(self_test_residual(*registry.create("mine")), 0);
+}
+
+TEST(Muelu, NeedsNotMoreIterationsOnFinerMeshesAndFewerWithRigidModes) {
+  Registry registry = full_registry();
+  if (const auto info = registry.find("belos:muelu"); !info.available) GTEST_SKIP() << info.reason;
+  const auto iterations = [&](const Elastic& system, const AnalyzeHints& hints) {
+    const auto solver = registry.create("belos:muelu");
+    const std::vector<double> b(system.pattern.order, 1.0);
+    std::vector<double> x(b.size());
+    EXPECT_EQ(solver->analyze(system.pattern, hints), Outcome::ok);
+    EXPECT_EQ(solver->factorize(system.values), Outcome::ok) << solver->message();
+    EXPECT_EQ(solver->solve(b, x, 1, 1e-9).outcome, Outcome::ok) << solver->message();
+    return solver->statistics().iterations;
+  };
+  const Elastic coarse = elasticity(2, 24, 0.3), fine = elasticity(2, 48, 0.3);
+  const int on_coarse = iterations(coarse, coarse.hints()), on_fine = iterations(fine, fine.hints());
+  EXPECT_GT(on_coarse, 0);
+  EXPECT_LE(on_fine, 1.5 * on_coarse);
+  EXPECT_LT(on_fine, iterations(fine, {.block_size = 2, .dofs = fine.dofs}));
 }
 
 }  // namespace

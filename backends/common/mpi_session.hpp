@@ -5,6 +5,7 @@
 #include <mpi.h>
 
 #include <cstdlib>
+#include <vector>
 
 #include "itr/linear/abi.h"
 
@@ -23,11 +24,19 @@ inline int32_t prepare_mpi(int32_t may_start) {
   int finalized = 0;
   MPI_Finalized(&finalized);
   if (finalized || !may_start) return ITR_FAILED;
-  // A program that no launcher started needs no daemon beside it (Open MPI's way of saying so; others ignore it).
-  if (!std::getenv("OMPI_COMM_WORLD_SIZE")) setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+  // A program that no launcher started needs no daemon beside it, no shared memory, and no session folder, which all such
+  // programs of a machine would share and delete under each other. This is how Open MPI is told; others ignore it.
+  static constexpr const char* kAlone[][2] = {
+      {"OMPI_MCA_ess_singleton_isolated", "1"}, {"OMPI_MCA_orte_create_session_dirs", "0"}, {"OMPI_MCA_btl", "self"}};
+  std::vector<const char*> set;
+  if (!std::getenv("OMPI_COMM_WORLD_SIZE"))
+    for (const auto& [name, value] : kAlone)
+      if (!std::getenv(name) && setenv(name, value, 0) == 0) set.push_back(name);
   // Modules have a lock each, so two of them may call MPI at the same time.
   int provided = 0;
-  if (MPI_Init_thread(nullptr, nullptr, MPI_THREAD_MULTIPLE, &provided) != MPI_SUCCESS) return ITR_FAILED;
+  const int status = MPI_Init_thread(nullptr, nullptr, MPI_THREAD_MULTIPLE, &provided);
+  for (const char* name : set) unsetenv(name);  // programs that this one starts are launched in their own way
+  if (status != MPI_SUCCESS) return ITR_FAILED;
   std::atexit([] {
     if (mpi_is_running()) MPI_Finalize();
   });
