@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "itr/core/error.hpp"
+#include "itr/linear/dump.hpp"
 #include "itr/linear/registry.hpp"
 
 namespace itr::linear {
@@ -504,6 +505,62 @@ TEST(Registry, ALibraryThatIsNoModuleSaysSo) {
   std::filesystem::create_symlink(map->l_name, folder.path() / "itr_backend_other.so");
   EXPECT_NE(reason_of("itr_backend_other").find("is no solver module"), std::string::npos);
   dlclose(handle);
+}
+
+TEST(Registry, AModuleOfAnotherAbiVersionSaysSo) {
+  Registry registry({std::filesystem::path(ITR_BINARY_DIR) / "tests" / "modules"});
+  const BackendInfo info = registry.find("old_abi_module");
+  EXPECT_FALSE(info.available);
+  EXPECT_NE(info.reason.find("ABI version 1"), std::string::npos) << info.reason;
+  EXPECT_THROW(registry.create("old_abi_module"), InputError);
+}
+
+TEST(Systems, ComeBackFromTheDiskAsTheyWereSolved) {
+  const ModuleFolder folder;
+  const Elastic elastic = elasticity(2, 5, 0.3);
+  const auto solver = make_dumping_solver(Registry().create("eigen"), folder.path(), 2);
+  ASSERT_EQ(solver->analyze(elastic.pattern, elastic.hints()), Outcome::ok);
+  ASSERT_EQ(solver->factorize(elastic.values), Outcome::ok);
+  std::vector<double> b(elastic.pattern.order), x(b.size());
+  for (std::size_t i = 0; i < b.size(); ++i) b[i] = std::cos(static_cast<double>(i));
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(solver->solve(b, x, 1, 1e-10).outcome, Outcome::ok);
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "000001"));
+  const DumpedSystem back = read_system(folder.path() / "000002");
+  EXPECT_EQ(back.pattern, elastic.pattern);
+  EXPECT_EQ(back.values, elastic.values);
+  EXPECT_EQ(back.rhs, b);
+  EXPECT_EQ(back.block_size, 2);
+  EXPECT_EQ(back.dofs, elastic.dofs);
+  EXPECT_EQ(back.coordinates, elastic.coordinates);
+  EXPECT_THROW(read_system(folder.path() / "000001"), InputError);
+  std::filesystem::resize_file(folder.path() / "000002" / "values.npy", 200);
+  EXPECT_THROW(read_system(folder.path() / "000002"), InputError);
+}
+
+/// Counts what reaches the engine.
+class CountingEngine final : public Engine {
+ public:
+  explicit CountingEngine(int& analyses) : analyses_(analyses) {}
+  bool set_option(const std::string&, const std::string&) override { return false; }
+  Outcome analyze(const SparsityPattern&, const AnalyzeHints&) override { return ++analyses_, Outcome::ok; }
+  Outcome factorize(std::span<const double>) override { return Outcome::ok; }
+  Outcome solve(std::span<const double>, std::span<double>, int) override { return Outcome::failed; }
+  Statistics statistics() const override { return {}; }
+  std::string message() const override { return "never solves"; }
+
+ private:
+  int& analyses_;
+};
+
+TEST(Solver, AnalysesAPatternOnceUnlessItMayUsePositions) {
+  const SparsityPattern one = from_dense(tridiagonal(5, 4, 1)).pattern, other = from_dense(tridiagonal(6, 4, 1)).pattern;
+  for (const bool iterative : {false, true}) {
+    int analyses = 0;
+    const auto solver =
+        make_checked_solver("counting", {.iterative = iterative}, std::make_unique<CountingEngine>(analyses));
+    for (const auto& pattern : {one, one, other, other, one}) EXPECT_EQ(solver->analyze(pattern, {}), Outcome::ok);
+    EXPECT_EQ(analyses, iterative ? 5 : 3);
+  }
 }
 
 TEST(Registry, AProgramAddsItsOwn) {

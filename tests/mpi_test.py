@@ -76,10 +76,11 @@ def test_same_result_on_any_number_of_ranks(scratch):
 
 
 def test_one_message_for_a_solver_without_mpi(scratch):
-    done = itr_run(2, scratch / "wrong", "--solver", "eigen")
-    assert done.returncode == 2, done.returncode
-    assert done.stderr.count("itr: linear solver") == 1, done.stderr
-    assert "mumps" in done.stderr, done.stderr
+    for solver in ("eigen", "auto"):
+        done = itr_run(2, scratch / "wrong", "--solver", solver)
+        assert done.returncode == 2, done.returncode
+        assert done.stderr.count("itr: linear solver") == 1, done.stderr
+        assert "does not use MPI" in done.stderr and "mumps" in done.stderr, done.stderr
 
 
 def test_all_end_when_rank_0_fails(scratch):

@@ -69,6 +69,8 @@ int dispatch(int argc, char** argv) {
   run->add_option("--threads", options.threads, "number of threads (0: all)")->check(CLI::NonNegativeNumber);
   run->add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
       ->allow_extra_args(false);
+  run->add_option("--dump-systems", options.dump_folder, "folder for the linear systems, to study solvers with");
+  run->add_option("--dump-every", options.dump_every, "with --dump-systems: each so many-th")->check(CLI::PositiveNumber);
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();

@@ -105,6 +105,8 @@ int run(const RunOptions& options) {
   return std::visit(
       [&](auto& setup) {
         if (!options.solver.empty()) setup.linear.solvers = {options.solver};
+        setup.linear.dump_folder = options.dump_folder;
+        setup.linear.dump_every = options.dump_every;
         const std::string solver = linear::choose_name(setup.linear, registry);
         if (this_launch().rank > 0) return serve(registry, solver);
         const RankSession session(registry, solver);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "itr/core/error.hpp"
+#include "itr/linear/dump.hpp"
 
 namespace itr::linear {
 
@@ -229,8 +230,9 @@ std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_
   }
 
   auto solver = make(choose_name(options, registry));
-  if (others.empty()) return solver;
-  return std::make_unique<FallbackSolver>(std::move(solver), std::move(others), logger);
+  if (!others.empty()) solver = std::make_unique<FallbackSolver>(std::move(solver), std::move(others), logger);
+  if (!options.dump_folder.empty()) solver = make_dumping_solver(std::move(solver), options.dump_folder, options.dump_every);
+  return solver;
 }
 
 }  // namespace itr::linear

@@ -114,10 +114,10 @@ std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
     const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
                                     (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0};
     rows.push_back({{engine.name, engine.library_version, engine.license, engine.options, capabilities, true, ""},
-                    [&engine, capabilities](const SolverOptions& options) {
+                    [&engine](const SolverOptions& options) -> std::unique_ptr<Engine> {
                       auto instance = std::make_unique<ModuleEngine>(engine);
                       apply_options(*instance, engine.name, engine.options, options);
-                      return make_checked_solver(engine.name, capabilities, std::move(instance));
+                      return instance;
                     },
                     &engine});
   }

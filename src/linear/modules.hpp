@@ -12,7 +12,7 @@ namespace itr::linear {
 
 struct ModuleRow {
   BackendInfo info;  ///< not available: `reason` says why, the name is the file's
-  SolverFactory factory;
+  EngineFactory factory;
   const itr_engine* engine = nullptr;
 };
 

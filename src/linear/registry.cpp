@@ -19,8 +19,9 @@ namespace {
 
 struct Row {
   BackendInfo info;
-  SolverFactory factory;
-  const itr_engine* engine = nullptr;  ///< of a module
+  EngineFactory make_engine;            ///< of ours and of modules
+  const itr_engine* engine = nullptr;   ///< of a module
+  SolverFactory make_solver = nullptr;  ///< of the program
 };
 
 Row built_in(const std::string& name, Capabilities capabilities, std::unique_ptr<Engine> (*make)(),
@@ -30,7 +31,7 @@ Row built_in(const std::string& name, Capabilities capabilities, std::unique_ptr
   return {{name, version, "MPL-2.0", options, capabilities, true, ""}, [=](const SolverOptions& asked) {
             auto engine = make();
             apply_options(*engine, name, options, asked);
-            return make_checked_solver(name, capabilities, std::move(engine));
+            return engine;
           }};
 }
 
@@ -98,6 +99,9 @@ struct Registry::Impl {
     return find(name);
   }
 
+  /// Throws InputError where it cannot be created.
+  const Row& usable(const std::string& asked);
+
   [[noreturn]] void refuse(const std::string& asked, const Row* row) {
     search();
     std::string present, absent;
@@ -119,8 +123,8 @@ struct Registry::Impl {
   const itr_engine& mpi_engine(const std::string& asked) {
     search();
     const Row* row = find(canonical_name(asked));
-    if (!row || !row->info.available) refuse(asked, row);
-    if (row->engine && row->engine->connect) return *row->engine;
+    if (asked != "auto" && (!row || !row->info.available)) refuse(asked, row);
+    if (row && row->engine && row->engine->connect) return *row->engine;
     std::string able;
     for (const Row& other : rows)
       if (other.engine && other.engine->connect) able += (able.empty() ? "" : ", ") + other.info.name;
@@ -145,9 +149,9 @@ Registry& Registry::operator=(Registry&&) noexcept = default;
 
 void Registry::add(BackendInfo info, SolverFactory factory) {
   if (Row* row = impl_->find(info.name))
-    *row = {std::move(info), std::move(factory)};
+    *row = {std::move(info), nullptr, nullptr, std::move(factory)};
   else
-    impl_->rows.push_back({std::move(info), std::move(factory)});
+    impl_->rows.push_back({std::move(info), nullptr, nullptr, std::move(factory)});
 }
 
 std::vector<BackendInfo> Registry::list() {
@@ -192,14 +196,25 @@ BackendInfo Registry::find(const std::string& asked) {
   return row->info;
 }
 
-std::unique_ptr<Solver> Registry::create(const std::string& asked, const SolverOptions& options) {
-  if (asked == "auto" && options.empty()) return make_auto_solver(*this, false, {});
-  const Row* row = impl_->find_anywhere(canonical_name(asked));
-  if (!row || !row->info.available) impl_->refuse(asked, row);
-  if (!impl_->has_its_mpi(*row))
+const Row& Registry::Impl::usable(const std::string& asked) {
+  const Row* row = find_anywhere(canonical_name(asked));
+  if (!row || !row->info.available) refuse(asked, row);
+  if (!has_its_mpi(*row))
     throw InputError({"", "linear solver", "\"" + asked + "\", which runs on MPI, and MPI is not initialised",
                       "MPI_Init before it, or Registry::allow_mpi_start()"});
-  return row->factory(options);
+  return *row;
+}
+
+std::unique_ptr<Engine> Registry::create_engine(const std::string& name, const SolverOptions& options) {
+  const Row& row = impl_->usable(name);
+  return row.make_engine ? row.make_engine(options) : nullptr;
+}
+
+std::unique_ptr<Solver> Registry::create(const std::string& asked, const SolverOptions& options) {
+  if (asked == "auto" && options.empty()) return make_auto_solver(*this, false, {});
+  const Row& row = impl_->usable(asked);
+  if (row.make_solver) return row.make_solver(options);
+  return make_checked_solver(row.info.name, row.info.capabilities, row.make_engine(options));
 }
 
 void Registry::allow_mpi_start() { impl_->may_start_mpi = true; }

@@ -14,6 +14,8 @@ struct LinearOptions {
   /// positive definite is an answer, not a failure: Newton projects it.
   std::vector<std::string> fallback;
   std::map<std::string, std::map<std::string, std::string>> options;  ///< by solver name: {"ordering", "metis"}
+  std::string dump_folder;  ///< where systems are written as they are solved (dump.hpp); empty: none are
+  int dump_every = 1;       ///< each so many-th
 };
 
 }  // namespace itr

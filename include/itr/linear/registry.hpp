@@ -26,6 +26,8 @@ struct BackendInfo {
 /// Throws InputError for options that the solver does not have (see apply_options).
 using SolverFactory = std::function<std::unique_ptr<Solver>(const SolverOptions&)>;
 
+using EngineFactory = std::function<std::unique_ptr<Engine>(const SolverOptions&)>;
+
 /// An ordinary object: make one per program or per simulation. Loading a module twice is harmless (modules stay loaded).
 class Registry {
  public:
@@ -48,6 +50,9 @@ class Registry {
   /// none of that name or it does not load, for options that it does not have, and for MPI that it needs and that does not
   /// run.
   std::unique_ptr<Solver> create(const std::string& name, const SolverOptions& options = {});
+  /// What stands behind that solver, without checks, residuals and refinement: to measure what they cost. Null for one that
+  /// a program added. Throws as create().
+  std::unique_ptr<Engine> create_engine(const std::string& name, const SolverOptions& options = {});
   /// The row of a name or alias, present or absent. Throws InputError if there is none.
   BackendInfo find(const std::string& name);
 

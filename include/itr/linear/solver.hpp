@@ -19,6 +19,7 @@ struct SparsityPattern {
   std::vector<int> column_starts;
   std::vector<int> row_indices;
   std::size_t nonzeros() const { return row_indices.size(); }
+  bool operator==(const SparsityPattern&) const = default;
 };
 
 enum class Outcome {
@@ -70,7 +71,8 @@ class Solver {
   virtual ~Solver() = default;
   virtual std::string_view name() const = 0;  ///< "eigen:ldlt"
   virtual Capabilities capabilities() const = 0;
-  /// Once per pattern. The pattern is copied where the solver needs it later.
+  /// Once per pattern; a direct solver does nothing for the pattern that it analysed last. The pattern is copied where the
+  /// solver needs it later.
   virtual Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) = 0;
   /// `values` in the order of the analysed pattern.
   virtual Outcome factorize(std::span<const double> values) = 0;

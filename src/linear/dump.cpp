@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+#include "itr/linear/dump.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "itr/core/error.hpp"
+
+namespace itr::linear {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the files say so");
+constexpr std::size_t kHeader = 128;  // bytes of NumPy's format 1.0: magic, version, length, text, padded
+
+template <typename T>
+constexpr const char* kType = std::is_same_v<T, double> ? "<f8" : "<i4";
+
+template <typename T>
+void write_array(const std::filesystem::path& file, std::span<const T> values) {
+  std::string text = std::string("{'descr': '") + kType<T> + "', 'fortran_order': False, 'shape': (" +
+                     std::to_string(values.size()) + ",), }";
+  text.resize(kHeader - 10 - 1, ' ');
+  const std::string header = std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(kHeader - 10) + '\0' + text + '\n';
+  std::ofstream out(file, std::ios::binary);
+  out << header;
+  out.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size_bytes()));
+  out.close();
+  if (!out) throw InputError({file.string(), "", "a file that cannot be written", "room in a folder that is writable"});
+}
+
+template <typename T>
+std::vector<T> read_array(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string header(kHeader, '\0');
+  in.read(header.data(), kHeader);
+  const auto shape = header.find("'shape': (");
+  if (!in || header.compare(0, 6, "\x93NUMPY") != 0 || header.find(kType<T>) == std::string::npos ||
+      shape == std::string::npos)
+    throw InputError(
+        {file.string(), "", "no array of the expected type", std::string("NumPy's format 1.0, one axis, ") + kType<T>});
+  std::vector<T> values(std::stoull(header.substr(shape + 10)));
+  in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+  if (!in) throw InputError({file.string(), "", "a file that ends early", std::to_string(values.size()) + " values"});
+  return values;
+}
+
+class DumpingSolver final : public Solver {
+ public:
+  DumpingSolver(std::unique_ptr<Solver> solver, std::filesystem::path folder, int every)
+      : solver_(std::move(solver)), folder_(std::move(folder)), every_(every) {}
+  std::string_view name() const override { return solver_->name(); }
+  Capabilities capabilities() const override { return solver_->capabilities(); }
+  Statistics statistics() const override { return solver_->statistics(); }
+  std::string message() const override { return solver_->message(); }
+
+  Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
+    system_.pattern = pattern;
+    system_.block_size = hints.block_size;
+    system_.dofs.assign(hints.dofs.begin(), hints.dofs.end());
+    system_.coordinates.assign(hints.coordinates.begin(), hints.coordinates.end());
+    return solver_->analyze(pattern, hints);
+  }
+  Outcome factorize(std::span<const double> values) override {
+    system_.values.assign(values.begin(), values.end());
+    return solver_->factorize(values);
+  }
+  SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
+    if (count_ % every_ == 0 && columns > 0) {
+      system_.rhs.assign(B.begin(), B.begin() + system_.pattern.order);
+      char name[16];
+      std::snprintf(name, sizeof name, "%06d", count_);
+      write_system(folder_ / name, system_);
+    }
+    ++count_;
+    return solver_->solve(B, X, columns, asked);
+  }
+
+ private:
+  std::unique_ptr<Solver> solver_;
+  std::filesystem::path folder_;
+  int every_, count_ = 0;
+  DumpedSystem system_;
+};
+
+}  // namespace
+
+void write_system(const std::filesystem::path& folder, const DumpedSystem& system) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  write_array<int>(folder / "starts.npy", system.pattern.column_starts);
+  write_array<int>(folder / "rows.npy", system.pattern.row_indices);
+  write_array<double>(folder / "values.npy", system.values);
+  write_array<double>(folder / "rhs.npy", system.rhs);
+  write_array<int>(folder / "dofs.npy", system.dofs);
+  write_array<double>(folder / "coordinates.npy", system.coordinates);
+  write_array<int>(folder / "block_size.npy", std::span<const int>(&system.block_size, 1));
+}
+
+DumpedSystem read_system(const std::filesystem::path& folder) {
+  DumpedSystem system;
+  system.pattern.column_starts = read_array<int>(folder / "starts.npy");
+  system.pattern.row_indices = read_array<int>(folder / "rows.npy");
+  system.values = read_array<double>(folder / "values.npy");
+  system.rhs = read_array<double>(folder / "rhs.npy");
+  system.dofs = read_array<int>(folder / "dofs.npy");
+  system.coordinates = read_array<double>(folder / "coordinates.npy");
+  const auto block_size = read_array<int>(folder / "block_size.npy");
+  system.pattern.order = static_cast<int>(system.pattern.column_starts.size()) - 1;
+  const auto n = static_cast<std::size_t>(system.pattern.order), hinted = system.dofs.size();
+  if (system.pattern.order < 0 || block_size.size() != 1 || system.rhs.size() != n || (hinted != 0 && hinted != n) ||
+      system.coordinates.size() % std::max<std::size_t>(n, 1) != 0 || system.values.size() != system.pattern.nonzeros() ||
+      system.pattern.column_starts.back() != static_cast<int>(system.pattern.nonzeros()))
+    throw InputError({folder.string(), "", "arrays of lengths that do not fit", "a system as write_system leaves it"});
+  system.block_size = block_size[0];
+  return system;
+}
+
+std::unique_ptr<Solver> make_dumping_solver(std::unique_ptr<Solver> solver, std::filesystem::path folder, int every) {
+  return std::make_unique<DumpingSolver>(std::move(solver), std::move(folder), every);
+}
+
+}  // namespace itr::linear

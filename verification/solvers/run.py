@@ -1,0 +1,170 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""What the choice of a linear solver costs: dumps Newton systems of scenes at several sizes, solves each with every solver
+that is there (a process each, with a limit of time and memory), and writes results.csv, the tables of README.md and a plot.
+
+python3 verification/solvers/run.py [--build build/release] [--work DIR] [--most UNKNOWNS] [--seconds 1200] [--gib 16]
+"""
+import argparse
+import csv
+import json
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+
+import numpy
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+SHARED = ROOT.parent / "shared" / "paper-scenes" / "scripts"
+
+# name, scene, --set for all sizes, numbers of refinements of geometry 0; the last system that is written counts
+SCENES = [
+    ("masticator 2D", ROOT / "examples" / "masticator.json",
+     ["/space/remesh/enabled=false", "/time/tend=1"], (1, 2, 3, 4, 5)),
+    ("twisted cube 3D", SHARED / "unit-tests" / "1-cube-twist-noremesh.json", [], (3, 4, 5)),
+    ("ball on wall 3D", SHARED / "ball-wall" / "3D-noremesh-nref0.json", ["/space/remesh/enabled=false"], (1, 2, 3)),
+]
+KEYS = ["scene", "solver", "ranks", "unknowns", "nonzeros", "outcome", "analyze_s", "factorize_s", "solve_s",
+        "bare_factorize_s", "bare_solve_s", "factor_nonzeros", "factor_mb", "largest_rank_mb", "flops", "iterations",
+        "residual"]
+ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
+                   OMPI_MCA_rmaps_base_oversubscribe="1")
+
+
+def dump(itr, scene, sets, refinements, folder, seconds):
+    """The folder of the last system that a scene's run solved before its time was over, or None."""
+    if not any(folder.glob("*/values.npy")):
+        command = [itr, "run", scene, "-o", folder / "run", "--dump-systems", folder, "--dump-every", "5", "--solver", "auto",
+                   "--set", f"/geometry/0/n_refs={refinements}"]
+        for value in sets:
+            command += ["--set", value]
+        folder.mkdir(parents=True, exist_ok=True)
+        with open(folder / "log", "w", encoding="utf-8") as log:
+            try:
+                subprocess.run(list(map(str, command)), stdout=log, stderr=log, timeout=seconds, check=False)
+            except subprocess.TimeoutExpired:
+                pass
+    whole = [path for path in sorted(folder.glob("[0-9]*")) if (path / "block_size.npy").exists()]  # written last
+    return whole[-1] if whole else None
+
+
+def solve(bench, system, solver, options, ranks, seconds, gib):
+    command = [str(bench), str(system), solver, *options]
+    if ranks > 1:
+        command = ["mpirun", "-n", str(ranks), *command]
+    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (int(gib * 2**30),) * 2)
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, preexec_fn=limit, env=ENVIRONMENT,
+                              check=False)
+    except subprocess.TimeoutExpired:
+        return {"outcome": f"did not finish in {seconds:g} s"}
+    if done.returncode != 0:
+        return {"outcome": f"ended with status {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"}
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def solvers_there(itr):
+    listing = subprocess.run([itr, "solvers"], capture_output=True, text=True, env=ENVIRONMENT, check=True).stdout
+    rows = [line for line in listing.splitlines() if line and not line[0].isspace()]
+    for row in rows:
+        if "absent:" in row:
+            print("left out:", row)
+    return [row.split()[0] for row in rows if "absent:" not in row]
+
+
+def table(rows, scene):
+    sizes = sorted({int(row["unknowns"]) for row in rows if row["scene"] == scene and row["unknowns"]})
+    lines = [f"**{scene}**: seconds of analysis + factorisation + solve (fill in 10⁶ entries or iterations; residual)", "",
+             "| solver | " + " | ".join(f"{n:,} unknowns".replace(",", " ") for n in sizes) + " |", "|---|" + "---|" * len(sizes)]
+    for solver in sorted({row["solver"] for row in rows}):
+        cells = []
+        for n in sizes:
+            row = next((r for r in rows if (r["scene"], r["solver"], r["ranks"]) == (scene, solver, 1)
+                        and int(r["unknowns"]) == n), None)
+            if row is None:
+                cells.append("")
+            elif row["outcome"] not in ("ok", "not converged"):
+                cells.append(row["outcome"])
+            else:
+                work = (f"{row['iterations']} it." if row["iterations"] else f"{row['factor_nonzeros'] / 1e6:.2f}")
+                cells.append(f"{row['analyze_s']:.2g} + {row['factorize_s']:.2g} + {row['solve_s']:.2g} ({work}; "
+                             f"{row['residual']:.0e})" + (" *" if row["outcome"] != "ok" else ""))
+        lines.append(f"| {solver} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def plot(rows, file):
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    scenes = sorted({row["scene"] for row in rows})
+    figure, axes = pyplot.subplots(1, len(scenes), figsize=(5 * len(scenes), 4.5), sharey=True, squeeze=False)
+    for axis, scene in zip(axes[0], scenes):
+        for i, solver in enumerate(sorted({row["solver"] for row in rows})):
+            points = sorted((r["unknowns"], r["factorize_s"] + r["solve_s"]) for r in rows
+                            if (r["scene"], r["solver"], r["ranks"], r["outcome"]) == (scene, solver, 1, "ok"))
+            if points:
+                axis.loglog(*zip(*points), marker="osd^v<>*xp"[i % 10], label=solver)
+        axis.set_title(scene)
+        axis.set_xlabel("unknowns")
+        axis.grid(alpha=0.3)
+    axes[0][0].set_ylabel("factorisation + solve [s]")
+    axes[0][-1].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(file, dpi=110)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
+    parser.add_argument("--work", type=pathlib.Path, default=ROOT / "results" / "solvers", help="for dumped systems")
+    parser.add_argument("--most", type=int, default=400_000, help="larger systems are left out")
+    parser.add_argument("--scene", nargs="*", help="only these")
+    parser.add_argument("--seconds", type=float, default=1200, help="a solver has for a system")
+    parser.add_argument("--gib", type=float, default=16, help="a solver has for a system, of address space")
+    parser.add_argument("--ranks", type=int, nargs="*", default=[1, 2, 4], help="for mumps")
+    parser.add_argument("--output", type=pathlib.Path, default=HERE)
+    arguments = parser.parse_args()
+    itr, bench = arguments.build / "bin" / "itr", arguments.build / "bin" / "itr_solver_bench"
+
+    rows = []
+    solvers = solvers_there(itr)
+    for name, scene, sets, sizes in SCENES:
+        if arguments.scene and name not in arguments.scene:
+            continue
+        if not scene.exists():
+            print("left out:", scene, "is not there")
+            continue
+        for refinements in sizes:
+            folder = arguments.work / f"{name.replace(' ', '-')}-{refinements}"
+            system = dump(itr, scene, sets, refinements, folder, arguments.seconds)
+            if system is None:
+                print(f"left out: {name} with {refinements} refinements: no system (see {folder / 'log'})", flush=True)
+                continue
+            unknowns = numpy.load(system / "rhs.npy", mmap_mode="r").shape[0]
+            if unknowns > arguments.most:
+                print(f"left out: {name} with {unknowns} unknowns", flush=True)
+                continue
+            for solver in solvers:
+                for ranks in arguments.ranks if solver == "mumps" else [1]:
+                    row = {"unknowns": unknowns, **solve(bench, system, solver, [], ranks, arguments.seconds, arguments.gib)}
+                    row.update(scene=name, solver=solver, ranks=ranks)
+                    rows.append(row)
+                    print(json.dumps(row), flush=True)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    with open(arguments.output / "results.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, KEYS)
+        writer.writeheader()
+        writer.writerows(rows)
+    plot(rows, arguments.output / "solvers.png")
+    text = "\n\n".join(table(rows, scene) for scene in dict.fromkeys(row["scene"] for row in rows))
+    (arguments.output / "tables.md").write_text(text + "\n", encoding="utf-8")
+    print(text)
+    return 0
+
+
+sys.exit(main())
