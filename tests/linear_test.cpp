@@ -224,6 +224,26 @@ TEST_P(EverySolver, SolvesElasticity) {
     }
 }
 
+TEST_P(EverySolver, SolvesMoreThanAThousandUnknownsOrRefusesThem) {
+  const Elastic system = elasticity(2, 27, 0.3);
+  ASSERT_GT(system.pattern.order, 1024);
+  const Outcome analyzed = solver_->analyze(system.pattern, system.hints());
+  if (GetParam().info.name == "amesos2:tacho") {
+    EXPECT_EQ(analyzed, Outcome::failed);
+    EXPECT_NE(solver_->message().find("1024"), std::string::npos);
+    return;
+  }
+  ASSERT_EQ(analyzed, Outcome::ok) << solver_->message();
+  const std::vector<double> b(system.pattern.order, 1.0);
+  std::vector<double> x(b.size());
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_EQ(solver_->factorize(system.values), Outcome::ok) << solver_->message();
+    EXPECT_EQ(solver_->solve(b, x, 1, 1e-9).outcome, Outcome::ok) << solver_->message();
+  }
+  const Eigen::Map<const Eigen::VectorXd> solution(x.data(), x.size());
+  EXPECT_LE((Eigen::VectorXd::Ones(x.size()) - system.full * solution).norm(), 2e-9 * std::sqrt(x.size()));
+}
+
 TEST_P(EverySolver, SolvesMassMatrices) { expect_solves(from_dense(tridiagonal(60, 4, 1)), 1e-12); }
 
 TEST_P(EverySolver, ReachesOrReportsStiffSystems) {

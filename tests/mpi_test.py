@@ -19,7 +19,7 @@ import time
 ITR, SOURCE, MPI_HOST = sys.argv[1:4]
 SCENE = str(pathlib.Path(SOURCE) / "examples" / "masticator.json")
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
-                   OMPI_MCA_rmaps_base_oversubscribe="1", OMPI_MCA_btl_base_warn_component_unused="0")
+                   OMPI_MCA_rmaps_base_oversubscribe="1", OMPI_MCA_mpi_yield_when_idle="1")
 PATIENCE = 120  # s; a hang fails here
 
 
