@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What `itr run` leaves in a folder (design §5), and that a certificate finds what is wrong in it.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -199,6 +200,9 @@ TEST_F(OutputTest, SeriesIsReadableAtAnyMomentAndCompleteAtTheEnd) {
     const std::string xdmf = text_of(folder / "sim.xdmf");
     EXPECT_EQ(count_of(xdmf, "</Xdmf>"), 1);
     EXPECT_GE(count_of(xdmf, "<Time "), step * 15 / 16);
+    const hdf5::Session session;
+    const hdf5::File file = hdf5::File::open(folder / "sim.h5");
+    EXPECT_EQ(file.read_doubles(fmt::format("/frames/{:06}/fields/x", step)).rows(), 8u);
   }
   writer.finish("finished");
   EXPECT_EQ(count_of(text_of(folder / "sim.xdmf"), "<Time "), kSteps);

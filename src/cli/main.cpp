@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 
 #include "itr/core/error.hpp"
@@ -71,6 +72,7 @@ int dispatch(int argc, char** argv) {
       ->allow_extra_args(false);
   run->add_option("--dump-systems", options.dump_folder, "folder for the linear systems, to study solvers with");
   run->add_option("--dump-every", options.dump_every, "with --dump-systems: each so many-th")->check(CLI::PositiveNumber);
+  run->add_flag("--resume", options.resume, "go on from the newest state that the folder has, or from the beginning");
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
@@ -98,6 +100,7 @@ int main(int argc, char** argv) {
   // All ranks read the scene and see the same mistakes; one of them says so.
   const bool speaks = itr::cli::this_launch().rank == 0;
   if (!speaks) spdlog::set_level(spdlog::level::off);
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is an error of the write, as a full disk is
   try {
     return dispatch(argc, argv);
   } catch (const itr::InputError& error) {

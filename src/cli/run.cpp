@@ -6,7 +6,10 @@
 
 #include <csignal>
 #include <cstdio>
+#include <memory>
+#include <optional>
 
+#include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/linear/choice.hpp"
@@ -19,7 +22,12 @@ namespace itr::cli {
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
-void on_interrupt(int) { interrupted = 1; }
+
+/// The step is finished and saved; who cannot wait sends the signal again.
+void on_interrupt(int signal) {
+  interrupted = 1;
+  std::signal(signal, SIG_DFL);
+}
 
 Logger make_logger() {
   return Logger([](LogLevel level, std::string_view message) {
@@ -49,47 +57,105 @@ void show_progress(const StepReport& report, int steps) {
   }
 }
 
-template <int Dim>
-int simulate(Setup<Dim> setup, const scene::Scene& scene, const std::string& directory, const RunOptions& options,
-             int threads, linear::Registry& registry) {
-  Simulation<Dim> simulation(std::move(setup), registry, make_logger());
-  output::Writer writer(directory, scene.output, {options.scene.string(), simulation.solver_name(), threads});
-  double output_seconds = 0;
-  const auto write = [&](StepReport report) {
-    report.seconds.output = output_seconds;  // of the frame before: this one is not written yet
-    report.seconds.total += output_seconds;
-    output_seconds = 0;
-    const ScopedTimer timer(output_seconds);
-    simulation.observe([&](const FrameView<Dim>& frame) { writer.write(frame, report); });
-  };
-  write(simulation.initial_report());
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  const int steps = simulation.setup().time.steps;
-  std::string outcome = "finished";
-  while (!simulation.finished()) {
-    const StepResult result = simulation.advance();
-    if (!result.ok) {
-      outcome = fmt::format("stopped in step {} (t = {:.6g} s): {}", simulation.state().step + 1,
-                            simulation.state().t + simulation.setup().time.dt, result.reason);
-      break;
-    }
-    write(result.report);
-    show_progress(result.report, steps);
-    if (interrupted) {
-      outcome = fmt::format("interrupted after step {}", simulation.state().step);
-      break;
-    }
-  }
-  writer.finish(outcome);
-  if (isatty(STDOUT_FILENO)) fmt::print("\n");
-  if (outcome == "finished") {
-    fmt::print("{} steps in {}\n", simulation.state().step, directory);
-    return done;
-  }
-  fmt::print(stderr, "itr: {}; the last good state is in {}\n", outcome, directory);
-  return simulation_stopped;
+std::string resume_hint(const std::string& directory) {
+  return fmt::format("`itr run` with --resume goes on from the last saved state in {}", directory);
 }
+
+/// The state to go on from; none without --resume or where the folder has none.
+std::optional<output::SavedState> find_resumable(const scene::Scene& scene, const std::string& directory,
+                                                 const RunOptions& options) {
+  if (!options.resume) return std::nullopt;
+  const auto saved = output::find_saved_state(directory);
+  if (!saved) {
+    spdlog::info("no saved state in {}: starting from the beginning", directory);
+    return std::nullopt;
+  }
+  const auto changes = scene::find_changes(saved->scene, scene.identity);
+  if (changes.empty()) return saved;
+  std::string text = "another scene than that of the saved state:";
+  for (const auto& change : changes) text += "\n  " + change;
+  throw InputError({options.scene.string(), "--resume", text, "the scene of " + saved->file.string()});
+}
+
+template <int Dim>
+class Run {
+ public:
+  Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
+      linear::Registry& registry)
+      : directory_(std::move(directory)), simulation_(std::move(setup), registry, make_logger()) {
+    const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
+    if (const auto saved = find_resumable(scene, directory_, options)) {
+      if (saved->backend != info.backend)
+        throw InputError({directory_, "--resume", "solver " + info.backend, saved->backend + ", as before"});
+      output::Checkpoint<Dim> checkpoint = output::read_checkpoint<Dim>(*saved);
+      simulation_.restore(checkpoint.state);
+      writer_ = std::make_unique<output::Writer>(directory_, scene.output, info, checkpoint);
+      is_saved_ = true;
+      spdlog::info("going on after step {}", simulation_.state().step);
+    } else {
+      writer_ = std::make_unique<output::Writer>(directory_, scene.output, info);
+      write(simulation_.initial_report());
+    }
+  }
+
+  int run() {
+    std::signal(SIGINT, on_interrupt);
+    std::signal(SIGTERM, on_interrupt);
+    std::string outcome;
+    try {
+      outcome = advance();
+      if (outcome != kFinished && !is_saved_) save();
+      writer_->finish(outcome);
+    } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
+      outcome = fmt::format("stopped at step {}, whose files could not all be written: {}", simulation_.state().step, error.what());
+    }
+    if (isatty(STDOUT_FILENO)) fmt::print("\n");
+    if (outcome == kFinished) {
+      fmt::print("{} steps in {}\n", simulation_.state().step, directory_);
+      return done;
+    }
+    fmt::print(stderr, "itr: {}; {}\n", outcome, resume_hint(directory_));
+    return simulation_stopped;
+  }
+
+ private:
+  static constexpr const char* kFinished = "finished";
+
+  /// Until the end or until something stops it; says what.
+  std::string advance() {
+    const int steps = simulation_.setup().time.steps;
+    while (!simulation_.finished()) {
+      const StepResult result = simulation_.advance();
+      if (!result.ok)
+        return fmt::format("stopped in step {} (t = {:.6g} s): {}", simulation_.state().step + 1,
+                           simulation_.state().t + simulation_.setup().time.dt, result.reason);
+      write(result.report);
+      show_progress(result.report, steps);
+      if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
+    }
+    return kFinished;
+  }
+
+  void write(StepReport report) {
+    report.seconds.output = output_seconds_;  // of the frame before: this one is not written yet
+    report.seconds.total += output_seconds_;
+    output_seconds_ = 0;
+    const ScopedTimer timer(output_seconds_);
+    const State<Dim>& state = simulation_.state();
+    is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(state.step);
+    simulation_.observe([&](const FrameView<Dim>& frame) { writer_->write(frame, report, is_saved_ ? &state : nullptr); });
+  }
+
+  void save() {
+    simulation_.observe([&](const FrameView<Dim>& frame) { writer_->save(frame, simulation_.state()); });
+  }
+
+  std::string directory_;
+  Simulation<Dim> simulation_;
+  std::unique_ptr<output::Writer> writer_;
+  double output_seconds_ = 0;
+  bool is_saved_ = false;  ///< whether the present state is
+};
 
 }  // namespace
 
@@ -110,7 +176,7 @@ int run(const RunOptions& options) {
         const std::string solver = linear::choose_name(setup.linear, registry);
         if (this_launch().rank > 0) return serve(registry, solver);
         const RankSession session(registry, solver);
-        return simulate(std::move(setup), scene, directory, options, num_threads(), registry);
+        return Run(std::move(setup), scene, directory, options, num_threads(), registry).run();
       },
       scene.setup);
 }

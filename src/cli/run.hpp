@@ -17,6 +17,7 @@ struct RunOptions {
   std::string dump_folder;  ///< of linear systems; empty: none
   int dump_every = 1;
   std::vector<scene::Override> overrides;
+  bool resume = false;  ///< go on from the newest saved state of the folder, if there is one
 };
 
 enum ExitStatus { done = 0, bad_input = 2, simulation_stopped = 3, certificate_failed = 4 };

@@ -73,6 +73,27 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
 }
 
 template <int Dim>
+void Mesh<Dim>::set_facets(const std::vector<Facet>& facets, const std::vector<int>& tags) {
+  ITR_CHECK(facets.size() == tags.size(), facets.size(), tags.size());
+  std::vector<Facet> found;
+  for (const Facet& facet : facets) {
+    const bool in_range = std::all_of(facet.begin(), facet.end(), [&](int v) { return v >= 0 && v < vertex_slots(); });
+    const FacetId f = in_range ? find_facet(facet) : kNone;
+    if (f == kNone)
+      throw InputError({"", "facet " + std::to_string(found.size()), "one that is not on the boundary", "a boundary facet"});
+    found.push_back(sorted(facet));
+  }
+  std::sort(found.begin(), found.end());
+  if (static_cast<int>(found.size()) != num_facets_ || std::adjacent_find(found.begin(), found.end()) != found.end())
+    throw InputError({"", "facets", std::to_string(found.size()), std::to_string(num_facets_) + " different ones"});
+  for (auto& list : facets_of_) list.clear();
+  facets_.clear();
+  facet_tag_.clear();
+  num_facets_ = 0;
+  for (std::size_t f = 0; f < facets.size(); ++f) add_facet(facets[f], tags[f]);
+}
+
+template <int Dim>
 Mat<Dim> Mesh<Dim>::rest_edges(CellId c) const {
   std::array<Vec<Dim>, Dim + 1> p;
   for (int k = 0; k <= Dim; ++k) p[k] = rest_[cells_[c][k]];

@@ -195,13 +195,8 @@ void check_frame(const StoredFrame& frame, const std::string& name, std::vector<
 }
 
 std::vector<fs::path> frame_files(const fs::path& directory) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(directory / "frames", error)) {
-    if (entry.path().extension() == ".h5") files.push_back(entry.path());
-  }
+  std::vector<fs::path> files = stored_frames(directory);
   if (files.empty()) throw InputError({directory.string(), "frames", "no *.h5 there", "a folder that `itr run` wrote"});
-  std::sort(files.begin(), files.end());
   return files;
 }
 

@@ -1,17 +1,40 @@
 // SPDX-License-Identifier: MIT
-// Files that are complete or absent, whatever ends the process: written under a temporary name, then renamed.
+// Files that are complete or absent, whatever ends the process: written under a temporary name, then renamed. A failure (a
+// full disk, a folder that cannot be written) is an InputError with the system's reason, and leaves no temporary file.
 #pragma once
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace itr::output {
 
-/// The name under which `path` is written before it is complete; same folder, so that the rename is atomic.
-std::filesystem::path temporary_name(const std::filesystem::path& path);
-/// Renames temporary_name(path) to path. Throws InputError.
-void publish(const std::filesystem::path& path);
-/// Replaces the file by `text`. Throws InputError.
-void write_text(const std::filesystem::path& path, const std::string& text);
+/// Whether a file has to survive the loss of power, not only of the process: waiting for the disk costs more than a 2D step.
+enum class Durability { process, power };
+
+/// Replaces the file by `bytes`.
+void write_file(const std::filesystem::path& path, std::string_view bytes, Durability durability = Durability::process);
+/// Waits until the file or folder is on the disk.
+void sync(const std::filesystem::path& path);
+
+/// A file that grows by whole lines: one that could not be written completely is taken back.
+class LineFile {
+ public:
+  /// Keeps the first `keep` bytes of what is there, without a file: none. Throws InputError where there are fewer.
+  LineFile(std::filesystem::path path, std::size_t keep);
+  ~LineFile();
+  LineFile(const LineFile&) = delete;
+  LineFile& operator=(const LineFile&) = delete;
+  /// `line` without its end.
+  void append(std::string line);
+  /// Takes back what is after the first `size` bytes.
+  void shorten(std::size_t size);
+  std::size_t size() const { return size_; }  ///< [bytes]
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+  std::size_t size_ = 0;
+};
 
 }  // namespace itr::output

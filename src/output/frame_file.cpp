@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "frame_file.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <string>
 
-#include "files.hpp"
 #include "itr/core/check.hpp"
 #include "itr/core/error.hpp"
 
@@ -77,7 +78,8 @@ Integers read_indices(const std::filesystem::path& path, const hdf5::File& file,
 }  // namespace
 
 template <int Dim>
-void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t) {
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, Durability durability,
+                 const FrameExtra& extra) {
   const Mesh<Dim>& mesh = frame.mesh;
   ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots() && mesh.num_cells() == mesh.cell_slots(), "mesh is not compact");
   ITR_CHECK(frame.x.size() == Dim * mesh.num_vertices(), frame.x.size(), mesh.num_vertices());
@@ -85,7 +87,7 @@ void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame,
   const VectorX u = frame.x - rest;
 
   const hdf5::Session session;
-  hdf5::File file = hdf5::File::create(temporary_name(path));
+  hdf5::File file = hdf5::File::create(path);
   file.write_attribute("step", static_cast<std::int64_t>(step));
   file.write_attribute("t", t);
   write_mesh(file, mesh, rest);
@@ -94,8 +96,31 @@ void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame,
   file.write("/fields/v", as_span(frame.v), Dim);
   file.write("/fields/elastic_density", frame.elastic_density, 0);
   write_obstacles(file, frame);
-  file.close();
-  publish(path);
+  if (extra) extra(file);
+  write_file(path, file.image(), durability);
+}
+
+std::vector<std::filesystem::path> stored_frames(const std::filesystem::path& directory) {
+  std::vector<std::filesystem::path> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(directory / "frames", error)) {
+    const std::string stem = entry.path().stem().string();
+    const bool is_number = !stem.empty() && stem.size() < 10 &&
+                           std::all_of(stem.begin(), stem.end(), [](unsigned char c) { return std::isdigit(c); });
+    if (is_number && entry.path().extension() == ".h5") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return step_of_frame(a) < step_of_frame(b); });
+  return files;
+}
+
+int step_of_frame(const std::filesystem::path& path) { return std::stoi(path.stem().string()); }
+
+FrameSizes read_frame_sizes(const std::filesystem::path& path) {
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(path);
+  const auto x = file.read_doubles("/fields/x");
+  return {file.read_double_attribute("t"), x.columns, static_cast<int>(x.rows()),
+          static_cast<int>(file.read_integers("/mesh/body").rows())};
 }
 
 StoredFrame read_frame(const std::filesystem::path& path) {
@@ -115,7 +140,7 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   return frame;
 }
 
-template void write_frame<2>(const std::filesystem::path&, const FrameView<2>&, int, double);
-template void write_frame<3>(const std::filesystem::path&, const FrameView<3>&, int, double);
+template void write_frame<2>(const std::filesystem::path&, const FrameView<2>&, int, double, Durability, const FrameExtra&);
+template void write_frame<3>(const std::filesystem::path&, const FrameView<3>&, int, double, Durability, const FrameExtra&);
 
 }  // namespace itr::output

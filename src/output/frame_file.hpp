@@ -4,16 +4,32 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
+#include "files.hpp"
 #include "hdf5.hpp"
 #include "itr/simulation/frame.hpp"
 
 namespace itr::output {
 
-/// Writes the frame under a temporary name and renames it.
+/// Adds what a frame holds beside the fields that every frame has.
+using FrameExtra = std::function<void(hdf5::File&)>;
+
 template <int Dim>
-void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t);
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t,
+                 Durability durability = Durability::process, const FrameExtra& extra = {});
+
+/// DIR/frames/NNNNNN.h5, by step.
+std::vector<std::filesystem::path> stored_frames(const std::filesystem::path& directory);
+int step_of_frame(const std::filesystem::path& path);
+
+/// What an index says of a frame.
+struct FrameSizes {
+  double t = 0;  ///< [s]
+  int dim = 0, vertices = 0, cells = 0;
+};
+FrameSizes read_frame_sizes(const std::filesystem::path& path);
 
 /// What a certificate needs of a stored frame. Indices are checked: all within range.
 struct StoredFrame {

@@ -28,8 +28,11 @@ Session::Session() : lock_(library_mutex()) {
 Session::~Session() { H5Eset_auto2(H5E_DEFAULT, print_, print_data_); }
 
 File File::create(const std::filesystem::path& path) {
-  Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
-  if (!file.is_valid()) throw unusable(path, "file", "a place where a file can be written");
+  constexpr std::size_t kIncrement = 1 << 20;
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_fapl_core(access.id(), kIncrement, false);
+  Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose);
+  if (!file.is_valid()) throw unusable(path, "file", "memory for it");
   return File(path, std::move(file));
 }
 
@@ -77,9 +80,43 @@ void File::link_file(const std::string& name, const std::string& relative_path) 
   require(H5Lcreate_external(relative_path.c_str(), "/", file_.id(), name.c_str(), links.id(), H5P_DEFAULT) >= 0, name);
 }
 
-void File::close() {
+void File::unlink(const std::string& name) { require(H5Ldelete(file_.id(), name.c_str(), H5P_DEFAULT) >= 0, name); }
+
+void File::write_text(const std::string& name, const std::string& text) {
+  write_raw(name, H5T_NATIVE_CHAR, text.data(), text.size(), 0);
+}
+
+std::string File::image() const {
   require(H5Fflush(file_.id(), H5F_SCOPE_LOCAL) >= 0, "file");
-  const Handle closing = std::move(file_);
+  const ssize_t size = H5Fget_file_image(file_.id(), nullptr, 0);
+  require(size > 0, "file");
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  require(H5Fget_file_image(file_.id(), bytes.data(), bytes.size()) == size, "file");
+  return bytes;
+}
+
+bool File::contains(const std::string& name) const { return H5Lexists(file_.id(), name.c_str(), H5P_DEFAULT) > 0; }
+
+void File::read_attribute_raw(const char* name, hid_t type, void* value) const {
+  const Handle attribute(H5Aopen(file_.id(), name, H5P_DEFAULT), H5Aclose);
+  require(attribute.is_valid() && H5Aread(attribute.id(), type, value) >= 0, name);
+}
+
+std::int64_t File::read_integer_attribute(const char* name) const {
+  std::int64_t value = 0;
+  read_attribute_raw(name, H5T_NATIVE_INT64, &value);
+  return value;
+}
+
+double File::read_double_attribute(const char* name) const {
+  double value = 0;
+  read_attribute_raw(name, H5T_NATIVE_DOUBLE, &value);
+  return value;
+}
+
+std::string File::read_text(const std::string& name) const {
+  const Table<char> table = read_raw<char>(name, H5T_NATIVE_CHAR);
+  return {table.values.begin(), table.values.end()};
 }
 
 template <typename T>

@@ -55,9 +55,11 @@ struct Table {
   std::size_t rows() const { return columns ? values.size() / columns : values.size(); }
 };
 
-/// A file that is being written or read. Names of datasets are full paths; groups are made on the way.
+/// A file that is read, or one that is being made in memory: HDF5 itself never writes to a disk, as it does not get over a
+/// full one. Names of datasets are full paths; groups are made on the way.
 class File {
  public:
+  /// `path` is for messages only.
   static File create(const std::filesystem::path& path);
   static File open(const std::filesystem::path& path);
 
@@ -67,9 +69,15 @@ class File {
   void write_attribute(const char* name, std::int64_t value);
   /// Link `name` here to the root of another file, by a path relative to this file's folder.
   void link_file(const std::string& name, const std::string& relative_path);
-  /// Writes everything out and closes; throws where that fails (a full disk shows only here).
-  void close();
+  void unlink(const std::string& name);
+  void write_text(const std::string& name, const std::string& text);
+  /// The bytes of the file that was created, as far as it is.
+  std::string image() const;
 
+  bool contains(const std::string& name) const;
+  std::int64_t read_integer_attribute(const char* name) const;
+  double read_double_attribute(const char* name) const;
+  std::string read_text(const std::string& name) const;
   Table<double> read_doubles(const std::string& name) const;
   Table<std::int64_t> read_integers(const std::string& name) const;
 
@@ -78,6 +86,7 @@ class File {
   void require(bool ok, const std::string& what) const;
   void write_raw(const std::string& name, hid_t type, const void* values, std::size_t size, int columns);
   void write_attribute_raw(const char* name, hid_t type, const void* value);
+  void read_attribute_raw(const char* name, hid_t type, void* value) const;
   template <typename T>
   Table<T> read_raw(const std::string& name, hid_t type) const;
 

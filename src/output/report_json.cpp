@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
+
+#include "itr/core/error.hpp"
 
 namespace itr::output {
 
@@ -102,6 +105,41 @@ void Totals::add(const StepReport& report) {
   total_.min_distance = std::min(before.min_distance, report.min_distance);
   total_.min_volume_ratio = std::min(before.min_volume_ratio, report.min_volume_ratio);
   total_.peak_rss_mb = std::max(before.peak_rss_mb, report.peak_rss_mb);
+}
+
+namespace {
+
+/// Calls `visit` with every number of a report, in a fixed order.
+template <typename Report, typename Visit>
+void for_each_number(Report& r, Visit&& visit) {
+  for (auto* n : {&r.step, &r.vertices, &r.elements, &r.unknowns, &r.newton_iterations, &r.damped_steps}) visit(*n);
+  for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths}) {
+    visit(count->tried);
+    visit(count->accepted);
+  }
+  auto& e = r.energy;
+  auto& s = r.seconds;
+  for (auto* x : {&r.t, &e.inertia, &e.elastic, &e.body, &e.contact, &e.friction, &e.total, &r.energy_before_remesh,
+                  &r.min_distance, &r.min_volume_ratio, &s.assembly, &s.linear_solve, &s.line_search, &s.ccd, &s.remesh,
+                  &s.projection, &s.output, &s.total, &r.peak_rss_mb})
+    visit(*x);
+}
+
+}  // namespace
+
+std::vector<double> Totals::save() const {
+  std::vector<double> values = {energy_decrease_};
+  for_each_number(total_, [&](auto number) { values.push_back(static_cast<double>(number)); });
+  return values;
+}
+
+void Totals::restore(const std::vector<double>& values) {
+  if (const std::size_t expected = save().size(); values.size() != expected)
+    throw InputError({"", "saved totals", std::to_string(values.size()) + " numbers", std::to_string(expected)});
+  energy_decrease_ = values[0];
+  std::size_t next = 1;
+  for_each_number(total_,
+                  [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]); });
 }
 
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {

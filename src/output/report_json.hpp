@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "itr/output/writer.hpp"
 
@@ -15,6 +16,9 @@ std::string step_json(const StepReport& report);
 class Totals {
  public:
   void add(const StepReport& report);
+  /// All of it as numbers, for a checkpoint, and back. Throws InputError for a wrong length.
+  std::vector<double> save() const;
+  void restore(const std::vector<double>& values);
   /// The text of summary.json.
   std::string summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const;
 

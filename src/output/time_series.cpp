@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "files.hpp"
 #include "hdf5.hpp"
 #include "itr/core/timer.hpp"
@@ -11,8 +13,8 @@ namespace itr::output {
 
 namespace {
 
-constexpr double kLongestDelay = 5;  // [s] an index may lag behind by, where frames are rare
-constexpr std::size_t kGrowth = 16;  // rewrite when a 16th of the frames is new: O(n log n) bytes in all
+constexpr double kMostShare = 0.02;  // of the time, that replacing sim.xdmf may take
+constexpr std::size_t kGrowth = 16;  // or it is replaced when a 16th of the frames is new: O(n log n) bytes in all
 
 std::string data_item(const FrameEntry& entry, const char* set, const std::string& shape, const char* type) {
   return fmt::format("<DataItem Dimensions=\"{}\" NumberType=\"{}\" Precision=\"8\" Format=\"HDF\">{}:{}</DataItem>", shape,
@@ -55,42 +57,71 @@ std::string grid(const FrameEntry& entry) {
   return text + "      </Grid>\n";
 }
 
-std::string xdmf(const std::vector<FrameEntry>& entries) {
-  std::string text =
-      "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
-      "    <Grid Name=\"simulation\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
-  for (const FrameEntry& entry : entries) text += grid(entry);
-  return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
-}
+constexpr const char* kHead =
+    "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
+    "    <Grid Name=\"simulation\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+constexpr const char* kTail = "    </Grid>\n  </Domain>\n</Xdmf>\n";
 
-void write_links(const std::filesystem::path& path, const std::vector<FrameEntry>& entries) {
-  const hdf5::Session session;
-  hdf5::File file = hdf5::File::create(temporary_name(path));
-  for (const FrameEntry& entry : entries) {
-    file.link_file("/frames/" + std::filesystem::path(entry.file).stem().string(), entry.file);
-  }
-  file.close();
-  publish(path);
-}
+std::string link_name(const std::string& file) { return "/frames/" + std::filesystem::path(file).stem().string(); }
 
 }  // namespace
 
-bool TimeSeries::is_due() const {
-  const std::size_t waiting = entries_.size() - num_written_;
-  return waiting * kGrowth >= entries_.size() || seconds_now() - last_write_ > kLongestDelay;
+/// sim.h5 as it is made in memory: a frame adds one link.
+struct TimeSeries::Links {
+  explicit Links(const std::filesystem::path& path) : file(hdf5::File::create(path)) {}
+  hdf5::File file;
+};
+
+TimeSeries::TimeSeries(std::filesystem::path directory) : directory_(std::move(directory)) {
+  const hdf5::Session session;
+  links_ = std::make_unique<Links>(directory_ / "sim.h5");
 }
 
-void TimeSeries::add(FrameEntry entry) {
-  entries_.push_back(std::move(entry));
-  if (is_due()) write();
+TimeSeries::~TimeSeries() {
+  const hdf5::Session session;
+  links_.reset();
+}
+
+void TimeSeries::append(const FrameEntry& entry) {
+  const hdf5::Session session;
+  links_->file.link_file(link_name(entry.file), entry.file);
+  files_.push_back(entry.file);
+  text_ += grid(entry);
+  text_ends_.push_back(text_.size());
+}
+
+void TimeSeries::add(const FrameEntry& entry) {
+  append(entry);
+  write_links();
+  const bool is_far_behind = (files_.size() - num_written_) * kGrowth >= files_.size();
+  if (is_far_behind || write_seconds_ <= kMostShare * (seconds_now() - last_write_)) write_text();
+}
+
+void TimeSeries::drop_last() {
+  const hdf5::Session session;
+  links_->file.unlink(link_name(files_.back()));
+  files_.pop_back();
+  num_written_ = std::min(num_written_, files_.size());
+  text_ends_.pop_back();
+  text_.resize(text_ends_.empty() ? 0 : text_ends_.back());
+}
+
+void TimeSeries::write_text() {
+  const double start = seconds_now();
+  write_file(directory_ / "sim.xdmf", kHead + text_ + kTail);
+  num_written_ = files_.size();
+  last_write_ = seconds_now();
+  write_seconds_ = last_write_ - start;
+}
+
+void TimeSeries::write_links() {
+  const hdf5::Session session;
+  write_file(directory_ / "sim.h5", links_->file.image());
 }
 
 void TimeSeries::write() {
-  if (num_written_ == entries_.size() && !entries_.empty()) return;
-  write_links(directory_ / "sim.h5", entries_);
-  write_text(directory_ / "sim.xdmf", xdmf(entries_));
-  num_written_ = entries_.size();
-  last_write_ = seconds_now();
+  write_links();
+  write_text();
 }
 
 }  // namespace itr::output

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,22 +17,34 @@ struct FrameEntry {
   int vertices = 0, cells = 0;
 };
 
-/// Both files are replaced as a whole, so that they are readable at any moment; replacing them at every frame would cost
-/// O(n^2), so they follow in steps that grow with their length (and at least every few seconds).
+/// Both files are replaced as a whole, so that they are readable at any moment. sim.h5 follows at every frame. The text of
+/// sim.xdmf is much longer, and replacing it every time would cost O(n^2), so it follows as long as that takes a small share
+/// of the time that passes, or in steps that grow with its length.
 class TimeSeries {
  public:
-  explicit TimeSeries(std::filesystem::path directory) : directory_(std::move(directory)) {}
-  void add(FrameEntry entry);
-  /// Brings the files up to date.
+  explicit TimeSeries(std::filesystem::path directory);
+  ~TimeSeries();
+  /// Takes in a frame that was stored earlier; the files follow with the next write or add.
+  void append(const FrameEntry& entry);
+  /// Takes in a new frame.
+  void add(const FrameEntry& entry);
+  /// Leaves out the newest frame.
+  void drop_last();
+  /// Brings both files up to date.
   void write();
 
  private:
-  bool is_due() const;
+  struct Links;
+  void write_links();
+  void write_text();
 
   std::filesystem::path directory_;
-  std::vector<FrameEntry> entries_;
-  std::size_t num_written_ = 0;
-  double last_write_ = 0;
+  std::unique_ptr<Links> links_;
+  std::vector<std::string> files_;
+  std::vector<std::size_t> text_ends_;  ///< length of text_ after each frame
+  std::string text_;                    ///< of the grids
+  std::size_t num_written_ = 0;         ///< frames that sim.xdmf has
+  double last_write_ = 0, write_seconds_ = 0;
 };
 
 }  // namespace itr::output

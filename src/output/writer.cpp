@@ -4,14 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <fstream>
-#include <system_error>
 #include <vector>
 
+#include "checkpoint.hpp"
 #include "files.hpp"
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
+#include "itr/core/timer.hpp"
 #include "report_json.hpp"
 #include "time_series.hpp"
 
@@ -21,27 +20,27 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_frame_name(const fs::path& path) {
-  const std::string stem = path.stem().stem().string();  // also of "000000.h5.tmp"
-  const bool is_number =
-      !stem.empty() && std::all_of(stem.begin(), stem.end(), [](unsigned char c) { return std::isdigit(c); });
-  return is_number && (path.extension() == ".h5" || path.extension() == ".tmp");
-}
+bool is_leftover(const fs::path& path) { return path.extension() == ".tmp"; }
 
-/// A folder may hold an earlier, longer run; its frames must not pass for ours. Only files that a run writes are removed.
-void clear(const fs::path& directory) {
+/// A folder may hold an earlier, longer run; its frames must not pass for ours. Only files that a run writes are removed:
+/// frames after `last_step` and what was being written when a run was killed.
+void remove_frames_after(const fs::path& directory, int last_step) {
   std::vector<fs::path> stale;
-  for (const auto& entry : fs::directory_iterator(directory / "frames")) {
-    if (is_frame_name(entry.path())) stale.push_back(entry.path());
-  }
-  for (const char* name : {"sim.h5", "sim.xdmf", "steps.jsonl", "summary.json"}) stale.push_back(directory / name);
+  for (const fs::path& path : stored_frames(directory))
+    if (step_of_frame(path) > last_step) stale.push_back(path);
+  for (const fs::path& folder : {directory, directory / "frames"})
+    for (const auto& entry : fs::directory_iterator(folder))
+      if (is_leftover(entry.path())) stale.push_back(entry.path());
   for (const fs::path& path : stale) fs::remove(path);
 }
 
-void prepare(const fs::path& directory) {
+void prepare(const fs::path& directory, int last_step) {
   try {
     fs::create_directories(directory / "frames");
-    clear(directory);
+    if (last_step < 0)
+      for (const char* name : {"sim.h5", "sim.xdmf", "steps.jsonl"}) fs::remove(directory / name);
+    fs::remove(directory / "summary.json");
+    remove_frames_after(directory, last_step);
   } catch (const fs::filesystem_error& error) {
     throw InputError({directory.string(), "output folder", error.code().message(), "a folder that can be written"});
   }
@@ -50,53 +49,128 @@ void prepare(const fs::path& directory) {
 }  // namespace
 
 struct Writer::Impl {
-  Impl(fs::path folder, OutputOptions output_options, RunInfo run_info)
-      : directory(std::move(folder)), options(output_options), info(std::move(run_info)), series(directory) {
-    prepare(directory);
-    steps.open(directory / "steps.jsonl", std::ios::trunc);
-    require_steps();
+  /// Keeps frames up to `last_step` (-1: none) and the first `log_bytes` of steps.jsonl.
+  Impl(fs::path folder, OutputOptions output_options, RunInfo run_info, int last_step, std::size_t log_bytes)
+      : directory((prepare(folder, last_step), std::move(folder))),
+        options(output_options),
+        info(std::move(run_info)),
+        series(directory),
+        steps(directory / "steps.jsonl", log_bytes) {
+    for (const fs::path& path : stored_frames(directory)) {
+      const FrameSizes sizes = read_frame_sizes(path);
+      last_stored = step_of_frame(path);
+      series.append({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells});
+    }
+    last_checkpoint = seconds_now();
   }
 
-  void require_steps() const {
-    if (!steps) throw InputError({(directory / "steps.jsonl").string(), "file", "writing failed", "a writable folder"});
+  static std::string frame_name(int step) { return fmt::format("frames/{:06}.h5", step); }
+  bool is_due(int step) const { return step % std::max(options.skip_frames, 1) == 0; }
+
+  /// A state that was saved at a step which is not to be stored gives way to the next frame: a run that was interrupted
+  /// leaves what one that was not leaves.
+  void drop_unasked_frame() {
+    if (last_stored < 0 || is_due(last_stored)) return;
+    series.drop_last();
+    fs::remove(directory / frame_name(last_stored));
   }
 
   template <int Dim>
-  void store(const FrameView<Dim>& frame, const StepReport& report) {
-    const std::string name = fmt::format("frames/{:06}.h5", report.step);
-    write_frame(directory / name, frame, report.step, report.t);
-    series.add({name, report.t, Dim, frame.mesh.num_vertices(), frame.mesh.num_cells()});
+  void store(const FrameView<Dim>& frame, int step, double t, const State<Dim>* checkpoint) {
+    const std::string name = frame_name(step);
+    if (checkpoint) {
+      sync_frames();
+      const std::vector<double> saved_totals = totals.save();
+      const Progress progress{info.scene_identity, info.backend, saved_totals, steps.size()};
+      write_frame(directory / name, frame, step, t, Durability::power,
+                  [&](hdf5::File& file) { write_checkpoint(file, *checkpoint, progress); });
+      sync(directory / "frames");
+      last_checkpoint = seconds_now();
+    } else {
+      write_frame(directory / name, frame, step, t);
+      unsynced.push_back(name);
+    }
+  }
+
+  /// Takes a stored frame into the series. Where that fails the frame is there all the same.
+  template <int Dim>
+  void index(const FrameView<Dim>& frame, int step, double t) {
+    if (step == last_stored) return;
+    drop_unasked_frame();
+    last_stored = step;
+    series.add({frame_name(step), t, Dim, frame.mesh.num_vertices(), frame.mesh.num_cells()});
+  }
+
+  /// What a checkpoint relies on has to be on the disk before it.
+  void sync_frames() {
+    for (const std::string& name : unsynced) sync(directory / name);
+    sync(directory / "steps.jsonl");
+    unsynced.clear();
   }
 
   fs::path directory;
   OutputOptions options;
   RunInfo info;
   TimeSeries series;
-  std::ofstream steps;
+  LineFile steps;
   Totals totals;
   DisplacementNorms norms;
+  std::vector<std::string> unsynced;
+  int last_stored = kNone;
+  double last_checkpoint = 0;
 };
 
 Writer::Writer(fs::path directory, OutputOptions options, RunInfo info)
-    : impl_(std::make_unique<Impl>(std::move(directory), options, std::move(info))) {}
+    : impl_(std::make_unique<Impl>(std::move(directory), options, std::move(info), -1, 0)) {}
+
+template <int Dim>
+Writer::Writer(fs::path directory, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint)
+    : impl_(std::make_unique<Impl>(std::move(directory), options, std::move(info), checkpoint.state.step,
+                                   checkpoint.log_bytes)) {
+  impl_->totals.restore(checkpoint.totals);
+  const Mesh<Dim>& mesh = checkpoint.state.mesh;
+  impl_->norms = displacement_norms(mesh, checkpoint.state.history.x[0].head(Dim * mesh.num_vertices()));
+}
 
 Writer::~Writer() = default;
 
+bool Writer::is_checkpoint_due(int step) const {
+  return impl_->is_due(step) && (step == 0 || seconds_now() - impl_->last_checkpoint >= impl_->options.checkpoint_period);
+}
+
 template <int Dim>
-void Writer::write(const FrameView<Dim>& frame, const StepReport& report) {
-  if (report.step % std::max(impl_->options.skip_frames, 1) == 0) impl_->store(frame, report);
-  impl_->steps << step_json(report) + '\n' << std::flush;  // one write, so that a reader sees whole lines
-  impl_->require_steps();
+void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const State<Dim>* checkpoint) {
+  const std::size_t length = impl_->steps.size();
+  impl_->steps.append(step_json(report));
   impl_->totals.add(report);
   impl_->norms = displacement_norms(frame.mesh, frame.x);
+  if (!checkpoint && !impl_->is_due(report.step)) return;
+  try {
+    impl_->store(frame, report.step, report.t, checkpoint);
+  } catch (const InputError&) {
+    impl_->steps.shorten(length);  // a step whose frame is not there was not done
+    throw;
+  }
+  impl_->index(frame, report.step, report.t);
+}
+
+template <int Dim>
+void Writer::save(const FrameView<Dim>& frame, const State<Dim>& state) {
+  impl_->store(frame, state.step, state.t, &state);
+  impl_->index(frame, state.step, state.t);
 }
 
 void Writer::finish(const std::string& outcome) {
   impl_->series.write();
-  write_text(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, outcome, impl_->norms));
+  write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, outcome, impl_->norms));
 }
 
-template void Writer::write<2>(const FrameView<2>&, const StepReport&);
-template void Writer::write<3>(const FrameView<3>&, const StepReport&);
+#define ITR_INSTANTIATE(Dim)                                                                     \
+  template Writer::Writer(fs::path, OutputOptions, RunInfo, const Checkpoint<Dim>&);             \
+  template void Writer::write<Dim>(const FrameView<Dim>&, const StepReport&, const State<Dim>*); \
+  template void Writer::save<Dim>(const FrameView<Dim>&, const State<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr::output

@@ -2,7 +2,11 @@
 #include "geometry.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <sstream>
 
 #include "itr/mesh/refine.hpp"
 #include "selection.hpp"
@@ -162,15 +166,35 @@ int dimension_of(const Node& geometry, const MeshFile& file) {
 
 }  // namespace
 
-const MeshFile& MeshFiles::get(const Node& geometry) {
+std::filesystem::path MeshFiles::find(const Node& geometry) {
   const Node node = geometry["mesh"];
   if (!node.exists()) node.fail("the path of a mesh file");
   const std::filesystem::path path = geometry.document().resolve(node.string(""));
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored))
     node.fail(abbreviate(node.json()) + ", but there is no file '" + path.string() + "'", "the path of a mesh file");
+  return path;
+}
+
+const MeshFile& MeshFiles::get(const Node& geometry) {
+  const std::filesystem::path path = find(geometry);
   const auto found = files_.find(path.string());
   return found != files_.end() ? found->second : files_.emplace(path.string(), read_mesh_file(path)).first->second;
+}
+
+std::string MeshFiles::hash(const Node& geometry) {
+  const std::filesystem::path path = find(geometry);
+  std::string& text = hashes_[path.string()];
+  if (!text.empty()) return text;
+  std::ifstream file(path, std::ios::binary);
+  std::uint64_t hash = 0xcbf29ce484222325;
+  std::array<char, 1 << 16> buffer;
+  while (file.read(buffer.data(), buffer.size()), file.gcount() > 0)
+    for (std::streamsize i = 0; i < file.gcount(); ++i)
+      hash = (hash ^ static_cast<unsigned char>(buffer[static_cast<std::size_t>(i)])) * 0x100000001b3;
+  std::ostringstream out;
+  out << std::hex << hash;
+  return text = out.str();
 }
 
 Geometries list_geometries(const Node& root) {

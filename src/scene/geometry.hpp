@@ -15,9 +15,14 @@ class MeshFiles {
  public:
   /// The file that `geometry/mesh` names; InputError there if it is missing.
   const MeshFile& get(const Node& geometry);
+  /// Of the bytes of that file (FNV-1a), in hexadecimal.
+  std::string hash(const Node& geometry);
 
  private:
+  static std::filesystem::path find(const Node& geometry);
+
   std::map<std::string, MeshFile> files_;
+  std::map<std::string, std::string> hashes_;
 };
 
 /// Enabled geometries, in the order of the file. The others are not looked at further.

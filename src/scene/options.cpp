@@ -250,6 +250,8 @@ OutputOptions read_output(const Node& root) {
   const bool is_usable = skip.exists() && skip.json().is_number_integer() && skip.json() > 0 && skip.json() < 1e9;
   OutputOptions options;
   if (is_usable) options.skip_frames = skip.integer(1);
+  const Node period = root["output"]["checkpoint_period"];
+  if (period.exists() && period.json().is_number() && period.json() >= 0) options.checkpoint_period = period.number(30);
   return options;
 }
 

@@ -73,7 +73,37 @@ std::string read_directory(const Node& root) {
   return node.exists() && node.json().is_string() ? node.string("") : "";
 }
 
+std::string make_identity(const Node& root, const Geometries& geometries, MeshFiles& files) {
+  Json identity = root.json();
+  identity.erase("output");
+  identity.erase("tests");
+  if (identity.contains("solver") && identity["solver"].is_object()) identity["solver"].erase("max_threads");
+  Json hashes = Json::object();
+  for (const auto* list : {&geometries.bodies, &geometries.obstacles})
+    for (const Node& geometry : *list) hashes[geometry["mesh"].pointer()] = files.hash(geometry);
+  identity["files"] = std::move(hashes);
+  return identity.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 }  // namespace
+
+std::vector<std::string> find_changes(const std::string& before, const std::string& now) {
+  const Json old_scene = Json::parse(before, nullptr, false), new_scene = Json::parse(now, nullptr, false);
+  if (old_scene.is_discarded()) return {"the scene of the saved state cannot be read"};
+  std::vector<std::string> changes;
+  for (const Json& change : Json::diff(old_scene, new_scene)) {
+    const std::string path = change["path"], operation = change["op"];
+    const Json::json_pointer pointer(path);
+    if (path.starts_with("/files/")) {
+      changes.push_back(pointer.back() + ": the file has another content");
+      continue;
+    }
+    const auto value_in = [&](const Json& scene) { return scene.contains(pointer) ? abbreviate(scene[pointer]) : "absent"; };
+    changes.push_back(path + ": was " + value_in(old_scene) + ", is " +
+                      (operation == "remove" ? "absent" : abbreviate(change["value"])));
+  }
+  return changes;
+}
 
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides) {
   const Document document = load_document(file, overrides);
@@ -86,6 +116,7 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   scene.output = read_output(root);
   scene.max_threads = read_max_threads(root);
   scene.directory = read_directory(root);
+  scene.identity = make_identity(root, geometries, files);
   if (find_dimension(geometries, files) == 2)
     scene.setup = read_setup<2>(root, geometries, files, scene.warnings);
   else

@@ -173,6 +173,24 @@ StepResult Simulation<Dim>::advance() {
 }
 
 template <int Dim>
+void Simulation<Dim>::restore(State<Dim> state) {
+  const auto refuse = [](const std::string& place, auto found, auto expected) {
+    throw InputError({"", place, std::to_string(found), std::to_string(expected)});
+  };
+  const auto size = static_cast<Eigen::Index>(Dim * (state.mesh.vertex_slots() + impl_->setup.obstacles.rest.size()));
+  const History& history = state.history;
+  for (const auto* fields : {&history.x, &history.v, &history.a})
+    for (const VectorX& field : *fields)
+      if (field.size() != size) refuse("length of a saved field", field.size(), size);
+  if (history.x.empty() || history.v.empty()) refuse("saved states", history.x.size(), 1);
+  if (history.a.empty() != impl_->state.history.a.empty())
+    refuse("saved accelerations", history.a.size(), impl_->state.history.a.size());
+  for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
+    if (!impl_->setup.materials.contains(state.mesh.body(c))) refuse("body of a saved cell", state.mesh.body(c), 0);
+  impl_->state = std::move(state);
+}
+
+template <int Dim>
 bool Simulation<Dim>::finished() const {
   return impl_->state.step >= impl_->setup.time.steps;
 }

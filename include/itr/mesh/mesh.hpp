@@ -75,6 +75,10 @@ class Mesh {
   /// more than two cells. `body` has one body id a cell.
   Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector<int> body);
 
+  /// Gives the boundary facets these slots and tags: a mesh that is read back numbers them as the one that was saved did.
+  /// Throws InputError where `facets` are not the boundary facets, each once.
+  void set_facets(const std::vector<Facet>& facets, const std::vector<int>& tags);
+
   int num_vertices() const { return num_vertices_; }  ///< alive ones; ids run to vertex_slots()
   int num_cells() const { return num_cells_; }
   int num_facets() const { return num_facets_; }

@@ -5,6 +5,8 @@ namespace itr {
 
 struct OutputOptions {
   int skip_frames = 1;  ///< store every n-th step
+  double checkpoint_period =
+      30;  ///< least time between checkpoints, from which a run can be resumed [s]; 0: every stored step
 };
 
 }  // namespace itr

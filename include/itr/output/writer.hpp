@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "itr/output/checkpoint.hpp"
 #include "itr/output/options.hpp"
 #include "itr/simulation/frame.hpp"
 
@@ -24,18 +25,29 @@ struct RunInfo {
   std::string scene;    ///< path of the scene file
   std::string backend;  ///< solver that was used
   int threads = 1;
+  std::string scene_identity{};  ///< all of the scene that a resumed run must have in common with this one
 };
 
 /// One a run. Every file is either complete or absent; steps.jsonl is flushed a line at a time. Throws InputError where the
-/// folder cannot be written.
+/// folder cannot be written (unwritable, full): what was written before stays readable.
 class Writer {
  public:
+  /// A new run: files of an earlier one are removed.
   Writer(std::filesystem::path directory, OutputOptions options, RunInfo info);
-  ~Writer();
-  /// Stores the frame if its step is due, and the step's line always. `report.seconds.output` is what the caller measured
-  /// for the *previous* call's writing, so the caller passes it in.
+  /// Goes on after a saved state of this folder: what the run wrote after it is removed, to be computed again.
   template <int Dim>
-  void write(const FrameView<Dim>& frame, const StepReport& report);
+  Writer(std::filesystem::path directory, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint);
+  ~Writer();
+
+  /// Whether it is time for the next stored step to be a checkpoint.
+  bool is_checkpoint_due(int step) const;
+  /// Stores the step's line always; the frame if its step is due, or if there is a `checkpoint`, the state to be saved.
+  /// `report.seconds.output` is what the caller measured for the *previous* call's writing, so the caller passes it in.
+  template <int Dim>
+  void write(const FrameView<Dim>& frame, const StepReport& report, const State<Dim>* checkpoint = nullptr);
+  /// Saves the state after the step that was written last.
+  template <int Dim>
+  void save(const FrameView<Dim>& frame, const State<Dim>& state);
   /// `outcome` is "finished" or the reason why the simulation stopped. Writes summary.json with totals, threads, versions
   /// and norms of the last frame.
   void finish(const std::string& outcome);

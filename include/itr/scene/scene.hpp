@@ -25,7 +25,11 @@ struct Scene {
   int max_threads = 0;                ///< solver/max_threads; 0: all
   std::string directory;              ///< output/directory, may be empty
   std::vector<std::string> warnings;  ///< legal but suspicious things
+  std::string identity;               ///< JSON of all that the results depend on: the merged scene, hashes of its files
 };
+
+/// What two identities differ in, a line each, with JSON pointers; empty: nothing.
+std::vector<std::string> find_changes(const std::string& before, const std::string& now);
 
 /// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides = {});

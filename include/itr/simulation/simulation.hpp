@@ -17,6 +17,8 @@
 namespace itr {
 
 /// Where a simulation stands: a value. Fields are interleaved over the mesh's vertices followed by the obstacles' ones.
+/// The rest of a simulation is a pure function of this and of its setup, so that a run which is resumed from a saved state
+/// has the same bits: what is added here is to be saved by output/checkpoint.cpp.
 template <int Dim>
 struct State {
   Mesh<Dim> mesh;   ///< compact
@@ -47,6 +49,8 @@ class Simulation {
   /// One time step with remeshing inside it. Numerical failure is a result with a reason.
   StepResult advance();
   bool finished() const;
+  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup.
+  void restore(State<Dim> state);
 
   const State<Dim>& state() const;
   const Setup<Dim>& setup() const;

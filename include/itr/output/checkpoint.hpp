@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// Saved states, from which a run goes on with the same bits as if it had never stopped. They are frames with a group more.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "itr/simulation/simulation.hpp"
+
+namespace itr::output {
+
+/// The newest saved state of a folder, and what it belongs to.
+struct SavedState {
+  std::filesystem::path file;
+  std::string scene;    ///< RunInfo::scene_identity of the run that saved it
+  std::string backend;  ///< solver of that run
+  int dim = 0;
+};
+
+/// The newest state in DIR/frames that can be read; none if there is none.
+std::optional<SavedState> find_saved_state(const std::filesystem::path& directory);
+
+template <int Dim>
+struct Checkpoint {
+  State<Dim> state;
+  std::vector<double> totals;  ///< of the output so far, see Totals
+  std::size_t log_bytes = 0;   ///< length of steps.jsonl then
+};
+
+/// Throws InputError where the file is unreadable or inconsistent.
+template <int Dim>
+Checkpoint<Dim> read_checkpoint(const SavedState& saved);
+
+}  // namespace itr::output

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+#include "checkpoint.hpp"
+
+#include <algorithm>
+
+#include "frame_file.hpp"
+#include "itr/core/error.hpp"
+
+namespace itr::output {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kFormat = 1;
+
+std::string field_name(const char* kind, std::size_t age) {
+  return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
+}
+
+std::vector<VectorX> read_fields(const hdf5::File& file, const char* kind) {
+  std::vector<VectorX> fields;
+  while (file.contains(std::string("/checkpoint/history/") + kind) && file.contains(field_name(kind, fields.size()))) {
+    const auto table = file.read_doubles(field_name(kind, fields.size()));
+    fields.emplace_back(Eigen::Map<const VectorX>(table.values.data(), static_cast<Eigen::Index>(table.values.size())));
+  }
+  return fields;
+}
+
+template <std::size_t N>
+std::vector<std::array<int, N>> read_rows(const fs::path& path, const hdf5::File& file, const std::string& name) {
+  const auto table = file.read_integers(name);
+  if (table.columns != N)
+    throw InputError({path.string(), name, std::to_string(table.columns) + " columns", std::to_string(N)});
+  std::vector<std::array<int, N>> rows(table.rows());
+  for (std::size_t i = 0; i < table.values.size(); ++i) rows[i / N][i % N] = static_cast<int>(table.values[i]);
+  return rows;
+}
+
+std::vector<int> read_ints(const hdf5::File& file, const std::string& name) {
+  const auto table = file.read_integers(name);
+  return {table.values.begin(), table.values.end()};
+}
+
+template <int Dim>
+Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
+  const auto rest = file.read_doubles("/mesh/rest");
+  std::vector<Vec<Dim>> points(rest.values.size() / Dim);
+  for (std::size_t v = 0; v < points.size(); ++v) points[v] = Eigen::Map<const Vec<Dim>>(rest.values.data() + Dim * v);
+  auto cells = read_rows<Dim + 1>(path, file, "/mesh/simplices");
+  auto body = read_ints(file, "/mesh/body");
+  const auto facets = read_rows<Dim>(path, file, "/mesh/surface");
+  const auto tags = read_ints(file, "/checkpoint/facet_tag");
+  if (body.size() != cells.size() || tags.size() != facets.size())
+    throw InputError({path.string(), "/mesh", "lists of different lengths", "one entry for every cell and facet"});
+  Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
+  mesh.set_facets(facets, tags);
+  return mesh;
+}
+
+}  // namespace
+
+template <int Dim>
+void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress) {
+  std::vector<std::int64_t> tags;
+  for (FacetId f = 0; f < state.mesh.facet_slots(); ++f) tags.push_back(state.mesh.facet_tag(f));
+  file.write("/checkpoint/facet_tag", tags, 0);
+  const auto write_fields = [&](const char* kind, const std::vector<VectorX>& fields) {
+    for (std::size_t age = 0; age < fields.size(); ++age)
+      file.write(field_name(kind, age), std::span(fields[age].data(), static_cast<std::size_t>(fields[age].size())), 0);
+  };
+  write_fields("x", state.history.x);
+  write_fields("v", state.history.v);
+  write_fields("a", state.history.a);
+  file.write("/checkpoint/energy_guard", std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0}, 0);
+  file.write("/checkpoint/totals", progress.totals, 0);
+  file.write_text("/checkpoint/scene", std::string(progress.scene));
+  file.write_text("/checkpoint/backend", std::string(progress.backend));
+  file.write_attribute("checkpoint_format", kFormat);
+  file.write_attribute("checkpoint_log_bytes", static_cast<std::int64_t>(progress.log_bytes));
+}
+
+std::optional<SavedState> find_saved_state(const fs::path& directory) {
+  std::vector<fs::path> files = stored_frames(directory);
+  std::reverse(files.begin(), files.end());
+  for (const fs::path& path : files) {
+    try {
+      const hdf5::Session session;
+      const hdf5::File file = hdf5::File::open(path);
+      if (!file.contains("/checkpoint")) continue;
+      if (file.read_integer_attribute("checkpoint_format") != kFormat) continue;
+      return SavedState{path, file.read_text("/checkpoint/scene"), file.read_text("/checkpoint/backend"),
+                        file.read_doubles("/mesh/rest").columns};
+    } catch (const InputError&) {  // cut off by a loss of power: the one before it is the newest
+    }
+  }
+  return std::nullopt;
+}
+
+template <int Dim>
+Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(saved.file);
+  Checkpoint<Dim> checkpoint;
+  State<Dim>& state = checkpoint.state;
+  try {
+    state.mesh = read_mesh<Dim>(saved.file, file);
+  } catch (const InputError& error) {
+    throw InputError({saved.file.string(), "/mesh " + error.parts().place, error.parts().found, error.parts().expected});
+  }
+  state.history.x = read_fields(file, "x");
+  state.history.v = read_fields(file, "v");
+  state.history.a = read_fields(file, "a");
+  const std::vector<double> guard = file.read_doubles("/checkpoint/energy_guard").values;
+  if (guard.size() != 2)
+    throw InputError({saved.file.string(), "/checkpoint/energy_guard", std::to_string(guard.size()) + " numbers", "2"});
+  state.created_energy = guard[0];
+  state.history.damp_next = guard[1] != 0;
+  state.step = static_cast<int>(file.read_integer_attribute("step"));
+  state.t = file.read_double_attribute("t");
+  checkpoint.totals = file.read_doubles("/checkpoint/totals").values;
+  checkpoint.log_bytes = static_cast<std::size_t>(file.read_integer_attribute("checkpoint_log_bytes"));
+  return checkpoint;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                            \
+  template void write_checkpoint<Dim>(hdf5::File&, const State<Dim>&, const Progress&); \
+  template Checkpoint<Dim> read_checkpoint<Dim>(const SavedState&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr::output

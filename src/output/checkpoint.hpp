@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// The part of a frame from which a run goes on with the same bits (design §5): group /checkpoint beside /mesh.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "hdf5.hpp"
+#include "itr/output/checkpoint.hpp"
+
+namespace itr::output {
+
+/// What a run has counted and written when it saves a state.
+struct Progress {
+  std::string_view scene, backend;  ///< what a resumed run has to have in common with the saved one
+  std::span<const double> totals;
+  std::size_t log_bytes;  ///< length of steps.jsonl, the line of this step included
+};
+
+/// Adds to a frame that has /mesh of `state` already.
+template <int Dim>
+void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress);
+
+}  // namespace itr::output

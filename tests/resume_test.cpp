@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: MIT
+// Nothing is lost: the command is killed, interrupted and denied its disk, and goes on to the same end, bit for bit.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "itr/core/error.hpp"
+#include "itr/output/certify.hpp"
+#include "output/frame_file.hpp"
+#include "output/hdf5.hpp"
+
+namespace itr::output {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Arguments = std::vector<std::string>;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+int count_lines(const fs::path& path) {
+  const std::string text = text_of(path);
+  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+}
+
+/// `itr run`, its output in a file.
+class Command {
+ public:
+  /// `largest_file` [bytes]: writes beyond fail, as those on a full disk do; 0: no limit.
+  Command(const Arguments& arguments, const fs::path& log, rlim_t largest_file = 0) : log_(log) {
+    std::vector<std::string> words = {std::string(ITR_BINARY_DIR) + "/bin/itr", "run"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (auto& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    pid_ = fork();
+    if (pid_ != 0) return;
+    const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    dup2(out, STDOUT_FILENO);
+    dup2(out, STDERR_FILENO);
+    if (const rlimit limit = {largest_file, largest_file}; largest_file) setrlimit(RLIMIT_FSIZE, &limit);
+    execv(argv[0], argv.data());
+    _exit(127);
+  }
+
+  void send(int signal) const { kill(pid_, signal); }
+  /// Exit status, or minus the signal that ended it.
+  int wait() const {
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+  std::string said() const { return text_of(log_); }
+
+ private:
+  fs::path log_;
+  pid_t pid_ = 0;
+};
+
+struct Case {
+  const char* name;
+  const char* scene;  ///< in examples/
+  int steps;
+  std::string time;  ///< the rest of /time
+  Arguments sets;
+};
+
+std::ostream& operator<<(std::ostream& out, const Case& value) { return out << value.name; }
+
+class InterruptTest : public ::testing::Test {
+ protected:
+  InterruptTest() {
+    std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::replace(name.begin(), name.end(), '/', '-');
+    folder = fs::path(ITR_BINARY_DIR) / "tests" / "resume" / name;
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+  }
+
+  Arguments arguments(const Case& which, const fs::path& directory, double checkpoint_period, bool resume = false) const {
+    Arguments words = {fmt::format("{}/examples/{}", ITR_SOURCE_DIR, which.scene), "-o", directory.string(), "--threads",
+                       "1"};
+    Arguments sets = which.sets;
+    sets.push_back(fmt::format(R"(/time={{"time_steps":{},{}}})", which.steps, which.time));
+    sets.push_back(fmt::format("/output/checkpoint_period={}", checkpoint_period));
+    for (const auto& set : sets) words.insert(words.end(), {"--set", set});
+    if (resume) words.push_back("--resume");
+    return words;
+  }
+
+  Command start(const Arguments& words) const { return Command(words, folder / "log"); }
+
+  /// Lets it run until steps.jsonl has that many lines, then sends the signal.
+  static int stop_at(const Command& command, const fs::path& directory, int lines, int signal) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (count_lines(directory / "steps.jsonl") < lines && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    command.send(signal);
+    return command.wait();
+  }
+
+  fs::path folder;
+};
+
+class ResumeTest : public InterruptTest, public ::testing::WithParamInterface<Case> {};
+
+/// steps.jsonl without what depends on the machine's mood.
+std::vector<Json> results_of(const fs::path& directory) {
+  std::vector<Json> lines;
+  std::istringstream text(text_of(directory / "steps.jsonl"));
+  for (std::string line; std::getline(text, line);) {
+    lines.push_back(Json::parse(line));
+    lines.back().erase("seconds");
+    lines.back().erase("peak_rss_mb");
+  }
+  return lines;
+}
+
+void expect_same_bits(const hdf5::File& a, const hdf5::File& b, const std::string& frame) {
+  for (const char* name : {"/mesh/rest", "/fields/x", "/fields/u", "/fields/v", "/fields/elastic_density", "/obstacles/x"}) {
+    const auto x = a.read_doubles(frame + name).values, y = b.read_doubles(frame + name).values;
+    ASSERT_EQ(x.size(), y.size()) << frame << name;
+    EXPECT_TRUE(x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(double)) == 0) << frame << name;
+  }
+  for (const char* name : {"/mesh/simplices", "/mesh/body", "/mesh/surface"})
+    EXPECT_EQ(a.read_integers(frame + name).values, b.read_integers(frame + name).values) << frame << name;
+}
+
+/// Through sim.h5, so that its links are tried too.
+void expect_same_results(const fs::path& a, const fs::path& b) {
+  EXPECT_EQ(results_of(a), results_of(b));
+  const auto frames = stored_frames(a);
+  ASSERT_EQ(frames.size(), stored_frames(b).size());
+  const hdf5::Session session;
+  const hdf5::File file_a = hdf5::File::open(a / "sim.h5"), file_b = hdf5::File::open(b / "sim.h5");
+  for (const auto& frame : frames) expect_same_bits(file_a, file_b, "/frames/" + frame.stem().string());
+}
+
+Json summary_of(const fs::path& directory) {
+  Json summary = Json::parse(text_of(directory / "summary.json"));
+  summary.erase("seconds");
+  summary.erase("peak_rss_mb");
+  return summary;
+}
+
+/// What a killed run leaves: every step of the log but perhaps the last is linked from sim.h5 and readable.
+void expect_readable(const fs::path& directory) {
+  for (const auto& frame : stored_frames(directory)) EXPECT_NO_THROW(read_frame(frame)) << frame;
+  const int steps = static_cast<int>(results_of(directory).size());
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(directory / "sim.h5");
+  for (int step = 0; step + 1 < steps; ++step)
+    EXPECT_GT(file.read_doubles(fmt::format("/frames/{:06}/fields/x", step)).rows(), 0u) << step;
+}
+
+const Arguments kImpact = {"/initial_conditions/velocity/0/value=[67, -20]",
+                           "/geometry/0/transformation/translation=[0.0629, 0]",
+                           "/space/remesh/split/acceptance_tolerance=1"};
+
+Arguments operator+(Arguments a, const Arguments& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+const Case kStopped = {"stopped", "ball_wall.json", 60, R"("dt":2e-5)", {"/space/remesh/enabled=false"}};
+
+TEST_P(ResumeTest, KilledRunGoesOnBitForBit) {
+  const Case& which = GetParam();
+  const fs::path whole = folder / "whole", killed = folder / "killed";
+  ASSERT_EQ(start(arguments(which, whole, 30)).wait(), 0) << text_of(folder / "log");
+  ASSERT_EQ(results_of(whole).size(), static_cast<std::size_t>(which.steps + 1));
+
+  // With a period of 0 the newest frame is the state; with 0.05 s the run has to go back to an older one.
+  ASSERT_EQ(stop_at(start(arguments(which, killed, 0)), killed, which.steps / 3, SIGKILL), -SIGKILL);
+  expect_readable(killed);
+  ASSERT_EQ(stop_at(start(arguments(which, killed, 0.05, true)), killed, 2 * which.steps / 3, SIGKILL), -SIGKILL);
+  expect_readable(killed);
+  const Command last = start(arguments(which, killed, 0.05, true));
+  ASSERT_EQ(last.wait(), 0) << last.said();
+  EXPECT_NE(last.said().find("going on after step"), std::string::npos) << last.said();
+  expect_same_results(whole, killed);
+  EXPECT_EQ(summary_of(whole), summary_of(killed));
+}
+
+TEST_F(InterruptTest, FinishesTheStepSavesAndSaysHowToGoOn) {
+  const fs::path whole = folder / "whole", stopped = folder / "stopped";
+  ASSERT_EQ(start(arguments(kStopped, whole, 30)).wait(), 0);
+  const Command first = start(arguments(kStopped, stopped, 30));
+  ASSERT_EQ(stop_at(first, stopped, 10, SIGINT), 3) << first.said();
+  EXPECT_NE(first.said().find("interrupted after step"), std::string::npos) << first.said();
+  EXPECT_NE(first.said().find("--resume"), std::string::npos) << first.said();
+  const int steps = static_cast<int>(results_of(stopped).size());
+  const Command second = start(arguments(kStopped, stopped, 30, true));
+  ASSERT_EQ(second.wait(), 0) << second.said();
+  EXPECT_NE(second.said().find(fmt::format("going on after step {}\n", steps - 1)), std::string::npos) << second.said();
+  expect_same_results(whole, stopped);
+}
+
+TEST_F(InterruptTest, AnotherSceneIsRefusedWithWhatDiffers) {
+  Case which = kStopped;
+  const fs::path run = folder / "run";
+  const Command first = start(arguments(which, run, 0));
+  ASSERT_EQ(stop_at(first, run, 5, SIGINT), 3) << first.said();
+  which.sets.push_back("/materials/nu=0.3");
+  const Command second = start(arguments(which, run, 0, true));
+  EXPECT_EQ(second.wait(), 2);
+  EXPECT_NE(second.said().find("/materials/nu: was 0.45, is 0.3"), std::string::npos) << second.said();
+  expect_readable(run);
+}
+
+/// The limit on the size of a file fails a write as a full disk does; sim.xdmf meets it first.
+class FullDiskTest : public InterruptTest, public ::testing::WithParamInterface<double> {};
+
+TEST_P(FullDiskTest, StopsTheRunAndLeavesConsistentFiles) {
+  const double period = GetParam();
+  constexpr rlim_t kLimit = 60'000;
+  const fs::path whole = folder / "whole", run = folder / "run";
+  ASSERT_EQ(start(arguments(kStopped, whole, 30)).wait(), 0);
+  const Command first(arguments(kStopped, run, period), folder / "log", kLimit);
+  EXPECT_EQ(first.wait(), 3) << first.said();
+  EXPECT_NE(first.said().find("File too large"), std::string::npos) << first.said();
+  EXPECT_NE(first.said().find("space left"), std::string::npos) << first.said();
+  expect_readable(run);
+  for (const auto& entry : fs::recursive_directory_iterator(run)) EXPECT_NE(entry.path().extension(), ".tmp");
+  const Command second = start(arguments(kStopped, run, 30, true));
+  ASSERT_EQ(second.wait(), 0) << second.said();
+  expect_same_results(whole, run);
+}
+
+INSTANTIATE_TEST_SUITE_P(CheckpointPeriod, FullDiskTest, ::testing::Values(0.0, 30.0));
+
+TEST_F(InterruptTest, FolderThatCannotBeWrittenStopsTheRunBeforeItStarts) {
+  std::ofstream(folder / "run") << "a file stands here";
+  const Command command = start(arguments(kStopped, folder / "run", 30));
+  EXPECT_EQ(command.wait(), 2);
+  EXPECT_NE(command.said().find((folder / "run").string()), std::string::npos) << command.said();
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, ResumeTest,
+    ::testing::Values(Case{"impact", "ball_wall.json", 40, R"("dt":2e-5)", kImpact},
+                      Case{"newmark", "ball_wall.json", 40, R"("dt":2e-5,"integrator":"ImplicitNewmark")",
+                           kImpact + Arguments{"/contact/friction_coefficient=0.3"}},
+                      Case{"bdf3", "ball_wall.json", 40, R"("dt":2e-5,"integrator":"BDF3")", kImpact},
+                      Case{"masticator", "masticator.json", 30, R"("dt":0.05)", {}},
+                      Case{"quasistatic", "cantilever.json", 12, R"("dt":0.05,"quasistatic":true)", {}}),
+    [](const auto& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace itr::output
