@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 
+#include "explain.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
@@ -76,6 +77,12 @@ int dispatch(int argc, char** argv) {
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
+  auto* schema = app.add_subcommand("schema", "JSON Schema of scenes");
+  auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing");
+  explain->add_option("scene", options.scene, "scene file (JSON)")->required();
+  explain->add_option("--solver", options.solver, "linear solver, see `itr solvers`");
+  explain->add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
+      ->allow_extra_args(false);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
@@ -88,8 +95,12 @@ int dispatch(int argc, char** argv) {
     throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
+  if (*schema) {
+    fmt::print("{}\n", scene::json_schema());
+    return cli::done;
+  }
   for (const auto& text : sets) options.overrides.push_back(parse_override(text));
-  return cli::run(options);
+  return *explain ? cli::explain(options) : cli::run(options);
 }
 
 }  // namespace

@@ -107,7 +107,8 @@ class Run {
       if (outcome != kFinished && !is_saved_) save();
       writer_->finish(outcome);
     } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
-      outcome = fmt::format("stopped at step {}, whose files could not all be written: {}", simulation_.state().step, error.what());
+      outcome = fmt::format("stopped at step {}, whose files could not all be written: {}", simulation_.state().step,
+                            error.what());
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     if (outcome == kFinished) {

@@ -34,4 +34,7 @@ std::vector<std::string> find_changes(const std::string& before, const std::stri
 /// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides = {});
 
+/// The JSON Schema (draft 7) of scenes, made from the table that `read` checks keys and values against.
+std::string json_schema();
+
 }  // namespace itr::scene

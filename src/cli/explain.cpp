@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT
+#include "explain.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <set>
+
+#include "itr/core/error.hpp"
+#include "itr/linear/registry.hpp"
+#include "itr/simulation/simulation.hpp"
+#include "itr/simulation/step_problem.hpp"
+
+namespace itr::cli {
+
+namespace {
+
+constexpr double kSliver = 0.1;                  ///< quality below which an element is one
+constexpr double kLargeRatio = 1e3;              ///< of stiffnesses or of element sizes, from which systems are hard
+constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
+constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
+constexpr double kUsualModulus[] = {1e2, 1e13};  ///< [Pa]
+
+const char* name_of(MaterialLaw law) {
+  switch (law) {
+    case MaterialLaw::neo_hookean:
+      return "neo-Hookean";
+    case MaterialLaw::linear:
+      return "linear elastic";
+    case MaterialLaw::saint_venant_kirchhoff:
+      return "St. Venant-Kirchhoff";
+    case MaterialLaw::fixed_corotated:
+      return "fixed corotated";
+    case MaterialLaw::mooney_rivlin:
+      return "Mooney-Rivlin";
+  }
+  return "";
+}
+
+void term(const char* name, bool is_in, const std::string& reason) {
+  fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
+}
+
+/// 1 for a regular simplex, 0 for a flat one: its volume by that of the regular one of the same root mean square edge.
+template <int Dim>
+double quality(const Mesh<Dim>& mesh, CellId c) {
+  double squared = 0;
+  for (int i = 0; i <= Dim; ++i)
+    for (int j = 0; j < i; ++j) squared += (mesh.rest(mesh.cell(c)[i]) - mesh.rest(mesh.cell(c)[j])).squaredNorm();
+  const double edge = std::sqrt(squared / (Dim * (Dim + 1) / 2));
+  const double regular = Dim == 2 ? std::sqrt(3.0) / 4 : std::sqrt(2.0) / 12;
+  return mesh.volume(c) / (regular * std::pow(edge, Dim));
+}
+
+/// Which connected surface every vertex of the scene belongs to, by its smallest vertex.
+std::vector<int> find_components(const CollisionSurface& surface, std::size_t num_vertices) {
+  std::vector<int> parent(num_vertices);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto find = [&](int v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (const auto& [a, b] : surface.edges) {
+    const int first = find(a), second = find(b);
+    parent[std::max(first, second)] = std::min(first, second);
+  }
+  for (std::size_t v = 0; v < num_vertices; ++v) parent[v] = find(static_cast<int>(v));
+  return parent;
+}
+
+std::string describe(const TimeOptions& time) {
+  if (time.is_static) return "one static solve";
+  const std::string scheme = time.integrator == Integrator::newmark          ? "Newmark"
+                             : time.integrator == Integrator::implicit_euler ? "implicit Euler"
+                                                                             : "BDF" + std::to_string(time.bdf_order);
+  return fmt::format("{}{}, {} steps of {} s from {} s", time.quasistatic ? "quasistatic, " : "", scheme, time.steps,
+                     time.dt, time.t0);
+}
+
+template <int Dim>
+class Explanation {
+ public:
+  /// Throws InputError for what `run` would refuse.
+  Explanation(const Setup<Dim>& setup, std::vector<std::string> warnings)
+      : setup_(setup), simulation_(setup, registry_), warnings_(std::move(warnings)) {}
+
+  void print() {
+    bodies();
+    fmt::print("time\n  {}\n", describe(setup_.time));
+    terms();
+    unknowns();
+    fmt::print("linear solver\n  {}\n", solver());
+    if (setup_.contact.enabled) contact();
+    fmt::print("warnings\n");
+    if (warnings_.empty()) fmt::print("  none\n");
+    for (const auto& warning : warnings_) fmt::print("  {}\n", warning);
+  }
+
+ private:
+  bool is_dynamic() const { return !setup_.time.is_static && !setup_.time.quasistatic; }
+  bool has_friction() const {
+    return setup_.contact.enabled && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
+  }
+
+  void bodies() {
+    struct Sum {
+      int cells = 0;
+      double volume = 0;
+    };
+    std::map<int, Sum> sums;
+    double worst = 1, shortest = std::numeric_limits<double>::infinity(), longest = 0;
+    CellId worst_cell = 0;
+    int slivers = 0;
+    const Mesh<Dim>& mesh = setup_.mesh;
+    for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+      Sum& sum = sums[mesh.body(c)];
+      ++sum.cells;
+      sum.volume += mesh.volume(c);
+      const double q = quality(mesh, c);
+      slivers += q < kSliver;
+      if (q < worst) worst = q, worst_cell = c;
+    }
+    for (const auto& [a, b] : mesh.edges()) {
+      const double length = (mesh.rest(a) - mesh.rest(b)).norm();
+      shortest = std::min(shortest, length);
+      longest = std::max(longest, length);
+    }
+    fmt::print("bodies ({}D)\n", Dim);
+    double softest = std::numeric_limits<double>::infinity(), stiffest = 0;
+    for (const auto& [id, sum] : sums) {
+      const Material& material = setup_.materials.at(id);
+      fmt::print("  id {}: {} elements, {} {:.4g} m^{}, {}, E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^{}, mass {:.4g} kg\n",
+                 id, sum.cells, Dim == 2 ? "area" : "volume", sum.volume, Dim, name_of(material.law),
+                 material.youngs_modulus, material.poisson_ratio, material.density, Dim, material.density * sum.volume);
+      softest = std::min(softest, material.youngs_modulus);
+      stiffest = std::max(stiffest, material.youngs_modulus);
+      check_units(id, material);
+    }
+    fmt::print("  {} vertices, {} elements, edges {:.4g} to {:.4g} m, worst quality {:.3g} (1: regular; element {})\n",
+               mesh.num_vertices(), mesh.num_cells(), shortest, longest, worst, worst_cell);
+    if (slivers > 0)
+      warn("{} slivers (quality below {}), the worst is element {} with {:.2g}", slivers, kSliver, worst_cell, worst);
+    if (stiffest > kLargeRatio * softest) warn("stiffness ratio {:.2g} between bodies", stiffest / softest);
+    if (longest > kLargeRatio * shortest) warn("edges differ in length by a factor of {:.2g}", longest / shortest);
+    Vec<Dim> low = mesh.rest(0), high = low;
+    for (int v = 0; v < mesh.vertex_slots(); ++v) {
+      low = low.cwiseMin(mesh.rest(v));
+      high = high.cwiseMax(mesh.rest(v));
+    }
+    const double size = (high - low).maxCoeff();
+    if (size < kUsualLength[0] || size > kUsualLength[1]) warn("the bodies span {:.3g} m: are lengths in metres?", size);
+  }
+
+  void check_units(int id, const Material& material) {
+    if (material.youngs_modulus < kUsualModulus[0] || material.youngs_modulus > kUsualModulus[1])
+      warn("body {}: E = {:.3g} Pa is unusual: are moduli in Pa?", id, material.youngs_modulus);
+    if (Dim == 3 && (material.density < kUsualDensity[0] || material.density > kUsualDensity[1]))
+      warn("body {}: rho = {:.3g} kg/m^3 is unusual: are densities in kg/m^3?", id, material.density);
+  }
+
+  void terms() {
+    fmt::print("energy terms\n");
+    term("inertia", is_dynamic(),
+         setup_.time.is_static     ? "no /time: static"
+         : setup_.time.quasistatic ? "/time/quasistatic"
+         : setup_.lump_mass        ? "dynamics, lumped mass"
+                                   : "dynamics, consistent mass");
+    term("elastic", true, "always");
+    std::string loads;
+    if (setup_.body_acceleration) loads = "/boundary_conditions/rhs";
+    if (!setup_.neumann.empty()) loads += (loads.empty() ? "" : ", ") + std::to_string(setup_.neumann.size()) + " tractions";
+    term("body", !loads.empty(), loads.empty() ? "no body force, no tractions" : loads);
+    term("contact", setup_.contact.enabled,
+         !setup_.contact.enabled     ? "/contact/enabled is false"
+         : setup_.contact.convergent ? "convergent form"
+                                     : "/contact/enabled");
+    term("friction", has_friction(),
+         has_friction()            ? fmt::format("mu = {}", setup_.contact.friction_coefficient)
+         : !setup_.contact.enabled ? "no contact"
+                                   : "no coefficient of friction, or no iterations for it");
+    term("remeshing", setup_.remesh.enabled,
+         setup_.remesh.enabled ? "/space/remesh/enabled" : "/space/remesh/enabled is false");
+  }
+
+  void unknowns() {
+    const auto held = held_dofs(setup_, setup_.mesh, setup_.time.t0 + setup_.time.dt).held;
+    const int bodies = Dim * setup_.mesh.vertex_slots();
+    const auto num_held = std::count(held.begin(), held.begin() + bodies, 1);
+    const double n = static_cast<double>(bodies - num_held);
+    const double edges = static_cast<double>(setup_.mesh.edges().size());
+    const double entries = Dim * Dim * (setup_.mesh.num_vertices() + 2 * edges);
+    // How the fill of nested dissection grows; the factors in front are rough.
+    const double fill = Dim == 2 ? 8 * n * std::log2(std::max(n, 2.0)) : 6 * std::pow(n, 4.0 / 3);
+    constexpr double kEntryBytes = 12, kMegabyte = 1e6;
+    fmt::print("unknowns\n  {} of {} ({} held); matrix {:.1f} MB, factor about {:.1f} MB{}\n", bodies - num_held, bodies,
+               num_held, entries * kEntryBytes / kMegabyte, fill * 8 / kMegabyte,
+               setup_.remesh.enabled ? ", more as the mesh is refined" : "");
+    if (n == 0) warn("every vertex is held: there is nothing to solve for");
+  }
+
+  std::string solver() const {
+    std::string asked;
+    for (const auto& name : setup_.linear.solvers) asked += (asked.empty() ? "" : ", ") + name;
+    return fmt::format("{} (asked for: {})", simulation_.solver_name(), asked);
+  }
+
+  /// Surfaces and which of them can meet; what is near at the start.
+  void contact() {
+    const CollisionSurface surface = collision_surface(setup_.mesh, setup_.obstacles);
+    const VectorX& x = simulation_.state().history.x[0];
+    const auto component = find_components(surface, surface.counts.size());
+    std::set<int> moving, fixed;
+    for (const int v : surface.vertices) (surface.counts[v] ? moving : fixed).insert(component[v]);
+    const std::size_t m = moving.size(), f = fixed.size();
+    fmt::print(
+        "contact\n  {} surfaces of bodies, {} of obstacles; pairs that can touch: {} body-body, {} within a body, "
+        "{} body-obstacle (obstacles among themselves are not searched)\n",
+        m, f, m * (m - 1) / 2, m, m * f);
+    fmt::print("  {} surface vertices, {} edges", surface.vertices.size(), surface.edges.size());
+    if (Dim == 3) fmt::print(", {} triangles", surface.triangles.size());
+    const double dhat = setup_.contact.activation_distance;
+    Workspace workspace;
+    const ContactEnergy<Dim> energy(surface, setup_.contact, 1, 1);
+    const auto active = energy.active(x, workspace).size();
+    const double gap = energy.min_distance(x, workspace);
+    fmt::print("; d-hat {:.4g} m, {} pairs nearer than that at the start\n", dhat, active);
+    if (gap < dhat)
+      warn("gap {:.3g} m at the start is below d-hat = {:.3g} m: surfaces push each other from the start", gap, dhat);
+    double shortest = std::numeric_limits<double>::infinity();
+    for (const auto& [a, b] : surface.edges)
+      if (surface.counts[a]) shortest = std::min(shortest, (setup_.mesh.rest(a) - setup_.mesh.rest(b)).norm());
+    if (dhat > shortest)
+      warn("d-hat = {:.3g} m is above the shortest surface edge, {:.3g} m: surfaces feel themselves", dhat, shortest);
+  }
+
+  template <typename... Args>
+  void warn(fmt::format_string<Args...> text, Args&&... args) {
+    warnings_.push_back(fmt::format(text, std::forward<Args>(args)...));
+  }
+
+  const Setup<Dim>& setup_;
+  linear::Registry registry_;
+  const Simulation<Dim> simulation_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace
+
+int explain(const RunOptions& options) {
+  scene::Scene scene = scene::read(options.scene, options.overrides);
+  std::visit(
+      [&](auto& setup) {
+        if (!options.solver.empty()) setup.linear.solvers = {options.solver};
+        Explanation(setup, scene.warnings).print();
+      },
+      scene.setup);
+  return done;
+}
+
+}  // namespace itr::cli

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// Input that explains itself: the schema says what the reader accepts, `itr explain` says what is modelled.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "itr/core/error.hpp"
+#include "itr/scene/scene.hpp"
+
+namespace itr {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+bool has_type(const Json& value, const std::string& type) {
+  if (type == "object") return value.is_object();
+  if (type == "array") return value.is_array();
+  if (type == "string") return value.is_string();
+  if (type == "boolean") return value.is_boolean();
+  if (type == "number") return value.is_number();
+  return value.is_number() && value.get<double>() == std::floor(value.get<double>());
+}
+
+/// The keywords that our schema uses; a null member is an absent one.
+bool is_valid(const Json& value, const Json& schema) {
+  for (const auto& [keyword, argument] : schema.items()) {
+    if (keyword == "type" && !has_type(value, argument)) return false;
+    if (keyword == "const" && value != argument) return false;
+    if (keyword == "not" && is_valid(value, argument)) return false;
+    if (keyword == "minimum" && !(value >= argument)) return false;
+    if (keyword == "exclusiveMinimum" && !(value > argument)) return false;
+    if (keyword == "items")
+      for (const auto& item : value)
+        if (!is_valid(item, argument)) return false;
+    if (keyword == "anyOf" &&
+        std::none_of(argument.begin(), argument.end(), [&](const Json& s) { return is_valid(value, s); }))
+      return false;
+    if (keyword == "required")
+      for (const std::string key : argument)
+        if (!value.contains(key)) return false;
+    if (keyword != "properties") continue;
+    for (const auto& [key, member] : value.items())
+      if (!member.is_null() && !(argument.contains(key) ? is_valid(member, argument[key]) : false)) return false;
+  }
+  return true;
+}
+
+Json read_json(const fs::path& file) { return Json::parse(std::ifstream(file), nullptr, true, true); }
+
+std::vector<fs::path> example_scenes() {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(fs::path(ITR_SOURCE_DIR) / "examples"))
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  return files;
+}
+
+TEST(Schema, AcceptsWhatTheReaderAccepts) {
+  const Json schema = Json::parse(scene::json_schema());
+  ASSERT_GE(example_scenes().size(), 3u);
+  for (const auto& file : example_scenes()) EXPECT_TRUE(is_valid(read_json(file), schema)) << file;
+}
+
+TEST(Schema, RefusesWhatTheReaderRefuses) {
+  const Json schema = Json::parse(scene::json_schema());
+  const fs::path file = fs::path(ITR_SOURCE_DIR) / "examples/masticator.json";
+  const Json good = read_json(file);
+  const std::array<std::pair<const char*, Json>, 8> wrong = {{{"/time/dt", -1},
+                                                              {"/time/dtt", 1},
+                                                              {"/contact/dhat", 0},
+                                                              {"/contact/enabled", 1},
+                                                              {"/contact/friction_coefficient", -0.1},
+                                                              {"/solver/nonlinear/max_iterations", 0},
+                                                              {"/solver/rayleigh_damping", {1}},
+                                                              {"/space/remesh/split/max_depth", 0.5}}};
+  for (const auto& [pointer, value] : wrong) {
+    Json scene = good;
+    scene[Json::json_pointer(pointer)] = value;
+    EXPECT_FALSE(is_valid(scene, schema)) << pointer;
+    EXPECT_THROW(scene::read(file, {{pointer, value.dump()}}), InputError) << pointer;
+  }
+}
+
+std::string explain(const std::string& arguments) {
+  const std::string command = std::string(ITR_BINARY_DIR) + "/bin/itr explain " + ITR_SOURCE_DIR "/examples/" + arguments;
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  std::string text;
+  for (std::array<char, 4096> buffer; std::fgets(buffer.data(), buffer.size(), pipe);) text += buffer.data();
+  pclose(pipe);
+  return text;
+}
+
+TEST(Explain, SaysWhatIsModelledAndWhy) {
+  const std::string text = explain("cantilever.json");
+  for (const char* line :
+       {"inertia    no   /time/quasistatic", "elastic    yes  always", "contact    no   /contact/enabled is false",
+        "body       yes  1 tractions", "144 of 162 (18 held)", "warnings\n  none"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << "\n" << text;
+}
+
+TEST(Explain, WarnsOfWhatLooksWrong) {
+  const std::string ball = "ball_wall.json ";
+  EXPECT_NE(explain(ball + "--set /contact/dhat=0.1").find("is above the shortest surface edge"), std::string::npos);
+  EXPECT_NE(explain(ball + "--set /contact/dhat=0.1").find("at the start is below d-hat"), std::string::npos);
+  EXPECT_NE(explain(ball + "--set /materials/E=1").find("are moduli in Pa?"), std::string::npos);
+  EXPECT_NE(explain(ball + "--set '/geometry/0/transformation/scale=[0.04, 0.0004]'").find("slivers"), std::string::npos);
+  EXPECT_NE(explain(ball + "--set /geometry/0/transformation/scale=40000").find("are lengths in metres?"),
+            std::string::npos);
+  EXPECT_NE(explain(ball + "--solver eigen").find("eigen:ldlt (asked for: eigen)"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace itr
