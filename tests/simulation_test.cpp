@@ -97,7 +97,7 @@ void expect_valid(const Simulation<2>& simulation) {
   for (const VectorX& x : state.history.x) {
     EXPECT_EQ(find_inverted<2>(state.mesh, x), kNone);
     const CollisionSurface surface = collision_surface(state.mesh, simulation.setup().obstacles);
-    EXPECT_FALSE(find_intersection<2>(surface, x)) << "step " << state.step;
+    EXPECT_FALSE(has_intersection<2>(surface, x)) << "step " << state.step;
   }
 }
 

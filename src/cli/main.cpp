@@ -100,7 +100,14 @@ int dispatch(int argc, char** argv) {
     return cli::done;
   }
   for (const auto& text : sets) options.overrides.push_back(parse_override(text));
-  return *explain ? cli::explain(options) : cli::run(options);
+  try {
+    return *explain ? cli::explain(options) : cli::run(options);
+  } catch (const InputError& error) {  // what the library finds wrong with a setup is wrong with its scene
+    if (!error.parts().file.empty()) throw;
+    InputError::Parts parts = error.parts();
+    parts.file = options.scene.string();
+    throw InputError(parts);
+  }
 }
 
 }  // namespace

@@ -183,10 +183,13 @@ std::string Registry::canonical_name(const std::string& name) {
                                                               {"Eigen::UmfPackLU", "umfpack"}};
   const auto it = kAliases.find(name);
   if (it != kAliases.end()) return it->second;
-  // Other programs' solvers that we have no equal of.
-  if (name.rfind("Eigen::", 0) == 0 || name == "Pardiso" || name == "Hypre" || name == "AMGCL" || name == "MAS" ||
-      name == "Trilinos" || name == "cuSolverDN")
-    return {};
+  // PolyFEM's solvers that we have no equal of: they change no result, so the default takes their place.
+  static const std::set<std::string> kOthers = {
+      "Eigen::SparseQR", "Eigen::CholmodSimplicialLDLT", "Eigen::SuperLU", "Eigen::PardisoLDLT", "Eigen::PardisoLLT",
+      "Eigen::PardisoLU", "Eigen::AccelerateLLT", "Eigen::AccelerateLDLT", "Eigen::LeastSquaresConjugateGradient",
+      "Eigen::DGMRES", "Eigen::BiCGSTAB", "Eigen::GMRES", "Eigen::MINRES", "Eigen::LDLT", "Eigen::LLT",
+      "Eigen::PartialPivLU", "Eigen::FullPivLU", "Pardiso", "Hypre", "AMGCL", "AMGCL_cuda", "MAS", "Trilinos", "cuSolverDN"};
+  if (kOthers.contains(name)) return {};
   return name;
 }
 

@@ -20,8 +20,9 @@ int cell_orientation(const std::array<int, 4>& c, ConstVectorView x) {
 
 }  // namespace
 
-std::optional<std::array<int, 2>> find_intersection(ConstVectorView x, std::span<const std::array<int, 2>> edges,
-                                                    std::span<const char> counts) {
+std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<const std::array<int, 2>> edges,
+                                                   std::span<const char> counts, std::size_t most) {
+  std::vector<std::array<int, 2>> pairs;
   std::vector<Box<2>> boxes(edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e)
     for (const int v : edges[e]) boxes[e].include(Vec<2>(x.segment<2>(2 * v)));
@@ -38,15 +39,17 @@ std::optional<std::array<int, 2>> find_intersection(ConstVectorView x, std::span
       if (a == c || a == d || b == c || b == d) continue;
       if (!counts[a] && !counts[b] && !counts[c] && !counts[d]) continue;
       if (segments_intersect(x.segment<2>(2 * a), x.segment<2>(2 * b), x.segment<2>(2 * c), x.segment<2>(2 * d)))
-        return std::array{static_cast<int>(e), f};
+        pairs.push_back({static_cast<int>(e), f});
+      if (pairs.size() >= most) return pairs;
     }
   }
-  return std::nullopt;
+  return pairs;
 }
 
-std::optional<std::array<int, 2>> find_intersection(ConstVectorView x, std::span<const std::array<int, 2>> edges,
-                                                    std::span<const std::array<int, 3>> triangles,
-                                                    std::span<const char> counts) {
+std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<const std::array<int, 2>> edges,
+                                                   std::span<const std::array<int, 3>> triangles,
+                                                   std::span<const char> counts, std::size_t most) {
+  std::vector<std::array<int, 2>> pairs;
   const auto at = [&](int v) { return Vec<3>(x.segment<3>(3 * v)); };
   std::vector<Box<3>> boxes(edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e)
@@ -64,10 +67,11 @@ std::optional<std::array<int, 2>> find_intersection(ConstVectorView x, std::span
       const auto [p, q] = edges[e];
       if (p == a || p == b || p == c || q == a || q == b || q == c) continue;
       if (!counts[a] && !counts[b] && !counts[c] && !counts[p] && !counts[q]) continue;
-      if (segment_intersects_triangle(at(p), at(q), at(a), at(b), at(c))) return std::array{e, static_cast<int>(t)};
+      if (segment_intersects_triangle(at(p), at(q), at(a), at(b), at(c))) pairs.push_back({e, static_cast<int>(t)});
+      if (pairs.size() >= most) return pairs;
     }
   }
-  return std::nullopt;
+  return pairs;
 }
 
 template <int Dim>

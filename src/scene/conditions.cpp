@@ -49,7 +49,7 @@ class ConditionReader {
     if (!rhs.exists()) return;
     const ValueFunction<Dim> value = read_function<Dim>(rhs, rhs["interpolation"], -1);
     if (value.is_zero) return;
-    check_defined<Dim>(value.function, all_vertices(), setup_.time.t0, rhs);
+    check_defined<Dim>(value.function, all_vertices(), times(), rhs);
     setup_.body_acceleration = value.function;
   }
 
@@ -60,7 +60,7 @@ class ConditionReader {
       const std::array<bool, Dim> components = read_components(node["dimension"]);
       const bool is_free = std::none_of(components.begin(), components.end(), [](bool b) { return b; });
       for (const int tag : tags_of(node, seen)) {
-        check_defined<Dim>(function, vertices_with(tag), setup_.time.t0, node["value"]);
+        check_defined<Dim>(function, vertices_with(tag), times(), node["value"]);
         if (!is_free) setup_.dirichlet.push_back({tag, components, function});
       }
     }
@@ -71,7 +71,7 @@ class ConditionReader {
     for (const Node& node : boundary_["neumann_boundary"].items()) {
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
       for (const int tag : tags_of(node, seen)) {
-        check_defined<Dim>(value.function, vertices_with(tag), setup_.time.t0, node["value"]);
+        check_defined<Dim>(value.function, vertices_with(tag), times(), node["value"]);
         if (!value.is_zero) setup_.neumann.push_back({tag, value.function});
       }
     }
@@ -85,7 +85,7 @@ class ConditionReader {
         return Vec<Dim>::Constant(f(X, t)).eval();
       };
       for (const int tag : tags_of(node, seen)) {
-        check_defined<Dim>(as_vector, vertices_with(tag), setup_.time.t0, node["value"]);
+        check_defined<Dim>(as_vector, vertices_with(tag), times(), node["value"]);
         if (!value.is_zero) setup_.pressure.push_back({tag, value.function});
       }
     }
@@ -112,7 +112,7 @@ class ConditionReader {
         moved.push_back(obstacles.rest[v]);
       }
       if (moved.empty()) continue;
-      check_defined<Dim>(value.function, moved, setup_.time.t0, node["value"]);
+      check_defined<Dim>(value.function, moved, times(), node["value"]);
       obstacles.motions.push_back(value.function);
     }
   }
@@ -129,7 +129,7 @@ class ConditionReader {
         warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
         continue;
       }
-      check_defined<Dim>(value.function, vertices_of_body(body), 0, node["value"]);
+      check_defined<Dim>(value.function, vertices_of_body(body), {0}, node["value"]);
       if (!value.is_zero) conditions.push_back({body, value.function});
     }
     return conditions;
@@ -173,6 +173,14 @@ class ConditionReader {
 
   void warn_unused(const Node& node) {
     warnings_.push_back(node["id"].pointer() + ": nothing has the id " + abbreviate(node["id"].json()));
+  }
+
+  /// Where functions of time are tried before anything is computed: both ends, after the first step, in the middle.
+  std::vector<double> times() const {
+    const TimeOptions& time = setup_.time;
+    if (time.is_static) return {time.t0, 1};
+    const double duration = time.dt * time.steps;
+    return {time.t0, time.t0 + time.dt, time.t0 + duration / 2, time.t0 + duration};
   }
 
   std::vector<Vec<Dim>> points(std::set<int> vertices) const {

@@ -46,7 +46,8 @@ Component read_component(const Node& node) {
   } else {
     node.fail("a number or an expression");
   }
-  if (std::isnan(component.constant)) node.fail(abbreviate(node.json()) + ", which is not a number", "one with a value");
+  if (!std::isfinite(component.constant))
+    node.fail(abbreviate(node.json()) + ", which has no finite value", "one with a value");
   return component;
 }
 
@@ -102,21 +103,24 @@ ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpol
 }
 
 template <int Dim>
-void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t,
-                   const Node& value) {
-  for (const Vec<Dim>& X : points) {
-    if (!function(X, t).hasNaN()) continue;
-    std::ostringstream place;
-    place << abbreviate(value.json()) << ", which has no value at X = (" << X.transpose() << "), t = " << t;
-    value.fail(place.str(), "a value there");
-  }
+void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points,
+                   const std::vector<double>& times, const Node& value) {
+  for (const double t : times)
+    for (const Vec<Dim>& X : points) {
+      if (function(X, t).allFinite()) continue;
+      std::ostringstream place;
+      place << abbreviate(value.json()) << ", which has no finite value at X = (" << X.transpose() << "), t = " << t;
+      value.fail(place.str(), "a value there");
+    }
 }
 
 template ValueFunction<2> read_function(const Node&, const Node&, double);
 template ValueFunction<3> read_function(const Node&, const Node&, double);
 template ScalarFunction<2> read_scalar_function(const Node&, const Node&);
 template ScalarFunction<3> read_scalar_function(const Node&, const Node&);
-template void check_defined(const SpaceTimeFunction<2>&, const std::vector<Vec<2>>&, double, const Node&);
-template void check_defined(const SpaceTimeFunction<3>&, const std::vector<Vec<3>>&, double, const Node&);
+template void check_defined(const SpaceTimeFunction<2>&, const std::vector<Vec<2>>&, const std::vector<double>&,
+                            const Node&);
+template void check_defined(const SpaceTimeFunction<3>&, const std::vector<Vec<3>>&, const std::vector<double>&,
+                            const Node&);
 
 }  // namespace itr::scene

@@ -34,8 +34,9 @@ struct ScalarFunction {
 template <int Dim>
 ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpolation);
 
-/// Throws InputError at `value` if the function has no value (NaN) at one of the points at time t.
+/// Throws InputError at `value` if the function has no finite value at one of the points at one of the times.
 template <int Dim>
-void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points, double t, const Node& value);
+void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points,
+                   const std::vector<double>& times, const Node& value);
 
 }  // namespace itr::scene

@@ -182,6 +182,19 @@ std::map<int, std::vector<Vec<3>>> barycenters_by_body(const Mesh<Dim>& mesh) {
 
 }  // namespace
 
+/// "0, 1, 2 (of 9)": the first elements of a body.
+template <int Dim>
+std::string list_elements(const Mesh<Dim>& mesh, int body) {
+  constexpr int kMostNamed = 5;
+  std::string text;
+  int count = 0;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (mesh.body(c) != body) continue;
+    if (++count <= kMostNamed) text += (text.empty() ? "" : ", ") + std::to_string(c);
+  }
+  return count > kMostNamed ? text + ", ... (" + std::to_string(count) + " of them)" : text;
+}
+
 template <int Dim>
 std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, std::vector<std::string>& warnings) {
   const Node node = root["materials"];
@@ -207,8 +220,9 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
   }
   for (const auto& [body, of_body] : points)
     if (!materials.contains(body))
-      node.fail("no material with the id " + std::to_string(body) + ", which elements of the mesh have",
-                "one for every body");
+      node.fail(
+          "no material with the id " + std::to_string(body) + ", which elements " + list_elements(mesh, body) + " have",
+          "one for every body");
   return materials;
 }
 

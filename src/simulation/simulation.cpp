@@ -46,12 +46,16 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
     for (const int v : primitive) text += (text.empty() ? "" : "-") + describe<Dim>(x.segment<Dim>(Dim * v));
     return text;
   };
-  const auto pair = find_intersection<Dim>(surface, x);
-  if (!pair) return;
-  const auto [first, second] = *pair;
-  const std::string found =
-      "edge " + corners(surface.edges[first]) + " and " +
-      (Dim == 2 ? "edge " + corners(surface.edges[second]) : "triangle " + corners(surface.triangles[second]));
+  constexpr std::size_t kMostNamed = 5;
+  const auto pairs = find_intersections<Dim>(surface, x, kMostNamed + 1);
+  if (pairs.empty()) return;
+  std::string found;
+  for (std::size_t i = 0; i < std::min(pairs.size(), kMostNamed); ++i) {
+    const auto [first, second] = pairs[i];
+    found += (i ? "; " : "") + ("edge " + corners(surface.edges[first])) + " and " +
+             (Dim == 2 ? "edge " + corners(surface.edges[second]) : "triangle " + corners(surface.triangles[second]));
+  }
+  if (pairs.size() > kMostNamed) found += "; and more";
   throw InputError({"", "initial state", "surfaces that intersect: " + found, "surfaces that do not touch"});
 }
 

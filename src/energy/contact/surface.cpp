@@ -95,12 +95,12 @@ CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, s
 }
 
 template <>
-std::optional<std::array<int, 2>> find_intersection<2>(const CollisionSurface& surface, ConstVectorView x) {
-  return find_intersection(x, surface.edges, surface.counts);
+std::vector<std::array<int, 2>> find_intersections<2>(const CollisionSurface& surface, ConstVectorView x, std::size_t most) {
+  return find_intersections(x, surface.edges, surface.counts, most);
 }
 template <>
-std::optional<std::array<int, 2>> find_intersection<3>(const CollisionSurface& surface, ConstVectorView x) {
-  return find_intersection(x, surface.edges, surface.triangles, surface.counts);
+std::vector<std::array<int, 2>> find_intersections<3>(const CollisionSurface& surface, ConstVectorView x, std::size_t most) {
+  return find_intersections(x, surface.edges, surface.triangles, surface.counts, most);
 }
 
 template CollisionSurface make_collision_surface<2>(std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>,

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -48,9 +47,13 @@ CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, s
                                         std::span<const int> points, std::span<const Vec<Dim>> rest,
                                         std::vector<char> counts);
 
-/// The first two edges (2D), or the first edge and triangle (3D), that share a point without sharing a vertex and of which
-/// one counts: indices, decided exactly.
+/// The first `most` pairs of two edges (2D), or of an edge and a triangle (3D), that share a point without sharing a vertex
+/// and of which one counts: indices, decided exactly.
 template <int Dim>
-std::optional<std::array<int, 2>> find_intersection(const CollisionSurface& surface, ConstVectorView x);
+std::vector<std::array<int, 2>> find_intersections(const CollisionSurface& surface, ConstVectorView x, std::size_t most);
+template <int Dim>
+bool has_intersection(const CollisionSurface& surface, ConstVectorView x) {
+  return !find_intersections<Dim>(surface, x, 1).empty();
+}
 
 }  // namespace itr

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+// Every mistake that the command refuses before it computes anything: exit status 2, and a message with the file, the place
+// in it, what was found and what was expected.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace itr {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr const char* kMsh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
+constexpr const char* kTetNodes = "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n";
+
+const std::vector<std::pair<const char*, std::string>> kFiles = {
+    {"square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"},
+    {"line.obj", "v -1 -0.5 0\nv 2 -0.5 0\nl 1 2\n"},
+    {"flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 4\nf 1 2 3\n"},
+    {"surface.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n"},
+    {"word.obj", "v 0 0 0\nv 1 zero 0\n"},
+    {"range.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9\n"},
+    {"inverted.msh", std::string(kMsh) + kTetNodes + "$Elements\n1\n1 4 2 3 1 2 1 3 4\n$EndElements\n"},
+    {"cut.msh", std::string(kMsh) + "$Nodes\n4\n1 0 0 0\n2 1 0"},
+    {"cut_elements.msh", std::string(kMsh) + kTetNodes + "$Elements\n1\n1 4 2 3 1 1 2"},
+    {"quad.msh", std::string(kMsh) + kTetNodes + "$Elements\n1\n1 3 2 3 1 1 2 3 4\n$EndElements\n"},
+    {"node.msh", std::string(kMsh) + kTetNodes + "$Elements\n1\n1 4 2 3 1 1 2 3 7\n$EndElements\n"},
+    {"text.msh", "this is no mesh\n"},
+    {"mesh.stl", "solid\n"},
+    {"folder/empty.obj", ""},
+};
+
+struct Refusal {
+  const char* name;
+  Json changes;       ///< merged into the scene
+  std::string file;   ///< that the message names
+  std::string place;  ///< in that file
+  std::string found, expected;
+};
+
+Json geometry(const char* mesh) { return {{"geometry", {{{"mesh", mesh}, {"volume_selection", 1}}}}}; }
+Json material(const char* key, const Json& value) {
+  Json one = {{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}};
+  one[key] = value;
+  return {{"materials", {one}}};
+}
+Json velocity(const Json& value) { return {{"initial_conditions", {{"velocity", {{{"id", 1}, {"value", value}}}}}}}; }
+Json rhs(const Json& value) { return {{"boundary_conditions", {{"rhs", value}}}}; }
+Json contact(const char* key, const Json& value) { return {{"contact", {{"enabled", true}, {key, value}}}}; }
+Json overlapping() {
+  return {{"geometry",
+           {{{"mesh", "square.obj"}, {"volume_selection", 1}},
+            {{"mesh", "line.obj"}, {"is_obstacle", true}, {"transformation", {{"translation", {0, 1}}}}}}},
+          {"contact", {{"enabled", true}, {"dhat", 1e-3}}},
+          {"solver", {{"contact", {{"barrier_stiffness", 1e5}}}}}};
+}
+
+const std::vector<Refusal> kRefusals = {
+    {"missing mesh", geometry("none.obj"), "scene.json", "/geometry/0/mesh", "none.obj", "the path of a mesh file"},
+    {"a folder for a mesh", geometry("folder"), "scene.json", "/geometry/0/mesh", "folder", "the path of a mesh file"},
+    {"truncated nodes", geometry("cut.msh"), "cut.msh", "line", "end", ""},
+    {"truncated elements", geometry("cut_elements.msh"), "cut_elements.msh", "line", "end", ""},
+    {"not a mesh", geometry("text.msh"), "text.msh", "line 1", "another beginning", "$MeshFormat"},
+    {"unknown format", geometry("mesh.stl"), "mesh.stl", "", ".stl", ".msh"},
+    {"empty file", geometry("folder/empty.obj"), "empty.obj", "", "no vertices", ""},
+    {"word for a number", geometry("word.obj"), "word.obj", "line 2", "zero", "a coordinate"},
+    {"vertex out of range", geometry("range.obj"), "range.obj", "triangle 0", "", ""},
+    {"node out of range", geometry("node.msh"), "node.msh", "", "node 7", ""},
+    {"unknown element type", geometry("quad.msh"), "quad.msh", "", "element 1 of type 3", ""},
+    {"inverted element", geometry("inverted.msh"), "scene.json", "/geometry/0/mesh", "inverted elements 0",
+     "positive volume"},
+    {"degenerate element", geometry("flat.obj"), "scene.json", "/geometry/0/mesh", "degenerate elements 1",
+     "positive volume"},
+    {"a line for a body", geometry("line.obj"), "scene.json", "/geometry/0/mesh", "without cells", "triangles"},
+    {"a surface for a body", geometry("surface.obj"), "scene.json", "/geometry/0/mesh", "surface", "tetrahedra"},
+    {"element without material", material("id", 2), "scene.json", "/materials", "which elements 0, 1 have", "every body"},
+    {"intersecting surfaces", overlapping(), "scene.json", "initial state", "(1.000000, 1.000000)", "do not touch"},
+    {"no time step", {{"time", {{"dt", nullptr}}}}, "scene.json", "/time", "tend", "two of tend, dt and time_steps"},
+    {"contradicting times", {{"time", {{"time_steps", 3}}}}, "scene.json", "/time", "3", "tend = t0 + dt * time_steps"},
+    {"wrong time key", {{"time", {{"step", 0.1}}}}, "scene.json", "/time/step", "unknown key", "time_steps"},
+    {"negative time step", {{"time", {{"dt", -0.1}}}}, "scene.json", "/time/dt", "-0.1", "> 0"},
+    {"end before start", {{"time", {{"t0", 3}}}}, "scene.json", "/time/tend", "1", "after t0"},
+    {"unknown integrator", {{"time", {{"integrator", "RK4"}}}}, "scene.json", "/time/integrator", "RK4", "ImplicitEuler"},
+    {"unknown name", rhs({0, "9.81 * tt"}), "scene.json", "/boundary_conditions/rhs/1", "'tt'", "expression"},
+    {"unfinished expression", rhs({"1 +", 0}), "scene.json", "/boundary_conditions/rhs/0", "1 +", "expression"},
+    {"not a number", velocity({"sqrt(-1 - x)", 0}), "scene.json", "/velocity/0/value", "no finite value at X", "a value"},
+    {"infinite", velocity({"1 / x", 0}), "scene.json", "/velocity/0/value", "no finite value at X = (0", "a value"},
+    {"infinite constant", velocity({"1 / 0", 0}), "scene.json", "/velocity/0/value/0", "1 / 0", "a value"},
+    {"not a number later", rhs({"sqrt(0.9 - t)", 0}), "scene.json", "/boundary_conditions/rhs", "t = 1", "a value"},
+    {"E = 0", material("E", 0), "scene.json", "/materials/0/E", "0", "> 0"},
+    {"nu = 0.5", material("nu", 0.5), "scene.json", "/materials/0/nu", "0.5", "(-1, 0.5)"},
+    {"nu = -1", material("nu", -1), "scene.json", "/materials/0/nu", "-1", "(-1, 0.5)"},
+    {"rho = 0", material("rho", 0), "scene.json", "/materials/0/rho", "0", "> 0"},
+    {"unknown law", material("type", "Ogden"), "scene.json", "/materials/0/type", "Ogden", "NeoHookean"},
+    {"no d-hat", contact("dhat", 0), "scene.json", "/contact/dhat", "0", "> 0"},
+    {"negative d-hat", contact("dhat", -1e-3), "scene.json", "/contact/dhat", "-0.001", "> 0"},
+    {"negative friction", contact("friction_coefficient", -1), "scene.json", "/contact/friction_coefficient", "-1", ">= 0"},
+    {"unknown solver",
+     {{"solver", {{"linear", {{"solver", "Cholmodd"}}}}}},
+     "scene.json",
+     "/solver/linear/solver",
+     "Cholmodd",
+     "eigen:ldlt"},
+    {"unknown solver of Eigen",
+     {{"solver", {{"linear", {{"solver", "Eigen::LDLLT"}}}}}},
+     "scene.json",
+     "/solver/linear/solver",
+     "Eigen::LDLLT",
+     "eigen:ldlt"},
+    {"unknown Newton",
+     {{"solver", {{"nonlinear", {{"solver", "newtonn"}}}}}},
+     "scene.json",
+     "/solver/nonlinear/solver",
+     "newtonn",
+     "Newton"},
+    {"misspelt key",
+     {{"contact", {{"friction_coeficient", 1}}}},
+     "scene.json",
+     "/contact/friction_coeficient",
+     "unknown key",
+     "\"friction_coefficient\" perhaps"},
+    {"key in a wrong place", {{"dhat", 1}}, "scene.json", "/dhat", "unknown key", "/contact/dhat"},
+    {"wrong type", {{"contact", {{"enabled", "yes"}}}}, "scene.json", "/contact/enabled", "yes", "true or false"},
+    {"no geometry", {{"geometry", nullptr}}, "scene.json", "/geometry", "nothing", "geometries"},
+    {"no materials", {{"materials", nullptr}}, "scene.json", "/materials", "nothing", "materials"},
+};
+
+std::ostream& operator<<(std::ostream& out, const Refusal& refusal) { return out << refusal.name; }
+
+class Refusals : public ::testing::TestWithParam<Refusal> {
+ protected:
+  Refusals() : folder_(fs::path(::testing::TempDir()) / ("itr_refusal_" + std::to_string(::getpid()))) {
+    fs::create_directories(folder_ / "folder");
+    for (const auto& [name, text] : kFiles) std::ofstream(folder_ / name) << text;
+  }
+  ~Refusals() override { fs::remove_all(folder_); }
+
+  /// Exit status and message.
+  std::pair<int, std::string> run(const std::string& scene) const {
+    std::ofstream(folder_ / "scene.json") << scene;
+    const std::string command = std::string(ITR_BINARY_DIR) + "/bin/itr run " + (folder_ / "scene.json").string() + " -o " +
+                                (folder_ / "results").string() + " 2>&1";
+    FILE* pipe = popen(command.c_str(), "r");
+    std::string text;
+    for (std::array<char, 4096> buffer; std::fgets(buffer.data(), buffer.size(), pipe);) text += buffer.data();
+    return {WEXITSTATUS(pclose(pipe)), text};
+  }
+
+  static Json good_scene() {
+    return {{"geometry", {{{"mesh", "square.obj"}, {"volume_selection", 1}}}},
+            {"materials", {{{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}}}},
+            {"time", {{"dt", 0.1}, {"tend", 1}}}};
+  }
+
+  fs::path folder_;
+};
+
+TEST_P(Refusals, SayFilePlaceFoundAndExpected) {
+  const Refusal& refusal = GetParam();
+  Json scene = good_scene();
+  scene.merge_patch(refusal.changes);
+  const auto [status, message] = run(scene.dump());
+  EXPECT_EQ(status, 2) << message;
+  EXPECT_FALSE(fs::exists(folder_ / "results")) << "something was computed";
+  const auto found_at = message.find("found "), expected_at = message.find("; expected ");
+  ASSERT_NE(found_at, std::string::npos) << message;
+  ASSERT_NE(expected_at, std::string::npos) << message;
+  const std::string head = message.substr(0, found_at), found = message.substr(found_at, expected_at - found_at);
+  EXPECT_NE(head.find((folder_ / "").string()), std::string::npos) << message;
+  EXPECT_NE(head.find(refusal.file + ":"), std::string::npos) << message;
+  EXPECT_NE(head.find(refusal.place), std::string::npos) << message;
+  EXPECT_NE(found.find(refusal.found), std::string::npos) << message;
+  EXPECT_NE(message.substr(expected_at).find(refusal.expected), std::string::npos) << message;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Refusals, ::testing::ValuesIn(kRefusals), [](const auto& info) {
+  std::string name = info.param.name;
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  return name;
+});
+
+TEST_F(Refusals, GoodSceneRuns) {
+  const auto [status, message] = run(good_scene().dump());
+  EXPECT_EQ(status, 0) << message;
+}
+
+TEST_F(Refusals, WrongJsonNamesTheLine) {
+  const auto [status, message] = run("{\n  \"geometry\": [\n");
+  EXPECT_EQ(status, 2) << message;
+  EXPECT_NE(message.find("line 3"), std::string::npos) << message;
+}
+
+}  // namespace
+}  // namespace itr
