@@ -260,6 +260,9 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"newmark", "ball_wall.json", 40, R"("dt":2e-5,"integrator":"ImplicitNewmark")",
                            kImpact + Arguments{"/contact/friction_coefficient=0.3"}},
                       Case{"bdf3", "ball_wall.json", 40, R"("dt":2e-5,"integrator":"BDF3")", kImpact},
+                      Case{"adaptive", "ball_wall.json", 40, R"("dt":2e-5)",
+                           kImpact + Arguments{"/space/remesh/enabled=false", "/contact/friction_coefficient=0.3",
+                                               "/solver/contact/barrier_stiffness=\"adaptive\""}},
                       Case{"masticator", "masticator.json", 30, R"("dt":0.05)", {}},
                       Case{"quasistatic", "cantilever.json", 12, R"("dt":0.05,"quasistatic":true)", {}}),
     [](const auto& info) { return info.param.name; });

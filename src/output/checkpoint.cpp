@@ -72,6 +72,9 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   write_fields("x", state.history.x);
   write_fields("v", state.history.v);
   write_fields("a", state.history.a);
+  const BarrierStiffness& stiffness = state.stiffness;
+  file.write("/checkpoint/barrier_stiffness",
+             std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
   file.write("/checkpoint/energy_guard", std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0}, 0);
   file.write("/checkpoint/totals", progress.totals, 0);
   file.write_text("/checkpoint/scene", std::string(progress.scene));
@@ -111,6 +114,11 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.x = read_fields(file, "x");
   state.history.v = read_fields(file, "v");
   state.history.a = read_fields(file, "a");
+  const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;
+  if (stiffness.size() != 3)
+    throw InputError(
+        {saved.file.string(), "/checkpoint/barrier_stiffness", std::to_string(stiffness.size()) + " numbers", "3"});
+  state.stiffness = {stiffness[0], stiffness[1], stiffness[2]};
   const std::vector<double> guard = file.read_doubles("/checkpoint/energy_guard").values;
   if (guard.size() != 2)
     throw InputError({saved.file.string(), "/checkpoint/energy_guard", std::to_string(guard.size()) + " numbers", "2"});

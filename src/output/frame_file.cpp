@@ -67,6 +67,20 @@ void require_range(const std::filesystem::path& path, const std::string& name, c
   }
 }
 
+template <int Dim>
+void write_asked(hdf5::File& file, const AskedFields& asked) {
+  const auto write = [&](const char* name, std::span<const double> values, int columns) {
+    if (!values.empty()) file.write(name, values, columns);
+  };
+  write("/fields/contact_force", as_span(asked.forces.contact), Dim);
+  write("/fields/friction_force", as_span(asked.forces.friction), Dim);
+  write("/fields/reaction_force", as_span(asked.forces.reaction), Dim);
+  write("/fields/von_mises", asked.von_mises, 0);
+  write("/fields/stress", asked.stress, Dim * Dim);
+  write("/totals/kinetic_energy", asked.kinetic_energy, 0);
+  write("/totals/momentum", asked.momentum, 0);
+}
+
 Integers read_indices(const std::filesystem::path& path, const hdf5::File& file, const std::string& name, int columns,
                       std::size_t vertices) {
   hdf5::Table<std::int64_t> table = file.read_integers(name);
@@ -95,6 +109,7 @@ void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame,
   file.write("/fields/u", as_span(u), Dim);
   file.write("/fields/v", as_span(frame.v), Dim);
   file.write("/fields/elastic_density", frame.elastic_density, 0);
+  if (frame.asked) write_asked<Dim>(file, *frame.asked);
   write_obstacles(file, frame);
   if (extra) extra(file);
   write_file(path, file.image(), durability);
@@ -119,8 +134,14 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
   const auto x = file.read_doubles("/fields/x");
-  return {file.read_double_attribute("t"), x.columns, static_cast<int>(x.rows()),
-          static_cast<int>(file.read_integers("/mesh/body").rows())};
+  FrameSizes sizes{file.read_double_attribute("t"),
+                   x.columns,
+                   static_cast<int>(x.rows()),
+                   static_cast<int>(file.read_integers("/mesh/body").rows()),
+                   {}};
+  for (const char* name : kAskedFields)
+    if (file.contains(std::string("/fields/") + name)) sizes.asked.push_back(name);
+  return sizes;
 }
 
 StoredFrame read_frame(const std::filesystem::path& path) {

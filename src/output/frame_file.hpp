@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "files.hpp"
@@ -24,10 +25,14 @@ void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame,
 std::vector<std::filesystem::path> stored_frames(const std::filesystem::path& directory);
 int step_of_frame(const std::filesystem::path& path);
 
+/// Datasets of /fields that only a scene which asks for them has.
+constexpr const char* kAskedFields[] = {"contact_force", "friction_force", "reaction_force", "von_mises", "stress"};
+
 /// What an index says of a frame.
 struct FrameSizes {
   double t = 0;  ///< [s]
   int dim = 0, vertices = 0, cells = 0;
+  std::vector<std::string> asked;  ///< names of kAskedFields that it has
 };
 FrameSizes read_frame_sizes(const std::filesystem::path& path);
 

@@ -16,29 +16,45 @@ namespace {
 constexpr double kMostShare = 0.02;  // of the time, that replacing sim.xdmf may take
 constexpr std::size_t kGrowth = 16;  // or it is replaced when a 16th of the frames is new: O(n log n) bytes in all
 
-std::string data_item(const FrameEntry& entry, const char* set, const std::string& shape, const char* type) {
+std::string data_item(const FrameEntry& entry, const std::string& set, const std::string& shape, const char* type) {
   return fmt::format("<DataItem Dimensions=\"{}\" NumberType=\"{}\" Precision=\"8\" Format=\"HDF\">{}:{}</DataItem>", shape,
                      type, entry.file, set);
 }
 
-std::string attribute(const char* name, const char* type, const char* center, const std::string& data) {
+std::string attribute(const std::string& name, const char* type, const char* center, const std::string& data) {
   return fmt::format("        <Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"{}\">{}</Attribute>\n", name, type,
                      center, data);
 }
 
-/// Component `k` of a vertex field as a scalar: readers of XDMF expect three components of a vector, a plane one has two.
-std::string component(const FrameEntry& entry, const char* name, const char* set, int k) {
+/// Column `k` of a table as a scalar: readers of XDMF expect vectors and tensors of space, ours of the plane have fewer.
+std::string column(const FrameEntry& entry, const std::string& name, const std::string& set, int k, int columns,
+                   bool on_cells) {
+  const int rows = on_cells ? entry.cells : entry.vertices;
   const std::string slab = fmt::format(
       "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0}\"><DataItem Dimensions=\"3 2\" Format=\"XML\">0 {1} 1 1 {0} 1"
       "</DataItem>{2}</DataItem>",
-      entry.vertices, k, data_item(entry, set, fmt::format("{} {}", entry.vertices, entry.dim), "Float"));
-  return attribute(fmt::format("{}_{}", name, "xyz"[k]).c_str(), "Scalar", "Node", slab);
+      rows, k, data_item(entry, set, fmt::format("{} {}", rows, columns), "Float"));
+  return attribute(name, "Scalar", on_cells ? "Cell" : "Node", slab);
 }
 
-std::string vector_field(const FrameEntry& entry, const char* name, const char* set) {
+std::string vector_field(const FrameEntry& entry, const std::string& name, const std::string& set) {
   const std::string shape = fmt::format("{} {}", entry.vertices, entry.dim);
   if (entry.dim == 3) return attribute(name, "Vector", "Node", data_item(entry, set, shape, "Float"));
-  return component(entry, name, set, 0) + component(entry, name, set, 1);
+  return column(entry, name + "_x", set, 0, 2, false) + column(entry, name + "_y", set, 1, 2, false);
+}
+
+std::string tensor_field(const FrameEntry& entry, const std::string& name, const std::string& set) {
+  if (entry.dim == 3)
+    return attribute(name, "Tensor", "Cell", data_item(entry, set, fmt::format("{} 9", entry.cells), "Float"));
+  return column(entry, name + "_xx", set, 0, 4, true) + column(entry, name + "_xy", set, 1, 4, true) +
+         column(entry, name + "_yy", set, 3, 4, true);
+}
+
+std::string asked_field(const FrameEntry& entry, const std::string& name) {
+  const std::string set = "/fields/" + name;
+  if (name == "stress") return tensor_field(entry, name, set);
+  if (name != "von_mises") return vector_field(entry, name, set);
+  return attribute(name, "Scalar", "Cell", data_item(entry, set, std::to_string(entry.cells), "Float"));
 }
 
 std::string grid(const FrameEntry& entry) {
@@ -54,6 +70,7 @@ std::string grid(const FrameEntry& entry) {
   text += vector_field(entry, "u", "/fields/u") + vector_field(entry, "v", "/fields/v");
   text += attribute("elastic_density", "Scalar", "Cell", data_item(entry, "/fields/elastic_density", cells, "Float"));
   text += attribute("body", "Scalar", "Cell", data_item(entry, "/mesh/body", cells, "Int"));
+  for (const std::string& name : entry.asked) text += asked_field(entry, name);
   return text + "      </Grid>\n";
 }
 

@@ -15,6 +15,7 @@ struct FrameEntry {
   double t = 0;      ///< [s]
   int dim = 0;
   int vertices = 0, cells = 0;
+  std::vector<std::string> asked;  ///< fields that not every frame has, see kAskedFields
 };
 
 /// Both files are replaced as a whole, so that they are readable at any moment. sim.h5 follows at every frame. The text of

@@ -59,7 +59,7 @@ struct Writer::Impl {
     for (const fs::path& path : stored_frames(directory)) {
       const FrameSizes sizes = read_frame_sizes(path);
       last_stored = step_of_frame(path);
-      series.append({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells});
+      series.append({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.asked});
     }
     last_checkpoint = seconds_now();
   }
@@ -98,7 +98,16 @@ struct Writer::Impl {
     if (step == last_stored) return;
     drop_unasked_frame();
     last_stored = step;
-    series.add({frame_name(step), t, Dim, frame.mesh.num_vertices(), frame.mesh.num_cells()});
+    std::vector<std::string> asked;
+    if (frame.asked) {
+      const NodalForces& forces = frame.asked->forces;
+      if (forces.contact.size()) asked.push_back("contact_force");
+      if (forces.friction.size()) asked.push_back("friction_force");
+      if (forces.reaction.size()) asked.push_back("reaction_force");
+      if (!frame.asked->von_mises.empty()) asked.push_back("von_mises");
+      if (!frame.asked->stress.empty()) asked.push_back("stress");
+    }
+    series.add({frame_name(step), t, Dim, frame.mesh.num_vertices(), frame.mesh.num_cells(), std::move(asked)});
   }
 
   /// What a checkpoint relies on has to be on the disk before it.

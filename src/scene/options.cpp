@@ -271,6 +271,19 @@ std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& ti
   return damping;
 }
 
+FieldOptions read_fields(const Node& root) {
+  const Node asked = root["output"]["paraview"]["options"];
+  // As all of /output, what is wrong here never stops a scene.
+  const auto is_asked = [&](const char* key) { return asked.has(key) && asked[key].json() == true; };
+  return {.contact_forces = is_asked("contact_forces"),
+          .friction_forces = is_asked("friction_forces"),
+          .reaction_forces = is_asked("reaction_forces"),
+          .von_mises = is_asked("scalar_values"),
+          .stress = is_asked("tensor_values"),
+          .kinetic_energy = is_asked("kinetic_energy"),
+          .momentum = is_asked("momentum")};
+}
+
 bool read_lump_mass(const Node& root) { return root["solver"]["advanced"]["lump_mass_matrix"].boolean(false); }
 
 void check_space(const Node& root) {

@@ -24,6 +24,8 @@ LinearOptions read_linear(const Node& root);
 RemeshOptions read_remesh(const Node& root);
 OutputOptions read_output(const Node& root);
 std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& time);
+/// Which fields output/paraview/options asks for.
+FieldOptions read_fields(const Node& root);
 bool read_lump_mass(const Node& root);
 void check_space(const Node& root);
 

@@ -42,6 +42,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.remesh = read_remesh(root);
   setup.linear = read_linear(root);
   setup.damping = read_damping(root, setup.time);
+  setup.fields = read_fields(root);
   setup.lump_mass = read_lump_mass(root);
   check_space(root);
 

@@ -130,6 +130,7 @@ struct Simulation<Dim>::Impl {
   std::unique_ptr<linear::Solver> solver;
   State<Dim> state;
   double shortest_edge = 0;  ///< of the initial mesh [m]
+  NodalForces forces;        ///< of the last step
 };
 
 template <int Dim>
@@ -142,6 +143,12 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   refuse_intersections(impl_->setup, impl_->state);
   if (impl_->setup.consistent_initial_acceleration && !impl_->state.history.a.empty())
     set_consistent_acceleration(impl_->setup, impl_->state, *impl_->solver);
+  if (const FieldOptions& asked = impl_->setup.fields; asked.any_forces()) {
+    const State<Dim>& state = impl_->state;
+    StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->solver, state.stiffness);
+    impl_->forces = problem.forces(state.history.x[0]);
+    impl_->forces.reaction.setZero();  // no step has been solved
+  }
   impl_->shortest_edge = std::numeric_limits<double>::infinity();
   const auto& mesh = impl_->state.mesh;
   for (const auto& [a, b] : mesh.edges())
@@ -173,7 +180,9 @@ StepReport Simulation<Dim>::initial_report() const {
 
 template <int Dim>
 StepResult Simulation<Dim>::advance() {
-  return take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->solver, impl_->logger, impl_->state);
+  StepResult result = take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->solver, impl_->logger, impl_->state);
+  if (result.ok) impl_->forces = result.forces;
+  return result;
 }
 
 template <int Dim>
@@ -227,9 +236,61 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
     data.elastic_density.push_back(elastic_density<Dim>(deformation_gradient<Dim>(element, data.x),
                                                         elastic_moduli<Dim>(material, rest_barycenter(cells, element))));
   }
+  add_asked(data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   return data;
+}
+
+namespace {
+
+/// Of the stress in space: zero out of the plane in plane stress, what F_zz = 1 gives in plane strain.
+template <int Dim>
+double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
+  Mat<3> s = Mat<3>::Zero();
+  s.template topLeftCorner<Dim, Dim>() = cauchy;
+  if (Dim == 2) s(2, 2) = out_of_plane;
+  const Mat<3> deviator = s - s.trace() / 3 * Mat<3>::Identity();
+  return std::sqrt(1.5) * deviator.norm();
+}
+
+template <int Dim>
+double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Vec<Dim>& X) {
+  if (Dim == 3 || !material.plane_strain) return 0;
+  Mat<3> in_space = Mat<3>::Identity();
+  in_space.template topLeftCorner<Dim, Dim>() = F;
+  Vec<3> place = Vec<3>::Zero();
+  place.template head<Dim>() = X;
+  return elastic_stress<3>(in_space, elastic_moduli<3>(material, place))(2, 2) / F.determinant();
+}
+
+}  // namespace
+
+template <int Dim>
+void Simulation<Dim>::add_asked(FrameData& data) const {
+  const FieldOptions& options = impl_->setup.fields;
+  AskedFields& asked = data.asked;
+  asked.forces = impl_->forces;
+  const CellSet<Dim> cells = whole_mesh(impl_->state.mesh, {});
+  if (options.von_mises || options.stress)
+    for (const auto& element : cells.elements) {
+      const Material& material = impl_->setup.materials.at(element.body);
+      const Mat<Dim> F = deformation_gradient<Dim>(element, data.x);
+      const Vec<Dim> X = rest_barycenter(cells, element);
+      const Mat<Dim> cauchy = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
+      if (options.von_mises) asked.von_mises.push_back(von_mises<Dim>(cauchy, out_of_plane_stress<Dim>(material, F, X)));
+      for (int i = 0; options.stress && i < Dim; ++i)
+        for (int j = 0; j < Dim; ++j) asked.stress.push_back(cauchy(i, j));
+    }
+  if (!options.kinetic_energy && !options.momentum) return;
+  VectorX product = VectorX::Zero(data.v.size());
+  InertiaEnergy<Dim>(cells, impl_->setup.materials, impl_->setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+                     VectorX::Zero(data.v.size()))
+      .add_mass_product(data.v, product);
+  if (options.kinetic_energy) asked.kinetic_energy = {0.5 * data.v.dot(product)};
+  if (!options.momentum) return;
+  asked.momentum.assign(Dim, 0);
+  for (Eigen::Index i = 0; i < product.size(); ++i) asked.momentum[i % Dim] += product[i];
 }
 
 template class Simulation<2>;

@@ -238,6 +238,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
     report.unknowns = problem->dofs().num_unknowns;
     report.min_distance = problem->min_distance(x);
     report.min_volume_ratio = min_volume_ratio(problem->cells(), x);
+    if (setup.fields.any_forces()) result.forces = problem->forces(x);
   }
   next.stiffness = problem->stiffness();
   TimeIntegrator(setup.time).push(std::move(x), next.history);
@@ -298,6 +299,7 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, lin
   part.step = 0;
   if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);
   StepReport effort = whole.report;
+  NodalForces forces;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
     StepResult result = take_step_in_parts(half, shortest_edge, solver, logger, part);
@@ -305,8 +307,9 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, lin
     if (!result.ok) return result;
     effort = result.report;
     parts += std::max(1, result.report.cut_steps);
+    forces = std::move(result.forces);
   }
-  whole = {.report = effort};
+  whole = {.report = effort, .forces = std::move(forces)};
   whole.report.cut_steps = parts;
   whole.report.step = part.step = state.step + 1;
   whole.report.t = part.t = setup.time.t0 + part.step * setup.time.dt;

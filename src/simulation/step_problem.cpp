@@ -271,6 +271,26 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
 }
 
 template <int Dim>
+NodalForces StepProblem<Dim>::forces(const VectorX& x) {
+  const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
+  const auto force = [&](std::initializer_list<const Energy*> terms) {
+    VectorX gradient = VectorX::Zero(x.size());
+    for (const Energy* term : terms)
+      if (term) term->add_gradient(x, gradient, workspace_);
+    return VectorX(-gradient.head(bodies) / scaling_);
+  };
+  NodalForces forces;
+  const FieldOptions& asked = setup_.fields;
+  if (asked.contact_forces) forces.contact = force({contact_.get()});
+  if (asked.friction_forces) forces.friction = force({friction_.get()});
+  if (!asked.reaction_forces) return forces;
+  forces.reaction = -force({inertia_.get(), elastic_.get(), loads_.get(), contact_.get(), friction_.get()});
+  for (Eigen::Index i = 0; i < bodies; ++i)
+    if (dofs_.unknown[i] != kNone) forces.reaction[i] = 0;
+  return forces;
+}
+
+template <int Dim>
 double StepProblem<Dim>::created_energy(const History& history, const VectorX& x) {
   const VectorX &x0 = history.x[0], &v0 = history.v[0];
   const bool trapezoidal = TimeIntegrator(setup_.time).is_trapezoidal(history);

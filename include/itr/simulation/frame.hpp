@@ -41,6 +41,22 @@ struct StepReport {
   double peak_rss_mb = 0;
 };
 
+/// Forces on the bodies' vertices at the end of a step, interleaved [N]; 2D: by thickness. Their sum with the elastic forces
+/// and the loads is mass times acceleration. Empty where not asked for.
+struct NodalForces {
+  VectorX contact, friction;
+  VectorX reaction;  ///< of what holds a vertex in its prescribed directions; 0 elsewhere, and before the first step
+};
+
+/// Fields that a scene may ask for (FieldOptions); empty where it does not.
+struct AskedFields {
+  NodalForces forces;
+  std::vector<double> von_mises;       ///< a cell [Pa]; in 2D of the plane stress, or strain, that the material says
+  std::vector<double> stress;          ///< Cauchy stress, Dim x Dim a cell, row-major [Pa]
+  std::vector<double> kinetic_energy;  ///< of all bodies, one number [J]
+  std::vector<double> momentum;        ///< of all bodies, Dim numbers [kg m/s]
+};
+
 /// The state after a step on its own mesh. References are valid during the observer's call only.
 template <int Dim>
 struct FrameView {
@@ -51,6 +67,7 @@ struct FrameView {
   const std::vector<Vec<Dim>>& obstacle_x;     ///< obstacle positions now [m]
   const std::vector<std::array<int, 2>>& obstacle_edges;
   const std::vector<std::array<int, 3>>& obstacle_triangles;
+  const AskedFields* asked = nullptr;  ///< null: nothing was asked for
 };
 
 }  // namespace itr

@@ -62,6 +62,14 @@ struct InitialCondition {
   SpaceTimeFunction<Dim> value;  ///< evaluated at t = 0
 };
 
+/// What observers are shown beside positions, velocities and elastic density. What is not asked for is not computed.
+struct FieldOptions {
+  bool contact_forces = false, friction_forces = false, reaction_forces = false;
+  bool von_mises = false, stress = false;
+  bool kinetic_energy = false, momentum = false;
+  bool any_forces() const { return contact_forces || friction_forces || reaction_forces; }
+};
+
 template <int Dim>
 struct Setup {
   Mesh<Dim> mesh;  ///< with body ids and facet tags
@@ -83,6 +91,7 @@ struct Setup {
   RemeshOptions remesh;
   LinearOptions linear;
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
+  FieldOptions fields;
   bool lump_mass = false;
 };
 

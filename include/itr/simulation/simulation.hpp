@@ -33,6 +33,7 @@ struct StepResult {
   bool ok = true;
   std::string reason;  ///< where not ok: why the step could not be done; the state is that before the step
   StepReport report;
+  NodalForces forces;  ///< those that the setup asks for
 };
 
 template <int Dim>
@@ -60,7 +61,7 @@ class Simulation {
   void observe(Observer&& observer) const {
     const FrameData data = frame_data();
     observer(FrameView<Dim>{state().mesh, data.x, data.v, data.elastic_density, data.obstacle_x, setup().obstacles.edges,
-                            setup().obstacles.triangles});
+                            setup().obstacles.triangles, &data.asked});
   }
 
  private:
@@ -68,8 +69,10 @@ class Simulation {
     VectorX x, v;
     std::vector<double> elastic_density;
     std::vector<Vec<Dim>> obstacle_x;
+    AskedFields asked;
   };
   FrameData frame_data() const;
+  void add_asked(FrameData& data) const;
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -49,6 +49,8 @@ class StepProblem {
 
   EnergyReport report(const VectorX& x);
   double min_distance(const VectorX& x);
+  /// At a solution x, those that the setup asks for.
+  NodalForces forces(const VectorX& x);
   /// What the integrator (the trapezoidal rule or implicit Euler) adds to the mechanical energy by a step to x [J]: its work
   /// is a mean of the forces at both ends times the way, the potential's is the integral along it. Friction and loads aside.
   double created_energy(const History& history, const VectorX& x);

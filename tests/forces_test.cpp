@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+// Forces, stresses, kinetic energy and momentum that observers ask for, against closed forms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "itr/simulation/simulation.hpp"
+
+namespace itr {
+namespace {
+
+constexpr double kGravity = 10, kDensity = 1000, kSize = 0.2;
+
+template <int Dim>
+Mesh<Dim> make_block();
+
+template <>
+Mesh<2> make_block<2>() {
+  constexpr int n = 3;
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i) rest.emplace_back(kSize * i / n, kSize * j / n);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const int a = j * (n + 1) + i, b = a + 1, c = a + n + 2, d = a + n + 1;
+      cells.push_back({a, b, c});
+      cells.push_back({a, c, d});
+    }
+  return Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1));
+}
+
+/// A cube of six tetrahedra around its diagonal.
+template <>
+Mesh<3> make_block<3>() {
+  std::vector<Vec<3>> rest;
+  for (int i = 0; i < 8; ++i) rest.emplace_back(kSize * (i & 1), kSize * (i >> 1 & 1), kSize * (i >> 2 & 1));
+  const std::vector<std::array<int, 4>> cells = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
+                                                 {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
+  return Mesh<3>(rest, cells, std::vector<int>(6, 1));
+}
+
+template <int Dim>
+Setup<Dim> block() {
+  Setup<Dim> setup;
+  setup.mesh = make_block<Dim>();
+  for (int f = 0; f < setup.mesh.facet_slots(); ++f) {  // 1: left, 2: top, 3: others
+    double left = 0, top = 0;
+    for (const int v : setup.mesh.facet(f)) {
+      left = std::max(left, setup.mesh.rest(v)[0]);
+      top = std::max(top, kSize - setup.mesh.rest(v)[1]);
+    }
+    setup.mesh.set_facet_tag(f, left < 1e-9 ? 1 : top < 1e-9 ? 2 : 3);
+  }
+  setup.materials[1] = {.youngs_modulus = 1e5, .poisson_ratio = 0.3, .density = kDensity};
+  setup.body_acceleration = [](const Vec<Dim>&, double) { return Vec<Dim>(-kGravity * Vec<Dim>::Unit(1)); };
+  setup.time = {.dt = 0.01, .steps = 10};
+  setup.newton.step_tolerance = 1e-11;
+  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 1e-12;
+  setup.fields = {true, true, true, true, true, true, true};
+  return setup;
+}
+
+template <int Dim>
+double weight() {
+  return kDensity * kGravity * std::pow(kSize, Dim);
+}
+
+/// A table half a d-hat below the block.
+template <int Dim>
+void add_table(Setup<Dim>& setup) {
+  constexpr double dhat = 1e-3;
+  const double y = -dhat / 2;
+  auto& table = setup.obstacles;
+  if constexpr (Dim == 2) {
+    table.rest = {{-1, y}, {1, y}};
+    table.edges = {{0, 1}};
+  } else {
+    table.rest = {{-1, y, -1}, {1, y, -1}, {1, y, 1.1}, {-1, y, 1}};
+    table.triangles = {{0, 2, 1}, {0, 3, 2}};
+  }
+  table.motion.assign(table.rest.size(), kNone);
+  setup.contact = {.enabled = true, .activation_distance = dhat, .convergent = true, .barrier_stiffness = 1e6};
+}
+
+template <int Dim>
+AskedFields asked(const Simulation<Dim>& simulation) {
+  AskedFields fields;
+  simulation.observe([&](const FrameView<Dim>& frame) { fields = *frame.asked; });
+  return fields;
+}
+
+template <int Dim>
+Vec<Dim> sum(const VectorX& field) {
+  Vec<Dim> total = Vec<Dim>::Zero();
+  for (Eigen::Index i = 0; i < field.size(); i += Dim) total += field.segment<Dim>(i);
+  return total;
+}
+
+template <int Dim>
+AskedFields after_one_step(const Setup<Dim>& setup) {
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  const StepResult result = simulation.advance();
+  EXPECT_TRUE(result.ok) << result.reason;
+  return asked(simulation);
+}
+
+/// Held sideways only, so that the table alone carries it.
+template <int Dim>
+void expect_table_carries_weight() {
+  Setup<Dim> setup = block<Dim>();
+  add_table(setup);
+  setup.time.quasistatic = true;
+  DirichletCondition<Dim> guide{1, {}, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); }};
+  guide.components.fill(true);
+  guide.components[1] = false;
+  setup.dirichlet = {guide};
+  const AskedFields fields = after_one_step(setup);
+  EXPECT_NEAR(sum<Dim>(fields.forces.contact)[1], weight<Dim>(), 1e-7 * weight<Dim>());
+  EXPECT_NEAR(sum<Dim>(fields.forces.reaction)[1], 0, 1e-9);
+  EXPECT_NEAR((sum<Dim>(fields.forces.contact) + sum<Dim>(fields.forces.reaction))[0], 0, 1e-6);
+  EXPECT_EQ(fields.forces.friction.norm(), 0);
+}
+
+TEST(Forces, TableCarriesTheWeightOfABlock2D) { expect_table_carries_weight<2>(); }
+TEST(Forces, TableCarriesTheWeightOfABlock3D) { expect_table_carries_weight<3>(); }
+
+template <int Dim>
+void expect_support_carries_weight() {
+  Setup<Dim> setup = block<Dim>();
+  setup.time.quasistatic = true;
+  setup.fields.contact_forces = setup.fields.friction_forces = false;
+  DirichletCondition<Dim> hook{2, {}, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); }};
+  hook.components.fill(true);
+  setup.dirichlet = {hook};
+  const AskedFields fields = after_one_step(setup);
+  EXPECT_LT((sum<Dim>(fields.forces.reaction) - weight<Dim>() * Vec<Dim>::Unit(1)).norm(), 1e-8 * weight<Dim>());
+  EXPECT_EQ(fields.forces.contact.size(), 0);
+  for (int v = 0; v < setup.mesh.vertex_slots(); ++v)
+    if (setup.mesh.rest(v)[1] < kSize - 1e-9) EXPECT_EQ((fields.forces.reaction.segment<Dim>(Dim * v).norm()), 0) << v;
+}
+
+TEST(Forces, SupportCarriesTheWeightOfAHangingBlock2D) { expect_support_carries_weight<2>(); }
+TEST(Forces, SupportCarriesTheWeightOfAHangingBlock3D) { expect_support_carries_weight<3>(); }
+
+/// A block that slides: friction is mu times the normal force, against the motion, and all forces change the momentum.
+template <int Dim>
+void expect_coulomb() {
+  Setup<Dim> setup = block<Dim>();
+  add_table(setup);
+  constexpr double mu = 0.3;
+  // In space the block widens as it lands, so that vertices slip a little sideways too: at an angle below 0.02.
+  constexpr double kDeviation = Dim == 3 ? 0.02 * 0.02 / 2 : 0;
+  setup.contact.friction_coefficient = mu;
+  setup.contact.friction_iterations = 30;
+  setup.contact.friction_tolerance = 1e-9;
+  setup.initial_velocity.push_back({1, [](const Vec<Dim>&, double) { return Vec<Dim>(2 * Vec<Dim>::Unit(0)); }});
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  Vec<Dim> momentum = Eigen::Map<const Vec<Dim>>(asked(simulation).momentum.data());
+  EXPECT_NEAR(momentum[0], 2 * weight<Dim>() / kGravity, 1e-12 * weight<Dim>());
+  for (int step = 1; step <= 10; ++step) {
+    const StepResult result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    const AskedFields fields = asked(simulation);
+    const Vec<Dim> normal = sum<Dim>(fields.forces.contact), friction = sum<Dim>(fields.forces.friction);
+    EXPECT_LE(-friction[0], mu * normal[1] + 1e-6 * weight<Dim>()) << step;
+    EXPECT_GE(-friction[0], (1 - kDeviation) * mu * normal[1] - 1e-6 * weight<Dim>()) << step;
+    const Vec<Dim> next = Eigen::Map<const Vec<Dim>>(fields.momentum.data());
+    const Vec<Dim> change = (next - momentum) / setup.time.dt;
+    EXPECT_LT((change - (normal + friction - weight<Dim>() * Vec<Dim>::Unit(1))).norm(), 1e-5 * weight<Dim>()) << step;
+    momentum = next;
+  }
+}
+
+TEST(Forces, SlidingFrictionIsCoulombs2D) { expect_coulomb<2>(); }
+TEST(Forces, SlidingFrictionIsCoulombs3D) { expect_coulomb<3>(); }
+
+/// Neo-Hookean, stretched along one axis: sigma = (mu (F F^T - I) + lambda ln J I) / J.
+template <int Dim>
+void expect_stress_of_stretch(bool plane_strain) {
+  constexpr double stretch = 1.2;
+  Setup<Dim> setup = block<Dim>();
+  setup.materials[1].plane_strain = plane_strain;
+  setup.initial_displacement.push_back(
+      {1, [](const Vec<Dim>& X, double) { return Vec<Dim>((stretch - 1) * X[0] * Vec<Dim>::Unit(0)); }});
+  linear::Registry registry;
+  const AskedFields fields = asked(Simulation<Dim>(setup, registry));
+  const double mu = setup.materials[1].lame_mu(), lambda = setup.materials[1].lame_lambda(Dim);
+  const double along = (mu * (stretch * stretch - 1) + lambda * std::log(stretch)) / stretch;
+  const double across = lambda * std::log(stretch) / stretch, out = Dim == 3 || plane_strain ? across : 0;
+  const double von_mises =
+      std::sqrt(0.5 * (std::pow(along - across, 2) + std::pow(across - out, 2) + std::pow(out - along, 2)));
+  ASSERT_EQ(fields.von_mises.size(), static_cast<std::size_t>(setup.mesh.num_cells()));
+  ASSERT_EQ(fields.stress.size(), Dim * Dim * fields.von_mises.size());
+  for (std::size_t c = 0; c < fields.von_mises.size(); ++c) {
+    EXPECT_NEAR(fields.von_mises[c], von_mises, 1e-9 * along);
+    for (int i = 0; i < Dim; ++i)
+      for (int j = 0; j < Dim; ++j)
+        EXPECT_NEAR(fields.stress[Dim * Dim * c + Dim * i + j], i != j ? 0 : i == 0 ? along : across, 1e-9 * along);
+  }
+}
+
+TEST(Stress, OfAStretchInPlaneStress) { expect_stress_of_stretch<2>(false); }
+TEST(Stress, OfAStretchInPlaneStrain) { expect_stress_of_stretch<2>(true); }
+TEST(Stress, OfAStretchInSpace) { expect_stress_of_stretch<3>(false); }
+
+TEST(Totals, OfARotatingBlock) {
+  auto setup = block<2>();
+  setup.initial_velocity.push_back({1, [](const Vec<2>& X, double) { return Vec<2>(1 - X[1], X[0]); }});
+  linear::Registry registry;
+  const AskedFields fields = asked(Simulation<2>(setup, registry));
+  const double mass = kDensity * kSize * kSize, inertia = mass * kSize * kSize / 6, half = kSize / 2;
+  const Vec<2> v(1 - half, half);  // of the centre of mass
+  EXPECT_NEAR(fields.kinetic_energy.at(0), 0.5 * mass * v.squaredNorm() + 0.5 * inertia, 1e-12 * mass);
+  EXPECT_NEAR(fields.momentum.at(0), mass * v[0], 1e-12 * mass);
+  EXPECT_NEAR(fields.momentum.at(1), mass * v[1], 1e-12 * mass);
+}
+
+TEST(Fields, ThatNobodyAsksForAreNotThere) {
+  auto setup = block<2>();
+  setup.fields = {};
+  const AskedFields fields = after_one_step(setup);
+  EXPECT_EQ(fields.forces.contact.size() + fields.forces.friction.size() + fields.forces.reaction.size(), 0);
+  EXPECT_TRUE(fields.von_mises.empty() && fields.stress.empty() && fields.kinetic_energy.empty() && fields.momentum.empty());
+}
+
+}  // namespace
+}  // namespace itr
