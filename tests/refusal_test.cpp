@@ -192,6 +192,12 @@ TEST_F(Refusals, GoodSceneRuns) {
   EXPECT_EQ(status, 0) << message;
 }
 
+TEST_F(Refusals, NumbersThatNoDoubleHolds) {  // found by fuzz_input
+  const auto [status, message] = run("{\"time\": {\"dt\": 1e999}}");
+  EXPECT_EQ(status, 2) << message;
+  EXPECT_NE(message.find("1e999"), std::string::npos) << message;
+}
+
 TEST_F(Refusals, WrongJsonNamesTheLine) {
   const auto [status, message] = run("{\n  \"geometry\": [\n");
   EXPECT_EQ(status, 2) << message;

@@ -32,6 +32,8 @@ Json parse(const std::string& text, const fs::path& file) {
     std::string what = error.what();  // "[json.exception.parse_error.101] parse error at line 3, column 5: syntax error ..."
     if (const auto colon = what.find(": "); colon != std::string::npos) what = what.substr(colon + 2);
     throw InputError({file.string(), "line " + std::to_string(line), what, "JSON"});
+  } catch (const Json::out_of_range& error) {  // a number that no double holds
+    throw InputError({file.string(), "/", error.what(), "finite numbers"});
   }
 }
 
@@ -108,7 +110,7 @@ void apply_override(Json& args, const Override& override) {
   Json value;
   try {
     value = Json::parse(override.value);
-  } catch (const Json::parse_error&) {
+  } catch (const Json::exception&) {
     refuse_override(override, "'" + override.value + "'", "JSON (a string needs its quotes: '\"text\"')");
   }
   Json* place = &args;

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: MIT
+// Reads mutated scenes and meshes: whatever is in a file, reading it ends, in an InputError or a setup. Meant to run under
+// the sanitizers, which turn what is wrong into a crash.
+// usage: fuzz_input [SECONDS [SEED]]
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+#include "itr/core/error.hpp"
+#include "itr/core/timer.hpp"
+#include "itr/scene/scene.hpp"
+#include "itr/simulation/simulation.hpp"
+#include "itr/simulation/step.hpp"
+
+namespace itr {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Random = std::mt19937;
+
+constexpr unsigned kLongestCase = 20;     ///< [s]
+constexpr double kMostMemoryGrowth = 10;  ///< by what the unmutated scenes need
+
+int below(Random& random, std::size_t n) { return static_cast<int>(random() % std::max<std::size_t>(n, 1)); }
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// Changes some bytes, cuts, repeats or takes out a part.
+std::string mutate_bytes(std::string text, Random& random) {
+  static const char* const kParts[] = {"-1", "1e308", "nan", "99999999999", "0",         "\n",
+                                       "{",  "]",     "\"",  "$Elements\n", "f 1 1 1\n", "\xff"};
+  for (int n = 1 + below(random, 4); n > 0 && !text.empty(); --n) {
+    const std::size_t at = below(random, text.size()), length = below(random, std::min<std::size_t>(text.size() - at, 40));
+    switch (random() % 6) {
+      case 0:
+        text[at] = static_cast<char>(random());
+        break;
+      case 1:
+        text.resize(at);
+        break;
+      case 2:
+        text.erase(at, length);
+        break;
+      case 3:
+        text.insert(at, text.substr(at, length));
+        break;
+      case 4:
+        text.insert(at, kParts[below(random, std::size(kParts))]);
+        break;
+      default:
+        text.replace(at, length, kParts[below(random, std::size(kParts))]);
+    }
+  }
+  return text;
+}
+
+void collect(Json& value, std::vector<Json*>& all) {
+  all.push_back(&value);
+  if (value.is_structured())
+    for (auto& child : value) collect(child, all);
+}
+
+/// Puts values of other kinds and sizes, or copies from elsewhere, in place of some values; drops and renames keys.
+Json mutate_values(Json scene, Random& random) {
+  static const Json kValues[] = {nullptr,
+                                 true,
+                                 0,
+                                 -1,
+                                 1,
+                                 2,
+                                 1e-300,
+                                 1e308,
+                                 -0.0,
+                                 0.5,
+                                 4294967296,
+                                 "",
+                                 "x",
+                                 "1/0",
+                                 "sqrt(-1)",
+                                 "t^t^t",
+                                 "all",
+                                 "((((((",
+                                 Json::array(),
+                                 Json::object(),
+                                 {1, 2},
+                                 {1, "y"},
+                                 {1, 2, 3, 4},
+                                 {{"a", 1}},
+                                 "NeoHookean",
+                                 "meshes/line.obj",
+                                 "meshes",
+                                 "BDF6"};
+  for (int n = 1 + below(random, 3); n > 0; --n) {
+    std::vector<Json*> all;
+    collect(scene, all);
+    Json& target = *all[below(random, all.size())];
+    switch (random() % 5) {
+      case 0:
+      case 1:
+        target = kValues[below(random, std::size(kValues))];
+        break;
+      case 2:
+        target = Json(*all[below(random, all.size())]);
+        break;
+      case 3:
+        if (target.is_object() && !target.empty()) target.erase(std::next(target.begin(), below(random, target.size())));
+        break;
+      default:
+        if (target.is_structured() && target.is_array())
+          target.push_back(kValues[below(random, std::size(kValues))]);
+        else if (target.is_number())
+          target = target.get<double>() * (random() % 2 ? -1 : 1e9);
+    }
+  }
+  return scene;
+}
+
+/// Refinement and copies may ask for as much memory as they like.
+void limit_size(Json& scene) {
+  if (!scene.is_object() || !scene.contains("geometry") || !scene["geometry"].is_structured()) return;
+  const auto limit = [](Json& geometry) {
+    if (!geometry.is_object()) return;
+    geometry.erase("array");
+    if (geometry.contains("n_refs") && geometry["n_refs"].is_number() && geometry["n_refs"] > 2) geometry["n_refs"] = 2;
+  };
+  limit(scene["geometry"]);
+  for (auto& geometry : scene["geometry"]) limit(geometry);
+}
+
+class Fuzzer {
+ public:
+  Fuzzer(const fs::path& examples, unsigned seed)
+      : random_(seed), folder_(fs::temp_directory_path() / ("itr_fuzz_" + std::to_string(getpid()))) {
+    fs::create_directories(folder_ / "meshes");
+    for (const auto& entry : fs::directory_iterator(examples))
+      if (entry.path().extension() == ".json") scenes_.push_back(Json::parse(text_of(entry.path())));
+    for (const auto& entry : fs::directory_iterator(examples / "meshes"))
+      meshes_.emplace_back(entry.path().filename().string(), text_of(entry.path()));
+    std::sort(meshes_.begin(), meshes_.end());
+    for (const auto& [name, text] : meshes_) write("meshes/" + name, text);
+    for (const Json& scene : scenes_) {
+      write("scene.json", scene.dump());
+      read();
+    }
+    least_memory_ = peak_rss_mb();
+  }
+  ~Fuzzer() { fs::remove_all(folder_); }
+
+  /// Returns whether memory stayed within bounds.
+  bool run_case() {
+    Json scene = scenes_[below(random_, scenes_.size())];
+    const int kind = below(random_, 3);
+    if (kind == 0) scene = mutate_values(scene, random_);
+    limit_size(scene);
+    const std::string text = scene.dump(1);
+    write("scene.json", kind == 1 ? without_growth(mutate_bytes(text, random_)) : text);
+    const auto& [name, mesh] = meshes_[below(random_, meshes_.size())];
+    if (kind == 2) write("meshes/" + name, mutate_bytes(mesh, random_));
+    alarm(kLongestCase);
+    read();
+    alarm(0);
+    if (kind == 2) write("meshes/" + name, mesh);
+    return peak_rss_mb() < kMostMemoryGrowth * least_memory_;
+  }
+
+  int accepted() const { return accepted_; }
+  const fs::path& folder() const { return folder_; }
+
+ private:
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
+
+  static std::string without_growth(const std::string& text) {
+    try {
+      Json scene = Json::parse(text);
+      limit_size(scene);
+      return scene.dump(-1, ' ', false, Json::error_handler_t::replace);
+    } catch (const Json::exception&) {
+      return text;
+    }
+  }
+
+  void read() {
+    try {
+      const scene::Scene scene = scene::read(folder_ / "scene.json");
+      std::visit([&](const auto& setup) { start(setup); }, scene.setup);
+      ++accepted_;
+    } catch (const InputError&) {
+    }
+  }
+
+  template <int Dim>
+  void start(const Setup<Dim>& setup) {
+    linear::Registry registry;
+    Simulation<Dim>(setup, registry).initial_report();
+  }
+
+  Random random_;
+  fs::path folder_;
+  std::vector<Json> scenes_;
+  std::vector<std::pair<std::string, std::string>> meshes_;
+  double least_memory_ = 0;
+  int accepted_ = 0;
+};
+
+}  // namespace
+}  // namespace itr
+
+int main(int argc, char** argv) {
+  const double seconds = argc > 1 ? std::atof(argv[1]) : 10;
+  const unsigned seed = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 1;
+  itr::Fuzzer fuzzer(std::filesystem::path(ITR_SOURCE_DIR) / "examples", seed);
+  const double start = itr::seconds_now();
+  int cases = 0;
+  try {
+    for (; itr::seconds_now() - start < seconds; ++cases)
+      if (!fuzzer.run_case()) throw std::runtime_error("more than ten times the memory");
+  } catch (const std::exception& error) {
+    std::printf("case %d of seed %u: %s\n", cases, seed, error.what());
+    return 1;
+  }
+  std::printf("%d cases, %d of them accepted, no crash\n", cases, fuzzer.accepted());
+}

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Opens the series of short runs with the reader of meshio and compares it with the frames.
+
+usage: xdmf_test.py ITR EXAMPLES
+"""
+
+import pathlib
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as ElementTree
+
+import h5py
+import meshio
+import numpy
+
+ASKED = ("contact_forces", "friction_forces", "reaction_forces", "scalar_values", "tensor_values")
+CELLS = {2: "triangle", 3: "tetra"}
+
+
+def run(itr, scene, directory, sets):
+    command = [itr, "run", scene, "-o", directory, "--threads", "1"]
+    for text in sets + [f"/output/paraview/options/{name}=true" for name in ASKED]:
+        command += ["--set", text]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def items(grid):
+    """Name -> array of every attribute, with HyperSlabs carried out, as XDMF defines them."""
+    for attribute in grid.findall("Attribute"):
+        yield attribute, attribute.find("DataItem")
+
+
+def read_item(directory, item):
+    if item.get("ItemType") != "HyperSlab":
+        name, dataset = item.text.strip().split(":")
+        with h5py.File(directory / name) as file:
+            values = file[dataset][()]
+        shape = tuple(int(n) for n in item.get("Dimensions").split())
+        return values.reshape(shape)
+    selection, source = item.findall("DataItem")
+    start, stride, count = numpy.array(selection.text.split(), int).reshape(3, 2)
+    values = read_item(directory, source)
+    part = values[start[0] : start[0] + count[0] * stride[0] : stride[0], start[1] : start[1] + count[1] * stride[1] : stride[1]]
+    return part.reshape(int(item.get("Dimensions")))
+
+
+def check_attributes(directory, frames):
+    """Every attribute of every grid: its data are there, with the shape that it says."""
+    root = ElementTree.parse(directory / "sim.xdmf").getroot()
+    grids = root.findall("./Domain/Grid/Grid")
+    assert len(grids) == len(frames), (len(grids), len(frames))
+    for grid, frame in zip(grids, frames):
+        with h5py.File(frame) as file:
+            assert float(grid.find("Time").get("Value")) == file.attrs["t"]
+            names = {attribute.get("Name") for attribute, _ in items(grid)}
+            for field in file["fields"]:
+                assert field == "x" or any(n == field or n.startswith(field + "_") for n in names), (field, names)
+            sizes = {"Node": len(file["fields/x"]), "Cell": len(file["mesh/body"])}
+        for attribute, item in items(grid):
+            assert len(read_item(directory, item)) == sizes[attribute.get("Center")], attribute.get("Name")
+
+
+def check_meshio(directory, frames):
+    """meshio reads meshes and whole arrays of each step; it knows no HyperSlabs, which are therefore taken out for it."""
+    tree = ElementTree.parse(directory / "sim.xdmf")
+    for number, frame in enumerate(frames):
+        single = ElementTree.fromstring('<Xdmf Version="3.0"><Domain/></Xdmf>')
+        grid = tree.getroot().findall("./Domain/Grid/Grid")[number]
+        grid.remove(grid.find("Time"))
+        for attribute, item in list(items(grid)):
+            if item.get("ItemType") == "HyperSlab":
+                grid.remove(attribute)
+        single.find("Domain").append(grid)
+        path = directory / "single.xdmf"
+        ElementTree.ElementTree(single).write(path)
+        mesh = meshio.read(path)
+        with h5py.File(frame) as file:
+            x = file["fields/x"][()]
+            assert numpy.array_equal(mesh.points[:, : x.shape[1]], x)
+            assert numpy.array_equal(mesh.cells_dict[CELLS[x.shape[1]]], file["mesh/simplices"][()])
+            assert numpy.array_equal(mesh.cell_data["von_mises"][0], file["fields/von_mises"][()])
+            assert numpy.array_equal(mesh.cell_data["body"][0], file["mesh/body"][()])
+    return mesh
+
+
+def main(itr, examples):
+    examples = pathlib.Path(examples)
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        (folder / "tet.msh").write_text(
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+            "$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n"
+        )
+        (folder / "tet.json").write_text(
+            '{"geometry": [{"mesh": "tet.msh"}], "materials": {"type": "NeoHookean", "E": 1e5, "nu": 0.3, "rho": 1000},'
+            '"boundary_conditions": {"rhs": [0, 9.81, 0]}, "time": {"dt": 0.01, "time_steps": 3}}'
+        )
+        runs = {
+            "masticator": (examples / "masticator.json", ['/time={"dt":0.05,"time_steps":12}']),
+            "tet": (folder / "tet.json", []),
+        }
+        for name, (scene, sets) in runs.items():
+            directory = folder / name
+            run(itr, scene, directory, sets)
+            frames = sorted((directory / "frames").glob("*.h5"))
+            assert len(frames) == (13 if name == "masticator" else 4), len(frames)
+            check_attributes(directory, frames)
+            mesh = check_meshio(directory, frames)
+            if name == "tet":
+                assert mesh.cell_data["stress"][0].shape[-1] in (3, 9)
+                assert mesh.point_data["reaction_force"].shape == (4, 3)
+            print(f"{name}: {len(frames)} grids, last with {len(mesh.points)} points")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
