@@ -79,7 +79,7 @@ def test_one_message_for_a_solver_without_mpi(scratch):
     for solver in ("eigen", "auto"):
         done = itr_run(2, scratch / "wrong", "--solver", solver)
         assert done.returncode == 2, done.returncode
-        assert done.stderr.count("itr: linear solver") == 1, done.stderr
+        assert done.stderr.count("which does not use MPI") == 1, done.stderr
         assert "does not use MPI" in done.stderr and "mumps" in done.stderr, done.stderr
 
 

@@ -158,6 +158,16 @@ class Run {
   bool is_saved_ = false;  ///< whether the present state is
 };
 
+/// The name of the solver that is there; a wrong one is an error where it was asked for.
+std::string choose_solver_name(const LinearOptions& linear, const RunOptions& options, linear::Registry& registry) {
+  try {
+    return linear::choose_name(linear, registry);
+  } catch (const InputError& error) {
+    const char* place = options.solver.empty() ? "/solver/linear/solver" : "--solver";
+    throw InputError({"", place, error.parts().found, error.parts().expected});
+  }
+}
+
 }  // namespace
 
 int run(const RunOptions& options) {
@@ -174,7 +184,7 @@ int run(const RunOptions& options) {
         if (!options.solver.empty()) setup.linear.solvers = {options.solver};
         setup.linear.dump_folder = options.dump_folder;
         setup.linear.dump_every = options.dump_every;
-        const std::string solver = linear::choose_name(setup.linear, registry);
+        const std::string solver = choose_solver_name(setup.linear, options, registry);
         if (this_launch().rank > 0) return serve(registry, solver);
         const RankSession session(registry, solver);
         return Run(std::move(setup), scene, directory, options, num_threads(), registry).run();
