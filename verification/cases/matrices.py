@@ -3,7 +3,7 @@
 import numpy as np
 import ufl
 from harness.fenicsx import Body
-from harness.materials import laws
+from harness.materials import laws, words
 from harness.probe import matrices
 from harness.scenes import box_mesh, scene, write_mesh
 from harness.suite import Result
@@ -64,7 +64,7 @@ def results(context):
             errors = {}
             for seed, strength in enumerate([0.005, 0.02, 0.05]):
                 u = random_state(points, cells, seed, strength)
-                ours = matrices(context, f"{dim}d-{name.replace(', ', '-').replace(' ', '-')}-{seed}", content, u)
+                ours = matrices(context, f"{dim}d-{words(name)}-{seed}", content, u)
                 found = {"mass matrix": entry_error(ours["mass"], body.mass_matrix),
                          "tangent": entry_error(ours["tangent"], body.tangent(u)),
                          "internal force": vector_error(ours["force"], body.internal_force(u)),

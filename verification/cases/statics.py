@@ -3,7 +3,7 @@
 import numpy as np
 import ufl
 from harness.fenicsx import Body
-from harness.materials import laws
+from harness.materials import laws, words
 from harness.scenes import box_mesh, run_scene, scene, write_mesh
 from harness.suite import Result
 
@@ -43,7 +43,7 @@ def results(context):
                                 "rhs": [0, -GRAVITY, 0][:dim],
                                 "dirichlet_boundary": [{"id": 1, "value": [0, f"{STRETCH} * y", 0][:dim]}],
                                 "neumann_boundary": [{"id": 3, "value": PULL[:dim]}]})
-            run = run_scene(context, f"{dim}d-{name.replace(', ', '-').replace(' ', '-')}", content)
+            run = run_scene(context, f"{dim}d-{words(name)}", content)
             ours = run.last().u.ravel()
             yield Result(f"{dim}D, {name}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()), TOLERANCE,
                          note=f"{len(points)} vertices, up to {np.abs(u).max():.3g} m")
