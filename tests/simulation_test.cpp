@@ -519,6 +519,18 @@ TEST(Simulation, HeldVerticesThatCannotArriveEndTheStepWithTheReason) {
     EXPECT_NE(result.reason.find("held vertices"), std::string::npos) << "reason: " << result.reason;
     EXPECT_EQ(simulation.state().step, 0);
     EXPECT_EQ(simulation.state().history.x[0], start);
+TEST(Simulation, DirichletMayMoveByLessThanRoundOff) {
+  auto setup = free_square(3);
+  setup.newton.first_gradient_tolerance = setup.newton.gradient_tolerance = 1e-300;
+  setup.newton.step_tolerance = 1e-11;
+  setup.time = {.dt = 0.0025, .steps = 3};
+  setup.dirichlet.push_back(
+      {1, {true, true}, [](const Vec<2>& X, double t) { return Vec<2>(std::pow(3 * t, 8) * (X[0] + 0.2 * X[1]), 0); }});
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  while (!simulation.finished()) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
   }
 }
 

@@ -298,8 +298,10 @@ class Minimizer {
           if (dofs_.unknown[k] == kNone) candidate_[k] = target_[k];
       const double value = timed_value(candidate_);
       if (!std::isfinite(value)) continue;
+      // A motion of held dofs within the tolerance of positions may change energies by less than their round-off.
+      const bool negligible = advancing && step == 1 && motion_.step.norm() < options_.step_tolerance;
       const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
-      if (!acceptable(merit_change, value, step, merit_slope, advancing)) continue;
+      if (!negligible && !acceptable(merit_change, value, step, merit_slope, advancing)) continue;
       const bool straight = !advancing && step == 1 && value - value_ < kStraight * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
       accept(value);
