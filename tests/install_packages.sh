@@ -14,7 +14,7 @@ packages=(
   libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
   python3 python3-h5py python3-matplotlib python3-numpy python3-pil
-  python3-dolfinx python3-meshio python3-scipy
+  python3-dolfinx python3-meshio python3-scipy python3-sympy
 )
 
 missing=()

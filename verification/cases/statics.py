@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A clamped body of two materials that hangs in gravity and is pulled at its end."""
+"""A clamped body of two materials in gravity that is pulled at its end: loads grow over ten quasi-static steps, and all at
+once for the law that has a solution to find from anywhere (others may invert on the way)."""
 import numpy as np
 import ufl
 from harness.fenicsx import Body
@@ -14,7 +15,7 @@ TOLERANCE = 1e-9
 NEEDS = ("dolfinx", "meshio", "h5py", "scipy")
 
 MESHES = {2: ([20, 6], [1.0, 0.3]), 3: ([8, 3, 3], [1.0, 0.3, 0.3])}
-PULL, GRAVITY, STRETCH = [120.0, -20.0, 10.0], -0.6, 0.02
+PULL, GRAVITY, STRETCH = [60.0, -10.0, 5.0], -0.3, 0.01  # St. Venant-Kirchhoff inverts under twice as much
 
 
 def results(context):
@@ -38,14 +39,24 @@ def results(context):
             u = np.zeros(points.size)
             for share in np.linspace(0.1, 1, 10):  # loads step by step, so that Newton finds its way
                 u = body.solve(share * load, held, share * targets.ravel(), u)
-            content = scene(mesh, [{"id": k + 1, **material} for k, material in enumerate(law.scene)],
-                            boundary_conditions={
-                                "rhs": [0, -GRAVITY, 0][:dim],
-                                "dirichlet_boundary": [{"id": 1, "value": [0, f"{STRETCH} * y", 0][:dim]}],
-                                "neumann_boundary": [{"id": 3, "value": PULL[:dim]}]})
-            run = run_scene(context, f"{dim}d-{words(name)}", content)
-            ours = run.last().u.ravel()
-            yield Result(f"{dim}D, {name}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()), TOLERANCE,
-                         note=f"{len(points)} vertices, up to {np.abs(u).max():.3g} m")
-            energy = body.energy(u)
-            yield Result(f"{dim}D, {name}, elastic energy", abs(run.steps[-1]["energy"]["elastic"] / energy - 1), TOLERANCE)
+            for kind in ("quasi-static", "static") if name.startswith("neo") else ("quasi-static",):
+                content = scene_of(mesh, law, dim, kind)
+                run = run_scene(context, f"{dim}d-{words(name)}-{kind}", content)
+                ours = run.last().u.ravel()
+                yield Result(f"{dim}D, {name}, {kind}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()),
+                             TOLERANCE, note=f"{len(points)} vertices, up to {np.abs(u).max():.3g} m")
+                energy = body.energy(u)
+                yield Result(f"{dim}D, {name}, {kind}, elastic energy",
+                             abs(run.steps[-1]["energy"]["elastic"] / energy - 1), TOLERANCE)
+
+
+def scene_of(mesh, law, dim, kind):
+    share = "1" if kind == "static" else "t"
+    content = scene(mesh, [{"id": k + 1, **material} for k, material in enumerate(law.scene)],
+                    boundary_conditions={
+                        "rhs": [0, f"{-GRAVITY} * {share}", 0][:dim],
+                        "dirichlet_boundary": [{"id": 1, "value": [0, f"{STRETCH} * y * {share}", 0][:dim]}],
+                        "neumann_boundary": [{"id": 3, "value": [f"{pull} * {share}" for pull in PULL[:dim]]}]})
+    if kind == "quasi-static":
+        content["time"] = {"dt": 0.1, "tend": 1, "quasistatic": True}
+    return content

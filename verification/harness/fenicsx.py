@@ -96,7 +96,7 @@ class Space:
 class Body(Space):
     """A hyperelastic body: internal forces and their tangent, consistent forces of loads.
 
-    `law(F, *parameters, dim)` is the strain energy density in UFL; `parameters` and `rho` are numbers, or arrays of one
+    `law(F, *parameters, dim, ufl)` is the strain energy density; `parameters` and `rho` are numbers, or arrays of one
     value a cell; `sides` names facets by predicates of coordinates.
     """
 
@@ -106,7 +106,7 @@ class Body(Space):
         constants = [self.coefficient(p) for p in parameters]
         self.u = fem.Function(self.V)
         F = ufl.Identity(self.dim) + ufl.grad(self.u)
-        energy = law(F, *constants, self.dim) * ufl.dx(metadata={"quadrature_degree": 1})  # constant in a cell
+        energy = law(F, *constants, self.dim, ufl) * ufl.dx(metadata={"quadrature_degree": 1})  # constant in a cell
         test = ufl.TestFunction(self.V)
         gradient = ufl.derivative(energy, self.u, test)
         self.energy_form = fem.form(energy)

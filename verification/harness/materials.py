@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Material laws in UFL, from their formulas (scene-format, section 3): what our derivatives are held against."""
+"""Material laws from their formulas (scene-format, section 3), written with the operators of a module `m`: `ufl`, or the
+symbolic one of harness.manufactured. They are what our derivatives are held against."""
 import dataclasses
-
-import ufl
 
 
 def lame(E, nu, dim, plane_strain=False):
@@ -10,53 +9,54 @@ def lame(E, nu, dim, plane_strain=False):
     return E / (2 * (1 + nu)), nu * E / (1 - nu**2) if dim == 2 and not plane_strain else E * nu / ((1 + nu) * (1 - 2 * nu))
 
 
-def neo_hookean(F, mu, lmbda, dim):
-    J = ufl.det(F)
-    return mu / 2 * (ufl.tr(F.T * F) - dim - 2 * ufl.ln(J)) + lmbda / 2 * ufl.ln(J)**2
+def neo_hookean(F, mu, lmbda, dim, m):
+    J = m.det(F)
+    return mu / 2 * (m.tr(F.T * F) - dim - 2 * m.ln(J)) + lmbda / 2 * m.ln(J)**2
 
 
-def linear(F, mu, lmbda, dim):
-    e = ufl.sym(F) - ufl.Identity(dim)
-    return mu * ufl.inner(e, e) + lmbda / 2 * ufl.tr(e)**2
+def linear(F, mu, lmbda, dim, m):
+    e = m.sym(F) - m.Identity(dim)
+    return mu * m.inner(e, e) + lmbda / 2 * m.tr(e)**2
 
 
-def saint_venant(F, mu, lmbda, dim):
-    E = (F.T * F - ufl.Identity(dim)) / 2
-    return mu * ufl.inner(E, E) + lmbda / 2 * ufl.tr(E)**2
+def saint_venant(F, mu, lmbda, dim, m):
+    E = (F.T * F - m.Identity(dim)) / 2
+    return mu * m.inner(E, E) + lmbda / 2 * m.tr(E)**2
 
 
-def trace_of_stretch(F, dim):
+def trace_of_stretch(F, dim, m):
     """tr U of the polar decomposition F = R U, without it: the largest root of a polynomial of F's invariants."""
-    C, J = F.T * F, ufl.det(F)
-    I = ufl.tr(C)
+    C, J = F.T * F, m.det(F)
+    I = m.tr(C)
     if dim == 2:
-        return ufl.sqrt(I + 2 * J)
-    II = (I**2 - ufl.tr(C * C)) / 2
-    s = ufl.sqrt(3 * I)  # from above Newton cannot miss the largest root
+        return m.sqrt(I + 2 * J)
+    II = (I**2 - m.tr(C * C)) / 2
+    s = m.sqrt(3 * I)  # from above Newton cannot miss the largest root
     for _ in range(5):
         s = s - ((s**2 - I)**2 - 8 * J * s - 4 * II) / (4 * s * (s**2 - I) - 8 * J)
     return s
 
 
-def fixed_corotated(F, mu, lmbda, dim):
-    return mu * (ufl.tr(F.T * F) - 2 * trace_of_stretch(F, dim) + dim) + lmbda / 2 * (ufl.det(F) - 1)**2
+def fixed_corotated(F, mu, lmbda, dim, m):
+    trace = getattr(m, "trace_of_stretch", trace_of_stretch)
+    return mu * (m.tr(F.T * F) - 2 * trace(F, dim, m) + dim) + lmbda / 2 * (m.det(F) - 1)**2
 
 
-def isochoric_invariants(F, dim):
-    C, J = F.T * F, ufl.det(F)
+def isochoric_invariants(F, dim, m):
+    C, J = F.T * F, m.det(F)
     scaled = C / J**(2 / dim)
-    return ufl.tr(scaled), (ufl.tr(scaled)**2 - ufl.tr(scaled * scaled)) / 2
+    return m.tr(scaled), (m.tr(scaled)**2 - m.tr(scaled * scaled)) / 2
 
 
-def mooney_rivlin(F, c1, c2, k, dim):
-    I1, I2 = isochoric_invariants(F, dim)
-    return c1 * (I1 - dim) + c2 * (I2 - dim * (dim - 1) / 2) + k / 2 * ufl.ln(ufl.det(F))**2
+def mooney_rivlin(F, c1, c2, k, dim, m):
+    I1, I2 = isochoric_invariants(F, dim, m)
+    return c1 * (I1 - dim) + c2 * (I2 - dim * (dim - 1) / 2) + k / 2 * m.ln(m.det(F))**2
 
 
-def mooney_rivlin_3(F, c1, c2, c3, d1, dim):
-    I1, I2 = isochoric_invariants(F, dim)
+def mooney_rivlin_3(F, c1, c2, c3, d1, dim, m):
+    I1, I2 = isochoric_invariants(F, dim, m)
     return (c1 * (I1 - dim) + c2 * (I2 - dim * (dim - 1) / 2) + c3 * (I1 - dim) * (I2 - dim)
-            + d1 * (ufl.det(F) - 1)**2)
+            + d1 * (m.det(F) - 1)**2)
 
 
 @dataclasses.dataclass
