@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Sets up, builds and runs all tests but the ones labelled `long`. Needs Debian 12 and nothing else.
+# Sets up, builds and runs all tests but the ones labelled `long`, and the short form of the verification suite. Needs
+# Debian 12 and nothing else.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export DEBIAN_FRONTEND=noninteractive
@@ -14,3 +15,4 @@ fi
 cmake --preset release
 cmake --build --preset release -- -j "${ITR_JOBS:-2}"
 ctest --test-dir build/release --output-on-failure --no-tests=error -LE long
+python3 verification/run.py --quick

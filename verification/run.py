@@ -5,8 +5,7 @@
 python3 verification/run.py [--quick] [--case NAME]... [--build build/release] [--report DIR]
 
 A full run, or one of some cases, brings verification/report up to date; --quick writes into BUILD/verification, so that it
-never replaces figures of a full run. Exit status: 0 passed, 1 a case failed; with --skip-status N, N where nothing failed
-and a case could not run for want of a package.
+never replaces figures of a full run. Exit status: 0 passed, 1 a case failed.
 """
 import argparse
 import importlib
@@ -49,7 +48,6 @@ def parse():
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
     parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared", help="folder of the paper's scenes")
     parser.add_argument("--report", type=pathlib.Path, help="folder of the report")
-    parser.add_argument("--skip-status", type=int, default=0)
     return parser.parse_args()
 
 
@@ -67,7 +65,7 @@ def main():
     entries = json.loads(stored.read_text())["cases"] if stored.exists() else {}
     ran = {}
     for name in chosen:
-        folder = build / "verification-runs" / name
+        folder = build / ("verification-quick-runs" if options.quick else "verification-runs") / name
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         print(f"{name}", flush=True)
@@ -85,10 +83,7 @@ def main():
     by_status = {status: [n for n, e in ran.items() if e["status"] == status] for status in ("passed", "failed", "skipped")}
     print("; ".join(f"{len(names)} {status}" + (f" ({', '.join(names)})" if names and status != "passed" else "")
                     for status, names in by_status.items()) + f"; report in {report}")
-    if by_status["failed"]:
-        return 1
-    unable = [name for name in by_status["skipped"] if ran[name]["message"].startswith("not installed")]
-    return options.skip_status if unable else 0
+    return 1 if by_status["failed"] else 0
 
 
 if __name__ == "__main__":

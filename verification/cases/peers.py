@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""PolyFEM's regression scenes, by tests/peer_scenes.py."""
+import subprocess
+import sys
+
+from harness.suite import ROOT, Failure, Result
+
+TITLE = "Peers' scenes"
+QUANTITY = "largest deviation of five norms of the final displacement, relative"
+REFERENCE = "the values that PolyFEM stores with each scene"
+TOLERANCE = "each scene's own margin; refused scenes count as failed"
+NEEDS = ()
+QUICK = False  # some scenes take minutes
+
+
+def results(context):
+    program = ROOT / "tests/peer_scenes.py"
+    if not program.exists():
+        raise Failure(f"{program} is not there")
+    command = [sys.executable, str(program), "--itr", str(context.build / "bin/itr"), "--scenes",
+               str(context.shared / "peer-scenes")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in done.stdout.splitlines() if line.startswith("| ")]
+    if len(rows) < 2:
+        raise Failure(done.stderr)
+    for scene, status, seconds, detail in rows[1:]:
+        yield Result(scene, 0.0 if status == "pass" else 1.0, 0.0, status, "pass", f"{detail} ({seconds} s)")
