@@ -26,10 +26,12 @@ REMESH = {"enabled": True, "split": {"acceptance_tolerance": 0.02, "culling_thre
 
 
 def scene_of(mesh, rule, steps):
+    # Where shaking and coarsening make energy, steps of implicit Euler would take the place of Newmark's: not here.
+    integrator = {"type": rule, "energy_growth_limit": 1e300} if rule == "ImplicitNewmark" else rule
     return scene(mesh, {"type": "NeoHookean", "E": E, "nu": NU, "rho": RHO},
                  boundary_conditions={"rhs": [0, -GRAVITY],
                                       "dirichlet_boundary": [{"id": 1, "value": [0, f"{SHAKE} * sin(20 * t)"]}]},
-                 time={"dt": H, "time_steps": steps, "integrator": rule}, space={"remesh": REMESH})
+                 time={"dt": H, "time_steps": steps, "integrator": integrator}, space={"remesh": REMESH})
 
 
 class Reference:
@@ -84,7 +86,7 @@ def results(context):
     mesh = context.folder / "beam.msh"
     write_mesh(mesh, points, cells)
     for rule in RULES:
-        run = run_scene(context, rule, scene_of(mesh, rule, 10 if context.quick else 40))
+        run = run_scene(context, rule, scene_of(mesh, rule, 6 if context.quick else 40))
         done = {kind: sum(step[kind]["accepted"] for step in run.steps) for kind in ("splits", "collapses", "swaps", "smooths")}
         if not all(done.values()):
             raise Failure(f"{rule}: the scene is to use every operation, but accepted {done}")
