@@ -302,7 +302,9 @@ class Minimizer {
       const bool negligible = advancing && step == 1 && motion_.step.norm() < options_.step_tolerance;
       const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
       if (!negligible && !acceptable(merit_change, value, step, merit_slope, advancing)) continue;
-      const bool straight = !advancing && step == 1 && value - value_ < kStraight * slope;
+      // Also by its slope at the end: near round-off values alone say anything.
+      const bool straight = !advancing && step == 1 && value - value_ < kStraight * slope &&
+                            free_dot(step_, gradient_at(candidate_)) < kStraight / 2 * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
       accept(value);
       if (straight) go_on();
