@@ -480,10 +480,11 @@ TEST(Simulation, StaticsAreCutIntoSmallerLoads) {
   EXPECT_TRUE(simulation.finished());
   EXPECT_GE(result.report.cut_steps, 2);
   EXPECT_EQ(simulation.state().t, 1);
-  for (int f = 0; f < simulation.state().mesh.facet_slots(); ++f)
-    if (simulation.state().mesh.facet_tag(f) == 4)
-      for (const int v : simulation.state().mesh.facet(f))
-        EXPECT_EQ(simulation.state().history.x[0][2 * v], simulation.state().mesh.rest(v)[0] + 0.2);
+  for (int f = 0; f < simulation.state().mesh.facet_slots(); ++f) {
+    if (simulation.state().mesh.facet_tag(f) != 4) continue;
+    for (const int v : simulation.state().mesh.facet(f))
+      EXPECT_EQ(simulation.state().history.x[0][2 * v], simulation.state().mesh.rest(v)[0] + 0.2);
+  }
 }
 
 /// The square on a line, its upper side moved down by `depth` in one step.
@@ -519,6 +520,9 @@ TEST(Simulation, HeldVerticesThatCannotArriveEndTheStepWithTheReason) {
     EXPECT_NE(result.reason.find("held vertices"), std::string::npos) << "reason: " << result.reason;
     EXPECT_EQ(simulation.state().step, 0);
     EXPECT_EQ(simulation.state().history.x[0], start);
+  }
+}
+
 TEST(Simulation, DirichletMayMoveByLessThanRoundOff) {
   auto setup = free_square(3);
   setup.newton.first_gradient_tolerance = setup.newton.gradient_tolerance = 1e-300;
