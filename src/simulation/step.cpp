@@ -181,6 +181,8 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
     const NewtonSummary summary = problem->solve(x, lagged);
     add_seconds(summary, report.seconds);
     report.newton_iterations += summary.iterations;
+    if (summary.converged() && !summary.message.empty())
+      logger.warning(fmt::format("step {}: {}", next.step, summary.message));
     if (summary.linear_residual > kPoorResidual)
       logger.warning(
           fmt::format("step {}: linear solves by {} reached a relative residual of {:.1e} only; another solver, or a "

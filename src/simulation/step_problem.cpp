@@ -15,6 +15,7 @@ namespace {
 constexpr double kFixedPoint = 1e-12;      ///< rounds of lagging that move nothing by more than this are over [m]
 constexpr std::size_t kLongestCycle = 16;  ///< rounds that are remembered
 constexpr int kPressureRounds = 50;        ///< most, where pressure has no potential
+constexpr int kPatience = 30;              ///< rounds without a smaller residual after which lagging will not converge
 constexpr double kSameState = 1e-3;        ///< of a solve's step tolerance: states nearer than that are one
 
 /// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
@@ -235,6 +236,9 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
   const int rounds = most_rounds();
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
   std::vector<VectorX> previous = {lagged_x};  // newest last
+  VectorX best = x;
+  double least = std::numeric_limits<double>::infinity();
+  int best_round = 0;
   for (int round = 1; summary.converged() && (round < rounds || has_friction()); ++round) {
     const EnergySum relagged = energy(x);
     VectorX gradient = VectorX::Zero(x.size());
@@ -242,7 +246,19 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
     double norm = 0;
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
-    if (has_friction() && std::sqrt(norm) <= tolerance) break;
+    norm = std::sqrt(norm);
+    if (has_friction() && norm <= tolerance) break;
+    if (norm < least) {
+      least = norm;
+      best = x;
+      best_round = round;
+    } else if (round - best_round >= kPatience) {
+      x = best;
+      energy(x);
+      summary.message = "friction lagging does not converge: residual " + std::to_string(least) + " after " +
+                        std::to_string(round) + " rounds, asked " + std::to_string(tolerance);
+      break;
+    }
     if (has_recurred(x, previous, setup_.newton.step_tolerance)) break;
     if (round >= rounds) break;
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
