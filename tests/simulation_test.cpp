@@ -167,7 +167,8 @@ ImpactEnergy supersonic_impact(double energy_growth_limit) {
   const auto solver = registry.create("eigen");
   const auto energy = [&] {
     const State<2>& state = simulation.state();
-    StepProblem<2> problem(setup, state.mesh, state.history, state.t, *solver);
+    SparseSystem system(*solver);
+    StepProblem<2> problem(setup, state.mesh, state.history, state.t, system);
     return problem.mechanical_energy(state.history.x[0], state.history.v[0]);
   };
   const double start = energy();

@@ -14,7 +14,15 @@ DofMap DofMap::from_held(const std::vector<char>& held) {
 }
 
 void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
-  *this = {};
+  kept_key_ = nullptr;
+  place_.clear();
+  changed_ = true;
+  if (dim == dim_ && stencil_size == stencil_size_ && dofs.unknown == unknown_ && stencils == stencils_) {
+    pattern_ = base_;
+    return;
+  }
+  pattern_ = {};
+  gathers_.clear();
   unknown_ = dofs.unknown;
   stencils_ = std::move(stencils);
   stencil_size_ = stencil_size;
@@ -43,7 +51,6 @@ void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stenci
   }
   base_ = pattern_;
   gathers_.resize((num_stencils() + kBatch - 1) / kBatch);
-  changed_ = true;
 }
 
 const SparseAssembler::Gather& SparseAssembler::gather(std::size_t batch) {

@@ -28,10 +28,10 @@ linear::SolveReport DenseSystem::solve(const VectorX& rhs, VectorX& solution) {
 
 double DenseSystem::diagonal_scale() const { return hessian_.rows() > 0 ? hessian_.diagonal().cwiseAbs().maxCoeff() : 0; }
 
-SparseSystem::SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, std::span<const int> stencils,
-                           int stencil_size)
-    : solver_(solver), dim_(dim) {
-  assembler_.reset(dofs, dim, {stencils.begin(), stencils.end()}, stencil_size);
+void SparseSystem::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
+  dim_ = dim;
+  pattern_changed_ = true;
+  assembler_.reset(dofs, dim, std::move(stencils), stencil_size);
 }
 
 void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,

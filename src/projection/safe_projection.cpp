@@ -45,10 +45,8 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   energy.add(std::make_shared<VolumeBarrier<Dim>>(problem.cells, kVolumeActivation,
                                                   kVolumeStiffness * stiffness * problem.scaling));
   if (contact) energy.add(contact);
-  std::vector<int> stencils;
-  for (const auto& element : problem.cells.elements)
-    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
-  SparseSystem system(solver, dofs, Dim, stencils, Dim + 1);
+  SparseSystem system(solver);
+  system.reset(dofs, Dim, stencil_vertices(problem.cells), Dim + 1);
   NewtonOptions options;
   options.max_iterations = 100;
   options.step_tolerance = kRelativeTolerance * way.norm();

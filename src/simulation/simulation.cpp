@@ -92,7 +92,7 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
 
 /// Makes a0 solve M a0 = f - grad Psi at the start (held dofs keep theirs).
 template <int Dim>
-void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, linear::Solver& solver) {
+void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, SparseSystem& system) {
   const CellSet<Dim> cells = whole_mesh(state.mesh, setup.obstacles.rest);
   const DofMap dofs = DofMap::from_held(held_dofs(setup, state.mesh, state.t).held);
   VectorX& a = state.history.a[0];
@@ -107,10 +107,7 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, lin
     force -= LoadEnergy<Dim>(cells, setup.materials, loads, 1).forces();
   if (const auto loads = loads_at(setup, state.t); !loads.pressures.empty())
     PressureEnergy<Dim>(cells, loads, state.history.x[0], 1).add_gradient(state.history.x[0], force, workspace);
-  std::vector<int> stencils;
-  for (const auto& element : cells.elements)
-    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
-  SparseSystem system(solver, dofs, Dim, stencils, Dim + 1);
+  system.reset(dofs, Dim, stencil_vertices(cells), Dim + 1);
   PrescribedMotion motion;
   VectorX rhs(dofs.num_unknowns), solution;
   system.assemble(sum, zero, PsdProjection::none, dofs, motion, workspace);
@@ -128,6 +125,7 @@ struct Simulation<Dim>::Impl {
   Setup<Dim> setup;
   Logger logger;
   std::unique_ptr<linear::Solver> solver;
+  std::unique_ptr<SparseSystem> system;  ///< keeps what it knows of the mesh from step to step
   State<Dim> state;
   double shortest_edge = 0;  ///< of the initial mesh [m]
   NodalForces forces;        ///< of the last step
@@ -139,13 +137,14 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   impl_->setup = std::move(setup);
   impl_->logger = std::move(logger);
   impl_->solver = linear::choose_solver(impl_->setup.linear, !impl_->setup.newton.project_to_psd, registry, impl_->logger);
+  impl_->system = std::make_unique<SparseSystem>(*impl_->solver);
   impl_->state = initial_state(impl_->setup);
   refuse_intersections(impl_->setup, impl_->state);
   if (impl_->setup.consistent_initial_acceleration && !impl_->state.history.a.empty())
-    set_consistent_acceleration(impl_->setup, impl_->state, *impl_->solver);
+    set_consistent_acceleration(impl_->setup, impl_->state, *impl_->system);
   if (const FieldOptions& asked = impl_->setup.fields; asked.any_forces()) {
     const State<Dim>& state = impl_->state;
-    StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->solver, state.stiffness);
+    StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->system, state.stiffness);
     impl_->forces = problem.forces(state.history.x[0]);
     impl_->forces.reaction.setZero();  // no step has been solved
   }
@@ -168,7 +167,7 @@ StepReport Simulation<Dim>::initial_report() const {
   report.t = state.t;
   report.vertices = state.mesh.num_vertices();
   report.elements = state.mesh.num_cells();
-  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->solver, state.stiffness);
+  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->system, state.stiffness);
   report.unknowns = problem.dofs().num_unknowns;
   report.energy = problem.report(state.history.x[0]);
   report.energy_before_remesh = report.energy.total;
@@ -180,7 +179,7 @@ StepReport Simulation<Dim>::initial_report() const {
 
 template <int Dim>
 StepResult Simulation<Dim>::advance() {
-  StepResult result = take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->solver, impl_->logger, impl_->state);
+  StepResult result = take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->system, impl_->logger, impl_->state);
   if (result.ok) impl_->forces = result.forces;
   return result;
 }

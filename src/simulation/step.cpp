@@ -153,7 +153,7 @@ std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const
 }  // namespace
 
 template <int Dim>
-StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solver& solver, const Logger& logger,
+StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, const Logger& logger,
                      State<Dim>& state) {
   StepResult result;
   StepReport& report = result.report;
@@ -174,7 +174,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
   VectorX x = next.history.x[0];
   const auto make_problem = [&] {
     const ScopedTimer timer(report.seconds.assembly);
-    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, solver, state.stiffness);
+    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, system, state.stiffness);
   };
   auto problem = make_problem();
   const auto solve = [&](const VectorX& lagged) {
@@ -187,7 +187,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
       logger.warning(
           fmt::format("step {}: linear solves by {} reached a relative residual of {:.1e} only; another solver, or a "
                       "`fallback`, may do better",
-                      next.step, solver.name(), summary.linear_residual));
+                      next.step, system.solver().name(), summary.linear_residual));
     return summary;
   };
   NewtonSummary summary = solve(state.history.x[0]);
@@ -212,7 +212,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, linear::Solv
       const State<Dim> unchanged = next;
       const VectorX solution = x;
       const RemeshReport remeshed =
-          remesh_and_project(setup, shortest_edge, *problem, t, next, x, report.seconds, solver, logger);
+          remesh_and_project(setup, shortest_edge, *problem, t, next, x, report.seconds, system.solver(), logger);
       report.splits = {remeshed.splits.tried, remeshed.splits.accepted};
       report.collapses = {remeshed.collapses.tried, remeshed.collapses.accepted};
       report.swaps = {remeshed.swaps.tried, remeshed.swaps.accepted};
@@ -290,9 +290,9 @@ Setup<Dim> halved(const Setup<Dim>& setup, const State<Dim>& state) {
 }  // namespace
 
 template <int Dim>
-StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, linear::Solver& solver, const Logger& logger,
+StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, const Logger& logger,
                               State<Dim>& state) {
-  StepResult whole = take_step(setup, shortest_edge, solver, logger, state);
+  StepResult whole = take_step(setup, shortest_edge, system, logger, state);
   if (whole.ok || setup.time.step_cuts == 0) return whole;
   const Setup<Dim> half = halved(setup, state);
   logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
@@ -304,7 +304,7 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, lin
   NodalForces forces;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
-    StepResult result = take_step_in_parts(half, shortest_edge, solver, logger, part);
+    StepResult result = take_step_in_parts(half, shortest_edge, system, logger, part);
     add_effort(effort, result.report);
     if (!result.ok) return result;
     effort = result.report;
@@ -319,9 +319,9 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, lin
   return whole;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                  \
-  template StepResult take_step<Dim>(const Setup<Dim>&, double, linear::Solver&, const Logger&, State<Dim>&); \
-  template StepResult take_step_in_parts<Dim>(const Setup<Dim>&, double, linear::Solver&, const Logger&, State<Dim>&);
+#define ITR_INSTANTIATE(Dim)                                                                                \
+  template StepResult take_step<Dim>(const Setup<Dim>&, double, SparseSystem&, const Logger&, State<Dim>&); \
+  template StepResult take_step_in_parts<Dim>(const Setup<Dim>&, double, SparseSystem&, const Logger&, State<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -100,13 +100,14 @@ HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t
 
 template <int Dim>
 StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
-                              linear::Solver& solver, const BarrierStiffness& stiffness)
+                              SparseSystem& system, const BarrierStiffness& stiffness)
     : setup_(setup),
       loads_at_end_(loads_at(setup, t)),
       cells_(whole_mesh(mesh, setup.obstacles.rest)),
       held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
-      stiffness_(stiffness) {
+      stiffness_(stiffness),
+      system_(system) {
   const TimeIntegrator integrator(setup.time);
   scaling_ = integrator.scaling(history);
   if (!setup.time.quasistatic && !setup.time.is_static)
@@ -123,11 +124,7 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
       adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_, setup.contact, average_mass(), scaling_);
   }
   velocity_ = {integrator.velocity_rate(history), integrator.velocity_reference(history)};
-  std::vector<int> stencils;
-  stencils.reserve(cells_.elements.size() * (Dim + 1));
-  for (const auto& element : cells_.elements)
-    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
-  system_ = std::make_unique<SparseSystem>(solver, dofs_, Dim, stencils, Dim + 1);
+  system_.reset(dofs_, Dim, stencil_vertices(cells_), Dim + 1);
 }
 
 template <int Dim>
@@ -198,7 +195,7 @@ template <int Dim>
 NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x) {
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = &norm_weights_};
-  if (!adaptive_) return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_, extras);
+  if (!adaptive_) return minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras);
   initialize_stiffness(x);
   x = start_of_solve(x);
   bool is_first = true;
@@ -208,7 +205,7 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x
     if (changed) contact_->set_stiffness(stiffness_.value);
     return changed;
   };
-  return minimize(sum, x, dofs_, held_.target, *system_, setup_.newton, workspace_, extras);
+  return minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras);
 }
 
 template <int Dim>

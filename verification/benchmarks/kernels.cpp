@@ -132,11 +132,8 @@ void Assembly(benchmark::State& state) {
   sum.add(std::make_shared<ElasticEnergy<3>>(cube.cells, kMaterials, 1));
   sum.add(std::make_shared<InertiaEnergy<3>>(cube.cells, kMaterials, MassKind::consistent, cube.x));
   const DofMap dofs = DofMap::from_held(std::vector<char>(cube.x.size(), 0));
-  std::vector<int> stencils;
-  for (const auto& element : cube.cells.elements)
-    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
   SparseAssembler assembler;
-  assembler.reset(dofs, 3, stencils, 4);
+  assembler.reset(dofs, 3, stencil_vertices(cube.cells), 4);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
   Workspace workspace;
   for (auto _ : state) {

@@ -69,11 +69,8 @@ void write_symmetric(const std::string& path, const SparseAssembler& assembler) 
 template <int Dim>
 SparseAssembler hessian(const Energy& energy, const CellSet<Dim>& cells, const VectorX& x, Workspace& workspace) {
   const DofMap dofs = DofMap::from_held(std::vector<char>(Dim * cells.num_vertices, 0));
-  std::vector<int> stencils;
-  for (const auto& element : cells.elements)
-    stencils.insert(stencils.end(), element.vertices.begin(), element.vertices.end());
   SparseAssembler assembler;
-  assembler.reset(dofs, Dim, stencils, Dim + 1);
+  assembler.reset(dofs, Dim, stencil_vertices(cells), Dim + 1);
   assembler.begin();
   HessianSink sink(dofs, assembler);
   energy.add_hessian(x, PsdProjection::none, sink, workspace);

@@ -31,6 +31,16 @@ struct CellSet {
 template <int Dim>
 CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra);
 
+/// Vertices of all elements, Dim + 1 each.
+template <int Dim>
+std::vector<int> stencil_vertices(const CellSet<Dim>& cells) {
+  std::vector<int> vertices;
+  vertices.reserve(cells.elements.size() * (Dim + 1));
+  for (const auto& element : cells.elements)
+    vertices.insert(vertices.end(), element.vertices.begin(), element.vertices.end());
+  return vertices;
+}
+
 template <int Dim>
 Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) {
   Vec<Dim> sum = Vec<Dim>::Zero();

@@ -31,7 +31,8 @@ class SparseAssembler {
   /// Stencils that are gathered at a time: what their blocks add to an entry is listed once, and summed entry by entry.
   static constexpr std::size_t kBatch = 512;
 
-  /// Base pattern: all pairs of unknowns of the vertices of one stencil. `stencils` holds `stencil_size` vertices each.
+  /// Base pattern: all pairs of unknowns of the vertices of one stencil. `stencils` holds `stencil_size` vertices each. What
+  /// was found out about the same stencils before is used again; what blocks added to their pattern is forgotten.
   void reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size);
   void begin();
   /// Adds to entry (row, column), row >= column.

@@ -46,8 +46,12 @@ class DenseSystem final : public NewtonSystem {
 /// For whole meshes: fixed base pattern of the elements, contacts added as they appear, analysed when the pattern changes.
 class SparseSystem final : public NewtonSystem {
  public:
-  /// `solver` must outlive this. `stencils`: vertices of the elements, `stencil_size` each.
-  SparseSystem(linear::Solver& solver, const DofMap& dofs, int dim, std::span<const int> stencils, int stencil_size);
+  /// `solver` must outlive this.
+  explicit SparseSystem(linear::Solver& solver) : solver_(solver) {}
+  /// For the unknowns of `dofs` and elements of the vertices `stencils`, `stencil_size` each: cheap where they are as
+  /// before.
+  void reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size);
+  linear::Solver& solver() { return solver_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
@@ -58,7 +62,7 @@ class SparseSystem final : public NewtonSystem {
   linear::Solver& solver_;
   SparseAssembler assembler_;
   bool pattern_changed_ = true;
-  int dim_;
+  int dim_ = 1;
   std::vector<int> dofs_;            ///< of each unknown
   std::vector<double> coordinates_;  ///< of each unknown's node when the pattern changed, dim each [m]
 };

@@ -39,8 +39,8 @@ template <int Dim>
 class StepProblem {
  public:
   /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
-  /// `stiffness`, which the barrier starts from where it is adaptive.
-  StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, linear::Solver& solver,
+  /// `stiffness`, which the barrier starts from where it is adaptive. `system` serves the newest problem only.
+  StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, SparseSystem& system,
               const BarrierStiffness& stiffness = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
@@ -91,7 +91,7 @@ class StepProblem {
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
   std::shared_ptr<PressureEnergy<Dim>> pressure_;
   std::vector<std::shared_ptr<DampingEnergy<Dim>>> damping_;
-  std::unique_ptr<SparseSystem> system_;
+  SparseSystem& system_;
 };
 
 /// The least det F over the elements.
