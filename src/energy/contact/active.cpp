@@ -3,6 +3,7 @@
 // inclusion-exclusion where the regions of neighbouring primitives overlap: faces - edges + vertices).
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <tuple>
 
 #include "candidates.hpp"
@@ -29,8 +30,7 @@ auto sort_key(const ContactStencil& s) {
 
 /// Sorts by features and sums the weights of equal ones; drops those that cancel.
 void merge(std::vector<ContactStencil>& stencils) {
-  std::stable_sort(stencils.begin(), stencils.end(),
-                   [](const ContactStencil& p, const ContactStencil& q) { return sort_key(p) < sort_key(q); });
+  parallel_sort(stencils, [](const ContactStencil& p, const ContactStencil& q) { return sort_key(p) < sort_key(q); });
   std::size_t kept = 0;
   for (std::size_t i = 0; i < stencils.size();) {
     ContactStencil sum = stencils[i];
@@ -45,7 +45,7 @@ void merge(std::vector<ContactStencil>& stencils) {
 }
 
 void sort_unique(std::vector<Ids>& ids) {
-  std::sort(ids.begin(), ids.end());
+  parallel_sort(ids, std::less<>());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
 
@@ -227,11 +227,14 @@ class ActiveSet {
     };
     visit_blocks<Part>(pairs.size(), visit, [&](const Part& part) { take(part); });
     sort_unique(vertex_edges_);
-    for (const auto& [e, v] : vertex_edges_) remove_overlap(e, v);
+    const auto remove = [&](std::size_t i, Part& part) { remove_overlap(vertex_edges_[i][0], vertex_edges_[i][1], part); };
+    visit_blocks<Part>(vertex_edges_.size(), remove, [&](const Part& part) {
+      stencils_.insert(stencils_.end(), part.stencils.begin(), part.stencils.end());
+    });
   }
 
   /// The edges at v count the edge e more than once where v is what is closest to it.
-  void remove_overlap(int e, int v) {
+  void remove_overlap(int e, int v, Part& part) const {
     const double weight = surface_.edge_area[e] / 4;
     int not_parallel = 0;
     for (const int f : surface_.vertex_edges[v]) {
@@ -243,9 +246,9 @@ class ActiveSet {
         ++not_parallel;
         continue;
       }
-      stencils_.push_back(mollified(pair, features_of_edge_and_vertex(pair, e, v), threshold, -weight));
+      part.stencils.push_back(mollified(pair, features_of_edge_and_vertex(pair, e, v), threshold, -weight));
     }
-    if (not_parallel != 1) stencils_.push_back(edge_vertex(e, v, (1 - not_parallel) * weight));
+    if (not_parallel != 1) part.stencils.push_back(edge_vertex(e, v, (1 - not_parallel) * weight));
   }
 
   /// What is closest between the edge e and the vertex v of the pair's other edge, as features of the pair.

@@ -38,14 +38,6 @@ std::vector<std::array<int, 2>> collect(std::size_t n, const Find& find) {
   return all;
 }
 
-template <int Dim>
-void update_tree(bool keep, const std::vector<Box<Dim>>& boxes, Bvh<Dim>& tree) {
-  if (keep && tree.size() == static_cast<int>(boxes.size()))
-    tree.refit(boxes);
-  else
-    tree.build(boxes);
-}
-
 bool counts(const CollisionSurface& surface, int v) { return surface.counts[v]; }
 template <std::size_t N>
 bool counts(const CollisionSurface& surface, const std::array<int, N>& primitive) {
@@ -57,23 +49,24 @@ bool contains(const std::array<int, N>& primitive, int v) {
   return std::find(primitive.begin(), primitive.end(), v) != primitive.end();
 }
 
-/// (vertex, primitive) for all that overlap, share no vertex, and of which one counts.
+bool are_few(std::size_t a, std::size_t b) { return a * b < kFewPairs; }
+
+/// (vertex, primitive) for all that overlap, share no vertex, and of which one counts. `tree` is not needed for few pairs.
 template <int Dim, std::size_t N>
 std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
                                              const std::vector<std::array<int, N>>& primitives,
                                              const std::vector<Box<Dim>>& vertex_boxes, const std::vector<Box<Dim>>& boxes,
-                                             bool keep_tree, Bvh<Dim>& tree) {
+                                             const Bvh<Dim>& tree) {
   const auto matters = [&](int v, int i) {
     return !contains(primitives[i], v) && (counts(surface, v) || counts(surface, primitives[i]));
   };
   std::vector<std::array<int, 2>> pairs;
-  if (surface.vertices.size() * primitives.size() < kFewPairs) {
+  if (are_few(surface.vertices.size(), primitives.size())) {
     for (const int v : surface.vertices)
       for (std::size_t i = 0; i < primitives.size(); ++i)
         if (vertex_boxes[v].overlaps(boxes[i]) && matters(v, static_cast<int>(i))) pairs.push_back({v, static_cast<int>(i)});
     return pairs;
   }
-  update_tree(keep_tree, boxes, tree);
   Box<Dim> counting;  // what does not count only meets what does
   for (std::size_t i = 0; i < primitives.size(); ++i)
     if (counts(surface, primitives[i])) counting.include(boxes[i]);
@@ -89,10 +82,9 @@ std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
 
 template <int Dim>
 std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes,
-                                           bool keep_tree, Bvh<Dim>& tree) {
+                                           const Bvh<Dim>& tree) {
   const auto& edges = surface.edges;
-  const bool few = edges.size() * edges.size() < kFewPairs;
-  if (!few) update_tree(keep_tree, boxes, tree);
+  const bool few = are_few(edges.size(), edges.size());
   return collect(edges.size(), [&](int e, std::vector<std::array<int, 2>>& found) {
     if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
     const auto consider = [&](int f) {
@@ -151,12 +143,26 @@ void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVector
   build_boxes(surface, x, dx, reach);
   surface_ = &surface;
   const auto edge_boxes = boxes_of<Dim>(surface.edges, reach_);
+  const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);
+  const auto update_tree = [&](const std::vector<Box<Dim>>& boxes, std::size_t others, Bvh<Dim>& tree) {
+    if (are_few(boxes.size(), others)) return;
+    if (keep_trees && tree.size() == static_cast<int>(boxes.size()))
+      tree.refit(boxes);
+    else
+      tree.build(boxes);
+  };
+  const std::size_t num_vertices = surface.vertices.size();
+  parallel_blocks(2, 1, [&](std::size_t task, std::size_t) {
+    if (task == 0)
+      update_tree(edge_boxes, Dim == 2 ? num_vertices : edge_boxes.size(), edge_tree_);
+    else
+      update_tree(triangle_boxes, num_vertices, triangle_tree_);
+  });
   if constexpr (Dim == 2) {
-    vertex_edges_ = vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes, keep_trees, edge_tree_);
+    vertex_edges_ = vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes, edge_tree_);
   } else {
-    const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);
-    vertex_triangles_ = vertex_pairs<Dim>(surface, surface.triangles, reach_, triangle_boxes, keep_trees, triangle_tree_);
-    edge_edges_ = edge_pairs<Dim>(surface, edge_boxes, keep_trees, edge_tree_);
+    vertex_triangles_ = vertex_pairs<Dim>(surface, surface.triangles, reach_, triangle_boxes, triangle_tree_);
+    edge_edges_ = edge_pairs<Dim>(surface, edge_boxes, edge_tree_);
   }
 }
 
