@@ -332,6 +332,17 @@ TEST_F(SceneTest, Integrators) {
   EXPECT_TRUE(read2(square({{"time", nullptr}})).time.is_static);
 }
 
+TEST_F(SceneTest, WaysToProjectTheHessian) {
+  const auto newton = [&](const json& options) {
+    return read2(square({{"solver", {{"nonlinear", {{"Newton", options}}}}}})).newton;
+  };
+  EXPECT_FALSE(newton({{"use_psd_projection", false}}).project_to_psd);
+  EXPECT_TRUE(newton({{"psd_projection", "absolute"}}).absolute_eigenvalues);
+  EXPECT_FALSE(newton({{"psd_projection", "clamp"}}).absolute_eigenvalues);
+  EXPECT_EQ(newton({{"projected_iterations", 0}}).projected_iterations, 0);
+  EXPECT_FALSE(newton({{"extend_steps", false}}).extend_steps);
+}
+
 TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
   const json nonlinear = {{"x_delta", 1e-3}, {"grad_norm", 1e-7}, {"f_delta", 1e-3}};
   const itr::Setup<2> dynamic = read2(square({{"solver", {{"nonlinear", nonlinear}}}}));

@@ -116,9 +116,10 @@ template <int Dim>
 void PressureEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
   for (const LoadedFacet& facet : facets_) {
     Mat<Dim* Dim> block = scale_ * facet.pressure * cone_hessian(corners(facet, x));
-    if (psd == PsdProjection::clamp) {
+    if (psd != PsdProjection::none) {
       const Eigen::SelfAdjointEigenSolver<Mat<Dim * Dim>> eigen(block);
-      block = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
+      const auto values = eigen.eigenvalues().unaryExpr([psd](double value) { return projected(value, psd); });
+      block = eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
     }
     sink.add<Dim>(facet.vertices, block.data());
   }

@@ -45,11 +45,10 @@ void NewtonSummary::add_effort(const NewtonSummary& other) {
 namespace {
 
 constexpr double kArmijo = 1e-4;
-constexpr int kIterationsPerFallback = 5;  ///< iterations with the projected Hessian before the true one is tried again
-constexpr double kRoundOff = 1e-9;         ///< relative change of energy below which slopes tell more
-constexpr double kUnresolved = 1e-14;      ///< relative change of energy that a sum of many terms does not resolve
-constexpr double kLeastPenalty = 1e-8;     ///< force by length and stiffness: above the round-off of a body at rest
-constexpr double kStraight = 0.8;          ///< of the slope: an energy that falls by more over a full step hardly curves
+constexpr double kRoundOff = 1e-9;      ///< relative change of energy below which slopes tell more
+constexpr double kUnresolved = 1e-14;   ///< relative change of energy that a sum of many terms does not resolve
+constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
+constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostDoublings = 12;
 constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
@@ -74,7 +73,8 @@ class Minimizer {
       compute_remaining();
       if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
       if (!moving_ && has_small_gradient()) return stop(Termination::gradient);
-      if (!compute_direction()) return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
+      if (!compute_direction())
+        return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
       if (!moving_ && has_small_step()) return stop(Termination::step);
       if (!moving_ && -0.5 * free_dot(step_, gradient_) < options_.decrement_tolerance) return stop(Termination::decrement);
       const double before = value_;
@@ -206,19 +206,21 @@ class Minimizer {
   }
 
   bool compute_direction() {
-    projected_ = options_.project_to_psd && psd_iterations_ > 0;
+    projected_ = options_.project_to_psd && (psd_iterations_ > 0 || options_.projected_iterations == 0);
     if (psd_iterations_ > 0) --psd_iterations_;
     if (!projected_ && try_direction(PsdProjection::none, 0)) return true;
     if (options_.project_to_psd) {
-      if (!projected_) psd_iterations_ = kIterationsPerFallback - 1;
+      if (!projected_) psd_iterations_ = options_.projected_iterations - 1;
       projected_ = true;
-      if (try_direction(PsdProjection::clamp, 0)) return true;
+      if (try_direction(projection(), 0)) return true;
     }
     double shift = 1e-10 * std::max(system_.diagonal_scale(), 1e-300);
     for (int attempt = 0; attempt < 12 && is_curable(outcome_); ++attempt, shift *= 10)
       if (factor_and_solve(shift)) return true;
     return false;
   }
+
+  PsdProjection projection() const { return options_.absolute_eigenvalues ? PsdProjection::absolute : PsdProjection::clamp; }
 
   bool try_direction(PsdProjection psd, double shift) {
     {
@@ -271,9 +273,9 @@ class Minimizer {
   /// A failed search along the true Newton direction is tried once more along the projected one.
   bool retry_projected() {
     if (projected_ || !options_.project_to_psd) return false;
-    psd_iterations_ = kIterationsPerFallback - 1;
+    psd_iterations_ = options_.projected_iterations - 1;
     projected_ = true;
-    return try_direction(PsdProjection::clamp, 0) && line_search();
+    return try_direction(projection(), 0) && line_search();
   }
 
   bool line_search() {
@@ -303,7 +305,7 @@ class Minimizer {
       const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
       if (!negligible && !acceptable(merit_change, value, step, merit_slope, advancing)) continue;
       // Also by its slope at the end: near round-off values alone say anything.
-      const bool straight = !advancing && step == 1 && value - value_ < kStraight * slope &&
+      const bool straight = options_.extend_steps && !advancing && step == 1 && value - value_ < kStraight * slope &&
                             free_dot(step_, gradient_at(candidate_)) < kStraight / 2 * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
       accept(value);

@@ -132,7 +132,8 @@ constexpr Group kGroups[] = {
     {"/solver/nonlinear/line_search", Role::ignored,
      "use_grad_norm_tol min_step_size max_step_size_iter min_step_size_final max_step_size_iter_final "
      "default_init_step_size step_ratio Armijo RobustArmijo"},
-    {"/solver/nonlinear/Newton", Role::read, "use_psd_projection:boolean"},
+    {"/solver/nonlinear/Newton", Role::read,
+     "use_psd_projection:boolean psd_projection:string projected_iterations:integer extend_steps:boolean"},
     {"/solver/nonlinear/Newton", Role::ignored,
      "force_psd_projection residual_tolerance reg_weight_min reg_weight_max reg_weight_inc "
      "use_psd_projection_in_regularized"},

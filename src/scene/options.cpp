@@ -184,7 +184,11 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
     read_main_tolerances(root, scale, options);
   options.line_search = static_cast<LineSearch>(nonlinear["line_search"]["method"].choice(
       {"Backtracking", "Armijo", "RobustArmijo"}, static_cast<int>(options.line_search)));
-  options.project_to_psd = nonlinear["Newton"]["use_psd_projection"].boolean(true);
+  const Node newton = nonlinear["Newton"];
+  options.project_to_psd = newton["use_psd_projection"].boolean(true);
+  options.absolute_eigenvalues = newton["psd_projection"].choice({"clamp", "absolute"}, 0) == 1;
+  options.projected_iterations = newton["projected_iterations"].integer_at_least(0, options.projected_iterations);
+  options.extend_steps = newton["extend_steps"].boolean(options.extend_steps);
   return options;
 }
 

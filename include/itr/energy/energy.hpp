@@ -13,7 +13,13 @@
 
 namespace itr {
 
-enum class PsdProjection { none, clamp };
+/// What becomes of the negative eigenvalues of a stencil's Hessian: they stay, become 0, or change their sign (Chen et al.
+/// 2024, "Stabler Neo-Hookean Simulation").
+enum class PsdProjection { none, clamp, absolute };
+inline double projected(double eigenvalue, PsdProjection psd) {
+  if (eigenvalue >= 0 || psd == PsdProjection::none) return eigenvalue;
+  return psd == PsdProjection::clamp ? 0 : -eigenvalue;
+}
 
 /// Scratch of one solve, owned by the caller: terms keep no mutable caches, so solves never meet. What is in it never
 /// changes a result, only the time that it takes.

@@ -55,15 +55,16 @@ struct Mollifier {
   }
 };
 
-/// Leaves out the negative eigenvalues of a block whose range the orthonormal (or zero) columns of `basis` span: the
+/// Projects the negative eigenvalues of a block whose range the orthonormal (or zero) columns of `basis` span: the
 /// eigenproblem is as small as that range.
 template <int Size, int Rank>
-void clamp_to_psd(const Eigen::Matrix<double, Size, Rank>& basis, Mat<Size>& block) {
+void project_to_psd(const Eigen::Matrix<double, Size, Rank>& basis, PsdProjection psd, Mat<Size>& block) {
   const Mat<Rank> reduced = basis.transpose() * block * basis;
   const Eigen::SelfAdjointEigenSolver<Mat<Rank>> eigen(reduced);
   if (eigen.eigenvalues()[0] >= 0) return;
   const Eigen::Matrix<double, Size, Rank> modes = basis * eigen.eigenvectors();
-  block.noalias() = modes * eigen.eigenvalues().cwiseMax(0).asDiagonal() * modes.transpose();
+  const Vec<Rank> values = eigen.eigenvalues().unaryExpr([psd](double value) { return projected(value, psd); });
+  block.noalias() = modes * values.asDiagonal() * modes.transpose();
 }
 
 /// What is orthogonal to translations of four vertices: columns of Helmert's matrix (x) I.
@@ -232,7 +233,6 @@ void ContactEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 template <int Dim>
 void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
   const auto& stencils = active(x, workspace);
-  const bool clamp = psd == PsdProjection::clamp;
   const auto block_of = [&](const ContactStencil& s) {
     const auto p = gather<Dim>(s.vertices, s.size(), x);
     const double factor = scale_ * stiffness_ * s.weight;
@@ -249,7 +249,7 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
             (b * (m.second * cross.gradient * cross.gradient.transpose() + m.first * edge_cross_squared_hessian(p.data())) +
              m.first * b1 * (mixed + mixed.transpose()) +
              m.value * (b2 * q.gradient * q.gradient.transpose() + b1 * q.hessian));
-        if (clamp) clamp_to_psd<12, 9>(relative_motions(), block);
+        if (psd != PsdProjection::none) project_to_psd<12, 9>(relative_motions(), psd, block);
         return block;
       }
     }
@@ -257,7 +257,7 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
     const Vec<4 * Dim> gradient = squared_distance_gradient<Dim>(pair);
     block = factor * (barrier_second(pair.squared) * gradient * gradient.transpose() +
                       barrier_first(pair.squared) * pair_distance_hessian<Dim>(s.kind, p.data()));
-    if (clamp) clamp_to_psd<4 * Dim, Dim + 2>(pair_distance_range<Dim>(s.kind, pair), block);
+    if (psd != PsdProjection::none) project_to_psd<4 * Dim, Dim + 2>(pair_distance_range<Dim>(s.kind, pair), psd, block);
     return block;
   };
   // The sink reads the rows and columns of the pair's vertices alone.

@@ -75,8 +75,9 @@ void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
     // Along v the second derivative is f2, across it f1 / y; both are >= 0, so only the sign of the force can spoil it.
     Mat<kTangents> inner = isotropic * Mat<kTangents>::Identity();
     if (y > 0) inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
-    if (psd == PsdProjection::clamp && pair.force < 0) continue;
-    const Mat<Dim> world = scale_ * velocity_.rate * pair.force * pair.tangents * inner * pair.tangents.transpose();
+    const double force = projected(pair.force, psd);
+    if (force == 0) continue;
+    const Mat<Dim> world = scale_ * velocity_.rate * force * pair.tangents * inner * pair.tangents.transpose();
     const int dofs = Dim * pair.size;
     block.resize(dofs, dofs);
     for (int i = 0; i < pair.size; ++i)

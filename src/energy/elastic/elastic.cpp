@@ -94,27 +94,28 @@ void exact_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const 
     }
 }
 
-/// The same for any law; `psd` leaves out negative eigenvalues.
+/// The same for any law, projected.
 template <int Dim>
 void block_of_modes(const EigenSystem<Dim>& system, const ShapeGradients<Dim>& gradients, double weight, PsdProjection psd,
                     ElementBlock<Dim>& block) {
   block.setZero();
   for (std::size_t k = 0; k < system.values.size(); ++k) {
-    if (system.values[k] == 0 || (psd == PsdProjection::clamp && system.values[k] < 0)) continue;
+    const double value = projected(system.values[k], psd);
+    if (value == 0) continue;
     Vec<Dim*(Dim + 1)> w;
     for (int v = 0; v <= Dim; ++v) w.template segment<Dim>(Dim * v) = system.modes[k] * gradients.col(v);
-    block.noalias() += (weight * system.values[k]) * w * w.transpose();
+    block.noalias() += (weight * value) * w * w.transpose();
   }
 }
 
-/// Takes modes out of a block that has them.
+/// Projects a block that has these negative modes.
 template <int Dim>
-void remove_modes(const NegativeModes<Dim>& negative, const ShapeGradients<Dim>& gradients, double weight,
-                  ElementBlock<Dim>& block) {
+void project_modes(const NegativeModes<Dim>& negative, const ShapeGradients<Dim>& gradients, double weight,
+                   PsdProjection psd, ElementBlock<Dim>& block) {
   for (int k = 0; k < negative.count; ++k) {
     Vec<Dim*(Dim + 1)> w;
     for (int v = 0; v <= Dim; ++v) w.template segment<Dim>(Dim * v) = negative.modes[k] * gradients.col(v);
-    block.noalias() -= (weight * negative.values[k]) * w * w.transpose();
+    block.noalias() += weight * (projected(negative.values[k], psd) - negative.values[k]) * w * w.transpose();
   }
 }
 
@@ -179,8 +180,8 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
     const ElasticModuli& here = moduli(e);
     if (here.law == MaterialLaw::neo_hookean) {
       exact_block<Dim>(F, gradients, here.lame, weight, block);
-      if (psd == PsdProjection::clamp)
-        remove_modes<Dim>(neo_hookean_negative_modes<Dim>(F, here.lame), gradients, weight, block);
+      if (psd != PsdProjection::none)
+        project_modes<Dim>(neo_hookean_negative_modes<Dim>(F, here.lame), gradients, weight, psd, block);
     } else {
       block_of_modes<Dim>(elastic_eigensystem<Dim>(F, here), gradients, weight, psd, block);
     }
