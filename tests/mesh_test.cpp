@@ -176,6 +176,23 @@ TYPED_TEST(MeshOf, UniformRefinementKeepsTheDomainItsTagsAndIsConforming) {
   EXPECT_EQ(static_cast<int>(places.size()), fine.num_vertices());
 }
 
+/// PolyFEM's rule: the inner octahedron is split along the midpoints of (0,1) and (2,3) of the vertices in ascending order.
+TEST(Mesh, RefinementOfATetrahedronDependsOnItsNumbersAndNotOnTheirOrder) {
+  const std::vector<Vec<3>> rest = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  // Midpoints by edge: 01: 4, 02: 5, 03: 6, 12: 7, 13: 8, 23: 9.
+  const std::set<std::set<int>> expected = {{0, 4, 5, 6}, {1, 4, 7, 8}, {2, 5, 7, 9}, {3, 6, 8, 9},
+                                            {4, 9, 5, 6}, {4, 9, 6, 8}, {4, 9, 8, 7}, {4, 9, 7, 5}};
+  for (const Mesh<3>::Cell& cell : {Mesh<3>::Cell{0, 1, 2, 3}, {1, 2, 0, 3}, {2, 3, 0, 1}, {3, 0, 2, 1}}) {
+    const Mesh<3> fine = refine_uniformly(Mesh<3>(rest, {cell}, {1}));
+    EXPECT_EQ(fine.find_defect(), "");
+    std::set<std::set<int>> children;
+    for (int c = 0; c < fine.cell_slots(); ++c) children.emplace(fine.cell(c).begin(), fine.cell(c).end());
+    EXPECT_EQ(children, expected);
+    EXPECT_EQ(fine.rest(5), Vec<3>(0, 0.5, 0));
+    EXPECT_EQ(fine.rest(8), Vec<3>(0.5, 0, 0.5));
+  }
+}
+
 TYPED_TEST(MeshOf, SplitsKeepTheDomainAndItsTags) {
   constexpr int Dim = TypeParam::value;
   std::mt19937 random(4);
