@@ -519,6 +519,9 @@ TEST(Simulation, HeldVerticesThatCannotArriveEndTheStepWithTheReason) {
     const auto result = simulation.advance();
     ASSERT_FALSE(result.ok);
     EXPECT_NE(result.reason.find("held vertices"), std::string::npos) << "reason: " << result.reason;
+    // What is in the way is the line below the square.
+    for (const char* part : {"limited by the vertex-edge pair ", " obstacle 0 obstacle 1 near (", "the largest residual, "})
+      EXPECT_NE(result.reason.find(part), std::string::npos) << part << "; reason: " << result.reason;
     EXPECT_EQ(simulation.state().step, 0);
     EXPECT_EQ(simulation.state().history.x[0], start);
   }

@@ -118,6 +118,14 @@ class Minimizer {
     summary_.termination = termination;
     summary_.energy = value_;
     summary_.message = std::move(message);
+    if (summary_.converged()) return summary_;
+    summary_.failed_step = step_;
+    double largest = 0;
+    for (Eigen::Index i = 0; i < gradient_.size(); ++i) {
+      if (dofs_.unknown[i] == kNone || !(std::abs(gradient_[i]) > largest)) continue;
+      largest = std::abs(gradient_[i]);
+      summary_.worst_dof = static_cast<int>(i);
+    }
     return summary_;
   }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
+#include <sstream>
 #include <utility>
 
 namespace itr {
@@ -189,13 +191,90 @@ VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
   return free ? start : x;
 }
 
+/// "12 13 obstacle 4 near (0.1, 0.2)"
+template <int Dim>
+std::string StepProblem<Dim>::name_vertices(std::span<const int> vertices, const VectorX& x) const {
+  const int bodies = static_cast<int>(x.size() / Dim) - static_cast<int>(setup_.obstacles.rest.size());
+  std::ostringstream text;
+  Vec<Dim> middle = Vec<Dim>::Zero();
+  for (const int v : vertices) {
+    text << (v < bodies ? "" : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
+    middle += x.template segment<Dim>(Dim * v) / static_cast<double>(vertices.size());
+  }
+  text << "near (";
+  for (int c = 0; c < Dim; ++c) text << (c > 0 ? ", " : "") << middle[c];
+  text << ')';
+  return text.str();
+}
+
+/// Adds to the message of a solve that did not converge what stopped it: the cell or pair that limits the last step, and the
+/// cell and the pair at the largest residual.
+template <int Dim>
+NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
+  if (summary.converged()) return summary;
+  std::ostringstream text;
+  const VectorX& step = summary.failed_step;
+  if (step.size() == x.size() && step.allFinite()) {
+    StepLimit limit = elastic_->step_limit(x, step);
+    if (contact_)
+      if (StepLimit pair = contact_->step_limit(x, step, workspace_); pair.step < limit.step) limit = std::move(pair);
+    if (limit.step < 1)
+      text << "; " << limit.step << " of the last Newton step is free, limited by the " << limit.kind << ' '
+           << name_vertices(limit.vertices, x);
+  }
+  if (summary.worst_dof != kNone) {
+    const int v = summary.worst_dof / Dim;
+    Vec<Dim> total = Vec<Dim>::Zero();
+    double largest = -1;
+    std::string_view name;
+    for (const auto& term : sum.terms()) {
+      VectorX gradient = VectorX::Zero(x.size());
+      term->add_gradient(x, gradient, workspace_);
+      const Vec<Dim> force = gradient.template segment<Dim>(Dim * v) / scaling_;
+      total += force;
+      if (force.norm() > largest) {
+        largest = force.norm();
+        name = term->name();
+      }
+    }
+    text << "; the largest residual, " << total.norm() << " N, is at vertex " << name_vertices(std::array{v}, x)
+         << ", where the largest force, " << largest << " N, is that of the term '" << name << '\'';
+    const auto has = [v](const auto& vertices) { return std::find(vertices.begin(), vertices.end(), v) != vertices.end(); };
+    double least = std::numeric_limits<double>::infinity();
+    std::span<const int> stencil;
+    for (const auto& element : cells_.elements) {
+      if (!has(element.vertices)) continue;
+      const double ratio = deformation_gradient<Dim>(element, x).determinant();
+      if (ratio >= least) continue;
+      least = ratio;
+      stencil = element.vertices;
+    }
+    if (!stencil.empty()) text << "; its cell " << name_vertices(stencil, x) << " has the volume ratio " << least;
+    least = std::numeric_limits<double>::infinity();
+    stencil = {};
+    if (contact_)
+      for (const ContactStencil& s : contact_->active(x, workspace_)) {
+        if (!has(s.vertices)) continue;
+        const double distance = std::sqrt(contact_->distance(s, x).squared);
+        if (distance >= least) continue;
+        least = distance;
+        stencil = std::span(s.vertices.data(), s.size());
+      }
+    if (!stencil.empty())
+      text << "; its contact pair " << name_vertices(stencil, x) << " has the distance " << least << " m";
+  }
+  summary.message += text.str();
+  return summary;
+}
+
 /// One solve with what `sum` has lagged. Adaptive stiffness balances the terms before held dofs move: so it is in the
 /// regression values of peers' scenes.
 template <int Dim>
 NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x) {
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = &norm_weights_};
-  if (!adaptive_) return minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras);
+  if (!adaptive_)
+    return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
   initialize_stiffness(x);
   x = start_of_solve(x);
   bool is_first = true;
@@ -205,7 +284,7 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x
     if (changed) contact_->set_stiffness(stiffness_.value);
     return changed;
   };
-  return minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras);
+  return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
 }
 
 template <int Dim>

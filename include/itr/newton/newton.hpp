@@ -88,7 +88,9 @@ struct NewtonSummary {
   double step_norm = 0;        ///< of the last full step, in the options' norm
   double linear_residual = 0;  ///< worst relative residual of the linear solves
   double assembly_seconds = 0, linear_seconds = 0, line_search_seconds = 0, ccd_seconds = 0;
-  std::string message;  ///< what stopped it where it did not converge; what is to be known where it did
+  VectorX failed_step;    ///< full step of the last iteration where it did not converge, [m]; else empty
+  int worst_dof = kNone;  ///< unknown with the largest residual where it did not converge
+  std::string message;    ///< what stopped it where it did not converge; what is to be known where it did
 
   void add_effort(const NewtonSummary& other);
 };

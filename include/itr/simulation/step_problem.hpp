@@ -2,6 +2,9 @@
 // The incremental potential of one time step on one mesh, and its solution: terms that the scene needs and no others.
 #pragma once
 
+#include <span>
+#include <string>
+
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/contact/stiffness.hpp"
@@ -65,6 +68,8 @@ class StepProblem {
  private:
   EnergySum energy(const VectorX& lagged_x);
   NewtonSummary minimize_lagged(const EnergySum& sum, VectorX& x);
+  NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
+  std::string name_vertices(std::span<const int> vertices, const VectorX& x) const;
   void initialize_stiffness(const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
   bool has_friction() const;

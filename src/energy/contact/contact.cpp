@@ -342,6 +342,37 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
   }
 }
 
+template <int Dim>
+StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
+  const VectorX motion = dx;
+  auto& candidates = workspace.get<ContactCandidates<Dim>>();
+  candidates.update(surface_, x, &motion, dhat_);
+  const VectorX end = x + motion;
+  const auto p = [&](int v) -> Vec<Dim> { return x.segment<Dim>(Dim * v); };
+  const auto q = [&](int v) -> Vec<Dim> { return end.segment<Dim>(Dim * v); };
+  StepLimit least;
+  const auto look = [&](double t, const char* kind, std::vector<int> vertices) {
+    if (t < least.step) least = {t, kind, std::move(vertices)};
+  };
+  if constexpr (Dim == 2) {
+    for (const auto& [v, e] : candidates.vertex_edges()) {
+      const auto [a, b] = surface_.edges[e];
+      look(point_edge_ccd<2>(p(v), p(a), p(b), q(v), q(a), q(b)), "vertex-edge pair", {v, a, b});
+    }
+  } else {
+    for (const auto& [v, f] : candidates.vertex_triangles()) {
+      const auto [a, b, c] = surface_.triangles[f];
+      look(point_triangle_ccd(p(v), p(a), p(b), p(c), q(v), q(a), q(b), q(c)), "vertex-triangle pair", {v, a, b, c});
+    }
+    for (const auto& [e, f] : candidates.edge_edges()) {
+      const auto [a, b] = surface_.edges[e];
+      const auto [c, d] = surface_.edges[f];
+      look(edge_edge_ccd(p(a), p(b), p(c), p(d), q(a), q(b), q(c), q(d)), "edge-edge pair", {a, b, c, d});
+    }
+  }
+  return least;
+}
+
 template class ContactEnergy<2>;
 template class ContactEnergy<3>;
 

@@ -198,6 +198,16 @@ double ElasticEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
   return step;
 }
 
+template <int Dim>
+StepLimit ElasticEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx) const {
+  StepLimit least;
+  for (const auto& element : cells_.elements) {
+    const double t = kInversionMargin * first_inversion(edges_of<Dim>(element, x), edges_of<Dim>(element, dx));
+    if (t < least.step) least = {t, "cell", {element.vertices.begin(), element.vertices.end()}};
+  }
+  return least;
+}
+
 template class ElasticEnergy<2>;
 template class ElasticEnergy<3>;
 

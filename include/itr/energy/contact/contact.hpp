@@ -6,6 +6,7 @@
 #include "itr/energy/contact/options.hpp"
 #include "itr/energy/contact/surface.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/step_limit.hpp"
 #include "itr/geometry/distance.hpp"
 
 namespace itr {
@@ -37,6 +38,8 @@ class ContactEnergy final : public Energy {
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
   /// Time of impact by conservative CCD; feasible: no pair touches.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
+  /// The pair with the earliest time of impact.
+  StepLimit step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
 
   /// Active pairs at x, merged and sorted. Valid until the next call with this workspace.
   const std::vector<ContactStencil>& active(ConstVectorView x, Workspace& workspace) const;

@@ -5,6 +5,7 @@
 
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/step_limit.hpp"
 #include "itr/fem/cell_set.hpp"
 
 namespace itr {
@@ -21,6 +22,8 @@ class ElasticEnergy final : public Energy {
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
   /// 0.9 of the first time at which an element's volume vanishes on the way.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override;
+  /// The element that max_step comes from.
+  StepLimit step_limit(ConstVectorView x, ConstVectorView dx) const;
 
  private:
   const ElasticModuli& moduli(std::size_t e) const;
