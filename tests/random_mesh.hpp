@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+// Random meshes, edits and scenes for the tests of remeshing.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "itr/energy/contact/contact.hpp"
+#include "itr/energy/elastic/elastic.hpp"
+#include "itr/remesh/edits.hpp"
+#include "itr/remesh/fields.hpp"
+
+namespace itr {
+
+/// A unit square of n x n perturbed quadrilaterals with random diagonals; body 1 left of the middle, body 2 right of it;
+/// facet tags 1 to 4 by side.
+inline Mesh<2> random_mesh(int n, std::mt19937& random) {
+  std::uniform_real_distribution<double> noise(-0.25 / n, 0.25 / n);
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  std::vector<int> body;
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i) {
+      const bool inside_x = i > 0 && i < n && 2 * i != n, inside_y = j > 0 && j < n;
+      rest.emplace_back(double(i) / n + (inside_x && inside_y ? noise(random) : 0),
+                        double(j) / n + (inside_y && inside_x ? noise(random) : 0));
+    }
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const int a = j * (n + 1) + i, b = a + 1, c = a + n + 2, d = a + n + 1;
+      const bool diagonal = random() % 2;
+      cells.push_back(diagonal ? std::array{a, b, c} : std::array{a, b, d});
+      cells.push_back(diagonal ? std::array{a, c, d} : std::array{b, c, d});
+      body.insert(body.end(), 2, 2 * i < n ? 1 : 2);
+    }
+  Mesh<2> mesh(rest, cells, body);
+  for (int f = 0; f < mesh.facet_slots(); ++f) {
+    const Vec<2> m = 0.5 * (mesh.rest(mesh.facet(f)[0]) + mesh.rest(mesh.facet(f)[1]));
+    mesh.set_facet_tag(f, m[0] < 1e-9 ? 1 : m[1] < 1e-9 ? 2 : m[0] > 1 - 1e-9 ? 3 : 4);
+  }
+  return mesh;
+}
+
+struct Totals {
+  std::map<int, double> area, length;
+  explicit Totals(const Mesh<2>& mesh) {
+    for (int c = 0; c < mesh.cell_slots(); ++c)
+      if (mesh.is_cell_alive(c)) area[mesh.body(c)] += mesh.volume(c);
+    for (int f = 0; f < mesh.facet_slots(); ++f)
+      if (mesh.is_facet_alive(f))
+        length[mesh.facet_tag(f)] += (mesh.rest(mesh.facet(f)[1]) - mesh.rest(mesh.facet(f)[0])).norm();
+  }
+};
+
+/// The edit of a kind (0 to 3) at edge `which`, modulo their number; empty where there is none.
+inline std::optional<Edit<2>> edit_at(const Mesh<2>& mesh, unsigned kind, unsigned which) {
+  const auto edges = mesh.edges();
+  const EdgeKey edge = edges[which % edges.size()];
+  switch (kind) {
+    case 0:
+      return make_split(mesh, edge);
+    case 1:
+      return make_collapse(mesh, edge);
+    case 2:
+      return make_swap(mesh, edge);
+    default:
+      return make_move(mesh, edge[0], best_shaped_position(mesh, edge[0], 3));
+  }
+}
+
+inline std::optional<Edit<2>> random_edit(const Mesh<2>& mesh, std::mt19937& random) {
+  const unsigned which = random();
+  return edit_at(mesh, random() % 4, which);
+}
+
+/// A body above an obstacle line, within dhat of it, with a random state.
+struct TrialScene {
+  std::mt19937 random;
+  Mesh<2> mesh;
+  RemeshFields<2> fields;
+  StepContext<2> context;
+  explicit TrialScene(unsigned seed, int n = 6) : random(seed), mesh(random_mesh(n, random)) {
+    context.materials[1] = {.youngs_modulus = 10, .poisson_ratio = 0.3, .density = 2};
+    context.materials[2] = {.youngs_modulus = 1000, .poisson_ratio = 0.4, .density = 5};
+    context.scaling = 0.01;
+    context.contact = {.enabled = true, .activation_distance = 0.03, .convergent = true, .barrier_stiffness = 5};
+    context.newton.step_tolerance = 1e-9;
+    context.shortest_edge = 0.1;
+    context.loads.acceleration = [](const Vec<2>&) { return Vec<2>(0, -1); };
+    context.loads.tractions.emplace_back(4, [](const Vec<2>& X) { return Vec<2>(X[0], 1); });
+    auto& obstacles = context.obstacles;
+    obstacles.rest = obstacles.x = obstacles.velocity_reference = {{-0.5, -0.03}, {0.4, -0.02}, {1.5, -0.03}};
+    obstacles.edges = {{0, 1}, {1, 2}};
+    obstacles.area = {0.45, 1, 0.55};
+    obstacles.degree = {1, 2, 1};
+    obstacles.past_x = {obstacles.x};
+    std::uniform_real_distribution<double> noise(-0.008, 0.008);
+    fields.x.resize(2 * mesh.vertex_slots());
+    for (int v = 0; v < mesh.vertex_slots(); ++v)
+      for (int c = 0; c < 2; ++c) fields.x[2 * v + c] = mesh.rest(v)[c] + noise(random);
+    fields.predictor = fields.velocity_reference = fields.x;
+    for (Eigen::Index i = 0; i < fields.x.size(); ++i) fields.predictor[i] += noise(random);
+    fields.past_positions = {fields.predictor};
+  }
+};
+
+/// All terms on the whole mesh, built without any patch.
+inline double global_energy(const Mesh<2>& slots, const RemeshFields<2>& slot_fields, const StepContext<2>& context) {
+  Mesh<2> mesh = slots;
+  const auto map = mesh.compact();
+  const int bodies = mesh.vertex_slots();
+  const auto compacted = [&](const VectorX& field, const std::vector<Vec<2>>& extra) {
+    VectorX kept(2 * (bodies + extra.size()));
+    for (std::size_t v = 0; v < map.vertex.size(); ++v)
+      if (map.vertex[v] != kNone) kept.segment<2>(2 * map.vertex[v]) = field.segment<2>(2 * v);
+    for (std::size_t o = 0; o < extra.size(); ++o) kept.segment<2>(2 * (bodies + o)) = extra[o];
+    return kept;
+  };
+  const VectorX x = compacted(slot_fields.x, context.obstacles.x);
+  const CellSet<2> cells = whole_mesh(mesh, context.obstacles.rest);
+  CollisionSurface surface;
+  const int total = cells.num_vertices;
+  surface.area.assign(total, 0);
+  surface.degree.assign(total, 0);
+  surface.counts.assign(total, 0);
+  const auto add = [&](int a, int b) {
+    surface.edges.push_back({std::min(a, b), std::max(a, b)});
+    for (const int v : {a, b}) {
+      surface.area[v] += (cells.rest[a] - cells.rest[b]).norm() / 2;
+      ++surface.degree[v];
+    }
+  };
+  for (const auto& facet : cells.facets) add(facet.vertices[0], facet.vertices[1]);
+  for (int v = 0; v < total; ++v)
+    if (surface.degree[v] > 0) surface.vertices.push_back(v), surface.counts[v] = 1;
+  for (std::size_t o = 0; o < context.obstacles.x.size(); ++o) {
+    surface.vertices.push_back(bodies + static_cast<int>(o));
+    surface.area[bodies + o] = context.obstacles.area[o];
+    surface.degree[bodies + o] = context.obstacles.degree[o];
+  }
+  for (const auto& [a, b] : context.obstacles.edges) surface.edges.push_back({bodies + a, bodies + b});
+  std::sort(surface.edges.begin(), surface.edges.end());
+  Workspace workspace;
+  const VectorX predictor = compacted(slot_fields.predictor, context.obstacles.x);
+  return InertiaEnergy<2>(cells, context.materials, MassKind::consistent, predictor).value(x, workspace) +
+         ElasticEnergy<2>(cells, context.materials, context.scaling).value(x, workspace) +
+         LoadEnergy<2>(cells, context.materials, context.loads, context.scaling).value(x, workspace) +
+         ContactEnergy<2>(surface, context.contact, context.contact.barrier_stiffness, context.scaling).value(x, workspace);
+}
+
+}  // namespace itr
