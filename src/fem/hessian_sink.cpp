@@ -208,10 +208,10 @@ void HessianSink::add(std::span<const int> vertices, const double* block) {
       const int row = unknown[i];
       const double value = block[n * j + i];
       if (row < column || value == 0) continue;  // kNone is below every unknown; half of a mass block is zero
-      if (dense_)
-        (*dense_)(row, column) += value;
-      else
+      if (sparse_)
         sparse_->add(row, column, value);
+      else
+        (*dense_)(row, column) += value;
     }
   }
   if (motion_) add_motion<Dim>(vertices, block);
@@ -249,11 +249,9 @@ void HessianSink::add_batch(const CellSet<Dim>& cells, std::size_t first, std::s
   }
 }
 
-#define ITR_INSTANTIATE(Dim)                                                \
-  template void HessianSink::add<Dim>(std::span<const int>, const double*); \
-  template void HessianSink::add_batch<Dim>(const CellSet<Dim>&, std::size_t, std::span<const Mat<Dim*(Dim + 1)>>);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+template void HessianSink::add<2>(std::span<const int>, const double*);
+template void HessianSink::add<3>(std::span<const int>, const double*);
+template void HessianSink::add_batch<2>(const CellSet<2>&, std::size_t, std::span<const Mat<6>>);
+template void HessianSink::add_batch<3>(const CellSet<3>&, std::size_t, std::span<const Mat<12>>);
 
 }  // namespace itr

@@ -43,7 +43,7 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   const VectorX& x = state.history.x[0];
   const auto corners = [&](const auto& primitive) {
     std::string text;
-    for (const int v : primitive) text += (text.empty() ? "" : "-") + describe<Dim>(x.segment<Dim>(Dim * v));
+    for (const int v : primitive) text.append(text.empty() ? "" : "-").append(describe<Dim>(x.segment<Dim>(Dim * v)));
     return text;
   };
   constexpr std::size_t kMostNamed = 5;

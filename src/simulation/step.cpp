@@ -178,7 +178,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
   };
   auto problem = make_problem();
   const auto solve = [&](const VectorX& lagged) {
-    const NewtonSummary summary = problem->solve(x, lagged);
+    NewtonSummary summary = problem->solve(x, lagged);
     add_seconds(summary, report.seconds);
     report.newton_iterations += summary.iterations;
     if (summary.converged() && !summary.message.empty())
@@ -311,7 +311,7 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
     parts += std::max(1, result.report.cut_steps);
     forces = std::move(result.forces);
   }
-  whole = {.report = effort, .forces = std::move(forces)};
+  whole = {.reason = {}, .report = effort, .forces = std::move(forces)};
   whole.report.cut_steps = parts;
   whole.report.step = part.step = state.step + 1;
   whole.report.t = part.t = setup.time.t0 + part.step * setup.time.dt;

@@ -144,7 +144,8 @@ class ActiveSet {
     };
     visit_blocks<Part>(pairs.size(), visit, [&](const Part& part) { take(part); });
     sort_unique(corners_);
-    for (const auto& [i, j] : corners_) {
+    for (const Ids& ids : corners_) {
+      const int i = ids[0], j = ids[1];  // named by themselves: clang before 16 captures no structured bindings
       const bool adjacent = are_adjacent(i, j);
       const auto correct = [&](int vertex, int corner) {  // the corner's edges count the vertex n times
         const int n = surface_.degree[corner] - (adjacent ? 1 : 0);
