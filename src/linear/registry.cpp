@@ -184,11 +184,30 @@ std::string Registry::canonical_name(const std::string& name) {
   const auto it = kAliases.find(name);
   if (it != kAliases.end()) return it->second;
   // PolyFEM's solvers that we have no equal of: they change no result, so the default takes their place.
-  static const std::set<std::string> kOthers = {
-      "Eigen::SparseQR", "Eigen::CholmodSimplicialLDLT", "Eigen::SuperLU", "Eigen::PardisoLDLT", "Eigen::PardisoLLT",
-      "Eigen::PardisoLU", "Eigen::AccelerateLLT", "Eigen::AccelerateLDLT", "Eigen::LeastSquaresConjugateGradient",
-      "Eigen::DGMRES", "Eigen::BiCGSTAB", "Eigen::GMRES", "Eigen::MINRES", "Eigen::LDLT", "Eigen::LLT",
-      "Eigen::PartialPivLU", "Eigen::FullPivLU", "Pardiso", "Hypre", "AMGCL", "AMGCL_cuda", "MAS", "Trilinos", "cuSolverDN"};
+  static const std::set<std::string> kOthers = {"Eigen::SparseQR",
+                                                "Eigen::CholmodSimplicialLDLT",
+                                                "Eigen::SuperLU",
+                                                "Eigen::PardisoLDLT",
+                                                "Eigen::PardisoLLT",
+                                                "Eigen::PardisoLU",
+                                                "Eigen::AccelerateLLT",
+                                                "Eigen::AccelerateLDLT",
+                                                "Eigen::LeastSquaresConjugateGradient",
+                                                "Eigen::DGMRES",
+                                                "Eigen::BiCGSTAB",
+                                                "Eigen::GMRES",
+                                                "Eigen::MINRES",
+                                                "Eigen::LDLT",
+                                                "Eigen::LLT",
+                                                "Eigen::PartialPivLU",
+                                                "Eigen::FullPivLU",
+                                                "Pardiso",
+                                                "Hypre",
+                                                "AMGCL",
+                                                "AMGCL_cuda",
+                                                "MAS",
+                                                "Trilinos",
+                                                "cuSolverDN"};
   if (kOthers.contains(name)) return {};
   return name;
 }
