@@ -206,6 +206,19 @@ TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
     EXPECT_FALSE(pick_solver(traits, all).reason.empty());
 }
 
+// Fill of the squares and cubes of verification/scaling/results.csv, METIS.
+TEST(Auto, ForeseesTheFillOfSquaresAndCubes) {
+  const auto expect = [](int order, std::size_t nonzeros, int dim, double fill) {
+    const double estimate = estimate_factor_bytes({order, nonzeros, dim, false, 0}) / 8;
+    EXPECT_GE(estimate, 0.95 * fill);
+    EXPECT_LE(estimate, 2 * fill);
+  };
+  expect(51'842, 386'243, 2, 3.472e6);
+  expect(206'082, 1'540'483, 2, 16.69e6);
+  expect(52'728, 1'143'000, 3, 33.2e6);
+  expect(255'552, 5'670'975, 3, 305e6);
+}
+
 TEST(Auto, LogsWhatItTookAndSolves) {
   Registry registry;
   Log log;

@@ -130,6 +130,7 @@ class Mumps {
       icntl(mumps_, 14) *= 3;
       outcome = job(kFactorize);
     }
+    is_factorized_ = outcome == ITR_OK;
     if (outcome == ITR_OK && Symmetry == 1 && infog(mumps_, 12) > 0) {
       std::snprintf(text_.data(), text_.size(), "%d pivots are not positive", infog(mumps_, 12));
       return ITR_NOT_POSITIVE_DEFINITE;
@@ -150,10 +151,11 @@ class Mumps {
   itr_statistics statistics() const {
     itr_statistics result{};
     if (session_ < 0) return result;
-    result.factor_nonzeros = count(infog(mumps_, 29));
-    result.largest_bytes = 1e6 * infog(mumps_, 21);
-    result.factor_bytes = 1e6 * infog(mumps_, 22);
-    result.flops = mumps_.rinfog[2];
+    // Before the first factorisation what the analysis foresees.
+    result.factor_nonzeros = count(infog(mumps_, is_factorized_ ? 29 : 20));
+    result.largest_bytes = 1e6 * infog(mumps_, is_factorized_ ? 21 : 16);
+    result.factor_bytes = 1e6 * infog(mumps_, is_factorized_ ? 22 : 17);
+    result.flops = mumps_.rinfog[is_factorized_ ? 2 : 0];
     return result;
   }
   const char* message() const { return text_.data(); }
@@ -186,6 +188,7 @@ class Mumps {
     session_ = session.number;
     is_shared_ = session.communicator != MPI_COMM_NULL;
     instance_ = ++session.instances;
+    is_factorized_ = false;
     if (is_shared_) send({kInit, instance_, Symmetry});
     init(mumps_, Symmetry, is_shared_ ? session.communicator : MPI_COMM_SELF);
     return infog(mumps_, 1) >= 0;
@@ -225,7 +228,7 @@ class Mumps {
   DMUMPS_STRUC_C mumps_{};
   int session_ = -1;  ///< -1: not started
   int instance_ = 0;
-  bool is_shared_ = false;
+  bool is_shared_ = false, is_factorized_ = false;
   int ordering_ = kAuto;
   std::vector<MUMPS_INT> rows_, columns_;
   std::vector<double> values_;

@@ -78,6 +78,7 @@ class CheckedSolver final : public Solver {
 
   Outcome factorize(std::span<const double> values) override {
     ready_ = false;
+    if (!analyzed_) return note(Outcome::failed, "no analysis to factorise with");
     if (values.size() != pattern_.nonzeros())
       return note(Outcome::failed, "the number of values is not that of the pattern");
     if (!is_finite(values)) return note(Outcome::non_finite, "a matrix entry is not finite");

@@ -27,7 +27,7 @@ struct Pick {
 /// What `auto` takes among the solvers that are there. A pure function of its arguments but for `memory_bytes` = 0.
 Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& rows);
 
-/// Bytes that the factors of such a matrix take with a nested-dissection ordering, fitted to verification/solvers.
+/// Bytes that the factors of such a matrix take with a nested-dissection ordering, fitted to verification/scaling.
 double estimate_factor_bytes(const MatrixTraits& traits);
 
 /// Picks at each analysis, and tells the logger when the pick changes. `registry` must outlive it.

@@ -48,7 +48,7 @@ struct AnalyzeHints {
   std::span<const double> coordinates = {};  ///< block_size of each unknown: where its node is [m]
 };
 
-/// What the last factorisation and solve took; zero where the library does not tell.
+/// What the last factorisation and solve took, or what the analysis foresees; zero where the library does not tell.
 struct Statistics {
   double factor_nonzeros = 0;
   double factor_bytes = 0;   ///< summed over MPI ranks
