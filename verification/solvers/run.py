@@ -109,6 +109,29 @@ def table(rows, scene):
     return "\n".join(lines)
 
 
+def ratios(rows, least):
+    """Seconds of factorisation and solve over CHOLMOD's on the same system, over systems of at least so many unknowns."""
+    cost = {(r["scene"], r["unknowns"], r["solver"]): r["factorize_s"] + r["solve_s"] for r in rows
+            if r["outcome"] == "ok" and r["ranks"] == 1 and r["unknowns"] >= least}
+    lines = [f"Factorisation + solve over `cholmod:supernodal`'s, systems from {least} unknowns: median (least to most; systems)", "",
+             "| solver | 2D | 3D |", "|---|---|---|"]
+    for solver in sorted({key[2] for key in cost}):
+        cells = []
+        for dim in ("2D", "3D"):
+            some = [seconds / cost[scene, n, "cholmod:supernodal"] for (scene, n, name), seconds in cost.items()
+                    if name == solver and scene.endswith(dim) and (scene, n, "cholmod:supernodal") in cost]
+            cells.append(f"{numpy.median(some):.2g} ({min(some):.2g} to {max(some):.2g}; {len(some)})" if some else "")
+        lines.append(f"| {solver} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def read(file):
+    """Rows of an earlier run, numbers as numbers."""
+    with open(file, newline="", encoding="utf-8") as text:
+        return [{key: value if key in ("scene", "solver", "outcome") or not value else json.loads(value)
+                 for key, value in row.items()} for row in csv.DictReader(text)]
+
+
 def plot(rows, file):
     import matplotlib
     matplotlib.use("Agg")
@@ -139,7 +162,7 @@ def write(rows, folder):
         writer.writeheader()
         writer.writerows(rows)
     plot(rows, folder / "solvers.svg")
-    text = "\n\n".join(table(rows, scene) for scene in dict.fromkeys(row["scene"] for row in rows))
+    text = "\n\n".join([ratios(rows, 8000), *(table(rows, scene) for scene in dict.fromkeys(row["scene"] for row in rows))])
     (folder / "tables.md").write_text(text + "\n", encoding="utf-8")
     return text
 
@@ -149,7 +172,7 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "results" / "solvers", help="for dumped systems")
     parser.add_argument("--most", type=int, default=400_000, help="larger systems are left out")
-    parser.add_argument("--scene", nargs="*", help="only these")
+    parser.add_argument("--scene", nargs="*", help="only these; rows of others stay")
     parser.add_argument("--seconds", type=float, default=1200, help="a solver has for a system")
     parser.add_argument("--dump-seconds", type=float, default=1200, help="a run has to reach its end; else its last system counts")
     parser.add_argument("--once-from", type=int, default=100_000, help="larger systems are factorised once instead of six times")
@@ -159,7 +182,8 @@ def main():
     arguments = parser.parse_args()
     itr, bench = arguments.build / "bin" / "itr", arguments.build / "bin" / "itr_solver_bench"
 
-    rows = []
+    earlier = arguments.output / "results.csv"
+    rows = [row for row in read(earlier) if row["scene"] not in arguments.scene] if arguments.scene and earlier.exists() else []
     solvers = solvers_there(itr)
     for name, scene, sets, sizes in SCENES:
         if arguments.scene and name not in arguments.scene:
