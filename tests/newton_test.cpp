@@ -52,6 +52,37 @@ TEST(Newton, LeavesASaddleInFewSteps) {
   EXPECT_LE((x.array() - std::sqrt(c)).abs().maxCoeff(), 1e-9);
 }
 
+/// A quadratic whose gradient has noise that no step removes.
+class NoisyBowl final : public Energy {
+ public:
+  std::string_view name() const override { return "noisy bowl"; }
+  double value(ConstVectorView x, Workspace&) const override { return 1 + x.squaredNorm() / 2; }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
+    gradient += x;
+    gradient[0] += 1e-9 * std::sin(12.9 * ++calls_);
+  }
+  void add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const override {
+    for (int v = 0; v < x.size() / 2; ++v) sink.add<2>(std::array{v}, Mat<2>(Mat<2>::Identity()).data());
+  }
+
+ private:
+  mutable int calls_ = 0;
+};
+
+TEST(Newton, EndsAtRoundOffAndSaysSo) {
+  VectorX x = VectorX::Constant(4, 1.0);
+  const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+  DenseSystem system;
+  NewtonOptions options;
+  options.step_tolerance = options.gradient_tolerance = options.first_gradient_tolerance = 1e-12;  // below the noise
+  Workspace workspace;
+  const NewtonSummary summary = minimize(NoisyBowl(), x, dofs, VectorX(), system, options, workspace);
+  EXPECT_EQ(summary.termination, Termination::round_off) << to_string(summary.termination);
+  EXPECT_TRUE(summary.converged());
+  EXPECT_NE(summary.message.find("round-off"), std::string::npos);
+  EXPECT_LT(summary.iterations, 100);
+}
+
 TEST(Newton, CallsBackAfterEachStepAndTakesInAChangedEnergy) {
   VectorX x = VectorX::Constant(4, 2.0);
   const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));

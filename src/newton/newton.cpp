@@ -45,8 +45,10 @@ void NewtonSummary::add_effort(const NewtonSummary& other) {
 namespace {
 
 constexpr double kArmijo = 1e-4;
-constexpr double kRoundOff = 1e-9;      ///< relative change of energy below which slopes tell more
-constexpr double kUnresolved = 1e-14;   ///< relative change of energy that a sum of many terms does not resolve
+constexpr double kRoundOff = 1e-9;     ///< relative change of energy below which slopes tell more
+constexpr double kUnresolved = 1e-14;  ///< relative change of energy that a sum of many terms does not resolve
+constexpr const char* kAtRoundOff = "converged to the round-off of the energy, above the tolerances asked for";
+constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less than that
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostDoublings = 12;
@@ -77,6 +79,7 @@ class Minimizer {
         return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
       if (!moving_ && has_small_step()) return stop(Termination::step);
       if (!moving_ && -0.5 * free_dot(step_, gradient_) < options_.decrement_tolerance) return stop(Termination::decrement);
+      if (is_lost_in_round_off()) return stop(Termination::round_off, kAtRoundOff);
       const double before = value_;
       const bool found = line_search() || retry_projected();
       if (found && has_stalled(before)) return stop(Termination::energy);
@@ -86,7 +89,8 @@ class Minimizer {
           if (++blocked_ > kMaxBlocked) return stop(Termination::no_descent, describe_way_left());
           continue;
         }
-        if (-0.5 * free_dot(step_, gradient_) < kUnresolved * std::abs(value_)) return stop(Termination::round_off);
+        if (-0.5 * free_dot(step_, gradient_) < kUnresolved * std::abs(value_))
+          return stop(Termination::round_off, kAtRoundOff);
         return stop(Termination::no_descent, "the line search found no step");
       }
       if (extras_.after_step && extras_.after_step(x_)) value_ = timed_value(x_);
@@ -191,6 +195,13 @@ class Minimizer {
     if (first_step_ < 0) first_step_ = summary_.step_norm;
     return summary_.step_norm < options_.step_tolerance ||
            (summary_.iterations > 0 && summary_.step_norm < options_.relative_step_tolerance * first_step_);
+  }
+
+  /// Whether many steps in a row promised less than the energy resolves: the gradient is round-off, and stays.
+  bool is_lost_in_round_off() {
+    const bool unresolved = !moving_ && -0.5 * free_dot(step_, gradient_) < kUnresolved * std::abs(value_);
+    unresolved_ = unresolved ? unresolved_ + 1 : 0;
+    return unresolved_ >= kMostUnresolved;
   }
 
   /// Counts the steps in a row that hardly changed the energy.
@@ -387,6 +398,7 @@ class Minimizer {
   int psd_iterations_ = 0;
   int blocked_ = 0;
   double first_gradient_ = -1, first_step_ = -1;  ///< norms with the held dofs in place; below 0: not there yet
+  int unresolved_ = 0;                            ///< steps in a row that promised less than round-off
   int stalled_ = 0;
 };
 
