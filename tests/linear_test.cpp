@@ -2,14 +2,11 @@
 // One suite over every solver that is there: right answers against dense long double, failures as the right outcome.
 #include <gtest/gtest.h>
 
-#include <dlfcn.h>
-#include <link.h>
+#include <unistd.h>
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <numeric>
 #include <random>
@@ -419,143 +416,27 @@ TEST(Solver, ReportsThatMemoryIsOut) {
 }
 #endif
 
-TEST(Registry, NamesOfOthersMapToOurs) {
-  EXPECT_EQ(Registry::canonical_name(""), "eigen:ldlt");
-  EXPECT_EQ(Registry::canonical_name("eigen"), "eigen:ldlt");
-  EXPECT_EQ(Registry::canonical_name("cholmod"), "cholmod:supernodal");
-  EXPECT_EQ(Registry::canonical_name("Eigen::SimplicialLDLT"), "eigen:ldlt");
-  EXPECT_EQ(Registry::canonical_name("Eigen::SparseLU"), "eigen:lu");
-  EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod:supernodal");
-  for (const char* name : {"Eigen::PardisoLLT", "Eigen::AccelerateLDLT", "Hypre", "AMGCL", "Trilinos"})
-    EXPECT_EQ(Registry::canonical_name(name), "") << name;
-}
-
-TEST(Registry, RefusesOptionsThatASolverDoesNotHave) {
-  Registry registry = full_registry();
-  for (const auto& info : registry.list()) {
-    if (!info.available) continue;
-    try {
-      registry.create(info.name, {{"no-such-option", "1"}});
-      ADD_FAILURE() << info.name;
-    } catch (const InputError& error) {
-      EXPECT_NE(error.parts().place.find(info.name), std::string::npos);
-      EXPECT_NE(error.parts().found.find("no-such-option=1"), std::string::npos);
-    }
-  }
-  EXPECT_THROW(registry.create("eigen:cg", {{"tolerance", "2"}}), InputError);
-  EXPECT_THROW(registry.create("eigen:cg", {{"tolerance", "1e-9x"}}), InputError);
-  EXPECT_NO_THROW(registry.create("eigen:cg", {{"tolerance", "1e-9"}, {"max_iterations", "77"}}));
-}
-
-TEST(Registry, NeverStartsMpiWithoutTheProgramsWord) {
-  Registry registry;
-  const std::string name = "mumps";
-  if (!registry.find(name).available) GTEST_SKIP() << registry.find(name).reason;
-  if (registry.is_ready(name)) GTEST_SKIP() << "another test of this process has started MPI";
-  EXPECT_THROW(registry.create(name), InputError);
-  EXPECT_FALSE(registry.is_ready(name));
-  registry.allow_mpi_start();
-  EXPECT_TRUE(registry.is_ready(name));
-  EXPECT_GE(self_test_residual(*registry.create(name)), 0);
-}
-
-TEST(Registry, RefusesRanksForASolverWithoutMpi) {
-  Registry registry;
-  EXPECT_THROW(registry.connect("eigen"), InputError);
-  EXPECT_THROW(registry.serve("dense"), InputError);
-}
-
-TEST(Registry, UnknownNamesListWhatThereIs) {
-  try {
-    Registry().create("no-such-solver");
-    FAIL() << "accepted";
-  } catch (const InputError& error) {
-    EXPECT_NE(error.parts().expected.find("eigen:ldlt"), std::string::npos);
-    EXPECT_NE(error.parts().expected.find("mumps"), std::string::npos);
-  }
-}
-
-/// A folder of modules that only this process uses.
-class ModuleFolder {
- public:
-  ModuleFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "itr_modules_XXXXXX").string();
-    path_ = mkdtemp(name.data());
-    setenv("ITR_BACKEND_PATH", path_.c_str(), 1);
-  }
-  ~ModuleFolder() {
-    unsetenv("ITR_BACKEND_PATH");
-    std::error_code error;
-    std::filesystem::remove_all(path_, error);
-  }
-  ModuleFolder(const ModuleFolder&) = delete;
-  ModuleFolder& operator=(const ModuleFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-std::string reason_of(const std::string& name) {
-  for (const auto& info : Registry().list())
-    if (info.name == name && !info.available) return info.reason;
-  return "no such row, or it is there";
-}
-
-TEST(Registry, AModuleThatDoesNotLoadSaysWhyAndTheRestGoOn) {
-  const ModuleFolder folder;
-  std::ofstream(folder.path() / "itr_backend_broken.so") << "not a library";
-  EXPECT_NE(reason_of("itr_backend_broken").find("does not load"), std::string::npos);
-  EXPECT_GE(self_test_residual(*Registry().create("eigen")), 0);
-}
-
-TEST(Registry, ASolverWhoseModuleDoesNotLoadIsNotCalledMissing) {
-  const ModuleFolder folder;
-  std::ofstream(folder.path() / "itr_backend_umfpack.so") << "not a library";
-  Registry registry({folder.path()});  // not where a good one may be
-  EXPECT_NE(registry.find("umfpack").reason.find("does not load"), std::string::npos);
-  EXPECT_NE(registry.find("mumps").reason.find("libmumps-dev"), std::string::npos);
-}
-
-TEST(Registry, ALibraryThatIsNoModuleSaysSo) {
-  void* handle = dlopen("libm.so.6", RTLD_NOW);
-  ASSERT_TRUE(handle);
-  link_map* map = nullptr;
-  ASSERT_EQ(dlinfo(handle, RTLD_DI_LINKMAP, &map), 0);
-  const ModuleFolder folder;
-  std::filesystem::create_symlink(map->l_name, folder.path() / "itr_backend_other.so");
-  EXPECT_NE(reason_of("itr_backend_other").find("is no solver module"), std::string::npos);
-  dlclose(handle);
-}
-
-TEST(Registry, AModuleOfAnotherAbiVersionSaysSo) {
-  Registry registry({std::filesystem::path(ITR_BINARY_DIR) / "tests" / "modules"});
-  const BackendInfo info = registry.find("old_abi_module");
-  EXPECT_FALSE(info.available);
-  EXPECT_NE(info.reason.find("ABI version 1"), std::string::npos) << info.reason;
-  EXPECT_THROW(registry.create("old_abi_module"), InputError);
-}
-
 TEST(Systems, ComeBackFromTheDiskAsTheyWereSolved) {
-  const ModuleFolder folder;
+  const auto folder = std::filesystem::path(::testing::TempDir()) / ("itr_systems_" + std::to_string(::getpid()));
   const Elastic elastic = elasticity(2, 5, 0.3);
-  const auto solver = make_dumping_solver(Registry().create("eigen"), folder.path(), 2);
+  const auto solver = make_dumping_solver(Registry().create("eigen"), folder, 2);
   ASSERT_EQ(solver->analyze(elastic.pattern, elastic.hints()), Outcome::ok);
   ASSERT_EQ(solver->factorize(elastic.values), Outcome::ok);
   std::vector<double> b(elastic.pattern.order), x(b.size());
   for (std::size_t i = 0; i < b.size(); ++i) b[i] = std::cos(static_cast<double>(i));
   for (int i = 0; i < 3; ++i) EXPECT_EQ(solver->solve(b, x, 1, 1e-10).outcome, Outcome::ok);
-  EXPECT_FALSE(std::filesystem::exists(folder.path() / "000001"));
-  const DumpedSystem back = read_system(folder.path() / "000002");
+  EXPECT_FALSE(std::filesystem::exists(folder / "000001"));
+  const DumpedSystem back = read_system(folder / "000002");
   EXPECT_EQ(back.pattern, elastic.pattern);
   EXPECT_EQ(back.values, elastic.values);
   EXPECT_EQ(back.rhs, b);
   EXPECT_EQ(back.block_size, 2);
   EXPECT_EQ(back.dofs, elastic.dofs);
   EXPECT_EQ(back.coordinates, elastic.coordinates);
-  EXPECT_THROW(read_system(folder.path() / "000001"), InputError);
-  std::filesystem::resize_file(folder.path() / "000002" / "values.npy", 200);
-  EXPECT_THROW(read_system(folder.path() / "000002"), InputError);
+  EXPECT_THROW(read_system(folder / "000001"), InputError);
+  std::filesystem::resize_file(folder / "000002" / "values.npy", 200);
+  EXPECT_THROW(read_system(folder / "000002"), InputError);
+  std::filesystem::remove_all(folder);
 }
 
 /// Counts what reaches the engine.
@@ -582,15 +463,6 @@ TEST(Solver, AnalysesAPatternOnceUnlessItMayUsePositions) {
     for (const auto& pattern : {one, one, other, other, one}) EXPECT_EQ(solver->analyze(pattern, {}), Outcome::ok);
     EXPECT_EQ(analyses, iterative ? 5 : 3);
   }
-}
-
-TEST(Registry, AProgramAddsItsOwn) {
-  Registry registry;
-  BackendInfo info;
-  info.name = "mine";
-  info.available = true;
-  registry.add(info, [](const SolverOptions&) { return Registry().create("eigen"); });
-  EXPECT_GE(self_test_residual(*registry.create("mine")), 0);
 }
 
 TEST(Muelu, NeedsNotMoreIterationsOnFinerMeshesAndFewerWithRigidModes) {

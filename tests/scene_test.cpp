@@ -12,112 +12,12 @@
 #include <numbers>
 
 #include "itr/core/error.hpp"
-#include "scene/expression.hpp"
-#include "scene/interpolation.hpp"
 
 namespace itr::scene {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-double evaluate(const std::string& text, double x = 0, double y = 0, double z = 0, double t = 0) {
-  return Expression(text)({x, y, z, t});
-}
-
-TEST(Expression, OperatorsAsTinyexpr) {
-  EXPECT_EQ(evaluate("-2^2"), 4);
-  EXPECT_EQ(evaluate("2^3^2"), 64);
-  EXPECT_EQ(evaluate("2^-1"), 0.5);
-  EXPECT_EQ(evaluate("7 % 4 - 2 * 3 / 4"), 1.5);
-  EXPECT_EQ(evaluate("--1 + +.5e1"), 6);
-  EXPECT_EQ(evaluate("(1, 2) + 1"), 3);
-  EXPECT_EQ(evaluate("x + 10*y + 100*z + 1000*t", 1, 2, 3, 4), 4321);
-}
-
-TEST(Expression, Functions) {
-  EXPECT_EQ(evaluate("log(100)"), 2);
-  EXPECT_NEAR(evaluate("ln(e)"), 1, 1e-15);
-  EXPECT_NEAR(evaluate("sin pi"), 0, 1e-15);
-  EXPECT_EQ(evaluate("if(0, 1, 2)"), 1);
-  EXPECT_EQ(evaluate("if(-1, 1, 2)"), 2);
-  EXPECT_EQ(evaluate("min(3, max(1, 2)) + sign(-4) + sign(0)"), 1);
-  EXPECT_NEAR(evaluate("smooth_abs(-0.3, 5)"), -0.3 * std::tanh(-1.5), 1e-15);
-  EXPECT_NEAR(evaluate("rotate_2D_x(1, 0, pi/2)"), 0, 1e-15);
-  EXPECT_NEAR(evaluate("rotate_2D_y(1, 0, deg2rad(90))"), 1, 1e-15);
-  EXPECT_EQ(evaluate("fac(5) + ncr(5, 2) + npr(5, 2)"), 150);
-  EXPECT_EQ(evaluate("fac(1e9)"), INFINITY);
-  EXPECT_EQ(evaluate("smoothstep(0.5) + compare(1, 2) + half_smoothstep(2)"), 2.5);
-  EXPECT_EQ(evaluate("pi() - pi"), 0);
-  EXPECT_TRUE(Expression("1e6 / 16").is_constant());
-  EXPECT_FALSE(Expression("0 * t").is_constant());
-}
-
-TEST(Expression, RefusesWhatItDoesNotKnow) {
-  for (const char* text : {"", "1 +", "foo(1)", "min(1)", "min(1, 2, 3)", "2 2", "sin()", "(1", "x = 1", "X", "1..2", "if"})
-    EXPECT_THROW(Expression{text}, ExpressionError) << text;
-  EXPECT_THROW(Expression(std::string(100000, '(')), ExpressionError);
-  try {
-    Expression("1 + smoth_abs(t, 1)");
-    FAIL();
-  } catch (const ExpressionError& error) {
-    EXPECT_NE(std::string(error.what()).find("'smoth_abs' at character 5"), std::string::npos) << error.what();
-    EXPECT_NE(std::string(error.what()).find("smooth_abs"), std::string::npos);
-  }
-}
-
-Interpolation interpolation(const json& text) {
-  static Document document;  // outlives what is read from it
-  document = {"test.json", "", text};
-  return Interpolation(Node(document));
-}
-
-TEST(Interpolation, Ramps) {
-  EXPECT_EQ(Interpolation()(3), 1);
-  EXPECT_EQ(interpolation({{"type", "linear"}})(3), 3);
-  const Interpolation ramp = interpolation({{"type", "linear_ramp"}, {"from", 1}, {"to", 3}});
-  EXPECT_EQ(ramp(0), 0);
-  EXPECT_EQ(ramp(2.5), 1.5);
-  EXPECT_EQ(ramp(9), 2);
-}
-
-json piecewise(const char* type, const char* extend) {
-  return {{"type", type}, {"points", {0, 1, 3}}, {"values", {0, 2, 1}}, {"extend", extend}};
-}
-
-TEST(Interpolation, PiecesAndTheirExtension) {
-  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "constant"))(0.999), 0);
-  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "constant"))(1), 2);
-  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "constant"))(3), 1);
-  EXPECT_EQ(interpolation(piecewise("piecewise_constant", "repeat"))(3), 0);
-  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "constant"))(2), 1.5);
-  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "extrapolate"))(5), 0);
-  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "extrapolate"))(-1), -2);
-  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "repeat"))(3.5), 1);
-  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "repeat_offset"))(6.5), 3);
-  EXPECT_EQ(interpolation(piecewise("piecewise_linear", "repeat_offset"))(-2), 1);
-}
-
-TEST(Interpolation, CubicIsTwiceDifferentiableWithTheEndsOfItsExtension) {
-  const double h = 1e-4;
-  for (const char* extend : {"constant", "extrapolate", "repeat", "repeat_offset"}) {
-    const Interpolation g = interpolation(piecewise("piecewise_cubic", extend));
-    const auto slope = [&](double t) { return (g(t + h) - g(t - h)) / (2 * h); };
-    const auto curvature = [&](double t) { return (g(t + h) - 2 * g(t) + g(t - h)) / (h * h); };
-    for (const auto& [point, value] : {std::pair{0., 0.}, {1., 2.}, {3. - 1e-12, 1.}}) EXPECT_NEAR(g(point), value, 1e-9);
-    EXPECT_NEAR(slope(1 - 2 * h), slope(1 + 2 * h), 5e-3) << extend;
-    EXPECT_NEAR(curvature(1 - 2 * h), curvature(1 + 2 * h), 1e-2) << extend;
-    const double first = slope(2 * h), last = slope(3 - 2 * h);
-    const bool is_clamped = extend == std::string("constant"), is_natural = extend == std::string("extrapolate");
-    EXPECT_NEAR(last, is_clamped ? 0 : (is_natural ? slope(5) : first), 1e-2) << extend;
-  }
-}
-
-TEST(Interpolation, RefusesPointsThatDoNotFit) {
-  EXPECT_THROW(interpolation({{"type", "cubic"}}), InputError);
-  EXPECT_THROW(interpolation({{"type", "piecewise_linear"}, {"points", {0, 0}}, {"values", {1, 2}}}), InputError);
-  EXPECT_THROW(interpolation({{"type", "piecewise_linear"}, {"points", {0, 1}}, {"values", {1}}}), InputError);
-}
 
 /// A folder with a unit square of two triangles, a line and a tetrahedron, and scenes written into it.
 class SceneTest : public ::testing::Test {
@@ -555,70 +455,6 @@ TEST_F(SceneTest, RemeshOptions) {
   EXPECT_EQ(options.collapse.rel_max_edge_length, 3);
   EXPECT_EQ(options.smooth.max_iterations, 4);
   EXPECT_EQ(options.local.rings, 3);
-}
-
-// --- the paper's scenes -----------------------------------------------------------------------------------------------
-
-const fs::path kScripts = fs::path(ITR_SHARED_DIR) / "paper-scenes" / "scripts";
-
-int num_vertices(const Scene& scene) {
-  return std::visit([](const auto& s) { return s.mesh.num_vertices() + static_cast<int>(s.obstacles.rest.size()); },
-                    scene.setup);
-}
-
-TEST(PaperScenes, AreReadAndHaveTheVerticesOfTheReferenceRuns) {
-  if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
-  const std::vector<std::pair<const char*, int>> scenes = {
-      {"cantilever/cantilever.json", 81},  {"masticator/h=0.1.json", 249},    {"masticator/h=0.1-noremesh.json", 249},
-      {"masticator/h=0.2.json", 0},        {"masticator/h=0.05.json", 0},     {"ball-wall/2D.json", 141},
-      {"ball-wall/2D-noremesh.json", 141}, {"shake-rod/shake-rod-y.json", 0}, {"spikes2d/spikes2d.json", 676},
-      {"spikes2d/drop-bar.json", 0}};
-  for (const auto& [name, expected] : scenes) {
-    const Scene scene = read(kScripts / name);
-    if (expected > 0) {
-      EXPECT_EQ(num_vertices(scene), expected) << name;
-    }
-    EXPECT_EQ(std::visit([](const auto& s) { return s.mesh.find_defect(); }, scene.setup), "") << name;
-  }
-  for (const auto& entry : fs::directory_iterator(kScripts / "unit-tests"))
-    if (entry.path().extension() == ".json") {
-      EXPECT_NO_THROW(read(entry.path())) << entry.path();
-    }
-}
-
-TEST(PaperScenes, Masticator) {
-  if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
-  const Scene scene = read(kScripts / "masticator" / "h=0.1.json");
-  const auto& setup = std::get<itr::Setup<2>>(scene.setup);
-
-  EXPECT_EQ(setup.time.steps, 200);
-  EXPECT_EQ(setup.materials.at(0).youngs_modulus, 1e4);
-  EXPECT_EQ(setup.contact.barrier_stiffness, 1e3);
-  EXPECT_FALSE(setup.contact.adaptive_stiffness);
-  EXPECT_TRUE(setup.contact.convergent);
-  EXPECT_EQ(setup.contact.friction_iterations, 1000);
-  EXPECT_EQ(setup.remesh.split.acceptance_tolerance, 0.4);
-  EXPECT_EQ(setup.newton.max_iterations, 3000);
-  EXPECT_DOUBLE_EQ(setup.newton.step_tolerance, 1e-3 * 0.05);
-  ASSERT_EQ(setup.obstacles.motions.size(), 2u);
-  const double down = 0.76 * (1 - 4. / 5) * std::tanh(5 * (1 - 4. / 5)) - 0.76;
-  EXPECT_NEAR(setup.obstacles.motions[0]({0, 0.5}, 4)[1], down, 1e-15);
-  EXPECT_NEAR(setup.obstacles.motions[1]({0, 0.5}, 4)[1], -down, 1e-15);
-}
-
-TEST(PaperScenes, BrokenOnesSayWhy) {
-  if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
-  const auto place = [](const char* name) {
-    try {
-      read(kScripts / name);
-    } catch (const InputError& error) {
-      return error.parts().place;
-    }
-    return std::string("nothing wrong");
-  };
-  EXPECT_EQ(place("masticator/2D.json"), "/geometry/0/mesh");
-  EXPECT_EQ(place("spikes3d/drop-ball-noremesh-nref1.json"), "/patch/2");
-  EXPECT_EQ(place("common.json"), "/geometry");
 }
 
 }  // namespace

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: MIT
+// Contact, friction and the barrier's stiffness: derivatives, sums by their definitions, steps that are free of contact.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "derivatives.hpp"
+#include "itr/core/parallel.hpp"
+#include "itr/energy/contact/friction.hpp"
+#include "itr/energy/contact/stiffness.hpp"
+
+namespace itr {
+namespace {
+
+/// An open zigzag of obstacle edges below vertices of bodies, closer than dhat in some places.
+struct ContactScene {
+  CollisionSurface surface;
+  VectorX x;
+  ContactScene(unsigned seed, bool convergent) {
+    options.enabled = true;
+    options.activation_distance = 0.2;
+    options.convergent = convergent;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> noise(-0.04, 0.04);
+    const int n = 8;  // two polylines of n vertices, one above the other
+    x.resize(4 * n);
+    std::vector<Vec<2>> rest;
+    std::vector<std::array<int, 2>> edges;
+    for (int line = 0; line < 2; ++line)
+      for (int i = 0; i < n; ++i) {
+        const int v = line * n + i;
+        rest.emplace_back(0.3 * i, line);
+        x.segment<2>(2 * v) << 0.3 * i + 0.1 * line + noise(random), 0.12 * line + noise(random);
+        if (i + 1 < n) edges.push_back({v, v + 1});
+      }
+    surface = make_collision_surface<2>(edges, {}, {}, rest, std::vector<char>(2 * n, 1));
+  }
+  ContactOptions options;
+};
+
+class Contact : public ::testing::TestWithParam<bool> {};
+
+TEST_P(Contact, DerivativesMatchDifferences) {
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const ContactScene scene(seed, GetParam());
+    const ContactEnergy<2> contact(scene.surface, scene.options, 3, 0.5);
+    Workspace workspace;
+    ASSERT_FALSE(contact.active(scene.x, workspace).empty());
+    expect_derivatives(contact, scene.x, 1e-7, 1e-5);
+    expect_psd(contact, scene.x);
+  }
+}
+
+TEST_P(Contact, StepIsFreeOfContact) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const ContactScene scene(seed, GetParam());
+    const ContactEnergy<2> contact(scene.surface, scene.options, 3, 0.5);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 0.3);
+    const VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
+    Workspace workspace;
+    const double step = contact.max_step(scene.x, dx, workspace);
+    for (int i = 1; i <= 200; ++i) EXPECT_GT(contact.min_distance(scene.x + step * i / 200.0 * dx, workspace), 0) << seed;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(BothForms, Contact, ::testing::Bool(),
+                         [](const auto& info) { return info.param ? "convergent" : "plain"; });
+
+/// A vertex over the middle of a straight line of edges feels it once, wherever the line's vertices are.
+TEST(Contact, ConvergentFormCountsOverlappingEdgesOnce) {
+  const auto energy_over = [](double corner) {
+    const std::vector<Vec<2>> rest = {{0, 0.05}, {-1, 0}, {corner, 0}, {1, 0}};
+    CollisionSurface surface = make_collision_surface<2>({{1, 2}, {2, 3}}, {}, std::vector<int>{0}, rest, {1, 0, 0, 0});
+    surface.area = {1, 0, 0, 0};  // only the vertex itself carries weight
+    ContactOptions options{.enabled = true, .activation_distance = 0.1, .convergent = true};
+    VectorX x(8);
+    for (int v = 0; v < 4; ++v) x.segment<2>(2 * v) = rest[v];
+    Workspace workspace;
+    return ContactEnergy<2>(surface, options, 1, 1).value(x, workspace);
+  };
+  EXPECT_NEAR(energy_over(0.0), energy_over(0.5), 1e-12 * energy_over(0.5));
+}
+
+/// Two sheets of triangles, one above the other and turned by `angle`; parallel edges where it is 0.
+struct ContactScene3 {
+  CollisionSurface surface;
+  VectorX x;
+  ContactOptions options;
+  ContactScene3(unsigned seed, bool convergent, double angle, double roughness) {
+    options.enabled = true;
+    options.activation_distance = 0.2;
+    options.convergent = convergent;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> noise(-roughness, roughness);
+    const int n = 4;
+    std::vector<Vec<3>> rest;
+    std::vector<std::array<int, 3>> triangles;
+    for (int sheet = 0; sheet < 2; ++sheet)
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+          const int v = static_cast<int>(rest.size());
+          const double c = std::cos(angle * sheet), s = std::sin(angle * sheet), a = 0.3 * i + 0.08 * sheet, b = 0.3 * j;
+          rest.emplace_back(c * a - s * b, s * a + c * b, 0.12 * sheet);
+          if (i + 1 < n && j + 1 < n) {
+            triangles.push_back({v, v + n, v + n + 1});
+            triangles.push_back({v, v + n + 1, v + 1});
+          }
+        }
+    x.resize(3 * rest.size());
+    for (std::size_t v = 0; v < rest.size(); ++v)
+      x.segment<3>(3 * v) = rest[v] + Vec<3>(noise(random), noise(random), noise(random));
+    surface = make_collision_surface<3>({}, triangles, {}, rest, std::vector<char>(rest.size(), 1));
+  }
+};
+
+TEST_P(Contact, DerivativesMatchDifferencesIn3D) {
+  int mollified = 0;
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    const ContactScene3 scene(seed, GetParam(), seed % 2 ? 0.4 : 0, seed % 2 ? 0.03 : 0.003);
+    const ContactEnergy<3> contact(scene.surface, scene.options, 3, 0.5);
+    Workspace workspace;
+    ASSERT_FALSE(contact.active(scene.x, workspace).empty());
+    for (const auto& s : contact.active(scene.x, workspace)) mollified += s.is_mollified();
+    expect_derivatives(contact, scene.x, 1e-8, 2e-5);
+    expect_psd(contact, scene.x);
+  }
+  EXPECT_GT(mollified, 20);
+}
+
+TEST_P(Contact, StepIsFreeOfContactIn3D) {
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    const ContactScene3 scene(seed, GetParam(), 0.2 * seed, 0.02);
+    const ContactEnergy<3> contact(scene.surface, scene.options, 3, 0.5);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 0.2);
+    const VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
+    Workspace workspace;
+    const double step = contact.max_step(scene.x, dx, workspace);
+    EXPECT_LT(step, 1);
+    for (int i = 1; i <= 100; ++i) {
+      Workspace fresh;
+      EXPECT_GT(contact.min_distance(scene.x + step * i / 100.0 * dx, fresh), 0) << seed;
+    }
+  }
+}
+
+/// The sum by its definition: every pair of primitives, nothing merged, no tree.
+double plain_energy(const ContactScene3& scene, const ContactEnergy<3>& contact) {
+  double sum = 0;
+  const auto& surface = scene.surface;
+  const auto at = [&](int v) { return Vec<3>(scene.x.segment<3>(3 * v)); };
+  for (const int v : surface.vertices)
+    for (const auto& [a, b, c] : surface.triangles)
+      if (v != a && v != b && v != c) sum += contact.barrier(point_triangle_distance_squared(at(v), at(a), at(b), at(c)));
+  for (std::size_t e = 0; e < surface.edges.size(); ++e)
+    for (std::size_t f = e + 1; f < surface.edges.size(); ++f) {
+      const auto [a, b] = surface.edges[e];
+      const auto [c, d] = surface.edges[f];
+      if (a == c || a == d || b == c || b == d) continue;
+      const Vec<3> x[] = {at(a), at(b), at(c), at(d)};
+      const double s = edge_cross_squared(x);
+      const double eps = 1e-3 * surface.edge_length_squared[e] * surface.edge_length_squared[f];
+      const double m = s < eps ? (2 - s / eps) * s / eps : 1;
+      sum += m * contact.barrier(edge_edge_distance_squared(x[0], x[1], x[2], x[3]));
+    }
+  return sum;
+}
+
+TEST(Contact3, EnergyIsTheSumOverAllPairs) {
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    const ContactScene3 scene(seed, false, seed % 2 ? 0.3 : 0, seed % 2 ? 0.03 : 0.002);
+    const ContactEnergy<3> contact(scene.surface, scene.options, 1, 1);
+    Workspace workspace;
+    const double expected = plain_energy(scene, contact);
+    EXPECT_GT(expected, 0);
+    EXPECT_NEAR(contact.value(scene.x, workspace), expected, 1e-12 * expected);
+  }
+}
+
+/// A vertex over a plane of triangles feels it once, wherever the plane's vertices and edges are.
+TEST(Contact3, ConvergentFormCountsOverlappingTrianglesOnce) {
+  const auto energy_over = [](double a, double b) {
+    const std::vector<Vec<3>> rest = {{0, 0, 0.05}, {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {a, b, 0}};
+    CollisionSurface surface = make_collision_surface<3>({}, {{1, 2, 5}, {2, 3, 5}, {3, 4, 5}, {4, 1, 5}},
+                                                         std::vector<int>{0}, rest, {1, 0, 0, 0, 0, 0});
+    surface.area = {1, 0, 0, 0, 0, 0};  // only the vertex itself carries weight
+    ContactOptions options{.enabled = true, .activation_distance = 0.1, .convergent = true};
+    VectorX x(18);
+    for (int v = 0; v < 6; ++v) x.segment<3>(3 * v) = rest[v];
+    Workspace workspace;
+    return ContactEnergy<3>(surface, options, 1, 1).value(x, workspace);
+  };
+  const double inside = energy_over(0.5, 0.1);
+  EXPECT_GT(inside, 0);
+  EXPECT_NEAR(energy_over(0, 0), inside, 1e-12 * inside) << "over a vertex";
+  EXPECT_NEAR(energy_over(0.5, 0.5), inside, 1e-12 * inside) << "over an edge";
+  EXPECT_NEAR(energy_over(0.02, 0.01), inside, 1e-12 * inside) << "over a triangle, next to a vertex";
+}
+
+TEST(Contact3, ObstaclePointsAndEdgesAreFelt) {
+  // A body's triangle over a codimensional edge and a codimensional point.
+  const std::vector<Vec<3>> rest = {{0, 0, 0.05}, {1, 0, 0.05}, {0, 1, 0.05}, {0.2, -1, 0}, {0.2, 2, 0}, {0.5, 0.25, 0}};
+  VectorX x(18);
+  for (int v = 0; v < 6; ++v) x.segment<3>(3 * v) = rest[v];
+  const ContactOptions options{.enabled = true, .activation_distance = 0.1};
+  Workspace workspace;
+  const CollisionSurface surface =
+      make_collision_surface<3>({{3, 4}}, {{0, 1, 2}}, std::vector<int>{3, 4, 5}, rest, {1, 1, 1, 0, 0, 0});
+  const ContactEnergy<3> contact(surface, options, 1, 1);
+  int by_point = 0, by_edge = 0;
+  for (const auto& s : contact.active(x, workspace)) {
+    by_point += s.kind == PairKind::face_vertex && s.vertices[0] == 5;
+    by_edge += s.kind == PairKind::edge_edge && s.vertices[2] == 3 && s.vertices[3] == 4;
+  }
+  EXPECT_EQ(by_point, 1);
+  EXPECT_GE(by_edge, 1);
+}
+
+/// Slow slip of a pair of sheets or lines.
+template <int Dim, typename Scene>
+void expect_friction_derivatives(Scene scene, unsigned seed) {
+  scene.options.friction_coefficient = 0.4;
+  scene.options.friction_velocity = 0.05;
+  const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
+  Workspace workspace;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, 0.001);
+  const VectorX reference = scene.x + VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
+  const FrictionEnergy<Dim> friction(contact, scene.x, workspace, scene.options, {20, reference}, 0.01);
+  ASSERT_FALSE(friction.empty());
+  expect_derivatives(friction, scene.x, 1e-7, 1e-5);
+  expect_psd(friction, scene.x);
+}
+
+TEST(Friction, DerivativesMatchDifferences) {
+  for (unsigned seed = 0; seed < 10; ++seed) expect_friction_derivatives<2>(ContactScene(seed, false), seed);
+  for (unsigned seed = 0; seed < 4; ++seed) expect_friction_derivatives<3>(ContactScene3(seed, seed % 2, 0.4, 0.03), seed);
+}
+
+TEST(Contact3, HasTheSameBitsForOneAndTwoThreads) {
+  const ContactScene3 scene(3, true, 0.3, 0.02);
+  const VectorX dx = 0.3 * VectorX::Random(scene.x.size());
+  const auto run = [&](int threads) {
+    const ThreadLimit limit(threads);
+    const ContactEnergy<3> contact(scene.surface, scene.options, 3, 0.5);
+    Workspace workspace;
+    VectorX result(scene.x.size() + 2);
+    result << gradient_of(contact, scene.x), contact.value(scene.x, workspace), contact.max_step(scene.x, dx, workspace);
+    return result;
+  };
+  EXPECT_TRUE((run(1).array() == run(2).array()).all());
+}
+
+TEST(AdaptiveStiffness, BalancesTheBarrierAndStaysInItsBounds) {
+  const ContactScene3 scene(3, false, 0.3, 0.02);
+  Workspace workspace;
+  const ContactEnergy<3> contact(scene.surface, scene.options, 1, 1);
+  const VectorX barrier = gradient_of(contact, scene.x);
+  const double mass = 2, scale = 0.25, Dhat = 0.04;
+  const AdaptiveStiffness<3> adaptive(scene.surface, scene.options, mass, scale);
+  Vec<3> low = scene.x.head<3>(), high = low;
+  for (Eigen::Index i = 0; i < scene.x.size(); i += 3) {
+    low = low.cwiseMin(scene.x.segment<3>(i));
+    high = high.cwiseMax(scene.x.segment<3>(i));
+  }
+  const double d0 = std::pow(1e-8 * (high - low).norm(), 2), r = Dhat / d0;
+  const double least = 1e11 * mass / (4 * d0 * ((r + 2) * r - 2 * std::log(d0 / Dhat) - 3));
+  BarrierStiffness stiffness;
+  adaptive.initialize(scene.x, -7 * least * barrier, stiffness, workspace);
+  EXPECT_NEAR(stiffness.value * scale, 7 * least, 1e-10 * least);
+  EXPECT_NEAR(stiffness.largest * scale, 100 * least, 1e-10 * least);
+  adaptive.initialize(scene.x, barrier, stiffness, workspace);  // pulls the same way as the barrier
+  EXPECT_NEAR(stiffness.value * scale, least, 1e-10 * least);
+  adaptive.initialize(scene.x, -1e9 * least * barrier, stiffness, workspace);
+  EXPECT_NEAR(stiffness.value * scale, 100 * least, 1e-8 * least);
+
+  // In the convergent form the force at x is that of the plain one: the energies are made equal there.
+  auto options = scene.options;
+  options.convergent = true;
+  const ContactEnergy<3> convergent(scene.surface, options, 1, 1);
+  BarrierStiffness other;
+  AdaptiveStiffness<3>(scene.surface, options, mass, scale).initialize(scene.x, -7 * least * barrier, other, workspace);
+  EXPECT_NEAR(other.value * convergent.value(scene.x, workspace) * scale, 7 * least * contact.value(scene.x, workspace),
+              1e-10 * least * contact.value(scene.x, workspace));
+}
+
+TEST(AdaptiveStiffness, DoublesWhileTinyGapsClose) {
+  const std::vector<Vec<2>> rest = {{0, 1}, {-1, 0}, {1, 0}};
+  const CollisionSurface surface = make_collision_surface<2>({{1, 2}}, {}, std::vector<int>{0}, rest, {1, 0, 0});
+  const ContactOptions options{.enabled = true, .activation_distance = 0.1};
+  const AdaptiveStiffness<2> adaptive(surface, options, 1, 1);
+  Workspace workspace;
+  BarrierStiffness stiffness{.value = 1, .largest = 3};
+  const auto update = [&](double gap) {
+    VectorX x(6);
+    x << 0, gap, -1, 0, 1, 0;
+    return adaptive.update(x, stiffness, workspace);
+  };
+  EXPECT_FALSE(update(1e-3));
+  EXPECT_FALSE(update(1.5e-9));  // small now, but was large before
+  EXPECT_TRUE(update(1e-9));
+  EXPECT_EQ(stiffness.value, 2);
+  EXPECT_FALSE(update(1.2e-9));  // opening
+  EXPECT_TRUE(update(1e-9));
+  EXPECT_EQ(stiffness.value, 3);  // the largest
+  EXPECT_FALSE(update(0.5e-9));
+}
+
+}  // namespace
+}  // namespace itr
