@@ -8,6 +8,7 @@
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/local_problem.hpp"
 #include "itr/remesh/patch.hpp"
+#include "itr/remesh/prediction.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
 
@@ -112,6 +113,46 @@ TEST(LocalProblem, HistoryAsAFunctionNeverGainsByForgetting) {
     ++compared;
   }
   EXPECT_GT(compared, 5);
+}
+
+/// Linear elasticity has a quadratic energy: the prediction for the new vertex alone is then exact.
+TEST(Prediction, OfTheNewVertexIsWhatRelaxingItAloneGains) {
+  int compared = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    TrialScene scene(seed);
+    scene.context.contact.enabled = false;
+    for (auto& [body, material] : scene.context.materials) material.law = MaterialLaw::linear;
+    const auto edges = scene.mesh.edges();
+    const EdgeKey edge = edges[scene.random() % edges.size()];
+    const auto edit = make_split(scene.mesh, edge);
+    LocalScratch scratch;
+    SurfaceTree tree(scene.mesh, scene.fields, scene.context);
+    // Of a patch of nothing but the split cells only the new vertex is free.
+    LocalProblem after(scene.mesh, scene.fields, scene.context, edit.removed_cells, &edit, true, HistoryRule::function, tree,
+                       scratch);
+    if (after.num_unknowns() != 2) continue;
+    const double start = after.value(), gained = start - after.relax(1).energy;
+    const SplitPrediction prediction = predict_split(scene.mesh, scene.fields, scene.context, edge);
+    EXPECT_NEAR(prediction.of_vertex, gained, 1e-9 * std::abs(start)) << "seed " << seed;
+    EXPECT_GT(prediction.at_most, prediction.of_vertex);
+    ++compared;
+  }
+  EXPECT_GT(compared, 5);
+}
+
+TEST(Remesh, PredictionFindsEdgesThatCullingByEnergyLeavesOut) {
+  std::map<Screening, int> tried;
+  for (unsigned seed = 0; seed < 5; ++seed)
+    for (const auto screening : {Screening::energy_percentile, Screening::predicted_decrease, Screening::none}) {
+      TrialScene scene(seed);
+      RemeshOptions options;
+      options.collapse.enabled = false;
+      options.screening = screening;
+      tried[screening] += remesh(scene.mesh, scene.fields, scene.context, options).splits.tried;
+    }
+  EXPECT_GT(tried[Screening::energy_percentile], 0);
+  EXPECT_GT(tried[Screening::predicted_decrease], 2 * tried[Screening::energy_percentile]);
+  EXPECT_GT(tried[Screening::none], tried[Screening::predicted_decrease]);
 }
 
 TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {

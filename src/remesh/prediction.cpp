@@ -47,8 +47,8 @@ class DirectionalStiffness {
 };
 }  // namespace
 
-double predicted_split_gain(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
-                            const EdgeKey& edge) {
+SplitPrediction predict_split(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
+                              const EdgeKey& edge) {
   const auto [a, b] = edge;
   const Vec<2> middle = 0.5 * (mesh.rest(a) + mesh.rest(b));
   Vec<2> g = Vec<2>::Zero();
@@ -86,8 +86,9 @@ double predicted_split_gain(const Mesh<2>& mesh, const RemeshFields<2>& fields, 
     for (const auto& [tag, traction] : context.loads.tractions)
       if (tag == mesh.facet_tag(f)) g -= context.scaling * (mesh.rest(b) - mesh.rest(a)).norm() / 2 * traction(middle);
   const Eigen::LLT<Mat<2>> llt(H);
-  if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
-  return factor * 0.5 * g.dot(llt.solve(g));
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  const double of_vertex = llt.info() == Eigen::Success ? 0.5 * g.dot(llt.solve(g)) : kUnknown;
+  return {of_vertex, factor * of_vertex};
 }
 
 }  // namespace itr

@@ -90,7 +90,7 @@ std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFie
 EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
                      const RemeshOptions& options) {
   const auto edges = mesh.edges();
-  if (options.screening != Screening::energy_percentile) {  // every edge may be split and collapsed
+  if (options.screening == Screening::none) {  // every edge may be split and collapsed
     EdgeRanks ranks;
     for (const EdgeKey& edge : edges) ranks[edge] = Rank::top;
     return ranks;

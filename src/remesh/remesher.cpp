@@ -23,6 +23,9 @@ namespace itr {
 namespace {
 
 constexpr int kIterationsAfterAcceptance = 100;
+/// Wherever an edge ranks by energy, a new vertex that alone gains this many tolerances is worth a trial. Smaller values
+/// find more and cost more trials (study in verification/paper).
+constexpr double kWorthwhile = 5;
 constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
 
 EdgeKey key(VertexId a, VertexId b) { return {std::min(a, b), std::max(a, b)}; }
@@ -178,7 +181,6 @@ class Remesher {
     if (!(energy_before - energy_after >= required)) return std::nullopt;
     // The side without the edit gets the same effort, so that residual left over elsewhere is not credited to the edit.
     if (before->has_unknowns()) {
-      before = build(false);
       const double relaxed = before->relax(iterations).energy;
       if (!(relaxed - energy_after >= required)) return std::nullopt;
     }
@@ -216,9 +218,13 @@ class Remesher {
     // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the
     // same with fewer vertices: verification/paper.)
     Queue queue;
+    const double tolerance = context_.scaling * options_.split.acceptance_tolerance;
     const auto push = [&](const EdgeKey& edge) {
-      if (rank(edge) == Rank::top && depth(edge) < options_.split.max_depth)
-        queue.push(edge, predicted_split_gain(mesh_, fields_, context_, edge));
+      if (depth(edge) >= options_.split.max_depth) return;
+      const bool top = rank(edge) == Rank::top;
+      if (!top && options_.screening != Screening::predicted_decrease) return;
+      const double gain = predict_split(mesh_, fields_, context_, edge).of_vertex;
+      if (top || (gain >= kWorthwhile * tolerance && !is_in_contact(edge))) queue.push(edge, gain);
     };
     for (const EdgeKey& edge : mesh_.edges()) push(edge);
     while (const auto edge = queue.pop()) {
@@ -232,7 +238,7 @@ class Remesher {
         }
       }
       if (options_.screening != Screening::none && !is_in_contact(*edge) &&
-          predicted_split_gain(mesh_, fields_, context_, *edge) < context_.scaling * options_.split.acceptance_tolerance)
+          predict_split(mesh_, fields_, context_, *edge).at_most < tolerance)
         continue;
       ++report_.splits.tried;
       const auto edit = make_split(mesh_, *edge);
@@ -248,7 +254,7 @@ class Remesher {
     const double longest =
         std::min(options_.collapse.abs_max_edge_length, options_.collapse.rel_max_edge_length * context_.shortest_edge);
     const auto is_candidate = [&](const EdgeKey& e) {
-      return options_.screening != Screening::energy_percentile || rank(e) == Rank::bottom ||
+      return options_.screening == Screening::none || rank(e) == Rank::bottom ||
              rest_length(e) < kTinyEdge * context_.shortest_edge;
     };
     Queue queue;
@@ -301,7 +307,10 @@ class Remesher {
       if (!edit) continue;
       ++report_.swaps.tried;
       const Vec<2> center = 0.5 * (mesh_.rest((*edge)[0]) + mesh_.rest((*edge)[1]));
-      const auto patch = attempt(*edit, center, options_.swap.acceptance_tolerance, false);
+      // An increase in energy is allowed for the sake of the mesh's shape only: without that, edges swap to and fro.
+      const double least =
+          valence_gain(*edge) > 0 ? options_.swap.acceptance_tolerance : std::max(0.0, options_.swap.acceptance_tolerance);
+      const auto patch = attempt(*edit, center, least, false);
       if (!patch) continue;
       ++report_.swaps.accepted;
       for (const EdgeKey& near : edges_of(*patch))

@@ -218,8 +218,8 @@ RemeshOptions read_remesh(const Node& root) {
   RemeshOptions options;
   options.enabled = node["enabled"].boolean(false);
   options.sizing_field = node["type"].choice({"physics", "sizing_field"}, 0) == 1;
-  options.screening =
-      static_cast<Screening>(node["screening"].choice({"energy-percentile", "predicted-decrease", "none"}, 0));
+  options.screening = static_cast<Screening>(
+      node["screening"].choice({"energy-percentile", "predicted-decrease", "none"}, static_cast<int>(options.screening)));
   options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));
   options.sweeps = node["sweeps"].integer_at_least(1, 1);
 

@@ -4,10 +4,11 @@
 
 namespace itr {
 
+/// Which edges are tried; collapses only where the paper's culling puts an edge at the bottom, unless `none`.
 enum class Screening {
-  energy_percentile,   ///< the paper's culling of edges by energy
-  predicted_decrease,  ///< by the second-order estimate of what one new vertex gains
-  none
+  energy_percentile,   ///< the paper's culling: splits of edges at the top by energy
+  predicted_decrease,  ///< and of those whose new vertex alone is predicted to gain several times the tolerance
+  none                 ///< every edge, for splits and collapses
 };
 
 /// What x-hat, x_t and v_t are on a changed mesh when an operation is judged.
@@ -60,7 +61,7 @@ struct RemeshOptions {
   SwapOptions swap;
   SmoothOptions smooth;
   LocalRelaxationOptions local;
-  Screening screening = Screening::energy_percentile;
+  Screening screening = Screening::predicted_decrease;
   HistoryRule history = HistoryRule::function;
   int sweeps = 1;
 };

@@ -5,11 +5,13 @@
 
 namespace itr {
 
-/// An estimate from above of what splitting an edge can gain [J, times the scaling], for leaving out trials that cannot be
-/// accepted: the decrease 1/2 g^T H^-1 g of the new vertex alone (one 2 x 2 system; contact left out), times a factor by
-/// which a whole patch was seen to gain more, which grows towards incompressibility (design §4). Infinity where it cannot
-/// tell.
-double predicted_split_gain(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
-                            const EdgeKey& edge);
+/// What splitting an edge is predicted to gain [J, times the scaling], contact left out; infinite where it cannot tell.
+struct SplitPrediction {
+  double of_vertex;  ///< the decrease 1/2 g^T H^-1 g that the new vertex alone brings (one 2 x 2 system)
+  double at_most;    ///< times the factor by which a whole patch was seen to gain more: it grows towards incompressibility
+};
+
+SplitPrediction predict_split(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
+                              const EdgeKey& edge);
 
 }  // namespace itr
