@@ -403,9 +403,6 @@ TEST_F(SceneTest, SelectedPointsAreHeld) {
   EXPECT_EQ(held.held, (std::vector<char>{0, 0, 1, 1, 1, 1, 0, 0}));
   EXPECT_EQ(held.target.segment<2>(2), Vec<2>(6, 5));  // its facet is of the right side
   EXPECT_EQ(held.target.segment<2>(4), Vec<2>(3, 1));  // points win
-  json remeshed = scene;
-  remeshed["space"]["remesh"]["enabled"] = true;
-  EXPECT_EQ(wrong_place(remeshed), "/geometry");
 }
 
 TEST_F(SceneTest, PressureAndDamping) {

@@ -29,7 +29,11 @@ void DampingEnergy<Dim>::for_each(ConstVectorView x, F&& f) const {
 template <int Dim>
 double DampingEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = 0;
-  for_each(x, [&](const auto&, const auto& K, const VectorX& v) { sum += v.dot(K * v); });
+  VectorX force;
+  for_each(x, [&](const auto&, const auto& K, const VectorX& v) {
+    force.noalias() = K * v;
+    sum += v.dot(force);
+  });
   return 0.5 * coefficient_ / velocity_.rate * sum;
 }
 

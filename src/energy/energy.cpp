@@ -27,7 +27,13 @@ void EnergySum::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& s
 
 double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
   double step = 1;
-  for (const auto& term : terms_) step = std::min(step, term->max_step(x, dx, workspace));
+  VectorX part;
+  for (const auto& term : terms_) {  // each is asked only about the part of the way that those before it leave
+    const double fraction = step < 1 ? term->max_step(x, part, workspace) : term->max_step(x, dx, workspace);
+    if (fraction == 1) continue;
+    step *= fraction;
+    part = step * dx;
+  }
   return step;
 }
 

@@ -71,29 +71,32 @@ class Minimizer {
     value_ = timed_value(x_);
     if (!std::isfinite(value_)) return stop(Termination::infeasible, "the energy at the start is not finite");
     for (summary_.iterations = 0; summary_.iterations < options_.max_iterations; ++summary_.iterations) {
-      compute_gradient();
       compute_remaining();
+      compute_gradient();
       if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
       if (!moving_ && has_small_gradient()) return stop(Termination::gradient);
       if (!compute_direction())
         return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
       if (!moving_ && has_small_step()) return stop(Termination::step);
-      if (!moving_ && -0.5 * free_dot(step_, gradient_) < options_.decrement_tolerance) return stop(Termination::decrement);
+      if (!moving_ && decrement() < options_.decrement_tolerance) return stop(Termination::decrement);
       if (is_lost_in_round_off()) return stop(Termination::round_off, kAtRoundOff);
       const double before = value_;
-      const bool found = line_search() || retry_projected();
-      if (found && has_stalled(before)) return stop(Termination::energy);
-      if (!found) {
-        if (moving_ && !relaxing_) {  // held dofs are blocked: let the bodies give way first
-          relax_next_ = true;
+      if (!line_search() && !retry_projected()) {
+        const bool relaxed = is_unresolved();
+        if (moving_ && (!relaxing_ || relaxed)) {  // where held dofs are blocked, let the bodies give way first
+          relax_next_ = !relaxing_;
           if (++blocked_ > kMaxBlocked) return stop(Termination::no_descent, describe_way_left());
           continue;
         }
-        if (-0.5 * free_dot(step_, gradient_) < kUnresolved * std::abs(value_))
-          return stop(Termination::round_off, kAtRoundOff);
+        if (relaxed) return stop(Termination::round_off, kAtRoundOff);
         return stop(Termination::no_descent, "the line search found no step");
       }
+      const bool stalled = has_stalled(before);
       if (extras_.after_step && extras_.after_step(x_)) value_ = timed_value(x_);
+      if (stalled) {
+        ++summary_.iterations;
+        return stop(Termination::energy);
+      }
     }
     return stop(Termination::iterations, "no convergence in " + std::to_string(options_.max_iterations) + " iterations" +
                                              (moving_ ? ", " + describe_way_left() : ""));
@@ -197,10 +200,14 @@ class Minimizer {
            (summary_.iterations > 0 && summary_.step_norm < options_.relative_step_tolerance * first_step_);
   }
 
+  /// What the full step promises.
+  double decrement() const { return -0.5 * free_dot(step_, gradient_); }
+
+  bool is_unresolved() const { return decrement() < kUnresolved * std::abs(value_); }
+
   /// Whether many steps in a row promised less than the energy resolves: the gradient is round-off, and stays.
   bool is_lost_in_round_off() {
-    const bool unresolved = !moving_ && -0.5 * free_dot(step_, gradient_) < kUnresolved * std::abs(value_);
-    unresolved_ = unresolved ? unresolved_ + 1 : 0;
+    unresolved_ = !moving_ && is_unresolved() ? unresolved_ + 1 : 0;
     return unresolved_ >= kMostUnresolved;
   }
 
@@ -221,7 +228,28 @@ class Minimizer {
       if (dofs_.unknown[i] == kNone) remaining[i] = target_[i] - x_[i];
     remaining_l1_ = remaining.lpNorm<1>();
     moving_ = remaining_l1_ > 0;
+    if (moving_ && remaining.norm() < options_.step_tolerance && finish_motion(remaining)) moving_ = false;
     if (moving_ && !relaxing_) motion_.step = std::move(remaining);
+  }
+
+  /// Puts held dofs at their targets where that is free. The last bit of the way, within the tolerance of positions, may
+  /// change energies by less than their round-off: no search could tell that it helps.
+  bool finish_motion(const VectorX& remaining) {
+    {
+      const ScopedTimer timer(summary_.ccd_seconds);
+      if (energy_.max_step(x_, remaining, workspace_) < 1) return false;
+    }
+    candidate_ = x_;
+    move_to_targets(candidate_);
+    const double value = timed_value(candidate_);
+    if (!std::isfinite(value)) return false;
+    accept(value);
+    return true;
+  }
+
+  void move_to_targets(VectorX& x) const {
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] == kNone) x[i] = target_[i];
   }
 
   bool compute_direction() {
@@ -314,15 +342,11 @@ class Minimizer {
     const int limit = options_.line_search == LineSearch::backtracking ? 30 : 40;
     for (int i = 0; i < limit && step > 1e-14; ++i, step /= 2) {
       candidate_ = x_ + step * step_;
-      if (advancing && step == 1)  // exactly there, not to round-off
-        for (Eigen::Index k = 0; k < x_.size(); ++k)
-          if (dofs_.unknown[k] == kNone) candidate_[k] = target_[k];
+      if (advancing && step == 1) move_to_targets(candidate_);  // exactly there, not to round-off
       const double value = timed_value(candidate_);
       if (!std::isfinite(value)) continue;
-      // A motion of held dofs within the tolerance of positions may change energies by less than their round-off.
-      const bool negligible = advancing && step == 1 && motion_.step.norm() < options_.step_tolerance;
       const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
-      if (!negligible && !acceptable(merit_change, value, step, merit_slope, advancing)) continue;
+      if (!acceptable(merit_change, value, step, merit_slope, advancing)) continue;
       // Also by its slope at the end: near round-off values alone say anything.
       const bool straight = options_.extend_steps && !advancing && step == 1 && value - value_ < kStraight * slope &&
                             free_dot(step_, gradient_at(candidate_)) < kStraight / 2 * slope;
@@ -343,13 +367,14 @@ class Minimizer {
   /// near a saddle), steps of twice the length follow as long as they lower it: Newton would leave with hundreds of equal
   /// ones.
   void go_on() {
+    VectorX step = step_;
     for (int k = 0; k < kMostDoublings; ++k) {
-      step_ *= 2;
+      step *= 2;
       {
         const ScopedTimer timer(summary_.ccd_seconds);
-        if (energy_.max_step(x_, step_, workspace_) < 1) return;
+        if (energy_.max_step(x_, step, workspace_) < 1) return;
       }
-      candidate_ = x_ + step_;
+      candidate_ = x_ + step;
       const double value = timed_value(candidate_);
       if (!(value < value_)) return;
       accept(value);
@@ -360,16 +385,13 @@ class Minimizer {
     if (options_.line_search == LineSearch::backtracking && !advancing) return change < 0;
     if (change <= kArmijo * step * slope) return true;
     if (advancing || options_.line_search == LineSearch::armijo) return false;
-    // Where differences of energies drown in round-off, compare slopes (Hager & Zhang; PolyFEM's "RobustArmijo").
-    if (std::abs(value - value_) > 0.1 * std::abs(value_)) return false;
-    const VectorX gradient = gradient_at(candidate_);
-    const double before = free_dot(step_, gradient_), after = free_dot(step_, gradient);
-    const double mean = step / 2 * (before + after), spread = step / 2 * std::abs(after - before);
-    // That form refuses full steps to the minimum of a quadratic; where energies say nothing at all, a slope that shrinks
-    // will do.
-    if (std::abs(value - value_) <= kRoundOff * std::abs(value_) && std::abs(after) <= 0.5 * std::abs(before))
-      return mean <= kArmijo * step * slope;
-    return mean + spread <= kArmijo * step * slope;
+    // PolyFEM's "RobustArmijo" (scene-format §7; Hager & Zhang): where the energy changes little, in either direction, a
+    // slope that still falls at the end will do. That refuses full steps to the minimum of a quadratic: where energies say
+    // nothing at all, a slope that shrinks to half is enough.
+    const double change_of_energy = std::abs(value - value_);
+    if (change_of_energy > 0.1 * std::abs(value_)) return false;
+    const double after = free_dot(step_, gradient_at(candidate_));
+    return after <= kArmijo * slope || (change_of_energy <= kRoundOff * std::abs(value_) && after <= -0.5 * slope);
   }
 
   const Energy& energy_;

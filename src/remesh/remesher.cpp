@@ -363,17 +363,7 @@ class Remesher {
 }  // namespace
 
 RemeshReport remesh(Mesh<2>& mesh, RemeshFields<2>& fields, const StepContext<2>& context, const RemeshOptions& options) {
-  RemeshReport report;
-  {
-    const ScopedTimer timer(report.trial_seconds);
-    const RemeshReport done = Remesher(mesh, fields, context, options).run();
-    report.splits = done.splits;
-    report.collapses = done.collapses;
-    report.swaps = done.swaps;
-    report.smooths = done.smooths;
-    report.bound_by_activation_distance = done.bound_by_activation_distance;
-  }
-  return report;
+  return Remesher(mesh, fields, context, options).run();
 }
 
 }  // namespace itr

@@ -49,16 +49,9 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   BodyGeometry<Dim> bodies = read_bodies<Dim>(geometries, files, warnings);
   setup.mesh = std::move(bodies.mesh);
   setup.point_tags = std::move(bodies.point_tags);
-  if (setup.remesh.enabled && !setup.point_tags.empty())
-    root["geometry"].fail("a point_selection", "surface_selection where the mesh changes: others are not supported yet");
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
-  if (setup.remesh.enabled)
-    for (const auto& [body, material] : setup.materials)
-      if (material.density_at)
-        root["materials"].fail("a density that varies in space (id " + std::to_string(body) + ")",
-                               "constant densities where the mesh changes: others are not supported yet");
   setup.contact = read_contact(root, shortest_surface_edge<Dim>(setup.mesh, setup.obstacles), warnings);
   return setup;
 }

@@ -31,6 +31,11 @@ void refuse_unsupported(const Setup<Dim>& setup) {
            "adaptive stiffness with remeshing, which is not supported yet (give a number)");
   if (setup.remesh.enabled && setup.remesh.sizing_field)
     refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
+  if (setup.remesh.enabled && !setup.point_tags.empty())
+    refuse("/geometry", "a point_selection where the mesh changes (select surfaces)");
+  for (const auto& [body, material] : setup.materials)
+    if (setup.remesh.enabled && material.density_at)
+      refuse("/materials", "a density that varies in space where the mesh changes");
   if constexpr (Dim == 3) {
     if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing in 3D, which is not supported yet");
   }
@@ -129,6 +134,14 @@ struct Simulation<Dim>::Impl {
   State<Dim> state;
   double shortest_edge = 0;  ///< of the initial mesh [m]
   NodalForces forces;        ///< of the last step
+
+  /// Those of a state that no step of this simulation led to.
+  void set_forces_at_rest() {
+    if (!setup.fields.any_forces()) return;
+    StepProblem<Dim> problem(setup, state.mesh, state.history, state.t, *system, state.stiffness);
+    forces = problem.forces(state.history.x[0]);
+    forces.reaction.setZero();
+  }
 };
 
 template <int Dim>
@@ -142,12 +155,7 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   refuse_intersections(impl_->setup, impl_->state);
   if (impl_->setup.consistent_initial_acceleration && !impl_->state.history.a.empty())
     set_consistent_acceleration(impl_->setup, impl_->state, *impl_->system);
-  if (const FieldOptions& asked = impl_->setup.fields; asked.any_forces()) {
-    const State<Dim>& state = impl_->state;
-    StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->system, state.stiffness);
-    impl_->forces = problem.forces(state.history.x[0]);
-    impl_->forces.reaction.setZero();  // no step has been solved
-  }
+  impl_->set_forces_at_rest();
   impl_->shortest_edge = std::numeric_limits<double>::infinity();
   const auto& mesh = impl_->state.mesh;
   for (const auto& [a, b] : mesh.edges())
@@ -200,6 +208,7 @@ void Simulation<Dim>::restore(State<Dim> state) {
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
     if (!impl_->setup.materials.contains(state.mesh.body(c))) refuse("body of a saved cell", state.mesh.body(c), 0);
   impl_->state = std::move(state);
+  impl_->set_forces_at_rest();
 }
 
 template <int Dim>
@@ -235,7 +244,7 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
     data.elastic_density.push_back(elastic_density<Dim>(deformation_gradient<Dim>(element, data.x),
                                                         elastic_moduli<Dim>(material, rest_barycenter(cells, element))));
   }
-  add_asked(data);
+  add_asked(cells, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   return data;
@@ -266,11 +275,10 @@ double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Ve
 }  // namespace
 
 template <int Dim>
-void Simulation<Dim>::add_asked(FrameData& data) const {
+void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, FrameData& data) const {
   const FieldOptions& options = impl_->setup.fields;
   AskedFields& asked = data.asked;
   asked.forces = impl_->forces;
-  const CellSet<Dim> cells = whole_mesh(impl_->state.mesh, {});
   if (options.von_mises || options.stress)
     for (const auto& element : cells.elements) {
       const Material& material = impl_->setup.materials.at(element.body);

@@ -218,6 +218,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
       report.swaps = {remeshed.swaps.tried, remeshed.swaps.accepted};
       report.smooths = {remeshed.smooths.tried, remeshed.smooths.accepted};
       if (remeshed.changed()) {
+        auto problem_before = std::move(problem);
         problem = make_problem();
         summary = solve(VectorX(x));
         if (!summary.converged()) {
@@ -225,7 +226,9 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
                          "), keeping the mesh as it was");
           next = unchanged;
           x = solution;
-          problem = make_problem();
+          problem = std::move(problem_before);
+          for (auto* operations : {&report.splits, &report.collapses, &report.swaps, &report.smooths})
+            operations->accepted = 0;
         }
       }
     }

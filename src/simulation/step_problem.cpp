@@ -130,30 +130,38 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
 }
 
 template <int Dim>
-EnergySum StepProblem<Dim>::energy(const VectorX& lagged_x) {
-  EnergySum sum;
-  if (inertia_) sum.add(inertia_);
-  sum.add(elastic_);
-  if (loads_) sum.add(loads_);
-  if (contact_) sum.add(contact_);
-  friction_.reset();
+typename StepProblem<Dim>::LaggedTerms StepProblem<Dim>::lag(const VectorX& x) {
+  LaggedTerms terms;
   if (has_friction()) {
-    friction_ = std::make_shared<FrictionEnergy<Dim>>(*contact_, lagged_x, workspace_, setup_.contact, velocity_, scaling_);
-    if (!friction_->empty()) sum.add(friction_);
+    terms.friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, x, workspace_, setup_.contact, velocity_, scaling_);
+    if (terms.friction->empty()) terms.friction.reset();
   }
-  pressure_.reset();
   if (!loads_at_end_.pressures.empty()) {
-    pressure_ = std::make_shared<PressureEnergy<Dim>>(cells_, loads_at_end_, lagged_x, scaling_);
-    if (!pressure_->empty()) sum.add(pressure_);
+    terms.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, loads_at_end_, x, scaling_);
+    if (terms.pressure->empty()) terms.pressure.reset();
   }
-  damping_.clear();
   for (const DampingOptions& options : setup_.damping) {
     const Energy* damped = elastic_.get();
     if (options.term == DampingOptions::Term::contact) damped = contact_.get();
     if (!damped || setup_.time.is_static) continue;
-    damping_.push_back(std::make_shared<DampingEnergy<Dim>>(*damped, lagged_x, options.coefficient, velocity_, workspace_));
-    sum.add(damping_.back());
+    terms.damping.push_back(std::make_shared<DampingEnergy<Dim>>(*damped, x, options.coefficient, velocity_, workspace_));
   }
+  return terms;
+}
+
+template <int Dim>
+EnergySum StepProblem<Dim>::sum_with(const LaggedTerms& lagged) const {
+  EnergySum sum;
+  const auto add = [&](const std::shared_ptr<const Energy>& term) {
+    if (term) sum.add(term);
+  };
+  add(inertia_);
+  add(elastic_);
+  add(loads_);
+  add(contact_);
+  add(lagged.friction);
+  add(lagged.pressure);
+  for (const auto& term : lagged.damping) add(term);
   return sum;
 }
 
@@ -172,7 +180,7 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   if (inertia_) inertia_->add_gradient(x, gradient, workspace_);
   elastic_->add_gradient(x, gradient, workspace_);
   if (loads_) loads_->add_gradient(x, gradient, workspace_);
-  if (pressure_) pressure_->add_gradient(x, gradient, workspace_);
+  if (lagged_.pressure) lagged_.pressure->add_gradient(x, gradient, workspace_);
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
   for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
     gradient.template segment<Dim>(bodies + Dim * o) =
@@ -267,10 +275,11 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
   return summary;
 }
 
-/// One solve with what `sum` has lagged. Adaptive stiffness balances the terms before held dofs move: so it is in the
+/// One solve with `lagged_`. Adaptive stiffness balances the terms before held dofs move: so it is in the
 /// regression values of peers' scenes.
 template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_lagged(const EnergySum& sum, VectorX& x) {
+NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x) {
+  const EnergySum sum = sum_with(lagged_);
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = &norm_weights_};
   if (!adaptive_)
@@ -298,9 +307,9 @@ int StepProblem<Dim>::most_rounds() const {
   int rounds = 1;
   if (has_friction())
     rounds = setup_.contact.friction_iterations < 0 ? std::numeric_limits<int>::max() : setup_.contact.friction_iterations;
-  if (!damping_.empty())
+  if (!lagged_.damping.empty())
     for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
-  if (pressure_ && pressure_->is_lagged(dofs_)) rounds = std::max(rounds, kPressureRounds);
+  if (lagged_.pressure && lagged_.pressure->is_lagged(dofs_)) rounds = std::max(rounds, kPressureRounds);
   return rounds;
 }
 
@@ -308,17 +317,19 @@ template <int Dim>
 NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
   const bool is_first_step = std::isinf(stiffness_.largest);
   if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
-  NewtonSummary summary = minimize_lagged(energy(lagged_x), x);
+  lagged_ = lag(lagged_x);
+  NewtonSummary summary = minimize_lagged(x);
   const int rounds = most_rounds();
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
   std::vector<VectorX> previous = {lagged_x};  // newest last
   VectorX best = x;
+  LaggedTerms best_lagged = lagged_;
   double least = std::numeric_limits<double>::infinity();
   int best_round = 0;
-  for (int round = 1; summary.converged() && (round < rounds || has_friction()); ++round) {
-    const EnergySum relagged = energy(x);
+  for (int round = 1; summary.converged() && round < rounds; ++round) {
+    LaggedTerms next_lagged = lag(x);
     VectorX gradient = VectorX::Zero(x.size());
-    relagged.add_gradient(x, gradient, workspace_);
+    sum_with(next_lagged).add_gradient(x, gradient, workspace_);
     double norm = 0;
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
@@ -327,19 +338,20 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
     if (norm < least) {
       least = norm;
       best = x;
+      best_lagged = lagged_;
       best_round = round;
     } else if (round - best_round >= kPatience) {
       x = best;
-      energy(x);
+      lagged_ = best_lagged;
       summary.message = "friction lagging does not converge: residual " + std::to_string(least) + " after " +
                         std::to_string(round) + " rounds, asked " + std::to_string(tolerance);
       break;
     }
     if (has_recurred(x, previous, setup_.newton.step_tolerance)) break;
-    if (round >= rounds) break;
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
     previous.push_back(x);
-    NewtonSummary next = minimize_lagged(relagged, x);
+    lagged_ = std::move(next_lagged);
+    NewtonSummary next = minimize_lagged(x);
     const bool is_fixed_point = next.converged() && next.iterations == 0;
     next.add_effort(summary);
     summary = next;
@@ -350,14 +362,15 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
 
 template <int Dim>
 EnergyReport StepProblem<Dim>::report(const VectorX& x) {
+  const LaggedTerms lagged = lag(x);
   EnergyReport report;
   const auto value = [&](const auto& term) { return term ? term->value(x, workspace_) / scaling_ : 0.0; };
   report.inertia = value(inertia_);
   report.elastic = value(elastic_);
-  report.body = value(loads_) + value(pressure_);
+  report.body = value(loads_) + value(lagged.pressure);
   report.contact = value(contact_);
-  report.friction = value(friction_);
-  for (const auto& term : damping_) report.damping += value(term);
+  report.friction = value(lagged.friction);
+  for (const auto& term : lagged.damping) report.damping += value(term);
   report.total = report.inertia + report.elastic + report.body + report.contact + report.friction + report.damping;
   return report;
 }
@@ -365,18 +378,18 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
 template <int Dim>
 NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
-  const auto force = [&](std::initializer_list<const Energy*> terms) {
+  const auto force = [&](const Energy* term) {
     VectorX gradient = VectorX::Zero(x.size());
-    for (const Energy* term : terms)
-      if (term) term->add_gradient(x, gradient, workspace_);
+    if (term) term->add_gradient(x, gradient, workspace_);
     return VectorX(-gradient.head(bodies) / scaling_);
   };
   NodalForces forces;
   const FieldOptions& asked = setup_.fields;
-  if (asked.contact_forces) forces.contact = force({contact_.get()});
-  if (asked.friction_forces) forces.friction = force({friction_.get()});
+  if (asked.contact_forces) forces.contact = force(contact_.get());
+  if (asked.friction_forces) forces.friction = force(lagged_.friction.get());
   if (!asked.reaction_forces) return forces;
-  forces.reaction = -force({inertia_.get(), elastic_.get(), loads_.get(), contact_.get(), friction_.get()});
+  const EnergySum all = sum_with(lagged_);
+  forces.reaction = -force(&all);
   for (Eigen::Index i = 0; i < bodies; ++i)
     if (dofs_.unknown[i] != kNone) forces.reaction[i] = 0;
   return forces;

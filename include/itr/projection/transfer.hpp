@@ -38,7 +38,7 @@ MatrixX touched_cross_mass_product(const TransferMesh<Dim>& old_mesh, const Tran
                                    const TouchedCells& touched, const MatrixX& u_old);
 
 /// The same integral over one group of old and new cells that cover the same region, for a preview of a single edit:
-/// fills `A` (new_vertices x old_vertices, local numbering), `squares` with the old cells' mass matrix (old x old).
+/// fills `A` (new_vertices x old_vertices, local numbering).
 /// Cells are given by their rest positions through local vertex indices.
 template <int Dim>
 void patch_cross_mass(const TransferMesh<Dim>& old_patch, const TransferMesh<Dim>& new_patch, MatrixX& A);

@@ -80,7 +80,6 @@ class LocalProblem {
   bool is_free_of_intersections() const;
   /// Positions of free vertices, into a field of the mesh; `created` stands for kNewVertex.
   void write_back(VectorX& x, VertexId created) const;
-  const EnergySum& energy() const { return energy_; }
 
  private:
   int local(VertexId v);

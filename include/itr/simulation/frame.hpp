@@ -35,7 +35,7 @@ struct StepReport {
   OperationCount splits, collapses, swaps, smooths;
   int cut_steps = 0;            ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
   int damped_steps = 0;         ///< Newmark only: 1 if taken by implicit Euler, to keep energy from growing
-  double min_distance = 0;      ///< over contact pairs near each other; infinity where there are none [m]
+  double min_distance = 0;      ///< over contact pairs nearer than dhat; infinity where there are none [m]
   double min_volume_ratio = 1;  ///< smallest J = det F over the cells
   StepSeconds seconds;
   double peak_rss_mb = 0;

@@ -72,7 +72,7 @@ class Simulation {
     AskedFields asked;
   };
   FrameData frame_data() const;
-  void add_asked(FrameData& data) const;
+  void add_asked(const CellSet<Dim>& cells, FrameData& data) const;
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

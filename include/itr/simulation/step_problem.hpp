@@ -50,9 +50,10 @@ class StepProblem {
   /// the first round they are lagged at `lagged_x`.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x);
 
+  /// With everything lagged at x: numbers that compare between meshes and with other codes.
   EnergyReport report(const VectorX& x);
   double min_distance(const VectorX& x);
-  /// At a solution x, those that the setup asks for.
+  /// At a solution x, those that the setup asks for, as they were in the solve.
   NodalForces forces(const VectorX& x);
   /// What the integrator (the trapezoidal rule or implicit Euler) adds to the mechanical energy by a step to x [J]: its work
   /// is a mean of the forces at both ends times the way, the potential's is the integral along it. Friction and loads aside.
@@ -66,8 +67,15 @@ class StepProblem {
   double scaling() const { return scaling_; }
 
  private:
-  EnergySum energy(const VectorX& lagged_x);
-  NewtonSummary minimize_lagged(const EnergySum& sum, VectorX& x);
+  /// What depends on an earlier iterate of the step; null where the scene has none.
+  struct LaggedTerms {
+    std::shared_ptr<FrictionEnergy<Dim>> friction;
+    std::shared_ptr<PressureEnergy<Dim>> pressure;
+    std::vector<std::shared_ptr<DampingEnergy<Dim>>> damping;
+  };
+  LaggedTerms lag(const VectorX& x);
+  EnergySum sum_with(const LaggedTerms& lagged) const;
+  NewtonSummary minimize_lagged(VectorX& x);
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   std::string name_vertices(std::span<const int> vertices, const VectorX& x) const;
   void initialize_stiffness(const VectorX& x);
@@ -90,12 +98,10 @@ class StepProblem {
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;
   std::shared_ptr<LoadEnergy<Dim>> loads_;
   std::shared_ptr<ContactEnergy<Dim>> contact_;
-  std::shared_ptr<FrictionEnergy<Dim>> friction_;
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
-  std::shared_ptr<PressureEnergy<Dim>> pressure_;
-  std::vector<std::shared_ptr<DampingEnergy<Dim>>> damping_;
+  LaggedTerms lagged_;    ///< of the last solve
   SparseSystem& system_;
 };
 

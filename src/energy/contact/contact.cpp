@@ -19,9 +19,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = 64;
 constexpr std::size_t kBatch = 1024;  ///< local Hessians that are held at a time
 
-/// The active pairs of the positions that were asked for last.
+/// The active pairs of the positions that were asked for last, with what else they depend on.
 struct ActiveCache {
-  const void* owner = nullptr;
+  const CollisionSurface* surface = nullptr;
+  double dhat = 0;
+  bool convergent = false;
   VectorX x;
   std::vector<ContactStencil> stencils;
 };
@@ -140,12 +142,14 @@ double ContactEnergy<Dim>::barrier_second(double D) const {
 template <int Dim>
 const std::vector<ContactStencil>& ContactEnergy<Dim>::active(ConstVectorView x, Workspace& workspace) const {
   auto& cache = workspace.get<ActiveCache>();
-  if (cache.owner == this && cache.x.size() == x.size() &&
+  if (cache.surface == &surface_ && cache.dhat == dhat_ && cache.convergent == convergent_ && cache.x.size() == x.size() &&
       std::memcmp(cache.x.data(), x.data(), sizeof(double) * x.size()) == 0)
     return cache.stencils;
   cache.stencils = find_active(x, workspace);
   cache.x = x;
-  cache.owner = this;
+  cache.surface = &surface_;
+  cache.dhat = dhat_;
+  cache.convergent = convergent_;
   return cache.stencils;
 }
 
@@ -175,7 +179,7 @@ double ContactEnergy<Dim>::min_distance(ConstVectorView x, Workspace& workspace)
     const auto &a = surface_.edges[e], &b = surface_.edges[f];
     look(PairKind::edge_edge, {a[0], a[1], b[0], b[1]});
   }
-  return std::sqrt(smallest);
+  return smallest < dhat_ * dhat_ ? std::sqrt(smallest) : kInfinity;
 }
 
 template <int Dim>

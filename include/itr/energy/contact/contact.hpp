@@ -43,7 +43,7 @@ class ContactEnergy final : public Energy {
 
   /// Active pairs at x, merged and sorted. Valid until the next call with this workspace.
   const std::vector<ContactStencil>& active(ConstVectorView x, Workspace& workspace) const;
-  /// Smallest distance [m] over counted pairs nearer than the candidates reach; infinity where there are none.
+  /// Smallest distance [m] over counted pairs nearer than dhat; infinity where there are none.
   double min_distance(ConstVectorView x, Workspace& workspace) const;
   /// Whether any counted pair is near enough to x to be looked at.
   bool has_candidates(ConstVectorView x, Workspace& workspace) const;
