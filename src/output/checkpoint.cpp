@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 1;
+constexpr std::int64_t kFormat = 2;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -97,6 +97,9 @@ std::optional<SavedState> find_saved_state(const fs::path& directory) {
     } catch (const InputError&) {  // cut off by a loss of power: the one before it is the newest
     }
   }
+  if (!files.empty())
+    throw InputError({directory.string(), "saved states", "frames but no state that can be read",
+                      "a folder that this version of itr wrote"});
   return std::nullopt;
 }
 
