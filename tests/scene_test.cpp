@@ -232,6 +232,18 @@ TEST_F(SceneTest, Integrators) {
   EXPECT_TRUE(read2(square({{"time", nullptr}})).time.is_static);
 }
 
+TEST_F(SceneTest, RoundOffAddsNoStep) {
+  const auto steps = [&](double tend, double dt) {
+    return read2(square({{"time", {{"tend", tend}, {"dt", dt}}}})).time.steps;
+  };
+  EXPECT_EQ(steps(0.07, 0.01), 7);
+  EXPECT_EQ(steps(0.28, 0.01), 28);
+  EXPECT_EQ(steps(2.1, 0.3), 7);
+  EXPECT_EQ(steps(0.56, 0.01), 56);
+  EXPECT_EQ(steps(0.071, 0.01), 8);
+  EXPECT_EQ(steps(1e-12, 1), 1);
+}
+
 TEST_F(SceneTest, WaysToProjectTheHessian) {
   const auto newton = [&](const json& options) {
     return read2(square({{"solver", {{"nonlinear", {{"Newton", options}}}}}})).newton;

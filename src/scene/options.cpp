@@ -46,7 +46,9 @@ void read_steps(const Node& time, TimeOptions& options) {
       time.fail(abbreviate(time.json()), "tend = t0 + dt * time_steps, or only two of them");
     return;
   }
-  const double count = std::ceil(duration / options.dt);
+  const double ratio = duration / options.dt, nearest = std::round(ratio);
+  // Of decimal fractions: 0.07 / 0.01 is a little more than 7.
+  const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
   if (count > kMostSteps) dt.fail("at most 1e9 steps");
   options.steps = static_cast<int>(count);
 }
