@@ -290,7 +290,15 @@ TEST_F(SceneTest, TolerancesOfMainCarryTheScalesOfTheScene) {
   EXPECT_DOUBLE_EQ(linf.step_tolerance, 1e-4 * 3);
   EXPECT_DOUBLE_EQ(linf.relative_step_tolerance, 1e-3);
   EXPECT_EQ(newton(json::object()).norm, NewtonNorm::l2);  // no key of either vocabulary
-  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"x_delta", 1}, {"x_delta_tol", 1}}}}}}), "/solver/nonlinear/x_delta");
+}
+
+TEST_F(SceneTest, TolerancesOfTwoVocabulariesAreRefused) {
+  const auto place = [&](const json& nonlinear) { return wrong_place({{"solver", {{"nonlinear", nonlinear}}}}); };
+
+  EXPECT_EQ(place({{"x_delta", 1}, {"x_delta_tol", 1}}), "/solver/nonlinear/x_delta");
+  EXPECT_EQ(place({{"x_delta", 1}, {"advanced", {{"f_delta_tol", 1}}}}), "/solver/nonlinear/x_delta");
+  EXPECT_EQ(place({{"grad_norm_tol", 1}, {"advanced", {{"f_delta", 1}}}}), "/solver/nonlinear/advanced/f_delta");
+  EXPECT_EQ(place({{"advanced", {{"f_delta", 1}, {"f_delta_tol", 1}}}}), "/solver/nonlinear/advanced/f_delta");
 }
 
 TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {

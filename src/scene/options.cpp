@@ -120,11 +120,12 @@ constexpr const char* kPaperKeys[] = {"x_delta", "grad_norm", "f_delta"};
 constexpr const char* kMainKeys[] = {"x_delta_tol",     "grad_norm_tol",        "rel_grad_norm_tol",
                                      "rel_x_delta_tol", "newton_decrement_tol", "norm_type"};
 
+/// The first key of a vocabulary that a scene has; that of the energy is in /advanced.
 template <std::size_t N>
-Node find_any(const Node& node, const char* const (&keys)[N]) {
+Node find_any(const Node& nonlinear, const char* const (&keys)[N], const char* energy_key) {
   for (const char* key : keys)
-    if (node.has(key)) return node[key];
-  return node[keys[0]];
+    if (nonlinear.has(key)) return nonlinear[key];
+  return nonlinear["advanced"][energy_key];
 }
 
 /// At either of the two places where PolyFEM has had it.
@@ -177,10 +178,11 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
   const Node nonlinear = root["solver"]["nonlinear"];
   NewtonOptions options;
   options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, 500);
-  const Node paper_key = find_any(nonlinear, kPaperKeys), main_key = find_any(nonlinear, kMainKeys);
+  const Node paper_key = find_any(nonlinear, kPaperKeys, "f_delta");
+  const Node main_key = find_any(nonlinear, kMainKeys, "f_delta_tol");
   if (paper_key.exists() && main_key.exists())
     paper_key.fail("it beside " + main_key.pointer(), "one vocabulary of tolerances, not two");
-  if (paper_key.exists() || nonlinear["advanced"].has("f_delta"))
+  if (paper_key.exists())
     read_paper_tolerances(nonlinear, characteristic_length, options);
   else
     read_main_tolerances(root, scale, options);
