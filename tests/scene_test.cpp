@@ -192,6 +192,8 @@ TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
   EXPECT_EQ(wrong_place(material("E", "1e4 * t")), "/materials/0/E");
   EXPECT_EQ(wrong_place(material("rho", "1 / (x - x)")), "/materials/0/rho");
   EXPECT_EQ(wrong_place(material("c1", 1)), "/materials/0/c1");
+  EXPECT_EQ(wrong_place({{"materials", {{"type", "NeoHookean"}, {"lambda", 1}, {"mu", 1}, {"plane_strain", false}}}}),
+            "/materials/plane_strain");
   EXPECT_EQ(wrong_place({{"materials", {{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 1}}}}), "/materials/k");
   EXPECT_EQ(wrong_place({{"materials", {{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 1}, {"k", -1}}}}), "/materials/k");
   EXPECT_EQ(wrong_place({{"materials", {{"type", "SaintVenant"}, {"E", 1}, {"nu", 0.6}}}}), "/materials/nu");
@@ -230,6 +232,17 @@ TEST_F(SceneTest, Integrators) {
   EXPECT_EQ(read2(square({{"time", {{"tend", nullptr}, {"time_steps", 7}}}})).time.steps, 7);
   EXPECT_DOUBLE_EQ(read2(square({{"time", {{"dt", nullptr}, {"time_steps", 4}}}})).time.dt, 0.25);
   EXPECT_TRUE(read2(square({{"time", nullptr}})).time.is_static);
+}
+
+TEST_F(SceneTest, OptionsOfAnotherIntegratorAreRefused) {
+  const auto place = [&](const json& integrator) { return wrong_place({{"time", {{"integrator", integrator}}}}); };
+
+  EXPECT_EQ(place({{"type", "BDF2"}, {"steps", 3}}), "/time/integrator/steps");
+  EXPECT_EQ(place({{"type", "ImplicitEuler"}, {"steps", 3}}), "/time/integrator/steps");
+  EXPECT_EQ(place({{"type", "ImplicitNewmark"}, {"steps", 3}}), "/time/integrator/steps");
+  EXPECT_EQ(place({{"type", "BDF"}, {"steps", 3}, {"beta", 0.25}}), "/time/integrator/beta");
+  EXPECT_EQ(place({{"type", "ImplicitEuler"}, {"gamma", 0.5}}), "/time/integrator/gamma");
+  EXPECT_EQ(place({{"type", "BDF3"}, {"energy_growth_limit", 1}}), "/time/integrator/energy_growth_limit");
 }
 
 TEST_F(SceneTest, RoundOffAddsNoStep) {
@@ -336,8 +349,16 @@ TEST_F(SceneTest, SelectionsOfSurfacesAndVolumes) {
                                  {"id": 4, "normal": [-1, 0], "point": [0.1, 0]}])")),
             (Tags{1, 2, 3, 4}));
   EXPECT_EQ(tags(json::parse(R"([{"id": 6, "axis": 1, "position": 0.9}, 8])")), (Tags{8, 6, 8, 8}));
-  EXPECT_EQ(wrong_place({{"geometry", {{"mesh", "square.obj"}, {"surface_selection", {{"id", 1}, {"axis", "w"}}}}}}),
-            "/geometry/surface_selection/axis");
+}
+
+TEST_F(SceneTest, SelectionsOfNothingMeantAreRefused) {
+  const auto place = [&](const char* selection) {
+    return wrong_place({{"geometry", {{"mesh", "square.obj"}, {"surface_selection", json::parse(selection)}}}});
+  };
+  EXPECT_EQ(place(R"({"id": 1, "axis": "w"})"), "/geometry/surface_selection/axis");
+  EXPECT_EQ(place(R"({"id": 1, "normal": [0, 0], "point": [0, 0]})"), "/geometry/surface_selection/normal");
+  EXPECT_EQ(place(R"({"id": 1, "center": [0, 0], "radius": -1})"), "/geometry/surface_selection/radius");
+  EXPECT_EQ(place(R"({"id": 1, "p1": [0, 0], "p2": [1, 0], "radius": -1})"), "/geometry/surface_selection/radius");
 }
 
 TEST_F(SceneTest, TransformationsScaleRotateTranslate) {

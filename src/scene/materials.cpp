@@ -126,6 +126,7 @@ class MaterialReader {
 
   void read_lame() {
     if (node_.has("E") || node_.has("nu")) node_.fail("E and nu, or lambda and mu, not both");
+    if (node_.has("plane_strain")) node_["plane_strain"].fail("it beside lambda and mu", "it with E and nu only");
     for (const char* key : {"lambda", "mu"})
       if (!node_.has(key)) node_[key].fail("both of lambda and mu");
     const ScalarValue lambda = read_required("lambda"), mu = read_required("mu");

@@ -19,6 +19,12 @@ void read_integrator(const Node& node, TimeOptions& options) {
   const int index =
       name.choice({"ImplicitEuler", "ImplicitNewmark", "BDF", "BDF1", "BDF2", "BDF3", "BDF4", "BDF5", "BDF6"}, 0);
   options.integrator = std::array{Integrator::implicit_euler, Integrator::newmark, Integrator::bdf}[std::min(index, 2)];
+  const auto refuse = [&](const char* key, const char* owner) {
+    if (node.has(key)) node[key].fail("it beside the type " + abbreviate(name.json()), std::string("it with ") + owner);
+  };
+  if (index != 1)
+    for (const char* key : {"beta", "gamma", "energy_growth_limit"}) refuse(key, "ImplicitNewmark only");
+  if (index != 2) refuse("steps", "BDF only: BDF1 to BDF6 have their order in the name");
   if (index > 2) options.bdf_order = index - 2;
   if (index == 2) {
     if (!is_object) name.fail("BDF1 to BDF6, or an object with type and steps");
