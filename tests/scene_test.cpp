@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -398,6 +399,43 @@ TEST_F(SceneTest, BodiesAreConcatenatedAndCopied) {
   EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({4, 5})), 3);
   EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({0, 1})), kNoTag);
   EXPECT_EQ(setup.mesh.find_defect(), "");
+}
+
+TEST_F(SceneTest, ObstaclesAreRefined) {
+  const auto obstacles = [&](const char* mesh, int n_refs) {
+    json geometry = json::array(
+        {{{"mesh", "square.obj"}, {"volume_selection", 1}}, {{"mesh", mesh}, {"is_obstacle", true}, {"n_refs", n_refs}}});
+    geometry[1]["transformation"] = {{"translation", {0, -5}}};
+    return read2(square({{"geometry", geometry}})).obstacles;
+  };
+  EXPECT_EQ(obstacles("line.obj", 3).edges.size(), 8u);
+  const auto square_boundary = obstacles("square.obj", 2);
+  EXPECT_EQ(square_boundary.edges.size(), 16u);
+  EXPECT_EQ(square_boundary.rest.size(), 16u);
+  for (const auto& [a, b] : square_boundary.edges)
+    EXPECT_DOUBLE_EQ((square_boundary.rest[a] - square_boundary.rest[b]).norm(), 0.25);
+
+  json tet = square();
+  tet["geometry"] = json::array(
+      {{{"mesh", "tet.msh"}, {"volume_selection", 1}}, {{"mesh", "tet.msh"}, {"is_obstacle", true}, {"n_refs", 2}}});
+  tet["geometry"][1]["transformation"] = {{"translation", {0, 0, -5}}};
+  const auto surface = std::get<itr::Setup<3>>(read_scene(tet).setup).obstacles;
+  EXPECT_EQ(surface.triangles.size(), 64u);
+  EXPECT_EQ(surface.rest.size(), 34u);  // Euler: v - e + f = 2
+  EXPECT_EQ(surface.edges.size(), 96u);
+  Vec<3> area = Vec<3>::Zero();
+  double total = 0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vec<3> twice = (surface.rest[b] - surface.rest[a]).cross(surface.rest[c] - surface.rest[a]);
+    area += twice / 2;
+    total += twice.norm() / 2;
+  }
+  EXPECT_LT(area.norm(), 1e-13);  // closed, all turned the same way
+  EXPECT_NEAR(total, 1.5 + std::sqrt(3.0) / 2, 1e-13);
+  for (const int too_much : {12, 17}) {
+    tet["geometry"][1]["n_refs"] = too_much;
+    EXPECT_EQ(failure(tet).place, "/geometry/1/n_refs");
+  }
 }
 
 TEST_F(SceneTest, ConditionsAndMotions) {
