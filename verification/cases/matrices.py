@@ -70,6 +70,6 @@ def results(context):
                          "internal force": vector_error(ours["force"], body.internal_force(u)),
                          "load": vector_error(ours["load"], load),
                          "energy": abs(ours["energy"] / body.energy(u) - 1)}
-                errors = {key: max(error, errors.get(key, 0)) for key, error in found.items()}
+                errors = {key: np.maximum(error, errors.get(key, 0)) for key, error in found.items()}
             for key, error in errors.items():
                 yield Result(f"{dim}D, {name}, {key}", float(error), TOLERANCE, note="worst of 3 states")

@@ -4,6 +4,9 @@ import html
 import math
 
 
+VERDICT = {True: "ok", False: "**FAIL**", None: "not judged"}
+
+
 def number(value):
     if isinstance(value, float):
         return f"{value:.6g}" if math.isfinite(value) else str(value)
@@ -18,15 +21,20 @@ def rows_of(entry):
                ("tolerance", "tolerance"), ("note", "note")]
     used = [(title, key) for title, key in columns
             if any(result.get(key) not in (None, "") for result in entry["results"])]
-    rows = [[number(result.get(key)) for _, key in used] + ["ok" if result["passed"] else "**FAIL**"]
+    rows = [[number(result.get(key)) for _, key in used] + [VERDICT[result["passed"]]]
             for result in entry["results"]]
     return [title for title, _ in used] + [""], rows
 
 
+def counts(entry):
+    """Passed of judged."""
+    judged = [result["passed"] for result in entry["results"] if result["passed"] is not None]
+    return f"{sum(judged)}/{len(judged)}"
+
+
 def summary_rows(entries):
-    return [[name, entry.get("title", ""), entry["status"] if entry["status"] != "failed" else "**FAILED**",
-             f"{sum(r['passed'] for r in entry['results'])}/{len(entry['results'])}", number(entry.get("seconds")),
-             f"{entry['mode']}, {entry['date']}"] for name, entry in entries.items()]
+    return [[name, entry.get("title", ""), entry["status"] if entry["status"] != "failed" else "**FAILED**", counts(entry),
+             number(entry.get("seconds")), f"{entry['mode']}, {entry['date']}"] for name, entry in entries.items()]
 
 
 SUMMARY_HEADER = ["case", "what", "status", "results", "seconds", "run"]
