@@ -43,5 +43,16 @@ class Judgement(unittest.TestCase):
         self.assertEqual(run(Result("shown", 7.0, None))["status"], "failed")
 
 
+class Report(unittest.TestCase):
+    def test_each_case_shows_the_commit_of_its_own_run(self):
+        old, new = run(Result("x", 0.0, 1.0)), run(Result("x", 0.0, 1.0))
+        old["versions"], new["versions"] = {"itr": "aaaa111"}, {"itr": "bbbb222", "numpy": "1.24"}
+        text = report.markdown(report.blocks({"old": old, "new": new, "older": run(Result("x", 0.0, 1.0))}))
+        old_row, new_row, _ = (line for line in text.splitlines() if "| passed |" in line)
+        self.assertIn("aaaa111", old_row)
+        self.assertIn("bbbb222", new_row)
+        self.assertIn("Run with itr bbbb222, numpy 1.24.", text)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -32,24 +32,30 @@ def counts(entry):
     return f"{sum(judged)}/{len(judged)}"
 
 
+def run_of(entry):
+    """When and of which commit; entries of before versions were stored with each have none."""
+    return ", ".join(filter(None, [entry["mode"], entry["date"], entry.get("versions", {}).get("itr")]))
+
+
 def summary_rows(entries):
     return [[name, entry.get("title", ""), entry["status"] if entry["status"] != "failed" else "**FAILED**", counts(entry),
-             number(entry.get("seconds")), f"{entry['mode']}, {entry['date']}"] for name, entry in entries.items()]
+             number(entry.get("seconds")), run_of(entry)] for name, entry in entries.items()]
 
 
 SUMMARY_HEADER = ["case", "what", "status", "results", "seconds", "run"]
 
 
-def blocks(entries, versions):
+def blocks(entries):
     """The report as (kind, content) pairs, whatever it is written in."""
     yield "h1", "Verification report"
-    yield "p", "Written by `verification/run.py`; do not edit. Versions: " + \
-        ", ".join(f"{name} {version}" for name, version in versions.items()) + "."
+    yield "p", "Written by `verification/run.py`; do not edit."
     yield "table", (SUMMARY_HEADER, summary_rows(entries))
     for name, entry in entries.items():
         yield "h2", f"{name}: {entry.get('title', '')}"
         if "quantity" in entry:
             yield "p", f"Quantity: {entry['quantity']}. Reference: {entry['reference']}. Tolerance: {entry['tolerance']}."
+        if versions := entry.get("versions"):
+            yield "p", "Run with " + ", ".join(f"{name} {version}" for name, version in versions.items()) + "."
         if entry["message"]:
             yield "pre", entry["message"]
         if entry["results"]:
@@ -86,7 +92,7 @@ def html_page(content):
     return f'<!doctype html><meta charset="utf-8"><title>Verification report</title><style>{STYLE}</style>\n{body}\n'
 
 
-def write_report(folder, entries, versions):
-    content = list(blocks(entries, versions))
+def write_report(folder, entries):
+    content = list(blocks(entries))
     (folder / "report.md").write_text(markdown(content))
     (folder / "report.html").write_text(html_page(content))
