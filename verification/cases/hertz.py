@@ -3,6 +3,7 @@
 import numpy as np
 from harness.contact import vertex_lengths, with_obstacle, write_line
 from harness.fields import fitted_order, gradients, volumes
+from harness.materials import lame
 from harness.scenes import box_mesh, oriented, run_scene, scene, write_mesh
 from harness.suite import Result, excess
 
@@ -29,7 +30,7 @@ def body(n):
 
 def nodal_forces(frame):
     """Internal forces of linear elasticity in plane strain."""
-    mu, lmbda = YOUNG / (2 * (1 + NU)), YOUNG * NU / ((1 + NU) * (1 - 2 * NU))
+    mu, lmbda = lame(YOUNG, NU, 2, plane_strain=True)
     slopes = gradients(frame.rest, frame.cells, frame.u)
     strain = (slopes + slopes.transpose(0, 2, 1)) / 2
     stress = 2 * mu * strain + lmbda * np.trace(strain, axis1=1, axis2=2)[:, None, None] * np.eye(2)
