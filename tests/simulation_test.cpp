@@ -11,32 +11,16 @@
 #include "itr/mesh/validate.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "itr/simulation/step_problem.hpp"
+#include "square_mesh.hpp"
 
 namespace itr {
 namespace {
 
-/// A square of n x n cells, two triangles each, with its corner at the origin; facets by side as `threshold` selects them.
+/// Diagonals alternate.
 Mesh<2> make_square(int n, double size) {
-  std::vector<Vec<2>> rest;
-  std::vector<std::array<int, 3>> cells;
-  for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i) rest.emplace_back(size * i / n, size * j / n);
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i, b = a + 1, c = a + n + 2, d = a + n + 1;
-      if ((i + j) % 2) {
-        cells.push_back({a, b, c});
-        cells.push_back({a, c, d});
-      } else {
-        cells.push_back({a, b, d});
-        cells.push_back({b, c, d});
-      }
-    }
-  Mesh<2> mesh(rest, cells, std::vector<int>(cells.size(), 1));
-  for (int f = 0; f < mesh.facet_slots(); ++f) {
-    const Vec<2> middle = 0.5 * (mesh.rest(mesh.facet(f)[0]) + mesh.rest(mesh.facet(f)[1]));
-    mesh.set_facet_tag(f, middle[0] < 1e-9 ? 1 : middle[1] < 1e-9 ? 2 : middle[0] > size - 1e-9 ? 3 : 4);
-  }
+  const Grid grid = make_regular_grid(n, size, [](int i, int j) { return (i + j) % 2; });
+  Mesh<2> mesh(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
+  tag_sides(mesh, size);
   return mesh;
 }
 
