@@ -129,7 +129,9 @@ void expect_support_carries_weight() {
   EXPECT_LT((sum<Dim>(fields.forces.reaction) - weight<Dim>() * Vec<Dim>::Unit(1)).norm(), 1e-8 * weight<Dim>());
   EXPECT_EQ(fields.forces.contact.size(), 0);
   for (int v = 0; v < setup.mesh.vertex_slots(); ++v)
-    if (setup.mesh.rest(v)[1] < kSize - 1e-9) EXPECT_EQ((fields.forces.reaction.segment<Dim>(Dim * v).norm()), 0) << v;
+    if (setup.mesh.rest(v)[1] < kSize - 1e-9) {
+      EXPECT_EQ((fields.forces.reaction.segment<Dim>(Dim * v).norm()), 0) << v;
+    }
 }
 
 TEST(Forces, SupportCarriesTheWeightOfAHangingBlock2D) { expect_support_carries_weight<2>(); }

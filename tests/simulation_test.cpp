@@ -493,8 +493,9 @@ TEST(Simulation, HeldVerticesArriveWhereOnlyTheWayIsBlocked) {
   expect_valid(simulation);
   const auto& state = simulation.state();
   for (int f = 0; f < state.mesh.facet_slots(); ++f)
-    if (state.mesh.facet_tag(f) == 4)
+    if (state.mesh.facet_tag(f) == 4) {
       for (const int v : state.mesh.facet(f)) EXPECT_EQ(state.history.x[0][2 * v + 1], state.mesh.rest(v)[1] - 0.1);
+    }
 }
 
 TEST(Simulation, HeldVerticesThatCannotArriveEndTheStepWithTheReason) {
