@@ -181,20 +181,15 @@ std::map<int, std::vector<Vec<3>>> barycenters_by_body(const Mesh<Dim>& mesh) {
   return points;
 }
 
-}  // namespace
-
-/// "0, 1, 2 (of 9)": the first elements of a body.
 template <int Dim>
-std::string list_elements(const Mesh<Dim>& mesh, int body) {
-  constexpr int kMostNamed = 5;
-  std::string text;
-  int count = 0;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (mesh.body(c) != body) continue;
-    if (++count <= kMostNamed) text += (text.empty() ? "" : ", ") + std::to_string(c);
-  }
-  return count > kMostNamed ? text + ", ... (" + std::to_string(count) + " of them)" : text;
+std::vector<int> elements_of(const Mesh<Dim>& mesh, int body) {
+  std::vector<int> elements;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (mesh.body(c) == body) elements.push_back(c);
+  return elements;
 }
+
+}  // namespace
 
 template <int Dim>
 std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, std::vector<std::string>& warnings) {
@@ -221,9 +216,9 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
   }
   for (const auto& [body, of_body] : points)
     if (!materials.contains(body))
-      node.fail(
-          "no material with the id " + std::to_string(body) + ", which elements " + list_elements(mesh, body) + " have",
-          "one for every body");
+      node.fail("no material with the id " + std::to_string(body) + ", which elements " + list_ids(elements_of(mesh, body)) +
+                    " have",
+                "one for every body");
   return materials;
 }
 
