@@ -93,7 +93,7 @@ std::optional<SavedState> find_saved_state(const fs::path& directory) {
       if (!file.contains("/checkpoint")) continue;
       if (file.read_integer_attribute("checkpoint_format") != kFormat) continue;
       return SavedState{path, file.read_text("/checkpoint/scene"), file.read_text("/checkpoint/backend"),
-                        file.read_doubles("/mesh/rest").columns};
+                        file.shape("/mesh/rest").columns};
     } catch (const InputError&) {  // cut off by a loss of power: the one before it is the newest
     }
   }
