@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "itr/simulation/simulation.hpp"
+#include "square_mesh.hpp"
 
 namespace itr {
 namespace {
@@ -16,18 +17,8 @@ Mesh<Dim> make_block();
 
 template <>
 Mesh<2> make_block<2>() {
-  constexpr int n = 3;
-  std::vector<Vec<2>> rest;
-  std::vector<std::array<int, 3>> cells;
-  for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i) rest.emplace_back(kSize * i / n, kSize * j / n);
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i, b = a + 1, c = a + n + 2, d = a + n + 1;
-      cells.push_back({a, b, c});
-      cells.push_back({a, c, d});
-    }
-  return Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1));
+  const Grid grid = make_regular_grid(3, kSize, [](int, int) { return true; });
+  return Mesh<2>(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
 }
 
 /// A cube of six tetrahedra around its diagonal.
@@ -138,7 +129,9 @@ void expect_support_carries_weight() {
   EXPECT_LT((sum<Dim>(fields.forces.reaction) - weight<Dim>() * Vec<Dim>::Unit(1)).norm(), 1e-8 * weight<Dim>());
   EXPECT_EQ(fields.forces.contact.size(), 0);
   for (int v = 0; v < setup.mesh.vertex_slots(); ++v)
-    if (setup.mesh.rest(v)[1] < kSize - 1e-9) EXPECT_EQ((fields.forces.reaction.segment<Dim>(Dim * v).norm()), 0) << v;
+    if (setup.mesh.rest(v)[1] < kSize - 1e-9) {
+      EXPECT_EQ((fields.forces.reaction.segment<Dim>(Dim * v).norm()), 0) << v;
+    }
 }
 
 TEST(Forces, SupportCarriesTheWeightOfAHangingBlock2D) { expect_support_carries_weight<2>(); }

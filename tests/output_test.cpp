@@ -119,6 +119,11 @@ TEST_F(OutputTest, FrameHoldsTheStateWithTheAgreedNames) {
   const hdf5::File file = hdf5::File::open(folder / "frames/000007.h5");
   const auto x = file.read_doubles("/fields/x");
   EXPECT_EQ(x.columns, 2);
+  EXPECT_EQ(file.shape("/fields/x").columns, 2);
+  EXPECT_EQ(file.shape("/fields/x").rows, x.rows());
+  EXPECT_EQ(file.shape("/mesh/body").columns, 0);
+  EXPECT_EQ(file.shape("/mesh/body").rows, file.read_integers("/mesh/body").values.size());
+  EXPECT_THROW(file.shape("/fields"), InputError);
   EXPECT_EQ(x.values, std::vector<double>(plane.x.begin(), plane.x.end()));
   EXPECT_EQ(file.read_doubles("/fields/u").values[0], -0.1);
   EXPECT_EQ(file.read_doubles("/fields/v").values, std::vector<double>(plane.v.begin(), plane.v.end()));

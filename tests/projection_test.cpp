@@ -8,6 +8,7 @@
 
 #include "itr/geometry/measures.hpp"
 #include "itr/projection/transfer.hpp"
+#include "square_mesh.hpp"
 
 namespace itr {
 namespace {
@@ -23,20 +24,16 @@ struct Arrays {
 /// on the middle line move by `noise`.
 Arrays make(int n, std::mt19937& random, double noise) {
   std::uniform_real_distribution<double> shift(-noise / n, noise / n);
-  Arrays mesh;
-  for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i) {
-      const bool free = i > 0 && i < n && j > 0 && j < n && 2 * i != n;
-      mesh.rest.emplace_back(double(i) / n + (free ? shift(random) : 0), double(j) / n + (free ? shift(random) : 0));
-    }
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i, b = a + 1, c = a + n + 2, d = a + n + 1;
-      const bool diagonal = random() % 2;
-      mesh.cells.push_back(diagonal ? std::array{a, b, c} : std::array{a, b, d});
-      mesh.cells.push_back(diagonal ? std::array{a, c, d} : std::array{b, c, d});
-      mesh.density.insert(mesh.density.end(), 2, 2 * i < n ? 1 : 7);
-    }
+  const auto place = [&](int i, int j) {
+    const bool free = i > 0 && i < n && j > 0 && j < n && 2 * i != n;
+    return Vec<2>(double(i) / n + (free ? shift(random) : 0), double(j) / n + (free ? shift(random) : 0));
+  };
+  Grid grid = make_grid(n, place, [&](int, int) { return random() % 2; });
+  Arrays mesh{std::move(grid.rest), std::move(grid.cells), {}};
+  for (const auto& cell : mesh.cells) {
+    const double middle = (mesh.rest[cell[0]][0] + mesh.rest[cell[1]][0] + mesh.rest[cell[2]][0]) / 3;
+    mesh.density.push_back(middle < 0.5 ? 1 : 7);
+  }
   return mesh;
 }
 

@@ -12,6 +12,7 @@
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/remesh/edits.hpp"
 #include "itr/remesh/fields.hpp"
+#include "square_mesh.hpp"
 
 namespace itr {
 
@@ -19,28 +20,16 @@ namespace itr {
 /// facet tags 1 to 4 by side.
 inline Mesh<2> random_mesh(int n, std::mt19937& random) {
   std::uniform_real_distribution<double> noise(-0.25 / n, 0.25 / n);
-  std::vector<Vec<2>> rest;
-  std::vector<std::array<int, 3>> cells;
+  const auto place = [&](int i, int j) {
+    const bool inside = i > 0 && i < n && 2 * i != n && j > 0 && j < n;
+    return Vec<2>(double(i) / n + (inside ? noise(random) : 0), double(j) / n + (inside ? noise(random) : 0));
+  };
+  const Grid grid = make_grid(n, place, [&](int, int) { return random() % 2; });
   std::vector<int> body;
-  for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i) {
-      const bool inside_x = i > 0 && i < n && 2 * i != n, inside_y = j > 0 && j < n;
-      rest.emplace_back(double(i) / n + (inside_x && inside_y ? noise(random) : 0),
-                        double(j) / n + (inside_y && inside_x ? noise(random) : 0));
-    }
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i, b = a + 1, c = a + n + 2, d = a + n + 1;
-      const bool diagonal = random() % 2;
-      cells.push_back(diagonal ? std::array{a, b, c} : std::array{a, b, d});
-      cells.push_back(diagonal ? std::array{a, c, d} : std::array{b, c, d});
-      body.insert(body.end(), 2, 2 * i < n ? 1 : 2);
-    }
-  Mesh<2> mesh(rest, cells, body);
-  for (int f = 0; f < mesh.facet_slots(); ++f) {
-    const Vec<2> m = 0.5 * (mesh.rest(mesh.facet(f)[0]) + mesh.rest(mesh.facet(f)[1]));
-    mesh.set_facet_tag(f, m[0] < 1e-9 ? 1 : m[1] < 1e-9 ? 2 : m[0] > 1 - 1e-9 ? 3 : 4);
-  }
+  for (const auto& cell : grid.cells)
+    body.push_back(grid.rest[cell[0]][0] + grid.rest[cell[1]][0] + grid.rest[cell[2]][0] < 1.5 ? 1 : 2);
+  Mesh<2> mesh(grid.rest, grid.cells, body);
+  tag_sides(mesh, 1);
   return mesh;
 }
 

@@ -65,15 +65,15 @@ Json overlapping() {
 const std::vector<Refusal> kRefusals = {
     {"missing mesh", geometry("none.obj"), "scene.json", "/geometry/0/mesh", "none.obj", "the path of a mesh file"},
     {"a folder for a mesh", geometry("folder"), "scene.json", "/geometry/0/mesh", "folder", "the path of a mesh file"},
-    {"truncated nodes", geometry("cut.msh"), "cut.msh", "line", "end", ""},
-    {"truncated elements", geometry("cut_elements.msh"), "cut_elements.msh", "line", "end", ""},
+    {"truncated nodes", geometry("cut.msh"), "cut.msh", "line 7", "the end", "a number"},
+    {"truncated elements", geometry("cut_elements.msh"), "cut_elements.msh", "line 13", "the end", "a number"},
     {"not a mesh", geometry("text.msh"), "text.msh", "line 1", "another beginning", "$MeshFormat"},
-    {"unknown format", geometry("mesh.stl"), "mesh.stl", "", ".stl", ".msh"},
-    {"empty file", geometry("folder/empty.obj"), "empty.obj", "", "no vertices", ""},
+    {"unknown format", geometry("mesh.stl"), "mesh.stl", "", ".stl", ".msh or .obj"},
+    {"empty file", geometry("folder/empty.obj"), "empty.obj", "", "no vertices", "a mesh"},
     {"word for a number", geometry("word.obj"), "word.obj", "line 2", "zero", "a coordinate"},
-    {"vertex out of range", geometry("range.obj"), "range.obj", "triangle 0", "", ""},
-    {"node out of range", geometry("node.msh"), "node.msh", "", "node 7", ""},
-    {"unknown element type", geometry("quad.msh"), "quad.msh", "", "element 1 of type 3", ""},
+    {"vertex out of range", geometry("range.obj"), "range.obj", "triangle 0", "vertex 8", "0 to 3 - 1"},
+    {"node out of range", geometry("node.msh"), "node.msh", "$Elements", "node 7", "a node of the $Nodes section"},
+    {"unknown element type", geometry("quad.msh"), "quad.msh", "line 13", "element 1 of type 3", "4 (tetrahedron)"},
     {"inverted element", geometry("inverted.msh"), "scene.json", "/geometry/0/mesh", "inverted elements 0",
      "positive volume"},
     {"degenerate element", geometry("flat.obj"), "scene.json", "/geometry/0/mesh", "degenerate elements 1",
@@ -167,6 +167,7 @@ TEST_P(Refusals, SayFilePlaceFoundAndExpected) {
   Json scene = good_scene();
   scene.merge_patch(refusal.changes);
   const auto [status, message] = run(scene.dump());
+  ASSERT_FALSE(refusal.found.empty() || refusal.expected.empty()) << "this row could not fail";
   EXPECT_EQ(status, 2) << message;
   EXPECT_FALSE(fs::exists(folder_ / "results")) << "something was computed";
   const auto found_at = message.find("found "), expected_at = message.find("; expected ");

@@ -198,6 +198,10 @@ TEST_P(ResumeTest, KilledRunGoesOnBitForBit) {
   EXPECT_NE(last.said().find("going on after step"), std::string::npos) << last.said();
   expect_same_results(whole, killed);
   EXPECT_EQ(summary_of(whole), summary_of(killed));
+
+  const Command again = start(arguments(which, killed, 0.05, true));
+  ASSERT_EQ(again.wait(), 0) << again.said();
+  EXPECT_EQ(summary_of(whole), summary_of(killed)) << "of a finished run that was resumed";
 }
 
 TEST_F(InterruptTest, FinishesTheStepSavesAndSaysHowToGoOn) {
@@ -224,6 +228,25 @@ TEST_F(InterruptTest, AnotherSceneIsRefusedWithWhatDiffers) {
   EXPECT_EQ(second.wait(), 2);
   EXPECT_NE(second.said().find("/materials/nu: was 0.45, is 0.3"), std::string::npos) << second.said();
   expect_readable(run);
+}
+
+/// As after an update of itr that changed the format of saved states.
+TEST_F(InterruptTest, FramesWithoutAReadableStateAreRefusedAndKept) {
+  const fs::path run = folder / "run";
+  const Command first = start(arguments(kStopped, run, 30));
+  ASSERT_EQ(stop_at(first, run, 5, SIGINT), 3) << first.said();
+  const auto frames = stored_frames(run);
+  const auto lines = results_of(run);
+  for (const auto& frame : frames) {
+    std::string bytes = text_of(frame);
+    for (std::size_t at; (at = bytes.find("checkpoint_format")) != std::string::npos;) bytes[at] = 'C';
+    std::ofstream(frame, std::ios::binary) << bytes;
+  }
+  const Command second = start(arguments(kStopped, run, 30, true));
+  EXPECT_EQ(second.wait(), 2);
+  EXPECT_NE(second.said().find("no state that can be read"), std::string::npos) << second.said();
+  EXPECT_EQ(stored_frames(run), frames);
+  EXPECT_EQ(results_of(run), lines);
 }
 
 /// The limit on the size of a file fails a write as a full disk does; sim.xdmf meets it first.
@@ -263,6 +286,10 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"adaptive", "ball_wall.json", 40, R"("dt":2e-5)",
                            kImpact + Arguments{"/space/remesh/enabled=false", "/contact/friction_coefficient=0.3",
                                                "/solver/contact/barrier_stiffness=\"adaptive\""}},
+                      Case{"cut_steps", "ball_wall.json", 40, R"("dt":2e-5,"step_cuts":3)",
+                           kImpact + Arguments{"/solver/nonlinear/max_iterations=8", "/space/remesh/enabled=false"}},
+                      Case{"damping", "ball_wall.json", 40, R"("dt":2e-5)",
+                           kImpact + Arguments{R"(/solver/rayleigh_damping=[{"form":"elasticity","stiffness_ratio":0.1}])"}},
                       Case{"masticator", "masticator.json", 30, R"("dt":0.05)", {}},
                       Case{"quasistatic", "cantilever.json", 12, R"("dt":0.05,"quasistatic":true)", {}}),
     [](const auto& info) { return info.param.name; });

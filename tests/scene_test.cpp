@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -192,6 +193,8 @@ TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
   EXPECT_EQ(wrong_place(material("E", "1e4 * t")), "/materials/0/E");
   EXPECT_EQ(wrong_place(material("rho", "1 / (x - x)")), "/materials/0/rho");
   EXPECT_EQ(wrong_place(material("c1", 1)), "/materials/0/c1");
+  EXPECT_EQ(wrong_place({{"materials", {{"type", "NeoHookean"}, {"lambda", 1}, {"mu", 1}, {"plane_strain", false}}}}),
+            "/materials/plane_strain");
   EXPECT_EQ(wrong_place({{"materials", {{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 1}}}}), "/materials/k");
   EXPECT_EQ(wrong_place({{"materials", {{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 1}, {"k", -1}}}}), "/materials/k");
   EXPECT_EQ(wrong_place({{"materials", {{"type", "SaintVenant"}, {"E", 1}, {"nu", 0.6}}}}), "/materials/nu");
@@ -230,6 +233,29 @@ TEST_F(SceneTest, Integrators) {
   EXPECT_EQ(read2(square({{"time", {{"tend", nullptr}, {"time_steps", 7}}}})).time.steps, 7);
   EXPECT_DOUBLE_EQ(read2(square({{"time", {{"dt", nullptr}, {"time_steps", 4}}}})).time.dt, 0.25);
   EXPECT_TRUE(read2(square({{"time", nullptr}})).time.is_static);
+}
+
+TEST_F(SceneTest, OptionsOfAnotherIntegratorAreRefused) {
+  const auto place = [&](const json& integrator) { return wrong_place({{"time", {{"integrator", integrator}}}}); };
+
+  EXPECT_EQ(place({{"type", "BDF2"}, {"steps", 3}}), "/time/integrator/steps");
+  EXPECT_EQ(place({{"type", "ImplicitEuler"}, {"steps", 3}}), "/time/integrator/steps");
+  EXPECT_EQ(place({{"type", "ImplicitNewmark"}, {"steps", 3}}), "/time/integrator/steps");
+  EXPECT_EQ(place({{"type", "BDF"}, {"steps", 3}, {"beta", 0.25}}), "/time/integrator/beta");
+  EXPECT_EQ(place({{"type", "ImplicitEuler"}, {"gamma", 0.5}}), "/time/integrator/gamma");
+  EXPECT_EQ(place({{"type", "BDF3"}, {"energy_growth_limit", 1}}), "/time/integrator/energy_growth_limit");
+}
+
+TEST_F(SceneTest, RoundOffAddsNoStep) {
+  const auto steps = [&](double tend, double dt) {
+    return read2(square({{"time", {{"tend", tend}, {"dt", dt}}}})).time.steps;
+  };
+  EXPECT_EQ(steps(0.07, 0.01), 7);
+  EXPECT_EQ(steps(0.28, 0.01), 28);
+  EXPECT_EQ(steps(2.1, 0.3), 7);
+  EXPECT_EQ(steps(0.56, 0.01), 56);
+  EXPECT_EQ(steps(0.071, 0.01), 8);
+  EXPECT_EQ(steps(1e-12, 1), 1);
 }
 
 TEST_F(SceneTest, WaysToProjectTheHessian) {
@@ -278,7 +304,15 @@ TEST_F(SceneTest, TolerancesOfMainCarryTheScalesOfTheScene) {
   EXPECT_DOUBLE_EQ(linf.step_tolerance, 1e-4 * 3);
   EXPECT_DOUBLE_EQ(linf.relative_step_tolerance, 1e-3);
   EXPECT_EQ(newton(json::object()).norm, NewtonNorm::l2);  // no key of either vocabulary
-  EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"x_delta", 1}, {"x_delta_tol", 1}}}}}}), "/solver/nonlinear/x_delta");
+}
+
+TEST_F(SceneTest, TolerancesOfTwoVocabulariesAreRefused) {
+  const auto place = [&](const json& nonlinear) { return wrong_place({{"solver", {{"nonlinear", nonlinear}}}}); };
+
+  EXPECT_EQ(place({{"x_delta", 1}, {"x_delta_tol", 1}}), "/solver/nonlinear/x_delta");
+  EXPECT_EQ(place({{"x_delta", 1}, {"advanced", {{"f_delta_tol", 1}}}}), "/solver/nonlinear/x_delta");
+  EXPECT_EQ(place({{"grad_norm_tol", 1}, {"advanced", {{"f_delta", 1}}}}), "/solver/nonlinear/advanced/f_delta");
+  EXPECT_EQ(place({{"advanced", {{"f_delta", 1}, {"f_delta_tol", 1}}}}), "/solver/nonlinear/advanced/f_delta");
 }
 
 TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {
@@ -316,8 +350,16 @@ TEST_F(SceneTest, SelectionsOfSurfacesAndVolumes) {
                                  {"id": 4, "normal": [-1, 0], "point": [0.1, 0]}])")),
             (Tags{1, 2, 3, 4}));
   EXPECT_EQ(tags(json::parse(R"([{"id": 6, "axis": 1, "position": 0.9}, 8])")), (Tags{8, 6, 8, 8}));
-  EXPECT_EQ(wrong_place({{"geometry", {{"mesh", "square.obj"}, {"surface_selection", {{"id", 1}, {"axis", "w"}}}}}}),
-            "/geometry/surface_selection/axis");
+}
+
+TEST_F(SceneTest, SelectionsOfNothingMeantAreRefused) {
+  const auto place = [&](const char* selection) {
+    return wrong_place({{"geometry", {{"mesh", "square.obj"}, {"surface_selection", json::parse(selection)}}}});
+  };
+  EXPECT_EQ(place(R"({"id": 1, "axis": "w"})"), "/geometry/surface_selection/axis");
+  EXPECT_EQ(place(R"({"id": 1, "normal": [0, 0], "point": [0, 0]})"), "/geometry/surface_selection/normal");
+  EXPECT_EQ(place(R"({"id": 1, "center": [0, 0], "radius": -1})"), "/geometry/surface_selection/radius");
+  EXPECT_EQ(place(R"({"id": 1, "p1": [0, 0], "p2": [1, 0], "radius": -1})"), "/geometry/surface_selection/radius");
 }
 
 TEST_F(SceneTest, TransformationsScaleRotateTranslate) {
@@ -357,6 +399,43 @@ TEST_F(SceneTest, BodiesAreConcatenatedAndCopied) {
   EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({4, 5})), 3);
   EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({0, 1})), kNoTag);
   EXPECT_EQ(setup.mesh.find_defect(), "");
+}
+
+TEST_F(SceneTest, ObstaclesAreRefined) {
+  const auto obstacles = [&](const char* mesh, int n_refs) {
+    json geometry = json::array(
+        {{{"mesh", "square.obj"}, {"volume_selection", 1}}, {{"mesh", mesh}, {"is_obstacle", true}, {"n_refs", n_refs}}});
+    geometry[1]["transformation"] = {{"translation", {0, -5}}};
+    return read2(square({{"geometry", geometry}})).obstacles;
+  };
+  EXPECT_EQ(obstacles("line.obj", 3).edges.size(), 8u);
+  const auto square_boundary = obstacles("square.obj", 2);
+  EXPECT_EQ(square_boundary.edges.size(), 16u);
+  EXPECT_EQ(square_boundary.rest.size(), 16u);
+  for (const auto& [a, b] : square_boundary.edges)
+    EXPECT_DOUBLE_EQ((square_boundary.rest[a] - square_boundary.rest[b]).norm(), 0.25);
+
+  json tet = square();
+  tet["geometry"] = json::array(
+      {{{"mesh", "tet.msh"}, {"volume_selection", 1}}, {{"mesh", "tet.msh"}, {"is_obstacle", true}, {"n_refs", 2}}});
+  tet["geometry"][1]["transformation"] = {{"translation", {0, 0, -5}}};
+  const auto surface = std::get<itr::Setup<3>>(read_scene(tet).setup).obstacles;
+  EXPECT_EQ(surface.triangles.size(), 64u);
+  EXPECT_EQ(surface.rest.size(), 34u);  // Euler: v - e + f = 2
+  EXPECT_EQ(surface.edges.size(), 96u);
+  Vec<3> area = Vec<3>::Zero();
+  double total = 0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vec<3> twice = (surface.rest[b] - surface.rest[a]).cross(surface.rest[c] - surface.rest[a]);
+    area += twice / 2;
+    total += twice.norm() / 2;
+  }
+  EXPECT_LT(area.norm(), 1e-13);  // closed, all turned the same way
+  EXPECT_NEAR(total, 1.5 + std::sqrt(3.0) / 2, 1e-13);
+  for (const int too_much : {12, 17}) {
+    tet["geometry"][1]["n_refs"] = too_much;
+    EXPECT_EQ(failure(tet).place, "/geometry/1/n_refs");
+  }
 }
 
 TEST_F(SceneTest, ConditionsAndMotions) {

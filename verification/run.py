@@ -63,6 +63,7 @@ def main():
 
     stored = report / "results.json"
     entries = json.loads(stored.read_text())["cases"] if stored.exists() else {}
+    found = versions(build)
     ran = {}
     for name in chosen:
         folder = build / ("verification-quick-runs" if options.quick else "verification-runs") / name
@@ -73,12 +74,12 @@ def main():
         ran[name] = run_case(cases[name], Context(folder, report, build, options.shared, options.quick, name))
         print(f"  {ran[name]['status']} in {time.perf_counter() - start:.1f} s"
               + (f": {ran[name]['message']}" if ran[name]["message"] else ""), flush=True)
+        ran[name]["versions"] = found
     # A case that could not run keeps the figures of when it could.
     entries.update({name: entry for name, entry in ran.items() if entry["status"] != "skipped" or name not in entries})
     entries = {name: entries[name] for name in cases if name in entries}
-    found = versions(build)
-    save_json(stored, {"versions": found, "cases": entries})
-    write_report(report, json.loads(stored.read_text())["cases"], found)
+    save_json(stored, {"cases": entries})
+    write_report(report, json.loads(stored.read_text())["cases"])
 
     by_status = {status: [n for n, e in ran.items() if e["status"] == status] for status in ("passed", "failed", "skipped")}
     print("; ".join(f"{len(names)} {status}" + (f" ({', '.join(names)})" if names and status != "passed" else "")

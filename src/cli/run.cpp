@@ -61,7 +61,7 @@ std::string resume_hint(const std::string& directory) {
   return fmt::format("`itr run` with --resume goes on from the last saved state in {}", directory);
 }
 
-/// The state to go on from; none without --resume or where the folder has none.
+/// The state to go on from; none without --resume or where the folder has no frames.
 std::optional<output::SavedState> find_resumable(const scene::Scene& scene, const std::string& directory,
                                                  const RunOptions& options) {
   if (!options.resume) return std::nullopt;

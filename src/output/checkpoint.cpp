@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 1;
+constexpr std::int64_t kFormat = 2;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -93,10 +93,13 @@ std::optional<SavedState> find_saved_state(const fs::path& directory) {
       if (!file.contains("/checkpoint")) continue;
       if (file.read_integer_attribute("checkpoint_format") != kFormat) continue;
       return SavedState{path, file.read_text("/checkpoint/scene"), file.read_text("/checkpoint/backend"),
-                        file.read_doubles("/mesh/rest").columns};
+                        file.shape("/mesh/rest").columns};
     } catch (const InputError&) {  // cut off by a loss of power: the one before it is the newest
     }
   }
+  if (!files.empty())
+    throw InputError({directory.string(), "saved states", "frames but no state that can be read",
+                      "a folder that this version of itr wrote"});
   return std::nullopt;
 }
 

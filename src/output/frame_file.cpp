@@ -133,12 +133,8 @@ int step_of_frame(const std::filesystem::path& path) { return std::stoi(path.ste
 FrameSizes read_frame_sizes(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
-  const auto x = file.read_doubles("/fields/x");
-  FrameSizes sizes{file.read_double_attribute("t"),
-                   x.columns,
-                   static_cast<int>(x.rows()),
-                   static_cast<int>(file.read_integers("/mesh/body").rows()),
-                   {}};
+  const hdf5::Shape x = file.shape("/fields/x"), body = file.shape("/mesh/body");
+  FrameSizes sizes{file.read_double_attribute("t"), x.columns, static_cast<int>(x.rows), static_cast<int>(body.rows), {}};
   for (const char* name : kAskedFields)
     if (file.contains(std::string("/fields/") + name)) sizes.asked.push_back(name);
   return sizes;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hdf5.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "itr/core/error.hpp"
@@ -119,20 +120,33 @@ std::string File::read_text(const std::string& name) const {
   return {table.values.begin(), table.values.end()};
 }
 
-template <typename T>
-Table<T> File::read_raw(const std::string& name, hid_t type) const {
-  const Handle set(H5Dopen2(file_.id(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  require(set.is_valid(), name);
-  const Handle space(H5Dget_space(set.id()), H5Sclose);
+Handle File::open_dataset(const std::string& name) const {
+  Handle dataset(H5Dopen2(file_.id(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  require(dataset.is_valid(), name);
+  return dataset;
+}
+
+Shape File::shape_of(const Handle& dataset, const std::string& name) const {
+  const Handle space(H5Dget_space(dataset.id()), H5Sclose);
   const int rank = H5Sget_simple_extent_ndims(space.id());
   require(rank == 1 || rank == 2, name);
-  std::array<hsize_t, 2> shape = {0, 1};
-  H5Sget_simple_extent_dims(space.id(), shape.data(), nullptr);
+  std::array<hsize_t, 2> extent = {0, 0};
+  H5Sget_simple_extent_dims(space.id(), extent.data(), nullptr);
+  require(rank == 1 || extent[1] > 0, name);
+  return {extent[0], static_cast<int>(extent[1])};
+}
+
+Shape File::shape(const std::string& name) const { return shape_of(open_dataset(name), name); }
+
+template <typename T>
+Table<T> File::read_raw(const std::string& name, hid_t type) const {
+  const Handle dataset = open_dataset(name);
+  const Shape shape = shape_of(dataset, name);
   Table<T> table;
-  table.columns = rank == 2 ? static_cast<int>(shape[1]) : 0;
-  table.values.resize(shape[0] * shape[1]);
+  table.columns = shape.columns;
+  table.values.resize(shape.rows * std::max(shape.columns, 1));
   if (!table.values.empty()) {
-    require(H5Dread(set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, table.values.data()) >= 0, name);
+    require(H5Dread(dataset.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, table.values.data()) >= 0, name);
   }
   return table;
 }

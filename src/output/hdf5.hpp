@@ -47,7 +47,13 @@ class Session {
   void* print_data_ = nullptr;
 };
 
-/// A table of rows x columns, row-major; columns = 0 stands for a plain vector.
+/// Rows x columns; columns = 0 stands for a plain vector.
+struct Shape {
+  std::size_t rows = 0;
+  int columns = 0;
+};
+
+/// The values of a dataset, row-major; columns as in Shape.
 template <typename T>
 struct Table {
   std::vector<T> values;
@@ -78,6 +84,8 @@ class File {
   std::int64_t read_integer_attribute(const char* name) const;
   double read_double_attribute(const char* name) const;
   std::string read_text(const std::string& name) const;
+  /// Of a dataset, without reading it.
+  Shape shape(const std::string& name) const;
   Table<double> read_doubles(const std::string& name) const;
   Table<std::int64_t> read_integers(const std::string& name) const;
 
@@ -87,6 +95,8 @@ class File {
   void write_raw(const std::string& name, hid_t type, const void* values, std::size_t size, int columns);
   void write_attribute_raw(const char* name, hid_t type, const void* value);
   void read_attribute_raw(const char* name, hid_t type, void* value) const;
+  Handle open_dataset(const std::string& name) const;
+  Shape shape_of(const Handle& dataset, const std::string& name) const;
   template <typename T>
   Table<T> read_raw(const std::string& name, hid_t type) const;
 

@@ -112,17 +112,18 @@ namespace {
 /// Calls `visit` with every number of a report, in a fixed order.
 template <typename Report, typename Visit>
 void for_each_number(Report& r, Visit&& visit) {
-  for (auto* n : {&r.step, &r.vertices, &r.elements, &r.unknowns, &r.newton_iterations, &r.damped_steps}) visit(*n);
+  for (auto* n : {&r.step, &r.vertices, &r.elements, &r.unknowns, &r.newton_iterations, &r.damped_steps, &r.cut_steps})
+    visit(*n);
   for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths}) {
     visit(count->tried);
     visit(count->accepted);
   }
   auto& e = r.energy;
+  for (auto* x : {&e.inertia, &e.elastic, &e.body, &e.contact, &e.friction, &e.damping, &e.total}) visit(*x);
   auto& s = r.seconds;
-  for (auto* x : {&r.t, &e.inertia, &e.elastic, &e.body, &e.contact, &e.friction, &e.total, &r.energy_before_remesh,
-                  &r.min_distance, &r.min_volume_ratio, &s.assembly, &s.linear_solve, &s.line_search, &s.ccd, &s.remesh,
-                  &s.projection, &s.output, &s.total, &r.peak_rss_mb})
+  for (auto* x : {&s.assembly, &s.linear_solve, &s.line_search, &s.ccd, &s.remesh, &s.projection, &s.output, &s.total})
     visit(*x);
+  for (auto* x : {&r.t, &r.energy_before_remesh, &r.min_distance, &r.min_volume_ratio, &r.peak_rss_mb}) visit(*x);
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ class ConditionReader {
   void read_body_acceleration() {
     const Node rhs = boundary_["rhs"];
     if (!rhs.exists()) return;
-    const ValueFunction<Dim> value = read_function<Dim>(rhs, rhs["interpolation"], -1);
+    const ValueFunction<Dim> value = read_function<Dim>(rhs, -1);
     if (value.is_zero) return;
     check_defined<Dim>(value.function, all_vertices(), times(), rhs);
     setup_.body_acceleration = value.function;
@@ -123,7 +123,7 @@ class ConditionReader {
     for (const Node& node : initial_[name].items()) {
       if (!node.has("id")) node["id"].fail("the id of a body");
       const int body = read_id(node["id"], 0);
-      const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
+      const ValueFunction<Dim> value = read_function<Dim>(node["value"]);
       if (!bodies_.contains(body)) warn_unused(node);
       if (!seen.insert(body).second) {
         warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");

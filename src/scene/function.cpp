@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "function.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <sstream>
@@ -51,6 +53,31 @@ Component read_component(const Node& node) {
   return component;
 }
 
+template <int Dim>
+std::array<Component, Dim> read_components(const Node& value) {
+  if (!value.exists() || !value.json().is_array()) value.fail("a list of numbers or expressions");
+  const std::vector<Node> values = value.items();
+  std::array<Component, Dim> components;
+  for (std::size_t c = 0; c < std::min<std::size_t>(Dim, values.size()); ++c) components[c] = read_component(values[c]);
+  return components;
+}
+
+template <int Dim>
+ValueFunction<Dim> combine(const std::array<Component, Dim>& components, double sign) {
+  if (std::all_of(components.begin(), components.end(), [](const Component& c) { return c.is_constant(); })) {
+    Vec<Dim> constant;
+    for (int c = 0; c < Dim; ++c) constant[c] = sign * components[c].constant;
+    return {[constant](const Vec<Dim>&, double) { return constant; }, constant.isZero(0)};
+  }
+  return {[components, sign](const Vec<Dim>& X, double t) {
+            const Expression::Variables variables{X[0], X[1], Dim == 3 ? X[Dim - 1] : 0, t};
+            Vec<Dim> result;
+            for (int c = 0; c < Dim; ++c) result[c] = sign * components[c](variables);
+            return result;
+          },
+          false};
+}
+
 }  // namespace
 
 ScalarValue read_scalar(const Node& node, double fallback) {
@@ -65,29 +92,18 @@ ScalarValue read_scalar(const Node& node, double fallback) {
 }
 
 template <int Dim>
-ValueFunction<Dim> read_function(const Node& value, const Node& interpolation, double sign) {
-  if (!value.exists() || !value.json().is_array()) value.fail("a list of numbers or expressions");
-  const std::vector<Node> values = value.items(), scales = interpolation.items();
-  std::array<Component, Dim> components;
-  bool is_constant = true;
-  for (std::size_t c = 0; c < Dim; ++c) {
-    if (c < values.size()) components[c] = read_component(values[c]);
-    if (scales.size() > 1 && c >= scales.size()) interpolation.fail("one entry, or one a component");
-    if (!scales.empty()) components[c].scale = Interpolation(scales.size() == 1 ? scales[0] : scales[c]);
-    is_constant = is_constant && components[c].is_constant();
-  }
-  if (is_constant) {
-    Vec<Dim> constant;
-    for (int c = 0; c < Dim; ++c) constant[c] = sign * components[c].constant;
-    return {[constant](const Vec<Dim>&, double) { return constant; }, constant.isZero(0)};
-  }
-  return {[components, sign](const Vec<Dim>& X, double t) {
-            const Expression::Variables variables{X[0], X[1], Dim == 3 ? X[Dim - 1] : 0, t};
-            Vec<Dim> result;
-            for (int c = 0; c < Dim; ++c) result[c] = sign * components[c](variables);
-            return result;
-          },
-          false};
+ValueFunction<Dim> read_function(const Node& value, double sign) {
+  return combine<Dim>(read_components<Dim>(value), sign);
+}
+
+template <int Dim>
+ValueFunction<Dim> read_function(const Node& value, const Node& interpolation) {
+  std::array<Component, Dim> components = read_components<Dim>(value);
+  const std::vector<Node> scales = interpolation.items();
+  if (scales.empty()) return combine<Dim>(components, 1);
+  if (scales.size() > 1 && scales.size() < Dim) interpolation.fail("one entry, or one a component");
+  for (std::size_t c = 0; c < Dim; ++c) components[c].scale = Interpolation(scales.size() == 1 ? scales[0] : scales[c]);
+  return combine<Dim>(components, 1);
 }
 
 template <int Dim>
@@ -114,8 +130,10 @@ void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec
     }
 }
 
-template ValueFunction<2> read_function(const Node&, const Node&, double);
-template ValueFunction<3> read_function(const Node&, const Node&, double);
+template ValueFunction<2> read_function(const Node&, double);
+template ValueFunction<3> read_function(const Node&, double);
+template ValueFunction<2> read_function(const Node&, const Node&);
+template ValueFunction<3> read_function(const Node&, const Node&);
 template ScalarFunction<2> read_scalar_function(const Node&, const Node&);
 template ScalarFunction<3> read_scalar_function(const Node&, const Node&);
 template void check_defined(const SpaceTimeFunction<2>&, const std::vector<Vec<2>>&, const std::vector<double>&,

@@ -21,11 +21,14 @@ struct ValueFunction {
   bool is_zero = false;  ///< all components are the constant 0
 };
 
-/// Missing components are 0, extra ones are passed over. `interpolation` may be absent; `sign` multiplies the value.
+/// Missing components are 0, extra ones are passed over; `sign` multiplies the value.
 template <int Dim>
-ValueFunction<Dim> read_function(const Node& value, const Node& interpolation, double sign = 1);
+ValueFunction<Dim> read_function(const Node& value, double sign = 1);
+/// The same times a factor of time by component, or one for all; `interpolation` may be absent.
+template <int Dim>
+ValueFunction<Dim> read_function(const Node& value, const Node& interpolation);
 
-/// One component of that: `value` is a number or an expression.
+/// One component of the latter: `value` is a number or an expression.
 template <int Dim>
 struct ScalarFunction {
   std::function<double(const Vec<Dim>& X, double t)> function;

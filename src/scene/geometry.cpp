@@ -50,21 +50,13 @@ double longest_edge(const std::vector<Vec<Dim>>& points, const typename Mesh<Dim
   return longest;
 }
 
-/// "3, 5" or, where there are many, "0, 1, 2, 3, 4, ... (17 of them)".
-std::string list(const std::vector<std::size_t>& ids) {
-  constexpr std::size_t kMostNamed = 5;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(ids.size(), kMostNamed); ++i) text += (i ? ", " : "") + std::to_string(ids[i]);
-  return ids.size() > kMostNamed ? text + ", ... (" + std::to_string(ids.size()) + " of them)" : text;
-}
-
 /// Triangles are turned to positive area; tetrahedra only if the transformation is a mirror: a file with inverted ones is
 /// wrong.
 template <int Dim>
 void orient_cells(const Node& geometry, const std::vector<Vec<Dim>>& points, bool is_mirror,
                   std::vector<typename Mesh<Dim>::Cell>& cells) {
-  std::vector<std::size_t> degenerate, inverted;
-  for (std::size_t c = 0; c < cells.size(); ++c) {
+  std::vector<int> degenerate, inverted;
+  for (int c = 0; c < static_cast<int>(cells.size()); ++c) {
     auto& cell = cells[c];
     if (is_mirror) std::swap(cell[0], cell[1]);
     double volume = signed_volume<Dim>(points, cell);
@@ -77,9 +69,9 @@ void orient_cells(const Node& geometry, const std::vector<Vec<Dim>>& points, boo
     else if (volume < 0)
       inverted.push_back(c);
   }
-  const auto refuse = [&](const char* what, const std::vector<std::size_t>& ids) {
+  const auto refuse = [&](const char* what, const std::vector<int>& ids) {
     if (!ids.empty())
-      geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + " with " + what + " elements " + list(ids),
+      geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + " with " + what + " elements " + list_ids(ids),
                             "elements of positive volume");
   };
   refuse("degenerate", degenerate);

@@ -126,6 +126,7 @@ class MaterialReader {
 
   void read_lame() {
     if (node_.has("E") || node_.has("nu")) node_.fail("E and nu, or lambda and mu, not both");
+    if (node_.has("plane_strain")) node_["plane_strain"].fail("it beside lambda and mu", "it with E and nu only");
     for (const char* key : {"lambda", "mu"})
       if (!node_.has(key)) node_[key].fail("both of lambda and mu");
     const ScalarValue lambda = read_required("lambda"), mu = read_required("mu");
@@ -180,20 +181,15 @@ std::map<int, std::vector<Vec<3>>> barycenters_by_body(const Mesh<Dim>& mesh) {
   return points;
 }
 
-}  // namespace
-
-/// "0, 1, 2 (of 9)": the first elements of a body.
 template <int Dim>
-std::string list_elements(const Mesh<Dim>& mesh, int body) {
-  constexpr int kMostNamed = 5;
-  std::string text;
-  int count = 0;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (mesh.body(c) != body) continue;
-    if (++count <= kMostNamed) text += (text.empty() ? "" : ", ") + std::to_string(c);
-  }
-  return count > kMostNamed ? text + ", ... (" + std::to_string(count) + " of them)" : text;
+std::vector<int> elements_of(const Mesh<Dim>& mesh, int body) {
+  std::vector<int> elements;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (mesh.body(c) == body) elements.push_back(c);
+  return elements;
 }
+
+}  // namespace
 
 template <int Dim>
 std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, std::vector<std::string>& warnings) {
@@ -220,9 +216,9 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
   }
   for (const auto& [body, of_body] : points)
     if (!materials.contains(body))
-      node.fail(
-          "no material with the id " + std::to_string(body) + ", which elements " + list_elements(mesh, body) + " have",
-          "one for every body");
+      node.fail("no material with the id " + std::to_string(body) + ", which elements " + list_ids(elements_of(mesh, body)) +
+                    " have",
+                "one for every body");
   return materials;
 }
 

@@ -68,6 +68,13 @@ std::string abbreviate(const Json& json) {
   return text;
 }
 
+std::string list_ids(const std::vector<int>& ids) {
+  constexpr std::size_t kMostNamed = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(ids.size(), kMostNamed); ++i) text += (i ? ", " : "") + std::to_string(ids[i]);
+  return ids.size() > kMostNamed ? text + ", ... (" + std::to_string(ids.size()) + " of them)" : text;
+}
+
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
   std::string nearest;
   std::size_t least = std::max<std::size_t>(2, name.size() / 2) + 1;

@@ -33,6 +33,8 @@ std::filesystem::path resolve_path(const std::filesystem::path& path, const std:
 std::string escape_token(std::string_view token);
 /// The JSON text of a value, cut to one short line.
 std::string abbreviate(const Json& json);
+/// "3, 5" or, where there are many, "0, 1, 2, 3, 4, ... (17 of them)".
+std::string list_ids(const std::vector<int>& ids);
 /// The candidate with the least edit distance; empty if none is close enough to be meant.
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Obstacles: collision-only surfaces out of mesh files (scene-format §2.6).
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -73,7 +74,7 @@ std::vector<char> find_used(std::size_t num_points, const Cells& solid, const Fa
   return is_used;
 }
 
-Surface extract_surface(const MeshFile& file, const std::vector<Edge>& polylines, const std::vector<Vec<2>>& points) {
+Surface extract_surface(const MeshFile& file, const std::vector<Vec<2>>& points) {
   std::vector<Triangle> triangles = file.triangles;
   for (Triangle& t : triangles) {
     const Vec<2> a = points[t[1]] - points[t[0]], b = points[t[2]] - points[t[0]];
@@ -81,38 +82,53 @@ Surface extract_surface(const MeshFile& file, const std::vector<Edge>& polylines
   }
   const std::vector<Edge> boundary = boundary_of(triangles);
   EdgeList edges;
-  for (const Edge& edge : polylines) edges.add(edge);
+  for (const Edge& edge : file.edges) edges.add(edge);
   for (const Edge& edge : boundary) edges.add(edge);
-  return {edges.take(), {}, find_used(points.size(), triangles, boundary, polylines)};
+  return {edges.take(), {}, find_used(points.size(), triangles, boundary, file.edges)};
 }
 
-Surface extract_surface(const MeshFile& file, const std::vector<Edge>& polylines, const std::vector<Vec<3>>& points) {
+Surface extract_surface(const MeshFile& file, const std::vector<Vec<3>>& points) {
   const std::vector<Triangle> triangles = file.tetrahedra.empty() ? file.triangles : boundary_of(file.tetrahedra);
   EdgeList edges;
-  for (const Edge& edge : polylines) edges.add(edge);
+  for (const Edge& edge : file.edges) edges.add(edge);
   for (const Triangle& t : triangles)
     for (const Edge& edge : {Edge{t[0], t[1]}, Edge{t[1], t[2]}, Edge{t[2], t[0]}}) edges.add(edge);
-  return {edges.take(), triangles, find_used(points.size(), file.tetrahedra, triangles, polylines)};
+  return {edges.take(), triangles, find_used(points.size(), file.tetrahedra, triangles, file.edges)};
 }
 
-/// Splits every edge of the polylines, `times` times.
+/// Splits every edge in two and every triangle in four.
 template <int Dim>
-void refine_polylines(const Node& geometry, std::vector<Edge>& polylines, std::vector<Vec<Dim>>& points) {
-  constexpr int kMost = 16;
+void refine_once(double where, Surface& surface, std::vector<Vec<Dim>>& points) {
+  std::map<Edge, int> middles;
+  std::vector<Edge> edges;
+  for (const auto& [a, b] : surface.edges) {
+    const int middle = middles[sorted(Edge{a, b})] = static_cast<int>(points.size());
+    points.push_back((1 - where) * points[a] + where * points[b]);
+    edges.insert(edges.end(), {{a, middle}, {middle, b}});
+  }
+  std::vector<Triangle> triangles;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const int ab = middles.at(sorted(Edge{a, b})), bc = middles.at(sorted(Edge{b, c})), ca = middles.at(sorted(Edge{c, a}));
+    triangles.insert(triangles.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    edges.insert(edges.end(), {{ab, bc}, {bc, ca}, {ca, ab}});
+  }
+  surface.edges = std::move(edges);
+  surface.triangles = std::move(triangles);
+  surface.is_used.resize(points.size(), true);
+}
+
+template <int Dim>
+void refine(const Node& geometry, Surface& surface, std::vector<Vec<Dim>>& points) {
+  constexpr int kMostTimes = 16;
+  constexpr double kMostEdges = 2e7;
   const int times = geometry["n_refs"].integer_at_least(0, 0);
-  if (times > kMost) geometry["n_refs"].fail("at most " + std::to_string(kMost));
+  if (times > kMostTimes) geometry["n_refs"].fail("at most " + std::to_string(kMostTimes));
+  const double edges = std::ldexp(surface.edges.size(), times) + std::ldexp(1.5 * surface.triangles.size(), 2 * times);
+  if (times > 0 && edges > kMostEdges) geometry["n_refs"].fail("less refinement: too many edges");
   const Node location = geometry["advanced"]["refinement_location"];
   const double where = location.number(0.5);
   if (!(where > 0 && where < 1)) location.fail("a number between 0 and 1");
-  for (int i = 0; i < times; ++i) {
-    std::vector<Edge> halves;
-    for (const auto& [a, b] : polylines) {
-      const int middle = static_cast<int>(points.size());
-      points.push_back((1 - where) * points[a] + where * points[b]);
-      halves.insert(halves.end(), {{a, middle}, {middle, b}});
-    }
-    polylines = std::move(halves);
-  }
+  for (int i = 0; i < times; ++i) refine_once<Dim>(where, surface, points);
 }
 
 template <int Dim>
@@ -150,9 +166,8 @@ void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<
   std::vector<Vec<Dim>> points = points_of<Dim>(file);
   transform<Dim>(points, geometry);
   const Box<Dim> box = bounding_box<Dim>(points);
-  std::vector<Edge> polylines = file.edges;
-  refine_polylines<Dim>(geometry, polylines, points);
-  Surface surface = extract_surface(file, polylines, points);
+  Surface surface = extract_surface(file, points);
+  refine<Dim>(geometry, surface, points);
   const int extract = geometry["extract"].choice({"volume", "surface", "edges", "points"}, 0);
   if (extract == 2) surface.triangles.clear();
   if (extract == 3) surface.triangles.clear(), surface.edges.clear();

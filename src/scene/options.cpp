@@ -19,6 +19,12 @@ void read_integrator(const Node& node, TimeOptions& options) {
   const int index =
       name.choice({"ImplicitEuler", "ImplicitNewmark", "BDF", "BDF1", "BDF2", "BDF3", "BDF4", "BDF5", "BDF6"}, 0);
   options.integrator = std::array{Integrator::implicit_euler, Integrator::newmark, Integrator::bdf}[std::min(index, 2)];
+  const auto refuse = [&](const char* key, const char* owner) {
+    if (node.has(key)) node[key].fail("it beside the type " + abbreviate(name.json()), std::string("it with ") + owner);
+  };
+  if (index != 1)
+    for (const char* key : {"beta", "gamma", "energy_growth_limit"}) refuse(key, "ImplicitNewmark only");
+  if (index != 2) refuse("steps", "BDF only: BDF1 to BDF6 have their order in the name");
   if (index > 2) options.bdf_order = index - 2;
   if (index == 2) {
     if (!is_object) name.fail("BDF1 to BDF6, or an object with type and steps");
@@ -46,7 +52,9 @@ void read_steps(const Node& time, TimeOptions& options) {
       time.fail(abbreviate(time.json()), "tend = t0 + dt * time_steps, or only two of them");
     return;
   }
-  const double count = std::ceil(duration / options.dt);
+  const double ratio = duration / options.dt, nearest = std::round(ratio);
+  // Of decimal fractions: 0.07 / 0.01 is a little more than 7.
+  const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
   if (count > kMostSteps) dt.fail("at most 1e9 steps");
   options.steps = static_cast<int>(count);
 }
@@ -118,11 +126,12 @@ constexpr const char* kPaperKeys[] = {"x_delta", "grad_norm", "f_delta"};
 constexpr const char* kMainKeys[] = {"x_delta_tol",     "grad_norm_tol",        "rel_grad_norm_tol",
                                      "rel_x_delta_tol", "newton_decrement_tol", "norm_type"};
 
+/// The first key of a vocabulary that a scene has; that of the energy is in /advanced.
 template <std::size_t N>
-Node find_any(const Node& node, const char* const (&keys)[N]) {
+Node find_any(const Node& nonlinear, const char* const (&keys)[N], const char* energy_key) {
   for (const char* key : keys)
-    if (node.has(key)) return node[key];
-  return node[keys[0]];
+    if (nonlinear.has(key)) return nonlinear[key];
+  return nonlinear["advanced"][energy_key];
 }
 
 /// At either of the two places where PolyFEM has had it.
@@ -175,10 +184,11 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
   const Node nonlinear = root["solver"]["nonlinear"];
   NewtonOptions options;
   options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, 500);
-  const Node paper_key = find_any(nonlinear, kPaperKeys), main_key = find_any(nonlinear, kMainKeys);
+  const Node paper_key = find_any(nonlinear, kPaperKeys, "f_delta");
+  const Node main_key = find_any(nonlinear, kMainKeys, "f_delta_tol");
   if (paper_key.exists() && main_key.exists())
     paper_key.fail("it beside " + main_key.pointer(), "one vocabulary of tolerances, not two");
-  if (paper_key.exists() || nonlinear["advanced"].has("f_delta"))
+  if (paper_key.exists())
     read_paper_tolerances(nonlinear, characteristic_length, options);
   else
     read_main_tolerances(root, scale, options);

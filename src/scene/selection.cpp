@@ -97,7 +97,7 @@ typename Selection<Dim>::Test Selection<Dim>::read_sphere(const Node& node) cons
   const bool is_relative = node["relative"].boolean(false);
   if (!node.has("radius")) node["radius"].fail("the radius of the sphere");
   const Vec<Dim> center = read_point(node["center"], is_relative);
-  const double radius = node["radius"].number(0) * (is_relative ? box_.diagonal().norm() : 1);
+  const double radius = node["radius"].non_negative(0) * (is_relative ? box_.diagonal().norm() : 1);
   return [=](const Vec<Dim>& p) { return (p - center).norm() <= radius; };
 }
 
@@ -105,7 +105,7 @@ template <int Dim>
 typename Selection<Dim>::Test Selection<Dim>::read_cylinder(const Node& node) const {
   const bool is_relative = node["relative"].boolean(false);
   const Vec<Dim> begin = read_point(node["p1"], is_relative), end = read_point(node["p2"], is_relative);
-  const double radius = node["radius"].number(0) * (is_relative ? box_.diagonal().norm() : 1);
+  const double radius = node["radius"].non_negative(0) * (is_relative ? box_.diagonal().norm() : 1);
   const double length = (end - begin).norm();
   if (!(length > 0)) node["p2"].fail("a point other than p1");
   const Vec<Dim> axis = (end - begin) / length;
@@ -140,6 +140,7 @@ typename Selection<Dim>::Test Selection<Dim>::read_axis(const Node& node) const 
 template <int Dim>
 typename Selection<Dim>::Test Selection<Dim>::read_plane(const Node& node) const {
   const Vec<Dim> normal = read_point(node["normal"], false);
+  if (normal.isZero(0)) node["normal"].fail("a direction");
   const bool is_relative = node["relative"].boolean(false);
   if (!node.has("point") && !node.has("offset")) node["point"].fail("a point of the plane, or its offset");
   const Vec<Dim> point =

@@ -5,7 +5,7 @@ from harness.contact import (barrier_pressure, gap_of_pressure, vertex_lengths, 
                              write_line)
 from harness.fields import consistent_mass_product, fitted_order, gradients, volumes
 from harness.scenes import box_mesh, run_scene, scene, write_mesh
-from harness.suite import Result
+from harness.suite import Result, excess
 
 TITLE = "Contact: weight, slope, patch test"
 QUANTITY = ("sum of contact forces against the weight; threshold and acceleration of a block on a slope; stress of two blocks "
@@ -58,7 +58,7 @@ def slope(context):
         t, speed = np.array([(f.t, consistent_mass_product(f.rest, f.cells, rho, f.v).sum(axis=0)[0] / (rho * size[0] * size[1]))
                              for f in run.frames()]).T
         if share < 1:
-            yield Result(f"slope, tan = {share} mu: speed after {end} s over eps_v", float(speed[-1] / epsv), 1.0,
+            yield Result(f"slope, tan = {share} mu: speed after {end} s over eps_v", abs(float(speed[-1] / epsv)), 1.0,
                          note="creeps, as smoothed friction does")
         else:
             later = t > end / 2
@@ -104,5 +104,5 @@ def results(context):
     for below, above in meshes:
         found = [patch(context, below, above, dhat) for dhat in gaps]
         order = float(fitted_order(gaps[1:], found[1:]))  # before, the gap is no small part of a cell
-        yield Result(f"patch test, {below} cells on {above}, order of the stress's error in dhat", max(0.0, 1 - order), 0.1, order,
+        yield Result(f"patch test, {below} cells on {above}, order of the stress's error in dhat", excess(1, order), 0.1, order,
                      1, "errors " + ", ".join(f"{e:.2e}" for e in found) + " for dhat of 1e-5, 1e-6, 1e-7")

@@ -2,11 +2,11 @@
 """The library's matrices on random states of two bodies grown together, one soft and one stiff."""
 import numpy as np
 import ufl
-from harness.fenicsx import Body
-from harness.materials import laws, words
+from harness.materials import words
 from harness.probe import matrices
-from harness.scenes import box_mesh, scene, write_mesh
+from harness.scenes import scene
 from harness.suite import Result
+from harness.two_bodies import two_bodies
 
 TITLE = "Matrices and forces entry by entry"
 QUANTITY = ("mass matrix, internal force, exact tangent, load vector and energy on random states; entries relative to the "
@@ -42,34 +42,22 @@ def vector_error(ours, reference):
 
 
 def results(context):
-    for dim, (counts, size) in MESHES.items():
-        points, cells = box_mesh(counts, size, jitter=0.25, seed=dim)
-        bodies = np.where(points[cells].mean(axis=1)[:, 0] < size[0] / 2, 1, 2)
-        mesh = context.folder / f"box{dim}.msh"
-        write_mesh(mesh, points, cells, bodies)
-        by_cell = lambda values: np.asarray(values)[bodies - 1]
-        for name, law in laws(dim).items():
-            parameters = zip(*(law.parameters(material, dim) for material in law.scene))
-            rho = by_cell([material["rho"] for material in law.scene])
-            body = Body(points, cells, law.density, [by_cell(p) for p in parameters], rho,
-                        {3: lambda x: np.isclose(x[0], size[0])})
-            x = body.X
-            acceleration = ufl.as_vector([1 + x[0], -9.81 * x[1], 2][:dim])
-            traction = ufl.as_vector([3e3 * x[1], -4e3, 1e3][:dim])
-            load = body.load(body.coefficient(rho) * ufl.inner(acceleration, body.test) * ufl.dx
-                             + ufl.inner(traction, body.test) * body.ds(3))()
-            content = scene(mesh, [{"id": k + 1, **material} for k, material in enumerate(law.scene)],
-                            boundary_conditions={"rhs": ["-1 - x", "9.81 * y", -2][:dim],
-                                                 "neumann_boundary": [{"id": 3, "value": ["3e3 * y", -4e3, 1e3][:dim]}]})
-            errors = {}
-            for seed, strength in enumerate([0.005, 0.02, 0.05]):
-                u = random_state(points, cells, seed, strength)
-                ours = matrices(context, f"{dim}d-{words(name)}-{seed}", content, u)
-                found = {"mass matrix": entry_error(ours["mass"], body.mass_matrix),
-                         "tangent": entry_error(ours["tangent"], body.tangent(u)),
-                         "internal force": vector_error(ours["force"], body.internal_force(u)),
-                         "load": vector_error(ours["load"], load),
-                         "energy": abs(ours["energy"] / body.energy(u) - 1)}
-                errors = {key: max(error, errors.get(key, 0)) for key, error in found.items()}
-            for key, error in errors.items():
-                yield Result(f"{dim}D, {name}, {key}", float(error), TOLERANCE, note="worst of 3 states")
+    for case in two_bodies(context.folder, MESHES):
+        dim, name, body = case.dim, case.name, case.body
+        x = body.X
+        load = case.load(ufl.as_vector([1 + x[0], -9.81 * x[1], 2][:dim]), ufl.as_vector([3e3 * x[1], -4e3, 1e3][:dim]))
+        content = scene(case.mesh, case.materials(),
+                        boundary_conditions={"rhs": ["-1 - x", "9.81 * y", -2][:dim],
+                                             "neumann_boundary": [{"id": 3, "value": ["3e3 * y", -4e3, 1e3][:dim]}]})
+        errors = {}
+        for seed, strength in enumerate([0.005, 0.02, 0.05]):
+            u = random_state(case.points, case.cells, seed, strength)
+            ours = matrices(context, f"{dim}d-{words(name)}-{seed}", content, u)
+            found = {"mass matrix": entry_error(ours["mass"], body.mass_matrix),
+                     "tangent": entry_error(ours["tangent"], body.tangent(u)),
+                     "internal force": vector_error(ours["force"], body.internal_force(u)),
+                     "load": vector_error(ours["load"], load),
+                     "energy": abs(ours["energy"] / body.energy(u) - 1)}
+            errors = {key: np.maximum(error, errors.get(key, 0)) for key, error in found.items()}
+        for key, error in errors.items():
+            yield Result(f"{dim}D, {name}, {key}", float(error), TOLERANCE, note="worst of 3 states")

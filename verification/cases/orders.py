@@ -8,7 +8,7 @@ from harness.fields import errors, fitted_order
 from harness.manufactured import X, divergence, expression, function_of_space, gradient, stress, t
 from harness.materials import laws, words
 from harness.scenes import box_mesh, run_scene, scene, write_mesh
-from harness.suite import Result
+from harness.suite import Result, excess
 
 TITLE = "Orders of convergence"
 QUANTITY = "order fitted over the series of element sizes or time steps (value), against the theory's (reference)"
@@ -104,7 +104,7 @@ def in_time(context, name, material, law, rule, any_start, steps, consistent=Tru
 
 def order_result(name, sizes, values, expected):
     order = float(fitted_order(sizes, values))
-    return Result(name, max(0.0, expected - order), 0.1, order, expected,
+    return Result(name, excess(expected, order), 0.1, order, expected,
                   "errors " + ", ".join(f"{value:.2e}" for value in values))
 
 

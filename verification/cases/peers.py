@@ -19,9 +19,10 @@ def results(context):
         raise Failure(f"{program} is not there")
     command = [sys.executable, str(program), "--itr", str(context.build / "bin/itr"), "--scenes",
                str(context.shared / "peer-scenes")]
+    expected = len((context.shared / "peer-scenes/scenes.txt").read_text().split())
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in done.stdout.splitlines() if line.startswith("| ")]
-    if len(rows) < 2:
-        raise Failure(done.stderr)
+    if len(rows) - 1 != expected:
+        raise Failure(f"{len(rows) - 1} of {expected} scenes, exit status {done.returncode}\n{done.stderr}")
     for scene, status, seconds, detail in rows[1:]:
         yield Result(scene, 0.0 if status == "pass" else 1.0, 0.0, status, "pass", f"{detail} ({seconds} s)")

@@ -3,10 +3,10 @@
 once for the law that has a solution to find from anywhere (others may invert on the way)."""
 import numpy as np
 import ufl
-from harness.fenicsx import Body
-from harness.materials import laws, words
-from harness.scenes import box_mesh, run_scene, scene, write_mesh
+from harness.materials import words
+from harness.scenes import run_scene, scene
 from harness.suite import Result
+from harness.two_bodies import two_bodies
 
 TITLE = "Static solutions against FEniCSx"
 QUANTITY = "nodal displacement relative to the largest; elastic energy, relative"
@@ -19,40 +19,28 @@ PULL, GRAVITY, STRETCH = [60.0, -10.0, 5.0], -0.3, 0.01  # St. Venant-Kirchhoff 
 
 
 def results(context):
-    for dim, (counts, size) in MESHES.items():
-        points, cells = box_mesh(counts, size, jitter=0.25, seed=dim)
-        bodies = np.where(points[cells].mean(axis=1)[:, 0] < size[0] / 2, 1, 2)
-        mesh = context.folder / f"bar{dim}.msh"
-        write_mesh(mesh, points, cells, bodies)
-        by_cell = lambda values: np.asarray(values)[bodies - 1]
-        for name, law in laws(dim).items():
-            parameters = zip(*(law.parameters(material, dim) for material in law.scene))
-            rho = by_cell([material["rho"] for material in law.scene])
-            body = Body(points, cells, law.density, [by_cell(p) for p in parameters], rho,
-                        {3: lambda x: np.isclose(x[0], size[0])})
-            gravity = ufl.as_vector([0, GRAVITY, 0][:dim])
-            load = body.load(body.coefficient(rho) * ufl.inner(gravity, body.test) * ufl.dx
-                             + ufl.inner(ufl.as_vector(PULL[:dim]), body.test) * body.ds(3))()
-            held = np.repeat(np.isclose(points[:, 0], 0), dim)
-            targets = np.zeros_like(points)
-            targets[:, 1] = STRETCH * points[:, 1]
-            u = np.zeros(points.size)
-            for share in np.linspace(0.1, 1, 10):  # loads step by step, so that Newton finds its way
-                u = body.solve(share * load, held, share * targets.ravel(), u)
-            for kind in ("quasi-static", "static") if name.startswith("neo") else ("quasi-static",):
-                content = scene_of(mesh, law, dim, kind)
-                run = run_scene(context, f"{dim}d-{words(name)}-{kind}", content)
-                ours = run.last().u.ravel()
-                yield Result(f"{dim}D, {name}, {kind}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()),
-                             TOLERANCE, note=f"{len(points)} vertices, up to {np.abs(u).max():.3g} m")
-                energy = body.energy(u)
-                yield Result(f"{dim}D, {name}, {kind}, elastic energy",
-                             abs(run.steps[-1]["energy"]["elastic"] / energy - 1), TOLERANCE)
+    for case in two_bodies(context.folder, MESHES):
+        dim, name, body, points = case.dim, case.name, case.body, case.points
+        load = case.load(ufl.as_vector([0, GRAVITY, 0][:dim]), ufl.as_vector(PULL[:dim]))
+        held = np.repeat(np.isclose(points[:, 0], 0), dim)
+        targets = np.zeros_like(points)
+        targets[:, 1] = STRETCH * points[:, 1]
+        u = np.zeros(points.size)
+        for share in np.linspace(0.1, 1, 10):  # loads step by step, so that Newton finds its way
+            u = body.solve(share * load, held, share * targets.ravel(), u)
+        for kind in ("quasi-static", "static") if name.startswith("neo") else ("quasi-static",):
+            run = run_scene(context, f"{dim}d-{words(name)}-{kind}", scene_of(case, kind))
+            ours = run.last().u.ravel()
+            yield Result(f"{dim}D, {name}, {kind}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()),
+                         TOLERANCE, note=f"{len(points)} vertices, up to {np.abs(u).max():.3g} m")
+            energy = body.energy(u)
+            yield Result(f"{dim}D, {name}, {kind}, elastic energy",
+                         abs(run.steps[-1]["energy"]["elastic"] / energy - 1), TOLERANCE)
 
 
-def scene_of(mesh, law, dim, kind):
-    share = "1" if kind == "static" else "t"
-    content = scene(mesh, [{"id": k + 1, **material} for k, material in enumerate(law.scene)],
+def scene_of(case, kind):
+    dim, share = case.dim, "1" if kind == "static" else "t"
+    content = scene(case.mesh, case.materials(),
                     boundary_conditions={
                         "rhs": [0, f"{-GRAVITY} * {share}", 0][:dim],
                         "dirichlet_boundary": [{"id": 1, "value": [0, f"{STRETCH} * y * {share}", 0][:dim]}],

@@ -169,7 +169,3 @@ class Body(Space):
                 return u
             smallest = min(smallest, size)
         raise RuntimeError(f"the reference's Newton did not converge: last step {size:.3g}")
-
-
-def dirichlet_vertices(points, predicate):
-    return np.flatnonzero(predicate(points.T))

@@ -19,9 +19,13 @@ def simplex_rule(dim, order=5):
     return np.concatenate([1 - points.sum(axis=1, keepdims=True), points], axis=1), weights * math.factorial(dim)
 
 
+def signed_volumes(simplices):
+    """Of N x d+1 x d corners."""
+    return np.linalg.det(simplices[:, 1:] - simplices[:, :1]) / math.factorial(simplices.shape[2])
+
+
 def volumes(points, cells):
-    edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    return np.abs(np.linalg.det(edges)) / math.factorial(points.shape[1])
+    return np.abs(signed_volumes(points[cells]))
 
 
 def gradients(points, cells, u):

@@ -4,7 +4,8 @@ import numpy as np
 import scipy.sparse.linalg
 
 from harness.fenicsx import scalar_mass
-from harness.refinement import common_refinement, evaluation, volumes
+from harness.fields import signed_volumes
+from harness.refinement import common_refinement, evaluation
 
 
 class Projection:
@@ -15,7 +16,7 @@ class Projection:
         corners = pieces.shape[1]
         points, cells = pieces.reshape(-1, corners - 1), np.arange(corners * len(pieces)).reshape(-1, corners)
         self.mass = scalar_mass(*new, new_density)
-        self.covered = volumes(pieces).sum() / volumes(new[0][new[1]]).sum()  # 1, or the refinement misses something
+        self.covered = signed_volumes(pieces).sum() / signed_volumes(new[0][new[1]]).sum()  # 1, or the refinement misses something
         pieces_mass = scalar_mass(points, cells, np.asarray(old_density)[in_old])
         self.weigh_old = pieces_mass @ evaluation(*old, np.repeat(in_old, corners), points)
         self.cross = evaluation(*new, np.repeat(in_new, corners), points).T @ self.weigh_old

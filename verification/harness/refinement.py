@@ -3,6 +3,8 @@
 piece of round-off volume."""
 import numpy as np
 
+from harness.fields import signed_volumes
+
 # Clipping a simplex by a half-space: for k corners inside, the pieces in terms of (inside corner i) and (crossing i-o).
 # The part of a simplex with k of n corners inside is a prism over the inside corners; a staircase cuts it.
 
@@ -51,12 +53,6 @@ def clip(simplices, owners, normals, offsets):
     return np.concatenate(pieces), np.concatenate(kept)
 
 
-def volumes(simplices):
-    """Signed, of N x d+1 x d corners."""
-    d = simplices.shape[2]
-    return np.linalg.det(simplices[:, 1:] - simplices[:, :1]) / (2 if d == 2 else 6)
-
-
 def common_refinement(points_a, cells_a, points_b, cells_b):
     """Pieces (N x d+1 x d corners, positive volume) and for each its cell of a and of b."""
     a, b = points_a[cells_a], points_b[cells_b]
@@ -75,8 +71,8 @@ def common_refinement(points_a, cells_a, points_b, cells_b):
     for k in range(d + 1):
         cell = pairs[owners, 1]
         pieces, owners = clip(pieces, owners, gradients[cell, k], origins[cell, k])
-    size = volumes(pieces)
-    smallest = 1e-14 * np.abs(volumes(b)).min()
+    size = signed_volumes(pieces)
+    smallest = 1e-14 * np.abs(signed_volumes(b)).min()
     pieces[size < 0, -2:] = pieces[size < 0, -2:][:, ::-1]
     keep = np.abs(size) > smallest
     return pieces[keep], pairs[owners[keep], 0], pairs[owners[keep], 1]

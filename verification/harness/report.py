@@ -4,6 +4,9 @@ import html
 import math
 
 
+VERDICT = {True: "ok", False: "**FAIL**", None: "not judged"}
+
+
 def number(value):
     if isinstance(value, float):
         return f"{value:.6g}" if math.isfinite(value) else str(value)
@@ -18,30 +21,41 @@ def rows_of(entry):
                ("tolerance", "tolerance"), ("note", "note")]
     used = [(title, key) for title, key in columns
             if any(result.get(key) not in (None, "") for result in entry["results"])]
-    rows = [[number(result.get(key)) for _, key in used] + ["ok" if result["passed"] else "**FAIL**"]
+    rows = [[number(result.get(key)) for _, key in used] + [VERDICT[result["passed"]]]
             for result in entry["results"]]
     return [title for title, _ in used] + [""], rows
 
 
+def counts(entry):
+    """Passed of judged."""
+    judged = [result["passed"] for result in entry["results"] if result["passed"] is not None]
+    return f"{sum(judged)}/{len(judged)}"
+
+
+def run_of(entry):
+    """When and of which commit; entries of before versions were stored with each have none."""
+    return ", ".join(filter(None, [entry["mode"], entry["date"], entry.get("versions", {}).get("itr")]))
+
+
 def summary_rows(entries):
-    return [[name, entry.get("title", ""), entry["status"] if entry["status"] != "failed" else "**FAILED**",
-             f"{sum(r['passed'] for r in entry['results'])}/{len(entry['results'])}", number(entry.get("seconds")),
-             f"{entry['mode']}, {entry['date']}"] for name, entry in entries.items()]
+    return [[name, entry.get("title", ""), entry["status"] if entry["status"] != "failed" else "**FAILED**", counts(entry),
+             number(entry.get("seconds")), run_of(entry)] for name, entry in entries.items()]
 
 
 SUMMARY_HEADER = ["case", "what", "status", "results", "seconds", "run"]
 
 
-def blocks(entries, versions):
+def blocks(entries):
     """The report as (kind, content) pairs, whatever it is written in."""
     yield "h1", "Verification report"
-    yield "p", "Written by `verification/run.py`; do not edit. Versions: " + \
-        ", ".join(f"{name} {version}" for name, version in versions.items()) + "."
+    yield "p", "Written by `verification/run.py`; do not edit."
     yield "table", (SUMMARY_HEADER, summary_rows(entries))
     for name, entry in entries.items():
         yield "h2", f"{name}: {entry.get('title', '')}"
         if "quantity" in entry:
             yield "p", f"Quantity: {entry['quantity']}. Reference: {entry['reference']}. Tolerance: {entry['tolerance']}."
+        if versions := entry.get("versions"):
+            yield "p", "Run with " + ", ".join(f"{name} {version}" for name, version in versions.items()) + "."
         if entry["message"]:
             yield "pre", entry["message"]
         if entry["results"]:
@@ -78,7 +92,7 @@ def html_page(content):
     return f'<!doctype html><meta charset="utf-8"><title>Verification report</title><style>{STYLE}</style>\n{body}\n'
 
 
-def write_report(folder, entries, versions):
-    content = list(blocks(entries, versions))
+def write_report(folder, entries):
+    content = list(blocks(entries))
     (folder / "report.md").write_text(markdown(content))
     (folder / "report.html").write_text(html_page(content))

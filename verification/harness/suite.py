@@ -16,17 +16,29 @@ ROOT = VERIFICATION.parent
 
 @dataclasses.dataclass
 class Result:
-    """One line of a case: passed where `error` <= `tolerance` (a NaN fails)."""
+    """One line of a case: passed where `error` <= `tolerance` (a NaN fails). Without a tolerance it is shown, not judged."""
     name: str
     error: float
-    tolerance: float
+    tolerance: float | None
     value: object = None  # what we computed, where the error alone does not say it
     reference: object = None
     note: str = ""
 
     @property
     def passed(self):
-        return bool(self.error <= self.tolerance)
+        """None where it is not judged."""
+        return None if self.tolerance is None else bool(self.error <= self.tolerance)
+
+    def line(self):
+        """As the terminal shows it."""
+        verdict = {True: "ok  ", False: "FAIL", None: "    "}[self.passed]
+        bound = "not judged" if self.passed is None else f"at most {self.tolerance:g}"
+        return f"  {verdict} {self.name}: {self.error:.3g} ({bound})" + (f"  {self.note}" if self.note else "")
+
+
+def excess(value, bound):
+    """By how much a value is over its bound, 0 below. A NaN stays one, which Python's max(0.0, nan) would not."""
+    return 0.0 if value <= bound else float(value - bound)
 
 
 def compare(name, value, reference, tolerance, note=""):
@@ -124,13 +136,12 @@ def run_case(case, context):
             entry.update(status="skipped", message="not part of --quick")
             return entry
         for result in case.results(context):
-            passed = result.passed
-            print(f"  {'ok  ' if passed else 'FAIL'} {result.name}: {result.error:.3g} (at most {result.tolerance:g})"
-                  + (f"  {result.note}" if result.note else ""), flush=True)
-            entry["results"].append({**dataclasses.asdict(result), "passed": passed})
-        if not entry["results"]:
+            print(result.line(), flush=True)
+            entry["results"].append({**dataclasses.asdict(result), "passed": result.passed})
+        judged = [result["passed"] for result in entry["results"] if result["passed"] is not None]
+        if not judged:
             entry["message"] = "the case gave no results"
-        elif all(result["passed"] for result in entry["results"]):
+        elif all(judged):
             entry["status"] = "passed"
     except Failure as error:
         entry["message"] = str(error)

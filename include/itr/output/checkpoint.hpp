@@ -19,7 +19,8 @@ struct SavedState {
   int dim = 0;
 };
 
-/// The newest state in DIR/frames that can be read; none if there is none.
+/// The newest state in DIR/frames that can be read; none where there are no frames. Throws InputError where there are frames
+/// but none of them has a state that can be read (another version wrote them, or they are damaged).
 std::optional<SavedState> find_saved_state(const std::filesystem::path& directory);
 
 template <int Dim>

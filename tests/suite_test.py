@@ -1,0 +1,58 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The verification suite judges: what it must not let pass. Argument: the source folder."""
+import math
+import pathlib
+import sys
+import tempfile
+import types
+import unittest
+
+SOURCE = pathlib.Path(sys.argv.pop())
+sys.path.insert(0, str(SOURCE / "verification"))
+from harness import report, suite  # noqa: E402
+from harness.suite import Result, excess  # noqa: E402
+
+
+def run(*results):
+    """The entry of a case with these results."""
+    case = types.SimpleNamespace(needs=[], loader=types.SimpleNamespace(exec_module=lambda module: None), TITLE="a case",
+                                 QUANTITY="x", REFERENCE="y", TOLERANCE=1, results=lambda context: results)
+    folder = pathlib.Path(tempfile.gettempdir())
+    return suite.run_case(case, suite.Context(folder, folder, folder, folder, False, "case"))
+
+
+class Judgement(unittest.TestCase):
+    def test_excess(self):
+        self.assertEqual(excess(2, 1.5), 0.5)
+        self.assertEqual(excess(1, 1.5), 0)
+        for value, bound in ((math.nan, 1), (1, math.nan)):
+            self.assertTrue(math.isnan(excess(value, bound)))
+
+    def test_nan_fails(self):
+        self.assertEqual(run(Result("order", excess(2, math.nan), 0.1))["status"], "failed")
+
+    def test_results_without_a_tolerance_are_shown_and_not_counted(self):
+        entry = run(Result("judged", 0.5, 1.0), Result("shown", 7.0, None))
+        self.assertEqual(entry["status"], "passed")
+        self.assertEqual(report.counts(entry), "1/1")
+        self.assertEqual([row[-1] for row in report.rows_of(entry)[1]], ["ok", "not judged"])
+
+    def test_a_case_that_judges_nothing_fails(self):
+        self.assertEqual(run()["status"], "failed")
+        self.assertEqual(run(Result("shown", 7.0, None))["status"], "failed")
+
+
+class Report(unittest.TestCase):
+    def test_each_case_shows_the_commit_of_its_own_run(self):
+        old, new = run(Result("x", 0.0, 1.0)), run(Result("x", 0.0, 1.0))
+        old["versions"], new["versions"] = {"itr": "aaaa111"}, {"itr": "bbbb222", "numpy": "1.24"}
+        text = report.markdown(report.blocks({"old": old, "new": new, "older": run(Result("x", 0.0, 1.0))}))
+        old_row, new_row, _ = (line for line in text.splitlines() if "| passed |" in line)
+        self.assertIn("aaaa111", old_row)
+        self.assertIn("bbbb222", new_row)
+        self.assertIn("Run with itr bbbb222, numpy 1.24.", text)
+
+
+if __name__ == "__main__":
+    unittest.main()
