@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "itr/simulation/simulation.hpp"
 #include "square_mesh.hpp"
@@ -118,13 +119,19 @@ TEST(Forces, TableCarriesTheWeightOfABlock2D) { expect_table_carries_weight<2>()
 TEST(Forces, TableCarriesTheWeightOfABlock3D) { expect_table_carries_weight<3>(); }
 
 template <int Dim>
-void expect_support_carries_weight() {
+Setup<Dim> hanging_block() {
   Setup<Dim> setup = block<Dim>();
-  setup.time.quasistatic = true;
-  setup.fields.contact_forces = setup.fields.friction_forces = false;
   DirichletCondition<Dim> hook{2, {}, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); }};
   hook.components.fill(true);
   setup.dirichlet = {hook};
+  return setup;
+}
+
+template <int Dim>
+void expect_support_carries_weight() {
+  Setup<Dim> setup = hanging_block<Dim>();
+  setup.time.quasistatic = true;
+  setup.fields.contact_forces = setup.fields.friction_forces = false;
   const AskedFields fields = after_one_step(setup);
   EXPECT_LT((sum<Dim>(fields.forces.reaction) - weight<Dim>() * Vec<Dim>::Unit(1)).norm(), 1e-8 * weight<Dim>());
   EXPECT_EQ(fields.forces.contact.size(), 0);
@@ -169,6 +176,59 @@ void expect_coulomb() {
 
 TEST(Forces, SlidingFrictionIsCoulombs2D) { expect_coulomb<2>(); }
 TEST(Forces, SlidingFrictionIsCoulombs3D) { expect_coulomb<3>(); }
+
+/// The forces of one step, as they were in its solve, are what changes the momentum; `loads` are those nobody reports.
+template <int Dim>
+void expect_forces_change_momentum(const Setup<Dim>& setup, const std::function<Vec<Dim>(const VectorX& x)>& loads) {
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  const Vec<Dim> before = Eigen::Map<const Vec<Dim>>(asked(simulation).momentum.data());
+  const StepResult result = simulation.advance();
+  ASSERT_TRUE(result.ok) << result.reason;
+  const AskedFields fields = asked(simulation);
+  const Vec<Dim> change = (Eigen::Map<const Vec<Dim>>(fields.momentum.data()) - before) / setup.time.dt;
+  Vec<Dim> forces = loads(simulation.state().history.x[0]) - weight<Dim>() * Vec<Dim>::Unit(1);
+  for (const VectorX& field : {fields.forces.contact, fields.forces.friction, fields.forces.reaction})
+    forces += sum<Dim>(field);
+  EXPECT_LT((change - forces).norm(), 1e-6 * weight<Dim>()) << change.transpose() << " not " << forces.transpose();
+}
+
+template <int Dim>
+Vec<Dim> no_loads(const VectorX&) {
+  return Vec<Dim>::Zero();
+}
+
+template <int Dim>
+void expect_one_round_of_friction_is_reported() {
+  Setup<Dim> setup = block<Dim>();
+  add_table(setup);
+  setup.contact.friction_coefficient = 0.3;
+  setup.contact.friction_iterations = 1;
+  setup.initial_velocity.push_back({1, [](const Vec<Dim>&, double) { return Vec<Dim>(2 * Vec<Dim>::Unit(0)); }});
+  expect_forces_change_momentum<Dim>(setup, no_loads<Dim>);
+}
+
+TEST(Forces, OfOneRoundOfFrictionAreThoseOfTheSolve2D) { expect_one_round_of_friction_is_reported<2>(); }
+TEST(Forces, OfOneRoundOfFrictionAreThoseOfTheSolve3D) { expect_one_round_of_friction_is_reported<3>(); }
+
+TEST(Forces, OfASupportBalanceDamping) {
+  auto setup = hanging_block<2>();
+  setup.damping.push_back({.term = DampingOptions::Term::elastic, .coefficient = 0.02});
+  expect_forces_change_momentum<2>(setup, no_loads<2>);
+}
+
+TEST(Forces, OfASupportBalancePressure) {
+  auto setup = hanging_block<2>();
+  constexpr double p = 3000;
+  setup.pressure.push_back({1, [](const Vec<2>&, double) { return p; }});
+  int corner = kNone;
+  for (int v = 0; v < setup.mesh.vertex_slots(); ++v)
+    if (setup.mesh.rest(v).norm() < 1e-12) corner = v;
+  expect_forces_change_momentum<2>(setup, [corner](const VectorX& x) {  // normals of the left side sum to its ends' distance
+    const Vec<2> down = x.segment<2>(2 * corner) - Vec<2>(0, kSize);
+    return Vec<2>(-p * down[1], p * down[0]);
+  });
+}
 
 /// Neo-Hookean, stretched along one axis: sigma = (mu (F F^T - I) + lambda ln J I) / J.
 template <int Dim>

@@ -226,9 +226,9 @@ RemeshOptions only(Kind kind, double tolerance, HistoryRule history) {
   return options;
 }
 
-TrialCount total(const RemeshReport& report) {
-  TrialCount sum;
-  for (const TrialCount& count : {report.splits, report.collapses, report.swaps, report.smooths}) {
+OperationCount total(const RemeshReport& report) {
+  OperationCount sum;
+  for (const OperationCount& count : {report.splits, report.collapses, report.swaps, report.smooths}) {
     sum.tried += count.tried;
     sum.accepted += count.accepted;
   }
@@ -248,7 +248,7 @@ RC_GTEST_PROP(TrialProperties, RejectedTrialsLeaveNoTrace, ()) {
   const Mesh<2> mesh = scene.mesh;
   const RemeshFields<2> fields = scene.fields;
   const auto history = *rc::gen::element(HistoryRule::function, HistoryRule::interpolated);
-  const TrialCount count = total(remesh(scene.mesh, scene.fields, scene.context, only(draw_kind(), 1e12, history)));
+  const OperationCount count = total(remesh(scene.mesh, scene.fields, scene.context, only(draw_kind(), 1e12, history)));
   RC_ASSERT(count.tried > 0);
   RC_ASSERT(count.accepted == 0);
   RC_ASSERT(same_mesh(scene.mesh, mesh));
@@ -287,7 +287,7 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
   const auto history = *rc::gen::element(HistoryRule::function, HistoryRule::interpolated);
   Mesh<2> mesh;
   RemeshFields<2> fields;
-  TrialCount count;
+  OperationCount count;
   RemeshOptions options;
   const double energy = global_energy(scene.mesh, scene.fields, scene.context);
   RC_PRE(std::isfinite(energy));

@@ -130,6 +130,7 @@ std::vector<Json> results_of(const fs::path& directory) {
     lines.push_back(Json::parse(line));
     lines.back().erase("seconds");
     lines.back().erase("peak_rss_mb");
+    lines.back().erase("trial_seconds");
   }
   return lines;
 }

@@ -287,6 +287,27 @@ TEST(Simulation, HasTheSameBitsForOneAndTwoThreads) {
   EXPECT_TRUE(same(one.v[0], two.v[0]));
 }
 
+TEST(Simulation, RefusesWhatRemeshingCannotCarryAlong) {
+  linear::Registry registry;
+  const auto refused = [&](const auto& setup) {
+    try {
+      Simulation<2> simulation(setup, registry);
+    } catch (const InputError& error) {
+      return error.parts().place;
+    }
+    return std::string();
+  };
+  auto setup = free_square(2);
+  setup.point_tags.assign(setup.mesh.vertex_slots(), 1);
+  EXPECT_EQ(refused(setup), "");
+  setup.remesh.enabled = true;
+  EXPECT_EQ(refused(setup), "/geometry");
+  setup.point_tags.clear();
+  EXPECT_EQ(refused(setup), "");
+  setup.materials[1].density_at = [](const Vec<3>&) { return 1.0; };
+  EXPECT_EQ(refused(setup), "/materials");
+}
+
 /// Held in x on the left and in y at the bottom: free to stretch, not to move.
 Setup<2> symmetric_square(int n) {
   auto setup = free_square(n);

@@ -73,33 +73,18 @@ std::string common_members(const StepReport& r) {
       number(r.min_volume_ratio), seconds_json(r.seconds), number(r.peak_rss_mb));
 }
 
-OperationCount operator+(const OperationCount& a, const OperationCount& b) {
-  return {a.tried + b.tried, a.accepted + b.accepted};
-}
-
-StepSeconds operator+(const StepSeconds& a, const StepSeconds& b) {
-  return {a.assembly + b.assembly, a.linear_solve + b.linear_solve, a.line_search + b.line_search, a.ccd + b.ccd,
-          a.remesh + b.remesh,     a.projection + b.projection,     a.output + b.output,           a.total + b.total};
-}
-
 }  // namespace
 
 std::string step_json(const StepReport& report) {
-  return fmt::format(R"({{"step":{},"t":{},{}}})", report.step, number(report.t), common_members(report));
+  return fmt::format(R"({{"step":{},"t":{},{},"trial_seconds":{}}})", report.step, number(report.t), common_members(report),
+                     number(report.trial_seconds));
 }
 
 void Totals::add(const StepReport& report) {
   const StepReport before = total_;
   const bool is_first = before.vertices == 0;
   total_ = report;
-  total_.newton_iterations += before.newton_iterations;
-  total_.damped_steps += before.damped_steps;
-  total_.cut_steps += before.cut_steps;
-  total_.splits = before.splits + report.splits;
-  total_.collapses = before.collapses + report.collapses;
-  total_.swaps = before.swaps + report.swaps;
-  total_.smooths = before.smooths + report.smooths;
-  total_.seconds = before.seconds + report.seconds;
+  total_.add_effort(before);
   if (report.step > 0) energy_decrease_ += report.energy_before_remesh - report.energy.total;
   if (is_first) return;
   total_.min_distance = std::min(before.min_distance, report.min_distance);

@@ -50,6 +50,11 @@ class Remesher {
       if (options_.smooth.enabled) smooth();
       if (accepted() == before) break;
     }
+    if (const auto middle = trial_seconds_.begin() + static_cast<std::ptrdiff_t>(trial_seconds_.size() / 2);
+        !trial_seconds_.empty()) {
+      std::nth_element(trial_seconds_.begin(), middle, trial_seconds_.end());
+      report_.trial_seconds = *middle;
+    }
     return report_;
   }
 
@@ -162,6 +167,7 @@ class Remesher {
   /// Previews an edit and commits it where it lowers the energy of its patch by `tolerance` [J] (design §3, rules a-d).
   /// Returns the cells of the patch with the new ones where it was accepted.
   std::optional<std::vector<CellId>> attempt(const Edit<2>& edit, const Vec<2>& center, double tolerance, bool one_ring) {
+    const ScopedTimer timer(trial_seconds_.emplace_back(0));
     if (!is_valid_in_all_configurations(edit)) return std::nullopt;
     LocalRelaxationOptions local = options_.local;
     if (one_ring) local.rings = 1, local.relative_volume = 0;
@@ -358,6 +364,7 @@ class Remesher {
   std::vector<int> near_;
   Marks patch_marks_;
   RemeshReport report_;
+  std::vector<double> trial_seconds_;
 };
 
 }  // namespace

@@ -213,10 +213,14 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
       const VectorX solution = x;
       const RemeshReport remeshed =
           remesh_and_project(setup, shortest_edge, *problem, t, next, x, report.seconds, system.solver(), logger);
-      report.splits = {remeshed.splits.tried, remeshed.splits.accepted};
-      report.collapses = {remeshed.collapses.tried, remeshed.collapses.accepted};
-      report.swaps = {remeshed.swaps.tried, remeshed.swaps.accepted};
-      report.smooths = {remeshed.smooths.tried, remeshed.smooths.accepted};
+      report.splits = remeshed.splits;
+      report.collapses = remeshed.collapses;
+      report.swaps = remeshed.swaps;
+      report.smooths = remeshed.smooths;
+      report.trial_seconds = remeshed.trial_seconds;
+      if (remeshed.bound_by_activation_distance > 0)
+        logger.debug(fmt::format("step {}: {} surface edges are too short to be split: they would be below dhat", next.step,
+                                 remeshed.bound_by_activation_distance));
       if (remeshed.changed()) {
         auto problem_before = std::move(problem);
         problem = make_problem();
@@ -255,24 +259,6 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
 
 namespace {
 
-OperationCount operator+(const OperationCount& a, const OperationCount& b) {
-  return {a.tried + b.tried, a.accepted + b.accepted};
-}
-
-/// Adds the effort of what came before `report` within one step.
-void add_effort(const StepReport& before, StepReport& report) {
-  report.newton_iterations += before.newton_iterations;
-  report.damped_steps += before.damped_steps;
-  report.splits = report.splits + before.splits;
-  report.collapses = report.collapses + before.collapses;
-  report.swaps = report.swaps + before.swaps;
-  report.smooths = report.smooths + before.smooths;
-  StepSeconds& s = report.seconds;
-  const StepSeconds& b = before.seconds;
-  s = {s.assembly + b.assembly, s.linear_solve + b.linear_solve, s.line_search + b.line_search, s.ccd + b.ccd,
-       s.remesh + b.remesh,     s.projection + b.projection,     s.output + b.output,           s.total + b.total};
-}
-
 /// The step from `state` on as two of half its length.
 template <int Dim>
 Setup<Dim> halved(const Setup<Dim>& setup, const State<Dim>& state) {
@@ -308,10 +294,10 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
     StepResult result = take_step_in_parts(half, shortest_edge, system, logger, part);
-    add_effort(effort, result.report);
+    parts += std::max(1, result.report.cut_steps);
+    result.report.add_effort(effort);
     if (!result.ok) return result;
     effort = result.report;
-    parts += std::max(1, result.report.cut_steps);
     forces = std::move(result.forces);
   }
   whole = {.reason = {}, .report = effort, .forces = std::move(forces)};

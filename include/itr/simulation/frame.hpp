@@ -8,6 +8,7 @@
 
 #include "itr/core/types.hpp"
 #include "itr/mesh/mesh.hpp"
+#include "itr/remesh/report.hpp"
 
 namespace itr {
 
@@ -16,13 +17,10 @@ struct EnergyReport {
   double inertia = 0, elastic = 0, body = 0, contact = 0, friction = 0, damping = 0, total = 0;
 };
 
-struct OperationCount {
-  int tried = 0, accepted = 0;
-};
-
 /// Wall-clock seconds of one step. The parts are disjoint and sum to the total but for what nobody names.
 struct StepSeconds {
   double assembly = 0, linear_solve = 0, line_search = 0, ccd = 0, remesh = 0, projection = 0, output = 0, total = 0;
+  StepSeconds& operator+=(const StepSeconds& other);
 };
 
 struct StepReport {
@@ -33,12 +31,16 @@ struct StepReport {
   EnergyReport energy;
   double energy_before_remesh = 0;  ///< total after the first solve [J]
   OperationCount splits, collapses, swaps, smooths;
+  double trial_seconds = 0;     ///< median over the trials of these operations; 0 where there were none
   int cut_steps = 0;            ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
   int damped_steps = 0;         ///< Newmark only: 1 if taken by implicit Euler, to keep energy from growing
   double min_distance = 0;      ///< over contact pairs nearer than dhat; infinity where there are none [m]
   double min_volume_ratio = 1;  ///< smallest J = det F over the cells
   StepSeconds seconds;
   double peak_rss_mb = 0;
+
+  /// Adds the effort of what came before: iterations, operations, damped and cut steps, seconds.
+  void add_effort(const StepReport& before);
 };
 
 /// Forces on the bodies' vertices at the end of a step, interleaved [N]; 2D: by thickness. Their sum with the elastic forces

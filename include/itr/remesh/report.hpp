@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// What a remesher did.
+#pragma once
+
+namespace itr {
+
+struct OperationCount {
+  int tried = 0, accepted = 0;
+  OperationCount& operator+=(const OperationCount& other) {
+    tried += other.tried;
+    accepted += other.accepted;
+    return *this;
+  }
+};
+
+struct RemeshReport {
+  OperationCount splits, collapses, swaps, smooths;
+  double trial_seconds = 0;              ///< median over the trials; 0 where there were none
+  int bound_by_activation_distance = 0;  ///< surface edges not split because they are shorter than 2 dhat
+
+  bool changed() const { return splits.accepted + collapses.accepted + swaps.accepted + smooths.accepted > 0; }
+  /// Whether the new space lacks functions of the old one, so that the history has to be projected.
+  bool coarsened() const { return collapses.accepted + swaps.accepted + smooths.accepted > 0; }
+};
+
+}  // namespace itr

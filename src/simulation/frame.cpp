@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#include "itr/simulation/frame.hpp"
+
+namespace itr {
+
+StepSeconds& StepSeconds::operator+=(const StepSeconds& other) {
+  assembly += other.assembly;
+  linear_solve += other.linear_solve;
+  line_search += other.line_search;
+  ccd += other.ccd;
+  remesh += other.remesh;
+  projection += other.projection;
+  output += other.output;
+  total += other.total;
+  return *this;
+}
+
+void StepReport::add_effort(const StepReport& before) {
+  newton_iterations += before.newton_iterations;
+  splits += before.splits;
+  collapses += before.collapses;
+  swaps += before.swaps;
+  smooths += before.smooths;
+  cut_steps += before.cut_steps;
+  damped_steps += before.damped_steps;
+  seconds += before.seconds;
+}
+
+}  // namespace itr
