@@ -484,5 +484,29 @@ TEST(Muelu, NeedsNotMoreIterationsOnFinerMeshesAndFewerWithRigidModes) {
   EXPECT_LT(on_fine, iterations(fine, {.block_size = 2, .dofs = fine.dofs}));
 }
 
+/// Less `shift` on the diagonal.
+Elastic shifted(Elastic system, double shift) {
+  for (int j = 0; j < system.pattern.order; ++j) system.values[system.pattern.column_starts[j]] -= shift;
+  system.full.diagonal().array() -= shift;
+  return system;
+}
+
+TEST(Muelu, TellsAnIndefiniteMatrixWhoseDiagonalIsPositive) {
+  Registry registry = full_registry();
+  if (const auto info = registry.find("belos:muelu"); !info.available) GTEST_SKIP() << info.reason;
+  const Elastic stiff = elasticity(2, 24, 0.3);
+  const Eigen::SelfAdjointEigenSolver<Dense> eigen(stiff.full);
+  const Eigen::VectorXd first = eigen.eigenvectors().col(0);
+  const std::vector<double> b(first.data(), first.data() + first.size());  // all of it along the negative direction
+  std::vector<double> x(b.size());
+  for (const double side : {0.9, 1.1}) {
+    const Elastic system = shifted(stiff, side * eigen.eigenvalues()[0]);
+    const auto solver = registry.create("belos:muelu");
+    ASSERT_EQ(solver->analyze(system.pattern, system.hints()), Outcome::ok);
+    ASSERT_EQ(solver->factorize(system.values), Outcome::ok) << solver->message();
+    EXPECT_EQ(solver->solve(b, x, 1, 1e-8).outcome, side < 1 ? Outcome::ok : Outcome::not_positive_definite);
+  }
+}
+
 }  // namespace
 }  // namespace itr::linear
