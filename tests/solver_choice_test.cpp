@@ -24,6 +24,7 @@ class Scripted final : public Engine {
     Outcome analyze = Outcome::ok, factorize = Outcome::ok;
     double error = 0;      ///< of the solution, relative
     int* calls = nullptr;  ///< of factorize
+    Outcome solve = Outcome::ok;
   };
   explicit Scripted(Script script) : script_(script) {}
   bool set_option(const std::string&, const std::string&) override { return false; }
@@ -35,7 +36,7 @@ class Scripted final : public Engine {
   }
   Outcome solve(std::span<const double> B, std::span<double> X, int) override {
     for (std::size_t i = 0; i < B.size(); ++i) X[i] = B[i] / scale_ * (1 + (i % 2 ? 1 : -1) * script_.error);
-    return Outcome::ok;
+    return script_.solve;
   }
   Statistics statistics() const override { return {}; }
   std::string message() const override { return "as told"; }
@@ -92,7 +93,8 @@ TEST(Fallback, TakesOverWhateverFails) {
   for (const auto& script :
        {Scripted::Script{.analyze = Outcome::failed}, Scripted::Script{.analyze = Outcome::out_of_memory},
         Scripted::Script{.factorize = Outcome::singular}, Scripted::Script{.factorize = Outcome::not_converged},
-        Scripted::Script{.error = 0.9}}) {
+        Scripted::Script{.error = 0.9}, Scripted::Script{.solve = Outcome::failed},
+        Scripted::Script{.error = std::numeric_limits<double>::quiet_NaN()}}) {
     Registry registry(kNoModules);
     add(registry, "weak", script);
     Log log;
@@ -143,6 +145,75 @@ TEST(Fallback, KeepsTheBestOfPoorAnswers) {
   EXPECT_EQ(solve(*solver, residual), Outcome::not_converged);
   EXPECT_LT(residual, 0.7);
   EXPECT_GT(residual, 1e-8);
+}
+
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Fallback, KeepsAPoorAnswerWhereTheOtherHasNone) {
+  for (const auto& without : {Scripted::Script{.solve = Outcome::failed}, Scripted::Script{.solve = Outcome::out_of_memory},
+                              Scripted::Script{.error = kNan}, Scripted::Script{.factorize = Outcome::out_of_memory},
+                              Scripted::Script{.analyze = Outcome::failed}}) {
+    for (const bool poor_first : {true, false}) {
+      if (!poor_first && (without.analyze != Outcome::ok || without.factorize != Outcome::ok)) continue;
+      Registry registry(kNoModules);
+      int poors_calls = 0;
+      add(registry, "poor", {.error = 1e-6, .calls = &poors_calls});
+      add(registry, "without", without);
+      const LinearOptions options{.solvers = {poor_first ? "poor" : "without"},
+                                  .fallback = {poor_first ? "without" : "poor"}};
+      const auto solver = choose_solver(options, false, registry, {});
+      std::vector<double> values(4, 2.0), b(4, 1.0), x(4);
+      ASSERT_EQ(solver->analyze(diagonal_pattern(4), {}), Outcome::ok);
+      ASSERT_EQ(solver->factorize(values), Outcome::ok);
+      for (int again = 0; again < 2; ++again) {
+        const SolveReport report = solver->solve(b, x, 1, 1e-30);
+        EXPECT_EQ(report.outcome, Outcome::not_converged);
+        EXPECT_LE(report.relative_residual, 1e-6);
+        for (const double value : x) EXPECT_NEAR(value, 0.5, 1e-5);
+      }
+      const int calls = poors_calls;
+      EXPECT_EQ(solver->factorize(values), Outcome::ok);  // by the one whose answer was kept
+      EXPECT_EQ(poors_calls, calls + 1);
+    }
+  }
+}
+
+TEST(Fallback, LeavesTheFirstFailureWhereNobodyCopes) {
+  Registry registry(kNoModules);
+  int calls = 0;
+  add(registry, "first", {.factorize = Outcome::singular, .calls = &calls});
+  add(registry, "second", {.factorize = Outcome::out_of_memory});
+  Log log;
+  const auto solver = choose_solver({.solvers = {"first"}, .fallback = {"second"}}, false, registry, log.logger());
+  const std::vector<double> values(4, 2.0);
+  ASSERT_EQ(solver->analyze(diagonal_pattern(4), {}), Outcome::ok);
+  for (int shift = 1; shift <= 2; ++shift) {  // Newton shifts a singular matrix and gives up on memory
+    EXPECT_EQ(solver->factorize(values), Outcome::singular);
+    EXPECT_EQ(calls, shift);
+  }
+}
+
+TEST(Fallback, NamesEachSolverWithItsOwnOutcome) {
+  Registry registry(kNoModules);
+  add(registry, "first", {.error = 0.9});
+  add(registry, "second", {.factorize = Outcome::out_of_memory});
+  Log log;
+  const LinearOptions options{.solvers = {"first"}, .fallback = {"second", "eigen:ldlt"}};
+  const auto solver = choose_solver(options, false, registry, log.logger());
+  double residual = 1;
+  EXPECT_EQ(solve(*solver, residual), Outcome::ok);
+  ASSERT_EQ(log.lines.size(), 2u);
+  EXPECT_NE(log.lines[0].find("first: not converged"), std::string::npos) << log.lines[0];
+  EXPECT_NE(log.lines[1].find("second: out of memory"), std::string::npos) << log.lines[1];
+}
+
+TEST(Fallback, PassesOnThatTheMatrixIsNotPositiveDefinite) {
+  Registry registry(kNoModules);
+  add(registry, "first", {.error = kNan});
+  add(registry, "second", {.factorize = Outcome::not_positive_definite});
+  const auto solver = choose_solver({.solvers = {"first"}, .fallback = {"second"}}, false, registry, {});
+  double residual = 1;
+  EXPECT_EQ(solve(*solver, residual), Outcome::not_positive_definite);
 }
 
 TEST(Choice, TakesTheFirstThatIsThereAndPassesOverOthersNames) {

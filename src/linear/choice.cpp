@@ -99,30 +99,40 @@ class FallbackSolver final : public Forwarding {
     coordinates_.assign(hints.coordinates.begin(), hints.coordinates.end());
     values_.clear();
     active_ = 0;
-    Outcome outcome = solvers_[0]->analyze(pattern_, hints);
-    while (is_solvers_fault(outcome) && advance(outcome)) outcome = analyze_active();
-    return outcome;
+    const Outcome first = solvers_[0]->analyze(pattern_, hints);
+    return take_over(first, [&] { return analyze_active(); });
   }
 
   Outcome factorize(std::span<const double> values) override {
     values_.assign(values.begin(), values.end());
-    Outcome outcome = solvers_[active_]->factorize(values_);
-    while (is_solvers_fault(outcome) && advance(outcome)) outcome = prepare_active();
-    return outcome;
+    const Outcome first = solvers_[active_]->factorize(values_);
+    return take_over(first, [&] { return prepare_active(); });
   }
 
+  /// The best of poor answers counts, and its solver goes on.
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
-    SolveReport report = solvers_[active_]->solve(B, X, columns, asked);
-    std::vector<double> other(X.size());
-    while (is_solvers_fault(report.outcome) && advance(report.outcome)) {
-      if (prepare_active() != Outcome::ok) continue;
+    SolveReport best = solvers_[active_]->solve(B, X, columns, asked);
+    std::size_t kept = active_;
+    Outcome last = best.outcome;
+    std::vector<double> other;
+    while (is_solvers_fault(last) && advance(last)) {
+      last = prepare_active();
+      if (last != Outcome::ok) continue;
+      other.resize(X.size());
       const SolveReport next = solvers_[active_]->solve(B, other, columns, asked);
-      // The better of two poor answers is kept.
-      if (next.outcome != Outcome::ok && next.relative_residual >= report.relative_residual) continue;
-      std::copy(other.begin(), other.end(), X.begin());
-      report = next;
+      last = next.outcome;
+      if (last != Outcome::ok && !(next.relative_residual < best.relative_residual)) continue;
+      std::ranges::copy(other, X.begin());
+      best = next;
+      kept = active_;
     }
-    return report;
+    // Without any solution, what a factorisation found out about the matrix is the answer.
+    if (std::isinf(best.relative_residual) && !is_solvers_fault(last)) {
+      best.outcome = last;
+      kept = active_;
+    }
+    active_ = kept;
+    return best;
   }
 
  private:
@@ -136,6 +146,16 @@ class FallbackSolver final : public Forwarding {
     logger_.warning("linear solver " + std::string(failed.name()) + ": " + to_string(outcome) + " (" + failed.message() +
                     "); falling back to " + std::string(solvers_[active_]->name()));
     return true;
+  }
+  /// Others try until one copes or tells something of the matrix. Where none does, all stays with the first failure.
+  template <typename F>
+  Outcome take_over(Outcome first, F&& attempt) {
+    const std::size_t start = active_;
+    Outcome last = first;
+    while (is_solvers_fault(last) && advance(last)) last = attempt();
+    if (!is_solvers_fault(last)) return last;
+    active_ = start;
+    return first;
   }
   Outcome analyze_active() {
     return solvers_[active_]->analyze(pattern_, {.block_size = block_size_, .dofs = dofs_, .coordinates = coordinates_});
