@@ -49,7 +49,6 @@ class Scripted final : public Engine {
 void add(Registry& registry, const std::string& name, Scripted::Script script) {
   BackendInfo info;
   info.name = name;
-  info.available = true;
   registry.add(info, [=](const SolverOptions& options) {
     auto engine = std::make_unique<Scripted>(script);
     apply_options(*engine, name, "", options);
@@ -242,6 +241,54 @@ TEST(Choice, ChecksFallbacksAndOptionsBeforeAnythingRuns) {
   EXPECT_NE(refused({{"eigen"}, {}, {{"no-such-solver", {{"a", "b"}}}}}).find("no-such-solver"), std::string::npos);
   EXPECT_EQ(refused({{"eigen:cg"}, {"mumps"}, {{"eigen:cg", {{"tolerance", "1e-9"}}}}}),
             "");  // an absent fallback only warns
+}
+
+/// Under the name that auto takes for large systems: notes its options, or cannot be created.
+void add_large(Registry& registry, SolverOptions* seen) {
+  BackendInfo info;
+  info.name = "cholmod:supernodal";
+  registry.add(info, [=](const SolverOptions& options) -> std::unique_ptr<Solver> {
+    if (!seen) throw InputError({"", "linear solver", "no licence", "a licence"});
+    *seen = options;
+    return make_checked_solver("cholmod:supernodal", {}, std::make_unique<Scripted>(Scripted::Script{}));
+  });
+}
+
+TEST(Auto, HandsOptionsToWhatItPicks) {
+  const SolverOptions metis = {{"ordering", "metis"}};
+  for (const bool as_fallback : {false, true}) {
+    Registry registry(kNoModules);
+    add(registry, "weak", {.analyze = Outcome::failed});
+    SolverOptions seen;
+    add_large(registry, &seen);
+    LinearOptions options;
+    options.solvers = {as_fallback ? "weak" : "auto"};
+    if (as_fallback) options.fallback = {"auto"};
+    options.options = {{"cholmod", metis}};
+    const auto solver = choose_solver(options, false, registry, {});
+    seen.clear();
+    EXPECT_EQ(solver->analyze(diagonal_pattern(100'000), {}), Outcome::ok);
+    EXPECT_EQ(seen, metis);
+  }
+}
+
+TEST(Auto, FailsWithTheReasonWhereItsPickCannotBeCreated) {
+  Registry registry(kNoModules);
+  add_large(registry, nullptr);
+  const auto solver = choose_solver({.solvers = {"auto"}}, false, registry, {});
+  EXPECT_EQ(solver->analyze(diagonal_pattern(100'000), {}), Outcome::failed);
+  EXPECT_NE(solver->message().find("no licence"), std::string::npos) << solver->message();
+  double residual = 1;
+  EXPECT_EQ(solve(*solver, residual), Outcome::ok);  // a small one: another pick
+}
+
+TEST(Choice, CreatesNoSolverThatWillNotRun) {
+  Registry registry(kNoModules);
+  add_large(registry, nullptr);
+  LinearOptions options{.solvers = {"eigen"}, .options = {{"cholmod", {{"ordering", "metis"}}}}};
+  EXPECT_NO_THROW(choose_solver(options, false, registry, {}));
+  options.fallback = {"cholmod"};
+  EXPECT_THROW(choose_solver(options, false, registry, {}), InputError);
 }
 
 std::vector<BackendInfo> there(const std::vector<std::string>& names) {
