@@ -12,7 +12,13 @@
 #include "itr/core/error.hpp"
 #include "itr/linear/dump.hpp"
 
-namespace itr::linear {
+namespace itr {
+
+void LinearOptions::validate() const {
+  if (dump_every < 1) throw InputError({"", "dump_every", std::to_string(dump_every), "at least 1"});
+}
+
+namespace linear {
 
 namespace {
 
@@ -265,6 +271,7 @@ std::string choose_name(const LinearOptions& options, Registry& registry) {
 
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
                                       Logger logger) {
+  options.validate();
   std::map<std::string, SolverOptions> options_of;
   for (const auto& [name, values] : options.options) options_of[registry.find(name).name] = values;
   const auto make = [&registry, options_of, may_be_indefinite, logger](const std::string& name) {
@@ -302,4 +309,5 @@ std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_
   return solver;
 }
 
-}  // namespace itr::linear
+}  // namespace linear
+}  // namespace itr

@@ -16,6 +16,9 @@ struct LinearOptions {
   std::map<std::string, std::map<std::string, std::string>> options = {};  ///< by solver name: {"ordering", "metis"}
   std::string dump_folder = {};  ///< where systems are written as they are solved (dump.hpp); empty: none are
   int dump_every = 1;            ///< each so many-th
+
+  /// Throws InputError.
+  void validate() const;
 };
 
 }  // namespace itr
