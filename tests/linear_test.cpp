@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <numeric>
 #include <random>
@@ -308,6 +309,25 @@ TEST_P(EverySolver, GoesOnAfterAFailedFactorization) {
   expect_solves(good, 1e-12, 1, false);
 }
 
+TEST_P(EverySolver, TellsStatisticsAtAnyTime) {
+  const auto expect_sane = [&](const char* when) {
+    const Statistics s = solver_->statistics();
+    for (const double figure : {s.factor_nonzeros, s.factor_bytes, s.largest_bytes, s.flops}) {
+      EXPECT_GE(figure, 0) << when;
+      EXPECT_LE(figure, 1e9) << when;
+    }
+    EXPECT_EQ(s.iterations, 0) << when;
+  };
+  expect_sane("before anything");
+  const System system = from_dense(tridiagonal(20, 4, 1));
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  expect_sane("after the analysis");
+  EXPECT_NE(solver_->factorize(std::vector<double>(system.values.size(), 0.0)), Outcome::ok);
+  expect_sane("after a failed factorisation");
+  ASSERT_EQ(solver_->factorize(system.values), Outcome::ok);
+  expect_sane("after a factorisation");
+}
+
 TEST_P(EverySolver, MeasuresResidualsWhoseSquaresLeaveTheRangeOfDouble) {
   const System system = from_dense(tridiagonal(20, 4, 1));
   ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
@@ -434,8 +454,48 @@ TEST(Systems, ComeBackFromTheDiskAsTheyWereSolved) {
   EXPECT_EQ(back.dofs, elastic.dofs);
   EXPECT_EQ(back.coordinates, elastic.coordinates);
   EXPECT_THROW(read_system(folder / "000001"), InputError);
-  std::filesystem::resize_file(folder / "000002" / "values.npy", 200);
-  EXPECT_THROW(read_system(folder / "000002"), InputError);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Systems, AreRefusedWhereTheirFilesAreDamaged) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / ("itr_damaged_" + std::to_string(::getpid()));
+  const Elastic elastic = elasticity(2, 3, 0.3);
+  const DumpedSystem good{elastic.pattern, elastic.values,     std::vector<double>(elastic.pattern.order, 1.0), 2,
+                          elastic.dofs,    elastic.coordinates};
+  const auto is_refused = [&] {
+    EXPECT_THROW(read_system(folder), InputError);
+    write_system(folder, good);
+  };
+  write_system(folder, good);
+  EXPECT_NO_THROW(read_system(folder));
+  const auto refused = [&](auto&& damage) {
+    DumpedSystem system = good;
+    damage(system);
+    write_system(folder, system);
+    is_refused();
+  };
+  refused([](DumpedSystem& s) { s.pattern.row_indices.back() = 1000; });
+  refused([](DumpedSystem& s) { s.pattern.row_indices[1] = -1; });
+  refused([](DumpedSystem& s) { std::swap(s.pattern.column_starts[1], s.pattern.column_starts[2]); });
+  refused([](DumpedSystem& s) { s.pattern.column_starts[0] = 1; });
+  refused([](DumpedSystem& s) { s.rhs.pop_back(); });
+  refused([](DumpedSystem& s) { s.coordinates.resize(s.dofs.size()); });
+  refused([](DumpedSystem& s) { s.dofs[1] = s.dofs[0]; });
+  refused([](DumpedSystem& s) { s.block_size = 0; });
+  std::filesystem::resize_file(folder / "values.npy", 200);
+  is_refused();
+  for (const std::string shape : {"(-1", "(x", "(9999999999999999999999", "(999999999999"}) {
+    const auto file = folder / "values.npy";
+    std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+    std::string header(128, ' ');
+    stream.read(header.data(), 128);
+    const auto place = header.find("(");
+    header.replace(place, shape.size(), shape);
+    stream.seekp(0);
+    stream.write(header.data(), 128);
+    stream.close();
+    is_refused();
+  }
   std::filesystem::remove_all(folder);
 }
 

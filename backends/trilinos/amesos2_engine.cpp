@@ -91,7 +91,8 @@ class Amesos2Engine {
 
   itr_statistics statistics() const {
     itr_statistics result{};
-    if (!solver_.is_null() && kind == Kind::klu2) {
+    const std::scoped_lock guard(trilinos_lock());
+    if (trilinos_is_running() && !solver_.is_null() && kind == Kind::klu2) {
       result.factor_nonzeros = static_cast<double>(solver_->getStatus().getNnzLU());
       result.factor_bytes = result.largest_bytes = 12 * result.factor_nonzeros;
     }

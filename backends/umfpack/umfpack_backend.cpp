@@ -67,6 +67,7 @@ class Umfpack {
 
   itr_statistics statistics() const {
     itr_statistics result{};
+    if (!numeric_) return result;
     result.factor_nonzeros = info_[UMFPACK_LNZ] + info_[UMFPACK_UNZ];
     result.factor_bytes = result.largest_bytes = info_[UMFPACK_NUMERIC_SIZE] * info_[UMFPACK_SIZE_OF_UNIT];
     result.flops = info_[UMFPACK_FLOPS];
