@@ -16,6 +16,7 @@
 
 #include "../common/blas.hpp"
 #include "../common/mpi_session.hpp"
+#include "../common/ordering.hpp"
 #include "itr/linear/module_adapter.hpp"
 
 namespace {
@@ -85,19 +86,17 @@ class Mumps {
   Mumps& operator=(const Mumps&) = delete;
 
   int set_option(std::string_view key, std::string_view value) {
-    static constexpr std::pair<std::string_view, int> kOrderings[] = {{"auto", kAuto},
+    static constexpr itr::backends::Ordering kOrderings[] = {{"auto", kAuto},
 #ifdef ITR_MUMPS_HAS_SCOTCH
-                                                                      {"scotch", kScotch},
+                                                             {"scotch", kScotch},
 #endif
-                                                                      {"amd", 0},
-                                                                      {"amf", kAmf},
-                                                                      {"qamd", 6}};
-    for (const auto& [name, ordering] : kOrderings)
-      if (key == "ordering" && value == name) {
-        ordering_ = ordering;
-        return ITR_OK;
-      }
-    return ITR_FAILED;
+                                                             {"amd", 0},
+                                                             {"amf", kAmf},
+                                                             {"qamd", 6}};
+    const auto ordering = itr::backends::find_ordering(kOrderings, key, value);
+    if (!ordering) return ITR_FAILED;
+    ordering_ = *ordering;
+    return ITR_OK;
   }
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {

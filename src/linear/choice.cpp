@@ -9,6 +9,7 @@
 #include <limits>
 #include <utility>
 
+#include "forwarding.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/dump.hpp"
 
@@ -29,17 +30,6 @@ constexpr std::size_t kSupernodalAbove2d = 60'000, kSupernodalAbove3d = 20'000; 
 double half_of_memory() {
   return 0.5 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
-
-/// Solvers that throw nothing away: what a decorator forwards to the one that answers now.
-class Forwarding : public Solver {
- public:
-  Capabilities capabilities() const override { return current().capabilities(); }
-  Statistics statistics() const override { return current().statistics(); }
-  std::string message() const override { return current().message(); }
-
- protected:
-  virtual const Solver& current() const = 0;
-};
 
 /// Stands for a solver that could not be created in the middle of a run.
 class Absent final : public Solver {

@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "forwarding.hpp"
 #include "itr/core/error.hpp"
 
 namespace itr::linear {
@@ -73,14 +74,11 @@ bool is_lower_triangle(const SparsityPattern& pattern) {
   return true;
 }
 
-class DumpingSolver final : public Solver {
+class DumpingSolver final : public Forwarding {
  public:
   DumpingSolver(std::unique_ptr<Solver> solver, std::filesystem::path folder, int every)
       : solver_(std::move(solver)), folder_(std::move(folder)), every_(every) {}
   std::string_view name() const override { return solver_->name(); }
-  Capabilities capabilities() const override { return solver_->capabilities(); }
-  Statistics statistics() const override { return solver_->statistics(); }
-  std::string message() const override { return solver_->message(); }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
     system_.pattern = pattern;
@@ -105,6 +103,8 @@ class DumpingSolver final : public Solver {
   }
 
  private:
+  const Solver& current() const override { return *solver_; }
+
   std::unique_ptr<Solver> solver_;
   std::filesystem::path folder_;
   int every_, count_ = 0;

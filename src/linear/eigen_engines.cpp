@@ -4,10 +4,10 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseLU>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "eigen_engines.hpp"
+#include "itr/linear/iteration_options.hpp"
 
 namespace itr::linear {
 
@@ -129,18 +129,7 @@ class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
 
 class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Sparse, Eigen::Lower>> {
  public:
-  bool set_option(const std::string& key, const std::string& value) override {
-    double number = 0;
-    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
-    if (error != std::errc() || end != value.data() + value.size() || !(number > 0)) return false;
-    if (key == "tolerance" && number < 1)
-      tolerance_ = number;
-    else if (key == "max_iterations" && number >= 1 && number < 1e9)
-      max_iterations_ = static_cast<int>(number);
-    else
-      return false;
-    return true;
-  }
+  bool set_option(const std::string& key, const std::string& value) override { return options_.set(key, value); }
   Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
     iterations_ = 0;
     Outcome worst = Outcome::ok;
@@ -155,16 +144,16 @@ class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Spa
  private:
   Outcome factorize_matrix() override {
     if ((matrix_.diagonal().array() <= 0).any()) return Outcome::not_positive_definite;
-    solver_.setTolerance(tolerance_);
-    solver_.setMaxIterations(max_iterations_ > 0 ? max_iterations_ : std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
+    solver_.setTolerance(options_.tolerance);
+    solver_.setMaxIterations(options_.max_iterations > 0 ? options_.max_iterations
+                                                         : std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
     solver_.compute(matrix_);
     iterations_ = 0;
     return success_or(Outcome::failed);
   }
   Statistics factor_statistics() const override { return {.iterations = iterations_}; }
-  double tolerance_ = 1e-12;
-  int max_iterations_ = 0;  ///< 0: by the size
-  int iterations_ = 0;      ///< of all columns of the last solve
+  IterationOptions options_{.tolerance = 1e-12};
+  int iterations_ = 0;  ///< of all columns of the last solve
 };
 
 class Dense final : public EigenEngine<Eigen::LLT<Eigen::MatrixXd, Eigen::Lower>> {

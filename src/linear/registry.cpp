@@ -11,6 +11,7 @@
 #include "eigen_engines.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/choice.hpp"
+#include "itr/linear/iteration_options.hpp"
 #include "modules.hpp"
 
 namespace itr::linear {
@@ -144,7 +145,7 @@ Registry::Registry(std::vector<std::filesystem::path> folders) : impl_(std::make
   impl_->rows.push_back(built_in("eigen:ldlt", {.indefinite = true}, make_eigen_ldlt));
   impl_->rows.push_back(built_in("eigen:llt", {}, make_eigen_llt));
   impl_->rows.push_back(built_in("eigen:lu", {.indefinite = true}, make_eigen_lu));
-  impl_->rows.push_back(built_in("eigen:cg", {.iterative = true}, make_eigen_cg, "tolerance=NUMBER max_iterations=NUMBER"));
+  impl_->rows.push_back(built_in("eigen:cg", {.iterative = true}, make_eigen_cg, IterationOptions::kNames));
   impl_->rows.push_back(built_in("dense", {}, make_dense));
 }
 Registry::~Registry() = default;
