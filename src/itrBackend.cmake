@@ -12,3 +12,18 @@ function(itr_add_backend name)
   install(TARGETS ${target} LIBRARY DESTINATION ${ITR_BACKEND_DIR})
   message(STATUS "solver module ${name}: will be built")
 endfunction()
+
+# itr_add_suitesparse(NAME): the module over SuiteSparse's library NAME, of NAME_backend.cpp; none where that is missing, and
+# `itr solvers` says so.
+function(itr_add_suitesparse name)
+  string(TOUPPER ${name} NAME)
+  find_path(ITR_${NAME}_INCLUDE ${name}.h PATH_SUFFIXES suitesparse)
+  find_library(ITR_${NAME}_LIBRARY ${name})
+  if(NOT ITR_${NAME}_INCLUDE OR NOT ITR_${NAME}_LIBRARY)
+    message(STATUS "solver module ${name}: absent (install libsuitesparse-dev)")
+    return()
+  endif()
+  itr_add_backend(${name} ${name}_backend.cpp)
+  target_include_directories(itr_backend_${name} SYSTEM PRIVATE ${ITR_${NAME}_INCLUDE})
+  target_link_libraries(itr_backend_${name} PRIVATE ${ITR_${NAME}_LIBRARY})
+endfunction()

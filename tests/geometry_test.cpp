@@ -300,6 +300,15 @@ TYPED_TEST(Geometry, PiecesOfAnIntersectionFillIt) {
   }
 }
 
+TEST(Measures, QualityIsOneForRegularSimplicesOnly) {
+  const double height = std::sqrt(3.0) / 2;
+  EXPECT_NEAR(simplex_quality<2>({Vec<2>(0, 0), Vec<2>(1, 0), Vec<2>(0.5, height)}), 1, 1e-15);
+  EXPECT_NEAR(simplex_quality<2>({Vec<2>(0, 0), Vec<2>(0.5, height), Vec<2>(1, 0)}), -1, 1e-15);
+  EXPECT_EQ(simplex_quality<2>({Vec<2>(0, 0), Vec<2>(1, 1), Vec<2>(3, 3)}), 0);
+  EXPECT_NEAR(simplex_quality<2>({Vec<2>(0, 0), Vec<2>(7, 0), Vec<2>(0, 7)}), height, 1e-15);  // of any size
+  EXPECT_NEAR(simplex_quality<3>({Vec<3>(1, 1, 1), Vec<3>(1, -1, -1), Vec<3>(-1, -1, 1), Vec<3>(-1, 1, -1)}), 1, 1e-15);
+}
+
 TEST(Predicates, AreExact) {
   const double tiny = std::ldexp(1.0, -53);
   EXPECT_EQ(orientation(Vec<2>(0, 0), Vec<2>(1, 1), Vec<2>(0.5, 0.5 + tiny)), 1);

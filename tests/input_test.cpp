@@ -2,6 +2,8 @@
 // Input that explains itself: the schema says what the reader accepts, `itr explain` says what is modelled.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "itr/core/error.hpp"
+#include "itr/linear/choice.hpp"
 #include "itr/scene/scene.hpp"
 
 namespace itr {
@@ -110,7 +113,31 @@ TEST(Explain, WarnsOfWhatLooksWrong) {
   EXPECT_NE(explain(ball + "--set '/geometry/0/transformation/scale=[0.04, 0.0004]'").find("slivers"), std::string::npos);
   EXPECT_NE(explain(ball + "--set /geometry/0/transformation/scale=40000").find("are lengths in metres?"),
             std::string::npos);
+}
+
+TEST(Explain, NamesTheSolverThatRunWouldTake) {
+  const std::string ball = "ball_wall.json ";
   EXPECT_NE(explain(ball + "--solver eigen").find("eigen:ldlt (asked for: eigen)"), std::string::npos);
+  EXPECT_NE(explain(ball + "--solver auto").find("eigen:ldlt, small"), std::string::npos) << explain(ball + "--solver auto");
+  for (const char* on_mpi : {"mumps", "belos:muelu"})
+    if (linear::Registry().find(on_mpi).available)
+      EXPECT_NE(explain(ball + "--solver " + on_mpi).find(std::string(on_mpi) + " (asked for"), std::string::npos);
+}
+
+// 144 unknowns of the cantilever: its 81 vertices less the 9 of its left side, 2 each.
+TEST(Explain, CountsTheEntriesOfTheMatrix) {
+  const std::filesystem::path file = ITR_SOURCE_DIR "/examples/cantilever.json";
+  const auto setup = std::get<itr::Setup<2>>(scene::read(file).setup);
+  std::size_t entries = 0, free_vertices = 0;
+  const auto is_free = [&](VertexId v) { return setup.mesh.rest(v).x() > 1e-9; };
+  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v) free_vertices += is_free(v);
+  for (const auto& [a, b] : setup.mesh.edges()) entries += is_free(a) && is_free(b) ? 4 : 0;
+  ASSERT_EQ(free_vertices, 72u);
+  entries += 3 * free_vertices;
+  const double megabytes = linear::estimate_factor_bytes({144, entries, 2, false, 0}) / 1e6;
+  const std::string line = fmt::format("matrix {:.1f} MB, factor of a direct solver up to about {:.1f} MB",
+                                       12e-6 * static_cast<double>(entries), megabytes);
+  EXPECT_NE(explain("cantilever.json").find(line), std::string::npos) << line;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <numeric>
 #include <random>
@@ -308,6 +309,25 @@ TEST_P(EverySolver, GoesOnAfterAFailedFactorization) {
   expect_solves(good, 1e-12, 1, false);
 }
 
+TEST_P(EverySolver, TellsStatisticsAtAnyTime) {
+  const auto expect_sane = [&](const char* when) {
+    const Statistics s = solver_->statistics();
+    for (const double figure : {s.factor_nonzeros, s.factor_bytes, s.largest_bytes, s.flops}) {
+      EXPECT_GE(figure, 0) << when;
+      EXPECT_LE(figure, 1e9) << when;
+    }
+    EXPECT_EQ(s.iterations, 0) << when;
+  };
+  expect_sane("before anything");
+  const System system = from_dense(tridiagonal(20, 4, 1));
+  ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
+  expect_sane("after the analysis");
+  EXPECT_NE(solver_->factorize(std::vector<double>(system.values.size(), 0.0)), Outcome::ok);
+  expect_sane("after a failed factorisation");
+  ASSERT_EQ(solver_->factorize(system.values), Outcome::ok);
+  expect_sane("after a factorisation");
+}
+
 TEST_P(EverySolver, MeasuresResidualsWhoseSquaresLeaveTheRangeOfDouble) {
   const System system = from_dense(tridiagonal(20, 4, 1));
   ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok);
@@ -434,8 +454,48 @@ TEST(Systems, ComeBackFromTheDiskAsTheyWereSolved) {
   EXPECT_EQ(back.dofs, elastic.dofs);
   EXPECT_EQ(back.coordinates, elastic.coordinates);
   EXPECT_THROW(read_system(folder / "000001"), InputError);
-  std::filesystem::resize_file(folder / "000002" / "values.npy", 200);
-  EXPECT_THROW(read_system(folder / "000002"), InputError);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Systems, AreRefusedWhereTheirFilesAreDamaged) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / ("itr_damaged_" + std::to_string(::getpid()));
+  const Elastic elastic = elasticity(2, 3, 0.3);
+  const DumpedSystem good{elastic.pattern, elastic.values,     std::vector<double>(elastic.pattern.order, 1.0), 2,
+                          elastic.dofs,    elastic.coordinates};
+  const auto is_refused = [&] {
+    EXPECT_THROW(read_system(folder), InputError);
+    write_system(folder, good);
+  };
+  write_system(folder, good);
+  EXPECT_NO_THROW(read_system(folder));
+  const auto refused = [&](auto&& damage) {
+    DumpedSystem system = good;
+    damage(system);
+    write_system(folder, system);
+    is_refused();
+  };
+  refused([](DumpedSystem& s) { s.pattern.row_indices.back() = 1000; });
+  refused([](DumpedSystem& s) { s.pattern.row_indices[1] = -1; });
+  refused([](DumpedSystem& s) { std::swap(s.pattern.column_starts[1], s.pattern.column_starts[2]); });
+  refused([](DumpedSystem& s) { s.pattern.column_starts[0] = 1; });
+  refused([](DumpedSystem& s) { s.rhs.pop_back(); });
+  refused([](DumpedSystem& s) { s.coordinates.resize(s.dofs.size()); });
+  refused([](DumpedSystem& s) { s.dofs[1] = s.dofs[0]; });
+  refused([](DumpedSystem& s) { s.block_size = 0; });
+  std::filesystem::resize_file(folder / "values.npy", 200);
+  is_refused();
+  for (const std::string shape : {"(-1", "(x", "(9999999999999999999999", "(999999999999"}) {
+    const auto file = folder / "values.npy";
+    std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+    std::string header(128, ' ');
+    stream.read(header.data(), 128);
+    const auto place = header.find("(");
+    header.replace(place, shape.size(), shape);
+    stream.seekp(0);
+    stream.write(header.data(), 128);
+    stream.close();
+    is_refused();
+  }
   std::filesystem::remove_all(folder);
 }
 
@@ -465,6 +525,36 @@ TEST(Solver, AnalysesAPatternOnceUnlessItMayUsePositions) {
   }
 }
 
+/// Gains a tenth with each solve, which takes seven iterations.
+class SlowEngine final : public Engine {
+ public:
+  bool set_option(const std::string&, const std::string&) override { return false; }
+  Outcome analyze(const SparsityPattern&, const AnalyzeHints&) override { return Outcome::ok; }
+  Outcome factorize(std::span<const double>) override { return Outcome::ok; }
+  Outcome solve(std::span<const double> B, std::span<double> X, int) override {
+    for (std::size_t i = 0; i < B.size(); ++i) X[i] = 0.9 * B[i];
+    return Outcome::ok;
+  }
+  Statistics statistics() const override { return {.iterations = 7}; }
+  std::string message() const override { return {}; }
+};
+
+TEST(CheckedSolver, CountsTheIterationsOfRefinementsToo) {
+  const System system = from_dense(Dense::Identity(5, 5));
+  const auto solver = make_checked_solver("slow", {.iterative = true}, std::make_unique<SlowEngine>());
+  const std::vector<double> b(5, 1.0);
+  std::vector<double> x(5);
+  ASSERT_EQ(solver->analyze(system.pattern, {}), Outcome::ok);
+  ASSERT_EQ(solver->factorize(system.values), Outcome::ok);
+  EXPECT_EQ(solver->statistics().iterations, 0);
+  const auto iterations_to = [&](double residual) {
+    EXPECT_EQ(solver->solve(b, x, 1, residual).outcome, Outcome::ok);
+    return solver->statistics().iterations;
+  };
+  EXPECT_EQ(iterations_to(0.2), 7);
+  EXPECT_EQ(iterations_to(2e-3), 21);
+}
+
 TEST(Muelu, NeedsNotMoreIterationsOnFinerMeshesAndFewerWithRigidModes) {
   Registry registry = full_registry();
   if (const auto info = registry.find("belos:muelu"); !info.available) GTEST_SKIP() << info.reason;
@@ -482,6 +572,30 @@ TEST(Muelu, NeedsNotMoreIterationsOnFinerMeshesAndFewerWithRigidModes) {
   EXPECT_GT(on_coarse, 0);
   EXPECT_LE(on_fine, 1.5 * on_coarse);
   EXPECT_LT(on_fine, iterations(fine, {.block_size = 2, .dofs = fine.dofs}));
+}
+
+/// Less `shift` on the diagonal.
+Elastic shifted(Elastic system, double shift) {
+  for (int j = 0; j < system.pattern.order; ++j) system.values[system.pattern.column_starts[j]] -= shift;
+  system.full.diagonal().array() -= shift;
+  return system;
+}
+
+TEST(Muelu, TellsAnIndefiniteMatrixWhoseDiagonalIsPositive) {
+  Registry registry = full_registry();
+  if (const auto info = registry.find("belos:muelu"); !info.available) GTEST_SKIP() << info.reason;
+  const Elastic stiff = elasticity(2, 24, 0.3);
+  const Eigen::SelfAdjointEigenSolver<Dense> eigen(stiff.full);
+  const Eigen::VectorXd first = eigen.eigenvectors().col(0);
+  const std::vector<double> b(first.data(), first.data() + first.size());  // all of it along the negative direction
+  std::vector<double> x(b.size());
+  for (const double side : {0.9, 1.1}) {
+    const Elastic system = shifted(stiff, side * eigen.eigenvalues()[0]);
+    const auto solver = registry.create("belos:muelu");
+    ASSERT_EQ(solver->analyze(system.pattern, system.hints()), Outcome::ok);
+    ASSERT_EQ(solver->factorize(system.values), Outcome::ok) << solver->message();
+    EXPECT_EQ(solver->solve(b, x, 1, 1e-8).outcome, side < 1 ? Outcome::ok : Outcome::not_positive_definite);
+  }
 }
 
 }  // namespace

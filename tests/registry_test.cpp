@@ -28,6 +28,27 @@ TEST(Registry, NeverStartsMpiWithoutTheProgramsWord) {
   EXPECT_GE(self_test_residual(*registry.create(name)), 0);
 }
 
+TEST(Registry, ASolverOnItsOwnRankOutlivesAConnection) {
+  Registry registry;
+  registry.allow_mpi_start();
+  if (!registry.find("mumps").available) GTEST_SKIP() << registry.find("mumps").reason;
+  const auto solver = registry.create("mumps");
+  const SparsityPattern pattern{2, {0, 2, 3}, {0, 1, 1}};
+  const std::vector<double> values = {2, 1, 2}, b = {3, 3};
+  std::vector<double> x(2);
+  const auto expect_solves = [&](const char* when) {
+    ASSERT_EQ(solver->factorize(values), Outcome::ok) << when << ": " << solver->message();
+    ASSERT_EQ(solver->solve(b, x, 1, 1e-12).outcome, Outcome::ok) << when << ": " << solver->message();
+    EXPECT_NEAR(x[0], 1, 1e-12);
+  };
+  ASSERT_EQ(solver->analyze(pattern, {}), Outcome::ok);
+  expect_solves("before");
+  registry.connect("mumps");
+  expect_solves("connected");
+  registry.disconnect("mumps");
+  expect_solves("after");
+}
+
 TEST(Registry, NamesOfOthersMapToOurs) {
   EXPECT_EQ(Registry::canonical_name(""), "eigen:ldlt");
   EXPECT_EQ(Registry::canonical_name("eigen"), "eigen:ldlt");
@@ -138,9 +159,9 @@ TEST(Registry, AProgramAddsItsOwn) {
   Registry registry;
   BackendInfo info;
   info.name = "mine";
-  info.available = true;
   registry.add(info, [](const SolverOptions&) { return Registry().create("eigen"); });
   EXPECT_GE(self_test_residual(*registry.create("mine")), 0);
+  EXPECT_TRUE(registry.find("mine").available);
 }
 
 }  // namespace

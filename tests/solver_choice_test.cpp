@@ -24,6 +24,7 @@ class Scripted final : public Engine {
     Outcome analyze = Outcome::ok, factorize = Outcome::ok;
     double error = 0;      ///< of the solution, relative
     int* calls = nullptr;  ///< of factorize
+    Outcome solve = Outcome::ok;
   };
   explicit Scripted(Script script) : script_(script) {}
   bool set_option(const std::string&, const std::string&) override { return false; }
@@ -35,7 +36,7 @@ class Scripted final : public Engine {
   }
   Outcome solve(std::span<const double> B, std::span<double> X, int) override {
     for (std::size_t i = 0; i < B.size(); ++i) X[i] = B[i] / scale_ * (1 + (i % 2 ? 1 : -1) * script_.error);
-    return Outcome::ok;
+    return script_.solve;
   }
   Statistics statistics() const override { return {}; }
   std::string message() const override { return "as told"; }
@@ -48,7 +49,6 @@ class Scripted final : public Engine {
 void add(Registry& registry, const std::string& name, Scripted::Script script) {
   BackendInfo info;
   info.name = name;
-  info.available = true;
   registry.add(info, [=](const SolverOptions& options) {
     auto engine = std::make_unique<Scripted>(script);
     apply_options(*engine, name, "", options);
@@ -92,7 +92,8 @@ TEST(Fallback, TakesOverWhateverFails) {
   for (const auto& script :
        {Scripted::Script{.analyze = Outcome::failed}, Scripted::Script{.analyze = Outcome::out_of_memory},
         Scripted::Script{.factorize = Outcome::singular}, Scripted::Script{.factorize = Outcome::not_converged},
-        Scripted::Script{.error = 0.9}}) {
+        Scripted::Script{.error = 0.9}, Scripted::Script{.solve = Outcome::failed},
+        Scripted::Script{.error = std::numeric_limits<double>::quiet_NaN()}}) {
     Registry registry(kNoModules);
     add(registry, "weak", script);
     Log log;
@@ -145,6 +146,75 @@ TEST(Fallback, KeepsTheBestOfPoorAnswers) {
   EXPECT_GT(residual, 1e-8);
 }
 
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Fallback, KeepsAPoorAnswerWhereTheOtherHasNone) {
+  for (const auto& without : {Scripted::Script{.solve = Outcome::failed}, Scripted::Script{.solve = Outcome::out_of_memory},
+                              Scripted::Script{.error = kNan}, Scripted::Script{.factorize = Outcome::out_of_memory},
+                              Scripted::Script{.analyze = Outcome::failed}}) {
+    for (const bool poor_first : {true, false}) {
+      if (!poor_first && (without.analyze != Outcome::ok || without.factorize != Outcome::ok)) continue;
+      Registry registry(kNoModules);
+      int poors_calls = 0;
+      add(registry, "poor", {.error = 1e-6, .calls = &poors_calls});
+      add(registry, "without", without);
+      const LinearOptions options{.solvers = {poor_first ? "poor" : "without"},
+                                  .fallback = {poor_first ? "without" : "poor"}};
+      const auto solver = choose_solver(options, false, registry, {});
+      std::vector<double> values(4, 2.0), b(4, 1.0), x(4);
+      ASSERT_EQ(solver->analyze(diagonal_pattern(4), {}), Outcome::ok);
+      ASSERT_EQ(solver->factorize(values), Outcome::ok);
+      for (int again = 0; again < 2; ++again) {
+        const SolveReport report = solver->solve(b, x, 1, 1e-30);
+        EXPECT_EQ(report.outcome, Outcome::not_converged);
+        EXPECT_LE(report.relative_residual, 1e-6);
+        for (const double value : x) EXPECT_NEAR(value, 0.5, 1e-5);
+      }
+      const int calls = poors_calls;
+      EXPECT_EQ(solver->factorize(values), Outcome::ok);  // by the one whose answer was kept
+      EXPECT_EQ(poors_calls, calls + 1);
+    }
+  }
+}
+
+TEST(Fallback, LeavesTheFirstFailureWhereNobodyCopes) {
+  Registry registry(kNoModules);
+  int calls = 0;
+  add(registry, "first", {.factorize = Outcome::singular, .calls = &calls});
+  add(registry, "second", {.factorize = Outcome::out_of_memory});
+  Log log;
+  const auto solver = choose_solver({.solvers = {"first"}, .fallback = {"second"}}, false, registry, log.logger());
+  const std::vector<double> values(4, 2.0);
+  ASSERT_EQ(solver->analyze(diagonal_pattern(4), {}), Outcome::ok);
+  for (int shift = 1; shift <= 2; ++shift) {  // Newton shifts a singular matrix and gives up on memory
+    EXPECT_EQ(solver->factorize(values), Outcome::singular);
+    EXPECT_EQ(calls, shift);
+  }
+}
+
+TEST(Fallback, NamesEachSolverWithItsOwnOutcome) {
+  Registry registry(kNoModules);
+  add(registry, "first", {.error = 0.9});
+  add(registry, "second", {.factorize = Outcome::out_of_memory});
+  Log log;
+  const LinearOptions options{.solvers = {"first"}, .fallback = {"second", "eigen:ldlt"}};
+  const auto solver = choose_solver(options, false, registry, log.logger());
+  double residual = 1;
+  EXPECT_EQ(solve(*solver, residual), Outcome::ok);
+  ASSERT_EQ(log.lines.size(), 2u);
+  EXPECT_NE(log.lines[0].find("first: not converged"), std::string::npos) << log.lines[0];
+  EXPECT_NE(log.lines[1].find("second: out of memory"), std::string::npos) << log.lines[1];
+}
+
+TEST(Fallback, PassesOnThatTheMatrixIsNotPositiveDefinite) {
+  Registry registry(kNoModules);
+  add(registry, "first", {.error = kNan});
+  add(registry, "second", {.factorize = Outcome::not_positive_definite});
+  const auto solver = choose_solver({.solvers = {"first"}, .fallback = {"second"}}, false, registry, {});
+  double residual = 1;
+  EXPECT_EQ(solve(*solver, residual), Outcome::not_positive_definite);
+}
+
 TEST(Choice, TakesTheFirstThatIsThereAndPassesOverOthersNames) {
   Registry registry(kNoModules);
   const auto name = [&](std::vector<std::string> solvers) { return choose_name({solvers, {}, {}}, registry); };
@@ -171,6 +241,59 @@ TEST(Choice, ChecksFallbacksAndOptionsBeforeAnythingRuns) {
   EXPECT_NE(refused({{"eigen"}, {}, {{"no-such-solver", {{"a", "b"}}}}}).find("no-such-solver"), std::string::npos);
   EXPECT_EQ(refused({{"eigen:cg"}, {"mumps"}, {{"eigen:cg", {{"tolerance", "1e-9"}}}}}),
             "");  // an absent fallback only warns
+}
+
+/// Under the name that auto takes for large systems: notes its options, or cannot be created.
+void add_large(Registry& registry, SolverOptions* seen) {
+  BackendInfo info;
+  info.name = "cholmod:supernodal";
+  registry.add(info, [=](const SolverOptions& options) -> std::unique_ptr<Solver> {
+    if (!seen) throw InputError({"", "linear solver", "no licence", "a licence"});
+    *seen = options;
+    return make_checked_solver("cholmod:supernodal", {}, std::make_unique<Scripted>(Scripted::Script{}));
+  });
+}
+
+TEST(Auto, HandsOptionsToWhatItPicks) {
+  const SolverOptions metis = {{"ordering", "metis"}};
+  for (const bool as_fallback : {false, true}) {
+    Registry registry(kNoModules);
+    add(registry, "weak", {.analyze = Outcome::failed});
+    SolverOptions seen;
+    add_large(registry, &seen);
+    LinearOptions options;
+    options.solvers = {as_fallback ? "weak" : "auto"};
+    if (as_fallback) options.fallback = {"auto"};
+    options.options = {{"cholmod", metis}};
+    const auto solver = choose_solver(options, false, registry, {});
+    seen.clear();
+    EXPECT_EQ(solver->analyze(diagonal_pattern(100'000), {}), Outcome::ok);
+    EXPECT_EQ(seen, metis);
+  }
+}
+
+TEST(Auto, FailsWithTheReasonWhereItsPickCannotBeCreated) {
+  Registry registry(kNoModules);
+  add_large(registry, nullptr);
+  const auto solver = choose_solver({.solvers = {"auto"}}, false, registry, {});
+  EXPECT_EQ(solver->analyze(diagonal_pattern(100'000), {}), Outcome::failed);
+  EXPECT_NE(solver->message().find("no licence"), std::string::npos) << solver->message();
+  double residual = 1;
+  EXPECT_EQ(solve(*solver, residual), Outcome::ok);  // a small one: another pick
+}
+
+TEST(Choice, RefusesToDumpEveryZerothSystem) {
+  Registry registry(kNoModules);
+  EXPECT_THROW(choose_solver({.dump_folder = "x", .dump_every = 0}, false, registry, {}), InputError);
+}
+
+TEST(Choice, CreatesNoSolverThatWillNotRun) {
+  Registry registry(kNoModules);
+  add_large(registry, nullptr);
+  LinearOptions options{.solvers = {"eigen"}, .options = {{"cholmod", {{"ordering", "metis"}}}}};
+  EXPECT_NO_THROW(choose_solver(options, false, registry, {}));
+  options.fallback = {"cholmod"};
+  EXPECT_THROW(choose_solver(options, false, registry, {}), InputError);
 }
 
 std::vector<BackendInfo> there(const std::vector<std::string>& names) {

@@ -6,10 +6,10 @@
 #include <array>
 #include <cstdio>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "../common/blas.hpp"
+#include "../common/ordering.hpp"
 #include "itr/linear/module_adapter.hpp"
 
 namespace {
@@ -40,15 +40,13 @@ class Cholmod {
   Cholmod& operator=(const Cholmod&) = delete;
 
   int set_option(std::string_view key, std::string_view value) {
-    static constexpr std::pair<std::string_view, int> kOrderings[] = {
+    static constexpr itr::backends::Ordering kOrderings[] = {
         {"auto", CHOLMOD_AMD}, {"amd", CHOLMOD_AMD}, {"metis", CHOLMOD_METIS}, {"natural", CHOLMOD_NATURAL}};
-    for (const auto& [name, ordering] : kOrderings)
-      if (key == "ordering" && value == name) {
-        may_try_metis_ = value == "auto";
-        common_.method[0].ordering = ordering;
-        return ITR_OK;
-      }
-    return ITR_FAILED;
+    const auto ordering = itr::backends::find_ordering(kOrderings, key, value);
+    if (!ordering) return ITR_FAILED;
+    may_try_metis_ = value == "auto";
+    common_.method[0].ordering = *ordering;
+    return ITR_OK;
   }
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {

@@ -40,7 +40,9 @@ inline int32_t prepare_mpi(int32_t may_start) {
   std::atexit([] {
     if (mpi_is_running()) MPI_Finalize();
   });
-  return ITR_OK;
+  if (provided == MPI_THREAD_MULTIPLE) return ITR_OK;
+  MPI_Finalize();
+  return ITR_FAILED;
 }
 
 }  // namespace itr::backends

@@ -16,6 +16,7 @@
 
 #include "../common/blas.hpp"
 #include "../common/mpi_session.hpp"
+#include "../common/ordering.hpp"
 #include "itr/linear/module_adapter.hpp"
 
 namespace {
@@ -85,19 +86,17 @@ class Mumps {
   Mumps& operator=(const Mumps&) = delete;
 
   int set_option(std::string_view key, std::string_view value) {
-    static constexpr std::pair<std::string_view, int> kOrderings[] = {{"auto", kAuto},
+    static constexpr itr::backends::Ordering kOrderings[] = {{"auto", kAuto},
 #ifdef ITR_MUMPS_HAS_SCOTCH
-                                                                      {"scotch", kScotch},
+                                                             {"scotch", kScotch},
 #endif
-                                                                      {"amd", 0},
-                                                                      {"amf", kAmf},
-                                                                      {"qamd", 6}};
-    for (const auto& [name, ordering] : kOrderings)
-      if (key == "ordering" && value == name) {
-        ordering_ = ordering;
-        return ITR_OK;
-      }
-    return ITR_FAILED;
+                                                             {"amd", 0},
+                                                             {"amf", kAmf},
+                                                             {"qamd", 6}};
+    const auto ordering = itr::backends::find_ordering(kOrderings, key, value);
+    if (!ordering) return ITR_FAILED;
+    ordering_ = *ordering;
+    return ITR_OK;
   }
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {
@@ -126,7 +125,7 @@ class Mumps {
     mumps_.a = values_.data();
     int outcome = job(kFactorize);
     // Delayed pivots may need more room than the analysis foresaw.
-    for (icntl(mumps_, 14) = kMemoryMargin; is_short_of_workspace() && icntl(mumps_, 14) < kMostMemoryMargin;) {
+    while (is_short_of_workspace() && icntl(mumps_, 14) < kMostMemoryMargin) {
       icntl(mumps_, 14) *= 3;
       outcome = job(kFactorize);
     }
@@ -171,7 +170,10 @@ class Mumps {
   static constexpr int kScotchFrom = 5000;                            ///< unknowns
   static constexpr int kMemoryMargin = 30, kMostMemoryMargin = 1000;  ///< of the estimate [%]
 
-  bool is_alive() const { return session_ == session.number && itr::backends::mpi_is_running(); }
+  /// An instance on its own rank does not care who connects or leaves.
+  bool is_alive() const {
+    return session_ >= 0 && (!is_shared_ || session_ == session.number) && itr::backends::mpi_is_running();
+  }
   int gone() {
     std::snprintf(text_.data(), text_.size(), "the MPI ranks of this solver are gone");
     return ITR_FAILED;
@@ -194,7 +196,7 @@ class Mumps {
     return infog(mumps_, 1) >= 0;
   }
   void end() {
-    if (session_ >= 0 && is_alive()) {
+    if (is_alive()) {
       if (is_shared_) send({kEnd, instance_, 0});
       run(mumps_, kEnd);
     }

@@ -5,11 +5,11 @@
 #include <array>
 #include <cstdio>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "../common/blas.hpp"
 #include "../common/full_matrix.hpp"
+#include "../common/ordering.hpp"
 #include "itr/linear/module_adapter.hpp"
 
 namespace {
@@ -29,14 +29,12 @@ class Umfpack {
   Umfpack& operator=(const Umfpack&) = delete;
 
   int set_option(std::string_view key, std::string_view value) {
-    static constexpr std::pair<std::string_view, int> kOrderings[] = {
+    static constexpr itr::backends::Ordering kOrderings[] = {
         {"amd", UMFPACK_ORDERING_AMD}, {"metis", UMFPACK_ORDERING_METIS}, {"natural", UMFPACK_ORDERING_NONE}};
-    for (const auto& [name, ordering] : kOrderings)
-      if (key == "ordering" && value == name) {
-        control_[UMFPACK_ORDERING] = ordering;
-        return ITR_OK;
-      }
-    return ITR_FAILED;
+    const auto ordering = itr::backends::find_ordering(kOrderings, key, value);
+    if (!ordering) return ITR_FAILED;
+    control_[UMFPACK_ORDERING] = *ordering;
+    return ITR_OK;
   }
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {
@@ -67,6 +65,7 @@ class Umfpack {
 
   itr_statistics statistics() const {
     itr_statistics result{};
+    if (!numeric_) return result;
     result.factor_nonzeros = info_[UMFPACK_LNZ] + info_[UMFPACK_UNZ];
     result.factor_bytes = result.largest_bytes = info_[UMFPACK_NUMERIC_SIZE] * info_[UMFPACK_SIZE_OF_UNIT];
     result.flops = info_[UMFPACK_FLOPS];

@@ -4,13 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <set>
 
 #include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/geometry/measures.hpp"
+#include "itr/linear/choice.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "itr/simulation/step_problem.hpp"
 
@@ -44,17 +45,6 @@ void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
 }
 
-/// 1 for a regular simplex, 0 for a flat one: its volume by that of the regular one of the same root mean square edge.
-template <int Dim>
-double quality(const Mesh<Dim>& mesh, CellId c) {
-  double squared = 0;
-  for (int i = 0; i <= Dim; ++i)
-    for (int j = 0; j < i; ++j) squared += (mesh.rest(mesh.cell(c)[i]) - mesh.rest(mesh.cell(c)[j])).squaredNorm();
-  const double edge = std::sqrt(squared / (Dim * (Dim + 1) / 2));
-  const double regular = Dim == 2 ? std::sqrt(3.0) / 4 : std::sqrt(2.0) / 12;
-  return mesh.volume(c) / (regular * std::pow(edge, Dim));
-}
-
 /// Which connected surface every vertex of the scene belongs to, by its smallest vertex.
 std::vector<int> find_components(const CollisionSurface& surface, std::size_t num_vertices) {
   std::vector<int> parent(num_vertices);
@@ -84,15 +74,15 @@ template <int Dim>
 class Explanation {
  public:
   /// Throws InputError for what `run` would refuse.
-  Explanation(const Setup<Dim>& setup, std::vector<std::string> warnings)
-      : setup_(setup), simulation_(setup, registry_), warnings_(std::move(warnings)) {}
+  Explanation(const Setup<Dim>& setup, linear::Registry& registry, std::vector<std::string> warnings)
+      : setup_(setup), registry_(registry), simulation_(setup, registry_), warnings_(std::move(warnings)) {}
 
   void print() {
     bodies();
     fmt::print("time\n  {}\n", describe(setup_.time));
     terms();
-    unknowns();
-    fmt::print("linear solver\n  {}\n", solver());
+    const linear::MatrixTraits matrix = unknowns();
+    fmt::print("linear solver\n  {}\n", solver(matrix));
     if (setup_.contact.enabled) contact();
     fmt::print("warnings\n");
     if (warnings_.empty()) fmt::print("  none\n");
@@ -119,7 +109,7 @@ class Explanation {
       Sum& sum = sums[mesh.body(c)];
       ++sum.cells;
       sum.volume += mesh.volume(c);
-      const double q = quality(mesh, c);
+      const double q = simplex_quality<Dim>(corners(c));
       slivers += q < kSliver;
       if (q < worst) worst = q, worst_cell = c;
     }
@@ -154,6 +144,12 @@ class Explanation {
     if (size < kUsualLength[0] || size > kUsualLength[1]) warn("the bodies span {:.3g} m: are lengths in metres?", size);
   }
 
+  std::array<Vec<Dim>, Dim + 1> corners(CellId c) const {
+    std::array<Vec<Dim>, Dim + 1> corners;
+    for (int i = 0; i <= Dim; ++i) corners[i] = setup_.mesh.rest(setup_.mesh.cell(c)[i]);
+    return corners;
+  }
+
   void check_units(int id, const Material& material) {
     if (material.youngs_modulus < kUsualModulus[0] || material.youngs_modulus > kUsualModulus[1])
       warn("body {}: E = {:.3g} Pa is unusual: are moduli in Pa?", id, material.youngs_modulus);
@@ -185,26 +181,39 @@ class Explanation {
          setup_.remesh.enabled ? "/space/remesh/enabled" : "/space/remesh/enabled is false");
   }
 
-  void unknowns() {
+  /// Of the elements; contact adds to it. Held vertices that move through contact are counted as held.
+  linear::MatrixTraits unknowns() {
     const auto held = held_dofs(setup_, setup_.mesh, setup_.time.t0 + setup_.time.dt).held;
     const int bodies = Dim * setup_.mesh.vertex_slots();
-    const auto num_held = std::count(held.begin(), held.begin() + bodies, 1);
-    const double n = static_cast<double>(bodies - num_held);
-    const double edges = static_cast<double>(setup_.mesh.edges().size());
-    const double entries = Dim * Dim * (setup_.mesh.num_vertices() + 2 * edges);
-    // How the fill of nested dissection grows; the factors in front are rough.
-    const double fill = Dim == 2 ? 8 * n * std::log2(std::max(n, 2.0)) : 6 * std::pow(n, 4.0 / 3);
+    const auto free = [&](VertexId v) {
+      return static_cast<int>(std::count(held.begin() + Dim * v, held.begin() + Dim * (v + 1), 0));
+    };
+    linear::MatrixTraits matrix;
+    matrix.block_size = Dim;
+    matrix.may_be_indefinite = !setup_.newton.project_to_psd;
+    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) {
+      matrix.order += free(v);
+      matrix.nonzeros += free(v) * (free(v) + 1) / 2;
+    }
+    for (const auto& [a, b] : setup_.mesh.edges()) matrix.nonzeros += free(a) * free(b);
     constexpr double kEntryBytes = 12, kMegabyte = 1e6;
-    fmt::print("unknowns\n  {} of {} ({} held); matrix {:.1f} MB, factor about {:.1f} MB{}\n", bodies - num_held, bodies,
-               num_held, entries * kEntryBytes / kMegabyte, fill * 8 / kMegabyte,
+    fmt::print("unknowns\n  {} of {} ({} held); matrix {:.1f} MB, factor of a direct solver up to about {:.1f} MB{}\n",
+               matrix.order, bodies, bodies - matrix.order, kEntryBytes * static_cast<double>(matrix.nonzeros) / kMegabyte,
+               linear::estimate_factor_bytes(matrix) / kMegabyte,
                setup_.remesh.enabled ? ", more as the mesh is refined" : "");
-    if (n == 0) warn("every vertex is held: there is nothing to solve for");
+    if (matrix.order == 0) warn("every vertex is held: there is nothing to solve for");
+    return matrix;
   }
 
-  std::string solver() const {
+  std::string solver(const linear::MatrixTraits& matrix) const {
     std::string asked;
     for (const auto& name : setup_.linear.solvers) asked += (asked.empty() ? "" : ", ") + name;
-    return fmt::format("{} (asked for: {})", simulation_.solver_name(), asked);
+    std::string name = simulation_.solver_name();
+    if (name == "auto") {
+      const linear::Pick pick = linear::pick_solver(matrix, registry_);
+      name = pick.name + ", " + pick.reason;
+    }
+    return fmt::format("{} (asked for: {})", name, asked);
   }
 
   /// Surfaces and which of them can meet; what is near at the start.
@@ -242,7 +251,7 @@ class Explanation {
   }
 
   const Setup<Dim>& setup_;
-  linear::Registry registry_;
+  linear::Registry& registry_;
   const Simulation<Dim> simulation_;
   std::vector<std::string> warnings_;
 };
@@ -251,10 +260,12 @@ class Explanation {
 
 int explain(const RunOptions& options) {
   scene::Scene scene = scene::read(options.scene, options.overrides);
+  linear::Registry registry;
+  registry.allow_mpi_start();
   std::visit(
       [&](auto& setup) {
         if (!options.solver.empty()) setup.linear.solvers = {options.solver};
-        Explanation(setup, scene.warnings).print();
+        Explanation(setup, registry, scene.warnings).print();
       },
       scene.setup);
   return done;

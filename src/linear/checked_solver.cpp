@@ -2,6 +2,7 @@
 // No backend is trusted: input is checked, the residual of every solve is computed, poor ones are refined.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <new>
 #include <utility>
 
@@ -34,6 +35,7 @@ namespace {
 
 constexpr int kRefinements = 2;
 constexpr double kUnitRoundOff = 1.1e-16;
+constexpr double kUnknown = std::numeric_limits<double>::infinity();  ///< residual where there is no solution
 
 bool is_finite(std::span<const double> values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
@@ -58,7 +60,11 @@ class CheckedSolver final : public Solver {
       : name_(std::move(name)), capabilities_(capabilities), engine_(std::move(engine)) {}
   std::string_view name() const override { return name_; }
   Capabilities capabilities() const override { return capabilities_; }
-  Statistics statistics() const override { return engine_->statistics(); }
+  Statistics statistics() const override {
+    Statistics statistics = engine_->statistics();
+    statistics.iterations = iterations_;
+    return statistics;
+  }
   std::string message() const override { return message_; }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
@@ -92,12 +98,13 @@ class CheckedSolver final : public Solver {
 
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
     const std::size_t n = pattern_.order;
-    if (!ready_) return {note(Outcome::failed, "no factorisation to solve with"), 1};
+    iterations_ = 0;
+    if (!ready_) return {note(Outcome::failed, "no factorisation to solve with"), kUnknown};
     if (columns < 0 || B.size() != n * columns || X.size() != B.size())
-      return {note(Outcome::failed, "wrong length of a vector"), 1};
+      return {note(Outcome::failed, "wrong length of a vector"), kUnknown};
     if (n == 0 || columns == 0) return {};
-    if (!is_finite(B)) return {note(Outcome::non_finite, "a right-hand side is not finite"), 1};
-    SolveReport report{Outcome::ok, 1};
+    if (!is_finite(B)) return {note(Outcome::non_finite, "a right-hand side is not finite"), kUnknown};
+    SolveReport report{Outcome::ok, kUnknown};
     report.outcome = guarded([&] {
       report = solve_checked(B, X, columns, asked);
       return report.outcome;
@@ -108,21 +115,25 @@ class CheckedSolver final : public Solver {
  private:
   SolveReport solve_checked(std::span<const double> B, std::span<double> X, int columns, double asked) {
     const std::size_t n = pattern_.order;
-    SolveReport report{engine_->solve(B, X, columns), 0};
-    if (report.outcome != Outcome::ok && report.outcome != Outcome::not_converged) {
-      note(report.outcome);
-      return report;
-    }
+    SolveReport report{solve_once(B, X, columns), 0};
+    if (report.outcome != Outcome::ok && report.outcome != Outcome::not_converged) return {note(report.outcome), kUnknown};
     bool finite = true;
     for (int c = 0; c < columns; ++c) {
       const double residual = refine(B.subspan(c * n, n), X.subspan(c * n, n), asked);
       finite = finite && std::isfinite(residual);  // std::max would swallow a NaN
       report.relative_residual = std::max(report.relative_residual, residual);
     }
-    if (!finite || !is_finite(X)) return {note(Outcome::non_finite, "the solution is not finite"), report.relative_residual};
+    // The matrix and the right-hand sides are finite: another solver may do better.
+    if (!finite || !is_finite(X)) return {note(Outcome::not_converged, "the solution is not finite"), kUnknown};
     report.outcome =
         report.relative_residual <= asked ? Outcome::ok : note(Outcome::not_converged, "the asked residual was not reached");
     return report;
+  }
+
+  Outcome solve_once(std::span<const double> B, std::span<double> X, int columns) {
+    const Outcome outcome = engine_->solve(B, X, columns);
+    iterations_ += engine_->statistics().iterations;
+    return outcome;
   }
 
   /// Exceptions end here: large systems do run out of memory, and Newton has an answer to that.
@@ -162,7 +173,7 @@ class CheckedSolver final : public Solver {
     if (scale == 0) return now == 0 ? 0 : 1;
     for (int i = 0; i < kRefinements && now > asked * scale; ++i) {
       correction_.resize(b.size());
-      if (engine_->solve(residual_, correction_, 1) != Outcome::ok) break;
+      if (solve_once(residual_, correction_, 1) != Outcome::ok) break;
       previous_.assign(x.begin(), x.end());
       for (std::size_t k = 0; k < b.size(); ++k) x[k] += correction_[k];
       residual(b, x);
@@ -183,6 +194,7 @@ class CheckedSolver final : public Solver {
   std::vector<double> values_, residual_, correction_, previous_;
   double largest_product_ = 0;
   bool analyzed_ = false, ready_ = false;
+  int iterations_ = 0;  ///< of the last solve with its refinements
   std::string message_;
 };
 

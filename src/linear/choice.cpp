@@ -5,12 +5,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <utility>
 
+#include "forwarding.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/dump.hpp"
 
-namespace itr::linear {
+namespace itr {
+
+void LinearOptions::validate() const {
+  if (dump_every < 1) throw InputError({"", "dump_every", std::to_string(dump_every), "at least 1"});
+}
+
+namespace linear {
 
 namespace {
 
@@ -22,18 +31,33 @@ double half_of_memory() {
   return 0.5 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-/// Solvers that throw nothing away: what a decorator forwards to the one that answers now.
-class Forwarding : public Solver {
+/// Stands for a solver that could not be created in the middle of a run.
+class Absent final : public Solver {
  public:
-  Capabilities capabilities() const override { return current().capabilities(); }
-  Statistics statistics() const override { return current().statistics(); }
-  std::string message() const override { return current().message(); }
+  Absent(std::string name, std::string why) : name_(std::move(name)), why_(std::move(why)) {}
+  std::string_view name() const override { return name_; }
+  Capabilities capabilities() const override { return {}; }
+  Outcome analyze(const SparsityPattern&, const AnalyzeHints&) override { return Outcome::failed; }
+  Outcome factorize(std::span<const double>) override { return Outcome::failed; }
+  SolveReport solve(std::span<const double>, std::span<double>, int, double) override {
+    return {Outcome::failed, std::numeric_limits<double>::infinity()};
+  }
+  Statistics statistics() const override { return {}; }
+  std::string message() const override { return why_; }
 
- protected:
-  virtual const Solver& current() const = 0;
+ private:
+  std::string name_, why_;
 };
 
-/// Those that would be refused because MPI does not run count as absent.
+template <typename Make>
+std::unique_ptr<Solver> created_or_absent(const std::string& name, Make&& make) {
+  try {
+    return make(name);
+  } catch (const InputError& error) {
+    return std::make_unique<Absent>(name, error.what());
+  }
+}
+
 std::vector<BackendInfo> ready_rows(Registry& registry) {
   std::vector<BackendInfo> rows = registry.list();
   for (BackendInfo& row : rows) row.available = registry.is_ready(row.name);
@@ -42,8 +66,12 @@ std::vector<BackendInfo> ready_rows(Registry& registry) {
 
 class AutoSolver final : public Forwarding {
  public:
-  AutoSolver(Registry& registry, bool may_be_indefinite, Logger logger)
-      : registry_(registry), rows_(ready_rows(registry)), may_be_indefinite_(may_be_indefinite), logger_(std::move(logger)) {
+  AutoSolver(Registry& registry, bool may_be_indefinite, Logger logger, std::map<std::string, SolverOptions> options)
+      : registry_(registry),
+        rows_(ready_rows(registry)),
+        may_be_indefinite_(may_be_indefinite),
+        logger_(std::move(logger)),
+        options_(std::move(options)) {
     pick({});
   }
   std::string_view name() const override { return "auto"; }
@@ -62,7 +90,9 @@ class AutoSolver final : public Forwarding {
 
   void pick(const MatrixTraits& traits) {
     Pick picked = pick_solver(traits, rows_);
-    if (!solver_ || picked.name != solver_->name()) solver_ = registry_.create(picked.name);
+    if (!solver_ || picked.name != solver_->name())
+      solver_ =
+          created_or_absent(picked.name, [&](const std::string& name) { return registry_.create(name, options_[name]); });
     if (traits.order > 0 && std::exchange(told_, picked.name) != picked.name)
       logger_.info("linear solver: auto takes " + picked.name + " for " + std::to_string(traits.order) +
                    " unknowns: " + picked.reason);
@@ -72,6 +102,7 @@ class AutoSolver final : public Forwarding {
   std::vector<BackendInfo> rows_;
   bool may_be_indefinite_;
   Logger logger_;
+  std::map<std::string, SolverOptions> options_;
   std::unique_ptr<Solver> solver_;
   std::string told_;  ///< the last pick that the logger knows
 };
@@ -85,9 +116,9 @@ bool is_solvers_fault(Outcome outcome) {
 /// One solver with others behind it. A matrix goes down the list until one copes; the next analysis starts at the top.
 class FallbackSolver final : public Forwarding {
  public:
-  using Make = std::function<std::unique_ptr<Solver>()>;
-  FallbackSolver(std::unique_ptr<Solver> first, std::vector<Make> others, Logger logger)
-      : others_(std::move(others)), logger_(std::move(logger)) {
+  using Make = std::function<std::unique_ptr<Solver>(const std::string& name)>;
+  FallbackSolver(std::unique_ptr<Solver> first, std::vector<std::string> others, Make make, Logger logger)
+      : others_(std::move(others)), make_(std::move(make)), logger_(std::move(logger)) {
     solvers_.push_back(std::move(first));
   }
   std::string_view name() const override { return solvers_[0]->name(); }
@@ -99,30 +130,40 @@ class FallbackSolver final : public Forwarding {
     coordinates_.assign(hints.coordinates.begin(), hints.coordinates.end());
     values_.clear();
     active_ = 0;
-    Outcome outcome = solvers_[0]->analyze(pattern_, hints);
-    while (is_solvers_fault(outcome) && advance(outcome)) outcome = analyze_active();
-    return outcome;
+    const Outcome first = solvers_[0]->analyze(pattern_, hints);
+    return take_over(first, [&] { return analyze_active(); });
   }
 
   Outcome factorize(std::span<const double> values) override {
     values_.assign(values.begin(), values.end());
-    Outcome outcome = solvers_[active_]->factorize(values_);
-    while (is_solvers_fault(outcome) && advance(outcome)) outcome = prepare_active();
-    return outcome;
+    const Outcome first = solvers_[active_]->factorize(values_);
+    return take_over(first, [&] { return prepare_active(); });
   }
 
+  /// The best of poor answers counts, and its solver goes on.
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
-    SolveReport report = solvers_[active_]->solve(B, X, columns, asked);
-    std::vector<double> other(X.size());
-    while (is_solvers_fault(report.outcome) && advance(report.outcome)) {
-      if (prepare_active() != Outcome::ok) continue;
+    SolveReport best = solvers_[active_]->solve(B, X, columns, asked);
+    std::size_t kept = active_;
+    Outcome last = best.outcome;
+    std::vector<double> other;
+    while (is_solvers_fault(last) && advance(last)) {
+      last = prepare_active();
+      if (last != Outcome::ok) continue;
+      other.resize(X.size());
       const SolveReport next = solvers_[active_]->solve(B, other, columns, asked);
-      // The better of two poor answers is kept.
-      if (next.outcome != Outcome::ok && next.relative_residual >= report.relative_residual) continue;
-      std::copy(other.begin(), other.end(), X.begin());
-      report = next;
+      last = next.outcome;
+      if (last != Outcome::ok && !(next.relative_residual < best.relative_residual)) continue;
+      std::ranges::copy(other, X.begin());
+      best = next;
+      kept = active_;
     }
-    return report;
+    // Without any solution, what a factorisation found out about the matrix is the answer.
+    if (std::isinf(best.relative_residual) && !is_solvers_fault(last)) {
+      best.outcome = last;
+      kept = active_;
+    }
+    active_ = kept;
+    return best;
   }
 
  private:
@@ -132,10 +173,20 @@ class FallbackSolver final : public Forwarding {
   bool advance(Outcome outcome) {
     if (active_ == others_.size()) return false;
     const Solver& failed = *solvers_[active_];
-    if (++active_ == solvers_.size()) solvers_.push_back(others_[active_ - 1]());
+    if (++active_ == solvers_.size()) solvers_.push_back(created_or_absent(others_[active_ - 1], make_));
     logger_.warning("linear solver " + std::string(failed.name()) + ": " + to_string(outcome) + " (" + failed.message() +
                     "); falling back to " + std::string(solvers_[active_]->name()));
     return true;
+  }
+  /// Others try until one copes or tells something of the matrix. Where none does, all stays with the first failure.
+  template <typename F>
+  Outcome take_over(Outcome first, F&& attempt) {
+    const std::size_t start = active_;
+    Outcome last = first;
+    while (is_solvers_fault(last) && advance(last)) last = attempt();
+    if (!is_solvers_fault(last)) return last;
+    active_ = start;
+    return first;
   }
   Outcome analyze_active() {
     return solvers_[active_]->analyze(pattern_, {.block_size = block_size_, .dofs = dofs_, .coordinates = coordinates_});
@@ -145,7 +196,8 @@ class FallbackSolver final : public Forwarding {
     return outcome == Outcome::ok ? solvers_[active_]->factorize(values_) : outcome;
   }
 
-  std::vector<Make> others_;
+  std::vector<std::string> others_;
+  Make make_;
   Logger logger_;
   std::vector<std::unique_ptr<Solver>> solvers_;  ///< those that were needed so far
   std::size_t active_ = 0;
@@ -188,8 +240,11 @@ Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& row
   return {"eigen:ldlt", "neither cholmod nor mumps is there"};
 }
 
-std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger) {
-  return std::make_unique<AutoSolver>(registry, may_be_indefinite, std::move(logger));
+Pick pick_solver(const MatrixTraits& traits, Registry& registry) { return pick_solver(traits, ready_rows(registry)); }
+
+std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger,
+                                         std::map<std::string, SolverOptions> options) {
+  return std::make_unique<AutoSolver>(registry, may_be_indefinite, std::move(logger), std::move(options));
 }
 
 std::string choose_name(const LinearOptions& options, Registry& registry) {
@@ -206,34 +261,43 @@ std::string choose_name(const LinearOptions& options, Registry& registry) {
 
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
                                       Logger logger) {
+  options.validate();
   std::map<std::string, SolverOptions> options_of;
   for (const auto& [name, values] : options.options) options_of[registry.find(name).name] = values;
   const auto make = [&registry, options_of, may_be_indefinite, logger](const std::string& name) {
-    if (name == "auto") return make_auto_solver(registry, may_be_indefinite, logger);
+    if (name == "auto") return make_auto_solver(registry, may_be_indefinite, logger, options_of);
     const auto found = options_of.find(Registry::canonical_name(name));
     return registry.create(name, found == options_of.end() ? SolverOptions() : found->second);
   };
-  // Options are checked now, also those of solvers that may never run.
-  for (const auto& [name, values] : options_of)
-    if (registry.is_ready(name)) registry.create(name, values);
 
-  std::vector<FallbackSolver::Make> others;
-  for (const auto& name : options.fallback) {
-    if (name != "auto") {
-      const BackendInfo info = registry.find(name);
-      if (!info.available) {
-        logger.warning("linear solver: the fallback " + name + " is absent: " + info.reason);
-        continue;
-      }
-      if (!registry.is_ready(name)) registry.create(name);  // says why: now, not in the middle of a step
+  const std::string first = choose_name(options, registry);
+  std::vector<std::string> others;
+  for (const auto& asked : options.fallback) {
+    if (asked == "auto") {
+      others.push_back(asked);
+      continue;
     }
-    others.push_back([make, name] { return make(name); });
+    const BackendInfo info = registry.find(asked);
+    if (!info.available) {
+      logger.warning("linear solver: the fallback " + asked + " is absent: " + info.reason);
+      continue;
+    }
+    if (!registry.is_ready(info.name)) registry.create(info.name);  // says why: now, not in the middle of a step
+    others.push_back(info.name);
   }
+  // Options are checked now, also those of solvers that run only later; but none is created, or MPI started, in vain.
+  const auto may_run = [&](const std::string& name) {
+    return first == name || first == "auto" || std::ranges::find(others, name) != others.end() ||
+           std::ranges::find(others, "auto") != others.end();
+  };
+  for (const auto& [name, values] : options_of)
+    if (may_run(name) && registry.is_ready(name)) registry.create(name, values);
 
-  auto solver = make(choose_name(options, registry));
-  if (!others.empty()) solver = std::make_unique<FallbackSolver>(std::move(solver), std::move(others), logger);
+  auto solver = make(first);
+  if (!others.empty()) solver = std::make_unique<FallbackSolver>(std::move(solver), std::move(others), make, logger);
   if (!options.dump_folder.empty()) solver = make_dumping_solver(std::move(solver), options.dump_folder, options.dump_every);
   return solver;
 }
 
-}  // namespace itr::linear
+}  // namespace linear
+}  // namespace itr

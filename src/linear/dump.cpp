@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "forwarding.hpp"
 #include "itr/core/error.hpp"
 
 namespace itr::linear {
@@ -45,20 +47,38 @@ std::vector<T> read_array(const std::filesystem::path& file) {
       shape == std::string::npos)
     throw InputError(
         {file.string(), "", "no array of the expected type", std::string("NumPy's format 1.0, one axis, ") + kType<T>});
-  std::vector<T> values(std::stoull(header.substr(shape + 10)));
+  std::uintmax_t count = 0;
+  const char* const digits = header.data() + shape + 10;
+  const auto parsed = std::from_chars(digits, header.data() + header.size(), count);
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(file, error);
+  // Before memory is taken for what a damaged header says.
+  if (error || parsed.ec != std::errc() || (bytes - kHeader) / sizeof(T) != count || (bytes - kHeader) % sizeof(T) != 0)
+    throw InputError({file.string(), "", "a header whose shape is not that of its file",
+                      std::to_string((bytes - kHeader) / sizeof(T)) + " values"});
+  std::vector<T> values(count);
   in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
-  if (!in) throw InputError({file.string(), "", "a file that ends early", std::to_string(values.size()) + " values"});
+  if (!in) throw InputError({file.string(), "", "a file that cannot be read", "a file that is readable"});
   return values;
 }
 
-class DumpingSolver final : public Solver {
+/// Columns one after another, each with its diagonal first and ascending rows below it.
+bool is_lower_triangle(const SparsityPattern& pattern) {
+  const auto& [order, starts, rows] = pattern;
+  if (order < 0 || starts.front() != 0 || starts.back() != static_cast<int>(rows.size())) return false;
+  for (int j = 0; j < order; ++j) {
+    if (starts[j] < 0 || starts[j] >= starts[j + 1] || starts[j + 1] > starts.back() || rows[starts[j]] != j) return false;
+    for (int p = starts[j] + 1; p < starts[j + 1]; ++p)
+      if (rows[p] <= rows[p - 1] || rows[p] >= order) return false;
+  }
+  return true;
+}
+
+class DumpingSolver final : public Forwarding {
  public:
   DumpingSolver(std::unique_ptr<Solver> solver, std::filesystem::path folder, int every)
       : solver_(std::move(solver)), folder_(std::move(folder)), every_(every) {}
   std::string_view name() const override { return solver_->name(); }
-  Capabilities capabilities() const override { return solver_->capabilities(); }
-  Statistics statistics() const override { return solver_->statistics(); }
-  std::string message() const override { return solver_->message(); }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
     system_.pattern = pattern;
@@ -83,6 +103,8 @@ class DumpingSolver final : public Solver {
   }
 
  private:
+  const Solver& current() const override { return *solver_; }
+
   std::unique_ptr<Solver> solver_;
   std::filesystem::path folder_;
   int every_, count_ = 0;
@@ -113,12 +135,19 @@ DumpedSystem read_system(const std::filesystem::path& folder) {
   system.coordinates = read_array<double>(folder / "coordinates.npy");
   const auto block_size = read_array<int>(folder / "block_size.npy");
   system.pattern.order = static_cast<int>(system.pattern.column_starts.size()) - 1;
-  const auto n = static_cast<std::size_t>(system.pattern.order), hinted = system.dofs.size();
-  if (system.pattern.order < 0 || block_size.size() != 1 || system.rhs.size() != n || (hinted != 0 && hinted != n) ||
-      system.coordinates.size() % std::max<std::size_t>(n, 1) != 0 || system.values.size() != system.pattern.nonzeros() ||
-      system.pattern.column_starts.back() != static_cast<int>(system.pattern.nonzeros()))
-    throw InputError({folder.string(), "", "arrays of lengths that do not fit", "a system as write_system leaves it"});
+  const auto refuse_unless = [&](bool ok, const char* found) {
+    if (!ok) throw InputError({folder.string(), "", found, "a system as write_system leaves it"});
+  };
+  refuse_unless(is_lower_triangle(system.pattern), "starts and rows of no lower triangle");
+  refuse_unless(block_size.size() == 1 && block_size[0] >= 1, "no block size");
   system.block_size = block_size[0];
+  const auto n = static_cast<std::size_t>(system.pattern.order);
+  const auto is_none_or = [](std::size_t size, std::size_t expected) { return size == 0 || size == expected; };
+  refuse_unless(system.values.size() == system.pattern.nonzeros() && system.rhs.size() == n &&
+                    is_none_or(system.dofs.size(), n) && is_none_or(system.coordinates.size(), n * system.block_size),
+                "arrays of lengths that do not fit");
+  for (std::size_t i = 0; i < system.dofs.size(); ++i)
+    refuse_unless(system.dofs[i] > (i == 0 ? -1 : system.dofs[i - 1]), "dofs that do not ascend");
   return system;
 }
 

@@ -4,10 +4,10 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseLU>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "eigen_engines.hpp"
+#include "itr/linear/iteration_options.hpp"
 
 namespace itr::linear {
 
@@ -26,23 +26,30 @@ class LowerTriangleEngine : public Engine {
   std::string message() const override { return {}; }
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints&) override {
     const std::vector<double> zeros(pattern.nonzeros(), 0.0);
+    factorized_ = false;
     matrix_ = Eigen::Map<const Sparse>(pattern.order, pattern.order, static_cast<int>(pattern.nonzeros()),
                                        pattern.column_starts.data(), pattern.row_indices.data(), zeros.data());
     return analyze_matrix();
   }
   Outcome factorize(std::span<const double> values) override {
     std::copy(values.begin(), values.end(), matrix_.valuePtr());
-    return factorize_matrix();
+    const Outcome outcome = factorize_matrix();
+    factorized_ = outcome == Outcome::ok;
+    return outcome;
   }
+  /// Eigen's solvers answer only after a factorisation.
+  Statistics statistics() const final { return factorized_ ? factor_statistics() : Statistics(); }
 
  protected:
   virtual Outcome analyze_matrix() = 0;
   virtual Outcome factorize_matrix() = 0;
+  virtual Statistics factor_statistics() const = 0;
   ConstColumns in(std::span<const double> B, int columns) const { return {B.data(), matrix_.rows(), columns}; }
   Columns out(std::span<double> X, int columns) const { return {X.data(), matrix_.rows(), columns}; }
   /// Of factors stored as values with 32-bit row indices.
   static Statistics sparse_factor(double nonzeros) { return {nonzeros, 12 * nonzeros, 12 * nonzeros}; }
   Sparse matrix_;
+  bool factorized_ = false;
 };
 
 /// Each pivot against its own row of the lower triangle `matrix`: against the largest pivot of all, a soft body beside a
@@ -88,7 +95,7 @@ class Ldlt final : public EigenEngine<Eigen::SimplicialLDLT<Sparse>> {
     solver_.factorize(matrix_);
     return solver_.info() == Eigen::Success ? check_pivots(matrix_, solver_) : Outcome::singular;
   }
-  Statistics statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
+  Statistics factor_statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
 };
 
 class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {
@@ -100,7 +107,7 @@ class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {
     solver_.factorize(matrix_);
     return success_or(Outcome::not_positive_definite);
   }
-  Statistics statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
+  Statistics factor_statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
 };
 
 class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
@@ -116,40 +123,37 @@ class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
     solver_.factorize(full);
     return success_or(Outcome::singular);
   }
-  Statistics statistics() const override { return sparse_factor(double(solver_.nnzL()) + double(solver_.nnzU())); }
+  Statistics factor_statistics() const override { return sparse_factor(double(solver_.nnzL()) + double(solver_.nnzU())); }
   bool analyzed_ = false;
 };
 
 class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Sparse, Eigen::Lower>> {
  public:
-  bool set_option(const std::string& key, const std::string& value) override {
-    double number = 0;
-    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
-    if (error != std::errc() || end != value.data() + value.size() || !(number > 0)) return false;
-    if (key == "tolerance" && number < 1)
-      tolerance_ = number;
-    else if (key == "max_iterations" && number >= 1 && number < 1e9)
-      max_iterations_ = static_cast<int>(number);
-    else
-      return false;
-    return true;
+  bool set_option(const std::string& key, const std::string& value) override { return options_.set(key, value); }
+  Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
+    iterations_ = 0;
+    Outcome worst = Outcome::ok;
+    for (int c = 0; c < columns; ++c) {  // Eigen counts the iterations of the last column only
+      out(X, columns).col(c) = solver_.solve(in(B, columns).col(c));
+      iterations_ += static_cast<int>(solver_.iterations());
+      if (solver_.info() != Eigen::Success) worst = Outcome::not_converged;
+    }
+    return worst;
   }
 
  private:
   Outcome factorize_matrix() override {
     if ((matrix_.diagonal().array() <= 0).any()) return Outcome::not_positive_definite;
-    solver_.setTolerance(tolerance_);
-    solver_.setMaxIterations(max_iterations_ > 0 ? max_iterations_ : std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
+    solver_.setTolerance(options_.tolerance);
+    solver_.setMaxIterations(options_.max_iterations > 0 ? options_.max_iterations
+                                                         : std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
     solver_.compute(matrix_);
+    iterations_ = 0;
     return success_or(Outcome::failed);
   }
-  Statistics statistics() const override {
-    Statistics statistics;
-    if (matrix_.rows() > 0) statistics.iterations = static_cast<int>(solver_.iterations());
-    return statistics;
-  }
-  double tolerance_ = 1e-12;
-  int max_iterations_ = 0;  ///< 0: by the size
+  Statistics factor_statistics() const override { return {.iterations = iterations_}; }
+  IterationOptions options_{.tolerance = 1e-12};
+  int iterations_ = 0;  ///< of all columns of the last solve
 };
 
 class Dense final : public EigenEngine<Eigen::LLT<Eigen::MatrixXd, Eigen::Lower>> {
@@ -157,7 +161,7 @@ class Dense final : public EigenEngine<Eigen::LLT<Eigen::MatrixXd, Eigen::Lower>
     solver_.compute(Eigen::MatrixXd(matrix_));
     return success_or(Outcome::not_positive_definite);
   }
-  Statistics statistics() const override {
+  Statistics factor_statistics() const override {
     const double n = static_cast<double>(matrix_.rows()), bytes = 8 * n * n;
     return {n * (n + 1) / 2, bytes, bytes, n * n * n / 3};
   }

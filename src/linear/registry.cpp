@@ -11,6 +11,7 @@
 #include "eigen_engines.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/choice.hpp"
+#include "itr/linear/iteration_options.hpp"
 #include "modules.hpp"
 
 namespace itr::linear {
@@ -102,14 +103,18 @@ struct Registry::Impl {
   /// Throws InputError where it cannot be created.
   const Row& usable(const std::string& asked);
 
-  [[noreturn]] void refuse(const std::string& asked, const Row* row) {
+  static std::string reason(const Row* row) { return row ? row->info.reason : ""; }
+
+  /// By value: the search may move the rows.
+  [[noreturn]] void refuse(const std::string& asked, const std::string reason_of_absence) {
     search();
     std::string present, absent;
     for (const Row& other : rows) {
       std::string& names = other.info.available ? present : absent;
       names += (names.empty() ? "" : ", ") + other.info.name;
     }
-    throw InputError({"", "linear solver", "\"" + asked + "\"" + (row ? ", which is absent: " + row->info.reason : ""),
+    throw InputError({"", "linear solver",
+                      "\"" + asked + "\"" + (reason_of_absence.empty() ? "" : ", which is absent: " + reason_of_absence),
                       "auto or one of " + present + " (absent: " + (absent.empty() ? "none" : absent) + ")"});
   }
 
@@ -123,7 +128,7 @@ struct Registry::Impl {
   const itr_engine& mpi_engine(const std::string& asked) {
     search();
     const Row* row = find(canonical_name(asked));
-    if (asked != "auto" && (!row || !row->info.available)) refuse(asked, row);
+    if (asked != "auto" && (!row || !row->info.available)) refuse(asked, reason(row));
     if (row && row->engine && row->engine->connect) return *row->engine;
     std::string able;
     for (const Row& other : rows)
@@ -140,7 +145,7 @@ Registry::Registry(std::vector<std::filesystem::path> folders) : impl_(std::make
   impl_->rows.push_back(built_in("eigen:ldlt", {.indefinite = true}, make_eigen_ldlt));
   impl_->rows.push_back(built_in("eigen:llt", {}, make_eigen_llt));
   impl_->rows.push_back(built_in("eigen:lu", {.indefinite = true}, make_eigen_lu));
-  impl_->rows.push_back(built_in("eigen:cg", {.iterative = true}, make_eigen_cg, "tolerance=NUMBER max_iterations=NUMBER"));
+  impl_->rows.push_back(built_in("eigen:cg", {.iterative = true}, make_eigen_cg, IterationOptions::kNames));
   impl_->rows.push_back(built_in("dense", {}, make_dense));
 }
 Registry::~Registry() = default;
@@ -148,6 +153,7 @@ Registry::Registry(Registry&&) noexcept = default;
 Registry& Registry::operator=(Registry&&) noexcept = default;
 
 void Registry::add(BackendInfo info, SolverFactory factory) {
+  info.available = true;
   if (Row* row = impl_->find(info.name))
     *row = {std::move(info), nullptr, nullptr, std::move(factory)};
   else
@@ -214,13 +220,13 @@ std::string Registry::canonical_name(const std::string& name) {
 
 BackendInfo Registry::find(const std::string& asked) {
   const Row* row = impl_->find_anywhere(canonical_name(asked));
-  if (!row) impl_->refuse(asked, nullptr);
+  if (!row) impl_->refuse(asked, "");
   return row->info;
 }
 
 const Row& Registry::Impl::usable(const std::string& asked) {
   const Row* row = find_anywhere(canonical_name(asked));
-  if (!row || !row->info.available) refuse(asked, row);
+  if (!row || !row->info.available) refuse(asked, reason(row));
   if (!has_its_mpi(*row))
     throw InputError({"", "linear solver", "\"" + asked + "\", which runs on MPI, and MPI is not initialised",
                       "MPI_Init before it, or Registry::allow_mpi_start()"});

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <string>
 
@@ -77,10 +78,12 @@ void bench(Registry& registry, const DumpedSystem& system, const std::string& na
       "{{\"solver\": \"{}\", \"unknowns\": {}, \"nonzeros\": {}, \"outcome\": \"{}\", \"analyze_s\": {:.4g}, "
       "\"factorize_s\": {:.4g}, \"solve_s\": {:.4g}, \"bare_factorize_s\": {:.4g}, \"bare_solve_s\": {:.4g}, "
       "\"factor_nonzeros\": {:.6g}, \"factor_mb\": {:.4g}, \"largest_rank_mb\": {:.4g}, \"flops\": {:.4g}, "
-      "\"iterations\": {}, \"residual\": {:.2e}}}\n",
+      "\"iterations\": {}, \"residual\": {}}}\n",
       name, system.pattern.order, system.pattern.nonzeros(), to_string(outcome), checked.analyze, checked.factorize,
       checked.solve, bare.factorize, bare.solve, statistics.factor_nonzeros, statistics.factor_bytes / 1e6,
-      statistics.largest_bytes / 1e6, statistics.flops, statistics.iterations, residual);
+      statistics.largest_bytes / 1e6, statistics.flops, statistics.iterations,
+      std::isfinite(residual) ? fmt::format("{:.2e}", residual) : "null");
+  if (outcome != Outcome::ok) fmt::print(stderr, "{}: {}\n", name, solver->message());
 }
 
 }  // namespace

@@ -8,6 +8,7 @@ python3 verification/solvers/run.py [--build build/release] [--work DIR] [--most
 import argparse
 import csv
 import json
+import math
 import os
 import pathlib
 import resource
@@ -104,7 +105,7 @@ def table(rows, scene):
             else:
                 work = (f"{row['iterations']} it." if row["iterations"] else f"{row['factor_nonzeros'] / 1e6:.2f}")
                 cells.append(f"{row['analyze_s']:.2g} + {row['factorize_s']:.2g} + {row['solve_s']:.2g} ({work}; "
-                             f"{row['residual']:.0e})" + (" *" if row["outcome"] != "ok" else ""))
+                             f"{math.inf if row['residual'] in (None, '') else row['residual']:.0e})" + (" *" if row["outcome"] != "ok" else ""))
         lines.append(f"| {solver} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

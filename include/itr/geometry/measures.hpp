@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <array>
+#include <cmath>
 
 #include "itr/core/types.hpp"
 
@@ -24,6 +25,18 @@ double simplex_volume(const Mat<Dim>& edges) {
 template <int Dim>
 double simplex_volume(const std::array<Vec<Dim>, Dim + 1>& p) {
   return simplex_volume<Dim>(edge_matrix<Dim>(p));
+}
+
+/// 1 for a regular simplex, 0 for a flat one, negative for an inverted one: its volume by that of the regular one of the
+/// same root mean square edge. (Parthasarathy, Graichen & Hathaway 1994 compare such measures.)
+template <int Dim>
+double simplex_quality(const std::array<Vec<Dim>, Dim + 1>& p) {
+  double squared = 0;
+  for (int i = 0; i <= Dim; ++i)
+    for (int j = 0; j < i; ++j) squared += (p[i] - p[j]).squaredNorm();
+  const double edge = std::sqrt(squared / (Dim * (Dim + 1) / 2));
+  const double regular = Dim == 2 ? std::sqrt(3.0) / 4 : std::sqrt(2.0) / 12;
+  return simplex_volume<Dim>(p) / (regular * std::pow(edge, Dim));
 }
 
 }  // namespace itr

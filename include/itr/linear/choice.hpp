@@ -26,12 +26,16 @@ struct Pick {
 
 /// What `auto` takes among the solvers that are there. A pure function of its arguments but for `memory_bytes` = 0.
 Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& rows);
+/// Among those of the registry that are ready: those that would be refused because MPI does not run count as absent.
+Pick pick_solver(const MatrixTraits& traits, Registry& registry);
 
 /// Bytes that the factors of such a matrix take with a nested-dissection ordering, fitted to verification/scaling.
 double estimate_factor_bytes(const MatrixTraits& traits);
 
-/// Picks at each analysis, and tells the logger when the pick changes. `registry` must outlive it.
-std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger);
+/// Picks at each analysis, and tells the logger when the pick changes. `options` by canonical name. A pick that cannot be
+/// created is an analysis that failed. `registry` must outlive it.
+std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger,
+                                         std::map<std::string, SolverOptions> options = {});
 
 /// The solver that stands first: a name of ours or "auto". Throws InputError for unknown names (present or absent is told)
 /// and where none of `solvers` is there. Other programs' names that we have no equal of ("Eigen::PardisoLDLT") are passed
@@ -39,7 +43,7 @@ std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefin
 std::string choose_name(const LinearOptions& options, Registry& registry);
 
 /// The solver that `options` ask for, with its fallbacks behind it. Throws InputError as choose_name, and for options that
-/// a solver does not have. `registry` must outlive the solver.
+/// a solver which may run does not have. `registry` must outlive the solver.
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
                                       Logger logger);
 

@@ -12,10 +12,13 @@ struct LinearOptions {
   std::vector<std::string> solvers = {"eigen"};  ///< the first one that there is
   /// Tried in this order on a matrix that the solver cannot factorise or solve to the asked residual. A matrix that is not
   /// positive definite is an answer, not a failure: Newton projects it.
-  std::vector<std::string> fallback;
-  std::map<std::string, std::map<std::string, std::string>> options;  ///< by solver name: {"ordering", "metis"}
-  std::string dump_folder;  ///< where systems are written as they are solved (dump.hpp); empty: none are
-  int dump_every = 1;       ///< each so many-th
+  std::vector<std::string> fallback = {};
+  std::map<std::string, std::map<std::string, std::string>> options = {};  ///< by solver name: {"ordering", "metis"}
+  std::string dump_folder = {};  ///< where systems are written as they are solved (dump.hpp); empty: none are
+  int dump_every = 1;            ///< each so many-th
+
+  /// Throws InputError.
+  void validate() const;
 };
 
 }  // namespace itr
