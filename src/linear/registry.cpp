@@ -56,6 +56,7 @@ constexpr Known kKnown[] = {{"cholmod:supernodal", "itr_backend_cholmod", "libsu
 struct Registry::Impl {
   std::vector<std::filesystem::path> folders;
   std::vector<Row> rows;
+  std::set<std::filesystem::path> loaded;
   bool searched = false;
   bool may_start_mpi = false;
 
@@ -64,19 +65,25 @@ struct Registry::Impl {
     return it == rows.end() ? nullptr : &*it;
   }
 
+  /// Loads the modules of a folder whose names `wanted` says true to.
+  template <typename Wanted>
+  void load(const std::filesystem::path& folder, const Wanted& wanted) {
+    std::error_code error;
+    std::set<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+      if (entry.path().extension() == ".so" && wanted(entry.path().stem().string())) files.insert(entry.path());
+    for (const auto& file : files) {
+      if (!loaded.insert(file).second) continue;
+      for (auto& row : load_module(file))
+        if (const Row* present = find(row.info.name); !present)
+          rows.push_back({std::move(row.info), std::move(row.factory), row.engine});
+    }
+  }
+
   /// Looks for modules, once. The first folder that has an engine wins.
   void search() {
     if (std::exchange(searched, true)) return;
-    for (const auto& folder : folders) {
-      std::error_code error;
-      std::set<std::filesystem::path> files;
-      for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-        if (entry.path().extension() == ".so") files.insert(entry.path());
-      for (const auto& file : files)
-        for (auto& row : load_module(file))
-          if (const Row* present = find(row.info.name); !present)
-            rows.push_back({std::move(row.info), std::move(row.factory), row.engine});
-    }
+    for (const auto& folder : folders) load(folder, [](const std::string&) { return true; });
     for (const Known& known : kKnown) {
       if (find(known.name)) continue;
       const Row* broken = find(known.module);  // a row of that name is a file that is there and does not load
@@ -93,9 +100,23 @@ struct Registry::Impl {
     }
   }
 
-  /// The row of a name of ours, searching for modules where it is not built in.
+  /// The row of a name of ours, searching for modules where it is not built in. Modules that are known to bring others only
+  /// stay unloaded while that can be: Trilinos and MUMPS take 40 MB.
   Row* find_anywhere(const std::string& name) {
     if (Row* row = find(name)) return row;
+    if (!searched)
+      for (const auto& folder : folders) {
+        load(folder, [&](const std::string& module) {
+          bool brings_others = false;
+          for (const Known& known : kKnown) {
+            if (module != known.module) continue;
+            if (name == known.name) return true;
+            brings_others = true;
+          }
+          return !brings_others;
+        });
+        if (Row* row = find(name)) return row;
+      }
     search();
     return find(name);
   }
