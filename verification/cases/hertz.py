@@ -42,17 +42,17 @@ def nodal_forces(frame):
     return forces
 
 
-def press(context, n, dhat):
+def press(context, n, dhat, approach=APPROACH):
     points, cells = body(n)
     mesh, plane = context.folder / f"body-{n}.msh", context.folder / "plane.obj"
     write_mesh(mesh, points, cells)
     write_line(plane, (-9, -dhat), (10, -dhat))
     content = scene(mesh, {"type": "LinearElasticity", "E": YOUNG, "nu": NU, "rho": 1.0, "plane_strain": True},
-                    boundary_conditions={"dirichlet_boundary": [{"id": 4, "value": [0, f"{-(APPROACH + dhat)} * t"]}]},
+                    boundary_conditions={"dirichlet_boundary": [{"id": 4, "value": [0, f"{-(approach + dhat)} * t"]}]},
                     time={"dt": 0.1, "tend": 1, "quasistatic": True})
     content["geometry"][0]["surface_selection"] = [{"id": 4, "box": [[-2, R - 1e-6], [2, R + 1e-6]]}]
     content["solver"]["nonlinear"]["x_delta"] = 1e-10
-    run = run_scene(context, f"press-{n}-{dhat:g}", with_obstacle(content, plane, dhat, YOUNG))
+    run = run_scene(context, f"press-{n}-{dhat:g}-{approach:g}", with_obstacle(content, plane, dhat, YOUNG))
     # The edge of the contact moves over the cells: an average of several states does not depend on where in a cell it is.
     return [pressures(frame) for frame in run.frames() if frame.t > 0.45]
 
@@ -95,7 +95,11 @@ def results(context):
                  listed(errors) + f" with {', '.join(str(2 * n) for n in sizes)} cells along")
     (x, pressure, _), last = series[-1][1][-1], found[-1][-1]
     yield Result("pressure on the finest mesh, L2", errors[-1], 3e-2)
-    yield Result("pressure on the finest mesh, largest within 0.9 a over the peak", mean(found[-1], "inside"), 5e-3)
+    # Hertz's formula is the limit of small contacts. At a / R = 0.03 it is 0.6 to 0.9 % off near the edge, and the finest mesh
+    # shows that; the same mesh with half of the contact is nearer to the limit.
+    inside = found[-1] if context.quick else [compare(*state) for state in press(context, sizes[-1], smallest / 4, APPROACH / 4)]
+    yield Result("pressure on the finest mesh, largest within 0.9 a over the peak", mean(inside, "inside"), 5e-3,
+                 note=f"a / R = {inside[-1]['a'] / R:.3f}")
     yield Result("peak pressure [Pa]", abs(pressure.max() / last["peak"] - 1), 5e-3, float(pressure.max()), float(last["peak"]))
     yield Result("half-width [m]", abs(last["found"] / last["a"] - 1), 2e-2, float(last["found"]), float(last["a"]))
     context.figure("pressure", lambda axes: draw(axes, x / last["a"], pressure / last["peak"], last["exact"] / last["peak"]))

@@ -10,6 +10,7 @@ namespace itr {
 namespace {
 
 constexpr std::size_t kBlock = 128;
+constexpr double kWasteful = 4;          ///< boxes this much roomier than a motion needs are made anew
 constexpr std::size_t kFewPairs = 4096;  ///< so many are looked at one by one: cheaper than a tree
 
 template <int Dim>
@@ -107,8 +108,18 @@ std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, cons
 }  // namespace
 
 template <int Dim>
-bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx) const {
+double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const VectorX* dx, double reach) const {
+  double motion = 0;
+  if (dx)
+    for (const int v : surface.vertices) motion = std::max(motion, at<Dim>(*dx, v).norm());
+  return 0.5 * reach + 0.25 * motion;
+}
+
+template <int Dim>
+bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx,
+                                   double room) const {
   if (surface_ != &surface || boxes_.size() != surface.vertices.size()) return false;
+  if (dx && room_ > kWasteful * room) return false;
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
     const Vec<Dim> p = at<Dim>(x, surface.vertices[i]);
     if (!boxes_[i].contains(p)) return false;
@@ -119,12 +130,8 @@ bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorV
 
 template <int Dim>
 void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx,
-                                         double reach) {
-  // Room around the motion, so that the pairs serve a whole line search and often the next one.
-  double motion = 0;
-  if (dx)
-    for (const int v : surface.vertices) motion = std::max(motion, at<Dim>(*dx, v).norm());
-  const double room = 0.5 * reach + 0.25 * motion;
+                                         double reach, double room) {
+  room_ = room;
   boxes_.assign(surface.vertices.size(), {});
   reach_.resize(surface.area.size());
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
@@ -138,9 +145,10 @@ void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstV
 
 template <int Dim>
 void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach) {
-  if (holds(surface, x, dx)) return;
+  const double room = room_for(surface, dx, reach);
+  if (holds(surface, x, dx, room)) return;
   const bool keep_trees = surface_ == &surface;
-  build_boxes(surface, x, dx, reach);
+  build_boxes(surface, x, dx, reach, room);
   surface_ = &surface;
   const auto edge_boxes = boxes_of<Dim>(surface.edges, reach_);
   const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);

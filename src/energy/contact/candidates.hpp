@@ -26,10 +26,13 @@ class ContactCandidates {
   bool empty() const { return vertex_edges_.empty() && vertex_triangles_.empty() && edge_edges_.empty(); }
 
  private:
-  bool holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx) const;
-  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
+  /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
+  double room_for(const CollisionSurface& surface, const VectorX* dx, double reach) const;
+  bool holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double room) const;
+  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach, double room);
 
   const CollisionSurface* surface_ = nullptr;
+  double room_ = 0;  ///< around the motion of the last search [m]
   std::vector<Box<Dim>> boxes_;  ///< one a surface vertex: while it stays in there, the pairs hold
   std::vector<Box<Dim>> reach_;  ///< by problem vertex, half the reach around its box
   Bvh<Dim> edge_tree_, triangle_tree_;
