@@ -65,7 +65,7 @@ std::string resume_hint(const std::string& directory) {
 std::optional<output::SavedState> find_resumable(const scene::Scene& scene, const std::string& directory,
                                                  const RunOptions& options) {
   if (!options.resume) return std::nullopt;
-  const auto saved = output::find_saved_state(directory);
+  auto saved = output::find_saved_state(directory);
   if (!saved) {
     spdlog::info("no saved state in {}: starting from the beginning", directory);
     return std::nullopt;

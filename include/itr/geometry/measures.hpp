@@ -34,7 +34,8 @@ double simplex_quality(const std::array<Vec<Dim>, Dim + 1>& p) {
   double squared = 0;
   for (int i = 0; i <= Dim; ++i)
     for (int j = 0; j < i; ++j) squared += (p[i] - p[j]).squaredNorm();
-  const double edge = std::sqrt(squared / (Dim * (Dim + 1) / 2));
+  constexpr double kEdges = 0.5 * Dim * (Dim + 1);
+  const double edge = std::sqrt(squared / kEdges);
   const double regular = Dim == 2 ? std::sqrt(3.0) / 4 : std::sqrt(2.0) / 12;
   return simplex_volume<Dim>(p) / (regular * std::pow(edge, Dim));
 }

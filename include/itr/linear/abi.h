@@ -16,6 +16,8 @@ extern "C" {
 #define ITR_BACKEND_ABI_VERSION 2
 #define ITR_BACKEND_ENTRY "itr_backend_module"
 
+/* Names as in C. NOLINTBEGIN(readability-identifier-naming) */
+
 /* Outcomes, as itr::linear::Outcome. */
 enum { ITR_OK, ITR_NOT_POSITIVE_DEFINITE, ITR_SINGULAR, ITR_NON_FINITE, ITR_OUT_OF_MEMORY, ITR_NOT_CONVERGED, ITR_FAILED };
 
@@ -81,6 +83,8 @@ typedef struct itr_module {
 } itr_module;
 
 typedef const itr_module* (*itr_backend_entry)(void);
+
+/* NOLINTEND(readability-identifier-naming) */
 
 #ifdef __cplusplus
 }
