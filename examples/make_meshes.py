@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Makes the meshes of the example scenes: near-equilateral triangulations of a beam, a square and a disc (Gmsh .msh 2.2),
-and Cook's membrane, a box and a line (.obj). The results are committed; run it again after a change here.
+"""Makes the meshes of the example scenes: near-equilateral triangulations of a beam, a square and a disc and a cube of
+tetrahedra (Gmsh .msh 2.2), and Cook's membrane, a box, a line and a floor (.obj). The results are committed; run it again after a change here.
 
 usage: make_meshes.py [-o DIR]
 """
 
 import argparse
+import itertools
 import pathlib
 
 import numpy as np
@@ -74,6 +75,21 @@ def ring(inner, outer):
     return triangles
 
 
+def cube(n):
+    """n x n x n boxes of a unit cube centred at the origin, each cut into six tetrahedra around a diagonal."""
+    number = np.arange((n + 1)**3).reshape(n + 1, n + 1, n + 1)
+    points = np.stack(np.unravel_index(number.ravel(), number.shape), axis=1) / n - 0.5
+    tetrahedra = []
+    for i, j, k in np.ndindex(n, n, n):
+        for a, b, c in itertools.permutations(np.eye(3, dtype=int)):
+            corners = [(0, 0, 0), a, a + b, a + b + c]
+            tetrahedron = [number[i + x, j + y, k + z] for x, y, z in corners]
+            if np.linalg.det(np.stack([a, b, c])) < 0:
+                tetrahedron[2:] = tetrahedron[:1:-1]
+            tetrahedra.append(tetrahedron)
+    return points, np.array(tetrahedra)
+
+
 def check(points, triangles):
     """Positive areas, and every vertex used."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
@@ -82,18 +98,21 @@ def check(points, triangles):
     assert len(np.unique(triangles)) == len(points)
 
 
-def write_msh(path, points, triangles):
-    check(points, triangles)
+def write_msh(path, points, cells):
+    if points.shape[1] == 2:
+        check(points, cells)
+        points = np.pad(points, ((0, 0), (0, 1)))
+    kind, name = (2, "triangles") if cells.shape[1] == 3 else (4, "tetrahedra")
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", str(len(points))]
-    lines += [f"{k + 1} {x:.16g} {y:.16g} 0" for k, (x, y) in enumerate(points)]
-    lines += ["$EndNodes", "$Elements", str(len(triangles))]
-    lines += [f"{k + 1} 2 2 0 1 {a + 1} {b + 1} {c + 1}" for k, (a, b, c) in enumerate(triangles)]
+    lines += [f"{k + 1} {x:.16g} {y:.16g} {z:.16g}" for k, (x, y, z) in enumerate(points)]
+    lines += ["$EndNodes", "$Elements", str(len(cells))]
+    lines += [f"{k + 1} {kind} 2 0 1 " + " ".join(str(v + 1) for v in cell) for k, cell in enumerate(cells)]
     path.write_text("\n".join(lines + ["$EndElements", ""]))
-    print(f"{path}: {len(points)} vertices, {len(triangles)} triangles")
+    print(f"{path}: {len(points)} vertices, {len(cells)} {name}")
 
 
 def write_obj(path, points, faces=(), lines=()):
-    text = [f"v {x:g} {y:g} 0" for x, y in points]
+    text = ["v " + " ".join(f"{c:g}" for c in (*point, 0)[:3]) for point in points]
     text += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
     text += ["l " + " ".join(str(v + 1) for v in line) for line in lines]
     path.write_text("\n".join(text) + "\n")
@@ -110,6 +129,8 @@ def main():
     write_msh(folder / "disc.msh", *disc(0.5, 0.1))
     write_obj(folder / "cook.obj", [(0, 0), (48, 44), (48, 60), (0, 44)], faces=[(0, 1, 3), (1, 2, 3)])
     write_obj(folder / "box.obj", [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], faces=[(0, 1, 2), (0, 2, 3)])
+    write_msh(folder / "cube.msh", *cube(3))
+    write_obj(folder / "floor.obj", [(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], faces=[(0, 2, 1), (0, 3, 2)])
     write_obj(folder / "line.obj", [(-0.5, 0), (0.5, 0)], lines=[(0, 1)])
 
 

@@ -291,6 +291,7 @@ INSTANTIATE_TEST_SUITE_P(
                            kImpact + Arguments{"/solver/nonlinear/max_iterations=8", "/space/remesh/enabled=false"}},
                       Case{"damping", "ball_wall.json", 40, R"("dt":2e-5)",
                            kImpact + Arguments{R"(/solver/rayleigh_damping=[{"form":"elasticity","stiffness_ratio":0.1}])"}},
+                      Case{"cubes", "cubes.json", 45, R"("dt":0.01)", {}},  // 3D; they meet in step 14
                       Case{"masticator", "masticator.json", 30, R"("dt":0.05)", {}},
                       Case{"quasistatic", "cantilever.json", 12, R"("dt":0.05,"quasistatic":true)", {}}),
     [](const auto& info) { return info.param.name; });
