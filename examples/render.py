@@ -122,6 +122,7 @@ def draw(axes, frame, norm, box):
     if frame.dim == 3:
         axes.set_zlim(low[2], high[2])
         axes.set_box_aspect(high - low)
+        axes.view_init(elev=20, azim=-60, vertical_axis="y")
     axes.set_title(f"step {frame.step}, t = {frame.t:.4g} s: {len(frame.x)} vertices, {len(frame.cells)} cells", fontsize=9)
     axes.tick_params(labelsize=7)
     return cells

@@ -126,6 +126,7 @@ ClosestFeatures closest_features(PairKind kind, const Vec<Dim>* x) {
       return {kind, {0, 1, -1, -1}};
     case PairKind::edge_vertex:
       return of_point_and_edge<Dim>(x, 0, 1, 2);
+    // In 2D this case does nothing, as the next: NOLINTNEXTLINE(bugprone-branch-clone)
     case PairKind::face_vertex:
       if constexpr (Dim == 3) {
         if (Foot(x[0], x[1], x[2], x[3]).inside) return {kind, {0, 1, 2, 3}};
@@ -158,6 +159,7 @@ PairDistance<Dim> pair_distance(PairKind kind, const Vec<Dim>* x) {
       result.separation = x[0] - x[1] - t * e;
       break;
     }
+    // In 2D this case does nothing, as the next: NOLINTNEXTLINE(bugprone-branch-clone)
     case PairKind::face_vertex:
       if constexpr (Dim == 3) {
         const Vec<3> u = x[2] - x[1], v = x[3] - x[1], w = x[0] - x[1], normal = u.cross(v);
@@ -235,6 +237,7 @@ double pair_distance_squared(PairKind kind, const Vec<Dim>* x) {
       return (x[0] - x[1]).squaredNorm();
     case PairKind::edge_vertex:
       return point_edge_distance_squared<Dim>(x[0], x[1], x[2]);
+    // In 2D this case does nothing, as the next: NOLINTNEXTLINE(bugprone-branch-clone)
     case PairKind::face_vertex:
       if constexpr (Dim == 3) return point_triangle_distance_squared(x[0], x[1], x[2], x[3]);
       break;
@@ -301,12 +304,12 @@ Mat<12> edge_cross_squared_hessian(const Vec<3>* x) {
   return hessian;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                     \
-  template ClosestFeatures closest_features<Dim>(PairKind, const Vec<Dim>*);                                     \
-  template PairDistance<Dim> pair_distance<Dim>(PairKind, const Vec<Dim>*);                                      \
-  template Mat<4 * Dim> pair_distance_hessian<Dim>(PairKind, const Vec<Dim>*);                                   \
-  template Eigen::Matrix<double, 4 * Dim, Dim + 2> pair_distance_range<Dim>(PairKind, const PairDistance<Dim>&); \
-  template double pair_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                         \
+#define ITR_INSTANTIATE(Dim)                                                                                         \
+  template ClosestFeatures closest_features<Dim>(PairKind, const Vec<Dim>*);                                         \
+  template PairDistance<Dim> pair_distance<Dim>(PairKind, const Vec<Dim>*);                                          \
+  template Mat<4 * (Dim)> pair_distance_hessian<Dim>(PairKind, const Vec<Dim>*);                                     \
+  template Eigen::Matrix<double, 4 * (Dim), (Dim) + 2> pair_distance_range<Dim>(PairKind, const PairDistance<Dim>&); \
+  template double pair_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                             \
   template double point_edge_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
