@@ -129,8 +129,8 @@ bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorV
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx,
-                                         double reach, double room) {
+void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach,
+                                         double room) {
   room_ = room;
   boxes_.assign(surface.vertices.size(), {});
   reach_.resize(surface.area.size());

@@ -32,7 +32,7 @@ class ContactCandidates {
   void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach, double room);
 
   const CollisionSurface* surface_ = nullptr;
-  double room_ = 0;  ///< around the motion of the last search [m]
+  double room_ = 0;              ///< around the motion of the last search [m]
   std::vector<Box<Dim>> boxes_;  ///< one a surface vertex: while it stays in there, the pairs hold
   std::vector<Box<Dim>> reach_;  ///< by problem vertex, half the reach around its box
   Bvh<Dim> edge_tree_, triangle_tree_;
