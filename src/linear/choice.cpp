@@ -250,7 +250,7 @@ std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefin
 std::string choose_name(const LinearOptions& options, Registry& registry) {
   for (const auto& asked : options.solvers) {
     if (asked == "auto") return asked;
-    const std::string name = Registry::canonical_name(asked);
+    std::string name = Registry::canonical_name(asked);
     if (!name.empty() && registry.find(name).available) return name;
   }
   // Names of ours that are absent are errors, others' only mean the default.
@@ -260,7 +260,7 @@ std::string choose_name(const LinearOptions& options, Registry& registry) {
 }
 
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
-                                      Logger logger) {
+                                      const Logger& logger) {
   options.validate();
   std::map<std::string, SolverOptions> options_of;
   for (const auto& [name, values] : options.options) options_of[registry.find(name).name] = values;

@@ -127,7 +127,7 @@ struct Registry::Impl {
   static std::string reason(const Row* row) { return row ? row->info.reason : ""; }
 
   /// By value: the search may move the rows.
-  [[noreturn]] void refuse(const std::string& asked, const std::string reason_of_absence) {
+  [[noreturn]] void refuse(const std::string& asked, std::string reason_of_absence) {
     search();
     std::string present, absent;
     for (const Row& other : rows) {
@@ -290,8 +290,9 @@ void Registry::serve(const std::string& name, const void* communicator) {
 void apply_options(Engine& engine, const std::string& name, const std::string& known, const SolverOptions& options) {
   for (const auto& [key, value] : options)
     if (!engine.set_option(key, value))
-      throw InputError({"", "linear solver " + name, "the option " + key + "=" + value,
-                        known.empty() ? "no option: it has none" : "one of " + known});
+      throw InputError({"", std::string("linear solver ").append(name),
+                        std::string("the option ").append(key).append("=").append(value),
+                        known.empty() ? "no option: it has none" : std::string("one of ").append(known)});
 }
 
 }  // namespace itr::linear

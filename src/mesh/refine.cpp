@@ -72,6 +72,7 @@ template <int Dim>
 Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
   ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots(), mesh.num_vertices(), mesh.vertex_slots());
   std::vector<Vec<Dim>> rest;
+  rest.reserve(mesh.vertex_slots());
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
   const Midpoints<Dim> mid(mesh, rest);
 

@@ -63,6 +63,7 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
 template <int Dim>
 void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress) {
   std::vector<std::int64_t> tags;
+  tags.reserve(state.mesh.facet_slots());
   for (FacetId f = 0; f < state.mesh.facet_slots(); ++f) tags.push_back(state.mesh.facet_tag(f));
   file.write("/checkpoint/facet_tag", tags, 0);
   const auto write_fields = [&](const char* kind, const std::vector<VectorX>& fields) {

@@ -183,8 +183,9 @@ class ConditionReader {
     return {time.t0, time.t0 + time.dt, time.t0 + duration / 2, time.t0 + duration};
   }
 
-  std::vector<Vec<Dim>> points(std::set<int> vertices) const {
+  std::vector<Vec<Dim>> points(const std::set<int>& vertices) const {
     std::vector<Vec<Dim>> result;
+    result.reserve(vertices.size());
     for (const int v : vertices) result.push_back(setup_.mesh.rest(v));
     return result;
   }
@@ -195,7 +196,7 @@ class ConditionReader {
       if (setup_.mesh.facet_tag(f) == tag) vertices.insert(setup_.mesh.facet(f).begin(), setup_.mesh.facet(f).end());
     for (std::size_t v = 0; v < setup_.point_tags.size(); ++v)
       if (setup_.point_tags[v] == tag) vertices.insert(static_cast<int>(v));
-    return points(std::move(vertices));
+    return points(vertices);
   }
 
   std::vector<Vec<Dim>> vertices_of_body(int body) const {
@@ -207,6 +208,7 @@ class ConditionReader {
 
   std::vector<Vec<Dim>> all_vertices() const {
     std::vector<Vec<Dim>> result;
+    result.reserve(setup_.mesh.vertex_slots());
     for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) result.push_back(setup_.mesh.rest(v));
     return result;
   }

@@ -177,7 +177,7 @@ int dimension_of(const Node& geometry, const MeshFile& file) {
 std::filesystem::path MeshFiles::find(const Node& geometry) {
   const Node node = geometry["mesh"];
   if (!node.exists()) node.fail("the path of a mesh file");
-  const std::filesystem::path path = geometry.document().resolve(node.string(""));
+  std::filesystem::path path = geometry.document().resolve(node.string(""));
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored))
     node.fail(abbreviate(node.json()) + ", but there is no file '" + path.string() + "'", "the path of a mesh file");

@@ -256,7 +256,7 @@ void check_keys(const Node& node, const std::string& pattern) {
   }
   for (const auto& [key, value] : node.json().items()) {
     if (!children->contains(key)) refuse_unknown(node, key, *children);
-    check_keys(node[key], pattern + "/" + key);
+    check_keys(node[key], std::string(pattern).append("/").append(key));
   }
 }
 
@@ -274,7 +274,7 @@ Json schema_of(const std::string& pattern) {
     return {{"anyOf", {{{"type", "array"}, {"items", item}}, item}}};  // one that stands for a list of one
   }
   Json object = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
-  for (const auto& key : *children) object["properties"][key] = schema_of(pattern + "/" + key);
+  for (const auto& key : *children) object["properties"][key] = schema_of(std::string(pattern).append("/").append(key));
   if (!entry) return object;
   return {{"anyOf", {object, {{"not", {{"type", "object"}}}}}}};
 }

@@ -54,6 +54,7 @@ class MaterialReader {
   MaterialReader(const Node& node, int dimension) : node_(node), dimension_(dimension) {
     if (!node.json().is_object()) node.fail("a material");
     std::vector<std::string> types;
+    types.reserve(std::size(kLaws));
     for (const LawName& law : kLaws) types.push_back(law.type);
     if (!node.has("type")) node["type"].fail("the material law");
     const LawName& law = kLaws[node["type"].choice(types, 0)];

@@ -31,6 +31,7 @@ double shortest_surface_edge(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstac
 template <int Dim>
 double body_diagonal(const Mesh<Dim>& mesh) {
   std::vector<Vec<Dim>> points;
+  points.reserve(mesh.vertex_slots());
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v) points.push_back(mesh.rest(v));
   return bounding_box<Dim>(points).diagonal().norm();
 }

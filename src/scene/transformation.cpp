@@ -30,7 +30,7 @@ Vec<Dim> read_scale(const Node& node, const Box<Dim>& box) {
   return factors.empty() ? Vec<Dim>::Ones().eval() : padded<Dim>(factors);
 }
 
-Mat<2> read_rotation(const Node& node, Mat<2>) {
+Mat<2> read_rotation(const Node& node, const Mat<2>&) {
   const Node rotation = node["rotation"];
   if (!rotation.exists() || (rotation.json().is_array() && rotation.json().empty())) return Mat<2>::Identity();
   if (rotation.json().is_array()) rotation.fail("one number: degrees, counter-clockwise (this is a 2D scene)");
@@ -56,7 +56,7 @@ Vec<3> direction(const Node& rotation, const Vec<3>& axis) {
   return axis.normalized();
 }
 
-Mat<3> read_rotation(const Node& node, Mat<3>) {
+Mat<3> read_rotation(const Node& node, const Mat<3>&) {
   const Node rotation = node["rotation"], mode_node = node["rotation_mode"];
   std::string mode = mode_node.string("xyz");
   std::transform(mode.begin(), mode.end(), mode.begin(), [](unsigned char c) { return std::tolower(c); });

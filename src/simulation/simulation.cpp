@@ -145,6 +145,7 @@ struct Simulation<Dim>::Impl {
 };
 
 template <int Dim>
+// It is moved: NOLINTNEXTLINE(performance-unnecessary-value-param)
 Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger) : impl_(std::make_unique<Impl>()) {
   refuse_unsupported(setup);
   impl_->setup = std::move(setup);

@@ -96,6 +96,8 @@ struct NoUnknowns {
   explicit NoUnknowns(Eigen::Index n) : dofs{std::vector<int>(n, kNone), 0}, sink(dofs, none) {}
 };
 
+// Their names are those of the report: NOLINTBEGIN(readability-identifier-naming)
+
 void ElementEnergy(benchmark::State& state) {
   const Cube cube(12);
   const ElasticEnergy<3> elastic(cube.cells, kMaterials, 1);
@@ -234,6 +236,8 @@ BENCHMARK(ActiveSet)->Arg(1)->Arg(2)->UseRealTime();
 BENCHMARK(StepLimit)->Arg(1)->Arg(2)->UseRealTime();
 BENCHMARK(CcdQuery<false>)->UseRealTime();
 BENCHMARK(CcdQuery<true>)->UseRealTime();
+
+// NOLINTEND(readability-identifier-naming)
 
 }  // namespace
 

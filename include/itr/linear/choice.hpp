@@ -45,6 +45,6 @@ std::string choose_name(const LinearOptions& options, Registry& registry);
 /// The solver that `options` ask for, with its fallbacks behind it. Throws InputError as choose_name, and for options that
 /// a solver which may run does not have. `registry` must outlive the solver.
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
-                                      Logger logger);
+                                      const Logger& logger);
 
 }  // namespace itr::linear
