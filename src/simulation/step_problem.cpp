@@ -10,6 +10,8 @@
 #include <sstream>
 #include <utility>
 
+#include "itr/core/timer.hpp"
+
 namespace itr {
 
 namespace {
@@ -315,10 +317,15 @@ int StepProblem<Dim>::most_rounds() const {
 
 template <int Dim>
 NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
-  const bool is_first_step = std::isinf(stiffness_.largest);
-  if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
-  lagged_ = lag(lagged_x);
+  double lagging_seconds = 0;
+  {
+    const ScopedTimer timer(lagging_seconds);
+    const bool is_first_step = std::isinf(stiffness_.largest);
+    if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
+    lagged_ = lag(lagged_x);
+  }
   NewtonSummary summary = minimize_lagged(x);
+  summary.assembly_seconds += lagging_seconds;
   const int rounds = most_rounds();
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
   std::vector<VectorX> previous = {lagged_x};  // newest last
@@ -327,9 +334,13 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
   double least = std::numeric_limits<double>::infinity();
   int best_round = 0;
   for (int round = 1; summary.converged() && round < rounds; ++round) {
-    LaggedTerms next_lagged = lag(x);
+    LaggedTerms next_lagged;
     VectorX gradient = VectorX::Zero(x.size());
-    sum_with(next_lagged).add_gradient(x, gradient, workspace_);
+    {
+      const ScopedTimer timer(summary.assembly_seconds);
+      next_lagged = lag(x);
+      sum_with(next_lagged).add_gradient(x, gradient, workspace_);
+    }
     double norm = 0;
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
