@@ -126,7 +126,7 @@ struct Registry::Impl {
 
   static std::string reason(const Row* row) { return row ? row->info.reason : ""; }
 
-  /// By value: the search may move the rows.
+  /// By value, as the search may move the rows: NOLINTNEXTLINE(performance-unnecessary-value-param)
   [[noreturn]] void refuse(const std::string& asked, std::string reason_of_absence) {
     search();
     std::string present, absent;

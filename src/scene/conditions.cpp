@@ -203,7 +203,7 @@ class ConditionReader {
     std::set<int> vertices;
     for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c)
       if (setup_.mesh.body(c) == body) vertices.insert(setup_.mesh.cell(c).begin(), setup_.mesh.cell(c).end());
-    return points(std::move(vertices));
+    return points(vertices);
   }
 
   std::vector<Vec<Dim>> all_vertices() const {
