@@ -305,15 +305,16 @@ void LocalProblem::add_terms(HistoryRule history) {
   if (!context_.loads.pressures.empty())
     energy_.add(std::make_shared<PressureEnergy<2>>(cells_, context_.loads, x_, context_.scaling));
   if (!has_surface_) return;
+  std::vector<std::pair<int, Box<2>>> bounds;
+  for (std::size_t i = 0; i < bounds_.size(); ++i)
+    if (surface_.counts[i]) bounds.emplace_back(static_cast<int>(i), bounds_[i]);
+  // Before contact, which then looks no further than that.
+  energy_.add(std::make_shared<MotionBound>(bounds));
   contact_ =
       std::make_shared<ContactEnergy<2>>(surface_, context_.contact, context_.contact.barrier_stiffness, context_.scaling);
   touches_contact_ = contact_->has_candidates(x_, workspace_);
   energy_.add(contact_);
   add_damping(DampingOptions::Term::contact, *contact_);
-  std::vector<std::pair<int, Box<2>>> bounds;
-  for (std::size_t i = 0; i < bounds_.size(); ++i)
-    if (surface_.counts[i]) bounds.emplace_back(static_cast<int>(i), bounds_[i]);
-  energy_.add(std::make_shared<MotionBound>(bounds));
   if (!touches_contact_ || context_.contact.friction_coefficient == 0 || context_.contact.friction_iterations == 0) return;
   auto friction =
       std::make_shared<FrictionEnergy<2>>(*contact_, x_, workspace_, context_.contact, velocity_rule(), context_.scaling);

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "itr/energy/contact/surface.hpp"
 #include "itr/geometry/bvh.hpp"
+#include "itr/geometry/distance.hpp"
 
 namespace itr {
 
@@ -20,6 +22,11 @@ class ContactCandidates {
   /// count.
   void update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
 
+  /// The lists that there are in this dimension, each with the kind of its pairs.
+  std::vector<std::pair<PairKind, const Pairs*>> all() const {
+    if constexpr (Dim == 2) return {{PairKind::edge_vertex, &vertex_edges_}};
+    return {{PairKind::face_vertex, &vertex_triangles_}, {PairKind::edge_edge, &edge_edges_}};
+  }
   const Pairs& vertex_edges() const { return vertex_edges_; }          ///< (vertex, edge); 2D
   const Pairs& vertex_triangles() const { return vertex_triangles_; }  ///< (vertex, triangle); 3D
   const Pairs& edge_edges() const { return edge_edges_; }              ///< smaller index first where both count; 3D

@@ -38,6 +38,37 @@ Positions<Dim> gather(const std::array<int, 4>& vertices, int size, ConstVectorV
   return p;
 }
 
+/// Vertices of a candidate: those of its first primitive, then those of the second.
+std::array<int, 4> vertices_of(const CollisionSurface& surface, PairKind kind, const std::array<int, 2>& pair) {
+  const auto [i, j] = pair;
+  if (kind == PairKind::edge_vertex) return {i, surface.edges[j][0], surface.edges[j][1], kNone};
+  if (kind == PairKind::face_vertex) return {i, surface.triangles[j][0], surface.triangles[j][1], surface.triangles[j][2]};
+  return {surface.edges[i][0], surface.edges[i][1], surface.edges[j][0], surface.edges[j][1]};
+}
+
+/// Share of the way from p to q that is free of contact, by conservative CCD.
+template <int Dim>
+double free_share(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q) {
+  const int size_of_first = kind == PairKind::edge_edge ? 2 : 1;
+  Box<Dim> first, second;
+  for (int k = 0; k < pair_size(kind); ++k) {
+    Box<Dim>& box = k < size_of_first ? first : second;
+    box.include(p[k]);
+    box.include(q[k]);
+  }
+  if (!first.overlaps(second)) return 1;
+  if constexpr (Dim == 2) return point_edge_ccd<2>(p[0], p[1], p[2], q[0], q[1], q[2]);
+  if constexpr (Dim == 3)
+    return kind == PairKind::edge_edge ? edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3])
+                                       : point_triangle_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]);
+}
+
+const char* name_of(PairKind kind) {
+  return kind == PairKind::edge_vertex   ? "vertex-edge pair"
+         : kind == PairKind::face_vertex ? "vertex-triangle pair"
+                                         : "edge-edge pair";
+}
+
 /// The features of a mollified pair whose distance counts.
 template <int Dim>
 Positions<Dim> closest_of(const ContactStencil& s, const Positions<Dim>& p) {
@@ -165,20 +196,11 @@ double ContactEnergy<Dim>::min_distance(ConstVectorView x, Workspace& workspace)
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
   candidates.update(surface_, x, nullptr, dhat_);
   double smallest = kInfinity;
-  const auto look = [&](PairKind kind, const std::array<int, 4>& vertices) {
-    const auto p = gather<Dim>(vertices, pair_size(kind), x);
-    smallest = std::min(smallest, pair_distance_squared<Dim>(kind, p.data()));
-  };
-  for (const auto& [v, e] : candidates.vertex_edges())
-    look(PairKind::edge_vertex, {v, surface_.edges[e][0], surface_.edges[e][1], kNone});
-  for (const auto& [v, f] : candidates.vertex_triangles()) {
-    const auto& t = surface_.triangles[f];
-    look(PairKind::face_vertex, {v, t[0], t[1], t[2]});
-  }
-  for (const auto& [e, f] : candidates.edge_edges()) {
-    const auto &a = surface_.edges[e], &b = surface_.edges[f];
-    look(PairKind::edge_edge, {a[0], a[1], b[0], b[1]});
-  }
+  for (const auto& [kind, pairs] : candidates.all())
+    for (const auto& pair : *pairs) {
+      const auto p = gather<Dim>(vertices_of(surface_, kind, pair), pair_size(kind), x);
+      smallest = std::min(smallest, pair_distance_squared<Dim>(kind, p.data()));
+    }
   return smallest < dhat_ * dhat_ ? std::sqrt(smallest) : kInfinity;
 }
 
@@ -291,89 +313,41 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
   const VectorX motion = dx;
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
   candidates.update(surface_, x, &motion, dhat_);
-  const auto start = [&](int v) -> Vec<Dim> { return x.segment<Dim>(Dim * v); };
-  // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
-  // the number of threads.
-  const auto least_over = [&](const auto& pairs, const auto& ccd) {
+  double least = 1;
+  for (const auto& [kind, list] : candidates.all()) {
+    // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
+    // the number of threads.
+    const auto& pairs = *list;
     std::vector<double> steps((pairs.size() + kBatch - 1) / kBatch, 1.0);
-    parallel_blocks(pairs.size(), kBatch, [&](std::size_t begin, std::size_t end) {
+    parallel_blocks(pairs.size(), kBatch, [&, kind = kind](std::size_t begin, std::size_t end) {
       double step = 1;
-      for (std::size_t i = begin; i < end; ++i) step *= ccd(pairs[i], step);
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto vertices = vertices_of(surface_, kind, pairs[i]);
+        const auto p = gather<Dim>(vertices, pair_size(kind), x);
+        auto q = gather<Dim>(vertices, pair_size(kind), motion);
+        for (int k = 0; k < pair_size(kind); ++k) q[k] = p[k] + step * q[k];
+        step *= free_share<Dim>(kind, p, q);
+      }
       steps[begin / kBatch] = step;
     });
-    double least = 1;
     for (const double step : steps) least = std::min(least, step);
-    return least;
-  };
-  const auto end_of = [&](int v, double step) -> Vec<Dim> { return start(v) + step * motion.segment<Dim>(Dim * v); };
-  if constexpr (Dim == 2) {
-    return least_over(candidates.vertex_edges(), [&](const std::array<int, 2>& pair, double step) {
-      const auto [a, b] = surface_.edges[pair[1]];
-      const int v = pair[0];
-      return point_edge_ccd<2>(start(v), start(a), start(b), end_of(v, step), end_of(a, step), end_of(b, step));
-    });
-  } else {
-    const auto apart = [](const Box<3>& p, const Box<3>& q) { return !p.overlaps(q); };
-    const double of_triangles = least_over(candidates.vertex_triangles(), [&](const std::array<int, 2>& pair, double step) {
-      const int v = pair[0];
-      const auto [a, b, c] = surface_.triangles[pair[1]];
-      const Vec<3> p[] = {start(v), start(a), start(b), start(c)};
-      const Vec<3> q[] = {end_of(v, step), end_of(a, step), end_of(b, step), end_of(c, step)};
-      Box<3> of_vertex, of_triangle;
-      for (int k = 0; k < 4; ++k) {
-        Box<3>& box = k == 0 ? of_vertex : of_triangle;
-        box.include(p[k]);
-        box.include(q[k]);
-      }
-      if (apart(of_vertex, of_triangle)) return 1.0;
-      return point_triangle_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]);
-    });
-    const double of_edges = least_over(candidates.edge_edges(), [&](const std::array<int, 2>& pair, double step) {
-      const auto [a, b] = surface_.edges[pair[0]];
-      const auto [c, d] = surface_.edges[pair[1]];
-      const Vec<3> p[] = {start(a), start(b), start(c), start(d)};
-      const Vec<3> q[] = {end_of(a, step), end_of(b, step), end_of(c, step), end_of(d, step)};
-      Box<3> first, second;
-      for (int k = 0; k < 4; ++k) {
-        Box<3>& box = k < 2 ? first : second;
-        box.include(p[k]);
-        box.include(q[k]);
-      }
-      if (apart(first, second)) return 1.0;
-      return edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]);
-    });
-    return std::min(of_triangles, of_edges);
   }
+  return least;
 }
 
 template <int Dim>
 StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  const VectorX motion = dx;
+  const VectorX motion = dx, end = x + dx;
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
   candidates.update(surface_, x, &motion, dhat_);
-  const VectorX end = x + motion;
-  const auto p = [&](int v) -> Vec<Dim> { return x.segment<Dim>(Dim * v); };
-  const auto q = [&](int v) -> Vec<Dim> { return end.segment<Dim>(Dim * v); };
   StepLimit least;
-  const auto look = [&](double t, const char* kind, std::vector<int> vertices) {
-    if (t < least.step) least = {t, kind, std::move(vertices)};
-  };
-  if constexpr (Dim == 2) {
-    for (const auto& [v, e] : candidates.vertex_edges()) {
-      const auto [a, b] = surface_.edges[e];
-      look(point_edge_ccd<2>(p(v), p(a), p(b), q(v), q(a), q(b)), "vertex-edge pair", {v, a, b});
+  for (const auto& [kind, pairs] : candidates.all())
+    for (const auto& pair : *pairs) {
+      const auto vertices = vertices_of(surface_, kind, pair);
+      const int size = pair_size(kind);
+      const double t = free_share<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, end));
+      if (t < least.step) least = {t, name_of(kind), {vertices.begin(), vertices.begin() + size}};
     }
-  } else {
-    for (const auto& [v, f] : candidates.vertex_triangles()) {
-      const auto [a, b, c] = surface_.triangles[f];
-      look(point_triangle_ccd(p(v), p(a), p(b), p(c), q(v), q(a), q(b), q(c)), "vertex-triangle pair", {v, a, b, c});
-    }
-    for (const auto& [e, f] : candidates.edge_edges()) {
-      const auto [a, b] = surface_.edges[e];
-      const auto [c, d] = surface_.edges[f];
-      look(edge_edge_ccd(p(a), p(b), p(c), p(d), q(a), q(b), q(c), q(d)), "edge-edge pair", {a, b, c, d});
-    }
-  }
   return least;
 }
 
