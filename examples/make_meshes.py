@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Makes the meshes of the example scenes: near-equilateral triangulations of a beam, a square and a disc and a cube of
-tetrahedra (Gmsh .msh 2.2), and Cook's membrane, a box, a line and a floor (.obj). The results are committed; run it again after a change here.
+tetrahedra (Gmsh .msh 2.2), and Cook's membrane, a box, a line and a floor (.obj). The results are committed; run it again
+after a change here.
 
 usage: make_meshes.py [-o DIR]
 """

@@ -296,10 +296,11 @@ class Minimizer {
     if ((outcome_ != linear::Outcome::ok && outcome_ != linear::Outcome::not_converged) || !solution.allFinite())
       return give_reason();
     summary_.linear_residual = std::max(summary_.linear_residual, report.relative_residual);
-    if (solution.dot(rhs) < 0) return false;  // not the minimiser of a convex model
+    const double descent = solution.dot(rhs);  // of no minimiser of a convex model where it is not positive
+    if (!(descent > 0) && !rhs.isZero(0)) return false;
     step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
     // step^T H step over all dofs, with H_ff step_f = rhs.
-    model_curvature_ = solution.dot(rhs) + 2 * solution.dot(motion_.coupling) + motion_.curvature;
+    model_curvature_ = descent + 2 * solution.dot(motion_.coupling) + motion_.curvature;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = solution[dofs_.unknown[i]];
     summary_.step_norm = step_norm();

@@ -23,7 +23,7 @@ std::string describe(const Vec<Dim>& p) {
 
 template <int Dim>
 void refuse_unsupported(const Setup<Dim>& setup) {
-  const auto refuse = [](const char* place, const char* found) {
+  const auto refuse = [](const char* place, const std::string& found) {
     throw InputError({"", place, found, "something that this version supports"});
   };
   if (setup.remesh.enabled && setup.contact.enabled && setup.contact.adaptive_stiffness)
@@ -35,7 +35,7 @@ void refuse_unsupported(const Setup<Dim>& setup) {
     refuse("/geometry", "a point_selection where the mesh changes (select surfaces)");
   for (const auto& [body, material] : setup.materials)
     if (setup.remesh.enabled && material.density_at)
-      refuse("/materials", "a density that varies in space where the mesh changes");
+      refuse("/materials", "a density that varies in space (id " + std::to_string(body) + ") where the mesh changes");
   if constexpr (Dim == 3) {
     if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing in 3D, which is not supported yet");
   }

@@ -132,12 +132,16 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
 }
 
 template <int Dim>
+std::shared_ptr<FrictionEnergy<Dim>> StepProblem<Dim>::lag_friction(const VectorX& x) {
+  if (!has_friction()) return nullptr;
+  auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, x, workspace_, setup_.contact, velocity_, scaling_);
+  return friction->empty() ? nullptr : friction;
+}
+
+template <int Dim>
 typename StepProblem<Dim>::LaggedTerms StepProblem<Dim>::lag(const VectorX& x) {
   LaggedTerms terms;
-  if (has_friction()) {
-    terms.friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, x, workspace_, setup_.contact, velocity_, scaling_);
-    if (terms.friction->empty()) terms.friction.reset();
-  }
+  terms.friction = lag_friction(x);
   if (!loads_at_end_.pressures.empty()) {
     terms.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, loads_at_end_, x, scaling_);
     if (terms.pressure->empty()) terms.pressure.reset();
@@ -373,15 +377,14 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
 
 template <int Dim>
 EnergyReport StepProblem<Dim>::report(const VectorX& x) {
-  const LaggedTerms lagged = lag(x);
   EnergyReport report;
   const auto value = [&](const auto& term) { return term ? term->value(x, workspace_) / scaling_ : 0.0; };
   report.inertia = value(inertia_);
   report.elastic = value(elastic_);
-  report.body = value(loads_) + value(lagged.pressure);
+  report.body = value(loads_) + value(lagged_.pressure);
   report.contact = value(contact_);
-  report.friction = value(lagged.friction);
-  for (const auto& term : lagged.damping) report.damping += value(term);
+  report.friction = value(lag_friction(x));
+  for (const auto& term : lagged_.damping) report.damping += value(term);
   report.total = report.inertia + report.elastic + report.body + report.contact + report.friction + report.damping;
   return report;
 }

@@ -27,8 +27,7 @@ struct NewtonOptions {
   double energy_tolerance = 0;              ///< stop after `energy_steps` steps in a row that change less [J s^2]
   int energy_steps = 100;
   LineSearch line_search = LineSearch::robust_armijo;
-  bool project_to_psd =
-      true;  ///< project the Hessian of every stencil to positive semi-definite where the sum is not definite
+  bool project_to_psd = true;         ///< project stencils' Hessians to semi-definite ones where the sum is not definite
   bool absolute_eigenvalues = false;  ///< by changing the sign of negative eigenvalues instead of clamping them
   int projected_iterations = 5;       ///< iterations with it before the true Hessian is tried again; 0: it never is
   bool extend_steps = true;           ///< go on along a step over which the energy fell in a straight line

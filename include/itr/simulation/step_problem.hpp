@@ -50,7 +50,7 @@ class StepProblem {
   /// the first round they are lagged at `lagged_x`.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x);
 
-  /// With everything lagged at x: numbers that compare between meshes and with other codes.
+  /// With friction lagged at x, so that numbers compare between meshes and with other codes; else as in the last solve.
   EnergyReport report(const VectorX& x);
   double min_distance(const VectorX& x);
   /// At a solution x, those that the setup asks for, as they were in the solve.
@@ -73,6 +73,7 @@ class StepProblem {
     std::shared_ptr<PressureEnergy<Dim>> pressure;
     std::vector<std::shared_ptr<DampingEnergy<Dim>>> damping;
   };
+  std::shared_ptr<FrictionEnergy<Dim>> lag_friction(const VectorX& x);
   LaggedTerms lag(const VectorX& x);
   EnergySum sum_with(const LaggedTerms& lagged) const;
   NewtonSummary minimize_lagged(VectorX& x);
