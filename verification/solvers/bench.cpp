@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // What one solver costs on one dumped system (itr run --dump-systems):
 //   [mpirun -n N] itr_solver_bench SYSTEM SOLVER [--analyze | --once] [KEY=VALUE]...
-// Prints one line of JSON: seconds of the analysis, of factorisations and solves (the best of three), of both through the
-// engine alone where it is a module (without checks, residuals and refinement), fill, bytes, achieved residual. --once: one
-// factorisation and no bare engine. --analyze: the analysis alone, and the fill, bytes and flops that it foresees.
+// Prints one line of JSON: seconds of the analysis, of a factorisation and a solve (medians), of both through the engine
+// alone where it is a module, what checks, residuals and refinement add to that (the median of the ratios of runs that
+// follow each other, less one), fill, bytes, achieved residual. --once: one factorisation and no bare engine. --analyze: the
+// analysis alone, and the fill, bytes and flops that it foresees.
 #include <dlfcn.h>
 #include <fmt/format.h>
 
@@ -11,6 +12,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "cli/ranks.hpp"
 #include "itr/core/error.hpp"
@@ -33,22 +35,37 @@ double seconds(F&& f) {
 }
 
 struct Times {
-  double analyze = 0, factorize = 0, solve = 0;  ///< [s]
+  double factorize = 0, solve = 0;  ///< [s]
+  double sum() const { return factorize + solve; }
 };
 
-/// How often to factorise and solve; 0: analyse only.
-enum Repeats { kAnalyze = 0, kOnce = 1, kBestOfThree = 3 };
+/// How often to factorise and solve.
+enum class Repeats {
+  none,  ///< analyse only
+  once,
+  some  ///< for half a second, and at least three times
+};
 
-template <typename Analyze, typename Factorize, typename Solve>
-Times measure(Repeats repeats, Analyze&& analyze, Factorize&& factorize, Solve&& solve) {
+template <typename Factorize, typename Solve>
+Times measure(Factorize&& factorize, Solve&& solve) {
   Times times;
-  times.analyze = seconds(analyze);
-  for (int i = 0; i < repeats; ++i) {
-    const double factorized = seconds(factorize), solved = seconds(solve);
-    times.factorize = i == 0 ? factorized : std::min(times.factorize, factorized);
-    times.solve = i == 0 ? solved : std::min(times.solve, solved);
-  }
+  times.factorize = seconds(factorize);
+  times.solve = seconds(solve);
   return times;
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
+Times median(const std::vector<Times>& times) {
+  std::vector<double> factorize, solve;
+  for (const Times& t : times) {
+    factorize.push_back(t.factorize);
+    solve.push_back(t.solve);
+  }
+  return times.empty() ? Times{} : Times{median(factorize), median(solve)};
 }
 
 void bench(Registry& registry, const DumpedSystem& system, const std::string& name, const SolverOptions& options,
@@ -58,31 +75,42 @@ void bench(Registry& registry, const DumpedSystem& system, const std::string& na
   Outcome outcome = Outcome::ok;
   double residual = 1;
   const auto keep_worst = [&](Outcome next) { outcome = outcome == Outcome::ok ? next : outcome; };
-  const Times checked = measure(
-      repeats, [&] { keep_worst(solver->analyze(system.pattern, system.hints())); },
-      [&] { keep_worst(solver->factorize(system.values)); },
-      [&] {
-        const SolveReport report = solver->solve(system.rhs, x, 1, kAskedResidual);
-        keep_worst(report.outcome);
-        residual = report.relative_residual;
-      });
-  const Statistics statistics = solver->statistics();
-  Times bare{};
-  if (const auto engine =
-          outcome == Outcome::ok && repeats == kBestOfThree ? registry.create_engine(name, options) : nullptr) {
-    bare = measure(
-        repeats, [&] { engine->analyze(system.pattern, system.hints()); }, [&] { engine->factorize(system.values); },
-        [&] { engine->solve(system.rhs, x, 1); });
+  const auto factorize_and_solve = [&] {
+    return measure([&] { keep_worst(solver->factorize(system.values)); },
+                   [&] {
+                     const SolveReport report = solver->solve(system.rhs, x, 1, kAskedResidual);
+                     keep_worst(report.outcome);
+                     residual = report.relative_residual;
+                   });
+  };
+  const double start = seconds_now();
+  keep_worst(solver->analyze(system.pattern, system.hints()));
+  const double analyze = seconds_now() - start;
+  std::vector<Times> checked, bare;
+  std::vector<double> overheads;  // of checks, copies, residuals and refinement, over the engine alone just before
+  if (repeats != Repeats::none && outcome == Outcome::ok) checked.push_back(factorize_and_solve());
+  if (repeats == Repeats::some && outcome == Outcome::ok) {
+    const auto engine = registry.create_engine(name, options);
+    if (engine) engine->analyze(system.pattern, system.hints());
+    for (double spent = 0; spent < 0.5 || checked.size() < 3; spent += checked.back().sum()) {
+      if (engine)
+        bare.push_back(measure([&] { engine->factorize(system.values); }, [&] { engine->solve(system.rhs, x, 1); }));
+      checked.push_back(factorize_and_solve());
+      if (engine) overheads.push_back(checked.back().sum() / bare.back().sum() - 1);
+    }
   }
+  const Times own = median(checked), library = median(bare);
+  const Statistics statistics = solver->statistics();
   fmt::print(
       "{{\"solver\": \"{}\", \"unknowns\": {}, \"nonzeros\": {}, \"outcome\": \"{}\", \"analyze_s\": {:.4g}, "
       "\"factorize_s\": {:.4g}, \"solve_s\": {:.4g}, \"bare_factorize_s\": {:.4g}, \"bare_solve_s\": {:.4g}, "
+      "\"overhead\": {}, "
       "\"factor_nonzeros\": {:.6g}, \"factor_mb\": {:.4g}, \"largest_rank_mb\": {:.4g}, \"flops\": {:.4g}, "
       "\"iterations\": {}, \"residual\": {}}}\n",
-      name, system.pattern.order, system.pattern.nonzeros(), to_string(outcome), checked.analyze, checked.factorize,
-      checked.solve, bare.factorize, bare.solve, statistics.factor_nonzeros, statistics.factor_bytes / 1e6,
-      statistics.largest_bytes / 1e6, statistics.flops, statistics.iterations,
-      std::isfinite(residual) ? fmt::format("{:.2e}", residual) : "null");
+      name, system.pattern.order, system.pattern.nonzeros(), to_string(outcome), analyze, own.factorize, own.solve,
+      library.factorize, library.solve, overheads.empty() ? "null" : fmt::format("{:.4f}", median(overheads)),
+      statistics.factor_nonzeros, statistics.factor_bytes / 1e6, statistics.largest_bytes / 1e6, statistics.flops,
+      statistics.iterations, std::isfinite(residual) ? fmt::format("{:.2e}", residual) : "null");
   if (outcome != Outcome::ok) fmt::print(stderr, "{}: {}\n", name, solver->message());
 }
 
@@ -95,11 +123,11 @@ int main(int argc, char** argv) {
   }
   try {
     SolverOptions options;
-    Repeats repeats = kBestOfThree;
+    Repeats repeats = Repeats::some;
     for (int i = 3; i < argc; ++i) {
       const std::string text = argv[i];
       if (text == "--analyze" || text == "--once") {
-        repeats = text == "--once" ? kOnce : kAnalyze;
+        repeats = text == "--once" ? Repeats::once : Repeats::none;
         continue;
       }
       const auto equals = text.find('=');

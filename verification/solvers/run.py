@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """What the choice of a linear solver costs: dumps Newton systems of scenes at several sizes, solves each with every solver
-that is there (a process each, with a limit of time and memory), and writes results.csv, the tables of README.md and a plot.
+that is there (a process each, with a limit of time and memory), then runs scenes from end to end with each, and writes
+results.csv, end_to_end.csv, the tables of README.md and a plot.
 
-python3 verification/solvers/run.py [--build build/release] [--work DIR] [--most UNKNOWNS] [--seconds 1200] [--gib 16]
+python3 verification/solvers/run.py [--build build/release] [--work DIR] [--seconds 1200] [--gib 16] [--scene NAME]...
 """
 import argparse
 import csv
@@ -12,6 +13,7 @@ import math
 import os
 import pathlib
 import resource
+import signal
 import subprocess
 import sys
 
@@ -22,28 +24,30 @@ ROOT = HERE.parent.parent
 SHARED = ROOT.parent / "shared" / "paper-scenes" / "scripts"
 
 
-def refined(*numbers):
-    return tuple([f"/geometry/0/n_refs={number}"] for number in numbers)
-
-
 # Starts close above the spikes or rollers with the speed of the fall, to be in contact after a few steps.
 FIXED = "/space/remesh/enabled=false"
 BALL = [FIXED, "/geometry/1/transformation/translation=[0.9,1.485,0.9]",
         '/initial_conditions/velocity=[{"id":2,"value":[0,-3.2,0]}]', "/time/tend=0.05"]
 MONKEY = [FIXED, '/initial_conditions/velocity=[{"id":2,"value":[0,-2,0]}]', "/time/tend=0.1"]
+MULTIGRID = '/solver/linear/solver="belos:muelu"'  # to get to a system of 300 000 unknowns in minutes
 SPHERE = '/geometry/1/mesh="../../meshes/sphere/sphere5K.msh"'
 # name, scene, --set for all sizes, --set for each size; the last system that is written counts
 SCENES = [
     ("bar-twist 3D", SHARED / "twisting-beam" / "twisting-beam.json", [FIXED, "/time/dt=0.05", "/time/tend=0.2"],
-     refined(0, 1, 2, 3)),
+     (["/geometry/0/n_refs=1"], ["/geometry/0/n_refs=2"], ["/geometry/0/n_refs=3", MULTIGRID])),
     ("ball on spikes 3D", SHARED / "spikes3d" / "drop-ball.json", BALL,
-     ([], [SPHERE], ["/geometry/1/n_refs=1"], ["/geometry/0/n_refs=1", SPHERE])),
+     ([], ["/geometry/1/n_refs=1"], ["/geometry/0/n_refs=1", "/geometry/1/n_refs=1", SPHERE, MULTIGRID])),
     ("monkey on rollers 3D", SHARED / "rollers" / "monkey-soft-hard.json", MONKEY,
-     (['/geometry/0/mesh="monkey3k_u.msh"'], [], ['/geometry/0/mesh="monkey18K_u.msh"'], ["/geometry/0/n_refs=1"])),
-    ("masticator 2D", ROOT / "examples" / "masticator.json", [FIXED, "/time/tend=1"], refined(1, 2, 3, 4, 5)),
+     ([], ["/geometry/0/n_refs=1"], ['/geometry/0/mesh="monkey18K_u.msh"', "/geometry/0/n_refs=1", MULTIGRID])),
+    ("masticator 2D", ROOT / "examples" / "masticator.json", [FIXED, "/time/tend=1"], tuple([f"/geometry/0/n_refs={number}"] for number in (2, 4, 5))),
 ]
+# the same scenes from end to end, at their first size (the masticator with remeshing): name, --set
+ENDS = {"masticator 2D": ["/time/tend=3"], "bar-twist 3D": [FIXED, "/time/dt=0.05", "/time/tend=0.5", "/geometry/0/n_refs=1"],
+        "ball on spikes 3D": [*BALL, "/time/tend=0.02"], "monkey on rollers 3D": MONKEY}
+DENSE_MOST = 10_000  # unknowns: `dense` is for patches
+END_KEYS = ["scene", "solver", "outcome", "steps", "newton_iterations", "total_s", "linear_s", "energy"]
 KEYS = ["scene", "solver", "ranks", "unknowns", "nonzeros", "outcome", "analyze_s", "factorize_s", "solve_s",
-        "bare_factorize_s", "bare_solve_s", "factor_nonzeros", "factor_mb", "largest_rank_mb", "flops", "iterations",
+        "bare_factorize_s", "bare_solve_s", "overhead", "factor_nonzeros", "factor_mb", "largest_rank_mb", "flops", "iterations",
         "residual"]
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
                    OMPI_MCA_rmaps_base_oversubscribe="1", OMPI_MCA_mpi_yield_when_idle="1")
@@ -52,8 +56,8 @@ ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROO
 def dump(itr, scene, sets, folder, seconds):
     """The folder of the last system that a scene's run solved before its time was over, or None."""
     if not any(folder.glob("*/values.npy")):
-        command = [itr, "run", scene, "-o", folder / "run", "--dump-systems", folder, "--dump-every", "5", "--solver", "auto"]
-        for value in sets:
+        command = [itr, "run", scene, "-o", folder / "run", "--dump-systems", folder, "--dump-every", "5"]
+        for value in ['/solver/linear/solver="auto"', *sets]:
             command += ["--set", value]
         folder.mkdir(parents=True, exist_ok=True)
         with open(folder / "log", "w", encoding="utf-8") as log:
@@ -65,19 +69,48 @@ def dump(itr, scene, sets, folder, seconds):
     return whole[-1] if whole else None
 
 
-def solve(bench, system, solver, options, ranks, seconds, gib):
-    command = [str(bench), str(system), solver, *options]
-    if ranks > 1:
-        command = ["mpirun", "-n", str(ranks), *command]
-    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (int(gib * 2**30),) * 2)
+def limited(command, seconds, gib, **keywords):
+    """Runs a command that has so many seconds of CPU on one thread, half as many again of wall time, and so much memory."""
+    def limit():
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds),) * 2)
+        resource.setrlimit(resource.RLIMIT_AS, (int(gib * 2**30),) * 2)
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, preexec_fn=limit, env=ENVIRONMENT,
-                              check=False)
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=1.5 * seconds,
+                              preexec_fn=limit, env=ENVIRONMENT, check=False, **keywords)
     except subprocess.TimeoutExpired:
-        return {"outcome": f"did not finish in {seconds:g} s"}
+        return None, f"did not finish in {seconds / 60:g} min"
+    if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):  # the first comes where both limits are one
+        return None, f"did not finish in {seconds / 60:g} min"
     if done.returncode != 0:
-        return {"outcome": f"ended with status {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"}
-    return json.loads(done.stdout.splitlines()[-1])
+        return None, f"ended with status {done.returncode}: {''.join(done.stderr.strip().splitlines()[-1:])}"
+    return done.stdout, "ok"
+
+
+def kept(file, make):
+    """What is in the file, or what `make` gives, which is kept there: a killed study goes on where it was."""
+    if not file.exists():
+        file.write_text(json.dumps(make()), encoding="utf-8")
+    return json.loads(file.read_text(encoding="utf-8"))
+
+
+def solve(bench, system, solver, options, ranks, seconds, gib):
+    command = [bench, system, solver, *options]
+    if ranks > 1:
+        command = ["mpirun", "-n", ranks, *command]
+
+    def make():
+        out, outcome = limited(command, seconds, gib)
+        return json.loads(out.splitlines()[-1]) if out else {"outcome": outcome}
+    return kept(system.parent / f"{solver.replace(':', '-')}-{ranks}.json", make)
+
+
+def foreseen(rows, scene, solver, ranks, unknowns):
+    """Seconds by the law of nested dissection through the largest system of the scene so far; 0 where there was none."""
+    power = 2 if scene.endswith("3D") else 1.5
+    cost = {int(r["unknowns"]): r["factorize_s"] + r["solve_s"] for r in rows
+            if (r["scene"], r["solver"], r["ranks"]) == (scene, solver, ranks) and r["outcome"] in ("ok", "not converged")
+            and not r["iterations"]}
+    return cost[max(cost)] * (unknowns / max(cost)) ** power if cost else 0
 
 
 def solvers_there(itr):
@@ -156,25 +189,76 @@ def plot(rows, file):
     figure.savefig(file, metadata={"Date": None})
 
 
-def write(rows, folder):
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / "results.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, KEYS)
+def run_scene(itr, scene, sets, solver, folder, seconds, gib):
+    """Seconds of all steps of a run on one thread, and of their linear solves."""
+    command = [itr, "run", scene, "-o", folder, "--threads", "1", "--solver", solver]
+    for value in sets:
+        command += ["--set", value]
+    _, outcome = limited(command, seconds, gib)
+    if outcome != "ok":
+        return {"outcome": outcome}
+    steps = [json.loads(line) for line in (folder / "steps.jsonl").read_text(encoding="utf-8").splitlines()]
+    return {"outcome": outcome, "steps": len(steps) - 1, "newton_iterations": sum(s["newton_iterations"] for s in steps),
+            "total_s": round(sum(s["seconds"]["total"] for s in steps), 2),
+            "linear_s": round(sum(s["seconds"]["linear_solve"] for s in steps), 2), "energy": steps[-1]["energy"]["total"]}
+
+
+def table_of_ends(rows):
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    of = {(row["scene"], row["solver"]): row for row in rows}
+    lines = ["Scenes from end to end, one thread: seconds of all steps (of them linear solves; over `cholmod:supernodal`'s)", "",
+             "| solver | " + " | ".join(scenes) + " |", "|---|" + "---|" * len(scenes)]
+    for solver in sorted({row["solver"] for row in rows}):
+        cells = []
+        for scene in scenes:
+            row, best = of.get((scene, solver)), of.get((scene, "cholmod:supernodal"))
+            if row is None or row["outcome"] != "ok":
+                cells.append(row["outcome"] if row else "")
+                continue
+            ratio = f"; {row['total_s'] / best['total_s']:.2g}" if best and best["outcome"] == "ok" else ""
+            cells.append(f"{row['total_s']:.3g} ({row['linear_s']:.3g}{ratio})")
+        lines.append(f"| {solver} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def table_of_overheads(rows):
+    """What checks, copies, residuals and refinement add, by solver over the systems of which it was measured."""
+    lines = ["Newton's calls over the bare engine's on the same matrix (checks, copies, residual, refinement): median, most", "",
+             "| solver | systems | median | most |", "|---|---|---|---|"]
+    for solver in sorted({row["solver"] for row in rows}):
+        some = [row["overhead"] for row in rows if row["solver"] == solver and row["ranks"] == 1
+                and row["unknowns"] >= 2000 and row.get("overhead") not in (None, "")]
+        if some:
+            lines.append(f"| {solver} | {len(some)} | {100 * numpy.median(some):.1f} % | {100 * max(some):.1f} % |")
+    return "\n".join(lines)
+
+
+def write_csv(file, keys, rows):
+    with open(file, "w", newline="", encoding="utf-8") as text:
+        writer = csv.DictWriter(text, keys, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
+
+
+def write(rows, ends, folder):
+    folder.mkdir(parents=True, exist_ok=True)
+    write_csv(folder / "results.csv", KEYS, rows)
+    write_csv(folder / "end_to_end.csv", END_KEYS, ends)
     plot(rows, folder / "solvers.svg")
-    text = "\n\n".join([ratios(rows, 8000), *(table(rows, scene) for scene in dict.fromkeys(row["scene"] for row in rows))])
-    (folder / "tables.md").write_text(text + "\n", encoding="utf-8")
-    return text
+    parts = [ratios(rows, 8000), table_of_ends(ends), table_of_overheads(rows),
+             *(table(rows, scene) for scene in dict.fromkeys(row["scene"] for row in rows))]
+    (folder / "tables.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    return "\n\n".join(parts)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "results" / "solvers", help="for dumped systems")
-    parser.add_argument("--most", type=int, default=400_000, help="larger systems are left out")
+    parser.add_argument("--most", type=int, default=1_000_000, help="larger systems are left out")
     parser.add_argument("--scene", nargs="*", help="only these; rows of others stay")
     parser.add_argument("--seconds", type=float, default=1200, help="a solver has for a system")
+    parser.add_argument("--end-seconds", type=float, default=600, help="a solver has for a scene from end to end")
     parser.add_argument("--dump-seconds", type=float, default=1200, help="a run has to reach its end; else its last system counts")
     parser.add_argument("--once-from", type=int, default=100_000, help="larger systems are factorised once instead of six times")
     parser.add_argument("--gib", type=float, default=16, help="a solver has for a system, of address space")
@@ -183,8 +267,11 @@ def main():
     arguments = parser.parse_args()
     itr, bench = arguments.build / "bin" / "itr", arguments.build / "bin" / "itr_solver_bench"
 
-    earlier = arguments.output / "results.csv"
-    rows = [row for row in read(earlier) if row["scene"] not in arguments.scene] if arguments.scene and earlier.exists() else []
+    def earlier(name):
+        file = arguments.output / name
+        return [row for row in read(file) if row["scene"] not in arguments.scene] if arguments.scene and file.exists() else []
+
+    rows, ends = earlier("results.csv"), earlier("end_to_end.csv")
     solvers = solvers_there(itr)
     for name, scene, sets, sizes in SCENES:
         if arguments.scene and name not in arguments.scene:
@@ -208,14 +295,26 @@ def main():
                     if (solver, ranks) in beaten:  # larger systems only take longer
                         continue
                     flags = ["--once"] if unknowns > arguments.once_from else []
-                    row = {"unknowns": unknowns, **solve(bench, system, solver, flags, ranks, arguments.seconds, arguments.gib)}
+                    row = {"unknowns": unknowns}
+                    seconds = foreseen(rows, name, solver, ranks, unknowns)
+                    if solver == "dense" and unknowns > DENSE_MOST:
+                        row["outcome"] = "left out"
+                    elif seconds > 2 * arguments.seconds:
+                        row["outcome"] = f"did not finish ({seconds / 60:.0f} min foreseen)"
+                    else:
+                        row.update(solve(bench, system, solver, flags, ranks, arguments.seconds, arguments.gib))
                     if row["outcome"] not in ("ok", "not converged"):
                         beaten.add((solver, ranks))
                     row.update(scene=name, solver=solver, ranks=ranks)
                     rows.append(row)
                     print(json.dumps(row), flush=True)
-        write(rows, arguments.output)
-    print(write(rows, arguments.output))
+        for solver in solvers:
+            folder = arguments.work / f"{name.replace(' ', '-')}-{solver.replace(':', '-')}"
+            ends.append({"scene": name, "solver": solver, **kept(folder.with_suffix(".json"), lambda: run_scene(
+                itr, scene, ENDS[name], solver, folder, arguments.end_seconds, arguments.gib))})
+            print(json.dumps(ends[-1]), flush=True)
+        write(rows, ends, arguments.output)
+    print(write(rows, ends, arguments.output))
     return 0
 
 
