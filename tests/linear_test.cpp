@@ -98,25 +98,25 @@ TEST_P(EverySolver, SolvesElasticity) {
     }
 }
 
-TEST_P(EverySolver, SolvesMoreThanAThousandUnknownsOrRefusesThem) {
+/// Libraries take other ways through large systems than through small ones.
+TEST_P(EverySolver, SolvesMoreThanAThousandUnknowns) {
   const Elastic system = elasticity(2, 27, 0.3);
-  ASSERT_GT(system.pattern.order, 1024);
-  const Outcome analyzed = solver_->analyze(system.pattern, system.hints());
-  if (GetParam().info.name == "amesos2:tacho") {
-    EXPECT_EQ(analyzed, Outcome::failed);
-    EXPECT_NE(solver_->message().find("1024"), std::string::npos);
-    EXPECT_EQ(solver_->factorize(system.values), Outcome::failed);  // of a refused analysis
-    return;
+  const int n = system.pattern.order;
+  ASSERT_GT(n, 1024);
+  ASSERT_EQ(solver_->analyze(system.pattern, system.hints()), Outcome::ok) << solver_->message();
+  if (is_cholesky()) {
+    auto indefinite = system.values;
+    indefinite[system.pattern.column_starts[n / 2]] = -1e3;
+    EXPECT_EQ(solver_->factorize(indefinite), Outcome::not_positive_definite);
   }
-  ASSERT_EQ(analyzed, Outcome::ok) << solver_->message();
-  const std::vector<double> b(system.pattern.order, 1.0);
-  std::vector<double> x(b.size());
+  std::vector<double> b(2 * n, 1.0), x(b.size());
+  for (int i = 0; i < n; ++i) b[n + i] = std::cos(i);
   for (int i = 0; i < 2; ++i) {
     ASSERT_EQ(solver_->factorize(system.values), Outcome::ok) << solver_->message();
-    EXPECT_EQ(solver_->solve(b, x, 1, 1e-9).outcome, Outcome::ok) << solver_->message();
+    EXPECT_EQ(solver_->solve(b, x, 2, 1e-9).outcome, Outcome::ok) << solver_->message();
   }
-  const Eigen::Map<const Eigen::VectorXd> solution(x.data(), x.size());
-  EXPECT_LE((Eigen::VectorXd::Ones(x.size()) - system.full * solution).norm(), 2e-9 * std::sqrt(x.size()));
+  const Eigen::Map<const Dense> B(b.data(), n, 2), X(x.data(), n, 2);
+  EXPECT_LE((B - system.full * X).colwise().norm().cwiseQuotient(B.colwise().norm()).maxCoeff(), 2e-9);
 }
 
 TEST_P(EverySolver, SolvesMassMatrices) { expect_solves(from_dense(tridiagonal(60, 4, 1)), 1e-12); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Amesos2: KLU2 (LU for sparse patterns, solves indefinite systems) and Tacho (Cholesky).
+// Amesos2's KLU2: LU for sparse patterns, solves indefinite systems.
 #include <Amesos2.hpp>
 
 #include <algorithm>
@@ -12,27 +12,19 @@ namespace itr::backends {
 
 namespace {
 
-enum class Kind { klu2, tacho };
-
-// From here on Tacho's own factorisation takes over from LAPACK's, and Amesos2 13.2 forgets to initialise it.
-constexpr int kTachoBelow = 1024;
-
-struct Amesos2Objects {
+struct Klu2Objects {
   RCP<Amesos2::Solver<Matrix, Vectors>> solver;
 };
 
-template <Kind kind>
-class Amesos2Engine : public TrilinosEngine<Amesos2Objects> {
+class Klu2Engine : public TrilinosEngine<Klu2Objects> {
  public:
   int set_option(std::string_view, std::string_view) { return ITR_FAILED; }
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {
     const std::scoped_lock guard(trilinos_lock());
     if (!start_kokkos()) return fail(ITR_FAILED, "MPI does not run");
-    if (kind == Kind::tacho && pattern.order >= kTachoBelow)
-      return fail(ITR_FAILED, "Amesos2 of Trilinos 13.2 crashes with Tacho from 1024 unknowns on");
     set_pattern(pattern);
-    objects_->solver = Amesos2::create<Matrix, Vectors>(kind == Kind::klu2 ? "KLU2" : "Tacho", objects_->matrix);
+    objects_->solver = Amesos2::create<Matrix, Vectors>("KLU2", objects_->matrix);
     objects_->solver->symbolicFactorization();
     return ITR_OK;
   }
@@ -47,7 +39,7 @@ class Amesos2Engine : public TrilinosEngine<Amesos2Objects> {
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception& error) {  // Amesos2 tells failures apart by text only
-      return fail(kind == Kind::klu2 ? ITR_SINGULAR : ITR_NOT_POSITIVE_DEFINITE, error.what());
+      return fail(ITR_SINGULAR, error.what());
     }
     return ITR_OK;
   }
@@ -74,7 +66,7 @@ class Amesos2Engine : public TrilinosEngine<Amesos2Objects> {
   itr_statistics statistics() const {
     itr_statistics result{};
     const std::scoped_lock guard(trilinos_lock());
-    if (trilinos_is_running() && objects_ && !objects_->solver.is_null() && kind == Kind::klu2) {
+    if (trilinos_is_running() && objects_ && !objects_->solver.is_null()) {
       result.factor_nonzeros = static_cast<double>(objects_->solver->getStatus().getNnzLU());
       result.factor_bytes = result.largest_bytes = 12 * result.factor_nonzeros;
     }
@@ -85,11 +77,7 @@ class Amesos2Engine : public TrilinosEngine<Amesos2Objects> {
 }  // namespace
 
 itr_engine klu2_row(const char* version) {
-  return on_mpi(
-      linear::ModuleAdapter<Amesos2Engine<Kind::klu2>>::row("amesos2:klu2", version, "LGPL-2.1+", ITR_INDEFINITE, ""));
-}
-itr_engine tacho_row(const char* version) {
-  return on_mpi(linear::ModuleAdapter<Amesos2Engine<Kind::tacho>>::row("amesos2:tacho", version, "BSD-3-Clause", 0, ""));
+  return on_mpi(linear::ModuleAdapter<Klu2Engine>::row("amesos2:klu2", version, "LGPL-2.1+", ITR_INDEFINITE, ""));
 }
 
 }  // namespace itr::backends

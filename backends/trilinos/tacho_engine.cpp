@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+// Tacho (Cholesky), without the adapter of Amesos2: that of Trilinos 13.2 never calls Tacho's initialize(), and crashes from
+// 1024 unknowns on, where Tacho's own factorisation takes over from LAPACK's.
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <Tacho.hpp>
+#include <Tacho_Driver.hpp>
+#include <algorithm>
+#include <new>
+#include <string_view>
+
+#include "itr/linear/module_adapter.hpp"
+#include "trilinos.hpp"
+
+namespace itr::backends {
+
+namespace {
+
+using Device = Tacho::UseThisDevice<Kokkos::DefaultHostExecutionSpace>::type;
+using Driver = Tacho::Driver<double, Device>;
+
+struct TachoObjects {
+  Driver driver;
+  Driver::value_type_array values;
+  ~TachoObjects() { driver.release(); }
+};
+
+class TachoEngine : public TrilinosEngine<TachoObjects> {
+ public:
+  int set_option(std::string_view, std::string_view) { return ITR_FAILED; }
+
+  int analyze(const itr_pattern& pattern, const itr_hints&) {
+    const std::scoped_lock guard(trilinos_lock());
+    if (!start_kokkos()) return fail(ITR_FAILED, "MPI does not run");
+    objects_.reset(new Objects());
+    full_.set_pattern(pattern);
+    Driver::size_type_array_host starts("starts", full_.starts.size());
+    Driver::ordinal_type_array_host indices("indices", full_.indices.size());
+    std::copy(full_.starts.begin(), full_.starts.end(), starts.data());
+    std::copy(full_.indices.begin(), full_.indices.end(), indices.data());
+    objects_->values = Driver::value_type_array("values", full_.values.size());
+    objects_->driver.setMatrixType(2, true);  // symmetric, positive definite
+    const auto order = fill_reducing_order();
+    Driver::ordinal_type_array_host forth("forth", full_.order), back("back", full_.order);
+    for (int k = 0; k < full_.order; ++k) {
+      forth(k) = order.indices()[k];
+      back(order.indices()[k]) = k;
+    }
+    objects_->driver.analyze(full_.order, starts, indices, forth, back);
+    objects_->driver.initialize();
+    return ITR_OK;
+  }
+
+  int factorize(const double* values, size_t count) {
+    const std::scoped_lock guard(trilinos_lock());
+    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
+    full_.set_values(values, count);
+    std::copy(full_.values.begin(), full_.values.end(), objects_->values.data());
+    try {
+      objects_->driver.factorize(objects_->values);
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& error) {  // LAPACK's number of the pivot is not handed on
+      return fail(ITR_NOT_POSITIVE_DEFINITE, error.what());
+    }
+    return ITR_OK;
+  }
+
+  int solve(const double* rhs, double* solution, int columns) {
+    const std::scoped_lock guard(trilinos_lock());
+    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
+    const auto length = static_cast<size_t>(full_.order) * columns;
+    Driver::value_type_matrix b("b", full_.order, columns), x("x", full_.order, columns), scratch("t", full_.order, columns);
+    std::copy_n(rhs, length, b.data());
+    objects_->driver.solve(x, b, scratch);
+    std::copy_n(x.data(), length, solution);
+    return ITR_OK;
+  }
+
+  itr_statistics statistics() const { return {}; }
+
+ private:
+  /// Eigen's AMD: Debian's Tacho is built without METIS, and then takes the unknowns as they come.
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> fill_reducing_order() const {
+    using Pattern = Eigen::SparseMatrix<double>;
+    const Eigen::Map<const Pattern> pattern(full_.order, full_.order, static_cast<int>(full_.indices.size()),
+                                            full_.starts.data(), full_.indices.data(), full_.values.data());
+    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
+    Eigen::AMDOrdering<int>()(Pattern(pattern), order);
+    return order;
+  }
+};
+
+}  // namespace
+
+itr_engine tacho_row(const char* version) {
+  return on_mpi(linear::ModuleAdapter<TachoEngine>::row("amesos2:tacho", version, "BSD-3-Clause", 0, ""));
+}
+
+}  // namespace itr::backends
