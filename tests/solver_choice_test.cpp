@@ -5,7 +5,11 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <set>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "itr/core/error.hpp"
 #include "itr/linear/choice.hpp"
@@ -296,14 +300,8 @@ TEST(Choice, CreatesNoSolverThatWillNotRun) {
   EXPECT_THROW(choose_solver(options, false, registry, {}), InputError);
 }
 
-std::vector<BackendInfo> there(const std::vector<std::string>& names) {
-  std::vector<BackendInfo> rows;
-  for (const auto& name : names) {
-    rows.emplace_back();
-    rows.back().name = name;
-    rows.back().available = true;
-  }
-  return rows;
+auto there(std::set<std::string> names) {
+  return [names = std::move(names)](const char* name) { return names.contains(name); };
 }
 
 TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
@@ -327,6 +325,19 @@ TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
   EXPECT_EQ(pick_solver(huge, none).name, "eigen:cg");
   for (const auto& traits : {tiny, small, large, large_3d, indefinite, huge})
     EXPECT_FALSE(pick_solver(traits, all).reason.empty());
+}
+
+TEST(Auto, AsksOnlyAboutSolversInQuestion) {  // an answer may load a module of 40 MB and start MPI
+  std::vector<std::string> asked;
+  const auto all = [&](const char* name) {
+    asked.emplace_back(name);
+    return true;
+  };
+  constexpr double kMemory = 64e9;
+  pick_solver({2000, 16'000, 2, false, kMemory}, all);
+  EXPECT_TRUE(asked.empty());
+  pick_solver({30'000, 700'000, 3, false, kMemory}, all);
+  EXPECT_EQ(asked, std::vector<std::string>{"cholmod:supernodal"});
 }
 
 // Fill of the squares and cubes of verification/scaling/results.csv, METIS.

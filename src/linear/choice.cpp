@@ -58,17 +58,10 @@ std::unique_ptr<Solver> created_or_absent(const std::string& name, Make&& make) 
   }
 }
 
-std::vector<BackendInfo> ready_rows(Registry& registry) {
-  std::vector<BackendInfo> rows = registry.list();
-  for (BackendInfo& row : rows) row.available = registry.is_ready(row.name);
-  return rows;
-}
-
 class AutoSolver final : public Forwarding {
  public:
   AutoSolver(Registry& registry, bool may_be_indefinite, Logger logger, std::map<std::string, SolverOptions> options)
       : registry_(registry),
-        rows_(ready_rows(registry)),
         may_be_indefinite_(may_be_indefinite),
         logger_(std::move(logger)),
         options_(std::move(options)) {
@@ -89,7 +82,7 @@ class AutoSolver final : public Forwarding {
   const Solver& current() const override { return *solver_; }
 
   void pick(const MatrixTraits& traits) {
-    Pick picked = pick_solver(traits, rows_);
+    Pick picked = pick_solver(traits, registry_);
     if (!solver_ || picked.name != solver_->name())
       solver_ =
           created_or_absent(picked.name, [&](const std::string& name) { return registry_.create(name, options_[name]); });
@@ -99,7 +92,6 @@ class AutoSolver final : public Forwarding {
   }
 
   Registry& registry_;
-  std::vector<BackendInfo> rows_;
   bool may_be_indefinite_;
   Logger logger_;
   std::map<std::string, SolverOptions> options_;
@@ -216,10 +208,7 @@ double estimate_factor_bytes(const MatrixTraits& traits) {
   return entries * std::max(double(traits.nonzeros), 6.0 * n * std::log2(std::max(2.0, n)));
 }
 
-Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& rows) {
-  const auto is_there = [&](const char* name) {
-    return std::any_of(rows.begin(), rows.end(), [&](const BackendInfo& row) { return row.name == name && row.available; });
-  };
+Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char* name)>& is_there) {
   const bool is_3d = traits.block_size == 3;
   const double memory = traits.memory_bytes > 0 ? traits.memory_bytes : half_of_memory();
   if (!traits.may_be_indefinite && estimate_factor_bytes(traits) > memory) {
@@ -240,7 +229,9 @@ Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& row
   return {"eigen:ldlt", "neither cholmod nor mumps is there"};
 }
 
-Pick pick_solver(const MatrixTraits& traits, Registry& registry) { return pick_solver(traits, ready_rows(registry)); }
+Pick pick_solver(const MatrixTraits& traits, Registry& registry) {
+  return pick_solver(traits, [&](const char* name) { return registry.is_ready(name); });
+}
 
 std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger,
                                          std::map<std::string, SolverOptions> options) {

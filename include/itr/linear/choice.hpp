@@ -2,6 +2,7 @@
 // From what a scene asks for to a solver: the first one that is there, one that picks by itself, one with others behind it.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "itr/core/log.hpp"
@@ -24,8 +25,9 @@ struct Pick {
   std::string reason;  ///< "3D and large: supernodal factorisation"
 };
 
-/// What `auto` takes among the solvers that are there. A pure function of its arguments but for `memory_bytes` = 0.
-Pick pick_solver(const MatrixTraits& traits, const std::vector<BackendInfo>& rows);
+/// What `auto` takes among the solvers that are there; `is_there` is asked about those in question only. A pure function of
+/// its arguments but for `memory_bytes` = 0.
+Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char* name)>& is_there);
 /// Among those of the registry that are ready: those that would be refused because MPI does not run count as absent.
 Pick pick_solver(const MatrixTraits& traits, Registry& registry);
 
