@@ -25,7 +25,7 @@ ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROO
 SIZES = {2: (20, 40, 80, 160, 320, 440), 3: (6, 9, 13, 19, 25, 31, 43)}  # cells along an edge of the square, of the cube
 RANKS = (1, 2, 4)
 # solver and options of the analyses
-ANALYSES = [("cholmod:supernodal", ["ordering=amd"]), ("cholmod:supernodal", ["ordering=metis"]), ("mumps:spd", [])]
+ANALYSES = [("cholmod:supernodal", ["ordering=amd"]), ("cholmod:supernodal", ["ordering=metis"]), ("mumps:spd", ["ordering=scotch"])]
 KEYS = ["dim", "unknowns", "nonzeros", "solver", "options", "ranks", "what", "factor_nonzeros", "flops", "factor_mb",
         "largest_rank_mb", "residual", "outcome"]
 
