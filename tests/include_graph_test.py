@@ -44,7 +44,7 @@ WALLS = {
     r"nlohmann/": {"scene", "cli"},
     r"CGAL/": {"geometry"},
     r"(oneapi/)?tbb/": {"core"},
-    r"hdf5\.h|H5": {"output"},
+    r"hdf5\.h|H5": {"core"},
     r"CLI/|spdlog/": {"cli"},
 }
 

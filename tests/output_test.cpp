@@ -13,7 +13,7 @@
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
 #include "itr/output/writer.hpp"
-#include "output/hdf5.hpp"
+#include "core/hdf5.hpp"
 
 namespace itr::output {
 namespace {

@@ -17,10 +17,10 @@
 #include <sstream>
 #include <thread>
 
+#include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
 #include "output/frame_file.hpp"
-#include "output/hdf5.hpp"
 
 namespace itr::output {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "hdf5.hpp"
+#include "core/hdf5.hpp"
 #include "itr/output/checkpoint.hpp"
 
 namespace itr::output {

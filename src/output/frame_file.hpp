@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "files.hpp"
-#include "hdf5.hpp"
+#include "core/hdf5.hpp"
 #include "itr/simulation/frame.hpp"
 
 namespace itr::output {

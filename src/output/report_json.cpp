@@ -2,13 +2,13 @@
 #include "report_json.hpp"
 
 #include <fmt/format.h>
-#include <hdf5.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
+#include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
 
 namespace itr::output {

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "core/hdf5.hpp"
 #include "files.hpp"
-#include "hdf5.hpp"
 #include "itr/core/timer.hpp"
 
 namespace itr::output {

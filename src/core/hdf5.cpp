@@ -6,7 +6,7 @@
 
 #include "itr/core/error.hpp"
 
-namespace itr::output::hdf5 {
+namespace itr::hdf5 {
 
 namespace {
 
@@ -75,6 +75,15 @@ void File::write_attribute(const char* name, double value) { write_attribute_raw
 
 void File::write_attribute(const char* name, std::int64_t value) { write_attribute_raw(name, H5T_NATIVE_INT64, &value); }
 
+void File::write_attribute(const std::string& object, const char* name, std::span<const std::int64_t> values) {
+  const hsize_t size = values.size();
+  const Handle space(H5Screate_simple(1, &size, nullptr), H5Sclose);
+  const Handle attribute(H5Acreate_by_name(file_.id(), object.c_str(), name, H5T_NATIVE_INT64, space.id(), H5P_DEFAULT,
+                                           H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose);
+  require(attribute.is_valid() && H5Awrite(attribute.id(), H5T_NATIVE_INT64, values.data()) >= 0, object + ", " + name);
+}
+
 void File::link_file(const std::string& name, const std::string& relative_path) {
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(links.id(), 1);
@@ -113,6 +122,18 @@ double File::read_double_attribute(const char* name) const {
   double value = 0;
   read_attribute_raw(name, H5T_NATIVE_DOUBLE, &value);
   return value;
+}
+
+std::vector<std::int64_t> File::read_integers_attribute(const std::string& object, const char* name) const {
+  const std::string what = object + ", attribute " + name;
+  const Handle attribute(H5Aopen_by_name(file_.id(), object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  require(attribute.is_valid(), what);
+  const Handle space(H5Aget_space(attribute.id()), H5Sclose);
+  const hssize_t size = H5Sget_simple_extent_npoints(space.id());
+  require(size >= 0, what);
+  std::vector<std::int64_t> values(static_cast<std::size_t>(size));
+  require(H5Aread(attribute.id(), H5T_NATIVE_INT64, values.data()) >= 0, what);
+  return values;
 }
 
 std::string File::read_text(const std::string& name) const {
@@ -157,4 +178,4 @@ Table<std::int64_t> File::read_integers(const std::string& name) const {
   return read_raw<std::int64_t>(name, H5T_NATIVE_INT64);
 }
 
-}  // namespace itr::output::hdf5
+}  // namespace itr::hdf5

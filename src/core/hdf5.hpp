@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace itr::output::hdf5 {
+namespace itr::hdf5 {
 
 /// Owns an HDF5 identifier.
 class Handle {
@@ -73,6 +73,8 @@ class File {
   void write(const std::string& name, std::span<const std::int64_t> values, int columns);
   void write_attribute(const char* name, double value);
   void write_attribute(const char* name, std::int64_t value);
+  /// The numbers of an attribute of a group or dataset that is there.
+  void write_attribute(const std::string& object, const char* name, std::span<const std::int64_t> values);
   /// Link `name` here to the root of another file, by a path relative to this file's folder.
   void link_file(const std::string& name, const std::string& relative_path);
   void unlink(const std::string& name);
@@ -83,6 +85,7 @@ class File {
   bool contains(const std::string& name) const;
   std::int64_t read_integer_attribute(const char* name) const;
   double read_double_attribute(const char* name) const;
+  std::vector<std::int64_t> read_integers_attribute(const std::string& object, const char* name) const;
   std::string read_text(const std::string& name) const;
   /// Of a dataset, without reading it.
   Shape shape(const std::string& name) const;
@@ -104,4 +107,4 @@ class File {
   Handle file_;
 };
 
-}  // namespace itr::output::hdf5
+}  // namespace itr::hdf5
