@@ -18,6 +18,7 @@
 
 #include "itr/core/error.hpp"
 #include "itr/core/timer.hpp"
+#include "itr/mesh/readers.hpp"
 #include "itr/scene/scene.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "itr/simulation/step.hpp"
@@ -43,8 +44,21 @@ std::string text_of(const fs::path& path) {
 
 /// Changes some bytes, cuts, repeats or takes out a part.
 std::string mutate_bytes(std::string text, Random& random) {
-  static const char* const kParts[] = {"-1", "1e308", "nan", "99999999999", "0",         "\n",
-                                       "{",  "]",     "\"",  "$Elements\n", "f 1 1 1\n", "\xff"};
+  static const char* const kParts[] = {"-1",
+                                       "1e308",
+                                       "nan",
+                                       "99999999999",
+                                       "0",
+                                       "\n",
+                                       "{",
+                                       "]",
+                                       "\"",
+                                       "$Elements\n",
+                                       "f 1 1 1\n",
+                                       "\xff",
+                                       "element face 9\n",
+                                       "property list char int vertex_index\n",
+                                       "end_header\n"};
   for (int n = 1 + below(random, 4); n > 0 && !text.empty(); --n) {
     const std::size_t at = below(random, text.size()), length = below(random, std::min<std::size_t>(text.size() - at, 40));
     switch (random() % 6) {
@@ -143,6 +157,36 @@ void limit_size(Json& scene) {
   for (auto& geometry : scene["geometry"]) limit(geometry);
 }
 
+/// The vertices, edges and triangles of a mesh in the .ply format.
+std::string as_ply(const MeshFile& mesh, bool binary) {
+  std::ostringstream out;
+  const auto put = [&](auto value) {
+    if (binary)
+      out.write(reinterpret_cast<const char*>(&value), sizeof(value));
+    else
+      out << +value << ' ';
+  };
+  out << "ply\nformat " << (binary ? "binary_little_endian" : "ascii") << " 1.0\nelement vertex " << mesh.vertices.size()
+      << "\nproperty double x\nproperty double y\nproperty double z\nelement face " << mesh.triangles.size()
+      << "\nproperty list uchar int vertex_indices\nelement edge " << mesh.edges.size()
+      << "\nproperty int vertex1\nproperty int vertex2\nend_header\n";
+  for (const Vec<3>& vertex : mesh.vertices)
+    for (const double x : vertex) put(x);
+  for (const auto& triangle : mesh.triangles) {
+    put(std::uint8_t{3});
+    for (const int v : triangle) put(v);
+  }
+  for (const auto& edge : mesh.edges)
+    for (const int v : edge) put(v);
+  return out.str();
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+  return text;
+}
+
 class Fuzzer {
  public:
   Fuzzer(const fs::path& examples, unsigned seed)
@@ -154,6 +198,7 @@ class Fuzzer {
       meshes_.emplace_back(entry.path().filename().string(), text_of(entry.path()));
     std::sort(meshes_.begin(), meshes_.end());
     for (const auto& [name, text] : meshes_) write("meshes/" + name, text);
+    add_ply();
     for (const Json& scene : scenes_) {
       write("scene.json", scene.dump());
       read();
@@ -183,6 +228,22 @@ class Fuzzer {
   const fs::path& folder() const { return folder_; }
 
  private:
+  /// Every .obj as a text and as a binary .ply, and the scenes with these.
+  void add_ply() {
+    for (const bool binary : {false, true}) {
+      const std::string ending = binary ? ".b.ply" : ".ply";
+      for (std::size_t i = 0, n = meshes_.size(); i < n; ++i) {
+        const std::string name = meshes_[i].first;
+        if (!name.ends_with(".obj")) continue;
+        meshes_.emplace_back(replaced(name, ".obj", ending), as_ply(read_mesh_file(folder_ / "meshes" / name), binary));
+        write("meshes/" + meshes_.back().first, meshes_.back().second);
+      }
+      for (std::size_t i = 0, n = scenes_.size(); i < n; ++i)
+        if (const std::string text = scenes_[i].dump(); text.find(".obj") != std::string::npos)
+          scenes_.push_back(Json::parse(replaced(text, ".obj", ending)));
+    }
+  }
+
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }

@@ -129,6 +129,69 @@ TEST(MeshReaders, ObjWithRelativeIndicesAndPolylines) {
   EXPECT_EQ(mesh.edges, (std::vector<std::array<int, 2>>{{0, 1}, {1, 2}}));
 }
 
+const std::string kTextPly =
+    "ply\nformat ascii 1.0\ncomment property of nobody\nelement vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\nproperty uchar red\nelement material 2\nproperty list uchar int parts\nproperty float shine\n"
+    "element face 2\nproperty list uchar int vertex_indices\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n"
+    "end_header\n0 0 0 255\n1 0 0 0\n0 1 0 0\n0 0 +1.5 7\n3 1 2 3 0.5\n0 1\n3 0 1 2\n3 0 3 1\n2 3\n";
+
+/// The same with doubles, as tools write it: the header's lines may end in \r\n, what is after it begins at once.
+std::string binary_ply(const std::string& end = "\n") {
+  std::string bytes;
+  for (const char* line :
+       {"ply", "format binary_little_endian 1.0", "element vertex 4", "property double x", "property double y",
+        "property double z", "property uchar red", "element material 1", "property list ushort short parts",
+        "element face 2", "property list uint8 int32 vertex_index", "property float quality", "end_header"})
+    bytes += line + end;
+  const double xyz[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1.5}};
+  for (const auto& v : xyz) bytes += raw(v[0], v[1], v[2], std::uint8_t{10});  // 10 is an end of line, too
+  bytes += raw(std::uint16_t{2}, std::int16_t{-1}, std::int16_t{3});
+  bytes += raw(std::uint8_t{3}, int32_t{0}, int32_t{1}, int32_t{2}, 0.5f);
+  return bytes + raw(std::uint8_t{3}, int32_t{0}, int32_t{3}, int32_t{1}, 0.5f);
+}
+
+TEST(MeshReaders, PlyTextAndBinary) {
+  for (const std::string& bytes : {kTextPly, binary_ply(), binary_ply("\r\n")}) {
+    const MeshFile mesh = read_bytes("a.ply", bytes);
+    ASSERT_EQ(mesh.vertices.size(), 4u);
+    EXPECT_EQ(mesh.vertices[1], Vec<3>(1, 0, 0));
+    EXPECT_EQ(mesh.vertices[3], Vec<3>(0, 0, 1.5));
+    EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 3, 1}}));
+    EXPECT_EQ(mesh.triangle_body, (std::vector<int>{0, 0}));
+  }
+  EXPECT_EQ(read_bytes("a.ply", kTextPly).edges, (std::vector<std::array<int, 2>>{{2, 3}}));
+}
+
+std::string changed(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(MeshReaders, SaysWhereAPlyFileIsWrong) {
+  const auto refuses = [](const std::string& from, const std::string& to, const std::string& found) {
+    const auto parts = failure("a.ply", changed(kTextPly, from, to));
+    EXPECT_NE((parts.place + " " + parts.found).find(found), std::string::npos) << parts.place << " " << parts.found;
+  };
+  refuses("ply\n", "solid\n", "line 1 another beginning");
+  refuses("ascii", "binary_big_endian", "the format 'binary_big_endian'");
+  refuses("end_header", "end", "the end of the file");
+  refuses("float y", "complex y", "line 6 the type 'complex'");
+  refuses("float y", "float why", "'vertex' without 'y'");
+  refuses("int vertex_indices", "int corners", "'face' without 'vertex_indices'");
+  refuses("element vertex 4\n", "", "line 4 a property");
+  refuses("element vertex 4", "element vertex many", "'many'");
+  refuses("element vertex 4", "element vertex -4", "a count of -4");
+  refuses("element vertex 4", "element vertex 4000000000", "a count of 4000000000");
+  refuses("element material", "element tristrips", "strips of triangles");
+  refuses("\n3 0 1 2\n", "\n4 0 1 2 3\n", "'vertex_indices' with 4 numbers");
+  refuses("\n3 0 1 2\n", "\n3 0 1 9\n", "triangle 0 vertex 9");
+  refuses("\n3 0 1 2\n", "\n3 0 1 0.5\n", "the number 0.5");
+  refuses("\n3 0 1 2\n", "\n3 0 1 1e10\n", "the number 10000000000");
+  refuses("+1.5", "inf", "vertex 3 a coordinate that is not finite");
+  refuses("+1.5", "up", "line 21 'up'");
+  refuses("property float x", "property list uchar float x", "'x' with 0 numbers");
+  EXPECT_EQ(failure("a.ply", binary_ply().substr(0, 330)).expected, "more data");
+}
+
 TEST(MeshReaders, SaysWhereAFileIsWrong) {
   EXPECT_THROW(read_mesh_file("/no/such/file.msh"), InputError);
   EXPECT_THROW(read_bytes("a.stl", ""), InputError);
@@ -168,6 +231,12 @@ TEST(MeshReaders, TruncatedFilesAreErrors) {
       } catch (const InputError&) {
       }
     }
+}
+
+TEST(MeshReaders, TruncatedPlyFilesAreErrors) {  // the header says how much there is
+  for (const std::string& whole : {kTextPly, binary_ply()})
+    for (std::size_t size = 0; size + 1 < whole.size(); ++size)
+      EXPECT_THROW(read_bytes("cut.ply", whole.substr(0, size)), InputError) << size;
 }
 
 TEST(Refine, TriangleIntoFourKeepsAreaTagsAndBody) {

@@ -68,7 +68,7 @@ const std::vector<Refusal> kRefusals = {
     {"truncated nodes", geometry("cut.msh"), "cut.msh", "line 7", "the end", "a number"},
     {"truncated elements", geometry("cut_elements.msh"), "cut_elements.msh", "line 13", "the end", "a number"},
     {"not a mesh", geometry("text.msh"), "text.msh", "line 1", "another beginning", "$MeshFormat"},
-    {"unknown format", geometry("mesh.stl"), "mesh.stl", "", ".stl", ".msh or .obj"},
+    {"unknown format", geometry("mesh.stl"), "mesh.stl", "", ".stl", ".msh, .obj or .ply"},
     {"empty file", geometry("folder/empty.obj"), "empty.obj", "", "no vertices", "a mesh"},
     {"word for a number", geometry("word.obj"), "word.obj", "line 2", "zero", "a coordinate"},
     {"vertex out of range", geometry("range.obj"), "range.obj", "triangle 0", "vertex 8", "0 to 3 - 1"},

@@ -48,11 +48,11 @@ void check(const MeshFile& mesh, const fs::path& file) {
 MeshFile read_mesh_file(const fs::path& file) {
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (ending != ".msh" && ending != ".obj")
+  const auto read = ending == ".msh" ? read_msh : ending == ".obj" ? read_obj : ending == ".ply" ? read_ply : nullptr;
+  if (!read)
     throw InputError(
-        {file.string(), "", "a name that ends in '" + ending + "'", ".msh or .obj (others are not supported yet)"});
-  const std::string bytes = read_bytes(file);
-  MeshFile mesh = ending == ".msh" ? read_msh(bytes, file) : read_obj(bytes, file);
+        {file.string(), "", "a name that ends in '" + ending + "'", ".msh, .obj or .ply (others are not supported yet)"});
+  MeshFile mesh = read(read_bytes(file), file);
   check(mesh, file);
   return mesh;
 }

@@ -11,5 +11,6 @@ namespace itr {
 
 MeshFile read_msh(std::string_view bytes, const std::filesystem::path& file);
 MeshFile read_obj(std::string_view bytes, const std::filesystem::path& file);
+MeshFile read_ply(std::string_view bytes, const std::filesystem::path& file);
 
 }  // namespace itr

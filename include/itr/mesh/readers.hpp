@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Mesh files: Gmsh .msh (2.2 and 4.1, text and binary) and Wavefront .obj.
+// Mesh files: Gmsh .msh (2.2 and 4.1, text and binary), Wavefront .obj and Stanford .ply.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@ namespace itr {
 /// What a file holds, before anything is made of it. Coordinates always three; ids 0-based.
 struct MeshFile {
   std::vector<Vec<3>> vertices;
-  std::vector<std::array<int, 2>> edges;      ///< line elements / `l` polylines
-  std::vector<std::array<int, 3>> triangles;  ///< `f` faces with more than three corners are an error
+  std::vector<std::array<int, 2>> edges;      ///< line elements / `l` polylines / `edge`
+  std::vector<std::array<int, 3>> triangles;  ///< faces of .obj and .ply with more corners are an error
   std::vector<std::array<int, 4>> tetrahedra;
   std::vector<int> triangle_body, tetrahedron_body;  ///< first physical tag; 0 if none
 };
