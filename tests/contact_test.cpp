@@ -10,6 +10,8 @@
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/contact/surface.hpp"
+#include "itr/energy/damping.hpp"
+#include "itr/energy/mapped.hpp"
 
 namespace itr {
 namespace {
@@ -237,6 +239,106 @@ void expect_friction_derivatives(Scene scene, unsigned seed) {
 TEST(Friction, DerivativesMatchDifferences) {
   for (unsigned seed = 0; seed < 10; ++seed) expect_friction_derivatives<2>(ContactScene(seed, false), seed);
   for (unsigned seed = 0; seed < 4; ++seed) expect_friction_derivatives<3>(ContactScene3(seed, seed % 2, 0.4, 0.03), seed);
+}
+
+/// A scene whose vertices y = A x follow from others: each mostly from its own, some also from up to three others.
+template <int Dim, typename Scene>
+struct MappedScene {
+  Scene scene;
+  std::shared_ptr<const VertexMap<Dim>> map;
+  VectorX x;  ///< where y is the scene's
+
+  MappedScene(Scene s, unsigned seed) : scene(std::move(s)) {
+    const int n = static_cast<int>(scene.x.size()) / Dim;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> weight(-0.1, 0.2);
+    MatrixX A = MatrixX::Zero(n, n);
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < i % 4; ++k) A(i, random() % n) += weight(random);
+      A(i, i) += 1 - A.row(i).sum();
+    }
+    typename VertexMap<Dim>::Weights weights = A.sparseView();
+    map = std::make_shared<VertexMap<Dim>>(weights, VectorX::Zero(Dim * n));
+    const Eigen::Map<const Eigen::Matrix<double, Dim, Eigen::Dynamic>> y(scene.x.data(), Dim, n);
+    const MatrixX solution = A.partialPivLu().solve(MatrixX(y.transpose())).transpose();
+    x = Eigen::Map<const VectorX>(solution.data(), Dim * n);
+  }
+};
+
+/// Derivatives; no net force, and no net moment of contact: weights that sum to one keep rigid motions rigid.
+template <int Dim, typename Scene>
+void expect_mapped_terms(Scene scene, unsigned seed) {
+  scene.options.friction_coefficient = 0.4;
+  scene.options.friction_velocity = 0.05;
+  const MappedScene<Dim, Scene> mapped(scene, seed);
+  const auto of_dofs = [&](auto term) { return MappedEnergy<Dim>(std::move(term), mapped.map); };
+  const auto& options = scene.options;
+  const auto contact = std::make_shared<ContactEnergy<Dim>>(scene.surface, options, 3, 0.5);
+  Workspace workspace;
+  const VectorX y = mapped.map->positions(mapped.x);
+  EXPECT_LE((y - scene.x).norm(), 1e-12);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, 0.001);
+  const VectorX reference = y + VectorX::NullaryExpr(y.size(), [&] { return normal(random); });
+  const VelocityRule velocity{20, reference};
+  const auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact, y, workspace, options, velocity, 0.01);
+  ASSERT_FALSE(friction->empty());
+  expect_derivatives(of_dofs(contact), mapped.x, 1e-8, 2e-5);
+  expect_psd(of_dofs(contact), mapped.x);
+  expect_derivatives(of_dofs(friction), mapped.x, 1e-7, 1e-5);
+  expect_psd(of_dofs(friction), mapped.x);
+  expect_derivatives(of_dofs(std::make_shared<DampingEnergy<Dim>>(*contact, y, 0.1, velocity, workspace)), mapped.x, 1e-6,
+                     1e-6);
+
+  bool is_contact = true;
+  for (const VectorX& force : {gradient_of(of_dofs(contact), mapped.x), gradient_of(of_dofs(friction), mapped.x)}) {
+    Vec<Dim> sum = Vec<Dim>::Zero();
+    Mat<Dim> moments = Mat<Dim>::Zero();  // its skew part is the moment
+    for (int v = 0; v < force.size() / Dim; ++v) {
+      sum += force.segment<Dim>(Dim * v);
+      moments += force.segment<Dim>(Dim * v) * mapped.x.template segment<Dim>(Dim * v).transpose();
+    }
+    EXPECT_LE(sum.norm(), 1e-12 * force.norm());
+    if (is_contact) EXPECT_LE((moments - moments.transpose()).norm(), 1e-10 * moments.norm());
+    is_contact = false;  // lagged friction acts at lagged points: it keeps the moment up to slip alone
+  }
+}
+
+TEST(MappedTerms, DerivativesMatchDifferencesAndMomentumIsKept) {
+  for (unsigned seed = 0; seed < 6; ++seed) expect_mapped_terms<2>(ContactScene(seed, seed % 2), seed);
+  for (unsigned seed = 0; seed < 3; ++seed) expect_mapped_terms<3>(ContactScene3(seed, seed % 2, 0.4, 0.03), seed);
+}
+
+TEST(MappedTerms, StepIsFreeOfContactOfWhatIsMapped) {
+  int stopped = 0;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const MappedScene<2, ContactScene> mapped(ContactScene(seed, true), seed);
+    const auto& scene = mapped.scene;
+    const MappedEnergy<2> contact(std::make_shared<ContactEnergy<2>>(scene.surface, scene.options, 3, 0.5), mapped.map);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 0.3);
+    const VectorX dx = VectorX::NullaryExpr(mapped.x.size(), [&] { return normal(random); });
+    Workspace workspace;
+    const double step = contact.max_step(mapped.x, dx, workspace);
+    stopped += step < 1;
+    for (int i = 0; i <= 100; ++i)
+      EXPECT_FALSE(has_intersection<2>(scene.surface, mapped.map->positions(mapped.x + step * i / 100.0 * dx)));
+  }
+  EXPECT_GT(stopped, 5);
+}
+
+TEST(AdaptiveStiffness, BalancesTheBarrierAsTheDofsFeelIt) {
+  const MappedScene<3, ContactScene3> mapped(ContactScene3(3, false, 0.3, 0.02), 1);
+  const auto& scene = mapped.scene;
+  const auto contact = std::make_shared<ContactEnergy<3>>(scene.surface, scene.options, 1, 1);
+  const VectorX y = mapped.map->positions(mapped.x), barrier = gradient_of(MappedEnergy<3>(contact, mapped.map), mapped.x);
+  const AdaptiveStiffness<3> adaptive(scene.surface, scene.options, 2, 1, mapped.map.get());
+  Workspace workspace;
+  BarrierStiffness stiffness;
+  adaptive.initialize(y, barrier, stiffness, workspace);  // pulls the same way: the least
+  const double least = stiffness.value;
+  adaptive.initialize(y, -7 * least * barrier, stiffness, workspace);
+  EXPECT_NEAR(stiffness.value, 7 * least, 1e-10 * least);
 }
 
 TEST(Contact3, HasTheSameBitsForOneAndTwoThreads) {

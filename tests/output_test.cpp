@@ -10,10 +10,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
 #include "itr/output/writer.hpp"
-#include "core/hdf5.hpp"
 
 namespace itr::output {
 namespace {
@@ -295,6 +295,29 @@ TEST_F(OutputTest, FindsABodyInAnObstacleButLetsObstaclesCross) {
   const auto violations = violations_of(plane);
   ASSERT_EQ(violations.size(), 1u);
   EXPECT_EQ(violations[0], "frames/000000.h5: edges (0, 1) and (obstacle 2, obstacle 3) intersect");
+}
+
+struct PlaneWithProxy : Plane {
+  std::vector<Vec<2>> proxy_x = {{-1, 0.2}, {0.5, 0.1}, {2, 0.2}};
+  std::vector<std::array<int, 2>> proxy_edges = {{0, 1}, {1, 2}};
+  FrameView<2> view() const {
+    FrameView<2> frame = Plane::view();
+    frame.proxy = {&proxy_x, &proxy_edges, &obstacle_triangles};
+    return frame;
+  }
+};
+
+TEST_F(OutputTest, AProxyTouchesInPlaceOfTheBoundary) {
+  PlaneWithProxy plane;
+  plane.obstacle_x = {{0.5, -0.25}, {0.5, 0.05}};  // through the lower square's bottom
+  EXPECT_FALSE(violations_of<Plane>(plane).empty());
+  EXPECT_TRUE(violations_of(plane).empty());
+  plane.proxy_x[1][1] = 0;
+  const auto violations = violations_of(plane);
+  ASSERT_EQ(violations.size(), 2u);
+  EXPECT_EQ(violations[0], "frames/000000.h5: edges (proxy 0, proxy 1) and (obstacle 0, obstacle 1) intersect");
+  plane.proxy_x[1][0] = std::nan("");
+  EXPECT_EQ(violations_of(plane).size(), 1u);
 }
 
 TEST_F(OutputTest, FindsAnEdgeFoldedOntoItsNeighbour) {

@@ -218,8 +218,9 @@ class Explanation {
 
   /// Surfaces and which of them can meet; what is near at the start.
   void contact() {
-    const CollisionSurface surface = collision_surface(setup_.mesh, setup_.obstacles);
-    const VectorX& x = simulation_.state().history.x[0];
+    const ContactSurface<Dim> contact = contact_surface(setup_, setup_.mesh);
+    const CollisionSurface& surface = contact.surface;
+    const VectorX x = contact.positions(simulation_.state().history.x[0]);
     const auto component = find_components(surface, surface.counts.size());
     std::set<int> moving, fixed;
     for (const int v : surface.vertices) (surface.counts[v] ? moving : fixed).insert(component[v]);
@@ -228,6 +229,7 @@ class Explanation {
         "contact\n  {} surfaces of bodies, {} of obstacles; pairs that can touch: {} body-body, {} within a body, "
         "{} body-obstacle (obstacles among themselves are not searched)\n",
         m, f, m * (m - 1) / 2, m, m * f);
+    if (setup_.proxy) fmt::print("  a collision mesh touches in place of the bodies' boundary\n");
     fmt::print("  {} surface vertices, {} edges", surface.vertices.size(), surface.edges.size());
     if (Dim == 3) fmt::print(", {} triangles", surface.triangles.size());
     const double dhat = setup_.contact.activation_distance;
@@ -239,8 +241,9 @@ class Explanation {
     if (gap < dhat)
       warn("gap {:.3g} m at the start is below d-hat = {:.3g} m: surfaces push each other from the start", gap, dhat);
     double shortest = std::numeric_limits<double>::infinity();
+    const auto rest = [&](int v) { return setup_.proxy ? setup_.proxy->rest[v] : setup_.mesh.rest(v); };
     for (const auto& [a, b] : surface.edges)
-      if (surface.counts[a]) shortest = std::min(shortest, (setup_.mesh.rest(a) - setup_.mesh.rest(b)).norm());
+      if (surface.counts[a]) shortest = std::min(shortest, (rest(a) - rest(b)).norm());
     if (dhat > shortest)
       warn("d-hat = {:.3g} m is above the shortest surface edge, {:.3g} m: surfaces feel themselves", dhat, shortest);
   }

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/damping.hpp"
 
+#include <algorithm>
+
 namespace itr {
 
 template <int Dim>
 DampingEnergy<Dim>::DampingEnergy(const Energy& damped, ConstVectorView lagged_x, double coefficient, VelocityRule velocity,
                                   Workspace& workspace)
     : coefficient_(coefficient), velocity_(std::move(velocity)) {
-  HessianSink sink(stiffness_);
+  HessianSink sink([this](std::span<const int> vertices, const double* values) {
+    Block block{{}, static_cast<int>(vertices.size()), values_.size()};
+    std::copy(vertices.begin(), vertices.end(), block.vertices.begin());
+    blocks_.push_back(block);
+    values_.insert(values_.end(), values, values + Dim * Dim * vertices.size() * vertices.size());
+  });
   damped.add_hessian(lagged_x, PsdProjection::clamp, sink, workspace);
 }
 
@@ -15,14 +22,14 @@ template <int Dim>
 template <typename F>
 void DampingEnergy<Dim>::for_each(ConstVectorView x, F&& f) const {
   VectorX v;
-  for (const auto& block : stiffness_.blocks) {
+  for (const Block& block : blocks_) {
     const int n = Dim * block.size;
     v.resize(n);
     for (int k = 0; k < block.size; ++k) {
       const int dof = Dim * block.vertices[k];
       v.segment<Dim>(Dim * k) = velocity_.rate * (x.segment<Dim>(dof) - velocity_.reference.template segment<Dim>(dof));
     }
-    f(block, Eigen::Map<const MatrixX>(stiffness_.values.data() + block.first, n, n), v);
+    f(block, Eigen::Map<const MatrixX>(values_.data() + block.first, n, n), v);
   }
 }
 
@@ -49,10 +56,10 @@ void DampingEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 template <int Dim>
 void DampingEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
   MatrixX scaled;
-  for (const auto& block : stiffness_.blocks) {
+  for (const Block& block : blocks_) {
     const int n = Dim * block.size;
-    scaled = coefficient_ * velocity_.rate * Eigen::Map<const MatrixX>(stiffness_.values.data() + block.first, n, n);
-    sink.add<Dim>(stiffness_.vertices(block), scaled.data());
+    scaled = coefficient_ * velocity_.rate * Eigen::Map<const MatrixX>(values_.data() + block.first, n, n);
+    sink.add<Dim>(vertices(block), scaled.data());
   }
 }
 

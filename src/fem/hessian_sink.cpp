@@ -185,21 +185,12 @@ bool SparseAssembler::finish() {
   return std::exchange(changed_, false);
 }
 
-namespace {
-constexpr int kMaxDofs = 12;
-}
-
 template <int Dim>
 void HessianSink::add(std::span<const int> vertices, const double* block) {
   const int n = Dim * static_cast<int>(vertices.size());
-  if (blocks_) {
-    BlockList::Block kept{{}, static_cast<int>(vertices.size()), blocks_->values.size()};
-    std::copy(vertices.begin(), vertices.end(), kept.vertices.begin());
-    blocks_->blocks.push_back(kept);
-    blocks_->values.insert(blocks_->values.end(), block, block + n * n);
-    return;
-  }
-  int unknown[kMaxDofs];
+  if (receiver_) return receiver_(vertices, block);
+  unknown_.resize(n);
+  int* const unknown = unknown_.data();
   for (int i = 0; i < n; ++i) unknown[i] = dofs_->unknown[Dim * vertices[i / Dim] + i % Dim];
   for (int j = 0; j < n; ++j) {
     const int column = unknown[j];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The surface is taken from the cells, not from what the frame says it is: a certificate should trust as little as it can.
-// Obstacles are prescribed, so two of them may cross each other; anything else that shares a point without sharing a vertex
-// is a violation.
+// Where a proxy touches in place of the boundary, it is the surface. Obstacles are prescribed, so two of them may cross each
+// other; anything else that shares a point without sharing a vertex is a violation.
 #include "itr/output/certify.hpp"
 
 #include <fmt/format.h>
@@ -21,11 +21,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Vertices of bodies, then of obstacles, and the surface simplices on them.
+/// Vertices of bodies or of their proxy, then of obstacles, and the surface simplices on them.
 template <int Dim>
 struct Surface {
   std::vector<Vec<Dim>> x;
   int num_body_vertices = 0;
+  const char* own = "";  ///< before the number of a vertex that is no obstacle's
   std::vector<std::array<int, 2>> edges;
   std::vector<std::array<int, 3>> triangles;  ///< 3D only
 
@@ -34,7 +35,7 @@ struct Surface {
     return simplex[0] >= num_body_vertices;
   }
   std::string name(int v) const {
-    return v < num_body_vertices ? std::to_string(v) : fmt::format("obstacle {}", v - num_body_vertices);
+    return v < num_body_vertices ? own + std::to_string(v) : fmt::format("obstacle {}", v - num_body_vertices);
   }
   template <std::size_t N>
   std::string name(const std::array<int, N>& simplex) const {
@@ -84,22 +85,33 @@ void add_facets(const std::vector<std::array<int, 3>>& facets, Surface<3>& surfa
 }
 
 template <int Dim>
-Surface<Dim> make_surface(const StoredFrame& frame) {
-  Surface<Dim> surface;
-  surface.x = points<Dim>(frame.x);
-  const int offset = surface.num_body_vertices = static_cast<int>(surface.x.size());
-  add_facets(boundary_facets<Dim>(frame.simplices), surface);
-  const std::vector<Vec<Dim>> obstacle = points<Dim>(frame.obstacle_x);
-  surface.x.insert(surface.x.end(), obstacle.begin(), obstacle.end());
-  const auto& edges = frame.obstacle_edges;
+void add_surface(const StoredSurface& stored, Surface<Dim>& surface) {
+  const int offset = static_cast<int>(surface.x.size());
+  const std::vector<Vec<Dim>> x = points<Dim>(stored.x);
+  surface.x.insert(surface.x.end(), x.begin(), x.end());
+  const auto& edges = stored.edges;
   for (std::size_t i = 0; i < edges.size(); i += 2) {
     surface.edges.push_back({offset + static_cast<int>(edges[i]), offset + static_cast<int>(edges[i + 1])});
   }
-  const auto& faces = frame.obstacle_faces;
+  const auto& faces = stored.faces;
   for (std::size_t i = 0; i < faces.size(); i += 3) {
     surface.triangles.push_back({offset + static_cast<int>(faces[i]), offset + static_cast<int>(faces[i + 1]),
                                  offset + static_cast<int>(faces[i + 2])});
   }
+}
+
+template <int Dim>
+Surface<Dim> make_surface(const StoredFrame& frame) {
+  Surface<Dim> surface;
+  if (frame.has_proxy) {
+    surface.own = "proxy ";
+    add_surface(frame.proxy, surface);
+  } else {
+    surface.x = points<Dim>(frame.x);
+    add_facets(boundary_facets<Dim>(frame.simplices), surface);
+  }
+  surface.num_body_vertices = static_cast<int>(surface.x.size());
+  add_surface(frame.obstacles, surface);
   return surface;
 }
 
@@ -185,8 +197,8 @@ template <int Dim>
 void check_frame(const StoredFrame& frame, const std::string& name, std::vector<std::string>& violations) {
   // What is not a number compares false with everything, and every predicate after it would pass.
   const auto is_finite = [](double value) { return std::isfinite(value); };
-  if (!std::all_of(frame.x.begin(), frame.x.end(), is_finite) ||
-      !std::all_of(frame.obstacle_x.begin(), frame.obstacle_x.end(), is_finite)) {
+  for (const auto* x : {&frame.x, &frame.obstacles.x, &frame.proxy.x}) {
+    if (std::all_of(x->begin(), x->end(), is_finite)) continue;
     violations.push_back(name + ": a position is not finite");
     return;
   }

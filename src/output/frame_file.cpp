@@ -47,12 +47,13 @@ void write_index_rows(hdf5::File& file, const std::string& name, const std::vect
 }
 
 template <int Dim>
-void write_obstacles(hdf5::File& file, const FrameView<Dim>& frame) {
+void write_surface(hdf5::File& file, const std::string& group, const std::vector<Vec<Dim>>& positions,
+                   const std::vector<std::array<int, 2>>& edges, const std::vector<std::array<int, 3>>& triangles) {
   std::vector<double> x;
-  for (const Vec<Dim>& p : frame.obstacle_x) x.insert(x.end(), p.data(), p.data() + Dim);
-  file.write("/obstacles/x", x, Dim);
-  write_index_rows(file, "/obstacles/edges", frame.obstacle_edges);
-  write_index_rows(file, "/obstacles/faces", frame.obstacle_triangles);
+  for (const Vec<Dim>& p : positions) x.insert(x.end(), p.data(), p.data() + Dim);
+  file.write(group + "/x", x, Dim);
+  write_index_rows(file, group + "/edges", edges);
+  write_index_rows(file, group + "/faces", triangles);
 }
 
 void require_shape(const std::filesystem::path& path, const std::string& name, int columns, int expected) {
@@ -89,6 +90,16 @@ Integers read_indices(const std::filesystem::path& path, const hdf5::File& file,
   return std::move(table.values);
 }
 
+StoredSurface read_surface(const std::filesystem::path& path, const hdf5::File& file, const std::string& group, int dim) {
+  hdf5::Table<double> x = file.read_doubles(group + "/x");
+  require_shape(path, group + "/x", x.columns, dim);
+  StoredSurface surface;
+  surface.edges = read_indices(path, file, group + "/edges", 2, x.rows());
+  surface.faces = read_indices(path, file, group + "/faces", 3, x.rows());
+  surface.x = std::move(x.values);
+  return surface;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -110,7 +121,8 @@ void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame,
   file.write("/fields/v", as_span(frame.v), Dim);
   file.write("/fields/elastic_density", frame.elastic_density, 0);
   if (frame.asked) write_asked<Dim>(file, *frame.asked);
-  write_obstacles(file, frame);
+  write_surface<Dim>(file, "/obstacles", frame.obstacle_x, frame.obstacle_edges, frame.obstacle_triangles);
+  if (frame.proxy.x) write_surface<Dim>(file, "/proxy", *frame.proxy.x, *frame.proxy.edges, *frame.proxy.triangles);
   if (extra) extra(file);
   write_file(path, file.image(), durability);
 }
@@ -147,13 +159,11 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   hdf5::Table<double> x = file.read_doubles("/fields/x");
   if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
   frame.dim = x.columns;
-  hdf5::Table<double> obstacle_x = file.read_doubles("/obstacles/x");
-  require_shape(path, "/obstacles/x", obstacle_x.columns, frame.dim);
   frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
-  frame.obstacle_edges = read_indices(path, file, "/obstacles/edges", 2, obstacle_x.rows());
-  frame.obstacle_faces = read_indices(path, file, "/obstacles/faces", 3, obstacle_x.rows());
   frame.x = std::move(x.values);
-  frame.obstacle_x = std::move(obstacle_x.values);
+  frame.obstacles = read_surface(path, file, "/obstacles", frame.dim);
+  frame.has_proxy = file.contains("/proxy");
+  if (frame.has_proxy) frame.proxy = read_surface(path, file, "/proxy", frame.dim);
   return frame;
 }
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "files.hpp"
 #include "core/hdf5.hpp"
+#include "files.hpp"
 #include "itr/simulation/frame.hpp"
 
 namespace itr::output {
@@ -36,14 +36,21 @@ struct FrameSizes {
 };
 FrameSizes read_frame_sizes(const std::filesystem::path& path);
 
+/// A surface of a stored frame.
+struct StoredSurface {
+  std::vector<double> x;            ///< k x dim, row-major [m]
+  std::vector<std::int64_t> edges;  ///< e x 2
+  std::vector<std::int64_t> faces;  ///< f x 3
+};
+
 /// What a certificate needs of a stored frame. Indices are checked: all within range.
 struct StoredFrame {
   int dim = 0;
-  std::vector<double> x;                     ///< n x dim, row-major [m]
-  std::vector<std::int64_t> simplices;       ///< m x (dim + 1)
-  std::vector<double> obstacle_x;            ///< k x dim
-  std::vector<std::int64_t> obstacle_edges;  ///< e x 2
-  std::vector<std::int64_t> obstacle_faces;  ///< f x 3
+  std::vector<double> x;                ///< n x dim, row-major [m]
+  std::vector<std::int64_t> simplices;  ///< m x (dim + 1)
+  StoredSurface obstacles;
+  bool has_proxy = false;
+  StoredSurface proxy;  ///< what touches in place of the boundary
 };
 
 /// Throws InputError where the file is unreadable or inconsistent.

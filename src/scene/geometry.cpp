@@ -174,24 +174,23 @@ int dimension_of(const Node& geometry, const MeshFile& file) {
 
 }  // namespace
 
-std::filesystem::path MeshFiles::find(const Node& geometry) {
-  const Node node = geometry["mesh"];
-  if (!node.exists()) node.fail("the path of a mesh file");
-  std::filesystem::path path = geometry.document().resolve(node.string(""));
+std::filesystem::path MeshFiles::find(const Node& name, const char* what) {
+  if (!name.exists()) name.fail(what);
+  std::filesystem::path path = name.document().resolve(name.string(""));
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored))
-    node.fail(abbreviate(node.json()) + ", but there is no file '" + path.string() + "'", "the path of a mesh file");
+    name.fail(abbreviate(name.json()) + ", but there is no file '" + path.string() + "'", what);
   return path;
 }
 
 const MeshFile& MeshFiles::get(const Node& geometry) {
-  const std::filesystem::path path = find(geometry);
+  const std::filesystem::path path = find(geometry["mesh"], kMesh);
   const auto found = files_.find(path.string());
   return found != files_.end() ? found->second : files_.emplace(path.string(), read_mesh_file(path)).first->second;
 }
 
-std::string MeshFiles::hash(const Node& geometry) {
-  const std::filesystem::path path = find(geometry);
+std::string MeshFiles::hash(const Node& name, const char* what) {
+  const std::filesystem::path path = find(name, what);
   std::string& text = hashes_[path.string()];
   if (!text.empty()) return text;
   std::ifstream file(path, std::ios::binary);

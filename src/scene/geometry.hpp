@@ -15,12 +15,14 @@ class MeshFiles {
  public:
   /// The file that `geometry/mesh` names; InputError there if it is missing.
   const MeshFile& get(const Node& geometry);
-  /// Of the bytes of that file (FNV-1a), in hexadecimal.
-  std::string hash(const Node& geometry);
+  static constexpr const char* kMesh = "the path of a mesh file";
+  static constexpr const char* kWeights = "the path of an HDF5 file with weights";
+  /// Of the bytes of the file that a value names (FNV-1a), in hexadecimal.
+  std::string hash(const Node& name, const char* what);
+  /// Its path. InputError there, which expects `what`, if there is no such file.
+  static std::filesystem::path find(const Node& name, const char* what);
 
  private:
-  static std::filesystem::path find(const Node& geometry);
-
   std::map<std::string, MeshFile> files_;
   std::map<std::string, std::string> hashes_;
 };
@@ -51,6 +53,11 @@ struct ObstacleGeometry {
 
 template <int Dim>
 ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files);
+
+/// The surface of the file that `holder` names as `mesh`, moved by the transformation of `geometry`. All points of the file
+/// are its vertices, in their order.
+template <int Dim>
+Obstacles<Dim> read_surface(const Node& holder, const Node& geometry, MeshFiles& files);
 
 /// Translations of the copies of a mesh_array, the zero one first; only that for other types.
 template <int Dim>

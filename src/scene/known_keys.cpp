@@ -104,8 +104,8 @@ constexpr Group kGroups[] = {
      "enabled:boolean dhat:positive dhat_percentage:positive epsv:positive friction_coefficient:non_negative "
      "use_convergent_formulation:boolean"},
     {"/contact", Role::only, "use_area_weighting=true use_improved_max_operator=true use_physical_barrier=true"},
-    {"/contact/collision_mesh", Role::only, "enabled=false"},
-    {"/contact/collision_mesh", Role::refused, "mesh linear_map max_edge_length tessellation_type"},
+    {"/contact/collision_mesh", Role::read, "enabled:boolean mesh:string linear_map:string"},
+    {"/contact/collision_mesh", Role::refused, "max_edge_length tessellation_type"},
 
     {"/solver", Role::ignored, "max_threads"},
     {"/solver/rayleigh_damping/*", Role::read, "form stiffness stiffness_ratio lagging_iterations"},

@@ -132,12 +132,11 @@ void refine(const Node& geometry, Surface& surface, std::vector<Vec<Dim>>& point
 }
 
 template <int Dim>
-void check_lengths(const Node& geometry, const Surface& surface, const std::vector<Vec<Dim>>& points) {
+void check_lengths(const Node& mesh, const Surface& surface, const std::vector<Vec<Dim>>& points) {
   for (const auto& [a, b] : surface.edges)
     if (!((points[a] - points[b]).norm() > 0))
-      geometry["mesh"].fail(
-          "an obstacle edge of length 0 (vertices " + std::to_string(a) + " and " + std::to_string(b) + ")",
-          "no degenerate obstacles");
+      mesh.fail("a surface edge of length 0 (vertices " + std::to_string(a) + " and " + std::to_string(b) + ")",
+                "no degenerate surfaces");
 }
 
 int read_obstacle_id(const Node& node) {
@@ -171,7 +170,7 @@ void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<
   const int extract = geometry["extract"].choice({"volume", "surface", "edges", "points"}, 0);
   if (extract == 2) surface.triangles.clear();
   if (extract == 3) surface.triangles.clear(), surface.edges.clear();
-  check_lengths<Dim>(geometry, surface, points);
+  check_lengths<Dim>(geometry["mesh"], surface, points);
   const int id = read_obstacle_id(geometry["surface_selection"]);
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
 }
@@ -185,6 +184,20 @@ ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& fi
   return all;
 }
 
+template <int Dim>
+Obstacles<Dim> read_surface(const Node& holder, const Node& geometry, MeshFiles& files) {
+  const MeshFile& file = files.get(holder);
+  std::vector<Vec<Dim>> points = points_of<Dim>(file);
+  transform<Dim>(points, geometry);
+  Surface surface = extract_surface(file, points);
+  if (std::find(surface.is_used.begin(), surface.is_used.end(), 0) != surface.is_used.end())
+    holder["mesh"].fail(abbreviate(holder["mesh"].json()) + " with points inside of a solid", "a surface");
+  check_lengths<Dim>(holder["mesh"], surface, points);
+  return {std::move(points), std::move(surface.edges), std::move(surface.triangles), {}, {}};
+}
+
+template Obstacles<2> read_surface(const Node&, const Node&, MeshFiles&);
+template Obstacles<3> read_surface(const Node&, const Node&, MeshFiles&);
 template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&);
 template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "collision_mesh.hpp"
 #include "conditions.hpp"
 #include "geometry.hpp"
 #include "known_keys.hpp"
@@ -16,15 +17,23 @@ namespace itr::scene {
 
 namespace {
 
-/// Of the surfaces that can touch: the bodies' boundary and the obstacles.
+/// Of the surfaces that can touch: the bodies' boundary or its proxy, and the obstacles.
 template <int Dim>
-double shortest_surface_edge(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
+double shortest_surface_edge(const Setup<Dim>& setup) {
   double shortest = std::numeric_limits<double>::infinity();
+  const auto include = [&](const auto& surface) {
+    for (const auto& [a, b] : surface.edges) shortest = std::min(shortest, (surface.rest[a] - surface.rest[b]).norm());
+  };
+  include(setup.obstacles);
+  if (setup.proxy) {
+    include(*setup.proxy);
+    return shortest;
+  }
+  const Mesh<Dim>& mesh = setup.mesh;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < i; ++j)
         shortest = std::min(shortest, (mesh.rest(mesh.facet(f)[i]) - mesh.rest(mesh.facet(f)[j])).norm());
-  for (const auto& [a, b] : obstacles.edges) shortest = std::min(shortest, (obstacles.rest[a] - obstacles.rest[b]).norm());
   return shortest;
 }
 
@@ -53,7 +62,8 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
-  setup.contact = read_contact(root, shortest_surface_edge<Dim>(setup.mesh, setup.obstacles), warnings);
+  setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files);
+  setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;
 }
 
@@ -75,7 +85,12 @@ std::string make_identity(const Node& root, const Geometries& geometries, MeshFi
   if (identity.contains("solver") && identity["solver"].is_object()) identity["solver"].erase("max_threads");
   Json hashes = Json::object();
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
-    for (const Node& geometry : *list) hashes[geometry["mesh"].pointer()] = files.hash(geometry);
+    for (const Node& geometry : *list) hashes[geometry["mesh"].pointer()] = files.hash(geometry["mesh"], MeshFiles::kMesh);
+  if (has_collision_mesh(root)) {
+    const Node node = root["contact"]["collision_mesh"];
+    hashes[node["mesh"].pointer()] = files.hash(node["mesh"], MeshFiles::kMesh);
+    hashes[node["linear_map"].pointer()] = files.hash(node["linear_map"], MeshFiles::kWeights);
+  }
   identity["files"] = std::move(hashes);
   return identity.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -31,6 +31,8 @@ void refuse_unsupported(const Setup<Dim>& setup) {
            "adaptive stiffness with remeshing, which is not supported yet (give a number)");
   if (setup.remesh.enabled && setup.remesh.sizing_field)
     refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
+  if (setup.remesh.enabled && setup.proxy)
+    refuse("/contact/collision_mesh", "a collision mesh where the bodies' mesh changes");
   if (setup.remesh.enabled && !setup.point_tags.empty())
     refuse("/geometry", "a point_selection where the mesh changes (select surfaces)");
   for (const auto& [body, material] : setup.materials)
@@ -42,10 +44,21 @@ void refuse_unsupported(const Setup<Dim>& setup) {
 }
 
 template <int Dim>
+void check_proxy(const Setup<Dim>& setup) {
+  if (!setup.proxy) return;
+  const auto text = [](auto rows, auto columns) { return std::to_string(rows) + " x " + std::to_string(columns); };
+  const CollisionProxy<Dim>& proxy = *setup.proxy;
+  const std::string found = text(proxy.weights.rows(), proxy.weights.cols());
+  const std::string expected = text(proxy.rest.size(), setup.mesh.num_vertices());
+  if (found != expected) throw InputError({"", "weights of the collision mesh", found, expected});
+}
+
+template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!setup.contact.enabled) return;
-  const CollisionSurface surface = collision_surface(state.mesh, setup.obstacles);
-  const VectorX& x = state.history.x[0];
+  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh);
+  const CollisionSurface& surface = contact.surface;
+  const VectorX x = contact.positions(state.history.x[0]);
   const auto corners = [&](const auto& primitive) {
     std::string text;
     for (const int v : primitive) text.append(text.empty() ? "" : "-").append(describe<Dim>(x.segment<Dim>(Dim * v)));
@@ -148,6 +161,7 @@ template <int Dim>
 // It is moved: NOLINTNEXTLINE(performance-unnecessary-value-param)
 Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger) : impl_(std::make_unique<Impl>()) {
   refuse_unsupported(setup);
+  check_proxy(setup);
   impl_->setup = std::move(setup);
   impl_->logger = std::move(logger);
   impl_->solver = linear::choose_solver(impl_->setup.linear, !impl_->setup.newton.project_to_psd, registry, impl_->logger);
@@ -248,6 +262,11 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
   add_asked(cells, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
+  if (impl_->setup.proxy) {
+    const VectorX y = contact_surface(impl_->setup, state.mesh).positions(all);
+    for (std::size_t v = 0; v < impl_->setup.proxy->rest.size(); ++v)
+      data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
+  }
   return data;
 }
 

@@ -146,7 +146,9 @@ bool keeps_energy(const Setup<Dim>& setup, StepProblem<Dim>& problem, const Newt
 template <int Dim>
 std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
   if (find_inverted<Dim>(mesh, x) != kNone) return "an inverted cell";
-  if (setup.contact.enabled && has_intersection<Dim>(collision_surface(mesh, setup.obstacles), x)) return "an intersection";
+  if (!setup.contact.enabled) return {};
+  const ContactSurface<Dim> contact = contact_surface(setup, mesh);
+  if (has_intersection<Dim>(contact.surface, contact.positions(x))) return "an intersection";
   return {};
 }
 

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <span>
 #include <sstream>
 #include <utility>
 
 #include "itr/core/timer.hpp"
+#include "itr/energy/mapped.hpp"
 
 namespace itr {
 
@@ -40,32 +40,6 @@ Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
   for (const auto& condition : setup.pressure)
     loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const Vec<Dim>& X) { return f(X, t); });
   return loads;
-}
-
-template <int Dim>
-CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
-  const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.rest.size());
-  std::vector<Vec<Dim>> rest;
-  rest.reserve(total);
-  for (int v = 0; v < bodies; ++v) rest.push_back(mesh.rest(v));
-  rest.insert(rest.end(), obstacles.rest.begin(), obstacles.rest.end());
-  std::vector<std::array<int, 2>> edges;
-  std::vector<std::array<int, 3>> triangles;
-  std::vector<char> counts(total, 0);
-  for (int f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
-    const auto& facet = mesh.facet(f);
-    for (const int v : facet) counts[v] = 1;
-    if constexpr (Dim == 2)
-      edges.push_back(facet);
-    else
-      triangles.push_back(facet);
-  }
-  for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
-  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
-  std::vector<int> points(obstacles.rest.size());
-  std::iota(points.begin(), points.end(), bodies);
-  return make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
 }
 
 template <int Dim>
@@ -121,21 +95,36 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
   if (loads_at_end_.has_dead_loads())
     loads_ = std::make_shared<LoadEnergy<Dim>>(cells_, setup.materials, loads_at_end_, scaling_);
   if (setup.contact.enabled) {
-    surface_ = collision_surface(mesh, setup.obstacles);
+    surface_ = contact_surface(setup, mesh);
     if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
-    contact_ = std::make_shared<ContactEnergy<Dim>>(surface_, setup.contact, stiffness_.value, scaling_);
+    contact_ = std::make_shared<ContactEnergy<Dim>>(surface_.surface, setup.contact, stiffness_.value, scaling_);
+    contact_of_dofs_ = of_dofs(contact_);
     if (setup.contact.adaptive_stiffness)
-      adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_, setup.contact, average_mass(), scaling_);
+      adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_.surface, setup.contact, average_mass(), scaling_,
+                                                           surface_.map.get());
   }
   velocity_ = {integrator.velocity_rate(history), integrator.velocity_reference(history)};
   system_.reset(dofs_, Dim, stencil_vertices(cells_), Dim + 1);
 }
 
+/// A term over the vertices of the surface as one over those of the problem.
 template <int Dim>
-std::shared_ptr<FrictionEnergy<Dim>> StepProblem<Dim>::lag_friction(const VectorX& x) {
+std::shared_ptr<const Energy> StepProblem<Dim>::of_dofs(std::shared_ptr<const Energy> term) const {
+  if (!surface_.map) return term;
+  return std::make_shared<MappedEnergy<Dim>>(std::move(term), surface_.map);
+}
+
+template <int Dim>
+VelocityRule StepProblem<Dim>::velocity_of_surface() const {
+  return {velocity_.rate, surface_.positions(velocity_.reference)};
+}
+
+template <int Dim>
+std::shared_ptr<const Energy> StepProblem<Dim>::lag_friction(const VectorX& x) {
   if (!has_friction()) return nullptr;
-  auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, x, workspace_, setup_.contact, velocity_, scaling_);
-  return friction->empty() ? nullptr : friction;
+  const auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, surface_.positions(x), workspace_, setup_.contact,
+                                                              velocity_of_surface(), scaling_);
+  return friction->empty() ? nullptr : of_dofs(friction);
 }
 
 template <int Dim>
@@ -147,10 +136,13 @@ typename StepProblem<Dim>::LaggedTerms StepProblem<Dim>::lag(const VectorX& x) {
     if (terms.pressure->empty()) terms.pressure.reset();
   }
   for (const DampingOptions& options : setup_.damping) {
-    const Energy* damped = elastic_.get();
-    if (options.term == DampingOptions::Term::contact) damped = contact_.get();
-    if (!damped || setup_.time.is_static) continue;
-    terms.damping.push_back(std::make_shared<DampingEnergy<Dim>>(*damped, x, options.coefficient, velocity_, workspace_));
+    if (setup_.time.is_static) continue;
+    if (options.term != DampingOptions::Term::contact)
+      terms.damping.push_back(
+          std::make_shared<DampingEnergy<Dim>>(*elastic_, x, options.coefficient, velocity_, workspace_));
+    else if (contact_)
+      terms.damping.push_back(of_dofs(std::make_shared<DampingEnergy<Dim>>(
+          *contact_, surface_.positions(x), options.coefficient, velocity_of_surface(), workspace_)));
   }
   return terms;
 }
@@ -164,7 +156,7 @@ EnergySum StepProblem<Dim>::sum_with(const LaggedTerms& lagged) const {
   add(inertia_);
   add(elastic_);
   add(loads_);
-  add(contact_);
+  add(contact_of_dofs_);
   add(lagged.friction);
   add(lagged.pressure);
   for (const auto& term : lagged.damping) add(term);
@@ -191,7 +183,7 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
     gradient.template segment<Dim>(bodies + Dim * o) =
         -scaling_ * (held_.target.template segment<Dim>(bodies + Dim * o) - setup_.obstacles.rest[o]);
-  adaptive_->initialize(x, gradient, stiffness_, workspace_);
+  adaptive_->initialize(surface_.positions(x), gradient, stiffness_, workspace_);
   contact_->set_stiffness(stiffness_.value);
 }
 
@@ -201,18 +193,19 @@ VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
   VectorX start = x;
   for (Eigen::Index i = 0; i < x.size(); ++i)
     if (dofs_.unknown[i] == kNone) start[i] = held_.target[i];
-  const bool free = std::isfinite(elastic_->value(start, workspace_)) && contact_->max_step(x, start - x, workspace_) == 1;
+  const bool free =
+      std::isfinite(elastic_->value(start, workspace_)) && contact_of_dofs_->max_step(x, start - x, workspace_) == 1;
   return free ? start : x;
 }
 
-/// "12 13 obstacle 4 near (0.1, 0.2)"
+/// "12 13 obstacle 4 near (0.1, 0.2)", of vertices at x: the problem's, or the surface's (those of a proxy: "proxy 12").
 template <int Dim>
-std::string StepProblem<Dim>::name_vertices(std::span<const int> vertices, const VectorX& x) const {
+std::string StepProblem<Dim>::name_vertices(std::span<const int> vertices, const VectorX& x, const char* own) const {
   const int bodies = static_cast<int>(x.size() / Dim) - static_cast<int>(setup_.obstacles.rest.size());
   std::ostringstream text;
   Vec<Dim> middle = Vec<Dim>::Zero();
   for (const int v : vertices) {
-    text << (v < bodies ? "" : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
+    text << (v < bodies ? own : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
     middle += x.template segment<Dim>(Dim * v) / static_cast<double>(vertices.size());
   }
   text << "near (";
@@ -227,14 +220,20 @@ template <int Dim>
 NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
   if (summary.converged()) return summary;
   std::ostringstream text;
+  const VectorX on_surface = surface_.positions(x);
+  const auto name_pair = [&](std::span<const int> vertices) {
+    return name_vertices(vertices, on_surface, surface_.map ? "proxy " : "");
+  };
   const VectorX& step = summary.failed_step;
   if (step.size() == x.size() && step.allFinite()) {
-    StepLimit limit = elastic_->step_limit(x, step);
-    if (contact_)
-      if (StepLimit pair = contact_->step_limit(x, step, workspace_); pair.step < limit.step) limit = std::move(pair);
+    const StepLimit cell = elastic_->step_limit(x, step);
+    StepLimit pair;
+    if (contact_) pair = contact_->step_limit(on_surface, surface_.motion(step), workspace_);
+    const bool is_pair = pair.step < cell.step;
+    const StepLimit& limit = is_pair ? pair : cell;
     if (limit.step < 1)
       text << "; " << limit.step << " of the last Newton step is free, limited by the " << limit.kind << ' '
-           << name_vertices(limit.vertices, x);
+           << (is_pair ? name_pair(limit.vertices) : name_vertices(limit.vertices, x));
   }
   if (summary.worst_dof != kNone) {
     const int v = summary.worst_dof / Dim;
@@ -254,6 +253,10 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
     text << "; the largest residual, " << total.norm() << " N, is at vertex " << name_vertices(std::array{v}, x)
          << ", where the largest force, " << largest << " N, is that of the term '" << name << '\'';
     const auto has = [v](const auto& vertices) { return std::find(vertices.begin(), vertices.end(), v) != vertices.end(); };
+    const auto acts_on_it = [&](std::span<const int> pair) {
+      if (!surface_.map) return has(pair);
+      return std::any_of(pair.begin(), pair.end(), [&](int w) { return has(surface_.map->sources(w)); });
+    };
     double least = std::numeric_limits<double>::infinity();
     std::span<const int> stencil;
     for (const auto& element : cells_.elements) {
@@ -267,15 +270,15 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
     least = std::numeric_limits<double>::infinity();
     stencil = {};
     if (contact_)
-      for (const ContactStencil& s : contact_->active(x, workspace_)) {
-        if (!has(s.vertices)) continue;
-        const double distance = std::sqrt(contact_->distance(s, x).squared);
+      for (const ContactStencil& s : contact_->active(on_surface, workspace_)) {
+        const std::span<const int> pair(s.vertices.data(), s.size());
+        if (!acts_on_it(pair)) continue;
+        const double distance = std::sqrt(contact_->distance(s, on_surface).squared);
         if (distance >= least) continue;
         least = distance;
-        stencil = std::span(s.vertices.data(), s.size());
+        stencil = pair;
       }
-    if (!stencil.empty())
-      text << "; its contact pair " << name_vertices(stencil, x) << " has the distance " << least << " m";
+    if (!stencil.empty()) text << "; its contact pair " << name_pair(stencil) << " has the distance " << least << " m";
   }
   summary.message += text.str();
   return summary;
@@ -295,7 +298,7 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x) {
   bool is_first = true;
   extras.after_step = [&](const VectorX& iterate) {
     if (std::exchange(is_first, false) || setup_.time.is_static) return false;
-    const bool changed = adaptive_->update(iterate, stiffness_, workspace_);
+    const bool changed = adaptive_->update(surface_.positions(iterate), stiffness_, workspace_);
     if (changed) contact_->set_stiffness(stiffness_.value);
     return changed;
   };
@@ -382,7 +385,7 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
   report.inertia = value(inertia_);
   report.elastic = value(elastic_);
   report.body = value(loads_) + value(lagged_.pressure);
-  report.contact = value(contact_);
+  report.contact = value(contact_of_dofs_);
   report.friction = value(lag_friction(x));
   for (const auto& term : lagged_.damping) report.damping += value(term);
   report.total = report.inertia + report.elastic + report.body + report.contact + report.friction + report.damping;
@@ -399,7 +402,7 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   };
   NodalForces forces;
   const FieldOptions& asked = setup_.fields;
-  if (asked.contact_forces) forces.contact = force(contact_.get());
+  if (asked.contact_forces) forces.contact = force(contact_of_dofs_.get());
   if (asked.friction_forces) forces.friction = force(lagged_.friction.get());
   if (!asked.reaction_forces) return forces;
   const EnergySum all = sum_with(lagged_);
@@ -421,7 +424,7 @@ double StepProblem<Dim>::created_energy(const History& history, const VectorX& x
     term.add_gradient(trapezoidal ? x0 : x, gradient, workspace_);
   };
   add(*elastic_);
-  if (contact_) add(*contact_);
+  if (contact_) add(*contact_of_dofs_);
   const double created = (rise - 0.5 * gradient.dot(x - x0)) / scaling_;
   if (trapezoidal) return created;
   const VectorX change = TimeIntegrator(setup_.time).velocity(x, history) - v0;
@@ -438,13 +441,13 @@ VectorX StepProblem<Dim>::momentum(const VectorX& v) const {
 template <int Dim>
 double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
   double energy = elastic_->value(x, workspace_) / scaling_;
-  if (contact_) energy += contact_->value(x, workspace_) / scaling_;
+  if (contact_) energy += contact_of_dofs_->value(x, workspace_) / scaling_;
   return energy + 0.5 * v.dot(momentum(v));
 }
 
 template <int Dim>
 double StepProblem<Dim>::min_distance(const VectorX& x) {
-  return contact_ ? contact_->min_distance(x, workspace_) : std::numeric_limits<double>::infinity();
+  return contact_ ? contact_->min_distance(surface_.positions(x), workspace_) : std::numeric_limits<double>::infinity();
 }
 
 template <int Dim>
@@ -454,11 +457,10 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   return least;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                 \
-  template class StepProblem<Dim>;                                                           \
-  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                              \
-  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&); \
-  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double);        \
+#define ITR_INSTANTIATE(Dim)                                                          \
+  template class StepProblem<Dim>;                                                    \
+  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                       \
+  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double); \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -88,25 +89,14 @@ struct PrescribedMotion {
   double curvature = 0;  ///< out: step_D^T H_DD step_D
 };
 
-/// Blocks of stencils kept as they came, over all dofs: a Hessian to use again without assembling it.
-struct BlockList {
-  struct Block {
-    std::array<int, 4> vertices;
-    int size;           ///< number of vertices
-    std::size_t first;  ///< of its values, column-major
-  };
-  std::vector<Block> blocks;
-  std::vector<double> values;
-  std::span<const int> vertices(const Block& block) const {
-    return {block.vertices.data(), static_cast<std::size_t>(block.size)};
-  }
-};
+/// Takes blocks (column-major) as they come, over all dofs.
+using BlockReceiver = std::function<void(std::span<const int> vertices, const double* block)>;
 
 class HessianSink {
  public:
   HessianSink(const DofMap& dofs, MatrixX& dense) : dofs_(&dofs), dense_(&dense) {}
   HessianSink(const DofMap& dofs, SparseAssembler& sparse) : dofs_(&dofs), sparse_(&sparse) {}
-  explicit HessianSink(BlockList& blocks) : blocks_(&blocks) {}
+  explicit HessianSink(BlockReceiver receiver) : receiver_(std::move(receiver)) {}
 
   /// Collects `motion.coupling` and `motion.curvature` along with the blocks.
   void set_motion(PrescribedMotion& motion) {
@@ -150,10 +140,11 @@ class HessianSink {
   template <int Dim>
   void add_motion(std::span<const int> vertices, const double* block);
 
-  const DofMap* dofs_ = nullptr;  ///< null where blocks are kept
+  const DofMap* dofs_ = nullptr;  ///< null where there is a receiver
   MatrixX* dense_ = nullptr;
   SparseAssembler* sparse_ = nullptr;
-  BlockList* blocks_ = nullptr;
+  BlockReceiver receiver_;
+  std::vector<int> unknown_;  ///< scratch of add
   PrescribedMotion* motion_ = nullptr;
 };
 

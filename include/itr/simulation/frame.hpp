@@ -59,6 +59,14 @@ struct AskedFields {
   std::vector<double> momentum;        ///< of all bodies, Dim numbers [kg m/s]
 };
 
+/// The surface that touches in place of the bodies' boundary, see CollisionProxy. Null: there is none.
+template <int Dim>
+struct ProxyView {
+  const std::vector<Vec<Dim>>* x = nullptr;  ///< positions now [m]
+  const std::vector<std::array<int, 2>>* edges = nullptr;
+  const std::vector<std::array<int, 3>>* triangles = nullptr;
+};
+
 /// The state after a step on its own mesh. References are valid during the observer's call only.
 template <int Dim>
 struct FrameView {
@@ -70,6 +78,7 @@ struct FrameView {
   const std::vector<std::array<int, 2>>& obstacle_edges;
   const std::vector<std::array<int, 3>>& obstacle_triangles;
   const AskedFields* asked = nullptr;  ///< null: nothing was asked for
+  ProxyView<Dim> proxy{};
 };
 
 }  // namespace itr

@@ -3,9 +3,11 @@
 // that embeds the library fills in itself. SI units throughout.
 #pragma once
 
+#include <Eigen/SparseCore>
 #include <array>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,16 @@ struct Obstacles {
   std::vector<std::array<int, 3>> triangles;    ///< 3D only
   std::vector<int> motion;                      ///< per vertex: index into `motions`, or kNone for a fixed one
   std::vector<SpaceTimeFunction<Dim>> motions;  ///< displacement from rest [m]
+};
+
+/// A surface that touches in place of the bodies' boundary and moves with their vertices: displacements of its vertices are
+/// `weights` times those of the mesh's.
+template <int Dim>
+struct CollisionProxy {
+  std::vector<Vec<Dim>> rest;                            ///< vertices [m]
+  std::vector<std::array<int, 2>> edges;                 ///< 2D: surface edges; 3D: edges of faces and codimensional edges
+  std::vector<std::array<int, 3>> triangles;             ///< 3D only
+  Eigen::SparseMatrix<double, Eigen::RowMajor> weights;  ///< a row for each of its vertices, a column for each of the mesh's
 };
 
 /// Displacement prescribed at the vertices of the boundary facets with a tag.
@@ -74,7 +86,8 @@ template <int Dim>
 struct Setup {
   Mesh<Dim> mesh;  ///< with body ids and facet tags
   Obstacles<Dim> obstacles;
-  std::map<int, Material> materials;  ///< by body id; every body of the mesh has one
+  std::optional<CollisionProxy<Dim>> proxy;  ///< not with remeshing
+  std::map<int, Material> materials;         ///< by body id; every body of the mesh has one
   std::vector<DirichletCondition<Dim>> dirichlet;
   /// By vertex of `mesh`: Dirichlet conditions with this tag hold it, whatever its facets say; kNoTag or empty: none. Not
   /// with remeshing.

@@ -60,15 +60,23 @@ class Simulation {
   template <typename Observer>
   void observe(Observer&& observer) const {
     const FrameData data = frame_data();
-    observer(FrameView<Dim>{state().mesh, data.x, data.v, data.elastic_density, data.obstacle_x, setup().obstacles.edges,
-                            setup().obstacles.triangles, &data.asked});
+    FrameView<Dim> frame{state().mesh,
+                         data.x,
+                         data.v,
+                         data.elastic_density,
+                         data.obstacle_x,
+                         setup().obstacles.edges,
+                         setup().obstacles.triangles,
+                         &data.asked};
+    if (setup().proxy) frame.proxy = {&data.proxy_x, &setup().proxy->edges, &setup().proxy->triangles};
+    observer(frame);
   }
 
  private:
   struct FrameData {
     VectorX x, v;
     std::vector<double> elastic_density;
-    std::vector<Vec<Dim>> obstacle_x;
+    std::vector<Vec<Dim>> obstacle_x, proxy_x;
     AskedFields asked;
   };
   FrameData frame_data() const;

@@ -14,6 +14,7 @@
 #include "itr/energy/load.hpp"
 #include "itr/energy/pressure.hpp"
 #include "itr/newton/newton.hpp"
+#include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/frame.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/time/integrator.hpp"
@@ -23,10 +24,6 @@ namespace itr {
 /// Loads of a setup at time t.
 template <int Dim>
 Loads<Dim> loads_at(const Setup<Dim>& setup, double t);
-
-/// The surface of a compact mesh and of the obstacles, whose vertices follow the mesh's.
-template <int Dim>
-CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles);
 
 /// Which dofs are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two conditions
 /// the one with the larger tag wins.
@@ -63,22 +60,24 @@ class StepProblem {
   const BarrierStiffness& stiffness() const { return stiffness_; }
   const DofMap& dofs() const { return dofs_; }
   const CellSet<Dim>& cells() const { return cells_; }
-  const CollisionSurface& surface() const { return surface_; }
+  const CollisionSurface& surface() const { return surface_.surface; }
   double scaling() const { return scaling_; }
 
  private:
   /// What depends on an earlier iterate of the step; null where the scene has none.
   struct LaggedTerms {
-    std::shared_ptr<FrictionEnergy<Dim>> friction;
+    std::shared_ptr<const Energy> friction;
     std::shared_ptr<PressureEnergy<Dim>> pressure;
-    std::vector<std::shared_ptr<DampingEnergy<Dim>>> damping;
+    std::vector<std::shared_ptr<const Energy>> damping;
   };
-  std::shared_ptr<FrictionEnergy<Dim>> lag_friction(const VectorX& x);
+  std::shared_ptr<const Energy> of_dofs(std::shared_ptr<const Energy> term) const;
+  VelocityRule velocity_of_surface() const;
+  std::shared_ptr<const Energy> lag_friction(const VectorX& x);
   LaggedTerms lag(const VectorX& x);
   EnergySum sum_with(const LaggedTerms& lagged) const;
   NewtonSummary minimize_lagged(VectorX& x);
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
-  std::string name_vertices(std::span<const int> vertices, const VectorX& x) const;
+  std::string name_vertices(std::span<const int> vertices, const VectorX& x, const char* own = "") const;
   void initialize_stiffness(const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
   bool has_friction() const;
@@ -89,7 +88,7 @@ class StepProblem {
   const Setup<Dim>& setup_;
   Loads<Dim> loads_at_end_;
   CellSet<Dim> cells_;
-  CollisionSurface surface_;
+  ContactSurface<Dim> surface_;
   HeldDofs<Dim> held_;
   DofMap dofs_;
   double scaling_;
@@ -98,7 +97,8 @@ class StepProblem {
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;
   std::shared_ptr<LoadEnergy<Dim>> loads_;
-  std::shared_ptr<ContactEnergy<Dim>> contact_;
+  std::shared_ptr<ContactEnergy<Dim>> contact_;       ///< over the vertices of the surface
+  std::shared_ptr<const Energy> contact_of_dofs_;     ///< the same over those of the problem
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed

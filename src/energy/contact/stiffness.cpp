@@ -25,14 +25,15 @@ ContactOptions plain_form(ContactOptions options) {
 
 template <int Dim>
 AdaptiveStiffness<Dim>::AdaptiveStiffness(const CollisionSurface& surface, const ContactOptions& options,
-                                          double average_mass, double scale)
+                                          double average_mass, double scale, const VertexMap<Dim>* map)
     : surface_(surface),
       plain_(surface, plain_form(options), 1, 1),
       actual_(surface, options, 1, 1),
       dhat_(options.activation_distance),
       convergent_(options.convergent),
       average_mass_(average_mass),
-      scale_(scale) {}
+      scale_(scale),
+      map_(map) {}
 
 template <int Dim>
 double AdaptiveStiffness<Dim>::bounding_diagonal(ConstVectorView x) const {
@@ -51,6 +52,11 @@ void AdaptiveStiffness<Dim>::initialize(ConstVectorView x, const VectorX& gradie
   stiffness.largest = kLargestByLeast * least;
   VectorX barrier = VectorX::Zero(x.size());
   plain_.add_gradient(x, barrier, workspace);
+  if (map_) {
+    VectorX of_dofs = VectorX::Zero(gradient.size());
+    map_->add_gradient(barrier, of_dofs);
+    barrier = std::move(of_dofs);
+  }
   const double norm_squared = barrier.squaredNorm();
   stiffness.value = norm_squared > 0 ? -barrier.dot(gradient) / norm_squared : 1;
   stiffness.value = std::clamp(stiffness.value, least, stiffness.largest);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "itr/energy/contact/contact.hpp"
+#include "itr/fem/vertex_map.hpp"
 
 namespace itr {
 
@@ -20,11 +21,15 @@ template <int Dim>
 class AdaptiveStiffness {
  public:
   /// `average_mass`: the sum of all entries of the mass matrix by its number of rows [kg]; 1 in statics. `scale`: alpha h^2.
-  AdaptiveStiffness(const CollisionSurface& surface, const ContactOptions& options, double average_mass, double scale);
+  /// `map`: from the dofs to the vertices of the surface, null where they are the same. It and the surface must outlive
+  /// this.
+  AdaptiveStiffness(const CollisionSurface& surface, const ContactOptions& options, double average_mass, double scale,
+                    const VertexMap<Dim>* map = nullptr);
 
-  /// Balances the barrier against `gradient`, that of all other terms at x (of all dofs, also held ones).
+  /// Balances the barrier at the positions x of the surface against `gradient`, that of all other terms there (of all dofs,
+  /// also held ones).
   void initialize(ConstVectorView x, const VectorX& gradient, BarrierStiffness& stiffness, Workspace& workspace) const;
-  /// After a Newton step to x: whether the stiffness was doubled.
+  /// After a Newton step to the positions x of the surface: whether the stiffness was doubled.
   bool update(ConstVectorView x, BarrierStiffness& stiffness, Workspace& workspace) const;
 
  private:
@@ -37,6 +42,7 @@ class AdaptiveStiffness {
   bool convergent_;
   double average_mass_;
   double scale_;
+  const VertexMap<Dim>* map_;
 };
 
 }  // namespace itr

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/mapped.hpp"
+
+#include <algorithm>
+
+namespace itr {
+
+template <int Dim>
+double MappedEnergy<Dim>::value(ConstVectorView x, Workspace& workspace) const {
+  return energy_->value(map_->positions(x), workspace);
+}
+
+template <int Dim>
+void MappedEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
+  const VectorX y = map_->positions(x);
+  VectorX gradient_in_y = VectorX::Zero(y.size());
+  energy_->add_gradient(y, gradient_in_y, workspace);
+  map_->add_gradient(gradient_in_y, gradient);
+}
+
+template <int Dim>
+void MappedEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
+  std::vector<int> sources;
+  MatrixX A, product;  // of one stencil: from the dofs of its sources to its own
+  HessianSink mapped([&](std::span<const int> vertices, const double* block) {
+    sources.clear();
+    for (const int v : vertices) sources.insert(sources.end(), map_->sources(v).begin(), map_->sources(v).end());
+    std::sort(sources.begin(), sources.end());
+    sources.erase(std::unique(sources.begin(), sources.end()), sources.end());
+    const auto rows = Dim * static_cast<Eigen::Index>(vertices.size());
+    A.setZero(rows, Dim * static_cast<Eigen::Index>(sources.size()));
+    for (std::size_t i = 0; i < vertices.size(); ++i)
+      for (std::size_t k = 0; k < map_->sources(vertices[i]).size(); ++k) {
+        const auto j = std::lower_bound(sources.begin(), sources.end(), map_->sources(vertices[i])[k]) - sources.begin();
+        A.block<Dim, Dim>(Dim * static_cast<Eigen::Index>(i), Dim * j).diagonal().setConstant(map_->weights(vertices[i])[k]);
+      }
+    product.noalias() = A.transpose() * (Eigen::Map<const MatrixX>(block, rows, rows) * A).eval();
+    sink.add<Dim>(sources, product.data());
+  });
+  energy_->add_hessian(map_->positions(x), psd, mapped, workspace);
+}
+
+template <int Dim>
+double MappedEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
+  return energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
+}
+
+template class MappedEnergy<2>;
+template class MappedEnergy<3>;
+
+}  // namespace itr

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#include "collision_mesh.hpp"
+
+#include <cmath>
+#include <cstdint>
+
+#include "core/hdf5.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// The datasets `values`, `rows` and `cols` of /weight_triplets, and its attribute `shape`. Triplets for one entry are
+/// summed.
+Weights read_weights(const std::filesystem::path& path, std::int64_t rows, std::int64_t columns) {
+  const auto fail = [&](const std::string& place, const std::string& found, const std::string& expected) {
+    throw InputError({path.string(), place, found, expected});
+  };
+  const std::string group = "weight_triplets";
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(path);
+  for (const char* name : {"values", "rows", "cols"})
+    if (!file.contains(group) || !file.contains(group + "/" + name)) fail(group + "/" + name, "no such dataset", "it");
+  const std::vector<std::int64_t> shape = file.read_integers_attribute(group, "shape");
+  if (shape != std::vector{rows, columns}) {
+    std::string found;
+    for (const std::int64_t n : shape) found += (found.empty() ? "" : " x ") + std::to_string(n);
+    fail(group + ", attribute shape", found,
+         std::to_string(rows) + " x " + std::to_string(columns) +
+             ", vertices of the collision mesh by vertices of the bodies (those in no cell are left out)");
+  }
+  const std::vector<double> values = file.read_doubles(group + "/values").values;
+  const auto read_indices = [&](const char* name, std::int64_t end) {
+    std::vector<std::int64_t> indices = file.read_integers(group + "/" + name).values;
+    if (indices.size() != values.size())
+      fail(group + "/" + name, std::to_string(indices.size()) + " numbers", std::to_string(values.size()) + ", one a value");
+    for (const std::int64_t i : indices)
+      if (i < 0 || i >= end) fail(group + "/" + name, "index " + std::to_string(i), "0 to " + std::to_string(end) + " - 1");
+    return indices;
+  };
+  const auto row = read_indices("rows", rows), column = read_indices("cols", columns);
+  std::vector<Eigen::Triplet<double>> triplets;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (!std::isfinite(values[k])) fail(group + "/values", "weight " + std::to_string(k) + " that is not finite", "numbers");
+    triplets.emplace_back(static_cast<int>(row[k]), static_cast<int>(column[k]), values[k]);
+  }
+  Weights weights(rows, columns);
+  weights.setFromTriplets(triplets.begin(), triplets.end());
+  return weights;
+}
+
+}  // namespace
+
+bool has_collision_mesh(const Node& root) {
+  const Node node = root["contact"]["collision_mesh"];
+  return node.exists() && node["enabled"].boolean(true) && root["contact"]["enabled"].boolean(false);
+}
+
+template <int Dim>
+std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const Geometries& geometries, const Mesh<Dim>& mesh,
+                                                       MeshFiles& files) {
+  if (!has_collision_mesh(root)) return {};
+  const Node node = root["contact"]["collision_mesh"];
+  if (root["space"]["remesh"]["enabled"].boolean(false))
+    node.fail("a collision mesh where the bodies' mesh changes", "one or the other (space/remesh/enabled)");
+  for (const Node& geometry : geometries.bodies)
+    if (geometry["n_refs"].integer(0) != 0) geometry["n_refs"].fail("0: a collision mesh follows the vertices of the file");
+  Obstacles<Dim> surface = read_surface<Dim>(node, root["geometry"].items().front(), files);
+  const auto vertices = static_cast<std::int64_t>(surface.rest.size());
+  return CollisionProxy<Dim>{
+      std::move(surface.rest), std::move(surface.edges), std::move(surface.triangles),
+      read_weights(MeshFiles::find(node["linear_map"], MeshFiles::kWeights), vertices, mesh.num_vertices())};
+}
+
+template std::optional<CollisionProxy<2>> read_collision_mesh(const Node&, const Geometries&, const Mesh<2>&, MeshFiles&);
+template std::optional<CollisionProxy<3>> read_collision_mesh(const Node&, const Geometries&, const Mesh<3>&, MeshFiles&);
+
+}  // namespace itr::scene

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#include "itr/simulation/contact_surface.hpp"
+
+#include <numeric>
+#include <utility>
+
+namespace itr {
+
+namespace {
+
+/// The surface of what moves with bodies, given by its primitives and rest positions, and the obstacles after it.
+template <int Dim>
+CollisionSurface with_obstacles(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
+                                std::vector<int> points, std::vector<Vec<Dim>> rest, std::vector<char> counts,
+                                const Obstacles<Dim>& obstacles) {
+  const int bodies = static_cast<int>(rest.size()), total = bodies + static_cast<int>(obstacles.rest.size());
+  rest.insert(rest.end(), obstacles.rest.begin(), obstacles.rest.end());
+  counts.resize(total, 0);
+  for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
+  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
+  for (int v = bodies; v < total; ++v) points.push_back(v);
+  return make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
+}
+
+/// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
+template <int Dim>
+std::shared_ptr<const VertexMap<Dim>> make_map(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
+  const CollisionProxy<Dim>& proxy = *setup.proxy;
+  const int vertices = mesh.vertex_slots(), own = static_cast<int>(proxy.rest.size());
+  const int obstacles = static_cast<int>(setup.obstacles.rest.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  VectorX offset = VectorX::Zero(Dim * (own + obstacles));
+  for (int i = 0; i < own; ++i) vertex_of<Dim>(offset, i) = proxy.rest[i];
+  for (int i = 0; i < own; ++i)
+    for (typename Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, i); it; ++it) {
+      entries.emplace_back(i, static_cast<int>(it.col()), it.value());
+      vertex_of<Dim>(offset, i) -= it.value() * mesh.rest(static_cast<int>(it.col()));
+    }
+  for (int o = 0; o < obstacles; ++o) entries.emplace_back(own + o, vertices + o, 1);
+  typename VertexMap<Dim>::Weights weights(own + obstacles, vertices + obstacles);
+  weights.setFromTriplets(entries.begin(), entries.end());
+  return std::make_shared<VertexMap<Dim>>(std::move(weights), std::move(offset));
+}
+
+}  // namespace
+
+template <int Dim>
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
+  std::vector<Vec<Dim>> rest;
+  rest.reserve(mesh.vertex_slots() + obstacles.rest.size());
+  for (int v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  std::vector<std::array<int, 2>> edges;
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<char> counts(rest.size(), 0);
+  for (int f = 0; f < mesh.facet_slots(); ++f) {
+    if (!mesh.is_facet_alive(f)) continue;
+    const auto& facet = mesh.facet(f);
+    for (const int v : facet) counts[v] = 1;
+    if constexpr (Dim == 2)
+      edges.push_back(facet);
+    else
+      triangles.push_back(facet);
+  }
+  return with_obstacles<Dim>(std::move(edges), std::move(triangles), {}, std::move(rest), std::move(counts), obstacles);
+}
+
+template <int Dim>
+ContactSurface<Dim> contact_surface(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
+  if (!setup.proxy) return {collision_surface(mesh, setup.obstacles), nullptr};
+  const CollisionProxy<Dim>& proxy = *setup.proxy;
+  std::vector<int> points(proxy.rest.size());
+  std::iota(points.begin(), points.end(), 0);
+  std::vector<char> counts(proxy.rest.size(), 1);
+  return {
+      with_obstacles<Dim>(proxy.edges, proxy.triangles, std::move(points), proxy.rest, std::move(counts), setup.obstacles),
+      make_map(setup, mesh)};
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                 \
+  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&); \
+  template ContactSurface<Dim> contact_surface<Dim>(const Setup<Dim>&, const Mesh<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr
