@@ -334,6 +334,30 @@ TEST_F(CollisionMeshScene, IsReadAndTransformedAsTheFirstGeometry) {
   EXPECT_EQ(scene::find_changes(before, read().identity).size(), 1u);
 }
 
+TEST_F(CollisionMeshScene, WarnsOfLooseVerticesAndOfWeightsThatLagBehind) {
+  write_weights();
+  EXPECT_EQ(read().warnings, std::vector<std::string>());
+  values_[0] *= 0.9;
+  write_weights();
+  ASSERT_EQ(read().warnings.size(), 1u);
+  EXPECT_NE(read().warnings[0].find("the weights of 1 vertices do not sum to 1"), std::string::npos) << read().warnings[0];
+  values_[0] /= 0.9;
+  rows_.push_back(shape_[0]++);
+  cols_.push_back(0);
+  values_.push_back(1);
+  write_weights();
+  std::string obj;
+  for (const Vec<3>& X : proxy_.rest)
+    obj += "v " + std::to_string(X[0]) + ' ' + std::to_string(X[1]) + ' ' + std::to_string(X[2]) + '\n';
+  obj += "v .1 .1 .1\n";
+  for (const auto& [a, b, c] : proxy_.triangles)
+    obj += "f " + std::to_string(a + 1) + ' ' + std::to_string(b + 1) + ' ' + std::to_string(c + 1) + '\n';
+  write("loose.obj", obj);
+  const auto warnings = read({{"contact", {{"collision_mesh", {{"mesh", "loose.obj"}}}}}}).warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("/contact/collision_mesh/mesh: 1 vertices in no edge"), std::string::npos) << warnings[0];
+}
+
 TEST_F(CollisionMeshScene, IsNotLookedAtWhereItIsNotUsed) {
   EXPECT_FALSE(std::get<itr::Setup<3>>(read({{"contact", {{"collision_mesh", {{"enabled", false}}}}}}).setup).proxy);
   EXPECT_FALSE(std::get<itr::Setup<3>>(read({{"contact", {{"enabled", false}}}}).setup).proxy);

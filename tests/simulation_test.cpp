@@ -537,6 +537,21 @@ TEST(Simulation, HeldVerticesThatCannotArriveEndTheStepWithTheReason) {
   }
 }
 
+TEST(Simulation, TheReasonNamesVerticesOfAProxy) {
+  linear::Registry registry;
+  auto setup = pressed_square(0.3);
+  const auto vertices = static_cast<Eigen::Index>(setup.mesh.num_vertices());
+  CollisionProxy<2> proxy{{}, {}, {}, {vertices, vertices}};
+  proxy.weights.setIdentity();
+  for (int v = 0; v < vertices; ++v) proxy.rest.push_back(setup.mesh.rest(v));
+  for (int f = 0; f < setup.mesh.facet_slots(); ++f) proxy.edges.push_back(setup.mesh.facet(f));
+  setup.proxy = proxy;
+  const auto result = Simulation<2>(setup, registry).advance();
+  ASSERT_FALSE(result.ok);
+  for (const char* part : {"its contact pair proxy ", " obstacle 0 obstacle 1 near ("})
+    EXPECT_NE(result.reason.find(part), std::string::npos) << part << "; reason: " << result.reason;
+}
+
 TEST(Simulation, DirichletMayMoveByLessThanRoundOff) {
   auto setup = free_square(3);
   setup.newton.first_gradient_tolerance = setup.newton.gradient_tolerance = 1e-300;

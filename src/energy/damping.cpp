@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "itr/core/check.hpp"
+
 namespace itr {
 
 template <int Dim>
@@ -11,6 +13,7 @@ DampingEnergy<Dim>::DampingEnergy(const Energy& damped, ConstVectorView lagged_x
     : coefficient_(coefficient), velocity_(std::move(velocity)) {
   HessianSink sink([this](std::span<const int> vertices, const double* values) {
     Block block{{}, static_cast<int>(vertices.size()), values_.size()};
+    ITR_CHECK(vertices.size() <= block.vertices.size(), vertices.size());
     std::copy(vertices.begin(), vertices.end(), block.vertices.begin());
     blocks_.push_back(block);
     values_.insert(values_.end(), values, values + Dim * Dim * vertices.size() * vertices.size());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "collision_mesh.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -51,6 +52,20 @@ Weights read_weights(const std::filesystem::path& path, std::int64_t rows, std::
   return weights;
 }
 
+template <int Dim>
+int count_loose(const CollisionProxy<Dim>& proxy) {
+  std::vector<char> is_used(proxy.rest.size(), 0);
+  for (const auto& edge : proxy.edges)  // those of the faces are among them
+    for (const int v : edge) is_used[v] = 1;
+  return static_cast<int>(std::count(is_used.begin(), is_used.end(), 0));
+}
+
+int count_unsteady(const Weights& weights) {
+  constexpr double kRounding = 1e-6;  // of files that hold single precision
+  const VectorX sums = weights * VectorX::Ones(weights.cols());
+  return static_cast<int>(((sums.array() - 1).abs() > kRounding).count());
+}
+
 }  // namespace
 
 bool has_collision_mesh(const Node& root) {
@@ -60,7 +75,7 @@ bool has_collision_mesh(const Node& root) {
 
 template <int Dim>
 std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const Geometries& geometries, const Mesh<Dim>& mesh,
-                                                       MeshFiles& files) {
+                                                       MeshFiles& files, std::vector<std::string>& warnings) {
   if (!has_collision_mesh(root)) return {};
   const Node node = root["contact"]["collision_mesh"];
   if (root["space"]["remesh"]["enabled"].boolean(false))
@@ -69,12 +84,21 @@ std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const G
     if (geometry["n_refs"].integer(0) != 0) geometry["n_refs"].fail("0: a collision mesh follows the vertices of the file");
   Obstacles<Dim> surface = read_surface<Dim>(node, root["geometry"].items().front(), files);
   const auto vertices = static_cast<std::int64_t>(surface.rest.size());
-  return CollisionProxy<Dim>{
+  CollisionProxy<Dim> proxy{
       std::move(surface.rest), std::move(surface.edges), std::move(surface.triangles),
       read_weights(MeshFiles::find(node["linear_map"], MeshFiles::kWeights), vertices, mesh.num_vertices())};
+  if (const int loose = count_loose(proxy); loose > 0)
+    warnings.push_back(node["mesh"].pointer() + ": " + std::to_string(loose) +
+                       " vertices in no edge and no face touch as points");
+  if (const int unsteady = count_unsteady(proxy.weights); unsteady > 0)
+    warnings.push_back(node["linear_map"].pointer() + ": the weights of " + std::to_string(unsteady) +
+                       " vertices do not sum to 1: they do not follow where the bodies move as a whole");
+  return proxy;
 }
 
-template std::optional<CollisionProxy<2>> read_collision_mesh(const Node&, const Geometries&, const Mesh<2>&, MeshFiles&);
-template std::optional<CollisionProxy<3>> read_collision_mesh(const Node&, const Geometries&, const Mesh<3>&, MeshFiles&);
+template std::optional<CollisionProxy<2>> read_collision_mesh(const Node&, const Geometries&, const Mesh<2>&, MeshFiles&,
+                                                              std::vector<std::string>&);
+template std::optional<CollisionProxy<3>> read_collision_mesh(const Node&, const Geometries&, const Mesh<3>&, MeshFiles&,
+                                                              std::vector<std::string>&);
 
 }  // namespace itr::scene

@@ -15,6 +15,6 @@ bool has_collision_mesh(const Node& root);
 /// the bodies' files in their order. Nothing where the scene has none.
 template <int Dim>
 std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const Geometries& geometries, const Mesh<Dim>& mesh,
-                                                       MeshFiles& files);
+                                                       MeshFiles& files, std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

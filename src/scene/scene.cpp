@@ -62,7 +62,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
-  setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files);
+  setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;
 }

@@ -22,26 +22,6 @@ CollisionSurface with_obstacles(std::vector<std::array<int, 2>> edges, std::vect
   return make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
 }
 
-/// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
-template <int Dim>
-std::shared_ptr<const VertexMap<Dim>> make_map(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
-  const CollisionProxy<Dim>& proxy = *setup.proxy;
-  const int vertices = mesh.vertex_slots(), own = static_cast<int>(proxy.rest.size());
-  const int obstacles = static_cast<int>(setup.obstacles.rest.size());
-  std::vector<Eigen::Triplet<double>> entries;
-  VectorX offset = VectorX::Zero(Dim * (own + obstacles));
-  for (int i = 0; i < own; ++i) vertex_of<Dim>(offset, i) = proxy.rest[i];
-  for (int i = 0; i < own; ++i)
-    for (typename Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, i); it; ++it) {
-      entries.emplace_back(i, static_cast<int>(it.col()), it.value());
-      vertex_of<Dim>(offset, i) -= it.value() * mesh.rest(static_cast<int>(it.col()));
-    }
-  for (int o = 0; o < obstacles; ++o) entries.emplace_back(own + o, vertices + o, 1);
-  typename VertexMap<Dim>::Weights weights(own + obstacles, vertices + obstacles);
-  weights.setFromTriplets(entries.begin(), entries.end());
-  return std::make_shared<VertexMap<Dim>>(std::move(weights), std::move(offset));
-}
-
 }  // namespace
 
 template <int Dim>
@@ -64,6 +44,26 @@ CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& 
   return with_obstacles<Dim>(std::move(edges), std::move(triangles), {}, std::move(rest), std::move(counts), obstacles);
 }
 
+/// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
+template <int Dim>
+std::shared_ptr<const VertexMap<Dim>> proxy_map(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
+  const CollisionProxy<Dim>& proxy = *setup.proxy;
+  const int vertices = mesh.vertex_slots(), own = static_cast<int>(proxy.rest.size());
+  const int obstacles = static_cast<int>(setup.obstacles.rest.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  VectorX offset = VectorX::Zero(Dim * (own + obstacles));
+  for (int i = 0; i < own; ++i) vertex_of<Dim>(offset, i) = proxy.rest[i];
+  for (int i = 0; i < own; ++i)
+    for (typename Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, i); it; ++it) {
+      entries.emplace_back(i, static_cast<int>(it.col()), it.value());
+      vertex_of<Dim>(offset, i) -= it.value() * mesh.rest(static_cast<int>(it.col()));
+    }
+  for (int o = 0; o < obstacles; ++o) entries.emplace_back(own + o, vertices + o, 1);
+  typename VertexMap<Dim>::Weights weights(own + obstacles, vertices + obstacles);
+  weights.setFromTriplets(entries.begin(), entries.end());
+  return std::make_shared<VertexMap<Dim>>(std::move(weights), std::move(offset));
+}
+
 template <int Dim>
 ContactSurface<Dim> contact_surface(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
   if (!setup.proxy) return {collision_surface(mesh, setup.obstacles), nullptr};
@@ -73,11 +73,12 @@ ContactSurface<Dim> contact_surface(const Setup<Dim>& setup, const Mesh<Dim>& me
   std::vector<char> counts(proxy.rest.size(), 1);
   return {
       with_obstacles<Dim>(proxy.edges, proxy.triangles, std::move(points), proxy.rest, std::move(counts), setup.obstacles),
-      make_map(setup, mesh)};
+      proxy_map(setup, mesh)};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                 \
-  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&); \
+#define ITR_INSTANTIATE(Dim)                                                                          \
+  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&);          \
+  template std::shared_ptr<const VertexMap<Dim>> proxy_map<Dim>(const Setup<Dim>&, const Mesh<Dim>&); \
   template ContactSurface<Dim> contact_surface<Dim>(const Setup<Dim>&, const Mesh<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

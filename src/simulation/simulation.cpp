@@ -263,7 +263,7 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   if (impl_->setup.proxy) {
-    const VectorX y = contact_surface(impl_->setup, state.mesh).positions(all);
+    const VectorX y = proxy_map(impl_->setup, state.mesh)->positions(all);
     for (std::size_t v = 0; v < impl_->setup.proxy->rest.size(); ++v)
       data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
   }
