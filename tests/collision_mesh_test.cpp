@@ -334,6 +334,29 @@ TEST_F(CollisionMeshScene, IsReadAndTransformedAsTheFirstGeometry) {
   EXPECT_EQ(scene::find_changes(before, read().identity).size(), 1u);
 }
 
+TEST_F(CollisionMeshScene, IsALoopOfLinesIn2D) {
+  write("square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n");
+  write("loop.obj", "v .5 -.05 0\nv 1 .5 0\nv .5 1 0\nv 0 .5 0\nl 1 2 3 4 1\n");
+  write("line.obj", "v -1 -0.055 0\nv 2 -0.055 0\nl 1 2\n");
+  values_.assign(8, 0.5);
+  rows_ = {0, 0, 1, 1, 2, 2, 3, 3};
+  cols_ = {0, 1, 1, 2, 2, 3, 3, 0};
+  shape_ = {4, 4};
+  write_weights();
+  const auto plane =
+      read({{"geometry", {{{"mesh", "square.obj"}, {"volume_selection", 1}}, {{"mesh", "line.obj"}, {"is_obstacle", true}}}},
+            {"contact", {{"collision_mesh", {{"mesh", "loop.obj"}}}}}});
+  EXPECT_TRUE(plane.warnings.empty());
+  const auto setup = std::get<itr::Setup<2>>(plane.setup);
+  ASSERT_TRUE(setup.proxy);
+  EXPECT_EQ(setup.proxy->edges.size(), 4u);
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const StepResult result = simulation.advance();
+  EXPECT_TRUE(result.ok) << result.reason;
+  EXPECT_LT(result.report.min_distance, 0.01);  // of the corner below to the line
+}
+
 TEST_F(CollisionMeshScene, WarnsOfLooseVerticesAndOfWeightsThatLagBehind) {
   write_weights();
   EXPECT_EQ(read().warnings, std::vector<std::string>());
