@@ -8,7 +8,7 @@
 namespace itr {
 
 template <int Dim>
-VertexMap<Dim>::VertexMap(Weights weights, VectorX offset) : weights_(std::move(weights)), offset_(std::move(offset)) {
+VertexMap<Dim>::VertexMap(const Weights& weights, VectorX offset) : weights_(weights), offset_(std::move(offset)) {
   ITR_CHECK(offset_.size() == Dim * weights_.rows(), offset_.size(), weights_.rows());
   weights_.prune([](Eigen::Index, Eigen::Index, double weight) { return weight != 0; });
   weights_.makeCompressed();

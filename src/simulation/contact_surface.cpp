@@ -61,7 +61,7 @@ std::shared_ptr<const VertexMap<Dim>> proxy_map(const Setup<Dim>& setup, const M
   for (int o = 0; o < obstacles; ++o) entries.emplace_back(own + o, vertices + o, 1);
   typename VertexMap<Dim>::Weights weights(own + obstacles, vertices + obstacles);
   weights.setFromTriplets(entries.begin(), entries.end());
-  return std::make_shared<VertexMap<Dim>>(std::move(weights), std::move(offset));
+  return std::make_shared<VertexMap<Dim>>(weights, std::move(offset));
 }
 
 template <int Dim>
@@ -76,12 +76,11 @@ ContactSurface<Dim> contact_surface(const Setup<Dim>& setup, const Mesh<Dim>& me
       proxy_map(setup, mesh)};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                          \
-  template CollisionSurface collision_surface<Dim>(const Mesh<Dim>&, const Obstacles<Dim>&);          \
-  template std::shared_ptr<const VertexMap<Dim>> proxy_map<Dim>(const Setup<Dim>&, const Mesh<Dim>&); \
-  template ContactSurface<Dim> contact_surface<Dim>(const Setup<Dim>&, const Mesh<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+template CollisionSurface collision_surface(const Mesh<2>&, const Obstacles<2>&);
+template std::shared_ptr<const VertexMap<2>> proxy_map(const Setup<2>&, const Mesh<2>&);
+template ContactSurface<2> contact_surface(const Setup<2>&, const Mesh<2>&);
+template CollisionSurface collision_surface(const Mesh<3>&, const Obstacles<3>&);
+template std::shared_ptr<const VertexMap<3>> proxy_map(const Setup<3>&, const Mesh<3>&);
+template ContactSurface<3> contact_surface(const Setup<3>&, const Mesh<3>&);
 
 }  // namespace itr

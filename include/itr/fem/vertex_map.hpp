@@ -15,7 +15,7 @@ class VertexMap {
   using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
   /// `weights`: a row for each vertex of y, a column for each of x; zeros in it are dropped. `offset`: c, interleaved [m].
-  VertexMap(Weights weights, VectorX offset);
+  VertexMap(const Weights& weights, VectorX offset);
 
   VectorX positions(ConstVectorView x) const;  ///< y(x)
   VectorX motion(ConstVectorView dx) const;    ///< y(x + dx) - y(x)
