@@ -299,7 +299,9 @@ void expect_mapped_terms(Scene scene, unsigned seed) {
       moments += force.segment<Dim>(Dim * v) * mapped.x.template segment<Dim>(Dim * v).transpose();
     }
     EXPECT_LE(sum.norm(), 1e-12 * force.norm());
-    if (is_contact) EXPECT_LE((moments - moments.transpose()).norm(), 1e-10 * moments.norm());
+    if (is_contact) {
+      EXPECT_LE((moments - moments.transpose()).norm(), 1e-10 * moments.norm());
+    }
     is_contact = false;  // lagged friction acts at lagged points: it keeps the moment up to slip alone
   }
 }
