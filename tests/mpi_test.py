@@ -20,7 +20,7 @@ ITR, SOURCE, MPI_HOST = sys.argv[1:4]
 SCENE = str(pathlib.Path(SOURCE) / "examples" / "masticator.json")
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
                    OMPI_MCA_rmaps_base_oversubscribe="1", OMPI_MCA_mpi_yield_when_idle="1")
-PATIENCE = 120  # s; a hang fails here
+PATIENCE = 300  # s; a hang fails here
 
 
 def mpirun(ranks, *command):
@@ -62,14 +62,15 @@ def rank_of(pid):
 
 
 def test_same_result_on_any_number_of_ranks(scratch):
-    few_steps = ["--set", "/time/tend=1.5", "--solver", "mumps"]
+    # Few: where ranks wait for a core that others keep busy, each message may take a slice of the scheduler's time.
+    few_steps = ["--set", "/time/tend=1", "--set", "/time/dt=0.5", "--solver", "mumps"]
     results = []
     for ranks in (1, 2, 3):
         folder = scratch / f"ranks{ranks}"
         done = itr_run(ranks, folder, *few_steps)
         assert done.returncode == 0, done.stderr
         results.append(energies(folder))
-    assert len(results[0]) == 31 and results[0][-1] > 1e-3, results[0]
+    assert len(results[0]) == 3 and results[0][-1] > 1e-3, results[0]
     for other in results[1:]:
         for a, b in zip(results[0], other, strict=True):
             assert abs(a - b) <= 1e-9 * max(abs(a), results[0][-1]), (a, b)

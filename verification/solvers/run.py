@@ -261,9 +261,9 @@ def main():
     parser.add_argument("--seconds", type=float, default=1200, help="a solver has for a system")
     parser.add_argument("--end-seconds", type=float, default=600, help="a solver has for a scene from end to end")
     parser.add_argument("--dump-seconds", type=float, default=1200, help="a run has to reach its end; else its last system counts")
-    parser.add_argument("--once-from", type=int, default=100_000, help="larger systems are factorised once instead of six times")
+    parser.add_argument("--once-from", type=int, default=30_000, help="larger systems are factorised once")
     parser.add_argument("--gib", type=float, default=16, help="a solver has for a system, of address space")
-    parser.add_argument("--ranks", type=int, nargs="*", default=[1, 2, 4], help="for mumps")
+    parser.add_argument("--ranks", type=int, nargs="*", default=[1, 2], help="for mumps")
     parser.add_argument("--output", type=pathlib.Path, default=HERE)
     arguments = parser.parse_args()
     itr, bench = arguments.build / "bin" / "itr", arguments.build / "bin" / "itr_solver_bench"
@@ -309,10 +309,13 @@ def main():
                     row.update(scene=name, solver=solver, ranks=ranks)
                     rows.append(row)
                     print(json.dumps(row), flush=True)
+        smallest = min((row["unknowns"] for row in rows if row["scene"] == name), default=0)
         for solver in solvers:
             folder = arguments.work / f"{name.replace(' ', '-')}-{solver.replace(':', '-')}"
-            ends.append({"scene": name, "solver": solver, **kept(folder.with_suffix(".json"), lambda: run_scene(
-                itr, scene, ENDS[name], solver, folder, arguments.end_seconds, arguments.gib))})
+            end = {"outcome": "left out"} if solver == "dense" and smallest > DENSE_MOST else kept(
+                folder.with_suffix(".json"),
+                lambda: run_scene(itr, scene, ENDS[name], solver, folder, arguments.end_seconds, arguments.gib))
+            ends.append({"scene": name, "solver": solver, **end})
             print(json.dumps(ends[-1]), flush=True)
         write(rows, ends, arguments.output)
     print(write(rows, ends, arguments.output))
