@@ -158,6 +158,7 @@ class Mumps {
     result.largest_bytes = 1e6 * infog(mumps_, is_factorized_ ? 21 : 16);
     result.factor_bytes = 1e6 * infog(mumps_, is_factorized_ ? 22 : 17);
     result.flops = mumps_.rinfog[is_factorized_ ? 2 : 0];
+    result.negative_pivots = is_factorized_ ? infog(mumps_, 12) : 0;
     return result;
   }
   const char* message() const { return text_.data(); }

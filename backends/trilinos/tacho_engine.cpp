@@ -25,6 +25,9 @@ struct TachoObjects {
   ~TachoObjects() { driver.release(); }
 };
 
+/// Unknowns up to which LAPACK factorises. Tacho's own limit is 1024, where that takes ten times as long.
+constexpr int kDenseBelow = 100;
+
 class TachoEngine : public TrilinosEngine<TachoObjects> {
  public:
   int set_option(std::string_view, std::string_view) { return ITR_FAILED; }
@@ -40,6 +43,7 @@ class TachoEngine : public TrilinosEngine<TachoObjects> {
     std::copy(full_.indices.begin(), full_.indices.end(), indices.data());
     objects_->values = Driver::value_type_array("values", full_.values.size());
     objects_->driver.setMatrixType(2, true);  // symmetric, positive definite
+    objects_->driver.setSmallProblemThresholdsize(kDenseBelow);
     const auto order = fill_reducing_order();
     Driver::ordinal_type_array_host forth("forth", full_.order), back("back", full_.order);
     for (int k = 0; k < full_.order; ++k) {

@@ -41,7 +41,12 @@ class ModuleEngine final : public Engine {
   Statistics statistics() const override {
     itr_statistics s{};
     if (self_) table_.statistics(self_, &s);
-    return {s.factor_nonzeros, s.factor_bytes, s.largest_bytes, s.flops, static_cast<int>(s.iterations)};
+    return {s.factor_nonzeros,
+            s.factor_bytes,
+            s.largest_bytes,
+            s.flops,
+            static_cast<int>(s.iterations),
+            static_cast<int>(s.negative_pivots)};
   }
   std::string message() const override { return self_ ? table_.message(self_) : "no memory for the solver"; }
 

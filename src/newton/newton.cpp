@@ -288,6 +288,12 @@ class Minimizer {
     }
     outcome_ = system_.factorize(shift);
     if (outcome_ != linear::Outcome::ok) return give_reason();
+    // Not only Cholesky must see it: along eigenvectors of negative eigenvalues Newton's step goes up to a saddle.
+    if (options_.project_to_psd && system_.negative_pivots() > 0) {
+      outcome_ = linear::Outcome::not_positive_definite;
+      failure_ = " (linear solve: " + std::to_string(system_.negative_pivots()) + " negative eigenvalues)";
+      return false;
+    }
     VectorX rhs = -motion_.coupling, solution;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];

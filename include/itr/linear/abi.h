@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define ITR_BACKEND_ABI_VERSION 2
+#define ITR_BACKEND_ABI_VERSION 3
 #define ITR_BACKEND_ENTRY "itr_backend_module"
 
 /* Names as in C. NOLINTBEGIN(readability-identifier-naming) */
@@ -41,10 +41,11 @@ typedef struct itr_hints {
 /* What the last factorisation and solve took; zero where the library does not tell. */
 typedef struct itr_statistics {
   double factor_nonzeros;
-  double factor_bytes;  /* summed over the ranks */
-  double largest_bytes; /* of any one rank */
-  double flops;         /* of the factorisation */
-  double iterations;    /* of the last solve */
+  double factor_bytes;    /* summed over the ranks */
+  double largest_bytes;   /* of any one rank */
+  double flops;           /* of the factorisation */
+  double iterations;      /* of the last solve */
+  double negative_pivots; /* of the last factorisation L D L^T: as many as negative eigenvalues */
 } itr_statistics;
 
 typedef struct itr_engine {

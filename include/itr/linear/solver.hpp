@@ -55,6 +55,7 @@ struct Statistics {
   double largest_bytes = 0;  ///< of any one rank
   double flops = 0;          ///< of the factorisation
   int iterations = 0;        ///< of the last solve
+  int negative_pivots = 0;   ///< of the last factorisation L D L^T: as many as negative eigenvalues
 };
 
 /// Options of a backend by name, as `itr solvers` lists them: {"ordering", "metis"}.

@@ -23,6 +23,8 @@ class NewtonSystem {
   /// Factorises Hessian + shift * I.
   virtual linear::Outcome factorize(double shift) = 0;
   virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
+  /// Of the last factorisation, where the solver tells: as many as negative eigenvalues of the matrix.
+  virtual int negative_pivots() const { return 0; }
   /// Who failed and why, after an outcome that was not ok.
   virtual std::string message() const = 0;
   /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
@@ -55,6 +57,7 @@ class SparseSystem final : public NewtonSystem {
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  int negative_pivots() const override { return solver_.statistics().negative_pivots; }
   std::string message() const override;
   double diagonal_scale() const override;
 
