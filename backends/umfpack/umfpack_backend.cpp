@@ -17,13 +17,13 @@ namespace {
 class Umfpack {
  public:
   Umfpack() {
-    umfpack_di_defaults(control_.data());
+    umfpack_dl_defaults(control_.data());
     control_[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;
     control_[UMFPACK_IRSTEP] = 0;  // residuals are checked and refined by our side for all backends
   }
   ~Umfpack() {
-    umfpack_di_free_symbolic(&symbolic_);
-    umfpack_di_free_numeric(&numeric_);
+    umfpack_dl_free_symbolic(&symbolic_);
+    umfpack_dl_free_numeric(&numeric_);
   }
   Umfpack(const Umfpack&) = delete;
   Umfpack& operator=(const Umfpack&) = delete;
@@ -39,25 +39,27 @@ class Umfpack {
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {
     matrix_.set_pattern(pattern);
-    umfpack_di_free_numeric(&numeric_);
-    umfpack_di_free_symbolic(&symbolic_);
-    return outcome(umfpack_di_symbolic(matrix_.order, matrix_.order, matrix_.starts.data(), matrix_.indices.data(), nullptr,
-                                       &symbolic_, control_.data(), info_.data()));
+    starts_.assign(matrix_.starts.begin(), matrix_.starts.end());
+    indices_.assign(matrix_.indices.begin(), matrix_.indices.end());
+    umfpack_dl_free_numeric(&numeric_);
+    umfpack_dl_free_symbolic(&symbolic_);
+    return outcome(umfpack_dl_symbolic(matrix_.order, matrix_.order, starts_.data(), indices_.data(), nullptr, &symbolic_,
+                                       control_.data(), info_.data()));
   }
 
   int factorize(const double* values, size_t count) {
     matrix_.set_values(values, count);
-    umfpack_di_free_numeric(&numeric_);
-    return outcome(umfpack_di_numeric(matrix_.starts.data(), matrix_.indices.data(), matrix_.values.data(), symbolic_,
-                                      &numeric_, control_.data(), info_.data()));
+    umfpack_dl_free_numeric(&numeric_);
+    return outcome(umfpack_dl_numeric(starts_.data(), indices_.data(), matrix_.values.data(), symbolic_, &numeric_,
+                                      control_.data(), info_.data()));
   }
 
   int solve(const double* rhs, double* solution, int columns) {
     for (int c = 0; c < columns; ++c) {
       const auto offset = static_cast<size_t>(c) * matrix_.order;
       std::array<double, UMFPACK_INFO> info{};
-      const int status = umfpack_di_solve(UMFPACK_A, matrix_.starts.data(), matrix_.indices.data(), matrix_.values.data(),
-                                          solution + offset, rhs + offset, numeric_, control_.data(), info.data());
+      const auto status = umfpack_dl_solve(UMFPACK_A, starts_.data(), indices_.data(), matrix_.values.data(),
+                                           solution + offset, rhs + offset, numeric_, control_.data(), info.data());
       if (const int result = outcome(status); result != ITR_OK) return result;
     }
     return ITR_OK;
@@ -74,8 +76,8 @@ class Umfpack {
   const char* message() const { return text_.data(); }
 
  private:
-  int outcome(int status) {
-    std::snprintf(text_.data(), text_.size(), "UMFPACK status %d", status);
+  int outcome(SuiteSparse_long status) {
+    std::snprintf(text_.data(), text_.size(), "UMFPACK status %ld", static_cast<long>(status));
     switch (status) {
       case UMFPACK_OK:
         return ITR_OK;
@@ -91,6 +93,7 @@ class Umfpack {
   }
 
   itr::backends::FullMatrix matrix_;
+  std::vector<SuiteSparse_long> starts_, indices_;  ///< with 32 bits UMFPACK ends at 2 GB of factors
   void *symbolic_ = nullptr, *numeric_ = nullptr;
   std::array<double, UMFPACK_CONTROL> control_{};
   std::array<double, UMFPACK_INFO> info_{};

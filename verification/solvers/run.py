@@ -81,6 +81,8 @@ def limited(command, seconds, gib, **keywords):
         return None, f"did not finish in {seconds / 60:g} min"
     if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):  # the first comes where both limits are one
         return None, f"did not finish in {seconds / 60:g} min"
+    if done.returncode < 0:
+        return None, f"crashed (signal {-done.returncode})"
     if done.returncode != 0:
         return None, f"ended with status {done.returncode}: {''.join(done.stderr.strip().splitlines()[-1:])}"
     return done.stdout, "ok"
