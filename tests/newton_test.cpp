@@ -55,10 +55,10 @@ TEST(Newton, LeavesASaddleInFewSteps) {
 }
 
 /// The second dof's descent outweighs that the first one goes up, to the saddle.
-TEST(Newton, IsNotDrawnToASaddleByAFactorisationThatAllowsIt) {
+TEST(Newton, IsNotDrawnToASaddleByASolverThatAllowsIt) {
   const double c = 1e-2;
   linear::Registry registry;
-  for (const char* name : {"eigen:llt", "eigen:ldlt"}) {
+  for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "eigen:cg"}) {
     const auto solver = registry.create(name);
     SparseSystem system(*solver);
     const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
@@ -70,7 +70,7 @@ TEST(Newton, IsNotDrawnToASaddleByAFactorisationThatAllowsIt) {
     Workspace workspace;
     const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
     EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
-    EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-9) << name;
+    EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-6) << name;  // the saddle is at 0
   }
 }
 

@@ -337,7 +337,8 @@ const char* version() {
 
 extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
   static const char* const text = version();
-  static const itr_engine engines[] = {row<2>("mumps", text, ITR_INDEFINITE | ITR_MPI), row<1>("mumps:spd", text, ITR_MPI)};
+  static const itr_engine engines[] = {row<2>("mumps", text, ITR_INDEFINITE | ITR_MPI | ITR_TELLS_DEFINITENESS),
+                                       row<1>("mumps:spd", text, ITR_MPI | ITR_TELLS_DEFINITENESS)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
   return &module;
 }

@@ -98,7 +98,8 @@ class TachoEngine : public TrilinosEngine<TachoObjects> {
 }  // namespace
 
 itr_engine tacho_row(const char* version) {
-  return on_mpi(linear::ModuleAdapter<TachoEngine>::row("amesos2:tacho", version, "BSD-3-Clause", 0, ""));
+  return on_mpi(
+      linear::ModuleAdapter<TachoEngine>::row("amesos2:tacho", version, "BSD-3-Clause", ITR_TELLS_DEFINITENESS, ""));
 }
 
 }  // namespace itr::backends

@@ -117,7 +117,8 @@ std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
   for (int i = 0; i < module->num_engines; ++i) {
     const itr_engine& engine = module->engines[i];
     const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
-                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0};
+                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0,
+                                    (engine.capabilities & ITR_TELLS_DEFINITENESS) != 0};
     rows.push_back({{engine.name, engine.library_version, engine.license, engine.options, capabilities, true, ""},
                     [&engine](const SolverOptions& options) -> std::unique_ptr<Engine> {
                       auto instance = std::make_unique<ModuleEngine>(engine);

@@ -253,7 +253,9 @@ class Minimizer {
   }
 
   bool compute_direction() {
-    projected_ = options_.project_to_psd && (psd_iterations_ > 0 || options_.projected_iterations == 0);
+    // A direction of the true Hessian is only taken where it is known to lead to a minimum, not to a saddle.
+    projected_ = options_.project_to_psd &&
+                 (psd_iterations_ > 0 || options_.projected_iterations == 0 || !system_.tells_definiteness());
     if (psd_iterations_ > 0) --psd_iterations_;
     if (!projected_ && try_direction(PsdProjection::none, 0)) return true;
     if (options_.project_to_psd) {

@@ -50,7 +50,7 @@ KEYS = ["scene", "solver", "ranks", "unknowns", "nonzeros", "outcome", "analyze_
         "bare_factorize_s", "bare_solve_s", "overhead", "factor_nonzeros", "factor_mb", "largest_rank_mb", "flops", "iterations",
         "residual"]
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
-                   OMPI_MCA_rmaps_base_oversubscribe="1", OMPI_MCA_mpi_yield_when_idle="1")
+                   OMPI_MCA_rmaps_base_oversubscribe="1")
 
 
 def dump(itr, scene, sets, folder, seconds):

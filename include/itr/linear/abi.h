@@ -22,7 +22,8 @@ extern "C" {
 enum { ITR_OK, ITR_NOT_POSITIVE_DEFINITE, ITR_SINGULAR, ITR_NON_FINITE, ITR_OUT_OF_MEMORY, ITR_NOT_CONVERGED, ITR_FAILED };
 
 /* Capability bits. */
-enum { ITR_INDEFINITE = 1, ITR_ITERATIVE = 2, ITR_THREADS = 4, ITR_MPI = 8 };
+/* ITR_TELLS_DEFINITENESS: ITR_NOT_POSITIVE_DEFINITE or negative_pivots tells of every matrix that is not. */
+enum { ITR_INDEFINITE = 1, ITR_ITERATIVE = 2, ITR_THREADS = 4, ITR_MPI = 8, ITR_TELLS_DEFINITENESS = 16 };
 
 /* Lower triangle with the diagonal, by columns, rows ascending. */
 typedef struct itr_pattern {

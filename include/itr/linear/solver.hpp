@@ -39,6 +39,7 @@ struct Capabilities {
   bool iterative = false;
   bool threads = false;
   bool mpi = false;
+  bool tells_definiteness = false;  ///< by the outcome or by Statistics::negative_pivots
 };
 
 /// What may help an analysis; all optional.
