@@ -177,17 +177,18 @@ def plot(rows, file):
 
     scenes = sorted({row["scene"] for row in rows})
     figure, axes = pyplot.subplots(1, len(scenes), figsize=(5 * len(scenes), 4.5), sharey=True, squeeze=False)
+    named = {}
     for axis, scene in zip(axes[0], scenes):
         for i, solver in enumerate(sorted({row["solver"] for row in rows})):
             points = sorted((r["unknowns"], r["factorize_s"] + r["solve_s"]) for r in rows
                             if (r["scene"], r["solver"], r["ranks"], r["outcome"]) == (scene, solver, 1, "ok"))
             if points:
-                axis.loglog(*zip(*points), marker="osd^v<>*xp"[i % 10], label=solver)
+                named[solver] = axis.loglog(*zip(*points), marker="osd^v<>*xp"[i % 10], color=pyplot.cm.tab20(i))[0]
         axis.set_title(scene)
         axis.set_xlabel("unknowns")
         axis.grid(alpha=0.3)
     axes[0][0].set_ylabel("factorisation + solve [s]")
-    axes[0][-1].legend(fontsize=7)
+    axes[0][-1].legend(named.values(), named, fontsize=7)
     figure.tight_layout()
     figure.savefig(file, metadata={"Date": None})
 
