@@ -6,8 +6,6 @@
 
 #include <cmath>
 
-#include "itr/linear/registry.hpp"
-
 namespace itr {
 namespace {
 
@@ -52,26 +50,6 @@ TEST(Newton, LeavesASaddleInFewSteps) {
   EXPECT_TRUE(summary.converged()) << summary.message;
   EXPECT_LT(summary.iterations, 60);  // growing by a hundredth a step it would be a thousand
   EXPECT_LE((x.array() - std::sqrt(c)).abs().maxCoeff(), 1e-9);
-}
-
-/// The second dof's descent outweighs that the first one goes up, to the saddle.
-TEST(Newton, IsNotDrawnToASaddleByASolverThatAllowsIt) {
-  const double c = 1e-2;
-  linear::Registry registry;
-  for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "eigen:cg"}) {
-    const auto solver = registry.create(name);
-    SparseSystem system(*solver);
-    const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
-    system.reset(dofs, 2, {}, 3);
-    VectorX x = Vec<2>(1e-6, 0.3);
-    NewtonOptions options;
-    options.step_tolerance = 1e-10;
-    options.gradient_tolerance = options.first_gradient_tolerance = 0;
-    Workspace workspace;
-    const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
-    EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
-    EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-6) << name;  // the saddle is at 0
-  }
 }
 
 /// A quadratic whose gradient has noise that no step removes.

@@ -149,9 +149,8 @@ extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_
   using Supernodal = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL>>;
   using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
   constexpr const char* kOptions = "ordering=auto|amd|metis|natural";
-  static const itr_engine engines[] = {
-      Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", ITR_TELLS_DEFINITENESS, kOptions),
-      Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", ITR_TELLS_DEFINITENESS, kOptions)};
+  static const itr_engine engines[] = {Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", 0, kOptions),
+                                       Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", 0, kOptions)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
   return &module;
 }

@@ -231,8 +231,8 @@ class Muelu : public TrilinosEngine<MueluObjects> {
 }  // namespace
 
 itr_engine muelu_row(const char* version) {
-  return on_mpi(linear::ModuleAdapter<Muelu>::row("belos:muelu", version, "BSD-3-Clause",
-                                                  ITR_ITERATIVE | ITR_TELLS_DEFINITENESS, linear::IterationOptions::kNames));
+  return on_mpi(linear::ModuleAdapter<Muelu>::row("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE,
+                                                  linear::IterationOptions::kNames));
 }
 
 }  // namespace itr::backends

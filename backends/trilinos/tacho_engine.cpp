@@ -98,8 +98,7 @@ class TachoEngine : public TrilinosEngine<TachoObjects> {
 }  // namespace
 
 itr_engine tacho_row(const char* version) {
-  return on_mpi(
-      linear::ModuleAdapter<TachoEngine>::row("amesos2:tacho", version, "BSD-3-Clause", ITR_TELLS_DEFINITENESS, ""));
+  return on_mpi(linear::ModuleAdapter<TachoEngine>::row("amesos2:tacho", version, "BSD-3-Clause", 0, ""));
 }
 
 }  // namespace itr::backends

@@ -41,12 +41,7 @@ class ModuleEngine final : public Engine {
   Statistics statistics() const override {
     itr_statistics s{};
     if (self_) table_.statistics(self_, &s);
-    return {s.factor_nonzeros,
-            s.factor_bytes,
-            s.largest_bytes,
-            s.flops,
-            static_cast<int>(s.iterations),
-            static_cast<int>(s.negative_pivots)};
+    return {s.factor_nonzeros, s.factor_bytes, s.largest_bytes, s.flops, static_cast<int>(s.iterations)};
   }
   std::string message() const override { return self_ ? table_.message(self_) : "no memory for the solver"; }
 
@@ -117,8 +112,7 @@ std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
   for (int i = 0; i < module->num_engines; ++i) {
     const itr_engine& engine = module->engines[i];
     const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
-                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0,
-                                    (engine.capabilities & ITR_TELLS_DEFINITENESS) != 0};
+                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0};
     rows.push_back({{engine.name, engine.library_version, engine.license, engine.options, capabilities, true, ""},
                     [&engine](const SolverOptions& options) -> std::unique_ptr<Engine> {
                       auto instance = std::make_unique<ModuleEngine>(engine);

@@ -253,9 +253,7 @@ class Minimizer {
   }
 
   bool compute_direction() {
-    // A direction of the true Hessian is only taken where it is known to lead to a minimum, not to a saddle.
-    projected_ = options_.project_to_psd &&
-                 (psd_iterations_ > 0 || options_.projected_iterations == 0 || !system_.tells_definiteness());
+    projected_ = options_.project_to_psd && (psd_iterations_ > 0 || options_.projected_iterations == 0);
     if (psd_iterations_ > 0) --psd_iterations_;
     if (!projected_ && try_direction(PsdProjection::none, 0)) return true;
     if (options_.project_to_psd) {
@@ -290,12 +288,6 @@ class Minimizer {
     }
     outcome_ = system_.factorize(shift);
     if (outcome_ != linear::Outcome::ok) return give_reason();
-    // Not only Cholesky must see it: along eigenvectors of negative eigenvalues Newton's step goes up to a saddle.
-    if (options_.project_to_psd && system_.negative_pivots() > 0) {
-      outcome_ = linear::Outcome::not_positive_definite;
-      failure_ = " (linear solve: " + std::to_string(system_.negative_pivots()) + " negative eigenvalues)";
-      return false;
-    }
     VectorX rhs = -motion_.coupling, solution;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];

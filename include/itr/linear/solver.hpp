@@ -39,7 +39,6 @@ struct Capabilities {
   bool iterative = false;
   bool threads = false;
   bool mpi = false;
-  bool tells_definiteness = false;  ///< by the outcome or by Statistics::negative_pivots
 };
 
 /// What may help an analysis; all optional.
@@ -56,7 +55,6 @@ struct Statistics {
   double largest_bytes = 0;  ///< of any one rank
   double flops = 0;          ///< of the factorisation
   int iterations = 0;        ///< of the last solve
-  int negative_pivots = 0;   ///< of the last factorisation L D L^T: as many as negative eigenvalues
 };
 
 /// Options of a backend by name, as `itr solvers` lists them: {"ordering", "metis"}.

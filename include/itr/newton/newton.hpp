@@ -23,10 +23,6 @@ class NewtonSystem {
   /// Factorises Hessian + shift * I.
   virtual linear::Outcome factorize(double shift) = 0;
   virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
-  /// Whether factorize, solve or negative_pivots tells of every matrix that is not positive definite.
-  virtual bool tells_definiteness() const { return true; }
-  /// Of the last factorisation: as many as negative eigenvalues of the matrix; 0 where the solver does not count them.
-  virtual int negative_pivots() const { return 0; }
   /// Who failed and why, after an outcome that was not ok.
   virtual std::string message() const = 0;
   /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
@@ -59,8 +55,6 @@ class SparseSystem final : public NewtonSystem {
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
-  bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
-  int negative_pivots() const override { return solver_.statistics().negative_pivots; }
   std::string message() const override;
   double diagonal_scale() const override;
 
