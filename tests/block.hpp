@@ -73,6 +73,17 @@ void add_table(Setup<Dim>& setup) {
   setup.contact = {.enabled = true, .activation_distance = dhat, .convergent = true, .barrier_stiffness = 1e6};
 }
 
+/// The block as it lands on the table, at 2 m/s along it.
+template <int Dim>
+Setup<Dim> sliding_block(int friction_iterations) {
+  Setup<Dim> setup = block<Dim>();
+  add_table(setup);
+  setup.contact.friction_coefficient = 0.3;
+  setup.contact.friction_iterations = friction_iterations;
+  setup.initial_velocity.push_back({1, [](const Vec<Dim>&, double) { return Vec<Dim>(2 * Vec<Dim>::Unit(0)); }});
+  return setup;
+}
+
 template <int Dim>
 AskedFields asked(const Simulation<Dim>& simulation) {
   AskedFields fields;

@@ -105,11 +105,7 @@ VectorX after_steps(Setup<Dim> setup, int steps) {
 /// With the boundary as its own proxy a step is what it is without one.
 template <int Dim>
 void expect_boundary_is_its_proxy() {
-  Setup<Dim> plain = block<Dim>();
-  add_table(plain);
-  plain.contact.friction_coefficient = 0.3;
-  plain.contact.friction_iterations = 3;
-  plain.initial_velocity.push_back({1, [](const Vec<Dim>&, double) { return Vec<Dim>(2 * Vec<Dim>::Unit(0)); }});
+  Setup<Dim> plain = sliding_block<Dim>(3);
   Setup<Dim> damped = plain;
   damped.damping.push_back({DampingOptions::Term::contact, 1e-3, 2});
   Setup<Dim> adaptive = plain;

@@ -116,7 +116,8 @@ class Mumps {
     icntl(mumps_, 7) = ordering_ == kAuto ? kAmf : ordering_;
     icntl(mumps_, 14) = kMemoryMargin;
     const int outcome = job(kAnalyze);
-    if (outcome != ITR_OK || ordering_ != kAuto || mumps_.rinfog[0] < kScotchFromFlops * pattern.order) return outcome;
+    const bool may_gain = ordering_ == kAuto && kScotch != kAmf && mumps_.rinfog[0] >= kScotchFromFlops * pattern.order;
+    if (outcome != ITR_OK || !may_gain) return outcome;
     icntl(mumps_, 7) = kScotch;
     return job(kAnalyze);
   }

@@ -21,7 +21,7 @@ void MappedEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wor
 template <int Dim>
 void MappedEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
   std::vector<int> sources;
-  MatrixX A, product;  // of one stencil: from the dofs of its sources to its own
+  MatrixX A, HA, product;  // A of one stencil: from the dofs of its sources to its own
   HessianSink mapped([&](std::span<const int> vertices, const double* block) {
     sources.clear();
     for (const int v : vertices) sources.insert(sources.end(), map_->sources(v).begin(), map_->sources(v).end());
@@ -34,7 +34,8 @@ void MappedEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessia
         const auto j = std::lower_bound(sources.begin(), sources.end(), map_->sources(vertices[i])[k]) - sources.begin();
         A.block<Dim, Dim>(Dim * static_cast<Eigen::Index>(i), Dim * j).diagonal().setConstant(map_->weights(vertices[i])[k]);
       }
-    product.noalias() = A.transpose() * (Eigen::Map<const MatrixX>(block, rows, rows) * A).eval();
+    HA.noalias() = Eigen::Map<const MatrixX>(block, rows, rows) * A;
+    product.noalias() = A.transpose() * HA;
     sink.add<Dim>(sources, product.data());
   });
   energy_->add_hessian(map_->positions(x), psd, mapped, workspace);

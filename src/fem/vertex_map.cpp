@@ -7,6 +7,18 @@
 
 namespace itr {
 
+namespace {
+
+/// A vector over dofs as a matrix with a row for each vertex.
+template <int Dim>
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Dim, Eigen::RowMajor>;
+template <int Dim>
+Eigen::Map<const Rows<Dim>> rows_of(ConstVectorView field) {
+  return {field.data(), field.size() / Dim, Dim};
+}
+
+}  // namespace
+
 template <int Dim>
 VertexMap<Dim>::VertexMap(const Weights& weights, VectorX offset) : weights_(weights), offset_(std::move(offset)) {
   ITR_CHECK(offset_.size() == Dim * weights_.rows(), offset_.size(), weights_.rows());
@@ -21,17 +33,14 @@ VectorX VertexMap<Dim>::positions(ConstVectorView x) const {
 
 template <int Dim>
 VectorX VertexMap<Dim>::motion(ConstVectorView dx) const {
-  VectorX dy = VectorX::Zero(offset_.size());
-  for (int i = 0; i < weights_.rows(); ++i)
-    for (std::size_t k = 0; k < count(i); ++k) vertex_of<Dim>(dy, i) += weights(i)[k] * vertex_of<Dim>(dx, sources(i)[k]);
+  VectorX dy(offset_.size());
+  Eigen::Map<Rows<Dim>>(dy.data(), weights_.rows(), Dim) = weights_ * rows_of<Dim>(dx);
   return dy;
 }
 
 template <int Dim>
 void VertexMap<Dim>::add_gradient(ConstVectorView gradient, VectorView result) const {
-  for (int i = 0; i < weights_.rows(); ++i)
-    for (std::size_t k = 0; k < count(i); ++k)
-      vertex_of<Dim>(result, sources(i)[k]) += weights(i)[k] * vertex_of<Dim>(gradient, i);
+  Eigen::Map<Rows<Dim>>(result.data(), weights_.cols(), Dim) += weights_.transpose() * rows_of<Dim>(gradient);
 }
 
 template class VertexMap<2>;

@@ -46,11 +46,11 @@ void refuse_unsupported(const Setup<Dim>& setup) {
 template <int Dim>
 void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
-  const auto text = [](auto rows, auto columns) { return std::to_string(rows) + " x " + std::to_string(columns); };
-  const CollisionProxy<Dim>& proxy = *setup.proxy;
-  const std::string found = text(proxy.weights.rows(), proxy.weights.cols());
-  const std::string expected = text(proxy.rest.size(), setup.mesh.num_vertices());
-  if (found != expected) throw InputError({"", "weights of the collision mesh", found, expected});
+  const auto& weights = setup.proxy->weights;
+  const auto rows = static_cast<Eigen::Index>(setup.proxy->rest.size()), columns = Eigen::Index{setup.mesh.num_vertices()};
+  if (weights.rows() == rows && weights.cols() == columns) return;
+  const auto text = [](Eigen::Index r, Eigen::Index c) { return std::to_string(r) + " x " + std::to_string(c); };
+  throw InputError({"", "weights of the collision mesh", text(weights.rows(), weights.cols()), text(rows, columns)});
 }
 
 template <int Dim>

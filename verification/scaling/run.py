@@ -25,7 +25,8 @@ ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROO
 SIZES = {2: (20, 40, 80, 160, 320, 440), 3: (6, 9, 13, 19, 25, 31, 43)}  # cells along an edge of the square, of the cube
 RANKS = (1, 2, 4)
 # solver and options of the analyses
-ANALYSES = [("cholmod:supernodal", ["ordering=amd"]), ("cholmod:supernodal", ["ordering=metis"]), ("mumps:spd", ["ordering=scotch"])]
+MUMPS = ("mumps:spd", ["ordering=scotch"])
+ANALYSES = [("cholmod:supernodal", ["ordering=amd"]), ("cholmod:supernodal", ["ordering=metis"]), MUMPS]
 KEYS = ["dim", "unknowns", "nonzeros", "solver", "options", "ranks", "what", "factor_nonzeros", "flops", "factor_mb",
         "largest_rank_mb", "residual", "outcome"]
 
@@ -196,7 +197,7 @@ def main():
         if dim == 3:
             unknowns, folder = max(system for system in there if system[0] <= arguments.factorize)
             for ranks in RANKS:
-                run(dim, unknowns, folder, "mumps:spd", [], ranks, "factorisation")
+                run(dim, unknowns, folder, *MUMPS, ranks, "factorisation")
 
     memory = arguments.memory * 2**30
     laws = model(rows, memory)

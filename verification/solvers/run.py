@@ -69,14 +69,14 @@ def dump(itr, scene, sets, folder, seconds):
     return whole[-1] if whole else None
 
 
-def limited(command, seconds, gib, **keywords):
+def limited(command, seconds, gib):
     """Runs a command that has so many seconds of CPU on one thread, half as many again of wall time, and so much memory."""
     def limit():
         resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds),) * 2)
         resource.setrlimit(resource.RLIMIT_AS, (int(gib * 2**30),) * 2)
     try:
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=1.5 * seconds,
-                              preexec_fn=limit, env=ENVIRONMENT, check=False, **keywords)
+                              preexec_fn=limit, env=ENVIRONMENT, check=False)
     except subprocess.TimeoutExpired:
         return None, f"did not finish in {seconds / 60:g} min"
     if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):  # the first comes where both limits are one

@@ -23,9 +23,11 @@ class ContactCandidates {
   void update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
 
   /// The lists that there are in this dimension, each with the kind of its pairs.
-  std::vector<std::pair<PairKind, const Pairs*>> all() const {
-    if constexpr (Dim == 2) return {{PairKind::edge_vertex, &vertex_edges_}};
-    return {{PairKind::face_vertex, &vertex_triangles_}, {PairKind::edge_edge, &edge_edges_}};
+  std::array<std::pair<PairKind, const Pairs*>, Dim - 1> all() const {
+    if constexpr (Dim == 2)
+      return {{{PairKind::edge_vertex, &vertex_edges_}}};
+    else
+      return {{{PairKind::face_vertex, &vertex_triangles_}, {PairKind::edge_edge, &edge_edges_}}};
   }
   const Pairs& vertex_edges() const { return vertex_edges_; }          ///< (vertex, edge); 2D
   const Pairs& vertex_triangles() const { return vertex_triangles_; }  ///< (vertex, triangle); 3D
