@@ -16,8 +16,13 @@ from harness.suite import Result, excess  # noqa: E402
 
 def run(*results):
     """The entry of a case with these results."""
+    return run_case(lambda context: results)
+
+
+def run_case(results):
+    """The entry of a case whose results these are: a function of its context."""
     case = types.SimpleNamespace(needs=[], loader=types.SimpleNamespace(exec_module=lambda module: None), TITLE="a case",
-                                 QUANTITY="x", REFERENCE="y", TOLERANCE=1, results=lambda context: results)
+                                 QUANTITY="x", REFERENCE="y", TOLERANCE=1, results=results)
     folder = pathlib.Path(tempfile.gettempdir())
     return suite.run_case(case, suite.Context(folder, folder, folder, folder, False, "case"))
 
@@ -41,6 +46,17 @@ class Judgement(unittest.TestCase):
     def test_a_case_that_judges_nothing_fails(self):
         self.assertEqual(run()["status"], "failed")
         self.assertEqual(run(Result("shown", 7.0, None))["status"], "failed")
+
+    def test_a_case_without_its_data_is_skipped_unless_it_failed_before(self):
+        def results(error):
+            def of(context):
+                yield Result("before", error, 1.0)
+                yield Result("scene", 0.0, 1.0, context.data("no such scene").name)
+            return of
+        entry = run_case(results(0.5))
+        self.assertEqual(entry["status"], "skipped")
+        self.assertIn("no such scene is not there (--shared)", entry["message"])
+        self.assertEqual(run_case(results(2.0))["status"], "failed")
 
 
 class Report(unittest.TestCase):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Continuous collision detection on queries with known answers."""
-from harness.suite import Failure, Result
+from harness.suite import Result
 
 TITLE = "Collision queries"
 QUANTITY = "collisions missed; times of 0 for primitives that start apart; false positives"
@@ -10,10 +10,7 @@ NEEDS = ()
 
 
 def results(context):
-    queries = context.shared / "ccd-queries"
-    if not queries.exists():
-        raise Failure(f"{queries} is not there: say --shared")
-    for line in context.call("ccd_queries", queries).splitlines():
+    for line in context.call("ccd_queries", context.data("ccd-queries")).splitlines():
         words = line.split()
         kind, count, missed, positives, zeros, nanoseconds = words[0], *(int(words[k]) for k in (1, 3, 5, 8, 12))
         yield Result(f"{kind}, missed", missed, 0, missed, note=f"{count} queries, {positives} false positives, {nanoseconds} ns each")

@@ -3,7 +3,7 @@
 import numpy as np
 from harness.fields import gradients, simplex_rule, volumes
 from harness.scenes import run_scene
-from harness.suite import Failure, Result
+from harness.suite import Result
 
 TITLE = "Cook's membrane: error against cost"
 QUANTITY = "error of the potential energy, tip displacement and gradient; the energy's over that of uniform refinement"
@@ -26,9 +26,7 @@ GRADED = [(2, 2, 6), (2, 2, 12), (2, 2, 24), (3, 2, 6), (3, 2, 12), (3, 2, 32)] 
 
 
 def itr(context, name, refinements, remesh, tolerance=None, swap=False, smooth=False, screening=""):
-    scene = context.shared / "paper-scenes/scripts/cantilever/cantilever.json"
-    if not scene.exists():
-        raise Failure(f"{scene} is not there: say --shared")
+    scene = context.data("paper-scenes/scripts/cantilever/cantilever.json")
     flag = lambda value: "true" if value else "false"
     sets = [f"/geometry/0/n_refs={refinements}", f"/space/remesh/enabled={flag(remesh)}", "/output/paraview/skip_frame=10"]
     if remesh:

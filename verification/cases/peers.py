@@ -17,9 +17,9 @@ def results(context):
     program = ROOT / "tests/peer_scenes.py"
     if not program.exists():
         raise Failure(f"{program} is not there")
-    command = [sys.executable, str(program), "--itr", str(context.build / "bin/itr"), "--scenes",
-               str(context.shared / "peer-scenes")]
-    expected = len((context.shared / "peer-scenes/scenes.txt").read_text().split())
+    scenes = context.data("peer-scenes")
+    command = [sys.executable, str(program), "--itr", str(context.build / "bin/itr"), "--scenes", str(scenes)]
+    expected = len((scenes / "scenes.txt").read_text().split())
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in done.stdout.splitlines() if line.startswith("| ")]
     if len(rows) - 1 != expected:

@@ -50,6 +50,10 @@ class Failure(Exception):
     """A program that a case ran did not do what it was asked."""
 
 
+class Skipped(Exception):
+    """What a case needs is not on this machine; says what, and where it was looked for."""
+
+
 @dataclasses.dataclass
 class Context:
     """Where a case works: its own empty folder, the programs, where its pictures and tables go."""
@@ -60,6 +64,13 @@ class Context:
     quick: bool
     case: str
     artifacts: list = dataclasses.field(default_factory=list)
+
+    def data(self, path):
+        """A file or folder of the shared data, which a machine need not have. Throws Skipped where it is not there."""
+        found = self.shared / path
+        if not found.exists():
+            raise Skipped(f"{found} is not there (--shared)")
+        return found
 
     def call(self, program, *arguments):
         """Runs a program of the build and returns what it printed. Throws Failure with its last words."""
@@ -143,6 +154,9 @@ def run_case(case, context):
             entry["message"] = "the case gave no results"
         elif all(judged):
             entry["status"] = "passed"
+    except Skipped as reason:
+        failed = any(result["passed"] is False for result in entry["results"])  # what ran counts
+        entry.update(status="failed" if failed else "skipped", message=str(reason))
     except Failure as error:
         entry["message"] = str(error)
     except Exception:  # a case that breaks is a case that fails; the others still run
