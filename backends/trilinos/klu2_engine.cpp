@@ -1,83 +1,99 @@
 // SPDX-License-Identifier: MIT
-// Amesos2's KLU2: LU for sparse patterns, solves indefinite systems.
-#include <Amesos2.hpp>
-
+// KLU2 (LU for sparse patterns, solves indefinite systems) without the adapter of Amesos2: that of Trilinos 13.2 does not
+// hand on why a factorisation failed, and takes the matrix through Kokkos and MPI, which KLU2 does not need.
+#include <Amesos2_KLU2_FunctionMap.hpp>
 #include <algorithm>
+#include <cstdint>
 #include <string_view>
 
-#include "itr/linear/module_adapter.hpp"
+#include "../common/full_matrix.hpp"
 #include "trilinos.hpp"
 
 namespace itr::backends {
 
 namespace {
 
-struct Klu2Objects {
-  RCP<Amesos2::Solver<Matrix, Vectors>> solver;
-};
-
-class Klu2Engine : public TrilinosEngine<Klu2Objects> {
+class Klu2 {
  public:
+  Klu2() { KLU2::klu_defaults<double, int>(&common_); }
+  ~Klu2() { forget(); }
+  Klu2(const Klu2&) = delete;
+  Klu2& operator=(const Klu2&) = delete;
+
   int set_option(std::string_view, std::string_view) { return ITR_FAILED; }
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!start_kokkos()) return fail(ITR_FAILED, "MPI does not run");
-    set_pattern(pattern);
-    objects_->solver = Amesos2::create<Matrix, Vectors>("KLU2", objects_->matrix);
-    objects_->solver->symbolicFactorization();
-    return ITR_OK;
+    forget();
+    matrix_.set_pattern(pattern);
+    symbolic_ = KLU2::klu_analyze<double, int>(matrix_.order, matrix_.starts.data(), matrix_.indices.data(), &common_);
+    return outcome();
   }
 
   int factorize(const double* values, size_t count) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
-    set_matrix(values, count);
-    try {
-      objects_->solver->setA(objects_->matrix, Amesos2::SYMBFACT);
-      objects_->solver->numericFactorization();
-    } catch (const std::bad_alloc&) {
-      throw;
-    } catch (const std::exception& error) {  // Amesos2 tells failures apart by text only
-      return fail(ITR_SINGULAR, error.what());
-    }
-    return ITR_OK;
+    matrix_.set_values(values, count);
+    KLU2::klu_free_numeric<double, int>(&numeric_, &common_);
+    numeric_ = KLU2::klu_factor<double, int>(matrix_.starts.data(), matrix_.indices.data(), matrix_.values.data(), symbolic_,
+                                             &common_);
+    return outcome();
   }
 
   int solve(const double* rhs, double* solution, int columns) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
-    const auto b = make_vectors(objects_->map, columns), x = make_vectors(objects_->map, columns);
-    const auto length = static_cast<size_t>(full_.order);
-    for (int c = 0; c < columns; ++c) {
-      auto column = b->getDataNonConst(c);
-      std::copy(rhs + c * length, rhs + (c + 1) * length, column.begin());
-    }
-    objects_->solver->setX(x);
-    objects_->solver->setB(b);
-    objects_->solver->solve();
-    for (int c = 0; c < columns; ++c) {
-      const auto column = x->getData(c);
-      std::copy(column.begin(), column.end(), solution + c * length);
-    }
-    return ITR_OK;
+    std::copy_n(rhs, static_cast<size_t>(matrix_.order) * columns, solution);
+    // With the transpose, which is the same: klu_solve of Trilinos 13.2, compiled by g++ 12 -O1, gives wrong answers.
+    KLU2::klu_tsolve<double, int>(symbolic_, numeric_, matrix_.order, columns, solution, &common_);
+    return outcome();
   }
 
   itr_statistics statistics() const {
     itr_statistics result{};
-    const std::scoped_lock guard(trilinos_lock());
-    if (trilinos_is_running() && objects_ && !objects_->solver.is_null()) {
-      result.factor_nonzeros = static_cast<double>(objects_->solver->getStatus().getNnzLU());
-      result.factor_bytes = result.largest_bytes = 12 * result.factor_nonzeros;
-    }
+    if (!numeric_) return result;
+    result.factor_nonzeros = static_cast<double>(numeric_->lnz) + numeric_->unz;
+    result.factor_bytes = result.largest_bytes = static_cast<double>(common_.memusage);
     return result;
   }
+
+  const char* message() const {
+    switch (common_.status) {
+      case KLU_OK:
+        return "";
+      case KLU_SINGULAR:
+        return "a pivot is zero";
+      case KLU_TOO_LARGE:
+        return "the factor has too many entries for KLU2's 32-bit indices";
+      default:
+        return "KLU2 failed";
+    }
+  }
+
+ private:
+  int outcome() const {
+    switch (common_.status) {
+      case KLU_OK:
+        return ITR_OK;
+      case KLU_SINGULAR:
+        return ITR_SINGULAR;
+      case KLU_OUT_OF_MEMORY:
+      case KLU_TOO_LARGE:
+        return ITR_OUT_OF_MEMORY;
+      default:
+        return ITR_FAILED;
+    }
+  }
+  void forget() {
+    KLU2::klu_free_numeric<double, int>(&numeric_, &common_);
+    KLU2::klu_free_symbolic<double, int>(&symbolic_, &common_);
+  }
+
+  KLU2::klu_common<double, int> common_{};
+  KLU2::klu_symbolic<double, int>* symbolic_ = nullptr;
+  KLU2::klu_numeric<double, int>* numeric_ = nullptr;
+  FullMatrix matrix_;
 };
 
 }  // namespace
 
 itr_engine klu2_row(const char* version) {
-  return on_mpi(linear::ModuleAdapter<Klu2Engine>::row("amesos2:klu2", version, "LGPL-2.1+", ITR_INDEFINITE, ""));
+  return linear::ModuleAdapter<Klu2>::row("amesos2:klu2", version, "LGPL-2.1+", ITR_INDEFINITE, "");
 }
 
 }  // namespace itr::backends

@@ -5,21 +5,59 @@
 #include <BelosPseudoBlockCGSolMgr.hpp>
 #include <BelosTpetraAdapter.hpp>
 #include <MueLu_CreateTpetraPreconditioner.hpp>
+#include <Teuchos_DefaultMpiComm.hpp>
+#include <Tpetra_CrsMatrix.hpp>
+#include <Tpetra_MultiVector.hpp>
 
 #include <algorithm>
 #include <array>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "../common/full_matrix.hpp"
 #include "itr/linear/iteration_options.hpp"
-#include "itr/linear/module_adapter.hpp"
 #include "trilinos.hpp"
 
 namespace itr::backends {
 
 namespace {
 
+using Map = Tpetra::Map<>;
+using Matrix = Tpetra::CrsMatrix<double>;
+using Vectors = Tpetra::MultiVector<double>;
 using Operator = Tpetra::Operator<double>;
+using Teuchos::RCP;
+
+/// Rows 0 .. order-1, all on this rank (MPI_COMM_SELF).
+RCP<const Map> make_map(int order) {
+  const auto self = Teuchos::rcp(new Teuchos::MpiComm<int>(MPI_COMM_SELF));
+  return Teuchos::rcp(new Map(order, 0, self));
+}
+
+RCP<Matrix> make_matrix(const RCP<const Map>& map, const FullMatrix& full) {
+  const auto entries = static_cast<Teuchos_Ordinal>(full.indices.size());
+  Teuchos::ArrayRCP<size_t> starts(static_cast<Teuchos_Ordinal>(full.starts.size()));
+  Teuchos::ArrayRCP<int> indices(entries);
+  Teuchos::ArrayRCP<double> values(entries);
+  std::copy(full.starts.begin(), full.starts.end(), starts.begin());
+  std::copy(full.indices.begin(), full.indices.end(), indices.begin());
+  std::copy(full.values.begin(), full.values.end(), values.begin());
+  const auto matrix = Teuchos::rcp(new Matrix(map, map, starts, indices, values));
+  matrix->fillComplete(map, map);
+  return matrix;
+}
+
+void set_values(Matrix& matrix, const FullMatrix& full) {
+  matrix.resumeFill();
+  for (int i = 0; i < full.order; ++i) {
+    const int first = full.starts[i], count = full.starts[i + 1] - first;
+    matrix.replaceLocalValues(i, count, &full.values[first], &full.indices[first]);
+  }
+  matrix.fillComplete(matrix.getDomainMap(), matrix.getRangeMap());
+}
+
+RCP<Vectors> make_vectors(const RCP<const Map>& map, int columns) { return Teuchos::rcp(new Vectors(map, columns)); }
 
 /// Positive definite wherever the diagonal is positive, whatever the rest of the matrix.
 class Jacobi final : public Operator {
@@ -39,28 +77,21 @@ class Jacobi final : public Operator {
   Tpetra::Vector<double> inverse_;
 };
 
-struct MueluObjects {
-  RCP<Vectors> null_space, coordinates;
-  RCP<Operator> preconditioner;
-};
-
-class Muelu : public TrilinosEngine<MueluObjects> {
+class Muelu {
  public:
   int set_option(std::string_view key, std::string_view value) { return options_.set(key, value) ? ITR_OK : ITR_FAILED; }
 
   int analyze(const itr_pattern& pattern, const itr_hints& hints) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!start_kokkos()) return fail(ITR_FAILED, "MPI does not run");
     fill_up(pattern, hints);
     const itr_pattern padded{static_cast<int32_t>(starts_.size() - 1), starts_.data(), rows_.data()};
-    set_pattern(padded);
+    full_.set_pattern(padded);
+    map_ = make_map(full_.order);
+    matrix_ = make_matrix(map_, full_);
     set_near_null_space(hints);
     return ITR_OK;
   }
 
   int factorize(const double* values, size_t count) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
     double diagonal = 0;
     for (const int p : diagonals_) {
       if (!(values[p] > 0)) return fail(ITR_NOT_POSITIVE_DEFINITE, "a diagonal entry is not positive");
@@ -68,7 +99,8 @@ class Muelu : public TrilinosEngine<MueluObjects> {
     }
     lower_.assign(rows_.size(), diagonal);  // also of the unknowns that fill up nodes
     for (size_t k = 0; k < count; ++k) lower_[place_[k]] = values[k];
-    set_matrix(lower_.data(), lower_.size());
+    full_.set_values(lower_.data(), lower_.size());
+    set_values(*matrix_, full_);
 
     Teuchos::ParameterList list;
     list.set("verbosity", "none");
@@ -82,16 +114,14 @@ class Muelu : public TrilinosEngine<MueluObjects> {
     // few contacts or twisted elements have it; beyond it the polynomial may be negative, and the preconditioner indefinite.
     list.sublist("smoother: params").set("chebyshev: eigenvalue max iterations", 50);
     auto& user = list.sublist("user data");
-    user.set("Nullspace", objects_->null_space);
-    if (!objects_->coordinates.is_null()) user.set("Coordinates", objects_->coordinates);
-    objects_->preconditioner = Teuchos::null;
-    objects_->preconditioner = MueLu::CreateTpetraPreconditioner(RCP<Operator>(objects_->matrix), list);
+    user.set("Nullspace", null_space_);
+    if (!coordinates_.is_null()) user.set("Coordinates", coordinates_);
+    preconditioner_ = Teuchos::null;
+    preconditioner_ = MueLu::CreateTpetraPreconditioner(RCP<Operator>(matrix_), list);
     return ITR_OK;
   }
 
   int solve(const double* rhs, double* solution, int columns) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
     iterations_ = 0;
     int outcome = ITR_OK;
     for (int c = 0; c < columns; ++c) {
@@ -107,6 +137,7 @@ class Muelu : public TrilinosEngine<MueluObjects> {
     result.iterations = iterations_;
     return result;
   }
+  const char* message() const { return message_.c_str(); }
 
  private:
   /// Numbers the unknowns so that each node has block_ of them, one after another.
@@ -145,9 +176,9 @@ class Muelu : public TrilinosEngine<MueluObjects> {
   void set_near_null_space(const itr_hints& hints) {
     const bool has_positions = hints.coordinates && (block_ == 2 || block_ == 3);
     const int modes = !has_positions ? block_ : block_ == 2 ? 3 : 6;
-    objects_->null_space = make_vectors(objects_->map, modes);
+    null_space_ = make_vectors(map_, modes);
     std::vector<Teuchos::ArrayRCP<double>> mode(modes);
-    for (int m = 0; m < modes; ++m) mode[m] = objects_->null_space->getDataNonConst(m);
+    for (int m = 0; m < modes; ++m) mode[m] = null_space_->getDataNonConst(m);
     const auto order = static_cast<int>(dofs_.size());
     std::array<double, 3> center{};
     if (has_positions)
@@ -171,24 +202,24 @@ class Muelu : public TrilinosEngine<MueluObjects> {
     }
     if (!has_positions) return;
     const auto nodes = make_map(full_.order / block_);
-    objects_->coordinates = make_vectors(nodes, block_);
+    coordinates_ = make_vectors(nodes, block_);
     for (int c = 0; c < block_; ++c) {
-      auto column = objects_->coordinates->getDataNonConst(c);
+      auto column = coordinates_->getDataNonConst(c);
       for (int i = 0; i < order; ++i) column[dofs_[i] / block_] = hints.coordinates[static_cast<size_t>(i) * block_ + c];
     }
   }
 
   int solve_one(const double* rhs, double* solution) {
-    const auto b = make_vectors(objects_->map, 1), x = make_vectors(objects_->map, 1);
+    const auto b = make_vectors(map_, 1), x = make_vectors(map_, 1);
     {
       auto column = b->getDataNonConst(0);
       for (size_t i = 0; i < dofs_.size(); ++i) column[dofs_[i]] = rhs[i];
     }
-    int outcome = iterate(b, x, objects_->preconditioner);
+    int outcome = iterate(b, x, preconditioner_);
     // Belos says the same of an indefinite matrix and of an indefinite preconditioner. Jacobi's cannot be that.
     if (outcome == ITR_NOT_POSITIVE_DEFINITE) {
       x->putScalar(0);
-      outcome = iterate(b, x, Teuchos::rcp(new Jacobi(*objects_->matrix)));
+      outcome = iterate(b, x, Teuchos::rcp(new Jacobi(*matrix_)));
     }
     const auto column = x->getData(0);
     for (size_t i = 0; i < dofs_.size(); ++i) solution[i] = column[dofs_[i]];
@@ -197,7 +228,7 @@ class Muelu : public TrilinosEngine<MueluObjects> {
 
   /// Conjugate gradients; ITR_NOT_POSITIVE_DEFINITE where the matrix or the preconditioner turns out not to be.
   int iterate(const RCP<Vectors>& b, const RCP<Vectors>& x, const RCP<Operator>& preconditioner) {
-    const auto problem = Teuchos::rcp(new Belos::LinearProblem<double, Vectors, Operator>(objects_->matrix, x, b));
+    const auto problem = Teuchos::rcp(new Belos::LinearProblem<double, Vectors, Operator>(matrix_, x, b));
     problem->setLeftPrec(preconditioner);
     problem->setHermitian();
     problem->setProblem();
@@ -218,7 +249,17 @@ class Muelu : public TrilinosEngine<MueluObjects> {
     }
   }
 
+  int fail(int outcome, const char* why) {
+    message_ = why;
+    return outcome;
+  }
+
   linear::IterationOptions options_{1e-10, 1000};
+  FullMatrix full_;
+  RCP<const Map> map_;
+  RCP<Matrix> matrix_;
+  RCP<Vectors> null_space_, coordinates_;
+  RCP<Operator> preconditioner_;
   int block_ = 1;
   int iterations_ = 0;
   std::vector<int> dofs_;           ///< row of each unknown in the filled-up system
@@ -226,13 +267,13 @@ class Muelu : public TrilinosEngine<MueluObjects> {
   std::vector<int> place_;          ///< where each entry of the given triangle goes in it
   std::vector<int> diagonals_;      ///< of the given triangle
   std::vector<double> lower_;
+  std::string message_;
 };
 
 }  // namespace
 
 itr_engine muelu_row(const char* version) {
-  return on_mpi(linear::ModuleAdapter<Muelu>::row("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE,
-                                                  linear::IterationOptions::kNames));
+  return kokkos_row<Muelu>("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE, linear::IterationOptions::kNames);
 }
 
 }  // namespace itr::backends

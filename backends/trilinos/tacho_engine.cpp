@@ -6,10 +6,12 @@
 #include <Tacho.hpp>
 #include <Tacho_Driver.hpp>
 #include <algorithm>
-#include <new>
+#include <exception>
+#include <memory>
+#include <string>
 #include <string_view>
 
-#include "itr/linear/module_adapter.hpp"
+#include "../common/full_matrix.hpp"
 #include "trilinos.hpp"
 
 namespace itr::backends {
@@ -19,25 +21,64 @@ namespace {
 using Device = Tacho::UseThisDevice<Kokkos::DefaultHostExecutionSpace>::type;
 using Driver = Tacho::Driver<double, Device>;
 
-struct TachoObjects {
+struct Objects {
   Driver driver;
   Driver::value_type_array values;
-  ~TachoObjects() { driver.release(); }
+  Objects() = default;
+  ~Objects() { driver.release(); }
+  Objects(const Objects&) = delete;
+  Objects& operator=(const Objects&) = delete;
 };
 
 /// Unknowns below which LAPACK factorises. With Tacho's own limit of 1024 the masticator's linear solves take six times as
 /// long.
 constexpr int kDenseBelow = 100;
 
-class TachoEngine : public TrilinosEngine<TachoObjects> {
+class TachoEngine {
  public:
   int set_option(std::string_view, std::string_view) { return ITR_FAILED; }
 
   int analyze(const itr_pattern& pattern, const itr_hints&) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!start_kokkos()) return fail(ITR_FAILED, "MPI does not run");
-    objects_.reset(new Objects());
+    objects_.reset();
     full_.set_pattern(pattern);
+    prepare();
+    return ITR_OK;
+  }
+
+  int factorize(const double* values, size_t count) {
+    if (!objects_) prepare();
+    full_.set_values(values, count);
+    std::copy(full_.values.begin(), full_.values.end(), objects_->values.data());
+    int outcome = ITR_OK;
+    keep_unless_it_throws([&](Driver& driver) {
+      try {
+        driver.factorize(objects_->values);
+      } catch (const std::exception& error) {  // LAPACK's number of the pivot is not handed on
+        if (is_out_of_memory(error)) throw;
+        message_ = error.what();
+        outcome = ITR_NOT_POSITIVE_DEFINITE;
+      }
+    });
+    return outcome;
+  }
+
+  int solve(const double* rhs, double* solution, int columns) {
+    if (!objects_) return ITR_FAILED;
+    const auto length = static_cast<size_t>(full_.order) * columns;
+    Driver::value_type_matrix b("b", full_.order, columns), x("x", full_.order, columns), scratch("t", full_.order, columns);
+    std::copy_n(rhs, length, b.data());
+    keep_unless_it_throws([&](Driver& driver) { driver.solve(x, b, scratch); });
+    std::copy_n(x.data(), length, solution);
+    return ITR_OK;
+  }
+
+  itr_statistics statistics() const { return {}; }
+  const char* message() const { return message_.c_str(); }
+
+ private:
+  /// Orders full_ and reserves memory for its factor.
+  void prepare() {
+    objects_ = std::make_unique<Objects>();
     Driver::size_type_array_host starts("starts", full_.starts.size());
     Driver::ordinal_type_array_host indices("indices", full_.indices.size());
     std::copy(full_.starts.begin(), full_.starts.end(), starts.data());
@@ -51,40 +92,23 @@ class TachoEngine : public TrilinosEngine<TachoObjects> {
       forth(k) = order.indices()[k];
       back(order.indices()[k]) = k;
     }
-    objects_->driver.analyze(full_.order, starts, indices, forth, back);
-    objects_->driver.initialize();
-    return ITR_OK;
+    keep_unless_it_throws([&](Driver& driver) {
+      driver.analyze(full_.order, starts, indices, forth, back);
+      driver.initialize();
+    });
   }
 
-  int factorize(const double* values, size_t count) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
-    full_.set_values(values, count);
-    std::copy(full_.values.begin(), full_.values.end(), objects_->values.data());
+  /// Where memory ends within a call, Tacho 13.2 would free twice what it has: it is left as it is, never to be destroyed.
+  template <typename F>
+  void keep_unless_it_throws(F&& f) {
     try {
-      objects_->driver.factorize(objects_->values);
-    } catch (const std::bad_alloc&) {
+      f(objects_->driver);
+    } catch (...) {
+      static_cast<void>(objects_.release());
       throw;
-    } catch (const std::exception& error) {  // LAPACK's number of the pivot is not handed on
-      return fail(ITR_NOT_POSITIVE_DEFINITE, error.what());
     }
-    return ITR_OK;
   }
 
-  int solve(const double* rhs, double* solution, int columns) {
-    const std::scoped_lock guard(trilinos_lock());
-    if (!trilinos_is_running()) return fail(ITR_FAILED, "MPI was finalised");
-    const auto length = static_cast<size_t>(full_.order) * columns;
-    Driver::value_type_matrix b("b", full_.order, columns), x("x", full_.order, columns), scratch("t", full_.order, columns);
-    std::copy_n(rhs, length, b.data());
-    objects_->driver.solve(x, b, scratch);
-    std::copy_n(x.data(), length, solution);
-    return ITR_OK;
-  }
-
-  itr_statistics statistics() const { return {}; }
-
- private:
   /// Eigen's AMD: Debian's Tacho is built without METIS, and then takes the unknowns as they come.
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> fill_reducing_order() const {
     using Pattern = Eigen::SparseMatrix<double>;
@@ -94,12 +118,16 @@ class TachoEngine : public TrilinosEngine<TachoObjects> {
     Eigen::AMDOrdering<int>()(Pattern(pattern), order);
     return order;
   }
+
+  FullMatrix full_;
+  std::unique_ptr<Objects> objects_;  ///< none before the first analysis, and where memory was out
+  std::string message_;
 };
 
 }  // namespace
 
 itr_engine tacho_row(const char* version) {
-  return on_mpi(linear::ModuleAdapter<TachoEngine>::row("amesos2:tacho", version, "BSD-3-Clause", 0, ""));
+  return kokkos_row<TachoEngine>("amesos2:tacho", version, "BSD-3-Clause", 0, "");
 }
 
 }  // namespace itr::backends

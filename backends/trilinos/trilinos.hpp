@@ -1,27 +1,21 @@
 // SPDX-License-Identifier: MIT
-// What the engines over Trilinos share: its start, its one lock, and matrices of one rank.
+// What the engines over Kokkos share: its start, its one lock, its way to say that memory is out. And the module's rows.
 #pragma once
 
-#include <Teuchos_RCP.hpp>
-#include <Tpetra_CrsMatrix.hpp>
-#include <Tpetra_MultiVector.hpp>
-#include <array>
-#include <cstdio>
+#include <cstring>
+#include <exception>
 #include <memory>
 #include <mutex>
-#include <vector>
+#include <new>
+#include <stdexcept>
+#include <string_view>
 
-#include "../common/full_matrix.hpp"
 #include "itr/linear/abi.h"
+#include "itr/linear/module_adapter.hpp"
 
 namespace itr::backends {
 
-using Map = Tpetra::Map<>;
-using Matrix = Tpetra::CrsMatrix<double>;
-using Vectors = Tpetra::MultiVector<double>;
-using Teuchos::RCP;
-
-/// Kokkos is not re-entrant: every call into Trilinos, destructors included, happens under this.
+/// Kokkos is not re-entrant: every call into it, destructors included, happens under this.
 std::mutex& trilinos_lock();
 
 /// Starts Kokkos where nobody has, finalised at exit by whoever started it. False where MPI does not run.
@@ -29,58 +23,62 @@ bool start_kokkos();
 /// False after Kokkos or MPI was finalised: what is left of an engine must not be touched then.
 bool trilinos_is_running();
 
-/// Rows 0 .. order-1, all on this rank (MPI_COMM_SELF: on two ranks klu2 of Trilinos 13.2 was wrong and tacho crashed).
-RCP<const Map> make_map(int order);
-RCP<Matrix> make_matrix(const RCP<const Map>& map, const FullMatrix& full);
-/// The same pattern, other values.
-void set_values(Matrix& matrix, const FullMatrix& full);
-RCP<Vectors> make_vectors(const RCP<const Map>& map, int columns);
+/// Kokkos makes a std::runtime_error of std::bad_alloc.
+inline bool is_out_of_memory(const std::exception& error) {
+  return dynamic_cast<const std::bad_alloc*>(&error) || std::strstr(error.what(), "failed to allocate memory");
+}
 
-/// What an engine over Trilinos is made of. Own: the objects that it needs beside the matrix, as RCPs.
-template <typename Own>
-class TrilinosEngine {
+/// An engine all of whose calls are made with Kokkos running and under its lock. Its default constructor makes no object of
+/// Kokkos.
+template <typename Engine>
+class OnKokkos {
  public:
-  TrilinosEngine(const TrilinosEngine&) = delete;
-  TrilinosEngine& operator=(const TrilinosEngine&) = delete;
-  const char* message() const { return text_.data(); }
-
- protected:
-  struct Objects : Own {
-    RCP<const Map> map;
-    RCP<Matrix> matrix;
-  };
-  TrilinosEngine() = default;
-  ~TrilinosEngine() {
+  OnKokkos() = default;
+  ~OnKokkos() {
     const std::scoped_lock guard(trilinos_lock());
     // After Kokkos has taken its memory back, what is left must not be destroyed.
-    if (!trilinos_is_running()) static_cast<void>(objects_.release());
-    objects_.reset();
+    if (!trilinos_is_running()) static_cast<void>(engine_.release());
+    engine_.reset();
   }
-  /// Forgets everything, and begins with zeros in this lower triangle.
-  void set_pattern(const itr_pattern& lower) {
-    objects_.reset(new Objects());
-    full_.set_pattern(lower);
-    objects_->map = make_map(full_.order);
-    objects_->matrix = make_matrix(objects_->map, full_);
-  }
-  void set_matrix(const double* values, size_t count) {
-    full_.set_values(values, count);
-    set_values(*objects_->matrix, full_);
-  }
-  int fail(int outcome, const char* why) {
-    std::snprintf(text_.data(), text_.size(), "%s", why);
-    return outcome;
-  }
+  OnKokkos(const OnKokkos&) = delete;
+  OnKokkos& operator=(const OnKokkos&) = delete;
 
-  FullMatrix full_;
-  std::unique_ptr<Objects> objects_;  ///< none before the first analysis
+  int set_option(std::string_view key, std::string_view value) { return engine_->set_option(key, value); }
+  int analyze(const itr_pattern& pattern, const itr_hints& hints) {
+    return guarded(start_kokkos, [&] { return engine_->analyze(pattern, hints); });
+  }
+  int factorize(const double* values, size_t count) {
+    return guarded(trilinos_is_running, [&] { return engine_->factorize(values, count); });
+  }
+  int solve(const double* rhs, double* solution, int columns) {
+    return guarded(trilinos_is_running, [&] { return engine_->solve(rhs, solution, columns); });
+  }
+  itr_statistics statistics() const { return engine_->statistics(); }
+  const char* message() const { return engine_->message(); }
 
  private:
-  std::array<char, 200> text_{};
+  template <typename F>
+  static int guarded(bool (*ready)(), F&& f) {
+    const std::scoped_lock guard(trilinos_lock());
+    if (!ready()) throw std::runtime_error("MPI does not run");
+    try {
+      return f();
+    } catch (const std::exception& error) {
+      if (is_out_of_memory(error)) throw std::bad_alloc();
+      throw;
+    }
+  }
+  std::unique_ptr<Engine> engine_ = std::make_unique<Engine>();
 };
 
-/// Rows of the module's table. All need MPI, if only on their own rank: Debian's Trilinos is built on it.
+/// A row of an engine that needs MPI, if only on its own rank: Debian's Trilinos is built on it.
 itr_engine on_mpi(itr_engine engine);
+template <typename Engine>
+itr_engine kokkos_row(const char* name, const char* version, const char* license, uint32_t capabilities,
+                      const char* options) {
+  return on_mpi(linear::ModuleAdapter<OnKokkos<Engine>>::row(name, version, license, capabilities, options));
+}
+
 itr_engine klu2_row(const char* version);
 itr_engine tacho_row(const char* version);
 itr_engine muelu_row(const char* version);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <Trilinos_version.h>
 #include <Kokkos_Core.hpp>
-#include <Teuchos_DefaultMpiComm.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
@@ -31,35 +29,6 @@ bool start_kokkos() {
   });
   return true;
 }
-
-RCP<const Map> make_map(int order) {
-  const auto self = Teuchos::rcp(new Teuchos::MpiComm<int>(MPI_COMM_SELF));
-  return Teuchos::rcp(new Map(order, 0, self));
-}
-
-RCP<Matrix> make_matrix(const RCP<const Map>& map, const FullMatrix& full) {
-  const auto entries = static_cast<Teuchos_Ordinal>(full.indices.size());
-  Teuchos::ArrayRCP<size_t> starts(static_cast<Teuchos_Ordinal>(full.starts.size()));
-  Teuchos::ArrayRCP<int> indices(entries);
-  Teuchos::ArrayRCP<double> values(entries);
-  std::copy(full.starts.begin(), full.starts.end(), starts.begin());
-  std::copy(full.indices.begin(), full.indices.end(), indices.begin());
-  std::copy(full.values.begin(), full.values.end(), values.begin());
-  const auto matrix = Teuchos::rcp(new Matrix(map, map, starts, indices, values));
-  matrix->fillComplete(map, map);
-  return matrix;
-}
-
-void set_values(Matrix& matrix, const FullMatrix& full) {
-  matrix.resumeFill();
-  for (int i = 0; i < full.order; ++i) {
-    const int first = full.starts[i], count = full.starts[i + 1] - first;
-    matrix.replaceLocalValues(i, count, &full.values[first], &full.indices[first]);
-  }
-  matrix.fillComplete(matrix.getDomainMap(), matrix.getRangeMap());
-}
-
-RCP<Vectors> make_vectors(const RCP<const Map>& map, int columns) { return Teuchos::rcp(new Vectors(map, columns)); }
 
 itr_engine on_mpi(itr_engine engine) {
   engine.prepare_mpi = prepare_mpi;

@@ -5,9 +5,35 @@
 #include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <new>
+#include <optional>
 
 #include "eigen_engines.hpp"
 #include "itr/linear/iteration_options.hpp"
+
+// SparseLU's own growth of its factors (Eigen 3.4) frees them, and where memory is out goes on with what it freed. This one
+// keeps them, so that std::bad_alloc leaves a solver that can be destroyed; it also moves pages instead of copying factors.
+namespace Eigen::internal {
+template <>
+template <typename Vector>
+Index SparseLUImpl<double, int>::expand(Vector& entries, Index& length, Index, Index length_is_new, Index& expansions) {
+  constexpr double kGrowth = 1.5;
+  constexpr Index kMost = std::numeric_limits<int>::max();  // places in the factors are of this type
+  const bool first = expansions == 0;
+  if (first) {
+    entries.resize(0);  // of an earlier factorisation
+  } else {
+    if (length_is_new == 0) {
+      if (length >= kMost) throw std::bad_alloc();
+      length = std::min(kMost, std::max(length + 1, static_cast<Index>(kGrowth * static_cast<double>(length))));
+    }
+    ++expansions;
+  }
+  entries.conservativeResize(length);
+  return 0;
+}
+}  // namespace Eigen::internal
 
 namespace itr::linear {
 
@@ -27,6 +53,7 @@ class LowerTriangleEngine : public Engine {
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints&) override {
     const std::vector<double> zeros(pattern.nonzeros(), 0.0);
     factorized_ = false;
+    forget();
     matrix_ = Eigen::Map<const Sparse>(pattern.order, pattern.order, static_cast<int>(pattern.nonzeros()),
                                        pattern.column_starts.data(), pattern.row_indices.data(), zeros.data());
     return analyze_matrix();
@@ -41,6 +68,7 @@ class LowerTriangleEngine : public Engine {
   Statistics statistics() const final { return factorized_ ? factor_statistics() : Statistics(); }
 
  protected:
+  virtual void forget() = 0;  ///< all of the analysis before
   virtual Outcome analyze_matrix() = 0;
   virtual Outcome factorize_matrix() = 0;
   virtual Statistics factor_statistics() const = 0;
@@ -71,43 +99,45 @@ Outcome check_pivots(const Sparse& matrix, const Eigen::SimplicialLDLT<Sparse>& 
   return Outcome::ok;
 }
 
-/// What all of Eigen's solvers share: they hold their factors and solve for columns.
+/// What all of Eigen's solvers share: they hold their factors and solve for columns. Each analysis begins with a new one: a
+/// vector of Eigen 3.4 that finds no memory when it is resized frees what it had twice, unless it was empty.
 template <typename EigenSolver>
 class EigenEngine : public LowerTriangleEngine {
  public:
   Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
-    out(X, columns) = solver_.solve(in(B, columns));
-    return solver_.info() == Eigen::Success ? Outcome::ok : Outcome::not_converged;
+    out(X, columns) = solver_->solve(in(B, columns));
+    return success_or(Outcome::not_converged);
   }
 
  protected:
+  void forget() override { solver_.emplace(); }
   Outcome analyze_matrix() override { return Outcome::ok; }
-  Outcome success_or(Outcome failure) const { return solver_.info() == Eigen::Success ? Outcome::ok : failure; }
-  EigenSolver solver_;
+  Outcome success_or(Outcome failure) const { return solver_->info() == Eigen::Success ? Outcome::ok : failure; }
+  std::optional<EigenSolver> solver_;
 };
 
 class Ldlt final : public EigenEngine<Eigen::SimplicialLDLT<Sparse>> {
   Outcome analyze_matrix() override {
-    solver_.analyzePattern(matrix_);
+    solver_->analyzePattern(matrix_);
     return Outcome::ok;
   }
   Outcome factorize_matrix() override {
-    solver_.factorize(matrix_);
-    return solver_.info() == Eigen::Success ? check_pivots(matrix_, solver_) : Outcome::singular;
+    solver_->factorize(matrix_);
+    return solver_->info() == Eigen::Success ? check_pivots(matrix_, *solver_) : Outcome::singular;
   }
-  Statistics factor_statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
+  Statistics factor_statistics() const override { return sparse_factor(solver_->matrixL().nestedExpression().nonZeros()); }
 };
 
 class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {
   Outcome analyze_matrix() override {
-    solver_.analyzePattern(matrix_);
+    solver_->analyzePattern(matrix_);
     return Outcome::ok;
   }
   Outcome factorize_matrix() override {
-    solver_.factorize(matrix_);
+    solver_->factorize(matrix_);
     return success_or(Outcome::not_positive_definite);
   }
-  Statistics factor_statistics() const override { return sparse_factor(solver_.matrixL().nestedExpression().nonZeros()); }
+  Statistics factor_statistics() const override { return sparse_factor(solver_->matrixL().nestedExpression().nonZeros()); }
 };
 
 class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
@@ -118,12 +148,12 @@ class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
   }
   Outcome factorize_matrix() override {
     const Sparse full = matrix_.selfadjointView<Eigen::Lower>();
-    if (!analyzed_) solver_.analyzePattern(full);
+    if (!analyzed_) solver_->analyzePattern(full);
     analyzed_ = true;
-    solver_.factorize(full);
+    solver_->factorize(full);
     return success_or(Outcome::singular);
   }
-  Statistics factor_statistics() const override { return sparse_factor(double(solver_.nnzL()) + double(solver_.nnzU())); }
+  Statistics factor_statistics() const override { return sparse_factor(double(solver_->nnzL()) + double(solver_->nnzU())); }
   bool analyzed_ = false;
 };
 
@@ -134,9 +164,9 @@ class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Spa
     iterations_ = 0;
     Outcome worst = Outcome::ok;
     for (int c = 0; c < columns; ++c) {  // Eigen counts the iterations of the last column only
-      out(X, columns).col(c) = solver_.solve(in(B, columns).col(c));
-      iterations_ += static_cast<int>(solver_.iterations());
-      if (solver_.info() != Eigen::Success) worst = Outcome::not_converged;
+      out(X, columns).col(c) = solver_->solve(in(B, columns).col(c));
+      iterations_ += static_cast<int>(solver_->iterations());
+      if (solver_->info() != Eigen::Success) worst = Outcome::not_converged;
     }
     return worst;
   }
@@ -144,10 +174,10 @@ class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Spa
  private:
   Outcome factorize_matrix() override {
     if ((matrix_.diagonal().array() <= 0).any()) return Outcome::not_positive_definite;
-    solver_.setTolerance(options_.tolerance);
-    solver_.setMaxIterations(options_.max_iterations > 0 ? options_.max_iterations
-                                                         : std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
-    solver_.compute(matrix_);
+    solver_->setTolerance(options_.tolerance);
+    solver_->setMaxIterations(options_.max_iterations > 0 ? options_.max_iterations
+                                                          : std::max<Eigen::Index>(1000, 10 * matrix_.rows()));
+    solver_->compute(matrix_);
     iterations_ = 0;
     return success_or(Outcome::failed);
   }
@@ -158,7 +188,7 @@ class ConjugateGradients final : public EigenEngine<Eigen::ConjugateGradient<Spa
 
 class Dense final : public EigenEngine<Eigen::LLT<Eigen::MatrixXd, Eigen::Lower>> {
   Outcome factorize_matrix() override {
-    solver_.compute(Eigen::MatrixXd(matrix_));
+    solver_->compute(Eigen::MatrixXd(matrix_));
     return success_or(Outcome::not_positive_definite);
   }
   Statistics factor_statistics() const override {
