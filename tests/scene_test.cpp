@@ -266,6 +266,9 @@ TEST_F(SceneTest, WaysToProjectTheHessian) {
   EXPECT_TRUE(newton({{"psd_projection", "absolute"}}).absolute_eigenvalues);
   EXPECT_FALSE(newton({{"psd_projection", "clamp"}}).absolute_eigenvalues);
   EXPECT_EQ(newton({{"projected_iterations", 0}}).projected_iterations, 0);
+  EXPECT_EQ(newton({{"force_psd_projection", true}}).projected_iterations, 0);
+  EXPECT_GT(newton({{"force_psd_projection", false}}).projected_iterations, 0);
+  EXPECT_THROW(newton({{"force_psd_projection", true}, {"use_psd_projection", false}}), itr::InputError);
   EXPECT_FALSE(newton({{"extend_steps", false}}).extend_steps);
 }
 

@@ -133,10 +133,10 @@ constexpr Group kGroups[] = {
      "use_grad_norm_tol min_step_size max_step_size_iter min_step_size_final max_step_size_iter_final "
      "default_init_step_size step_ratio Armijo RobustArmijo"},
     {"/solver/nonlinear/Newton", Role::read,
-     "use_psd_projection:boolean psd_projection:string projected_iterations:integer extend_steps:boolean"},
+     "use_psd_projection:boolean force_psd_projection:boolean psd_projection:string projected_iterations:integer "
+     "extend_steps:boolean"},
     {"/solver/nonlinear/Newton", Role::ignored,
-     "force_psd_projection residual_tolerance reg_weight_min reg_weight_max reg_weight_inc "
-     "use_psd_projection_in_regularized"},
+     "residual_tolerance reg_weight_min reg_weight_max reg_weight_inc use_psd_projection_in_regularized"},
 
     {"/solver/advanced", Role::read, "lump_mass_matrix:boolean"},
     {"/solver/advanced", Role::only,
