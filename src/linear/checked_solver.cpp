@@ -155,14 +155,21 @@ class CheckedSolver final : public Solver {
   /// residual = b - A x; also the largest product in it, whose round-off bounds how well the residual is known.
   void residual(std::span<const double> b, std::span<const double> x) {
     residual_.assign(b.begin(), b.end());
-    largest_product_ = 0;
-    for (int j = 0; j < pattern_.order; ++j)
-      for (int p = pattern_.column_starts[j]; p < pattern_.column_starts[j + 1]; ++p) {
+    double largest = 0;
+    for (int j = 0; j < pattern_.order; ++j) {
+      const int diagonal = pattern_.column_starts[j], end = pattern_.column_starts[j + 1];
+      double row = values_[diagonal] * x[j];  // kept in a register: through residual_[j] every sum would wait for the last
+      largest = std::max(largest, std::abs(row));
+      for (int p = diagonal + 1; p < end; ++p) {
         const int i = pattern_.row_indices[p];
-        residual_[i] -= values_[p] * x[j];
-        largest_product_ = std::max(largest_product_, std::abs(values_[p] * x[j]));
-        if (i != j) residual_[j] -= values_[p] * x[i];
+        const double product = values_[p] * x[j];
+        residual_[i] -= product;
+        largest = std::max(largest, std::abs(product));
+        row += values_[p] * x[i];
       }
+      residual_[j] -= row;
+    }
+    largest_product_ = largest;
   }
 
   /// Iterative refinement of one column; returns the relative residual that it ends with.
