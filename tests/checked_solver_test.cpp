@@ -34,6 +34,24 @@ TEST(CheckedSolver, AnalysesAPatternOnceUnlessItMayUsePositions) {
   }
 }
 
+TEST(CheckedSolver, AnalysesAnewWhereAnOldOrderMayNotServe) {
+  const SparsityPattern one = from_dense(tridiagonal(5, 4, 1)).pattern, other = from_dense(tridiagonal(6, 4, 1)).pattern;
+  for (const bool keeps : {false, true}) {
+    int analyses = 0;
+    const auto solver = make_checked_solver("counting", {.keeps_order = keeps}, std::make_unique<CountingEngine>(analyses));
+    const auto analyze = [&](const SparsityPattern& pattern, bool may_keep) {
+      EXPECT_EQ(solver->analyze(pattern, {.may_keep_order = may_keep}), Outcome::ok);
+      return analyses;
+    };
+    EXPECT_EQ(analyze(one, false), 1);
+    EXPECT_EQ(analyze(one, true), 1);
+    EXPECT_EQ(analyze(other, true), 2);
+    EXPECT_EQ(analyze(other, true), 2);
+    EXPECT_EQ(analyze(other, false), keeps ? 3 : 2);  // the analysis that it has may depend on `one`
+    EXPECT_EQ(analyze(other, false), keeps ? 3 : 2);
+  }
+}
+
 /// Gains a tenth with each solve, which takes seven iterations.
 class SlowEngine final : public Engine {
  public:

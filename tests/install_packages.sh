@@ -9,7 +9,7 @@ packages=(
   libeigen3-dev libtbb-dev libhdf5-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
   libcgal-dev libgmp-dev libmpfr-dev
   libsuitesparse-dev libopenblas-dev
-  libmumps-dev libmumps-ptscotch-dev libopenmpi-dev openmpi-bin
+  libmumps-dev libmumps-ptscotch-dev libptscotch-dev libopenmpi-dev openmpi-bin
   libtrilinos-{amesos2,tpetra,shylu,teuchos,kokkos,kokkos-kernels,epetra,epetraext,triutils,zoltan,trilinosss}-dev
   libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev

@@ -45,6 +45,27 @@ inline Dense tridiagonal(int n, double diagonal, double off) {
   return A;
 }
 
+/// The seven-point Laplacian of a cube of `side`^3 nodes, held all around; without the dense matrix.
+inline System laplacian(int side) {
+  System system;
+  const int n = side * side * side;
+  system.pattern.order = n;
+  const auto couple = [&](int node) {
+    system.pattern.row_indices.push_back(node);
+    system.values.push_back(-1);
+  };
+  for (int node = 0; node < n; ++node) {
+    system.pattern.column_starts.push_back(static_cast<int>(system.values.size()));
+    system.pattern.row_indices.push_back(node);
+    system.values.push_back(6);
+    if (node % side + 1 < side) couple(node + 1);
+    if (node / side % side + 1 < side) couple(node + side);
+    if (node + side * side < n) couple(node + side * side);
+  }
+  system.pattern.column_starts.push_back(static_cast<int>(system.values.size()));
+  return system;
+}
+
 /// What `itr solvers` lists; here the program is the test, which lets modules start MPI.
 inline Registry full_registry() {
   Registry registry;

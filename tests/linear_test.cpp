@@ -252,6 +252,50 @@ TEST_P(EverySolver, ReusesAndChangesPatterns) {
   expect_solves(from_dense(tridiagonal(11, 5, 1)), 1e-12);
 }
 
+/// Contacts come and go: entries between nodes that are far from each other.
+TEST_P(EverySolver, MayKeepAnOrderAndForgetsItWhenAsked) {
+  const Elastic body = elasticity(3, 4, 0.3);
+  const int n = body.pattern.order;
+  const auto with_contacts = [&](int first, int contacts) {
+    Dense full = body.full;
+    for (int c = 0; c < contacts; ++c) {
+      const int i = (first + 7 * c) % n, j = (first + 7 * c + n / 2) % n;
+      full(i, j) = full(j, i) = -0.1;
+      full(i, i) += 0.1;
+      full(j, j) += 0.1;
+    }
+    return from_dense(full);
+  };
+  const auto solution = [&](Solver& solver, const System& system, bool may_keep_order) {
+    std::vector<double> b(n, 1.0), x(n);
+    EXPECT_EQ(solver.analyze(system.pattern, {.may_keep_order = may_keep_order}), Outcome::ok) << solver.message();
+    EXPECT_EQ(solver.factorize(system.values), Outcome::ok) << solver.message();
+    EXPECT_EQ(solver.solve(b, x, 1, 1e-9).outcome, Outcome::ok) << solver.message();
+    return x;
+  };
+  const System few = with_contacts(3, 2), more = with_contacts(3, 5), others = with_contacts(20, n / 2);
+  solution(*solver_, few, false);
+  for (const System* system : {&more, &few, &others, &more}) expect_solves(*system, 1e-9, 2, true, {.may_keep_order = true});
+  expect_solves(from_dense(tridiagonal(11, 5, 1)), 1e-12, 1, true, {.may_keep_order = true});  // of another order
+  solution(*solver_, few, true);
+  solution(*solver_, more, true);
+  EXPECT_EQ(solution(*solver_, more, false), solution(*create(), more, false));  // to the last bit: as after a resume
+}
+
+/// Resumed runs and runs on more threads end with the same bits. Some orderings use threads and random numbers.
+TEST_P(EverySolver, FindsTheSameBitsTwice) {
+  const bool dense = GetParam().info.name == "dense";
+  const System system = laplacian(dense ? 8 : 20);
+  std::vector<double> b(system.pattern.order, 1.0), first(b.size()), second(b.size());
+  for (std::vector<double>* solution : {&first, &second}) {
+    if (solution == &second) solver_ = create();
+    ASSERT_EQ(solver_->analyze(system.pattern, {}), Outcome::ok) << solver_->message();
+    ASSERT_EQ(solver_->factorize(system.values), Outcome::ok) << solver_->message();
+    ASSERT_EQ(solver_->solve(b, *solution, 1, 1e-8).outcome, Outcome::ok) << solver_->message();
+  }
+  EXPECT_EQ(first, second);
+}
+
 TEST_P(EverySolver, SolvesSeveralRightHandSidesAndNone) {
   expect_solves(from_dense(springs(2, 6, 1)), 1e-10, 5);
   EXPECT_EQ(solver_->solve({}, {}, 0, 1e-10).outcome, Outcome::ok);

@@ -292,6 +292,11 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"damping", "ball_wall.json", 40, R"("dt":2e-5)",
                            kImpact + Arguments{R"(/solver/rayleigh_damping=[{"form":"elasticity","stiffness_ratio":0.1}])"}},
                       Case{"cubes", "cubes.json", 45, R"("dt":0.01)", {}},  // 3D; they meet in step 14
+                      Case{"kept_order",
+                           "cubes.json",
+                           45,
+                           R"("dt":0.01)",
+                           {R"(/solver/linear/solver=["cholmod", "eigen"])", "/space/remesh/enabled=false"}},
                       Case{"masticator", "masticator.json", 30, R"("dt":0.05)", {}},
                       Case{"quasistatic", "cantilever.json", 12, R"("dt":0.05,"quasistatic":true)", {}}),
     [](const auto& info) { return info.param.name; });

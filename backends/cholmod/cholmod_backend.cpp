@@ -24,8 +24,6 @@ class Cholmod {
     common_.supernodal = Supernodal;
     common_.final_ll = 1;
     common_.nmethods = 1;
-    common_.method[0].ordering = CHOLMOD_AMD;
-    common_.method[1].ordering = CHOLMOD_METIS;
     common_.postorder = 1;
     common_.quick_return_if_not_posdef = 1;
   }
@@ -45,11 +43,11 @@ class Cholmod {
     const auto ordering = itr::backends::find_ordering(kOrderings, key, value);
     if (!ordering) return ITR_FAILED;
     may_try_metis_ = value == "auto";
-    common_.method[0].ordering = *ordering;
+    ordering_ = *ordering;
     return ITR_OK;
   }
 
-  int analyze(const itr_pattern& pattern, const itr_hints&) {
+  int analyze(const itr_pattern& pattern, const itr_hints& hints) {
     const int n = pattern.order;
     starts_.assign(pattern.column_starts, pattern.column_starts + n + 1);
     rows_.assign(pattern.row_indices, pattern.row_indices + starts_[n]);
@@ -65,14 +63,17 @@ class Cholmod {
     matrix_.xtype = CHOLMOD_REAL;
     matrix_.dtype = CHOLMOD_DOUBLE;
     matrix_.sorted = matrix_.packed = 1;
-    cholmod_free_factor(&factor_, &common_);
-    common_.nmethods = 1;
-    factor_ = cholmod_analyze(&matrix_, &common_);
-    if (may_try_metis_ && factor_ && common_.fl > kMetisFromFlops * n) {
-      cholmod_free_factor(&factor_, &common_);
-      common_.nmethods = 2;  // the better of AMD's and METIS'
-      factor_ = cholmod_analyze(&matrix_, &common_);
+    if (order_.fits(pattern, hints)) {
+      analyze_by(CHOLMOD_GIVEN);
+      if (!factor_ || order_.is_good(flops_)) return status();
     }
+    analyze_by(ordering_);
+    if (may_try_metis_ && factor_ && flops_ > kMetisFromFlops * n) {
+      const double flops_by_amd = flops_;
+      analyze_by(CHOLMOD_METIS);
+      if (!factor_ || flops_ > flops_by_amd) analyze_by(CHOLMOD_AMD);
+    }
+    if (factor_) order_.keep(static_cast<const int*>(factor_->Perm), n, flops_);
     return status();
   }
 
@@ -108,12 +109,20 @@ class Cholmod {
     result.factor_nonzeros = common_.lnz;
     result.factor_bytes = result.largest_bytes =
         factor_->is_super ? 8.0 * factor_->xsize + 4.0 * factor_->ssize : 12.0 * factor_->nzmax;
-    result.flops = common_.fl;
+    result.flops = flops_;
     return result;
   }
   const char* message() const { return text_.data(); }
 
  private:
+  void analyze_by(int ordering) {
+    cholmod_free_factor(&factor_, &common_);
+    common_.method[0].ordering = ordering;
+    int* const given = ordering == CHOLMOD_GIVEN ? order_.places() : nullptr;
+    factor_ = cholmod_analyze_p(&matrix_, given, nullptr, 0, &common_);
+    flops_ = common_.fl;
+  }
+
   int status() {
     std::snprintf(text_.data(), text_.size(), "CHOLMOD status %d", common_.status);
     if (common_.status == CHOLMOD_OUT_OF_MEMORY || common_.status == CHOLMOD_TOO_LARGE) return ITR_OUT_OF_MEMORY;
@@ -122,9 +131,12 @@ class Cholmod {
 
   /// Flops of AMD's factorisation an unknown, from which half of them would pay for METIS' 10 to 25 microseconds an unknown
   /// (verification/scaling).
-  static constexpr double kMetisFromFlops = 4e5;
+  static constexpr double kMetisFromFlops = 1.5e5;
 
+  int ordering_ = CHOLMOD_AMD;
   bool may_try_metis_ = true;
+  itr::backends::KeptOrder order_;
+  double flops_ = 0;  ///< of a factorisation, by the analysis
   cholmod_common common_{};
   cholmod_sparse matrix_{};
   cholmod_factor* factor_ = nullptr;
@@ -149,8 +161,9 @@ extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_
   using Supernodal = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL>>;
   using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
   constexpr const char* kOptions = "ordering=auto|amd|metis|natural";
-  static const itr_engine engines[] = {Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", 0, kOptions),
-                                       Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", 0, kOptions)};
+  static const itr_engine engines[] = {
+      Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", ITR_KEEPS_ORDER, kOptions),
+      Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", ITR_KEEPS_ORDER, kOptions)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
   return &module;
 }

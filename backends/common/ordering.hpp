@@ -5,6 +5,9 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+#include <vector>
+
+#include "itr/linear/abi.h"
 
 namespace itr::backends {
 
@@ -19,5 +22,25 @@ std::optional<int> find_ordering(const Ordering (&table)[N], std::string_view ke
     if (name == value) return number;
   return {};
 }
+
+/// The fill-reducing order of an analysis, for later ones of patterns that are much alike: contacts come and go.
+class KeptOrder {
+ public:
+  void keep(const int* places, int order, double flops) {
+    places_.assign(places, places + order);
+    flops_ = flops;
+  }
+  bool fits(const itr_pattern& pattern, const itr_hints& hints) const {
+    return hints.may_keep_order != 0 && places_.size() == static_cast<std::size_t>(pattern.order);
+  }
+  int* places() { return places_.data(); }
+  /// Whether a factorisation in this order is still worth what it costs.
+  bool is_good(double flops) const { return flops <= kWorse * flops_; }
+
+ private:
+  static constexpr double kWorse = 1.2;
+  std::vector<int> places_;
+  double flops_ = 0;  ///< of a factorisation when it was new
+};
 
 }  // namespace itr::backends

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <mutex>
 #include <string_view>
@@ -18,6 +19,10 @@
 #include "../common/mpi_session.hpp"
 #include "../common/ordering.hpp"
 #include "itr/linear/module_adapter.hpp"
+
+#ifdef ITR_MUMPS_HAS_SCOTCH
+extern "C" void SCOTCH_randomReset(void);  // NOLINT(readability-identifier-naming)
+#endif
 
 namespace {
 
@@ -99,7 +104,7 @@ class Mumps {
     return ITR_OK;
   }
 
-  int analyze(const itr_pattern& pattern, const itr_hints&) {
+  int analyze(const itr_pattern& pattern, const itr_hints& hints) {
     const std::scoped_lock guard(lock);
     if (!start()) return ITR_FAILED;
     rows_.clear();
@@ -113,13 +118,17 @@ class Mumps {
     mumps_.nnz = static_cast<MUMPS_INT8>(rows_.size());
     mumps_.irn = rows_.data();
     mumps_.jcn = columns_.data();
-    icntl(mumps_, 7) = ordering_ == kAuto ? kAmf : ordering_;
     icntl(mumps_, 14) = kMemoryMargin;
-    const int outcome = job(kAnalyze);
-    const bool may_gain = ordering_ == kAuto && kScotch != kAmf && mumps_.rinfog[0] >= kScotchFromFlops * pattern.order;
-    if (outcome != ITR_OK || !may_gain) return outcome;
-    icntl(mumps_, 7) = kScotch;
-    return job(kAnalyze);
+    if (order_.fits(pattern, hints)) {
+      mumps_.perm_in = order_.places();
+      const int outcome = analyze_by(kGiven);
+      if (outcome != ITR_OK || order_.is_good(foreseen_flops())) return outcome;
+    }
+    int outcome = analyze_by(ordering_ == kAuto ? kAmf : ordering_);
+    if (outcome == ITR_OK && ordering_ == kAuto && kScotch != kAmf && foreseen_flops() >= kScotchFromFlops * pattern.order)
+      outcome = analyze_by(kScotch);
+    if (outcome == ITR_OK) order_.keep(mumps_.sym_perm, pattern.order, foreseen_flops());
+    return outcome;
   }
 
   int factorize(const double* values, size_t length) {
@@ -158,14 +167,14 @@ class Mumps {
     result.factor_nonzeros = count(infog(mumps_, is_factorized_ ? 29 : 20));
     result.largest_bytes = 1e6 * infog(mumps_, is_factorized_ ? 21 : 16);
     result.factor_bytes = 1e6 * infog(mumps_, is_factorized_ ? 22 : 17);
-    result.flops = mumps_.rinfog[is_factorized_ ? 2 : 0];
+    result.flops = is_factorized_ ? mumps_.rinfog[2] : foreseen_flops();
     return result;
   }
   const char* message() const { return text_.data(); }
 
  private:
   // MUMPS's own choice may be PORD, which ends the process on some graphs.
-  static constexpr int kAuto = -1, kAmf = 2;
+  static constexpr int kAuto = -1, kGiven = 1, kAmf = 2;
 #ifdef ITR_MUMPS_HAS_SCOTCH
   static constexpr int kScotch = 3;
 #else
@@ -173,7 +182,7 @@ class Mumps {
 #endif
   /// Flops of AMF's factorisation an unknown, from which the sixth to third of them that Scotch saves pays for its 5
   /// microseconds an unknown in two to four factorisations (verification/solvers).
-  static constexpr double kScotchFromFlops = 4e5;
+  static constexpr double kScotchFromFlops = 1.5e5;
   static constexpr int kMemoryMargin = 30, kMostMemoryMargin = 1000;  ///< of the estimate [%]
 
   /// An instance on its own rank does not care who connects or leaves.
@@ -209,6 +218,15 @@ class Mumps {
     session_ = -1;
   }
 
+  int analyze_by(int ordering) {
+#ifdef ITR_MUMPS_HAS_SCOTCH
+    SCOTCH_randomReset();  // else its next order would depend on those before
+#endif
+    icntl(mumps_, 7) = ordering;
+    return job(kAnalyze);
+  }
+  double foreseen_flops() const { return mumps_.rinfog[0]; }
+
   int job(int number) {
     if (is_shared_) send({number, instance_, 0});
     run(mumps_, number);
@@ -238,6 +256,7 @@ class Mumps {
   int instance_ = 0;
   bool is_shared_ = false, is_factorized_ = false;
   int ordering_ = kAuto;
+  itr::backends::KeptOrder order_;
   std::vector<MUMPS_INT> rows_, columns_;
   std::vector<double> values_;
   std::array<char, 96> text_{};
@@ -327,6 +346,9 @@ const char* version() {
   static char text[256], mpi[MPI_MAX_LIBRARY_VERSION_STRING];
   int length = 0;
   MPI_Get_library_version(mpi, &length);
+#ifdef ITR_MUMPS_HAS_SCOTCH
+  setenv("SCOTCH_PTHREAD_NUMBER", "1", 1);  // on several threads Scotch orders otherwise each time; it has no other switch
+#endif
   const std::string_view words = mpi;  // "Open MPI v4.1.4, package: ..."
   const auto end = static_cast<int>(std::min(words.find_first_of(",\n"), words.size()));
   std::snprintf(text, sizeof text, "MUMPS %s, %.*s, %s", MUMPS_VERSION, std::min(end, 40), mpi, itr::backends::pin_blas());
@@ -337,7 +359,8 @@ const char* version() {
 
 extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
   static const char* const text = version();
-  static const itr_engine engines[] = {row<2>("mumps", text, ITR_INDEFINITE | ITR_MPI), row<1>("mumps:spd", text, ITR_MPI)};
+  static const itr_engine engines[] = {row<2>("mumps", text, ITR_INDEFINITE | ITR_MPI | ITR_KEEPS_ORDER),
+                                       row<1>("mumps:spd", text, ITR_MPI | ITR_KEEPS_ORDER)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
   return &module;
 }

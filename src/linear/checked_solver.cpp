@@ -71,7 +71,9 @@ class CheckedSolver final : public Solver {
     ready_ = false;
     // An analysis of a direct solver sees the pattern alone. (An iterative one may use where the nodes are, and a result
     // that depended on where they once were could not be repeated from a saved state.)
-    if (analyzed_ && !capabilities_.iterative && pattern == pattern_) return Outcome::ok;
+    const bool serves = hints.may_keep_order || !order_may_be_old_;
+    if (analyzed_ && !capabilities_.iterative && serves && pattern == pattern_) return Outcome::ok;
+    order_may_be_old_ = hints.may_keep_order && capabilities_.keeps_order;
     analyzed_ = false;
     const Outcome outcome = guarded([&] {
       pattern_ = pattern;
@@ -200,7 +202,7 @@ class CheckedSolver final : public Solver {
   SparsityPattern pattern_;
   std::vector<double> values_, residual_, correction_, previous_;
   double largest_product_ = 0;
-  bool analyzed_ = false, ready_ = false;
+  bool analyzed_ = false, ready_ = false, order_may_be_old_ = false;
   int iterations_ = 0;  ///< of the last solve with its refinements
   std::string message_;
 };

@@ -29,7 +29,7 @@ class ModuleEngine final : public Engine {
     if (!self_) return Outcome::out_of_memory;
     const itr_pattern view{pattern.order, pattern.column_starts.data(), pattern.row_indices.data()};
     const itr_hints help{hints.block_size, hints.dofs.empty() ? nullptr : hints.dofs.data(),
-                         hints.coordinates.empty() ? nullptr : hints.coordinates.data()};
+                         hints.coordinates.empty() ? nullptr : hints.coordinates.data(), hints.may_keep_order};
     return outcome(table_.analyze(self_, &view, &help));
   }
   Outcome factorize(std::span<const double> values) override {
@@ -112,7 +112,8 @@ std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
   for (int i = 0; i < module->num_engines; ++i) {
     const itr_engine& engine = module->engines[i];
     const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
-                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0};
+                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0,
+                                    (engine.capabilities & ITR_KEEPS_ORDER) != 0};
     rows.push_back({{engine.name, engine.library_version, engine.license, engine.options, capabilities, true, ""},
                     [&engine](const SolverOptions& options) -> std::unique_ptr<Engine> {
                       auto instance = std::make_unique<ModuleEngine>(engine);

@@ -42,14 +42,15 @@ struct Known {
   const char* module;
   const char* packages;
 };
-constexpr Known kKnown[] = {{"cholmod:supernodal", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
-                            {"cholmod:simplicial", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
-                            {"umfpack", "itr_backend_umfpack", "libsuitesparse-dev libopenblas-dev"},
-                            {"mumps", "itr_backend_mumps", "libmumps-dev libmumps-ptscotch-dev libopenmpi-dev"},
-                            {"mumps:spd", "itr_backend_mumps", "libmumps-dev libmumps-ptscotch-dev libopenmpi-dev"},
-                            {"amesos2:klu2", "itr_backend_trilinos", "trilinos-all-dev"},
-                            {"amesos2:tacho", "itr_backend_trilinos", "trilinos-all-dev"},
-                            {"belos:muelu", "itr_backend_trilinos", "trilinos-all-dev"}};
+constexpr Known kKnown[] = {
+    {"cholmod:supernodal", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
+    {"cholmod:simplicial", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
+    {"umfpack", "itr_backend_umfpack", "libsuitesparse-dev libopenblas-dev"},
+    {"mumps", "itr_backend_mumps", "libmumps-dev libmumps-ptscotch-dev libptscotch-dev libopenmpi-dev"},
+    {"mumps:spd", "itr_backend_mumps", "libmumps-dev libmumps-ptscotch-dev libptscotch-dev libopenmpi-dev"},
+    {"amesos2:klu2", "itr_backend_trilinos", "trilinos-all-dev"},
+    {"amesos2:tacho", "itr_backend_trilinos", "trilinos-all-dev"},
+    {"belos:muelu", "itr_backend_trilinos", "trilinos-all-dev"}};
 
 }  // namespace
 

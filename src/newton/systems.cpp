@@ -31,6 +31,7 @@ double DenseSystem::diagonal_scale() const { return hessian_.rows() > 0 ? hessia
 void SparseSystem::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
   dim_ = dim;
   pattern_changed_ = true;
+  may_keep_order_ = false;
   assembler_.reset(dofs, dim, std::move(stencils), stencil_size);
 }
 
@@ -54,10 +55,12 @@ void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjecti
 
 linear::Outcome SparseSystem::factorize(double shift) {
   if (pattern_changed_) {
-    const auto outcome =
-        solver_.analyze(assembler_.pattern(), {.block_size = dim_, .dofs = dofs_, .coordinates = coordinates_});
+    const linear::AnalyzeHints hints{
+        .block_size = dim_, .dofs = dofs_, .coordinates = coordinates_, .may_keep_order = may_keep_order_};
+    const auto outcome = solver_.analyze(assembler_.pattern(), hints);
     if (outcome != linear::Outcome::ok) return outcome;
     pattern_changed_ = false;
+    may_keep_order_ = true;
   }
   if (shift == 0) return solver_.factorize(assembler_.values());
   std::vector<double> shifted(assembler_.values().begin(), assembler_.values().end());

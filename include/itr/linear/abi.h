@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define ITR_BACKEND_ABI_VERSION 2
+#define ITR_BACKEND_ABI_VERSION 3
 #define ITR_BACKEND_ENTRY "itr_backend_module"
 
 /* Names as in C. NOLINTBEGIN(readability-identifier-naming) */
@@ -22,7 +22,7 @@ extern "C" {
 enum { ITR_OK, ITR_NOT_POSITIVE_DEFINITE, ITR_SINGULAR, ITR_NON_FINITE, ITR_OUT_OF_MEMORY, ITR_NOT_CONVERGED, ITR_FAILED };
 
 /* Capability bits. */
-enum { ITR_INDEFINITE = 1, ITR_ITERATIVE = 2, ITR_THREADS = 4, ITR_MPI = 8 };
+enum { ITR_INDEFINITE = 1, ITR_ITERATIVE = 2, ITR_THREADS = 4, ITR_MPI = 8, ITR_KEEPS_ORDER = 16 };
 
 /* Lower triangle with the diagonal, by columns, rows ascending. */
 typedef struct itr_pattern {
@@ -36,6 +36,9 @@ typedef struct itr_hints {
   int32_t block_size;        /* unknowns a node where none is held: the dimension; 1: nothing is known */
   const int32_t* dofs;       /* order: block_size * node + component of each unknown, ascending; or NULL */
   const double* coordinates; /* block_size * order: position of each unknown's node [m]; or NULL */
+  /* 0: the result must depend on this pattern alone. Else, with ITR_KEEPS_ORDER, the fill-reducing order of an analysis
+   * before may serve again. */
+  int32_t may_keep_order;
 } itr_hints;
 
 /* What the last factorisation and solve took; zero where the library does not tell. */

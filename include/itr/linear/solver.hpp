@@ -39,6 +39,7 @@ struct Capabilities {
   bool iterative = false;
   bool threads = false;
   bool mpi = false;
+  bool keeps_order = false;  ///< makes use of AnalyzeHints::may_keep_order
 };
 
 /// What may help an analysis; all optional.
@@ -46,6 +47,9 @@ struct AnalyzeHints {
   int block_size = 1;                        ///< unknowns a node where none is held: the dimension; 1: nothing is known
   std::span<const int> dofs = {};            ///< of each unknown: block_size * node + component, ascending
   std::span<const double> coordinates = {};  ///< block_size of each unknown: where its node is [m]
+  /// The fill-reducing order of an analysis before may serve again, where the patterns are much alike. Without it the
+  /// analysis depends on the pattern alone, and so can be repeated from a saved state.
+  bool may_keep_order = false;
 };
 
 /// What the last factorisation and solve took, or what the analysis foresees; zero where the library does not tell.
