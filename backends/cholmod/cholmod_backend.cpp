@@ -118,7 +118,7 @@ class Cholmod {
   void analyze_by(int ordering) {
     cholmod_free_factor(&factor_, &common_);
     common_.method[0].ordering = ordering;
-    int* const given = ordering == CHOLMOD_GIVEN ? order_.places() : nullptr;
+    int* const given = ordering == CHOLMOD_GIVEN ? order_.permutation() : nullptr;
     factor_ = cholmod_analyze_p(&matrix_, given, nullptr, 0, &common_);
     flops_ = common_.fl;
   }

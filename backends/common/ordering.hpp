@@ -26,20 +26,21 @@ std::optional<int> find_ordering(const Ordering (&table)[N], std::string_view ke
 /// The fill-reducing order of an analysis, for later ones of patterns that are much alike: contacts come and go.
 class KeptOrder {
  public:
-  void keep(const int* places, int order, double flops) {
-    places_.assign(places, places + order);
+  /// `permutation` as the library gives and takes it; `flops` of a factorisation, as its analysis foresees them.
+  void keep(const int* permutation, int order, double flops) {
+    permutation_.assign(permutation, permutation + order);
     flops_ = flops;
   }
   bool fits(const itr_pattern& pattern, const itr_hints& hints) const {
-    return hints.may_keep_order != 0 && places_.size() == static_cast<std::size_t>(pattern.order);
+    return hints.may_keep_order != 0 && permutation_.size() == static_cast<std::size_t>(pattern.order);
   }
-  int* places() { return places_.data(); }
+  int* permutation() { return permutation_.data(); }
   /// Whether a factorisation in this order is still worth what it costs.
   bool is_good(double flops) const { return flops <= kWorse * flops_; }
 
  private:
   static constexpr double kWorse = 1.2;
-  std::vector<int> places_;
+  std::vector<int> permutation_;
   double flops_ = 0;  ///< of a factorisation when it was new
 };
 

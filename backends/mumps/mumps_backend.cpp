@@ -120,7 +120,7 @@ class Mumps {
     mumps_.jcn = columns_.data();
     icntl(mumps_, 14) = kMemoryMargin;
     if (order_.fits(pattern, hints)) {
-      mumps_.perm_in = order_.places();
+      mumps_.perm_in = order_.permutation();
       const int outcome = analyze_by(kGiven);
       if (outcome != ITR_OK || order_.is_good(foreseen_flops())) return outcome;
     }
