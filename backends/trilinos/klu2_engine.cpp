@@ -3,7 +3,6 @@
 // hand on why a factorisation failed, and takes the matrix through Kokkos and MPI, which KLU2 does not need.
 #include <Amesos2_KLU2_FunctionMap.hpp>
 #include <algorithm>
-#include <cstdint>
 #include <string_view>
 
 #include "../common/full_matrix.hpp"
@@ -25,6 +24,7 @@ class Klu2 {
   int analyze(const itr_pattern& pattern, const itr_hints&) {
     forget();
     matrix_.set_pattern(pattern);
+    const std::scoped_lock guard(trilinos_lock());  // it writes AMD's pointers to malloc, the same ones each time
     symbolic_ = KLU2::klu_analyze<double, int>(matrix_.order, matrix_.starts.data(), matrix_.indices.data(), &common_);
     return outcome();
   }

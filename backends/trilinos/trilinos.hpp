@@ -15,7 +15,7 @@
 
 namespace itr::backends {
 
-/// Kokkos is not re-entrant: every call into it, destructors included, happens under this.
+/// Kokkos is not re-entrant: every call into it, destructors included, happens under this, and what else is shared.
 std::mutex& trilinos_lock();
 
 /// Starts Kokkos where nobody has, finalised at exit by whoever started it. False where MPI does not run.
