@@ -5,8 +5,9 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <cmath>
+#include <cctype>
 #include <fstream>
+#include <string>
 
 #include "linear_systems.hpp"
 
@@ -65,6 +66,12 @@ TEST_P(EverySolver, SaysThatMemoryIsOut) {
     {
       const SpareMemory limit(bytes);
       outcome = solve(*solver, large);
+      if (outcome != Outcome::ok) {  // whoever goes on all the same is told so
+        for (int i = 0; i < 2; ++i) {
+          solver->factorize(large.values);
+          solver->solve(ones, solution, 1, 1e-8);
+        }
+      }
     }
     SCOPED_TRACE(std::to_string(bytes) + " bytes: " + to_string(outcome) + ", " + solver->message());
     EXPECT_TRUE(outcome == Outcome::ok || outcome == Outcome::out_of_memory);

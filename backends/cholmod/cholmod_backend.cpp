@@ -129,8 +129,8 @@ class Cholmod {
     return common_.status >= CHOLMOD_OK && factor_ ? ITR_OK : ITR_FAILED;
   }
 
-  /// Flops of AMD's factorisation an unknown, from which half of them would pay for METIS' 10 to 25 microseconds an unknown
-  /// (verification/scaling).
+  /// Flops of AMD's factorisation an unknown, from which the half of them that METIS saves pays for its 3 to 25 microseconds
+  /// an unknown in the few factorisations that its order lasts (verification/scaling, verification/solvers).
   static constexpr double kMetisFromFlops = 1.5e5;
 
   int ordering_ = CHOLMOD_AMD;

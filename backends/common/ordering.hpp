@@ -31,8 +31,10 @@ class KeptOrder {
     permutation_.assign(permutation, permutation + order);
     flops_ = flops;
   }
-  bool fits(const itr_pattern& pattern, const itr_hints& hints) const {
-    return hints.may_keep_order != 0 && permutation_.size() == static_cast<std::size_t>(pattern.order);
+  /// Whether it may serve; where it may not, it is forgotten: what comes must not depend on it.
+  bool fits(const itr_pattern& pattern, const itr_hints& hints) {
+    if (hints.may_keep_order == 0) permutation_.clear();
+    return !permutation_.empty() && permutation_.size() == static_cast<std::size_t>(pattern.order);
   }
   int* permutation() { return permutation_.data(); }
   /// Whether a factorisation in this order is still worth what it costs.

@@ -181,7 +181,7 @@ class Mumps {
   static constexpr int kScotch = kAmf;
 #endif
   /// Flops of AMF's factorisation an unknown, from which the sixth to third of them that Scotch saves pays for its 5
-  /// microseconds an unknown in two to four factorisations (verification/solvers).
+  /// microseconds an unknown in the factorisations that its order lasts, ten and more (verification/solvers).
   static constexpr double kScotchFromFlops = 1.5e5;
   static constexpr int kMemoryMargin = 30, kMostMemoryMargin = 1000;  ///< of the estimate [%]
 

@@ -58,6 +58,8 @@ class Klu2 {
         return "";
       case KLU_SINGULAR:
         return "a pivot is zero";
+      case KLU_OUT_OF_MEMORY:
+        return "out of memory";
       case KLU_TOO_LARGE:
         return "the factor has too many entries for KLU2's 32-bit indices";
       default:

@@ -82,6 +82,9 @@ class Muelu {
   int set_option(std::string_view key, std::string_view value) { return options_.set(key, value) ? ITR_OK : ITR_FAILED; }
 
   int analyze(const itr_pattern& pattern, const itr_hints& hints) {
+    preconditioner_ = Teuchos::null;
+    coordinates_ = null_space_ = Teuchos::null;
+    matrix_ = Teuchos::null;
     fill_up(pattern, hints);
     const itr_pattern padded{static_cast<int32_t>(starts_.size() - 1), starts_.data(), rows_.data()};
     full_.set_pattern(padded);

@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <exception>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "../common/full_matrix.hpp"
 #include "trilinos.hpp"
@@ -63,7 +65,7 @@ class TachoEngine {
   }
 
   int solve(const double* rhs, double* solution, int columns) {
-    if (!objects_) return ITR_FAILED;
+    if (!objects_) throw std::runtime_error("memory was out in the solve before");
     const auto length = static_cast<size_t>(full_.order) * columns;
     Driver::value_type_matrix b("b", full_.order, columns), x("x", full_.order, columns), scratch("t", full_.order, columns);
     std::copy_n(rhs, length, b.data());
@@ -78,20 +80,21 @@ class TachoEngine {
  private:
   /// Orders full_ and reserves memory for its factor.
   void prepare() {
-    objects_ = std::make_unique<Objects>();
+    auto objects = std::make_unique<Objects>();
     Driver::size_type_array_host starts("starts", full_.starts.size());
     Driver::ordinal_type_array_host indices("indices", full_.indices.size());
     std::copy(full_.starts.begin(), full_.starts.end(), starts.data());
     std::copy(full_.indices.begin(), full_.indices.end(), indices.data());
-    objects_->values = Driver::value_type_array("values", full_.values.size());
-    objects_->driver.setMatrixType(2, true);  // symmetric, positive definite
-    objects_->driver.setSmallProblemThresholdsize(kDenseBelow);
+    objects->values = Driver::value_type_array("values", full_.values.size());
+    objects->driver.setMatrixType(2, true);  // symmetric, positive definite
+    objects->driver.setSmallProblemThresholdsize(kDenseBelow);
     const auto order = fill_reducing_order();
     Driver::ordinal_type_array_host forth("forth", full_.order), back("back", full_.order);
     for (int k = 0; k < full_.order; ++k) {
       forth(k) = order.indices()[k];
       back(order.indices()[k]) = k;
     }
+    objects_ = std::move(objects);
     keep_unless_it_throws([&](Driver& driver) {
       driver.analyze(full_.order, starts, indices, forth, back);
       driver.initialize();

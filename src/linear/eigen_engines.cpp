@@ -5,8 +5,7 @@
 #include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <new>
+#include <cstddef>
 #include <optional>
 
 #include "eigen_engines.hpp"
@@ -14,20 +13,18 @@
 
 // SparseLU's own growth of its factors (Eigen 3.4) frees them, and where memory is out goes on with what it freed. This one
 // keeps them, so that std::bad_alloc leaves a solver that can be destroyed; it also moves pages instead of copying factors.
+// For places of a type that nobody else takes: a program must have one version of a function, and others use SparseLU too.
 namespace Eigen::internal {
 template <>
 template <typename Vector>
-Index SparseLUImpl<double, int>::expand(Vector& entries, Index& length, Index, Index length_is_new, Index& expansions) {
+Index SparseLUImpl<double, std::ptrdiff_t>::expand(Vector& entries, Index& length, Index, Index length_is_new,
+                                                   Index& expansions) {
   constexpr double kGrowth = 1.5;
-  constexpr Index kMost = std::numeric_limits<int>::max();  // places in the factors are of this type
   const bool first = expansions == 0;
   if (first) {
     entries.resize(0);  // of an earlier factorisation
   } else {
-    if (length_is_new == 0) {
-      if (length >= kMost) throw std::bad_alloc();
-      length = std::min(kMost, std::max(length + 1, static_cast<Index>(kGrowth * static_cast<double>(length))));
-    }
+    if (length_is_new == 0) length = std::max(length + 1, static_cast<Index>(kGrowth * static_cast<double>(length)));
     ++expansions;
   }
   entries.conservativeResize(length);
@@ -60,6 +57,7 @@ class LowerTriangleEngine : public Engine {
   }
   Outcome factorize(std::span<const double> values) override {
     std::copy(values.begin(), values.end(), matrix_.valuePtr());
+    factorized_ = false;
     const Outcome outcome = factorize_matrix();
     factorized_ = outcome == Outcome::ok;
     return outcome;
@@ -140,14 +138,16 @@ class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {
   Statistics factor_statistics() const override { return sparse_factor(solver_->matrixL().nestedExpression().nonZeros()); }
 };
 
-class Lu final : public EigenEngine<Eigen::SparseLU<Sparse>> {
+using WideSparse = Eigen::SparseMatrix<double, Eigen::ColMajor, std::ptrdiff_t>;
+
+class Lu final : public EigenEngine<Eigen::SparseLU<WideSparse>> {
   // SparseLU may drop entries that cancel when it is given a pattern of zeros, so it analyses with the first values.
   Outcome analyze_matrix() override {
     analyzed_ = false;
     return Outcome::ok;
   }
   Outcome factorize_matrix() override {
-    const Sparse full = matrix_.selfadjointView<Eigen::Lower>();
+    const WideSparse full = Sparse(matrix_.selfadjointView<Eigen::Lower>());
     if (!analyzed_) solver_->analyzePattern(full);
     analyzed_ = true;
     solver_->factorize(full);

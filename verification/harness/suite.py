@@ -156,7 +156,7 @@ def run_case(case, context):
             entry["status"] = "passed"
     except Skipped as reason:
         failed = any(result["passed"] is False for result in entry["results"])  # what ran counts
-        entry.update(status="failed" if failed else "skipped", message=str(reason))
+        entry.update(status="failed" if failed else "skipped", message=("not all passed, then: " if failed else "") + str(reason))
     except Failure as error:
         entry["message"] = str(error)
     except Exception:  # a case that breaks is a case that fails; the others still run

@@ -42,6 +42,7 @@ class ModuleAdapter {
       exception.clear();
       return f(engine);
     } catch (const std::bad_alloc&) {
+      exception = "out of memory";  // short enough to need none
       return ITR_OUT_OF_MEMORY;
     } catch (const std::exception& error) {
       exception = error.what();
