@@ -4,9 +4,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -64,6 +66,13 @@ inline System laplacian(int side) {
   }
   system.pattern.column_starts.push_back(static_cast<int>(system.values.size()));
   return system;
+}
+
+/// Of a case of one solver: gtest takes letters and digits only.
+inline std::string as_test_name(std::string name) {
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  return name;
 }
 
 /// What `itr solvers` lists; here the program is the test, which lets modules start MPI.

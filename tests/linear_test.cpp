@@ -338,10 +338,7 @@ std::vector<Case> cases() {
   return all;
 }
 std::string test_name(const ::testing::TestParamInfo<Case>& info) {
-  std::string name = ::testing::PrintToString(info.param);
-  for (char& c : name)
-    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-  return name;
+  return as_test_name(::testing::PrintToString(info.param));
 }
 INSTANTIATE_TEST_SUITE_P(Table, EverySolver, ::testing::ValuesIn(cases()), test_name);
 

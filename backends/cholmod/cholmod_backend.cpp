@@ -63,17 +63,17 @@ class Cholmod {
     matrix_.xtype = CHOLMOD_REAL;
     matrix_.dtype = CHOLMOD_DOUBLE;
     matrix_.sorted = matrix_.packed = 1;
-    if (order_.fits(pattern, hints)) {
+    if (order_.recall(pattern, hints)) {
       analyze_by(CHOLMOD_GIVEN);
-      if (!factor_ || order_.is_good(flops_)) return status();
+      if (!factor_ || order_.is_good(common_.fl)) return status();
     }
     analyze_by(ordering_);
-    if (may_try_metis_ && factor_ && flops_ > kMetisFromFlops * n) {
-      const double flops_by_amd = flops_;
+    if (may_try_metis_ && factor_ && common_.fl > kMetisFromFlops * n) {
+      const double flops_by_amd = common_.fl;
       analyze_by(CHOLMOD_METIS);
-      if (!factor_ || flops_ > flops_by_amd) analyze_by(CHOLMOD_AMD);
+      if (!factor_ || common_.fl > flops_by_amd) analyze_by(CHOLMOD_AMD);
     }
-    if (factor_) order_.keep(static_cast<const int*>(factor_->Perm), n, flops_);
+    if (factor_) order_.keep(static_cast<const int*>(factor_->Perm), n, common_.fl);
     return status();
   }
 
@@ -109,7 +109,7 @@ class Cholmod {
     result.factor_nonzeros = common_.lnz;
     result.factor_bytes = result.largest_bytes =
         factor_->is_super ? 8.0 * factor_->xsize + 4.0 * factor_->ssize : 12.0 * factor_->nzmax;
-    result.flops = flops_;
+    result.flops = common_.fl;
     return result;
   }
   const char* message() const { return text_.data(); }
@@ -120,7 +120,6 @@ class Cholmod {
     common_.method[0].ordering = ordering;
     int* const given = ordering == CHOLMOD_GIVEN ? order_.permutation() : nullptr;
     factor_ = cholmod_analyze_p(&matrix_, given, nullptr, 0, &common_);
-    flops_ = common_.fl;
   }
 
   int status() {
@@ -136,7 +135,6 @@ class Cholmod {
   int ordering_ = CHOLMOD_AMD;
   bool may_try_metis_ = true;
   itr::backends::KeptOrder order_;
-  double flops_ = 0;  ///< of a factorisation, by the analysis
   cholmod_common common_{};
   cholmod_sparse matrix_{};
   cholmod_factor* factor_ = nullptr;

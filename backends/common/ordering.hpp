@@ -31,10 +31,10 @@ class KeptOrder {
     permutation_.assign(permutation, permutation + order);
     flops_ = flops;
   }
-  /// Whether it may serve; where it may not, it is forgotten: what comes must not depend on it.
-  bool fits(const itr_pattern& pattern, const itr_hints& hints) {
+  /// Whether there is one that may serve this analysis. Where none may, it is forgotten: what comes must not depend on it.
+  bool recall(const itr_pattern& pattern, const itr_hints& hints) {
     if (hints.may_keep_order == 0) permutation_.clear();
-    return !permutation_.empty() && permutation_.size() == static_cast<std::size_t>(pattern.order);
+    return permutation_.size() == static_cast<std::size_t>(pattern.order);
   }
   int* permutation() { return permutation_.data(); }
   /// Whether a factorisation in this order is still worth what it costs.

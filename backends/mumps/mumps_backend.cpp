@@ -119,7 +119,7 @@ class Mumps {
     mumps_.irn = rows_.data();
     mumps_.jcn = columns_.data();
     icntl(mumps_, 14) = kMemoryMargin;
-    if (order_.fits(pattern, hints)) {
+    if (order_.recall(pattern, hints)) {
       mumps_.perm_in = order_.permutation();
       const int outcome = analyze_by(kGiven);
       if (outcome != ITR_OK || order_.is_good(foreseen_flops())) return outcome;
@@ -181,7 +181,7 @@ class Mumps {
   static constexpr int kScotch = kAmf;
 #endif
   /// Flops of AMF's factorisation an unknown, from which the sixth to third of them that Scotch saves pays for its 5
-  /// microseconds an unknown in the factorisations that its order lasts, ten and more (verification/solvers).
+  /// microseconds an unknown in the few factorisations that its order lasts (verification/solvers).
   static constexpr double kScotchFromFlops = 1.5e5;
   static constexpr int kMemoryMargin = 30, kMostMemoryMargin = 1000;  ///< of the estimate [%]
 

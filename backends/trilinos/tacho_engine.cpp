@@ -65,7 +65,7 @@ class TachoEngine {
   }
 
   int solve(const double* rhs, double* solution, int columns) {
-    if (!objects_) throw std::runtime_error("memory was out in the solve before");
+    if (!objects_) throw std::runtime_error("memory was out before");
     const auto length = static_cast<size_t>(full_.order) * columns;
     Driver::value_type_matrix b("b", full_.order, columns), x("x", full_.order, columns), scratch("t", full_.order, columns);
     std::copy_n(rhs, length, b.data());

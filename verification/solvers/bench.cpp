@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // What one solver costs on one dumped system (itr run --dump-systems):
-//   [mpirun -n N] itr_solver_bench SYSTEM SOLVER [--analyze | --once] [KEY=VALUE]...
+//   [mpirun -n N] itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [KEY=VALUE]...
 // Prints one line of JSON: seconds of the analysis, of a factorisation and a solve (medians), of both through the engine
 // alone where it is a module, what checks, residuals and refinement add to that (the median of the ratios of runs that
 // follow each other, less one), fill, bytes, achieved residual. --once: one factorisation and no bare engine. --analyze: the
-// analysis alone, and the fill, bytes and flops that it foresees.
+// analysis alone, and the fill, bytes and flops that it foresees. --after: the analysis may keep the order of that of
+// another system, which comes first.
 #include <dlfcn.h>
 #include <fmt/format.h>
 
@@ -69,7 +70,7 @@ Times median(const std::vector<Times>& times) {
 }
 
 void bench(Registry& registry, const DumpedSystem& system, const std::string& name, const SolverOptions& options,
-           Repeats repeats) {
+           Repeats repeats, const std::string& after) {
   std::vector<double> x(system.rhs.size());
   const auto solver = registry.create(name, options);
   Outcome outcome = Outcome::ok;
@@ -83,8 +84,14 @@ void bench(Registry& registry, const DumpedSystem& system, const std::string& na
                      residual = report.relative_residual;
                    });
   };
+  AnalyzeHints hints = system.hints();
+  if (!after.empty()) {
+    const DumpedSystem other = read_system(after);
+    keep_worst(solver->analyze(other.pattern, other.hints()));
+    hints.may_keep_order = true;
+  }
   const double start = seconds_now();
-  keep_worst(solver->analyze(system.pattern, system.hints()));
+  keep_worst(solver->analyze(system.pattern, hints));
   const double analyze = seconds_now() - start;
   std::vector<Times> checked, bare;
   std::vector<double> overheads;  // of checks, copies, residuals and refinement, over the engine alone just before
@@ -118,16 +125,21 @@ void bench(Registry& registry, const DumpedSystem& system, const std::string& na
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    fmt::print(stderr, "usage: itr_solver_bench SYSTEM SOLVER [--analyze | --once] [KEY=VALUE]...\n");
+    fmt::print(stderr, "usage: itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [KEY=VALUE]...\n");
     return 2;
   }
   try {
     SolverOptions options;
     Repeats repeats = Repeats::some;
+    std::string after;
     for (int i = 3; i < argc; ++i) {
       const std::string text = argv[i];
       if (text == "--analyze" || text == "--once") {
         repeats = text == "--once" ? Repeats::once : Repeats::none;
+        continue;
+      }
+      if (text == "--after" && i + 1 < argc) {
+        after = argv[++i];
         continue;
       }
       const auto equals = text.find('=');
@@ -139,7 +151,7 @@ int main(int argc, char** argv) {
     const std::string solver = Registry::canonical_name(argv[2]);
     if (cli::this_launch().rank > 0) return cli::serve(registry, solver);
     const cli::RankSession session(registry, solver);
-    bench(registry, read_system(argv[1]), solver, options, repeats);
+    bench(registry, read_system(argv[1]), solver, options, repeats, after);
     return 0;
   } catch (const InputError& error) {
     fmt::print(stderr, "itr_solver_bench: {}\n", error.what());

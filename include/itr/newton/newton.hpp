@@ -62,7 +62,7 @@ class SparseSystem final : public NewtonSystem {
   linear::Solver& solver_;
   SparseAssembler assembler_;
   bool pattern_changed_ = true;
-  bool may_keep_order_ = false;  ///< from one change of the contacts to the next, not over resets: a run goes on from there
+  bool may_keep_order_ = false;  ///< not over resets: a resumed run begins with one
   int dim_ = 1;
   std::vector<int> dofs_;            ///< of each unknown
   std::vector<double> coordinates_;  ///< of each unknown's node when the pattern changed, dim each [m]
