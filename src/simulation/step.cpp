@@ -11,8 +11,7 @@
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/validate.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/simulation/history_transfer.hpp"
+#include "itr/simulation/remesh_step.hpp"
 
 namespace itr {
 
@@ -31,101 +30,6 @@ void add_seconds(const NewtonSummary& summary, StepSeconds& seconds) {
   seconds.linear_solve += summary.linear_seconds;
   seconds.line_search += summary.line_search_seconds;
   seconds.ccd += summary.ccd_seconds;
-}
-
-/// The bodies' part of a field over bodies and obstacles.
-VectorX head_of(const VectorX& field, int dofs) { return field.head(dofs); }
-
-std::vector<Vec<2>> as_points(const VectorX& field, int first) {
-  std::vector<Vec<2>> points;
-  for (Eigen::Index i = 2 * first; i < field.size(); i += 2) points.emplace_back(field.segment<2>(i));
-  return points;
-}
-
-StepContext<2> make_context(const Setup<2>& setup, const State<2>& state, const StepProblem<2>& problem, const VectorX& x,
-                            double t, double shortest_edge) {
-  const TimeIntegrator integrator(setup.time);
-  StepContext<2> context;
-  context.materials = setup.materials;
-  context.loads = loads_at(setup, t);
-  context.has_inertia = !setup.time.quasistatic && !setup.time.is_static;
-  context.mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
-  context.scaling = problem.scaling();
-  context.contact = setup.contact;
-  if (!setup.time.is_static) context.damping = setup.damping;
-  context.velocity_rate = integrator.velocity_rate(state.history);
-  for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
-  context.newton = setup.newton;
-  context.shortest_edge = shortest_edge;
-  const int bodies = state.mesh.vertex_slots();
-  auto& obstacles = context.obstacles;
-  obstacles.rest = setup.obstacles.rest;
-  obstacles.edges = setup.obstacles.edges;
-  obstacles.x = as_points(x, bodies);
-  obstacles.velocity_reference = as_points(integrator.velocity_reference(state.history), bodies);
-  for (const auto& past : state.history.x) obstacles.past_x.push_back(as_points(past, bodies));
-  if (setup.contact.enabled) {
-    obstacles.area.assign(problem.surface().area.begin() + bodies, problem.surface().area.end());
-    obstacles.degree.assign(problem.surface().degree.begin() + bodies, problem.surface().degree.end());
-  }
-  return context;
-}
-
-RemeshFields<2> make_fields(const Setup<2>& setup, const State<2>& state, const VectorX& x) {
-  const int dofs = 2 * state.mesh.vertex_slots();
-  const TimeIntegrator integrator(setup.time);
-  RemeshFields<2> fields;
-  fields.x = head_of(x, dofs);
-  if (!setup.time.quasistatic && !setup.time.is_static)
-    fields.predictor = head_of(integrator.predictor(state.history), dofs);
-  if (setup.contact.enabled || !setup.damping.empty())
-    fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
-  for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
-  for (const auto& past : state.history.v) fields.past_rates.push_back(head_of(past, dofs));
-  for (const auto& past : state.history.a) fields.past_rates.push_back(head_of(past, dofs));
-  return fields;
-}
-
-/// Remeshes state.mesh and carries state.history and x over to the new mesh.
-RemeshReport remesh_and_project(const Setup<2>& setup, double shortest_edge, const StepProblem<2>& problem, double t,
-                                State<2>& state, VectorX& x, StepSeconds& seconds, linear::Solver& solver,
-                                const Logger& logger) {
-  const StepContext<2> context = make_context(setup, state, problem, x, t, shortest_edge);
-  RemeshFields<2> fields = make_fields(setup, state, x);
-  const Mesh<2> before = state.mesh;
-  RemeshReport report;
-  {
-    const ScopedTimer timer(seconds.remesh);
-    report = remesh(state.mesh, fields, context, setup.remesh);
-  }
-  if (!report.changed()) return report;
-  const ScopedTimer timer(seconds.projection);
-  TouchedCells touched;
-  for (int c = 0; c < before.cell_slots(); ++c)
-    if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
-  const int first_new = before.cell_slots();
-  const auto renumbering = state.mesh.compact();
-  for (int c = first_new; c < static_cast<int>(renumbering.cell.size()); ++c)
-    if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
-  const auto obstacle_dofs = 2 * static_cast<Eigen::Index>(setup.obstacles.rest.size());
-  const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
-    VectorX field(2 * state.mesh.vertex_slots() + obstacle_dofs);
-    for (std::size_t v = 0; v < renumbering.vertex.size(); ++v)
-      if (renumbering.vertex[v] != kNone)
-        field.segment<2>(2 * renumbering.vertex[v]) = slots.segment<2>(2 * static_cast<int>(v));
-    field.tail(obstacle_dofs) = with_obstacles.tail(obstacle_dofs);
-    return field;
-  };
-  const History old_history = state.history;
-  x = carried(fields.x, x);
-  for (std::size_t i = 0; i < state.history.x.size(); ++i)
-    state.history.x[i] = carried(fields.past_positions[i], old_history.x[i]);
-  std::size_t next = 0;
-  for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
-  for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
-  if (report.coarsened())  // refinement alone: interpolation is exact
-    transfer_history(setup, before, old_history, state.mesh, touched, problem.scaling(), solver, logger, state.history);
-  return report;
 }
 
 /// Whether a step of the trapezoidal rule, solved to x, stays within TimeOptions::energy_growth_limit. Books what it

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+#include "itr/simulation/remesh_step.hpp"
+
+#include "itr/core/timer.hpp"
+#include "itr/remesh/remesher.hpp"
+#include "itr/simulation/history_transfer.hpp"
+#include "itr/time/integrator.hpp"
+
+namespace itr {
+
+namespace {
+
+/// The bodies' part of a field over bodies and obstacles.
+VectorX head_of(const VectorX& field, int dofs) { return field.head(dofs); }
+
+template <int Dim>
+std::vector<Vec<Dim>> as_points(const VectorX& field, int first) {
+  std::vector<Vec<Dim>> points;
+  for (Eigen::Index i = Dim * first; i < field.size(); i += Dim) points.emplace_back(field.segment<Dim>(i));
+  return points;
+}
+
+template <int Dim>
+StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, const StepProblem<Dim>& problem,
+                              const VectorX& x, double t, double shortest_edge) {
+  const TimeIntegrator integrator(setup.time);
+  StepContext<Dim> context;
+  context.materials = setup.materials;
+  context.loads = loads_at(setup, t);
+  context.has_inertia = !setup.time.quasistatic && !setup.time.is_static;
+  context.mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
+  context.scaling = problem.scaling();
+  context.contact = setup.contact;
+  if (!setup.time.is_static) context.damping = setup.damping;
+  context.velocity_rate = integrator.velocity_rate(state.history);
+  for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
+  context.newton = setup.newton;
+  context.shortest_edge = shortest_edge;
+  const int bodies = state.mesh.vertex_slots();
+  auto& obstacles = context.obstacles;
+  obstacles.rest = setup.obstacles.rest;
+  obstacles.edges = setup.obstacles.edges;
+  obstacles.x = as_points<Dim>(x, bodies);
+  obstacles.velocity_reference = as_points<Dim>(integrator.velocity_reference(state.history), bodies);
+  for (const auto& past : state.history.x) obstacles.past_x.push_back(as_points<Dim>(past, bodies));
+  if (setup.contact.enabled) {
+    obstacles.area.assign(problem.surface().area.begin() + bodies, problem.surface().area.end());
+    obstacles.degree.assign(problem.surface().degree.begin() + bodies, problem.surface().degree.end());
+  }
+  return context;
+}
+
+template <int Dim>
+RemeshFields<Dim> make_fields(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
+  const int dofs = Dim * state.mesh.vertex_slots();
+  const TimeIntegrator integrator(setup.time);
+  RemeshFields<Dim> fields;
+  fields.x = head_of(x, dofs);
+  if (!setup.time.quasistatic && !setup.time.is_static)
+    fields.predictor = head_of(integrator.predictor(state.history), dofs);
+  if (setup.contact.enabled || !setup.damping.empty())
+    fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
+  for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
+  for (const auto& past : state.history.v) fields.past_rates.push_back(head_of(past, dofs));
+  for (const auto& past : state.history.a) fields.past_rates.push_back(head_of(past, dofs));
+  return fields;
+}
+
+}  // namespace
+
+template <int Dim>
+RemeshReport remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const StepProblem<Dim>& problem, double t,
+                                State<Dim>& state, VectorX& x, StepSeconds& seconds, linear::Solver& solver,
+                                const Logger& logger) {
+  const StepContext<Dim> context = make_context(setup, state, problem, x, t, shortest_edge);
+  RemeshFields<Dim> fields = make_fields(setup, state, x);
+  const Mesh<Dim> before = state.mesh;
+  RemeshReport report;
+  {
+    const ScopedTimer timer(seconds.remesh);
+    report = remesh(state.mesh, fields, context, setup.remesh);
+  }
+  if (!report.changed()) return report;
+  const ScopedTimer timer(seconds.projection);
+  TouchedCells touched;
+  for (int c = 0; c < before.cell_slots(); ++c)
+    if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
+  const int first_new = before.cell_slots();
+  const auto renumbering = state.mesh.compact();
+  for (int c = first_new; c < static_cast<int>(renumbering.cell.size()); ++c)
+    if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
+  const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
+  const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
+    VectorX field(Dim * state.mesh.vertex_slots() + obstacle_dofs);
+    for (std::size_t v = 0; v < renumbering.vertex.size(); ++v)
+      if (renumbering.vertex[v] != kNone)
+        field.segment<Dim>(Dim * renumbering.vertex[v]) = slots.segment<Dim>(Dim * static_cast<int>(v));
+    field.tail(obstacle_dofs) = with_obstacles.tail(obstacle_dofs);
+    return field;
+  };
+  const History old_history = state.history;
+  x = carried(fields.x, x);
+  for (std::size_t i = 0; i < state.history.x.size(); ++i)
+    state.history.x[i] = carried(fields.past_positions[i], old_history.x[i]);
+  std::size_t next = 0;
+  for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
+  for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
+  if (report.coarsened())  // refinement alone: interpolation is exact
+    transfer_history(setup, before, old_history, state.mesh, touched, problem.scaling(), solver, logger, state.history);
+  return report;
+}
+
+template RemeshReport remesh_and_project<2>(const Setup<2>&, double, const StepProblem<2>&, double, State<2>&, VectorX&,
+                                            StepSeconds&, linear::Solver&, const Logger&);
+
+}  // namespace itr
