@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../common/blas.hpp"
+#include "../common/openmp.hpp"
 #include "../common/ordering.hpp"
 #include "itr/linear/module_adapter.hpp"
 
@@ -79,6 +80,7 @@ class Cholmod {
 
   int factorize(const double* values, size_t count) {
     std::copy(values, values + count, values_.begin());
+    const itr::backends::OneOpenMpThread one_thread;
     cholmod_factorize(&matrix_, factor_, &common_);
     if (common_.status == CHOLMOD_NOT_POSDEF || (factor_ && factor_->minor < factor_->n)) {
       common_.status = CHOLMOD_OK;

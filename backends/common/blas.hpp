@@ -3,31 +3,25 @@
 // our own threads do not compete with BLAS's.
 #pragma once
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <string_view>
+
+#include "loaded.hpp"
 
 namespace itr::backends {
 
 /// Pins OpenBLAS to one thread; returns what BLAS this is. Call it once, when the module is loaded.
 inline const char* pin_blas() {
   static char text[96] = "reference BLAS (install libopenblas-dev: it is much faster)";
-  // The module is loaded locally, so its BLAS is searched among its own dependencies.
-  Dl_info info{};
-  if (!dladdr(reinterpret_cast<void*>(&pin_blas), &info) || !info.dli_fname) return text;
-  void* self = dlopen(info.dli_fname, RTLD_NOW | RTLD_NOLOAD);
-  if (!self) return text;
-  if (auto* set_threads = reinterpret_cast<void (*)(int)>(dlsym(self, "openblas_set_num_threads"))) {
+  if (auto* set_threads = find_loaded<void(int)>("openblas_set_num_threads")) {
     set_threads(1);
     // "OpenBLAS 0.3.21 NO_LAPACKE ...": the name and the version.
-    const auto config = reinterpret_cast<char* (*)()>(dlsym(self, "openblas_get_config"));
+    const auto config = find_loaded<char*()>("openblas_get_config");
     const std::string_view words = config ? config() : "OpenBLAS";
     const auto end = words.find(' ', words.find(' ') + 1);
     std::snprintf(text, sizeof text, "%.*s", static_cast<int>(std::min(end, words.size())), words.data());
   }
-  dlclose(self);
   return text;
 }
 

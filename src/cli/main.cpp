@@ -46,6 +46,7 @@ int list_solvers() {
     fmt::print("{:22} {}; {}; {}; {}\n", row.name, row.library_version, abilities, row.license,
                self_test(registry, row.name));
     if (!row.options.empty()) fmt::print("{:22}   options: {}\n", "", row.options);
+    if (!row.advice.empty()) fmt::print("{:22}   warning: {}\n", "", row.advice);
   }
   return cli::done;
 }

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <sstream>
 
+#include "blas_kernels.hpp"
 #include "itr/linear/engine.hpp"
 
 namespace itr::linear {
@@ -97,7 +98,10 @@ std::vector<std::filesystem::path> module_folders() {
 }
 
 std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
-  void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  void* handle = [&] {
+    const FittingBlasKernels choice;
+    return dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  }();
   if (!handle) {
     const char* why = dlerror();
     return broken(file, std::string("does not load: ") + (why ? why : "unknown reason"));
@@ -108,19 +112,22 @@ std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
   if (!module || module->abi_version != ITR_BACKEND_ABI_VERSION)
     return broken(file, "has ABI version " + std::to_string(module ? module->abi_version : 0) + ", this library " +
                             std::to_string(ITR_BACKEND_ABI_VERSION) + ": rebuild it");
+  const std::string kernels = blas_kernels(handle);
   std::vector<ModuleRow> rows;
   for (int i = 0; i < module->num_engines; ++i) {
     const itr_engine& engine = module->engines[i];
     const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
                                     (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0,
                                     (engine.capabilities & ITR_KEEPS_ORDER) != 0};
-    rows.push_back({{engine.name, engine.library_version, engine.license, engine.options, capabilities, true, ""},
-                    [&engine](const SolverOptions& options) -> std::unique_ptr<Engine> {
-                      auto instance = std::make_unique<ModuleEngine>(engine);
-                      apply_options(*instance, engine.name, engine.options, options);
-                      return instance;
-                    },
-                    &engine});
+    const std::string version = engine.library_version + (kernels.empty() ? "" : " for " + kernels);
+    rows.push_back(
+        {{engine.name, version, engine.license, engine.options, capabilities, true, "", advice_on_blas_kernels(kernels)},
+         [&engine](const SolverOptions& options) -> std::unique_ptr<Engine> {
+           auto instance = std::make_unique<ModuleEngine>(engine);
+           apply_options(*instance, engine.name, engine.options, options);
+           return instance;
+         },
+         &engine});
   }
   return rows;
 }

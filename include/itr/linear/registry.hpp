@@ -15,12 +15,13 @@ namespace itr::linear {
 
 struct BackendInfo {
   std::string name;             ///< "cholmod:supernodal"
-  std::string library_version;  ///< "CHOLMOD 3.0.14, OpenBLAS 0.3.21"
+  std::string library_version;  ///< "CHOLMOD 3.0.14, OpenBLAS 0.3.21 for SkylakeX": what its kernels are made for
   std::string license;
   std::string options;  ///< that create() takes: "ordering=amd|metis tolerance=NUMBER"
   Capabilities capabilities;
   bool available = false;
-  std::string reason;  ///< where absent: why, and the package to install
+  std::string reason;    ///< where absent: why, and the package to install
+  std::string advice{};  ///< where it is slower than it need be: what to do about that
 };
 
 /// Throws InputError for options that the solver does not have (see apply_options).

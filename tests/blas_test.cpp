@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// What libraries behind the solvers do by themselves: threads that nobody asked for, kernels for another CPU.
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+
+#include "linear/blas_kernels.hpp"
+#include "linear_systems.hpp"
+
+namespace itr::linear {
+namespace {
+
+constexpr const char* kVariable = "OPENBLAS_CORETYPE";
+
+std::ptrdiff_t count_threads() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/task"), std::filesystem::directory_iterator());
+}
+
+/// Debian's CHOLMOD started four threads for each factorisation, which were then there to stay.
+TEST(Threads, NoSolverStartsItsOwn) {
+  Registry registry = full_registry();
+  const System cube = laplacian(16);
+  std::vector<double> x(cube.pattern.order), b(x.size(), 1);
+  for (const auto& info : registry.list()) {
+    if (!info.available || info.name == "dense") continue;
+    const auto solver = registry.create(info.name);
+    self_test_residual(*solver);  // starts MPI and what it keeps running
+    const auto before = count_threads();
+    ASSERT_EQ(solver->analyze(cube.pattern, {}), Outcome::ok) << info.name;
+    ASSERT_EQ(solver->factorize(cube.values), Outcome::ok) << info.name;
+    EXPECT_EQ(solver->solve(b, x, 1, 1e-8).outcome, Outcome::ok) << info.name;
+    EXPECT_EQ(count_threads(), before) << info.name;
+  }
+}
+
+std::string solvers_as_listed(const std::string& environment) {
+  const std::string command = environment + " " + ITR_BINARY_DIR + "/bin/itr solvers";
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"), pclose);
+  std::string text;
+  std::array<char, 512> part{};
+  while (pipe && std::fgets(part.data(), part.size(), pipe.get())) text += part.data();
+  return text;
+}
+
+/// On machines with AVX2 and OpenBLAS; others have nothing to choose.
+class KernelsTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fitting_blas_kernels()) GTEST_SKIP() << "no AVX2";
+    if (std::getenv(kVariable)) GTEST_SKIP() << kVariable << " is set";
+    if (Registry().find("cholmod").library_version.find("OpenBLAS") == std::string::npos) GTEST_SKIP() << "no OpenBLAS";
+  }
+};
+
+TEST_F(KernelsTest, FitTheCpuWhateverItsModel) {
+  const BackendInfo info = Registry().find("cholmod");
+  EXPECT_NE(info.library_version.find(std::string("for ") + fitting_blas_kernels()), std::string::npos)
+      << info.library_version;
+  EXPECT_EQ(info.advice, "");
+  EXPECT_EQ(std::getenv(kVariable), nullptr) << "the environment was not put back";
+}
+
+TEST_F(KernelsTest, AreTheUsersWhereHeSaysWhich) {
+  const std::string text = solvers_as_listed(std::string(kVariable) + "=Prescott");
+  EXPECT_NE(text.find("for Prescott"), std::string::npos) << text;
+  EXPECT_NE(text.find(std::string("unset ") + kVariable), std::string::npos) << text;
+  EXPECT_EQ(solvers_as_listed("").find("Prescott"), std::string::npos);
+}
+
+TEST(Kernels, OfOldCpusComeWithAdvice) {
+  EXPECT_EQ(advice_on_blas_kernels(""), "");
+  EXPECT_EQ(advice_on_blas_kernels("SkylakeX"), "");
+  EXPECT_EQ(advice_on_blas_kernels("Haswell"), "");
+  EXPECT_EQ(advice_on_blas_kernels("Prescott").empty(), fitting_blas_kernels() == nullptr);
+}
+
+}  // namespace
+}  // namespace itr::linear
