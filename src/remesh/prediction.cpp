@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The hat function of the new vertex m is twice the shape function of a on the child that keeps b, and twice that of b on
 // the child that keeps a; each child has half the volume, and the deformation gradient of the parent.
-#include "itr/remesh/prediction.hpp"
+#include "prediction.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -13,8 +13,6 @@
 namespace itr {
 
 namespace {
-constexpr double kPatchOverVertex = 4;  ///< what a patch gains over its new vertex, times 1 / (1 - 2 nu)
-
 /// d2W/dF2 applied to motions of one vertex: the matrix of v -> v . d2W : (v x gradient).
 class DirectionalStiffness {
  public:
@@ -63,7 +61,7 @@ SplitPrediction predict_split(const Mesh<2>& mesh, const RemeshFields<2>& fields
     const Material& material = context.materials.at(mesh.body(c));
     const Vec<2> barycenter = (mesh.rest(cell[0]) + mesh.rest(cell[1]) + mesh.rest(cell[2])) / 3;
     const ElasticModuli moduli = elastic_moduli<2>(material, barycenter);
-    factor = std::max(factor, kPatchOverVertex / (1 - 2 * material.poisson_ratio));
+    factor = std::max(factor, patch_over_vertex(material.poisson_ratio));
     const CellSet<2>::Element element{cell, mesh.body(c), V, mesh.inverse_rest_edges(c)};
     const Mat<2> F = deformation_gradient<2>(element, fields.x), P = elastic_stress<2>(F, moduli);
     const DirectionalStiffness stiffness(F, moduli);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/remesh/ranking.hpp"
+#include "ranking.hpp"
 
 #include <algorithm>
 
@@ -66,12 +66,17 @@ std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFie
   }
   for (int v = 0; v < bodies; ++v)
     if (surface.counts[v]) surface.vertices.push_back(v);
-  for (int o = 0; o < total - bodies; ++o) {
-    surface.area[bodies + o] = obstacles.area[o];
-    surface.degree[bodies + o] = obstacles.degree[o];
-    surface.vertices.push_back(bodies + o);
+  for (const auto& [a, b] : obstacles.edges) {
+    add_edge(bodies + a, bodies + b);
+    for (const int o : {a, b}) {
+      surface.area[bodies + o] += (obstacles.rest[b] - obstacles.rest[a]).norm() / 2;
+      ++surface.degree[bodies + o];
+    }
   }
-  for (const auto& [a, b] : obstacles.edges) add_edge(bodies + a, bodies + b);
+  for (int v = bodies; v < total; ++v) {
+    if (surface.degree[v] == 0) surface.area[v] = 1;
+    surface.vertices.push_back(v);
+  }
   std::sort(surface.edges.begin(), surface.edges.end());
   VectorX x(2 * total);
   x.head(2 * bodies) = fields.x;

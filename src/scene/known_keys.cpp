@@ -157,7 +157,7 @@ constexpr Group kGroups[] = {
     {"/space/remesh/swap", Role::read, "enabled:boolean acceptance_tolerance:number max_depth:natural"},
     {"/space/remesh/smooth", Role::read, "enabled:boolean acceptance_tolerance:number max_iters:count"},
     {"/space/remesh/local_relaxation", Role::read,
-     "local_mesh_n_ring:natural local_mesh_rel_area:non_negative max_nl_iterations:count"},
+     "local_mesh_n_ring:natural local_mesh_max_cells:count local_mesh_rel_area:non_negative max_nl_iterations:count"},
 };
 
 struct Entry {

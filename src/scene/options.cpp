@@ -233,7 +233,7 @@ RemeshOptions read_remesh(const Node& root) {
   options.enabled = node["enabled"].boolean(false);
   options.sizing_field = node["type"].choice({"physics", "sizing_field"}, 0) == 1;
   options.screening = static_cast<Screening>(
-      node["screening"].choice({"energy-percentile", "predicted-decrease", "none"}, static_cast<int>(options.screening)));
+      node["screening"].choice({"energy-percentile", "bounds", "none"}, static_cast<int>(options.screening)));
   options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));
   options.sweeps = node["sweeps"].integer_at_least(1, 1);
 
@@ -256,6 +256,7 @@ RemeshOptions read_remesh(const Node& root) {
 
   const Node local = node["local_relaxation"];
   options.local.rings = local["local_mesh_n_ring"].integer_at_least(0, options.local.rings);
+  options.local.max_cells = local["local_mesh_max_cells"].integer_at_least(1, options.local.max_cells);
   options.local.relative_volume = read_share(local["local_mesh_rel_area"], options.local.relative_volume);
   options.local.max_iterations = local["max_nl_iterations"].integer_at_least(1, options.local.max_iterations);
   options.local.max_contact_iterations = std::max(options.local.max_contact_iterations, options.local.max_iterations);

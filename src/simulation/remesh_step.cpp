@@ -40,13 +40,10 @@ StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, 
   auto& obstacles = context.obstacles;
   obstacles.rest = setup.obstacles.rest;
   obstacles.edges = setup.obstacles.edges;
+  obstacles.triangles = setup.obstacles.triangles;
   obstacles.x = as_points<Dim>(x, bodies);
   obstacles.velocity_reference = as_points<Dim>(integrator.velocity_reference(state.history), bodies);
   for (const auto& past : state.history.x) obstacles.past_x.push_back(as_points<Dim>(past, bodies));
-  if (setup.contact.enabled) {
-    obstacles.area.assign(problem.surface().area.begin() + bodies, problem.surface().area.end());
-    obstacles.degree.assign(problem.surface().degree.begin() + bodies, problem.surface().degree.end());
-  }
   return context;
 }
 
@@ -78,7 +75,7 @@ RemeshReport remesh_and_project(const Setup<Dim>& setup, double shortest_edge, c
   RemeshReport report;
   {
     const ScopedTimer timer(seconds.remesh);
-    report = remesh(state.mesh, fields, context, setup.remesh);
+    report = remesh(state.mesh, fields, context, setup.remesh, state.remesh_memory);
   }
   if (!report.changed()) return report;
   const ScopedTimer timer(seconds.projection);
@@ -87,6 +84,7 @@ RemeshReport remesh_and_project(const Setup<Dim>& setup, double shortest_edge, c
     if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
   const int first_new = before.cell_slots();
   const auto renumbering = state.mesh.compact();
+  state.remesh_memory.renumber(renumbering.vertex);
   for (int c = first_new; c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
   const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());

@@ -5,12 +5,7 @@
 #include <map>
 #include <vector>
 
-#include "itr/energy/contact/friction.hpp"
-#include "itr/energy/contact/options.hpp"
-#include "itr/energy/damping.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/material.hpp"
+#include "itr/energy/incremental_potential.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/newton/options.hpp"
 #include "itr/remesh/options.hpp"
@@ -44,17 +39,9 @@ struct RemeshFields {
   void follow(const Edit<Dim>& edit, VertexId created);
 };
 
-/// The energy of the step, as every local problem needs it.
+/// The terms of the step, as every local problem needs them, and what else the remesher asks of a scene.
 template <int Dim>
-struct StepContext {
-  std::map<int, Material> materials;
-  Loads<Dim> loads;
-  bool has_inertia = true;
-  MassKind mass = MassKind::consistent;
-  double scaling = 1;  ///< alpha h^2 [s^2]
-  ContactOptions contact;
-  std::vector<DampingOptions> damping;
-  double velocity_rate = 1;                              ///< [1/s]
+struct StepContext : PotentialTerms<Dim> {
   std::map<int, std::array<bool, Dim>> held_components;  ///< by facet tag
   NewtonOptions newton;
   double shortest_edge = 0;  ///< of the initial mesh [m]
@@ -64,9 +51,8 @@ struct StepContext {
     std::vector<Vec<Dim>> x;                    ///< now [m]
     std::vector<Vec<Dim>> velocity_reference;   ///< [m]
     std::vector<std::vector<Vec<Dim>>> past_x;  ///< one a past position
-    std::vector<std::array<int, 2>> edges;
-    std::vector<double> area;  ///< by vertex, as in CollisionSurface
-    std::vector<int> degree;
+    std::vector<std::array<int, 2>> edges;      ///< as in Obstacles
+    std::vector<std::array<int, 3>> triangles;  ///< 3D only
   } obstacles;
 };
 

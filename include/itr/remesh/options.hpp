@@ -4,11 +4,11 @@
 
 namespace itr {
 
-/// Which edges are tried; collapses only where the paper's culling puts an edge at the bottom, unless `none`.
+/// Which edges are tried, and how an operation is decided.
 enum class Screening {
-  energy_percentile,   ///< the paper's culling: splits of edges at the top by energy
-  predicted_decrease,  ///< and of those whose new vertex alone is predicted to gain several times the tolerance
-  none                 ///< every edge, for splits and collapses
+  energy_percentile,  ///< the paper's culling: splits at the top by energy, collapses at the bottom; patches decide
+  bounds,             ///< every edge; what the new vertex alone gains decides, patches where it does not
+  none                ///< every edge; patches decide
 };
 
 /// What x-hat, x_t and v_t are on a changed mesh when an operation is judged.
@@ -48,7 +48,8 @@ struct SmoothOptions {
 
 struct LocalRelaxationOptions {
   int rings = 2;                   ///< rings of cells around the operation
-  double relative_volume = 0.01;   ///< least share of the total rest volume
+  int max_cells = 100;             ///< no further ring where there are so many
+  double relative_volume = 0;      ///< least share of the total rest volume (the paper's: 0.01)
   int max_iterations = 1;          ///< Newton iterations before the decision
   int max_contact_iterations = 4;  ///< the same where the patch touches contact
 };
@@ -61,7 +62,7 @@ struct RemeshOptions {
   SwapOptions swap;
   SmoothOptions smooth;
   LocalRelaxationOptions local;
-  Screening screening = Screening::predicted_decrease;
+  Screening screening = Screening::bounds;
   HistoryRule history = HistoryRule::function;
   int sweeps = 1;
 };

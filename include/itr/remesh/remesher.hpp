@@ -4,6 +4,7 @@
 #pragma once
 
 #include "itr/remesh/fields.hpp"
+#include "itr/remesh/memory.hpp"
 #include "itr/remesh/report.hpp"
 
 namespace itr {
@@ -11,6 +12,8 @@ namespace itr {
 /// Remeshes in place. The fields follow: x by local relaxation, all others interpolated at the vertices that edits set.
 /// On entry x is the solution on the mesh; on return it is feasible and no higher in energy than the operations' tolerances
 /// allow. Cells of ids below the entry's cell_slots() that are still alive were not touched.
-RemeshReport remesh(Mesh<2>& mesh, RemeshFields<2>& fields, const StepContext<2>& context, const RemeshOptions& options);
+/// `memory` has what was refused before, and is brought up to date.
+RemeshReport remesh(Mesh<2>& mesh, RemeshFields<2>& fields, const StepContext<2>& context, const RemeshOptions& options,
+                    RemeshMemory& memory);
 
 }  // namespace itr

@@ -6,9 +6,11 @@ namespace itr {
 
 struct OperationCount {
   int tried = 0, accepted = 0;
+  int relaxed = 0;  ///< of those tried: a patch was relaxed to decide; the others were decided by bounds
   OperationCount& operator+=(const OperationCount& other) {
     tried += other.tried;
     accepted += other.accepted;
+    relaxed += other.relaxed;
     return *this;
   }
 };
@@ -18,7 +20,8 @@ struct RemeshReport {
   double trial_seconds = 0;              ///< median over the trials; 0 where there were none
   int bound_by_activation_distance = 0;  ///< surface edges not split because they are shorter than 2 dhat
 
-  bool changed() const { return splits.accepted + collapses.accepted + swaps.accepted + smooths.accepted > 0; }
+  int accepted() const { return splits.accepted + collapses.accepted + swaps.accepted + smooths.accepted; }
+  bool changed() const { return accepted() > 0; }
   /// Whether the new space lacks functions of the old one, so that the history has to be projected.
   bool coarsened() const { return collapses.accepted + swaps.accepted + smooths.accepted > 0; }
 };

@@ -10,6 +10,7 @@
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/newton/newton.hpp"
+#include "itr/remesh/memory.hpp"
 #include "itr/simulation/frame.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/time/integrator.hpp"
@@ -26,6 +27,7 @@ struct State {
   int step = 0;
   double t = 0;                ///< [s]
   BarrierStiffness stiffness;  ///< where it is adaptive
+  RemeshMemory remesh_memory;  ///< what remeshing refused, and need not ask again
   double created_energy = 0;   ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 

@@ -5,14 +5,9 @@
 #include <unordered_map>
 
 #include "itr/remesh/fields.hpp"
+#include "queue.hpp"
 
 namespace itr {
-
-struct EdgeKeyHash {
-  std::size_t operator()(const EdgeKey& e) const {
-    return static_cast<std::size_t>(e[0]) * 0x9E3779B97F4A7C15ull ^ (static_cast<std::size_t>(e[1]) * 0xC2B2AE3D27D4EB4Full);
-  }
-};
 
 enum class Rank : char { bottom, middle, top };
 using EdgeRanks = std::unordered_map<EdgeKey, Rank, EdgeKeyHash>;

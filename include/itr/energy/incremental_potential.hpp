@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// The terms of the incremental potential (paper eq. 4), listed once for every scope: the whole mesh, a patch, one vertex.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "itr/energy/contact/contact.hpp"
+#include "itr/energy/contact/friction.hpp"
+#include "itr/energy/damping.hpp"
+#include "itr/energy/elastic/elastic.hpp"
+#include "itr/energy/inertia.hpp"
+#include "itr/energy/load.hpp"
+#include "itr/energy/material.hpp"
+#include "itr/energy/pressure.hpp"
+#include "itr/fem/vertex_map.hpp"
+
+namespace itr {
+
+/// What acts in a step, whatever cells it is summed over.
+template <int Dim>
+struct PotentialTerms {
+  std::map<int, Material> materials;  ///< by body
+  Loads<Dim> loads;                   ///< at the end of the step
+  bool has_inertia = true;
+  MassKind mass = MassKind::consistent;
+  double scaling = 1;  ///< alpha h^2 [s^2]
+  ContactOptions contact;
+  std::vector<DampingOptions> damping;  ///< empty in statics
+  double velocity_rate = 1;             ///< of VelocityRule [1/s]
+};
+
+/// Where the vertices of a scope come from: interleaved over its vertices, obstacles included.
+struct PotentialHistory {
+  VectorX predictor;           ///< x-hat [m]; needed with inertia
+  VectorX velocity_reference;  ///< positions of no velocity [m]; needed with friction or damping
+};
+
+template <int Dim>
+class IncrementalPotential {
+ public:
+  /// Terms of the scene on `cells`. What is referred to must outlive this.
+  IncrementalPotential(const PotentialTerms<Dim>& terms, const CellSet<Dim>& cells, PotentialHistory history);
+
+  /// Adds contact among the vertices of `surface`: those of the cells, or (with a `map` from theirs) of its own.
+  void add_contact(const CollisionSurface& surface, double stiffness, std::shared_ptr<const VertexMap<Dim>> map = nullptr);
+
+  /// Terms that depend on an earlier iterate; null or empty where the scene has none.
+  struct Lagged {
+    std::shared_ptr<const Energy> friction;
+    std::shared_ptr<PressureEnergy<Dim>> pressure;
+    std::vector<std::shared_ptr<const Energy>> damping;
+  };
+  /// Those lagged at x.
+  Lagged lag(const VectorX& x, Workspace& workspace) const;
+  std::shared_ptr<const Energy> lag_friction(const VectorX& x, Workspace& workspace) const;
+  bool has_friction() const;
+
+  /// Everything, with these lagged terms.
+  EnergySum sum(const Lagged& lagged) const;
+
+  /// Null where the scene has no such term.
+  const std::shared_ptr<InertiaEnergy<Dim>>& inertia() const { return inertia_; }
+  const std::shared_ptr<ElasticEnergy<Dim>>& elastic() const { return elastic_; }
+  const std::shared_ptr<LoadEnergy<Dim>>& loads() const { return loads_; }
+  const std::shared_ptr<ContactEnergy<Dim>>& contact() const { return contact_; }          ///< over the surface's vertices
+  const std::shared_ptr<const Energy>& contact_of_cells() const { return contact_of_cells_; }  ///< over the cells' vertices
+
+ private:
+  std::shared_ptr<const Energy> of_cells(std::shared_ptr<const Energy> term) const;
+  VectorX on_surface(const VectorX& x) const { return map_ ? map_->positions(x) : x; }
+  VelocityRule velocity() const { return {terms_.velocity_rate, history_.velocity_reference}; }
+  VelocityRule velocity_of_surface() const { return {terms_.velocity_rate, on_surface(history_.velocity_reference)}; }
+
+  const PotentialTerms<Dim>& terms_;
+  const CellSet<Dim>& cells_;
+  PotentialHistory history_;
+  std::shared_ptr<const VertexMap<Dim>> map_;
+  std::shared_ptr<InertiaEnergy<Dim>> inertia_;
+  std::shared_ptr<ElasticEnergy<Dim>> elastic_;
+  std::shared_ptr<LoadEnergy<Dim>> loads_;
+  std::shared_ptr<ContactEnergy<Dim>> contact_;
+  std::shared_ptr<const Energy> contact_of_cells_;
+};
+
+extern template class IncrementalPotential<2>;
+extern template class IncrementalPotential<3>;
+
+}  // namespace itr

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// What was refused before, in this step or an earlier one: most trials would only repeat it.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "itr/core/types.hpp"
+
+namespace itr {
+
+/// Refusals, each with what it depended on. Part of a simulation's state: which edges are asked again depends on it.
+struct RemeshMemory {
+  /// A signal is a number that stands for what a verdict depended on: as long as it stays in the range, so does the verdict.
+  struct Refusal {
+    double least_signal, most_signal;
+    bool in_contact;
+    bool holds(double signal, bool contact) const {
+      return contact == in_contact && signal >= least_signal && signal <= most_signal;
+    }
+  };
+  struct Entry {
+    EdgeKey edge;  ///< smaller vertex first; {vertex, kNone} of a vertex that was not moved
+    Refusal refusal;
+  };
+  enum Kind { split, collapse, swap, smooth };
+  static constexpr int kKinds = 4;
+  std::array<std::vector<Entry>, kKinds> refusals;  ///< by Kind; ascending by edge
+
+  /// With the vertex numbers of a compacted mesh; `number` has kNone for vertices that are gone.
+  void renumber(std::span<const VertexId> number);
+};
+
+}  // namespace itr

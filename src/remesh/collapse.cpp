@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <limits>
+
+#include "itr/remesh/edits.hpp"
+#include "session.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
+
+class Collapser {
+ public:
+  Collapser(RemeshSession<2>& session, const EdgeRanks& ranks)
+      : session_(session),
+        options_(session.options().collapse),
+        ranks_(ranks),
+        longest_(std::min(options_.abs_max_edge_length, options_.rel_max_edge_length * session.context().shortest_edge)) {}
+
+  void run() {
+    for (const EdgeKey& edge : session_.mesh().edges()) push(edge);
+    while (const auto edge = queue_.pop()) {
+      if (!may_be_collapsed(*edge)) continue;
+      const double signal = session_.roughness(*edge);
+      const bool in_contact = session_.is_in_contact(*edge);
+      if (session_.was_refused(RemeshMemory::collapse, *edge, signal, in_contact)) continue;
+      if (collapse(*edge) != Decision::by_bound) continue;
+      constexpr double kNever = std::numeric_limits<double>::infinity();  // a rougher field loses more
+      session_.remember(RemeshMemory::collapse, *edge,
+                        {signal / kSameSignal, in_contact ? signal * kSameSignal : kNever, in_contact});
+    }
+    session_.forget_depths();
+  }
+
+ private:
+  /// Shortest first.
+  void push(const EdgeKey& edge) {
+    if (is_candidate(edge)) queue_.push(edge, -session_.rest_length(edge));
+  }
+
+  bool is_candidate(const EdgeKey& edge) const {
+    if (session_.options().screening != Screening::energy_percentile) return true;
+    const auto it = ranks_.find(edge);
+    return (it != ranks_.end() && it->second == Rank::bottom) ||
+           session_.rest_length(edge) < kTinyEdge * session_.context().shortest_edge;
+  }
+
+  bool may_be_collapsed(const EdgeKey& edge) const {
+    if (!session_.exists(edge) || session_.rest_length(edge) > longest_ || session_.depth(edge) >= options_.max_depth)
+      return false;
+    const auto around = session_.mesh().cells_of_edge(edge);
+    return std::any_of(around.begin(), around.end(),
+                       [&](CellId c) { return session_.mesh().volume(c) <= longest_ * longest_ / 2; });
+  }
+
+  Decision collapse(const EdgeKey& edge) {
+    ++session_.report().collapses.tried;
+    const auto edit = make_collapse(session_.mesh(), edge);
+    if (!edit) return Decision::by_gate;
+    const int generation = session_.depth(edge) + 1;
+    const auto verdict = session_.attempt(*edit, edit->value->rest, options_.acceptance_tolerance);
+    session_.report().collapses.relaxed += verdict.was_relaxed;
+    if (!verdict.accepted()) return verdict.decision;
+    ++session_.report().collapses.accepted;
+    const VertexId kept = edit->value->vertex;
+    for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(kept))) {
+      if (near[0] == kept || near[1] == kept) session_.set_depth(near, generation);
+      push(near);
+    }
+    return Decision::accepted;
+  }
+
+  RemeshSession<2>& session_;
+  const CollapseOptions& options_;
+  const EdgeRanks& ranks_;
+  double longest_;
+  EdgeQueue queue_;
+};
+
+}  // namespace
+
+void collapse_edges(RemeshSession<2>& session, const EdgeRanks& ranks) { Collapser(session, ranks).run(); }
+
+}  // namespace itr

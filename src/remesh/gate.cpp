@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT
+#include "gate.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "itr/geometry/predicates.hpp"
+
+namespace itr {
+
+namespace {
+
+template <int Dim>
+int orientation_of(const std::array<Vec<Dim>, Dim + 1>& p) {
+  if constexpr (Dim == 2) return orientation(p[0], p[1], p[2]);
+  if constexpr (Dim == 3) return orientation(p[0], p[1], p[2], p[3]);
+}
+
+/// A simplex of the surface or of an obstacle, with ids that say which corners two of them share.
+template <int Dim>
+struct Piece {
+  std::array<Vec<Dim>, 3> p;
+  std::array<long, 3> id;
+  int size = 0;
+  void add(const Vec<Dim>& point, long number) {
+    p[size] = point;
+    id[size++] = number;
+  }
+  bool has(long number) const { return std::find(id.begin(), id.begin() + size, number) != id.begin() + size; }
+};
+
+bool meet(const Piece<2>& a, const Piece<2>& b) {
+  for (int k = 0; k < a.size; ++k)
+    if (b.has(a.id[k])) return false;
+  return a.size == 2 && b.size == 2 && segments_intersect(a.p[0], a.p[1], b.p[0], b.p[1]);
+}
+
+/// Whether an edge of `a` that shares no corner with the triangle `b` crosses it.
+bool crosses(const Piece<3>& a, const Piece<3>& b) {
+  if (b.size < 3 || a.size < 2) return false;
+  for (int k = 0; k < (a.size == 3 ? 3 : 1); ++k) {
+    const int l = (k + 1) % a.size;
+    if (!b.has(a.id[k]) && !b.has(a.id[l]) && segment_intersects_triangle(a.p[k], a.p[l], b.p[0], b.p[1], b.p[2])) return true;
+  }
+  return false;
+}
+bool meet(const Piece<3>& a, const Piece<3>& b) { return crosses(a, b) || crosses(b, a); }
+
+/// Whether a point lies in a closed simplex of whatever orientation, or flat.
+template <int Dim>
+bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex) {
+  bool positive = false, negative = false;
+  for (int k = 0; k <= Dim; ++k) {
+    auto corners = simplex;
+    corners[k] = point;
+    const int side = orientation_of<Dim>(corners);
+    positive = positive || side > 0;
+    negative = negative || side < 0;
+  }
+  return !(positive && negative);
+}
+
+}  // namespace
+
+template <int Dim>
+Gate<Dim>::Gate(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context)
+    : mesh_(mesh),
+      has_contact_(context.contact.enabled),
+      primitives_(ObstaclePrimitives::make<Dim>(context.obstacles)) {
+  configurations_.reserve(1 + fields.past_positions.size());
+  configurations_.push_back({&fields.x, {mesh, fields.x, primitives_, context.obstacles.x}});
+  for (std::size_t i = 0; i < fields.past_positions.size(); ++i)
+    configurations_.push_back(
+        {&fields.past_positions[i], {mesh, fields.past_positions[i], primitives_, context.obstacles.past_x[i]}});
+}
+
+template <int Dim>
+bool Gate<Dim>::passes(const Edit<Dim>& edit, typename SurfaceIndex<Dim>::Hits& hits) const {
+  for (const auto& configuration : configurations_)
+    if (!keeps_orientation(edit, *configuration.x)) return false;
+  if (!has_contact_ || edit.kind == Edit<Dim>::Kind::split || edit.inserted_facets.empty()) return true;
+  for (const auto& configuration : configurations_)
+    if (!stays_free(edit, configuration, hits)) return false;
+  return true;
+}
+
+template <int Dim>
+bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const {
+  const auto at = [&](VertexId v) {
+    return edit.value && v == edit.value->vertex ? RemeshFields<Dim>::interpolate(x, *edit.value)
+                                                 : Vec<Dim>(x.segment<Dim>(Dim * v));
+  };
+  return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
+    std::array<Vec<Dim>, Dim + 1> p;
+    for (int k = 0; k <= Dim; ++k) p[k] = at(cell.vertices[k]);
+    return orientation_of<Dim>(p) > 0;
+  });
+}
+
+template <int Dim>
+bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& configuration,
+                           typename SurfaceIndex<Dim>::Hits& hits) const {
+  const VectorX& x = *configuration.x;
+  const SurfaceIndex<Dim>& surface = configuration.surface;
+  const VertexId set = edit.value ? edit.value->vertex : kNone;
+  const Vec<Dim> target = edit.value ? RemeshFields<Dim>::interpolate(x, *edit.value) : Vec<Dim>(Vec<Dim>::Zero());
+  const auto after = [&](VertexId v) { return v == set ? target : surface.at(v); };
+  Box<Dim> box;
+  for (const auto& facet : edit.inserted_facets)
+    for (const VertexId v : facet.vertices) box.include(after(v));
+  for (const FacetId f : edit.removed_facets)
+    for (const VertexId v : mesh_.facet(f)) box.include(surface.at(v));
+  surface.query(box, hits);
+
+  // What moves on the way to the new surface: the vertex that is set and the one that goes, both to the target.
+  std::vector<std::array<Vec<Dim>, Dim + 1>> swept;
+  for (const FacetId f : edit.removed_facets) {
+    std::array<Vec<Dim>, Dim + 1> simplex;
+    int moving = 0;
+    for (int k = 0; k < Dim; ++k) {
+      const VertexId v = mesh_.facet(f)[k];
+      simplex[k] = surface.at(v);
+      moving += v == set || v == edit.removed_vertex;
+    }
+    simplex[Dim] = target;
+    if (moving > 0) swept.push_back(simplex);
+  }
+  const auto is_swept = [&](const Vec<Dim>& point) {
+    return std::any_of(swept.begin(), swept.end(), [&](const auto& simplex) { return lies_in<Dim>(point, simplex); });
+  };
+  const auto is_part = [&](VertexId v) {
+    if (v == set || v == edit.removed_vertex) return true;
+    return std::any_of(edit.inserted_facets.begin(), edit.inserted_facets.end(), [&](const auto& facet) {
+      return std::find(facet.vertices.begin(), facet.vertices.end(), v) != facet.vertices.end();
+    });
+  };
+
+  std::vector<Piece<Dim>> inserted;
+  for (const auto& facet : edit.inserted_facets) {
+    Piece<Dim>& piece = inserted.emplace_back();
+    for (const VertexId v : facet.vertices) piece.add(after(v), v);
+  }
+  const auto is_free_of = [&](const Piece<Dim>& other) {
+    return std::none_of(inserted.begin(), inserted.end(), [&](const Piece<Dim>& piece) { return meet(piece, other); });
+  };
+  for (const FacetId f : hits.facets) {
+    if (std::find(edit.removed_facets.begin(), edit.removed_facets.end(), f) != edit.removed_facets.end()) continue;
+    Piece<Dim> piece;
+    for (const VertexId v : mesh_.facet(f)) {
+      piece.add(after(v), v);
+      if (!is_part(v) && is_swept(after(v))) return false;
+    }
+    if (!is_free_of(piece)) return false;
+  }
+  for (const int i : hits.obstacles) {
+    Piece<Dim> piece;
+    for (const int v : primitives_.all[i].ids()) {
+      piece.add(surface.obstacle_at(v), -1L - v);
+      if (is_swept(surface.obstacle_at(v))) return false;
+    }
+    if (!is_free_of(piece)) return false;
+  }
+  return true;
+}
+
+template <int Dim>
+void Gate<Dim>::follow(const Edit<Dim>& edit, FacetId first_new) {
+  if (!has_contact_) return;
+  for (auto& configuration : configurations_) {
+    configuration.surface.follow(edit.removed_facets, first_new);
+    if (edit.value && edit.value->vertex != kNewVertex) configuration.surface.move(edit.value->vertex);
+  }
+}
+
+template class Gate<2>;
+template class Gate<3>;
+
+}  // namespace itr

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+// The step's energy on a patch of cells: the same terms as the whole mesh, all vertices outside held. Built for the mesh as
+// it is, or as an edit would make it. The patch may be a few rings, or just the cells of the edit: then what is free is
+// hardly more than the vertex that the edit sets.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "itr/energy/incremental_potential.hpp"
+#include "itr/newton/newton.hpp"
+#include "itr/remesh/fields.hpp"
+#include "marks.hpp"
+#include "surface_index.hpp"
+
+namespace itr {
+
+/// What local problems are made of. Nothing of it changes while one lives, so several may be looked at at once.
+template <int Dim>
+struct RemeshState {
+  const Mesh<Dim>& mesh;
+  const RemeshFields<Dim>& fields;
+  const StepContext<Dim>& context;
+  const SurfaceIndex<Dim>& surface;  ///< at fields.x
+  HistoryRule history;
+};
+
+/// A vertex of a local problem.
+struct LocalVertex {
+  enum class Kind : char { of_mesh, created, of_obstacle };
+  Kind kind = Kind::of_mesh;
+  int id = kNone;  ///< in the mesh or among the obstacles' vertices; kNewVertex where the edit creates it
+  bool operator==(const LocalVertex&) const = default;
+};
+
+/// Buffers of local problems that are worth keeping between them: one for each thread.
+template <int Dim>
+struct LocalScratch {
+  std::vector<int> local_of;           ///< by vertex slot: local id, valid where `known` is marked
+  std::vector<int> local_of_obstacle;  ///< the same of the obstacles' vertices
+  Marks known, known_obstacles, cells, patch;
+  typename SurfaceIndex<Dim>::Hits hits;
+  DenseSystem system;
+};
+
+template <int Dim>
+class LocalProblem {
+ public:
+  /// `patch` are alive cells, ascending, that hold all of the edit's removed cells; vertices whose cells are all in it are
+  /// free. The problem is that before the edit, or after it. What is handed in must outlive this.
+  LocalProblem(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, bool is_after,
+               LocalScratch<Dim>& scratch);
+  LocalProblem(const LocalProblem&) = delete;
+  LocalProblem& operator=(const LocalProblem&) = delete;
+
+  double value() { return energy_.value(x_, workspace_); }
+  /// At most so many Newton iterations from where it stands.
+  NewtonSummary relax(int max_iterations);
+  bool has_unknowns() const { return dofs_.num_unknowns > 0; }
+  int num_unknowns() const { return dofs_.num_unknowns; }
+  /// Whether any contact pair can come within reach.
+  bool touches_contact() const { return touches_contact_; }
+
+  struct Position {
+    VertexId vertex;  ///< kNewVertex for the one that the edit creates
+    Vec<Dim> x;
+  };
+  /// Where vertices are that have a free component.
+  std::vector<Position> positions() const;
+  /// Of the surface that this problem looked at (empty without contact).
+  const Box<Dim>& seen() const { return seen_; }
+
+ private:
+  using Kind = LocalVertex::Kind;
+  int local(LocalVertex v);
+  int local(VertexId v) { return local({v == kNewVertex ? Kind::created : Kind::of_mesh, v}); }
+  void add_cells(std::span<const CellId> patch);
+  void add_loaded_facets();
+  void hold_vertices();
+  void add_surface();
+  std::vector<char> vertices_whose_contacts_change();
+  VectorX gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values) const;
+  void add_terms();
+  void add_unrepresented_history(InertiaEnergy<Dim>& inertia) const;
+  bool is_value_vertex(const LocalVertex& v) const;
+  Vec<Dim> rest_position(const LocalVertex& v) const;
+  Vec<Dim> field_value(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, const LocalVertex& v) const;
+  bool is_removed(FacetId f) const;
+
+  const RemeshState<Dim>& state_;
+  const Mesh<Dim>& mesh_;
+  const Edit<Dim>& edit_;
+  bool is_after_;
+  LocalScratch<Dim>& scratch_;
+
+  CellSet<Dim> cells_;
+  std::vector<LocalVertex> vertices_;
+  VectorX x_;
+  DofMap dofs_;
+  CollisionSurface surface_;
+  bool has_surface_ = false, touches_contact_ = false;
+  EnergySum energy_;
+  std::unique_ptr<IncrementalPotential<Dim>> potential_;
+  std::vector<char> changes_;  ///< by local vertex: whether its contacts can change
+  Box<Dim> room_;              ///< where those may move
+  Box<Dim> seen_;
+  Workspace workspace_;
+};
+
+extern template class LocalProblem<2>;
+extern template class LocalProblem<3>;
+
+}  // namespace itr

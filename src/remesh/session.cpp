@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+#include "session.hpp"
+
+#include <algorithm>
+
+#include "itr/core/check.hpp"
+#include "itr/core/timer.hpp"
+#include "itr/mesh/validate.hpp"
+#include "prediction.hpp"
+
+namespace itr {
+
+template <int Dim>
+RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
+                                  const RemeshOptions& options, const RemeshMemory& memory)
+    : mesh_(mesh),
+      fields_(fields),
+      context_(context),
+      options_(options),
+      total_volume_(mesh.total_volume()),
+      gate_(mesh, fields, context),
+      refusals_(memory) {}
+
+template <int Dim>
+bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
+  const auto facets = mesh_.facets_of(e[0]);
+  return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
+    return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end();
+  });
+}
+
+template <int Dim>
+bool RemeshSession<Dim>::is_in_contact(const EdgeKey& e) {
+  if (!has_contact() || (!mesh_.is_boundary(e[0]) && !mesh_.is_boundary(e[1]))) return false;
+  Box<Dim> box;
+  for (const int v : e) box.include(Vec<Dim>(fields_.x.template segment<Dim>(Dim * v)));
+  gate_.present().query(box.inflated(context_.contact.activation_distance), scratch_.hits);
+  if (!scratch_.hits.obstacles.empty()) return true;
+  return std::any_of(scratch_.hits.facets.begin(), scratch_.hits.facets.end(), [&](FacetId f) {
+    const auto& facet = mesh_.facet(f);
+    return std::none_of(facet.begin(), facet.end(), [&](int v) { return v == e[0] || v == e[1]; });
+  });
+}
+
+template <int Dim>
+std::vector<EdgeKey> RemeshSession<Dim>::edges_of(std::span<const CellId> cells) const {
+  std::vector<EdgeKey> edges;
+  for (const CellId c : cells) {
+    if (!mesh_.is_cell_alive(c)) continue;
+    const auto& cell = mesh_.cell(c);
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = i + 1; j <= Dim; ++j) edges.push_back({std::min(cell[i], cell[j]), std::max(cell[i], cell[j])});
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+template <int Dim>
+double RemeshSession<Dim>::roughness(const EdgeKey& edge) {
+  around_.assign(mesh_.cells_of(edge[0]).begin(), mesh_.cells_of(edge[0]).end());
+  if (edge[1] != kNone)
+    for (const CellId c : mesh_.cells_of(edge[1]))
+      if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around_.push_back(c);
+  const auto variation = [&](const VectorX& field, auto&& weight) {
+    Mat<Dim> sum = Mat<Dim>::Zero();
+    double total = 0, squares = 0;
+    for (const CellId c : around_) {
+      const typename CellSet<Dim>::Element element{mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c)};
+      const Mat<Dim> gradient = deformation_gradient<Dim>(element, field);
+      const double w = weight(c);
+      sum += w * gradient;
+      squares += w * gradient.squaredNorm();
+      total += w;
+    }
+    return std::max(0.0, squares - sum.squaredNorm() / total);
+  };
+  const auto stiffness = [&](CellId c) { return mesh_.volume(c) * context_.materials.at(mesh_.body(c)).youngs_modulus; };
+  double result = context_.scaling * variation(fields_.x, stiffness);
+  if (context_.has_inertia) {
+    const double size = edge[1] == kNone ? mesh_.volume(around_[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
+    const auto mass = [&](CellId c) { return size * mesh_.volume(c) * context_.materials.at(mesh_.body(c)).density; };
+    result += variation(fields_.predictor, mass);
+  }
+  return result;
+}
+
+template <int Dim>
+double RemeshSession<Dim>::largest_poisson_ratio(const Edit<Dim>& edit) const {
+  double nu = 0;
+  for (const CellId c : edit.removed_cells) nu = std::max(nu, context_.materials.at(mesh_.body(c)).poisson_ratio);
+  return nu;
+}
+
+template <int Dim>
+Verdict<Dim> RemeshSession<Dim>::attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance,
+                                         const LocalRelaxationOptions& local) {
+  const ScopedTimer timer(trial_seconds_.emplace_back(0));
+  const RemeshState<Dim> state{mesh_, fields_, context_, gate_.present(), options_.history};
+  TrialOptions trial{.required = context_.scaling * tolerance, .local = local};
+  if (options_.screening == Screening::bounds) trial.patch_over_vertex = patch_over_vertex(largest_poisson_ratio(edit));
+  Verdict<Dim> verdict = preview<Dim>(state, gate_, edit, center, total_volume_, trial, scratch_);
+  if (verdict.accepted()) commit(edit, verdict);
+  return verdict;
+}
+
+template <int Dim>
+void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
+  const int first_cell = mesh_.cell_slots(), first_facet = mesh_.facet_slots();
+  const VertexId created = mesh_.apply(edit);
+  fields_.follow(edit, created);
+  gate_.follow(edit, first_facet);
+  for (const auto& [v, x] : verdict.positions) {
+    const VertexId vertex = v == kNewVertex ? created : v;
+    fields_.x.template segment<Dim>(Dim * vertex) = x;
+    if (has_contact()) gate_.move(vertex);
+  }
+  const std::size_t first = verdict.patch.size();
+  for (int c = first_cell; c < mesh_.cell_slots(); ++c) verdict.patch.push_back(c);
+  for (const EdgeKey& edge : edges_of(std::span(verdict.patch).subspan(first))) refusals_.forget(edge);
+  ITR_AUDIT(mesh_.find_defect().empty(), mesh_.find_defect());
+  ITR_AUDIT(find_inverted<Dim>(mesh_, fields_.x) == kNone);
+}
+
+template <int Dim>
+double RemeshSession<Dim>::median_trial_seconds() {
+  if (trial_seconds_.empty()) return 0;
+  const auto middle = trial_seconds_.begin() + static_cast<std::ptrdiff_t>(trial_seconds_.size() / 2);
+  std::nth_element(trial_seconds_.begin(), middle, trial_seconds_.end());
+  return *middle;
+}
+
+template class RemeshSession<2>;
+template class RemeshSession<3>;
+
+}  // namespace itr

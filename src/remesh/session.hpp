@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+// What all operations of one call of the remesher share: the mesh with its fields, the gate, memories, and the one way in
+// which an edit is tried and committed.
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "itr/remesh/remesher.hpp"
+#include "queue.hpp"
+#include "ranking.hpp"
+#include "refusals.hpp"
+#include "trial.hpp"
+
+namespace itr {
+
+template <int Dim>
+class RemeshSession {
+ public:
+  RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context, const RemeshOptions& options,
+                const RemeshMemory& memory);
+
+  const Mesh<Dim>& mesh() const { return mesh_; }
+  const RemeshFields<Dim>& fields() const { return fields_; }
+  const StepContext<Dim>& context() const { return context_; }
+  const RemeshOptions& options() const { return options_; }
+  RemeshReport& report() { return report_; }
+  bool has_contact() const { return context_.contact.enabled; }
+
+  double rest_length(const EdgeKey& e) const { return (mesh_.rest(e[0]) - mesh_.rest(e[1])).norm(); }
+  double length(const EdgeKey& e) const {
+    return (fields_.x.template segment<Dim>(Dim * e[0]) - fields_.x.template segment<Dim>(Dim * e[1])).norm();
+  }
+  bool exists(const EdgeKey& e) const {
+    return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty();
+  }
+  bool is_surface(const EdgeKey& e) const;
+  /// Whether contact can act on an edge's ends, so that the bulk terms alone do not tell what an edit gains.
+  bool is_in_contact(const EdgeKey& e);
+
+  /// Generations of an edge in this pass.
+  int depth(const EdgeKey& edge) const {
+    const auto it = depth_.find(edge);
+    return it == depth_.end() ? 0 : it->second;
+  }
+  void set_depth(const EdgeKey& edge, int generation) { depth_[edge] = generation; }
+  void forget_depths() { depth_.clear(); }
+
+  /// How much the deformation and the history vary over the cells around an edge (a vertex {v, kNone}): a field that is
+  /// linear there gives and takes nothing, whatever is done to the mesh. [J, times the scaling, up to a factor]
+  double roughness(const EdgeKey& edge);
+  /// Whether the same was refused before and what it depended on is as it was. Only where bounds decide.
+  bool was_refused(RemeshMemory::Kind kind, const EdgeKey& edge, double signal, bool in_contact) const {
+    return options_.screening == Screening::bounds && refusals_.holds(kind, edge, signal, in_contact);
+  }
+  void remember(RemeshMemory::Kind kind, const EdgeKey& edge, const RemeshMemory::Refusal& refusal) {
+    if (options_.screening == Screening::bounds) refusals_.add(kind, edge, refusal);
+  }
+  RemeshMemory memory() const { return refusals_.remembered(mesh_); }
+
+  /// Tries an edit that has to gain `tolerance` [J], and commits it where it does. Returns the verdict; the patch of an
+  /// accepted one has the new cells too.
+  Verdict<Dim> attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance, const LocalRelaxationOptions& local);
+  Verdict<Dim> attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance) {
+    return attempt(edit, center, tolerance, options_.local);
+  }
+
+  /// Edges of those cells that are alive, ascending.
+  std::vector<EdgeKey> edges_of(std::span<const CellId> cells) const;
+  double median_trial_seconds();
+
+ private:
+  void commit(const Edit<Dim>& edit, Verdict<Dim>& verdict);
+  double largest_poisson_ratio(const Edit<Dim>& edit) const;
+
+  Mesh<Dim>& mesh_;
+  RemeshFields<Dim>& fields_;
+  const StepContext<Dim>& context_;
+  const RemeshOptions& options_;
+  double total_volume_;
+  Gate<Dim> gate_;
+  LocalScratch<Dim> scratch_;
+  Refusals refusals_;
+  std::vector<CellId> around_;
+  std::unordered_map<EdgeKey, int, EdgeKeyHash> depth_;
+  RemeshReport report_;
+  std::vector<double> trial_seconds_;
+};
+
+/// Change of a signal by which a refusal no longer holds.
+inline constexpr double kSameSignal = 1.2;
+
+/// The operations, one file each. They count what they do in session.report(). `ranks` (of the paper's culling; empty where
+/// it is not asked for) are inherited by the edges that splits make.
+void split_edges(RemeshSession<2>& session, EdgeRanks& ranks);
+void collapse_edges(RemeshSession<2>& session, const EdgeRanks& ranks);
+void swap_edges(RemeshSession<2>& session);
+void smooth_vertices(RemeshSession<2>& session);
+
+}  // namespace itr

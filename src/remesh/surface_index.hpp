@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// All that can touch in one stored configuration: facets of the bodies, which edits and relaxations change, and obstacles,
+// which stand still while a mesh is changed. Found by place.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "itr/geometry/dynamic_tree.hpp"
+#include "itr/remesh/fields.hpp"
+
+namespace itr {
+
+/// Obstacles without what is part of something larger: triangles, edges of no triangle, points of no edge.
+struct ObstaclePrimitives {
+  struct Primitive {
+    std::array<int, 3> vertices{kNone, kNone, kNone};
+    int size = 0;
+    std::span<const int> ids() const { return {vertices.data(), static_cast<std::size_t>(size)}; }
+  };
+  std::vector<Primitive> all;
+  std::vector<std::vector<int>> at_vertex;  ///< indices into `all`
+
+  template <int Dim>
+  static ObstaclePrimitives make(const typename StepContext<Dim>::ObstacleGeometry& obstacles);
+};
+
+template <int Dim>
+class SurfaceIndex {
+ public:
+  struct Hits {
+    std::vector<FacetId> facets;  ///< ascending
+    std::vector<int> obstacles;   ///< indices of primitives, ascending
+  };
+
+  /// At these positions of the mesh's vertices and the obstacles'; all of it must outlive this.
+  SurfaceIndex(const Mesh<Dim>& mesh, const VectorX& x, const ObstaclePrimitives& primitives,
+               const std::vector<Vec<Dim>>& obstacle_x);
+
+  /// Whatever has a bounding box that meets `box`. Several may ask at once.
+  void query(const Box<Dim>& box, Hits& hits) const;
+  /// Takes in that the mesh changed: facets from `first_new` on are new, `removed` are gone.
+  void follow(std::span<const FacetId> removed, FacetId first_new);
+  /// Takes in that a vertex has moved.
+  void move(VertexId v);
+
+  const Mesh<Dim>& mesh() const { return *mesh_; }
+  Vec<Dim> at(VertexId v) const { return x_->template segment<Dim>(Dim * v); }
+  const Vec<Dim>& obstacle_at(int v) const { return (*obstacle_x_)[v]; }
+  const ObstaclePrimitives& primitives() const { return *primitives_; }
+
+ private:
+  Box<Dim> box_of(FacetId f) const;
+
+  const Mesh<Dim>* mesh_;
+  const VectorX* x_;
+  const ObstaclePrimitives* primitives_;
+  const std::vector<Vec<Dim>>* obstacle_x_;
+  DynamicTree<Dim> facets_;
+  Bvh<Dim> obstacles_;
+};
+
+extern template class SurfaceIndex<2>;
+extern template class SurfaceIndex<3>;
+
+}  // namespace itr

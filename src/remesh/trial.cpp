@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+#include "trial.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "patch.hpp"
+#include "prediction.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr int kIterationsAfterAcceptance = 100;
+constexpr int kBoundIterations = 2;  ///< of Newton, for a vertex alone
+
+/// Both sides of a comparison on one support.
+template <int Dim>
+struct Comparison {
+  double gain = -std::numeric_limits<double>::infinity();
+  bool touches_contact = false;
+  bool has_unknowns = false;
+  Box<Dim> seen;
+};
+
+/// `settle`, called with the side after the edit where it gains `required`, may go on with it.
+template <int Dim, typename Settle>
+Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, double required,
+                        int iterations, int contact_iterations, LocalScratch<Dim>& scratch, const Settle& settle) {
+  LocalProblem<Dim> before(state, patch, edit, false, scratch);
+  LocalProblem<Dim> after(state, patch, edit, true, scratch);
+  Comparison<Dim> result;
+  result.touches_contact = before.touches_contact() || after.touches_contact();
+  result.has_unknowns = after.has_unknowns();
+  result.seen = before.seen();
+  result.seen.include(after.seen());
+  const int effort = result.touches_contact ? contact_iterations : iterations;
+  const double energy_before = before.value();
+  const double energy_after = after.has_unknowns() ? after.relax(effort).energy : after.value();
+  result.gain = energy_before - energy_after;
+  // The side without the edit gets the same effort, so that residual left over elsewhere is not credited to the edit.
+  if (result.gain >= required && before.has_unknowns()) result.gain = before.relax(effort).energy - energy_after;
+  if (result.gain >= required) settle(after);
+  return result;
+}
+
+/// The cells of an edit and those around the vertex that it sets.
+template <int Dim>
+std::vector<CellId> star_of(const Mesh<Dim>& mesh, const Edit<Dim>& edit) {
+  std::vector<CellId> cells = edit.removed_cells;
+  if (edit.value && edit.value->vertex != kNewVertex) {
+    const auto around = mesh.cells_of(edit.value->vertex);
+    cells.insert(cells.end(), around.begin(), around.end());
+  }
+  std::sort(cells.begin(), cells.end());
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  return cells;
+}
+
+}  // namespace
+
+template <int Dim>
+double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch) {
+  const auto star = star_of(state.mesh, edit);
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  return compare<Dim>(state, star, edit, kNever, kBoundIterations, kBoundIterations, scratch, [](auto&) {}).gain;
+}
+
+template <int Dim>
+Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
+                     double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch) {
+  Verdict<Dim> verdict;
+  if (!gate.passes(edit, scratch.hits)) return verdict;
+  const auto finish = [&](LocalProblem<Dim>& after) {
+    if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
+    verdict.decision = Decision::accepted;
+    verdict.positions = after.positions();
+  };
+  bool is_enough = false;
+  if (options.patch_over_vertex > 0) {
+    const auto star = star_of(state.mesh, edit);
+    const auto bound = compare<Dim>(state, star, edit, options.required, kBoundIterations, kBoundIterations, scratch,
+                                    [&](auto&) { is_enough = true; });
+    const double factor = bound.touches_contact ? kPatchOverVertexInContact : options.patch_over_vertex;
+    const double at_most = bound.gain > 0 ? factor * bound.gain : bound.gain / factor;
+    if (at_most < options.required) {
+      verdict.decision = Decision::by_bound;
+      verdict.gain = bound.gain;
+      verdict.touches_contact = bound.touches_contact;
+      return verdict;
+    }
+  }
+  verdict.patch = select_patch<Dim>(state.mesh, edit.removed_cells, center, total_volume, options.local, scratch.patch);
+  if (is_enough) {
+    LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
+    verdict.seen = after.seen();
+    verdict.touches_contact = after.touches_contact();
+    finish(after);
+    return verdict;
+  }
+  const auto found = compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
+                                  options.local.max_contact_iterations, scratch, finish);
+  verdict.gain = found.gain;
+  verdict.touches_contact = found.touches_contact;
+  verdict.seen = found.seen;
+  verdict.was_relaxed = true;
+  if (!verdict.accepted()) verdict.decision = found.has_unknowns ? Decision::by_energy : Decision::no_unknowns;
+  return verdict;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                         \
+  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);                \
+  template Verdict<Dim> preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const Vec<Dim>&, double, \
+                                     const TrialOptions&, LocalScratch<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

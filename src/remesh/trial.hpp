@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// Whether an edit lowers the energy by enough: previewed on a const mesh, so that nothing has to be taken back.
+#pragma once
+
+#include <vector>
+
+#include "gate.hpp"
+#include "local_problem.hpp"
+
+namespace itr {
+
+enum class Decision : char {
+  accepted,
+  by_gate,     ///< some stored configuration would be invalid
+  by_bound,    ///< the energy cannot fall by enough: the new vertex alone tells
+  by_energy,   ///< a relaxed patch does not gain enough
+  no_unknowns  ///< nothing of the patch is free
+};
+
+/// What a preview found, and what there is to commit.
+template <int Dim>
+struct Verdict {
+  Decision decision = Decision::by_gate;
+  bool was_relaxed = false;  ///< whether it took the relaxation of a patch to decide
+  double gain = 0;  ///< decrease of the energy that was found [J, times the scaling]; negative: increase
+  bool touches_contact = false;
+  std::vector<CellId> patch;                                     ///< that was read
+  Box<Dim> seen;                                                 ///< of the surface
+  std::vector<typename LocalProblem<Dim>::Position> positions{};  ///< where accepted
+  bool accepted() const { return decision == Decision::accepted; }
+};
+
+struct TrialOptions {
+  double required = 0;           ///< least gain [J, times the scaling]
+  double patch_over_vertex = 0;  ///< see prediction.hpp; 0: bounds decide nothing
+  LocalRelaxationOptions local;
+};
+
+/// The decrease of the energy by the edit (design §3, rules a-d; paper eq. 11): both sides have one support and get the
+/// same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex that it sets free: what
+/// that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it refuses. A patch decides
+/// what lies between.
+template <int Dim>
+Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
+                     double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch);
+
+/// The lower bound alone: what the edit gains when only vertices move whose cells are all the edit's own or around the
+/// vertex that it sets. [J, times the scaling]
+template <int Dim>
+double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch);
+
+}  // namespace itr
