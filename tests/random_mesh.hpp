@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <optional>
 #include <random>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/remesh/edits.hpp"
 #include "itr/remesh/fields.hpp"
+#include "remesh/trial.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {
@@ -83,8 +85,6 @@ struct TrialScene {
     auto& obstacles = context.obstacles;
     obstacles.rest = obstacles.x = obstacles.velocity_reference = {{-0.5, -0.03}, {0.4, -0.02}, {1.5, -0.03}};
     obstacles.edges = {{0, 1}, {1, 2}};
-    obstacles.area = {0.45, 1, 0.55};
-    obstacles.degree = {1, 2, 1};
     obstacles.past_x = {obstacles.x};
     std::uniform_real_distribution<double> noise(-0.008, 0.008);
     fields.x.resize(2 * mesh.vertex_slots());
@@ -95,6 +95,24 @@ struct TrialScene {
     fields.past_positions = {fields.predictor};
   }
 };
+
+/// What local problems on a scene's mesh as it is are made of.
+struct LocalView {
+  Gate<2> gate;
+  LocalScratch<2> scratch;
+  RemeshState<2> state;
+  explicit LocalView(const TrialScene& scene, HistoryRule history = HistoryRule::function)
+      : gate(scene.mesh, scene.fields, scene.context),
+        state{scene.mesh, scene.fields, scene.context, gate.present(), history} {}
+  std::unique_ptr<LocalProblem<2>> problem(const std::vector<CellId>& patch, const Edit<2>& edit, bool is_after) {
+    return std::make_unique<LocalProblem<2>>(state, patch, edit, is_after, scratch);
+  }
+};
+
+/// Positions of a problem into those of the mesh that its edit made.
+inline void write_back(const LocalProblem<2>& problem, VertexId created, VectorX& x) {
+  for (const auto& [v, position] : problem.positions()) x.segment<2>(2 * (v == kNewVertex ? created : v)) = position;
+}
 
 /// All terms on the whole mesh, built without any patch.
 inline double global_energy(const Mesh<2>& slots, const RemeshFields<2>& slot_fields, const StepContext<2>& context) {
@@ -125,12 +143,8 @@ inline double global_energy(const Mesh<2>& slots, const RemeshFields<2>& slot_fi
   for (const auto& facet : cells.facets) add(facet.vertices[0], facet.vertices[1]);
   for (int v = 0; v < total; ++v)
     if (surface.degree[v] > 0) surface.vertices.push_back(v), surface.counts[v] = 1;
-  for (std::size_t o = 0; o < context.obstacles.x.size(); ++o) {
-    surface.vertices.push_back(bodies + static_cast<int>(o));
-    surface.area[bodies + o] = context.obstacles.area[o];
-    surface.degree[bodies + o] = context.obstacles.degree[o];
-  }
-  for (const auto& [a, b] : context.obstacles.edges) surface.edges.push_back({bodies + a, bodies + b});
+  for (const auto& [a, b] : context.obstacles.edges) add(bodies + a, bodies + b);
+  for (std::size_t o = 0; o < context.obstacles.x.size(); ++o) surface.vertices.push_back(bodies + static_cast<int>(o));
   std::sort(surface.edges.begin(), surface.edges.end());
   Workspace workspace;
   const VectorX predictor = compacted(slot_fields.predictor, context.obstacles.x);

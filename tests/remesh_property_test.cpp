@@ -10,10 +10,9 @@
 #include "itr/geometry/measures.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/projection/transfer.hpp"
-#include "itr/remesh/local_problem.hpp"
-#include "itr/remesh/patch.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
+#include "remesh/patch.hpp"
 
 namespace itr {
 namespace {
@@ -248,7 +247,9 @@ RC_GTEST_PROP(TrialProperties, RejectedTrialsLeaveNoTrace, ()) {
   const Mesh<2> mesh = scene.mesh;
   const RemeshFields<2> fields = scene.fields;
   const auto history = *rc::gen::element(HistoryRule::function, HistoryRule::interpolated);
-  const OperationCount count = total(remesh(scene.mesh, scene.fields, scene.context, only(draw_kind(), 1e12, history)));
+  RemeshMemory memory;
+  const OperationCount count =
+      total(remesh(scene.mesh, scene.fields, scene.context, only(draw_kind(), 1e12, history), memory));
   RC_ASSERT(count.tried > 0);
   RC_ASSERT(count.accepted == 0);
   RC_ASSERT(same_mesh(scene.mesh, mesh));
@@ -297,7 +298,8 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
     options = only(kind, middle, history);
     mesh = scene.mesh;
     fields = scene.fields;
-    count = total(remesh(mesh, fields, scene.context, options));
+    RemeshMemory memory;
+    count = total(remesh(mesh, fields, scene.context, options, memory));
     (count.accepted > 1 ? low : high) = middle;
   }
   RC_PRE(count.accepted == 1);
@@ -311,20 +313,13 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
   const Vec<2> center =
       edit->value ? edit->value->rest : Vec<2>(0.5 * (scene.mesh.rest(edit->edge[0]) + scene.mesh.rest(edit->edge[1])));
   Marks marks;
-  LocalScratch scratch;
-  SurfaceTree tree(scene.mesh, scene.fields, scene.context);
-  const auto patch = select_patch(scene.mesh, edit->removed_cells, center, scene.mesh.total_volume(), local, marks);
-  const auto make = [&](bool apply) {
-    return std::make_unique<LocalProblem>(scene.mesh, scene.fields, scene.context, patch, &*edit, apply, history, tree,
-                                          scratch);
-  };
-  auto before = make(false);
+  const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, center, scene.mesh.total_volume(), local, marks);
+  LocalView view(scene, history);
+  const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
   const double energy_before = before->value();
-  auto after = make(true);
   const bool contact = before->touches_contact() || after->touches_contact();
   const int iterations = contact ? local.max_contact_iterations : local.max_iterations;
   const double energy_after = after->relax(iterations).energy;
-  before = make(false);  // the problem with the edit used its scratch
   const double relaxed_before = before->has_unknowns() ? before->relax(iterations).energy : energy_before;
   const double tolerance = kind == Kind::split      ? options.split.acceptance_tolerance
                            : kind == Kind::collapse ? options.collapse.acceptance_tolerance
@@ -344,7 +339,7 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
   RemeshFields<2> replayed = scene.fields;
   const VertexId created = replayed_mesh.apply(*edit);
   replayed.follow(*edit, created);
-  after->write_back(replayed.x, created);
+  write_back(*after, created, replayed.x);
   RC_ASSERT(same_mesh(replayed_mesh, mesh));
   RC_ASSERT(same_fields(replayed, fields));
 }
@@ -360,7 +355,8 @@ RC_GTEST_PROP(TrialProperties, RemeshingHasTheSameBitsForOneAndTwoThreads, ()) {
     options.collapse.rel_max_edge_length = 100;
     options.collapse.culling_threshold = 0.1;
     options.swap.enabled = options.smooth.enabled = true;
-    remesh(scene.mesh, scene.fields, scene.context, options);
+    RemeshMemory memory;
+    remesh(scene.mesh, scene.fields, scene.context, options, memory);
     return std::pair(scene.mesh, scene.fields);
   };
   const auto one = run(1), two = run(2);

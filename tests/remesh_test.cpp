@@ -6,11 +6,10 @@
 #include <random>
 
 #include "itr/mesh/validate.hpp"
-#include "itr/remesh/local_problem.hpp"
-#include "itr/remesh/patch.hpp"
-#include "itr/remesh/prediction.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
+#include "remesh/patch.hpp"
+#include "remesh/prediction.hpp"
 
 namespace itr {
 namespace {
@@ -44,15 +43,11 @@ TEST(LocalProblem, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
     TrialScene scene(seed);
     const auto edit = random_edit(scene.mesh, scene.random);
     if (!edit) continue;
-    LocalScratch scratch;
     Marks marks;
-    SurfaceTree tree(scene.mesh, scene.fields, scene.context);
-    const auto patch = select_patch(scene.mesh, edit->removed_cells, Vec<2>(0.5, 0.5), 1, {}, marks);
-    LocalProblem before(scene.mesh, scene.fields, scene.context, patch, &*edit, false, HistoryRule::interpolated, tree,
-                        scratch);
-    LocalProblem after(scene.mesh, scene.fields, scene.context, patch, &*edit, true, HistoryRule::interpolated, tree,
-                       scratch);
-    const double local = after.value() - before.value();
+    const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, Vec<2>(0.5, 0.5), 1, {}, marks);
+    LocalView view(scene, HistoryRule::interpolated);
+    const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
+    const double local = after->value() - before->value();
     const double global_before = global_energy(scene.mesh, scene.fields, scene.context);
     Mesh<2> changed = scene.mesh;
     RemeshFields<2> fields = scene.fields;
@@ -61,7 +56,7 @@ TEST(LocalProblem, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
     if (!std::isfinite(global_before) || !std::isfinite(global_after)) continue;  // inverted by the random state
     EXPECT_NEAR(local, global_after - global_before, 1e-12 * std::abs(global_before)) << "seed " << seed;
     ++compared;
-    in_contact += before.touches_contact();
+    in_contact += before->touches_contact();
   }
   EXPECT_GT(compared, 15);
   EXPECT_GT(in_contact, 5);
@@ -72,18 +67,17 @@ TEST(LocalProblem, RelaxationLowersTheGlobalEnergyByWhatItReports) {
     TrialScene scene(seed);
     const auto edges = scene.mesh.edges();
     const auto edit = make_split(scene.mesh, edges[scene.random() % edges.size()]);
-    LocalScratch scratch;
     Marks marks;
-    SurfaceTree tree(scene.mesh, scene.fields, scene.context);
-    const auto patch = select_patch(scene.mesh, edit.removed_cells, edit.value->rest, 1, {}, marks);
-    LocalProblem after(scene.mesh, scene.fields, scene.context, patch, &edit, true, HistoryRule::function, tree, scratch);
-    const double start = after.value(), end = after.relax(5).energy;
+    const auto patch = select_patch<2>(scene.mesh, edit.removed_cells, edit.value->rest, 1, {}, marks);
+    LocalView view(scene);
+    const auto after = view.problem(patch, edit, true);
+    const double start = after->value(), end = after->relax(5).energy;
     Mesh<2> changed = scene.mesh;
     RemeshFields<2> fields = scene.fields;
     const VertexId created = changed.apply(edit);
     fields.follow(edit, created);
     const double global_start = global_energy(changed, fields, scene.context);
-    after.write_back(fields.x, created);
+    write_back(*after, created, fields.x);
     const double global_end = global_energy(changed, fields, scene.context);
     EXPECT_LT(end, start);
     EXPECT_NEAR(end - start, global_end - global_start, 1e-12 * std::abs(global_start)) << "seed " << seed;
@@ -99,14 +93,9 @@ TEST(LocalProblem, HistoryAsAFunctionNeverGainsByForgetting) {
     const auto edges = scene.mesh.edges();
     const auto edit = make_collapse(scene.mesh, edges[scene.random() % edges.size()]);
     if (!edit) continue;
-    LocalScratch scratch;
     Marks marks;
-    SurfaceTree tree(scene.mesh, scene.fields, scene.context);
-    const auto patch = select_patch(scene.mesh, edit->removed_cells, edit->value->rest, 1, {}, marks);
-    const auto inertia = [&](HistoryRule rule) {
-      LocalProblem after(scene.mesh, scene.fields, scene.context, patch, &*edit, true, rule, tree, scratch);
-      return after.value();
-    };
+    const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, edit->value->rest, 1, {}, marks);
+    const auto inertia = [&](HistoryRule rule) { return LocalView(scene, rule).problem(patch, *edit, true)->value(); };
     const double kept = inertia(HistoryRule::function), forgotten = inertia(HistoryRule::interpolated);
     if (!std::isfinite(kept)) continue;  // inverted by the random state
     EXPECT_GT(kept - forgotten, 0) << "seed " << seed;
@@ -125,13 +114,11 @@ TEST(Prediction, OfTheNewVertexIsWhatRelaxingItAloneGains) {
     const auto edges = scene.mesh.edges();
     const EdgeKey edge = edges[scene.random() % edges.size()];
     const auto edit = make_split(scene.mesh, edge);
-    LocalScratch scratch;
-    SurfaceTree tree(scene.mesh, scene.fields, scene.context);
     // Of a patch of nothing but the split cells only the new vertex is free.
-    LocalProblem after(scene.mesh, scene.fields, scene.context, edit.removed_cells, &edit, true, HistoryRule::function, tree,
-                       scratch);
-    if (after.num_unknowns() != 2) continue;
-    const double start = after.value(), gained = start - after.relax(1).energy;
+    LocalView view(scene);
+    const auto after = view.problem(edit.removed_cells, edit, true);
+    if (after->num_unknowns() != 2) continue;
+    const double start = after->value(), gained = start - after->relax(1).energy;
     const SplitPrediction prediction = predict_split(scene.mesh, scene.fields, scene.context, edge);
     EXPECT_NEAR(prediction.of_vertex, gained, 1e-9 * std::abs(start)) << "seed " << seed;
     EXPECT_GT(prediction.at_most, prediction.of_vertex);
@@ -140,19 +127,20 @@ TEST(Prediction, OfTheNewVertexIsWhatRelaxingItAloneGains) {
   EXPECT_GT(compared, 5);
 }
 
-TEST(Remesh, PredictionFindsEdgesThatCullingByEnergyLeavesOut) {
+TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
   std::map<Screening, int> tried;
   for (unsigned seed = 0; seed < 5; ++seed)
-    for (const auto screening : {Screening::energy_percentile, Screening::predicted_decrease, Screening::none}) {
+    for (const auto screening : {Screening::energy_percentile, Screening::bounds, Screening::none}) {
       TrialScene scene(seed);
       RemeshOptions options;
       options.collapse.enabled = false;
       options.screening = screening;
-      tried[screening] += remesh(scene.mesh, scene.fields, scene.context, options).splits.tried;
+      RemeshMemory memory;
+      tried[screening] += remesh(scene.mesh, scene.fields, scene.context, options, memory).splits.tried;
     }
   EXPECT_GT(tried[Screening::energy_percentile], 0);
-  EXPECT_GT(tried[Screening::predicted_decrease], 2 * tried[Screening::energy_percentile]);
-  EXPECT_GT(tried[Screening::none], tried[Screening::predicted_decrease]);
+  EXPECT_GT(tried[Screening::bounds], 2 * tried[Screening::energy_percentile]);
+  EXPECT_GT(tried[Screening::none], tried[Screening::bounds]);
 }
 
 TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {
@@ -166,7 +154,8 @@ TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {
     options.collapse.acceptance_tolerance = -1e-3;
     options.swap.enabled = options.smooth.enabled = true;
     const Totals before(scene.mesh);
-    const auto report = remesh(scene.mesh, scene.fields, scene.context, options);
+    RemeshMemory memory;
+    const auto report = remesh(scene.mesh, scene.fields, scene.context, options, memory);
     EXPECT_TRUE(report.changed());
     EXPECT_EQ(scene.mesh.find_defect(), "");
     EXPECT_EQ(find_inverted<2>(scene.mesh, scene.fields.x), kNone);

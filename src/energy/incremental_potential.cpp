@@ -59,8 +59,8 @@ typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(const 
       lagged.damping.push_back(
           std::make_shared<DampingEnergy<Dim>>(*elastic_, x, options.coefficient, velocity(), workspace));
     else if (contact_)
-      lagged.damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(
-          *contact_, on_surface(x), options.coefficient, velocity_of_surface(), workspace)));
+      lagged.damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(*contact_, on_surface(x), options.coefficient,
+                                                                             velocity_of_surface(), workspace)));
   }
   return lagged;
 }

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 2;
+constexpr std::int64_t kFormat = 3;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -58,6 +58,44 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
   return mesh;
 }
 
+constexpr const char* kOperations[RemeshMemory::kKinds] = {"split", "collapse", "swap", "smooth"};
+constexpr int kRefusalColumns = 5;  ///< two vertices, least and most signal, whether in contact
+
+std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }
+
+void write_memory(hdf5::File& file, const RemeshMemory& memory) {
+  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
+    std::vector<double> rows;
+    rows.reserve(kRefusalColumns * memory.refusals[kind].size());
+    for (const auto& [edge, refusal] : memory.refusals[kind])
+      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), refusal.least_signal, refusal.most_signal,
+                               refusal.in_contact ? 1.0 : 0.0});
+    if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
+  }
+}
+
+RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_vertices) {
+  RemeshMemory memory;
+  if (!file.contains("/checkpoint/refusals")) return memory;
+  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
+    if (!file.contains(refusals_name(kind))) continue;
+    const auto table = file.read_doubles(refusals_name(kind));
+    if (table.columns != kRefusalColumns)
+      throw InputError(
+          {path.string(), refusals_name(kind), std::to_string(table.columns) + " columns", std::to_string(kRefusalColumns)});
+    for (std::size_t i = 0; i < table.values.size(); i += kRefusalColumns) {
+      const double* row = &table.values[i];
+      const EdgeKey edge{static_cast<int>(row[0]), static_cast<int>(row[1])};
+      if (edge[0] < 0 || edge[0] >= num_vertices || edge[1] >= num_vertices)
+        throw InputError({path.string(), refusals_name(kind),
+                          "vertices " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]),
+                          "numbers below " + std::to_string(num_vertices)});
+      memory.refusals[kind].push_back({edge, {row[2], row[3], row[4] != 0}});
+    }
+  }
+  return memory;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -77,6 +115,7 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   file.write("/checkpoint/barrier_stiffness",
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
   file.write("/checkpoint/energy_guard", std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0}, 0);
+  write_memory(file, state.remesh_memory);
   file.write("/checkpoint/totals", progress.totals, 0);
   file.write_text("/checkpoint/scene", std::string(progress.scene));
   file.write_text("/checkpoint/backend", std::string(progress.backend));
@@ -128,6 +167,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
     throw InputError({saved.file.string(), "/checkpoint/energy_guard", std::to_string(guard.size()) + " numbers", "2"});
   state.created_energy = guard[0];
   state.history.damp_next = guard[1] != 0;
+  state.remesh_memory = read_memory(saved.file, file, state.mesh.vertex_slots());
   state.step = static_cast<int>(file.read_integer_attribute("step"));
   state.t = file.read_double_attribute("t");
   checkpoint.totals = file.read_doubles("/checkpoint/totals").values;

@@ -39,7 +39,7 @@ std::string energy_json(const EnergyReport& e) {
 }
 
 std::string count_json(const OperationCount& count) {
-  return fmt::format(R"({{"tried":{},"accepted":{}}})", count.tried, count.accepted);
+  return fmt::format(R"({{"tried":{},"relaxed":{},"accepted":{}}})", count.tried, count.relaxed, count.accepted);
 }
 
 std::string seconds_json(const StepSeconds& s) {
@@ -101,6 +101,7 @@ void for_each_number(Report& r, Visit&& visit) {
     visit(*n);
   for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths}) {
     visit(count->tried);
+    visit(count->relaxed);
     visit(count->accepted);
   }
   auto& e = r.energy;

@@ -40,7 +40,8 @@ bool crosses(const Piece<3>& a, const Piece<3>& b) {
   if (b.size < 3 || a.size < 2) return false;
   for (int k = 0; k < (a.size == 3 ? 3 : 1); ++k) {
     const int l = (k + 1) % a.size;
-    if (!b.has(a.id[k]) && !b.has(a.id[l]) && segment_intersects_triangle(a.p[k], a.p[l], b.p[0], b.p[1], b.p[2])) return true;
+    if (!b.has(a.id[k]) && !b.has(a.id[l]) && segment_intersects_triangle(a.p[k], a.p[l], b.p[0], b.p[1], b.p[2]))
+      return true;
   }
   return false;
 }
@@ -64,9 +65,7 @@ bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex
 
 template <int Dim>
 Gate<Dim>::Gate(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context)
-    : mesh_(mesh),
-      has_contact_(context.contact.enabled),
-      primitives_(ObstaclePrimitives::make<Dim>(context.obstacles)) {
+    : mesh_(mesh), has_contact_(context.contact.enabled), primitives_(ObstaclePrimitives::make<Dim>(context.obstacles)) {
   configurations_.reserve(1 + fields.past_positions.size());
   configurations_.push_back({&fields.x, {mesh, fields.x, primitives_, context.obstacles.x}});
   for (std::size_t i = 0; i < fields.past_positions.size(); ++i)

@@ -66,7 +66,8 @@ double RemeshSession<Dim>::roughness(const EdgeKey& edge) {
     Mat<Dim> sum = Mat<Dim>::Zero();
     double total = 0, squares = 0;
     for (const CellId c : around_) {
-      const typename CellSet<Dim>::Element element{mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c)};
+      const typename CellSet<Dim>::Element element{mesh_.cell(c), mesh_.body(c), mesh_.volume(c),
+                                                   mesh_.inverse_rest_edges(c)};
       const Mat<Dim> gradient = deformation_gradient<Dim>(element, field);
       const double w = weight(c);
       sum += w * gradient;
@@ -78,7 +79,8 @@ double RemeshSession<Dim>::roughness(const EdgeKey& edge) {
   const auto stiffness = [&](CellId c) { return mesh_.volume(c) * context_.materials.at(mesh_.body(c)).youngs_modulus; };
   double result = context_.scaling * variation(fields_.x, stiffness);
   if (context_.has_inertia) {
-    const double size = edge[1] == kNone ? mesh_.volume(around_[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
+    const double size =
+        edge[1] == kNone ? mesh_.volume(around_[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
     const auto mass = [&](CellId c) { return size * mesh_.volume(c) * context_.materials.at(mesh_.body(c)).density; };
     result += variation(fields_.predictor, mass);
   }

@@ -14,8 +14,7 @@ double worst_shape(const Mesh<2>& mesh, VertexId vertex) {
   double worst = 0;
   for (const CellId c : mesh.cells_of(vertex)) {
     double squares = 0;
-    for (int k = 0; k < 3; ++k)
-      squares += (mesh.rest(mesh.cell(c)[k]) - mesh.rest(mesh.cell(c)[(k + 1) % 3])).squaredNorm();
+    for (int k = 0; k < 3; ++k) squares += (mesh.rest(mesh.cell(c)[k]) - mesh.rest(mesh.cell(c)[(k + 1) % 3])).squaredNorm();
     worst = std::max(worst, squares / (2 * std::sqrt(3.0) * mesh.volume(c)));
   }
   return worst;

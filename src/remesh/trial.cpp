@@ -110,8 +110,8 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
   return verdict;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                         \
-  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);                \
+#define ITR_INSTANTIATE(Dim)                                                                                               \
+  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);                      \
   template Verdict<Dim> preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const Vec<Dim>&, double, \
                                      const TrialOptions&, LocalScratch<Dim>&);
 ITR_INSTANTIATE(2)

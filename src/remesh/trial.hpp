@@ -22,10 +22,10 @@ template <int Dim>
 struct Verdict {
   Decision decision = Decision::by_gate;
   bool was_relaxed = false;  ///< whether it took the relaxation of a patch to decide
-  double gain = 0;  ///< decrease of the energy that was found [J, times the scaling]; negative: increase
+  double gain = 0;           ///< decrease of the energy that was found [J, times the scaling]; negative: increase
   bool touches_contact = false;
-  std::vector<CellId> patch;                                     ///< that was read
-  Box<Dim> seen;                                                 ///< of the surface
+  std::vector<CellId> patch;                                      ///< that was read
+  Box<Dim> seen;                                                  ///< of the surface
   std::vector<typename LocalProblem<Dim>::Position> positions{};  ///< where accepted
   bool accepted() const { return decision == Decision::accepted; }
 };
@@ -37,9 +37,9 @@ struct TrialOptions {
 };
 
 /// The decrease of the energy by the edit (design §3, rules a-d; paper eq. 11): both sides have one support and get the
-/// same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex that it sets free: what
-/// that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it refuses. A patch decides
-/// what lies between.
+/// same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex that it sets free:
+/// what that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it refuses. A patch
+/// decides what lies between.
 template <int Dim>
 Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
                      double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch);
