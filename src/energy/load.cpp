@@ -10,18 +10,10 @@ namespace itr {
 
 namespace {
 
-/// Points in barycentric coordinates with equal weights, exact for degree 2: `near` at one vertex, the rest shared.
-template <int Vertices>
-constexpr double near_vertex() {
-  if constexpr (Vertices == 2) return 0.5 + 0.28867513459481287;  // Gauss points of an edge
-  if constexpr (Vertices == 3) return 2.0 / 3.0;
-  return 0.5854101966249685;
-}
-
 template <int Dim, std::size_t Vertices>
 void add_forces(const std::array<int, Vertices>& vertices, const CellSet<Dim>& cells, double weight,
                 const std::function<Vec<Dim>(const Vec<Dim>&)>& load, VectorX& forces) {
-  constexpr double kNear = near_vertex<static_cast<int>(Vertices)>(), kFar = (1 - kNear) / (Vertices - 1);
+  constexpr double kNear = near_vertex<Vertices>(), kFar = (1 - kNear) / (Vertices - 1);
   for (std::size_t q = 0; q < Vertices; ++q) {
     Vec<Dim> X = Vec<Dim>::Zero();
     for (std::size_t k = 0; k < Vertices; ++k) X += (k == q ? kNear : kFar) * cells.rest[vertices[k]];

@@ -26,7 +26,8 @@ class Collapser {
       const double signal = session_.roughness(*edge);
       const bool in_contact = session_.is_in_contact(*edge);
       if (session_.was_refused(RemeshMemory::collapse, *edge, signal, in_contact)) continue;
-      if (collapse(*edge) != Decision::by_bound) continue;
+      const Decision decision = collapse(*edge);
+      if (decision != Decision::by_bound && decision != Decision::by_energy) continue;
       constexpr double kNever = std::numeric_limits<double>::infinity();  // a rougher field loses more
       session_.remember(RemeshMemory::collapse, *edge,
                         {signal / kSameSignal, in_contact ? signal * kSameSignal : kNever, in_contact});
@@ -59,6 +60,8 @@ class Collapser {
     ++session_.report().collapses.tried;
     const auto edit = make_collapse(session_.mesh(), edge);
     if (!edit) return Decision::by_gate;
+    if (!session_.is_in_contact(edge) && session_.is_hopeless(*edit, session_.predict(*edit), options_.acceptance_tolerance))
+      return Decision::by_bound;
     const int generation = session_.depth(edge) + 1;
     const auto verdict = session_.attempt(*edit, edit->value->rest, options_.acceptance_tolerance);
     session_.report().collapses.relaxed += verdict.was_relaxed;

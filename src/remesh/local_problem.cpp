@@ -289,7 +289,8 @@ void LocalProblem<Dim>::add_terms() {
   x_ = gather(state_.fields.x, context.obstacles.x);
   PotentialHistory history;
   if (context.has_inertia) history.predictor = gather(state_.fields.predictor, {});
-  if (state_.fields.velocity_reference.size() > 0)
+  const bool has_velocity = has_surface_ || !context.damping.empty();  // friction or damping can act
+  if (has_velocity && state_.fields.velocity_reference.size() > 0)
     history.velocity_reference = gather(state_.fields.velocity_reference, context.obstacles.velocity_reference);
   potential_ = std::make_unique<IncrementalPotential<Dim>>(context, cells_, std::move(history));
   const bool is_nested = !is_after_ || edit_.kind == Edit<Dim>::Kind::split;

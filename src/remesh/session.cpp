@@ -6,7 +6,6 @@
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/validate.hpp"
-#include "prediction.hpp"
 
 namespace itr {
 
@@ -31,7 +30,7 @@ bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
 
 template <int Dim>
 bool RemeshSession<Dim>::is_in_contact(const EdgeKey& e) {
-  if (!has_contact() || (!mesh_.is_boundary(e[0]) && !mesh_.is_boundary(e[1]))) return false;
+  if (!has_contact() || !is_surface(e)) return false;
   Box<Dim> box;
   for (const int v : e) box.include(Vec<Dim>(fields_.x.template segment<Dim>(Dim * v)));
   gate_.present().query(box.inflated(context_.contact.activation_distance), scratch_.hits);
@@ -98,9 +97,10 @@ template <int Dim>
 Verdict<Dim> RemeshSession<Dim>::attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance,
                                          const LocalRelaxationOptions& local) {
   const ScopedTimer timer(trial_seconds_.emplace_back(0));
-  const RemeshState<Dim> state{mesh_, fields_, context_, gate_.present(), options_.history};
+  const RemeshState<Dim> state = this->state();
   TrialOptions trial{.required = context_.scaling * tolerance, .local = local};
-  if (options_.screening == Screening::bounds) trial.patch_over_vertex = patch_over_vertex(largest_poisson_ratio(edit));
+  if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth && edit.value)
+    trial.patch_over_vertex = patch_over_vertex(largest_poisson_ratio(edit));
   Verdict<Dim> verdict = preview<Dim>(state, gate_, edit, center, total_volume_, trial, scratch_);
   if (verdict.accepted()) commit(edit, verdict);
   return verdict;

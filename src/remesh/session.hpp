@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "itr/remesh/remesher.hpp"
+#include "prediction.hpp"
 #include "queue.hpp"
 #include "ranking.hpp"
 #include "refusals.hpp"
@@ -35,7 +36,7 @@ class RemeshSession {
     return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty();
   }
   bool is_surface(const EdgeKey& e) const;
-  /// Whether contact can act on an edge's ends, so that the bulk terms alone do not tell what an edit gains.
+  /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
   bool is_in_contact(const EdgeKey& e);
 
   /// Generations of an edge in this pass.
@@ -58,6 +59,17 @@ class RemeshSession {
   }
   RemeshMemory memory() const { return refusals_.remembered(mesh_); }
 
+  /// Whether predictions may leave out trials.
+  bool screens() const { return options_.screening != Screening::none; }
+  /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
+  double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance : 0; }
+  /// See prediction.hpp.
+  double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
+  /// Whether a prediction says that a patch cannot gain the tolerance [J] either.
+  bool is_hopeless(const Edit<Dim>& edit, double predicted, double tolerance) const {
+    return screens() && at_most(predicted, patch_over_vertex(largest_poisson_ratio(edit))) < context_.scaling * tolerance;
+  }
+
   /// Tries an edit that has to gain `tolerance` [J], and commits it where it does. Returns the verdict; the patch of an
   /// accepted one has the new cells too.
   Verdict<Dim> attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance, const LocalRelaxationOptions& local);
@@ -70,6 +82,7 @@ class RemeshSession {
   double median_trial_seconds();
 
  private:
+  RemeshState<Dim> state() const { return {mesh_, fields_, context_, gate_.present(), options_.history}; }
   void commit(const Edit<Dim>& edit, Verdict<Dim>& verdict);
   double largest_poisson_ratio(const Edit<Dim>& edit) const;
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "itr/remesh/edits.hpp"
-#include "prediction.hpp"
 #include "session.hpp"
 
 namespace itr {
@@ -20,14 +19,12 @@ class Splitter {
   void run() {
     for (const EdgeKey& edge : session_.mesh().edges()) push(edge);
     while (const auto edge = queue_.pop())
-      if (may_be_split(*edge) && is_worthwhile(*edge)) split(*edge);
+      if (may_be_split(*edge)) split(*edge);
     session_.forget_depths();
   }
 
  private:
-  SplitPrediction predict(const EdgeKey& edge) const {
-    return predict_split(session_.mesh(), session_.fields(), session_.context(), edge);
-  }
+  double predict(const EdgeKey& edge) const { return session_.predict(make_split(session_.mesh(), edge)); }
   bool is_culled() const { return session_.options().screening == Screening::energy_percentile; }
 
   // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the same
@@ -35,7 +32,7 @@ class Splitter {
   void push(const EdgeKey& edge) {
     if (session_.depth(edge) >= options_.max_depth) return;
     if (is_culled() && rank(edge) != Rank::top) return;
-    const double gain = predict(edge).of_vertex;
+    const double gain = predict(edge);
     if (!session_.was_refused(RemeshMemory::split, edge, gain, session_.is_in_contact(edge))) queue_.push(edge, gain);
   }
 
@@ -54,32 +51,28 @@ class Splitter {
     return false;
   }
 
-  /// Whether more than the tolerance can be gained; where contact acts, trials tell.
-  bool is_worthwhile(const EdgeKey& edge) {
-    if (session_.options().screening == Screening::none || session_.is_in_contact(edge)) return true;
-    return predict(edge).at_most >= tolerance_;
-  }
-
   void split(const EdgeKey& edge) {
-    ++session_.report().splits.tried;
     const auto edit = make_split(session_.mesh(), edge);
+    const double signal = session_.predict(edit);
+    const bool in_contact = session_.is_in_contact(edge);  // there trials tell
+    if (!in_contact && session_.is_hopeless(edit, signal, options_.acceptance_tolerance)) return;
+    ++session_.report().splits.tried;
     const auto verdict = session_.attempt(edit, edit.value->rest, options_.acceptance_tolerance);
     session_.report().splits.relaxed += verdict.was_relaxed;
-    if (!verdict.accepted()) return remember(edge, verdict);
+    if (!verdict.accepted()) return remember(edge, signal, in_contact, verdict.gain);
     ++session_.report().splits.accepted;
-    inherit(edge, session_.mesh().vertex_slots() - 1);
-    for (const EdgeKey& near : session_.edges_of(verdict.patch)) push(near);
+    const VertexId created = session_.mesh().vertex_slots() - 1;
+    inherit(edge, created);
+    for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(created))) push(near);
   }
 
   /// Bulk terms alone tell when a refused split can have become worthwhile; in contact any change may have done it.
-  void remember(const EdgeKey& edge, const Verdict<2>& verdict) {
-    const double signal = predict(edge).of_vertex;
-    const bool in_contact = session_.is_in_contact(edge);
+  void remember(const EdgeKey& edge, double signal, bool in_contact, double gain) {
     RemeshMemory::Refusal refusal{signal / kSameSignal, signal * kSameSignal, in_contact};
     if (!in_contact) {
       constexpr double kMargin = 1.3;
       refusal.least_signal = 0;
-      if (verdict.gain > 0) refusal.most_signal = signal * std::max(kSameSignal, tolerance_ / (kMargin * verdict.gain));
+      if (gain > 0) refusal.most_signal = signal * std::max(kSameSignal, tolerance_ / (kMargin * gain));
     }
     session_.remember(RemeshMemory::split, edge, refusal);
   }

@@ -40,14 +40,25 @@ void swap_edges(RemeshSession<2>& session) {
     if (!session.exists(*edge) || tries[*edge]++ >= options.max_depth) continue;
     const auto edit = make_swap(mesh, *edge);
     if (!edit) continue;
-    ++session.report().swaps.tried;
+    const double signal = session.roughness(*edge);
+    const bool in_contact = session.is_in_contact(*edge);
+    if (session.was_refused(RemeshMemory::swap, *edge, signal, in_contact)) continue;
+    const RemeshMemory::Refusal refusal{signal / kSameSignal, signal * kSameSignal, in_contact};
     const Vec<2> center = 0.5 * (mesh.rest((*edge)[0]) + mesh.rest((*edge)[1]));
     // An increase in energy is allowed for the sake of the mesh's shape only: without that, edges swap to and fro.
-    const double least =
-        valence_gain(mesh, *edge) > 0 ? options.acceptance_tolerance : std::max(0.0, options.acceptance_tolerance);
+    const double least = valence_gain(mesh, *edge) > 0 ? options.acceptance_tolerance
+                                                       : std::max(session.least_worthwhile(), options.acceptance_tolerance);
+    if (session.screens() && session.predict(*edit) < session.context().scaling * least) {
+      session.remember(RemeshMemory::swap, *edge, refusal);
+      continue;
+    }
+    ++session.report().swaps.tried;
     const auto verdict = session.attempt(*edit, center, least);
     session.report().swaps.relaxed += verdict.was_relaxed;
-    if (!verdict.accepted()) continue;
+    if (!verdict.accepted()) {
+      session.remember(RemeshMemory::swap, *edge, refusal);
+      continue;
+    }
     ++session.report().swaps.accepted;
     for (const EdgeKey& near : session.edges_of(verdict.patch))
       if (!session.is_surface(near) && valence_gain(mesh, near) > 0) queue.push(near, valence_gain(mesh, near));

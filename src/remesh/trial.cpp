@@ -14,7 +14,7 @@ namespace itr {
 namespace {
 
 constexpr int kIterationsAfterAcceptance = 100;
-constexpr int kBoundIterations = 2;  ///< of Newton, for a vertex alone
+constexpr int kBoundIterations = 1, kBoundContactIterations = 2;  ///< of Newton, for a vertex alone
 
 /// Both sides of a comparison on one support.
 template <int Dim>
@@ -65,7 +65,7 @@ template <int Dim>
 double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch) {
   const auto star = star_of(state.mesh, edit);
   constexpr double kNever = std::numeric_limits<double>::infinity();
-  return compare<Dim>(state, star, edit, kNever, kBoundIterations, kBoundIterations, scratch, [](auto&) {}).gain;
+  return compare<Dim>(state, star, edit, kNever, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {}).gain;
 }
 
 template <int Dim>
@@ -81,15 +81,22 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
   bool is_enough = false;
   if (options.patch_over_vertex > 0) {
     const auto star = star_of(state.mesh, edit);
-    const auto bound = compare<Dim>(state, star, edit, options.required, kBoundIterations, kBoundIterations, scratch,
-                                    [&](auto&) { is_enough = true; });
-    const double factor = bound.touches_contact ? kPatchOverVertexInContact : options.patch_over_vertex;
-    const double at_most = bound.gain > 0 ? factor * bound.gain : bound.gain / factor;
-    if (at_most < options.required) {
+    const auto is_refused_on_star = [&](HistoryRule history) {
+      const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
+      const auto bound = compare<Dim>(judged, star, edit, options.required, kBoundIterations, kBoundContactIterations,
+                                      scratch, [&](auto&) { is_enough = true; });
+      const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();
       verdict.decision = Decision::by_bound;
       verdict.gain = bound.gain;
       verdict.touches_contact = bound.touches_contact;
-      return verdict;
+      return at_most(bound.gain, surface_touches ? kPatchOverVertexInContact : options.patch_over_vertex) < options.required;
+    };
+    // What the new mesh cannot represent of the history takes the longest to find: first without.
+    const bool is_nested = edit.kind == Edit<Dim>::Kind::split || state.history == HistoryRule::interpolated;
+    if (is_refused_on_star(is_nested ? state.history : HistoryRule::interpolated)) return verdict;
+    if (!is_nested) {
+      is_enough = false;
+      if (is_refused_on_star(state.history)) return verdict;
     }
   }
   verdict.patch = select_patch<Dim>(state.mesh, edit.removed_cells, center, total_volume, options.local, scratch.patch);

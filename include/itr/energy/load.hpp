@@ -10,6 +10,15 @@
 
 namespace itr {
 
+/// Points of the quadrature of loads, in barycentric coordinates with equal weights, exact for degree 2: this share at one
+/// vertex of a simplex, the rest evenly at the others.
+template <std::size_t Vertices>
+constexpr double near_vertex() {
+  if constexpr (Vertices == 2) return 0.5 + 0.28867513459481287;  // Gauss points of an edge
+  if constexpr (Vertices == 3) return 2.0 / 3.0;
+  return 0.5854101966249685;
+}
+
 /// What acts on a body at one time: functions of rest position.
 template <int Dim>
 struct Loads {

@@ -113,6 +113,14 @@ class HessianSink {
   void add_elements(const CellSet<Dim>& cells, const Fill& fill) {
     using Block = Mat<Dim*(Dim + 1)>;
     const std::size_t n = cells.elements.size();
+    if (dense_ && !motion_) {  // a patch: one block after the other, without a buffer for all
+      Block block;
+      for (std::size_t e = 0; e < n; ++e) {
+        fill(e, block);
+        add<Dim>(cells.elements[e].vertices, block.data());
+      }
+      return;
+    }
     std::vector<Block> blocks(std::min(n, SparseAssembler::kBatch));
     for (std::size_t first = 0; first < n; first += SparseAssembler::kBatch) {
       const std::size_t count = std::min(SparseAssembler::kBatch, n - first);

@@ -24,8 +24,8 @@ struct RemeshMemory {
     EdgeKey edge;  ///< smaller vertex first; {vertex, kNone} of a vertex that was not moved
     Refusal refusal;
   };
-  enum Kind { split, collapse, swap, smooth };
-  static constexpr int kKinds = 4;
+  enum Kind { split, collapse, swap, smooth, reshape };
+  static constexpr int kKinds = 5;
   std::array<std::vector<Entry>, kKinds> refusals;  ///< by Kind; ascending by edge
 
   /// With the vertex numbers of a compacted mesh; `number` has kNone for vertices that are gone.
