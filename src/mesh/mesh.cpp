@@ -15,23 +15,6 @@ namespace itr {
 
 namespace {
 
-template <std::size_t N>
-std::array<int, N> sorted(std::array<int, N> ids) {
-  std::sort(ids.begin(), ids.end());
-  return ids;
-}
-
-/// The facet of a positively oriented cell opposite its vertex `k`, oriented outward.
-template <int Dim>
-typename MeshTypes<Dim>::Facet opposite_facet(const typename MeshTypes<Dim>::Cell& c, int k) {
-  if constexpr (Dim == 2) {
-    return {c[(k + 1) % 3], c[(k + 2) % 3]};
-  } else {
-    static constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-    return {c[kFaces[k][0]], c[kFaces[k][1]], c[kFaces[k][2]]};
-  }
-}
-
 /// Whether the order of distinct ids is an even permutation of ascending order.
 template <std::size_t N>
 bool is_even(const std::array<int, N>& ids) {
@@ -44,6 +27,17 @@ bool is_even(const std::array<int, N>& ids) {
 void erase_value(std::vector<int>& list, int value) { list.erase(std::find(list.begin(), list.end(), value)); }
 
 }  // namespace
+
+template <>
+MeshTypes<2>::Facet opposite_facet<2>(const MeshTypes<2>::Cell& c, int k) {
+  return {c[(k + 1) % 3], c[(k + 2) % 3]};
+}
+
+template <>
+MeshTypes<3>::Facet opposite_facet<3>(const MeshTypes<3>::Cell& c, int k) {
+  static constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+  return {c[kFaces[k][0]], c[kFaces[k][1]], c[kFaces[k][2]]};
+}
 
 template <int Dim>
 Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector<int> body)
@@ -64,7 +58,7 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
                         "a positive, finite one (not degenerate or inverted)"});
     for (int k = 0; k <= Dim; ++k) {
       const Facet facet = opposite_facet<Dim>(cells[c], k);
-      auto& entry = facets.try_emplace(sorted(facet), 0, facet).first->second;
+      auto& entry = facets.try_emplace(ascending(facet), 0, facet).first->second;
       if (++entry.first > 2) throw InputError({"", place(), "a facet with more than two cells", "a manifold mesh"});
     }
   }
@@ -81,7 +75,7 @@ void Mesh<Dim>::set_facets(const std::vector<Facet>& facets, const std::vector<i
     const FacetId f = in_range ? find_facet(facet) : kNone;
     if (f == kNone)
       throw InputError({"", "facet " + std::to_string(found.size()), "one that is not on the boundary", "a boundary facet"});
-    found.push_back(sorted(facet));
+    found.push_back(ascending(facet));
   }
   std::sort(found.begin(), found.end());
   if (static_cast<int>(found.size()) != num_facets_ || std::adjacent_find(found.begin(), found.end()) != found.end())
@@ -94,16 +88,18 @@ void Mesh<Dim>::set_facets(const std::vector<Facet>& facets, const std::vector<i
 }
 
 template <int Dim>
-Mat<Dim> Mesh<Dim>::rest_edges(CellId c) const {
+std::array<Vec<Dim>, Dim + 1> Mesh<Dim>::corners(CellId c) const {
   std::array<Vec<Dim>, Dim + 1> p;
   for (int k = 0; k <= Dim; ++k) p[k] = rest_[cells_[c][k]];
-  return edge_matrix<Dim>(p);
+  return p;
 }
 
 template <int Dim>
 void Mesh<Dim>::update_geometry(CellId c) {
-  const Mat<Dim> edges = rest_edges(c);
+  const auto p = corners(c);
+  const Mat<Dim> edges = edge_matrix<Dim>(p);
   volume_[c] = simplex_volume<Dim>(edges);
+  quality_[c] = simplex_quality<Dim>(p);
   inverse_edges_[c] = edges.inverse();
 }
 
@@ -113,6 +109,7 @@ void Mesh<Dim>::add_cell(const Cell& cell, int body) {
   cells_.push_back(cell);
   body_.push_back(body);
   volume_.push_back(0);
+  quality_.push_back(0);
   inverse_edges_.emplace_back();
   update_geometry(c);
   for (const int v : cell) cells_of_[v].push_back(c);
@@ -152,10 +149,23 @@ std::vector<CellId> Mesh<Dim>::cells_of_edge(const EdgeKey& edge) const {
 }
 
 template <int Dim>
+std::vector<FacetId> Mesh<Dim>::facets_of_edge(const EdgeKey& edge) const {
+  std::vector<FacetId> found;
+  for (const FacetId f : facets_of_[edge[0]])
+    if (std::find(facets_[f].begin(), facets_[f].end(), edge[1]) != facets_[f].end()) found.push_back(f);
+  return found;
+}
+
+template <int Dim>
+bool Mesh<Dim>::is_on_interface(VertexId v) const {
+  return std::any_of(cells_of_[v].begin(), cells_of_[v].end(), [&](CellId c) { return body_[c] != body_[cells_of_[v][0]]; });
+}
+
+template <int Dim>
 FacetId Mesh<Dim>::find_facet(const Facet& vertices) const {
-  const Facet key = sorted(vertices);
+  const Facet key = ascending(vertices);
   for (const FacetId f : facets_of_[vertices[0]])
-    if (sorted(facets_[f]) == key) return f;
+    if (ascending(facets_[f]) == key) return f;
   return kNone;
 }
 
@@ -216,7 +226,8 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
 
 template <int Dim>
 typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
-  Renumbering map{std::vector<VertexId>(vertex_slots(), kNone), std::vector<CellId>(cell_slots(), kNone)};
+  Renumbering map{std::vector<VertexId>(vertex_slots(), kNone), std::vector<CellId>(cell_slots(), kNone),
+                  std::vector<FacetId>(facet_slots(), kNone)};
   int vertices = 0, cells = 0, facets = 0;
   for (int v = 0; v < vertex_slots(); ++v) {
     if (!vertex_alive_[v]) continue;
@@ -235,12 +246,13 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
     cells_[to] = renumber(cells_[c]);
     body_[to] = body_[c];
     volume_[to] = volume_[c];
+    quality_[to] = quality_[c];
     inverse_edges_[to] = inverse_edges_[c];
     for (const int v : cells_[to]) cells_of_[v].push_back(to);
   }
   for (int f = 0; f < facet_slots(); ++f) {
     if (!is_facet_alive(f)) continue;
-    const int to = facets++;
+    const int to = map.facet[f] = facets++;
     facets_[to] = renumber(facets_[f]);
     facet_tag_[to] = facet_tag_[f];
     for (const int v : facets_[to]) facets_of_[v].push_back(to);
@@ -250,6 +262,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
   cells_.resize(cells);
   body_.resize(cells);
   volume_.resize(cells);
+  quality_.resize(cells);
   inverse_edges_.resize(cells);
   facets_.resize(facets);
   facet_tag_.resize(facets);
@@ -264,14 +277,14 @@ std::string Mesh<Dim>::find_defect() const {
     if (!is_cell_alive(c)) continue;
     ++alive;
     if (!(volume_[c] > 0)) return "cell " + std::to_string(c) + " has rest volume " + std::to_string(volume_[c]);
-    if (volume_[c] != simplex_volume<Dim>(rest_edges(c))) return "cell " + std::to_string(c) + " has an outdated volume";
+    if (volume_[c] != simplex_volume<Dim>(corners(c))) return "cell " + std::to_string(c) + " has an outdated volume";
     for (const int v : cells_[c]) {
       if (!vertex_alive_[v]) return "cell " + std::to_string(c) + " uses dead vertex " + std::to_string(v);
       if (std::count(cells_of_[v].begin(), cells_of_[v].end(), c) != 1) return "adjacency of vertex " + std::to_string(v);
     }
     for (int k = 0; k <= Dim; ++k) {
       const Facet facet = opposite_facet<Dim>(cells_[c], k);
-      if (++seen.try_emplace(sorted(facet), 0, facet).first->second.first > 2) return "facet with more than two cells";
+      if (++seen.try_emplace(ascending(facet), 0, facet).first->second.first > 2) return "facet with more than two cells";
     }
   }
   if (alive != num_cells_) return "wrong number of cells";

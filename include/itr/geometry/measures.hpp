@@ -37,7 +37,7 @@ double simplex_quality(const std::array<Vec<Dim>, Dim + 1>& p) {
   constexpr double kEdges = 0.5 * Dim * (Dim + 1);
   const double edge = std::sqrt(squared / kEdges);
   const double regular = Dim == 2 ? std::sqrt(3.0) / 4 : std::sqrt(2.0) / 12;
-  return simplex_volume<Dim>(p) / (regular * std::pow(edge, Dim));
+  return simplex_volume<Dim>(p) / (regular * (Dim == 2 ? edge * edge : edge * edge * edge));
 }
 
 }  // namespace itr

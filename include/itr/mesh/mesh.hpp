@@ -6,6 +6,7 @@
 // conditions refer to.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <optional>
@@ -42,6 +43,12 @@ struct Edit {
   struct NewFacet {
     Facet vertices;
     int tag;
+    FacetId parent = kNone;  ///< the removed facet whose place it takes a part of, or one of them
+  };
+  /// A facet between two bodies, vertices ascending (kNewVertex is the largest id).
+  struct NewInterface {
+    Facet vertices;
+    Facet parent;  ///< the removed one whose place it takes a part of, or one of them
   };
   /// The one vertex whose position and field values the edit sets: kNewVertex, or one that stays.
   struct Value {
@@ -53,14 +60,27 @@ struct Edit {
   };
 
   Kind kind;
-  EdgeKey edge{kNone, kNone};  ///< the edge; for a smooth, {vertex, kNone}
+  EdgeKey edge{kNone, kNone};  ///< the edge; of a 2-3 swap the one it makes; for a smooth {vertex, kNone}
   std::vector<CellId> removed_cells{};
   std::vector<NewCell> inserted_cells{};
   std::vector<FacetId> removed_facets{};
   std::vector<NewFacet> inserted_facets{};
+  std::vector<Facet> removed_interfaces{};
+  std::vector<NewInterface> inserted_interfaces{};
   std::optional<Value> value{};
   VertexId removed_vertex = kNone;
 };
+
+/// The facet of a positively oriented cell opposite its vertex `k`, oriented outward.
+template <int Dim>
+typename MeshTypes<Dim>::Facet opposite_facet(const typename MeshTypes<Dim>::Cell& cell, int k);
+
+/// The ids in ascending order: what names a facet or a cell whatever its orientation.
+template <std::size_t N>
+std::array<int, N> ascending(std::array<int, N> ids) {
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
 
 template <int Dim>
 class Mesh {
@@ -92,7 +112,8 @@ class Mesh {
   const Vec<Dim>& rest(VertexId v) const { return rest_[v]; }
   const Cell& cell(CellId c) const { return cells_[c]; }
   int body(CellId c) const { return body_[c]; }
-  double volume(CellId c) const { return volume_[c]; }  ///< rest area (2D) or volume (3D)
+  double volume(CellId c) const { return volume_[c]; }    ///< rest area (2D) or volume (3D)
+  double quality(CellId c) const { return quality_[c]; }  ///< simplex_quality of the rest shape
   /// Inverse of the matrix whose columns are the rest edges X_1 - X_0, ..., X_Dim - X_0.
   const Mat<Dim>& inverse_rest_edges(CellId c) const { return inverse_edges_[c]; }
   const Facet& facet(FacetId f) const { return facets_[f]; }
@@ -104,6 +125,10 @@ class Mesh {
 
   /// Cells that hold both ends of the edge, ascending.
   std::vector<CellId> cells_of_edge(const EdgeKey& edge) const;
+  /// Boundary facets that hold both ends of the edge.
+  std::vector<FacetId> facets_of_edge(const EdgeKey& edge) const;
+  /// Whether cells of more than one body meet at the vertex.
+  bool is_on_interface(VertexId v) const;
   /// The boundary facet on these vertices in any order, or kNone.
   FacetId find_facet(const Facet& vertices) const;
   /// All edges of alive cells, ascending.
@@ -117,6 +142,7 @@ class Mesh {
   struct Renumbering {
     std::vector<VertexId> vertex;  ///< old id -> new id, kNone for dead ones
     std::vector<CellId> cell;
+    std::vector<FacetId> facet;
   };
   /// Removes dead slots, keeps the order of the others.
   Renumbering compact();
@@ -129,7 +155,7 @@ class Mesh {
   void add_facet(const Facet& facet, int tag);
   void remove_cell(CellId c);
   void remove_facet(FacetId f);
-  Mat<Dim> rest_edges(CellId c) const;
+  std::array<Vec<Dim>, Dim + 1> corners(CellId c) const;
   void update_geometry(CellId c);
 
   int num_vertices_ = 0, num_cells_ = 0, num_facets_ = 0;
@@ -137,7 +163,7 @@ class Mesh {
   std::vector<char> vertex_alive_;
   std::vector<Cell> cells_;
   std::vector<int> body_;
-  std::vector<double> volume_;
+  std::vector<double> volume_, quality_;
   std::vector<Mat<Dim>> inverse_edges_;
   std::vector<Facet> facets_;
   std::vector<int> facet_tag_;

@@ -1,18 +1,104 @@
 // SPDX-License-Identifier: MIT
-// Makes edits from a const mesh: the combinatorial and rest-shape half of an operation. What the edit does to the energy is
-// decided in trial.hpp.
+// Makes edits from a const mesh: the combinatorial and rest-shape half of an operation. What the edit does to the energy,
+// and whether positions stay valid, is decided in a trial.
 #pragma once
 
+#include <array>
+#include <functional>
 #include <optional>
+#include <string_view>
 
 #include "itr/mesh/mesh.hpp"
+#include "itr/mesh/strata.hpp"
 
 namespace itr {
+
+/// Why an operation is not possible.
+enum class Refusal {
+  none,
+  gone,          ///< no such edge, facet or vertex in the mesh
+  non_manifold,  ///< the cells around it are neither a ball nor a half ball
+  held,       ///< whatever would have to go or move is on a feature, corner or patch that it may not leave: the shape would
+              ///< change
+  link,       ///< a collapse that would change the topology of the bodies, their surfaces or features (link condition)
+  exists,     ///< the edge that a swap makes is there already
+  long_ring,  ///< an edge to be removed has too many cells around it
+  shape,      ///< a cell would be inverted, flat, or much worse than the worst that is there now
+  outside,    ///< the target of a move lies outside of the cells around
+  cost        ///< infinite cost of each triangulation of the ring
+};
+inline constexpr int kRefusals = 10;
+std::string_view name(Refusal refusal);
+
+/// How often each refusal was seen.
+struct RefusalCounts {
+  std::array<long, kRefusals> count{};
+  long& operator[](Refusal refusal) { return count[static_cast<int>(refusal)]; }
+  long operator[](Refusal refusal) const { return count[static_cast<int>(refusal)]; }
+};
+
+/// An edit, or why there is none.
+template <int Dim>
+struct Proposal {
+  std::optional<Edit<Dim>> edit{};
+  Refusal refusal = Refusal::none;
+  double cost = 0;  ///< of the inserted cells, where the operation minimised one
+
+  explicit operator bool() const { return edit.has_value(); }
+};
+
+/// Least quality (simplex_quality of the rest shape: 1 regular, 0 flat) of a new cell, relative to the worst cell that it
+/// replaces: at least `share` of it, and where it is above `floor` not below `floor`. What is worse than `floor` may only
+/// improve, so that no sequence of edits makes a mesh worse than `floor` or what it was.
+struct QualityRule {
+  double share = 0.3;
+  double floor = 0.1;
+  double least(double worst_before) const { return std::max(share * worst_before, std::min(floor, worst_before)); }
+};
+/// A split halves volumes wherever it is wanted: only needles are kept from getting worse.
+inline constexpr QualityRule kSplitRule{.share = 0, .floor = 1e-4};
 
 /// Splits an edge at its midpoint: every incident cell and boundary facet becomes two. Fields of the new vertex are the
 /// means of the ends.
 template <int Dim>
 Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
+/// The same where the edge is there and the new cells keep the rule.
+template <int Dim>
+Proposal<Dim> propose_split(const Mesh<Dim>& mesh, const EdgeKey& edge, const QualityRule& rule = kSplitRule);
+
+/// Collapses an edge where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev
+/// 1999 in the volume, on patches and along features) and the rest shape exactly: an end may go where the edge is of its own
+/// stratum (in the volume, within its patch, along its straight feature). Where both may, the midpoint is tried first, then
+/// either end.
+template <int Dim>
+Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata, const EdgeKey& edge,
+                               const QualityRule& rule = {});
+
+/// Cost of a tetrahedron that an edit would insert, by its vertices (positively oriented) and body; infinite: never.
+using CellCost = std::function<double(const MeshTypes<3>::Cell& vertices, int body)>;
+
+/// The longest ring whose triangulations are searched.
+inline constexpr int kLongestRing = 7;
+
+/// Removes an edge: the ring around it is triangulated such that the sum of the new cells' costs is least (Klincsek 1980;
+/// the 3-2 and 4-4 swaps are rings of 3 and 4), each of them by the rule. Also within a patch of the surface (2-2 and on) or
+/// of an interface, where the facets at the edge swap in their plane.
+Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, const EdgeKey& edge, const CellCost& cost,
+                                 const QualityRule& rule = {});
+
+/// Replaces the two cells at an inner facet by three around the edge between their other vertices (2-3 swap).
+Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet& facet, const QualityRule& rule = {});
+
+/// Moves a vertex's rest position as far towards `target` as its stratum goes: in the volume to it, otherwise to its
+/// projection onto the patch or the feature. Fields are those of the old mesh at that place.
+template <int Dim>
+Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, VertexId vertex, const Vec<Dim>& target,
+                           const QualityRule& rule = {});
+
+/// The rest position, within the vertex's stratum, that makes the cells around as regular as possible (least sum of the
+/// AMIPS measure tr(J^T J) / det(J)^(2/Dim)), by damped Newton.
+template <int Dim>
+Vec<Dim> best_shaped_position(const Mesh<Dim>& mesh, const Strata<Dim>& strata, VertexId vertex, int max_iterations);
 
 /// Collapses an edge of a triangle mesh where that keeps the domain, its tags and material interfaces: an edge with one end
 /// on the boundary or an interface goes to that end, an interior edge to its midpoint, a boundary edge only along straight

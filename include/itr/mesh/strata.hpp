@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+// What of a mesh's shape each vertex, edge and facet belongs to: the inside, a flat patch of the surface or of an interface
+// between bodies, a straight feature, a corner. Found once from the input and carried by edits from then on, so that what an
+// edit may do never hangs on the round-off of earlier ones.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "itr/mesh/mesh.hpp"
+
+namespace itr {
+
+/// In ascending order of how much they are held.
+enum class Stratum : unsigned char {
+  volume,   ///< inside one body
+  surface,  ///< inside a patch: facets of one plane with one body and tag, or between the same two bodies (2D: of a line)
+  feature,  ///< on a straight stretch where the same patches meet (in 3D only)
+  corner,   ///< none of the others: cannot move without changing the shape
+  non_manifold  ///< the cells around are no ball, no half ball: bodies that hang together by this vertex or edge
+};
+std::string_view name(Stratum stratum);
+
+template <int Dim>
+class Strata {
+ public:
+  using Facet = typename MeshTypes<Dim>::Facet;
+  /// How far a vertex may lie off the plane or line of its neighbours, in units of the mesh's bounding box's diagonal, to
+  /// count as lying on it: coordinates of about 16 digits that were rotated and moved.
+  static constexpr double kFlatness = 1e-10;
+
+  Strata() = default;
+  explicit Strata(const Mesh<Dim>& mesh, double flatness = kFlatness);
+
+  Stratum vertex(VertexId v) const { return vertices_[v]; }
+  /// In 2D `surface` are all edges of the boundary and of interfaces.
+  Stratum edge(const Mesh<Dim>& mesh, const EdgeKey& edge) const;
+  /// The patch of a boundary facet.
+  int patch(FacetId facet) const { return patches_[facet]; }
+  /// The patch of the facet on these vertices (in any order) between two bodies; kNone where there is none.
+  int interface_patch(const Facet& vertices) const;
+  int num_patches() const { return static_cast<int>(planes_.size()); }
+
+  /// A boundary or interface facet and its patch.
+  struct Sheet {
+    Facet vertices;
+    int patch;
+    bool is_boundary;
+  };
+  std::vector<Sheet> sheets_of(const Mesh<Dim>& mesh, VertexId v) const;
+  std::vector<Sheet> sheets_of_edge(const Mesh<Dim>& mesh, const EdgeKey& edge) const;
+  /// The ends of the features at a vertex: two where it is of the kind `feature`.
+  std::vector<VertexId> feature_neighbours(const Mesh<Dim>& mesh, VertexId v) const;
+  /// Projects a displacement of the vertex's rest position onto those that leave the shape as it is: identity in the volume,
+  /// onto the patch's plane, onto the feature's direction, zero at a corner.
+  Mat<Dim> tangent_projector(const Mesh<Dim>& mesh, VertexId v) const;
+
+  /// Follows an edit that was just applied and created `created` (or kNone).
+  void follow(const Edit<Dim>& edit, VertexId created);
+  void compact(const typename Mesh<Dim>::Renumbering& map);
+  /// First disagreement with the mesh in words: missing or superfluous facets, a vertex off its patch's plane.
+  std::string find_defect(const Mesh<Dim>& mesh) const;
+
+ private:
+  struct Plane {
+    Vec<Dim> point, normal;
+  };
+  struct FacetHash {
+    std::size_t operator()(const Facet& facet) const {
+      std::size_t hash = 0;
+      for (const int v : facet) hash = (hash ^ static_cast<std::size_t>(v)) * 0x9e3779b97f4a7c15ull;
+      return hash ^ (hash >> 32);
+    }
+  };
+  void append_interfaces(const typename MeshTypes<Dim>::Cell& cell, std::span<const VertexId> held,
+                         std::vector<Sheet>& to) const;
+  Stratum classify(const Mesh<Dim>& mesh, VertexId v) const;
+
+  std::vector<Stratum> vertices_;
+  std::vector<int> patches_;  ///< by facet slot
+  std::unordered_map<Facet, int, FacetHash> interfaces_;
+  std::vector<Plane> planes_;  ///< by patch
+  double tolerance_ = 0;       ///< [m]
+};
+
+extern template class Strata<2>;
+extern template class Strata<3>;
+
+}  // namespace itr

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "edit_checks.hpp"
+
+#include <cmath>
+
+namespace itr {
+
+std::string_view name(Refusal refusal) {
+  static constexpr std::string_view kNames[kRefusals] = {"none",   "gone",      "non-manifold", "held",    "link",
+                                                         "exists", "long ring", "shape",        "outside", "cost"};
+  return kNames[static_cast<int>(refusal)];
+}
+
+bool has_valid_rest_shape(const Mesh<2>& mesh, const Edit<2>& edit) {
+  constexpr double kLeastVolumeShare = 1e-4;  // of the mean area around
+  double removed = 0;
+  for (const CellId c : edit.removed_cells) removed += mesh.volume(c);
+  const double least = kLeastVolumeShare * removed / static_cast<double>(edit.removed_cells.size());
+  for (const auto& cell : edit.inserted_cells) {
+    std::array<Vec<2>, 3> p;
+    for (int k = 0; k < 3; ++k)
+      p[k] = edit.value && cell.vertices[k] == edit.value->vertex ? edit.value->rest : mesh.rest(cell.vertices[k]);
+    if (orientation(p[0], p[1], p[2]) <= 0 || simplex_volume<2>(p) < least) return false;
+  }
+  return true;
+}
+
+template <int Dim>
+std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, std::span<const CellId> cells) {
+  std::vector<typename Mesh<Dim>::Facet> found;
+  if (std::all_of(cells.begin(), cells.end(), [&](CellId c) { return mesh.body(c) == mesh.body(cells[0]); })) return found;
+  std::vector<std::pair<typename Mesh<Dim>::Facet, int>> faces;
+  for (const CellId c : cells)
+    for (int k = 0; k <= Dim; ++k) faces.emplace_back(ascending(opposite_facet<Dim>(mesh.cell(c), k)), mesh.body(c));
+  std::sort(faces.begin(), faces.end());
+  for (std::size_t i = 1; i < faces.size(); ++i)
+    if (faces[i].first == faces[i - 1].first && faces[i].second != faces[i - 1].second) found.push_back(faces[i].first);
+  return found;
+}
+
+template <int Dim>
+bool is_on_interface(const Mesh<Dim>& mesh, VertexId vertex) {
+  return mesh.is_on_interface(vertex);
+}
+
+template std::vector<Mesh<2>::Facet> interfaces_among(const Mesh<2>&, std::span<const CellId>);
+template std::vector<Mesh<3>::Facet> interfaces_among(const Mesh<3>&, std::span<const CellId>);
+template bool is_on_interface<2>(const Mesh<2>&, VertexId);
+template bool is_on_interface<3>(const Mesh<3>&, VertexId);
+
+}  // namespace itr

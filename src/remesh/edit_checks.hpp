@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// What the operations' files share.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include "itr/geometry/measures.hpp"
+#include "itr/geometry/predicates.hpp"
+#include "itr/remesh/edits.hpp"
+
+namespace itr {
+
+template <std::size_t N>
+std::array<int, N> replaced(std::array<int, N> ids, int from, int to) {
+  std::replace(ids.begin(), ids.end(), from, to);
+  return ids;
+}
+
+template <std::size_t N>
+bool holds(const std::array<int, N>& ids, int v) {
+  return std::find(ids.begin(), ids.end(), v) != ids.end();
+}
+
+/// Whether every inserted triangle keeps a positive rest area that is not vanishing beside the removed ones.
+bool has_valid_rest_shape(const Mesh<2>& mesh, const Edit<2>& edit);
+
+/// Facets between two of these cells that are of different bodies, vertices ascending.
+template <int Dim>
+std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, std::span<const CellId> cells);
+
+/// Quality of a cell of which one vertex (kNone: none) is at another place; 0 where it is not positively oriented, by the
+/// exact predicate where round-off could decide.
+template <int Dim>
+double quality_with(const Mesh<Dim>& mesh, const typename Mesh<Dim>::Cell& cell, VertexId moved, const Vec<Dim>& place) {
+  constexpr double kCertain = 1e-9;
+  std::array<Vec<Dim>, Dim + 1> p;
+  for (int k = 0; k <= Dim; ++k) p[k] = cell[k] == moved ? place : mesh.rest(cell[k]);
+  const double quality = simplex_quality<Dim>(p);
+  if (quality > kCertain) return quality;
+  const bool positive = [&] {
+    if constexpr (Dim == 2)
+      return orientation(p[0], p[1], p[2]) > 0;
+    else
+      return orientation(p[0], p[1], p[2], p[3]) > 0;
+  }();
+  return positive && simplex_volume<Dim>(p) > 0 ? std::max(quality, std::numeric_limits<double>::min()) : 0;
+}
+
+/// Worst quality of these cells, at most 1.
+template <int Dim>
+double worst_quality(const Mesh<Dim>& mesh, std::span<const CellId> cells) {
+  double worst = 1;
+  for (const CellId c : cells) worst = std::min(worst, mesh.quality(c));
+  return worst;
+}
+
+template <int Dim>
+Proposal<Dim> refused(Refusal refusal) {
+  return {.refusal = refusal};
+}
+
+}  // namespace itr

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MIT
+#include <bit>
+
+#include "edit_checks.hpp"
+
+namespace itr {
+
+namespace {
+
+/// Neighbours that both vertices have in common.
+std::vector<VertexId> common_neighbours(const Mesh<2>& mesh, VertexId a, VertexId b) {
+  const auto ring = [&](VertexId v) {
+    std::vector<VertexId> ids;
+    for (const CellId c : mesh.cells_of(v))
+      for (const int w : mesh.cell(c))
+        if (w != v) ids.push_back(w);
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return ids;
+  };
+  const auto ra = ring(a), rb = ring(b);
+  std::vector<VertexId> common;
+  std::set_intersection(ra.begin(), ra.end(), rb.begin(), rb.end(), std::back_inserter(common));
+  return common;
+}
+
+/// Whether boundary vertex v can slide along the boundary edge v-w: its other boundary edge goes straight on with one tag.
+bool can_slide(const Mesh<2>& mesh, VertexId v, VertexId w, FacetId edge) {
+  const auto facets = mesh.facets_of(v);
+  if (facets.size() != 2 || is_on_interface(mesh, v)) return false;
+  const FacetId other = facets[0] == edge ? facets[1] : facets[0];
+  if (mesh.facet_tag(other) != mesh.facet_tag(edge)) return false;
+  const auto& f = mesh.facet(other);
+  const VertexId far = f[0] == v ? f[1] : f[0];
+  const Vec<2> a = (mesh.rest(w) - mesh.rest(v)).normalized(), b = (mesh.rest(far) - mesh.rest(v)).normalized();
+  constexpr double kStraight = 1 - 1e-10;
+  return -a.dot(b) > kStraight;
+}
+
+enum class End { first, second, middle };
+
+/// Where the vertex that is left may stand, or nothing.
+std::optional<End> collapse_target(const Mesh<2>& mesh, const EdgeKey& edge, FacetId facet) {
+  const auto [a, b] = edge;
+  if (facet != kNone) {
+    const bool slides_a = can_slide(mesh, a, b, facet), slides_b = can_slide(mesh, b, a, facet);
+    if (slides_a && slides_b) return End::middle;
+    if (slides_b) return End::first;
+    if (slides_a) return End::second;
+    return std::nullopt;
+  }
+  const bool fixed_a = mesh.is_boundary(a) || is_on_interface(mesh, a);
+  const bool fixed_b = mesh.is_boundary(b) || is_on_interface(mesh, b);
+  if (fixed_a && fixed_b) return std::nullopt;
+  return fixed_a ? End::first : fixed_b ? End::second : End::middle;
+}
+
+template <typename List>
+bool contains(const List& list, int item) {
+  return std::find(list.begin(), list.end(), item) != list.end();
+}
+
+/// Vertices around one end of an edge with whether they are in the edge's link: a hash table with linear probing.
+class Neighbourhood {
+ public:
+  explicit Neighbourhood(std::size_t most) : slots_(std::bit_ceil(2 * most + 1)) {}
+  void add(VertexId v) { slots_[find(v)].vertex = v; }
+  void put_in_link(VertexId v) { slots_[find(v)] = {v, true}; }
+  bool holds(VertexId v) const { return slots_[find(v)].vertex == v; }
+  bool is_in_link(VertexId v) const { return slots_[find(v)].in_link; }
+
+ private:
+  struct Slot {
+    VertexId vertex = kNone;
+    bool in_link = false;
+  };
+  std::size_t find(VertexId v) const {
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t i = static_cast<std::size_t>(v) * 0x9e3779b97f4a7c15ull >> 32 & mask;
+    while (slots_[i].vertex != kNone && slots_[i].vertex != v) i = (i + 1) & mask;
+    return i;
+  }
+  std::vector<Slot> slots_;
+};
+
+/// Link condition in the volume: whatever vertices and edges the links of a and b have in common must be in the link of a-b.
+template <int Dim>
+bool keeps_cells_apart(const Mesh<Dim>& mesh, VertexId a, VertexId b, const std::vector<CellId>& around_edge) {
+  const auto around_a = mesh.cells_of(a);
+  Neighbourhood beside_a(Dim * around_a.size());
+  for (const CellId c : around_a)
+    for (const int v : mesh.cell(c))
+      if (v != a) beside_a.add(v);
+  for (const CellId c : around_edge)
+    for (const int v : mesh.cell(c))
+      if (v != a && v != b) beside_a.put_in_link(v);
+  std::vector<EdgeKey> pairs;  // vertices of the link that b, but not a with b, has a cell on
+  for (const CellId c : mesh.cells_of(b)) {
+    const auto& cell = mesh.cell(c);
+    if (holds(cell, a)) continue;
+    std::array<VertexId, Dim + 1> common;
+    int n = 0;
+    for (const int w : cell) {
+      if (w == b || !beside_a.holds(w)) continue;
+      if (!beside_a.is_in_link(w)) return false;
+      common[n++] = w;
+    }
+    for (int i = 0; i < n; ++i)
+      for (int j = i + 1; j < n; ++j) pairs.push_back({common[i], common[j]});
+  }
+  const auto hold = [&](const auto& cells, const EdgeKey& pair) {
+    return std::any_of(cells.begin(), cells.end(),
+                       [&](CellId c) { return holds(mesh.cell(c), pair[0]) && holds(mesh.cell(c), pair[1]); });
+  };
+  return std::none_of(pairs.begin(), pairs.end(),
+                      [&](const EdgeKey& pair) { return !hold(around_edge, pair) && hold(around_a, pair); });
+}
+
+/// Link conditions among the facets of the boundary and of interfaces and, for a feature's edge, among features.
+template <int Dim>
+bool keeps_sheets_apart(const Mesh<Dim>& mesh, const Strata<Dim>& strata, const EdgeKey& edge, Stratum along) {
+  const auto vertices_of = [](const auto& sheets) {
+    std::vector<VertexId> vertices;
+    for (const auto& sheet : sheets) vertices.insert(vertices.end(), sheet.vertices.begin(), sheet.vertices.end());
+    return vertices;
+  };
+  const auto beside_a = vertices_of(strata.sheets_of(mesh, edge[0])), link = vertices_of(strata.sheets_of_edge(mesh, edge));
+  for (const int w : vertices_of(strata.sheets_of(mesh, edge[1])))
+    if (!contains(link, w) && contains(beside_a, w)) return false;
+  if (along != Stratum::feature) return true;
+  const auto features = strata.feature_neighbours(mesh, edge[0]);
+  for (const VertexId w : strata.feature_neighbours(mesh, edge[1]))
+    if (contains(features, w)) return false;
+  return true;
+}
+
+/// One way to collapse an edge: `gone` merges into `kept`, which may move.
+template <int Dim>
+struct Merge {
+  VertexId gone, kept;
+  Vec<Dim> place;
+  bool moves;
+};
+
+template <int Dim>
+bool keeps_shape(const Mesh<Dim>& mesh, const Merge<Dim>& merge, const QualityRule& rule) {
+  const auto around = mesh.cells_of(merge.gone);
+  double worst = worst_quality<Dim>(mesh, around);
+  if (merge.moves) worst = std::min(worst, worst_quality<Dim>(mesh, mesh.cells_of(merge.kept)));
+  const double least = rule.least(worst);
+  const auto fine = [&](CellId c, VertexId end, VertexId other) {
+    if (holds(mesh.cell(c), other)) return true;
+    const double quality = quality_with<Dim>(mesh, mesh.cell(c), end, merge.place);
+    return quality > 0 && quality >= least;
+  };
+  if (!std::all_of(around.begin(), around.end(), [&](CellId c) { return fine(c, merge.gone, merge.kept); })) return false;
+  const auto ring = mesh.cells_of(merge.kept);
+  return !merge.moves || std::all_of(ring.begin(), ring.end(), [&](CellId c) { return fine(c, merge.kept, merge.gone); });
+}
+
+template <int Dim>
+Edit<Dim> make_edit(const Mesh<Dim>& mesh, const EdgeKey& edge, const Merge<Dim>& merge) {
+  const auto& [gone, kept, place, moves] = merge;
+  Edit<Dim> edit{.kind = Edit<Dim>::Kind::collapse, .edge = edge};
+  typename Edit<Dim>::Value value{kept, place};
+  value.parents[0] = kept;
+  value.parents[1] = gone;
+  value.num_parents = moves ? 2 : 1;
+  value.weights[0] = moves ? 0.5 : 1;
+  value.weights[1] = moves ? 0.5 : 0;
+  edit.value = value;
+  edit.removed_vertex = gone;
+
+  const auto around = mesh.cells_of(gone);
+  edit.removed_cells.assign(around.begin(), around.end());
+  if (moves)
+    for (const CellId c : mesh.cells_of(kept))
+      if (!holds(mesh.cell(c), gone)) edit.removed_cells.push_back(c);
+  std::sort(edit.removed_cells.begin(), edit.removed_cells.end());
+  for (const CellId c : edit.removed_cells) {
+    const auto& cell = mesh.cell(c);
+    if (!(holds(cell, gone) && holds(cell, kept))) edit.inserted_cells.push_back({replaced(cell, gone, kept), mesh.body(c)});
+  }
+  const auto replace_facet = [&](FacetId f) {
+    edit.removed_facets.push_back(f);
+    const auto& facet = mesh.facet(f);
+    if (!(holds(facet, gone) && holds(facet, kept)))
+      edit.inserted_facets.push_back({replaced(facet, gone, kept), mesh.facet_tag(f), f});
+  };
+  for (const FacetId f : mesh.facets_of(gone)) replace_facet(f);
+  if (moves)
+    for (const FacetId f : mesh.facets_of(kept))
+      if (!holds(mesh.facet(f), gone)) replace_facet(f);
+  for (const auto& facet : interfaces_among<Dim>(mesh, edit.removed_cells)) {
+    if (!holds(facet, gone)) continue;
+    edit.removed_interfaces.push_back(facet);
+    if (!holds(facet, kept)) edit.inserted_interfaces.push_back({ascending(replaced(facet, gone, kept)), facet});
+  }
+  return edit;
+}
+
+}  // namespace
+
+template <int Dim>
+Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata, const EdgeKey& edge,
+                               const QualityRule& rule) {
+  const auto [a, b] = edge;
+  const auto around_edge = mesh.cells_of_edge(edge);
+  if (around_edge.empty()) return refused<Dim>(Refusal::gone);
+  const Stratum at_a = strata.vertex(a), at_b = strata.vertex(b), along = strata.edge(mesh, edge);
+  if (at_a == Stratum::non_manifold || at_b == Stratum::non_manifold || along == Stratum::non_manifold)
+    return refused<Dim>(Refusal::non_manifold);
+  if (at_a != along && at_b != along) return refused<Dim>(Refusal::held);
+  if (!keeps_cells_apart(mesh, a, b, around_edge)) return refused<Dim>(Refusal::link);
+  if (along != Stratum::volume && !keeps_sheets_apart(mesh, strata, edge, along)) return refused<Dim>(Refusal::link);
+  std::vector<Merge<Dim>> merges;
+  if (at_a == along && at_b == along) merges.push_back({b, a, 0.5 * (mesh.rest(a) + mesh.rest(b)), true});
+  if (at_b == along) merges.push_back({b, a, mesh.rest(a), false});
+  if (at_a == along) merges.push_back({a, b, mesh.rest(b), false});
+  for (const Merge<Dim>& merge : merges)
+    if (keeps_shape(mesh, merge, rule)) return {.edit = make_edit(mesh, edge, merge)};
+  return refused<Dim>(Refusal::shape);
+}
+
+std::optional<Edit<2>> make_collapse(const Mesh<2>& mesh, const EdgeKey& edge) {
+  const auto [a, b] = edge;
+  Edit<2> edit{.kind = Edit<2>::Kind::collapse, .edge = edge};
+  const auto around_edge = mesh.cells_of_edge(edge);
+  if (around_edge.empty() || common_neighbours(mesh, a, b).size() != around_edge.size()) return std::nullopt;
+  const FacetId facet = mesh.find_facet({a, b});
+  const auto target = collapse_target(mesh, edge, facet);
+  if (!target) return std::nullopt;
+
+  const VertexId kept = *target == End::second ? b : a, gone = kept == a ? b : a;
+  Edit<2>::Value value{kept, *target == End::middle ? Vec<2>(0.5 * (mesh.rest(a) + mesh.rest(b))) : mesh.rest(kept)};
+  value.parents = {kept, gone, kNone};
+  value.weights = *target == End::middle ? std::array{0.5, 0.5, 0.0} : std::array{1.0, 0.0, 0.0};
+  value.num_parents = *target == End::middle ? 2 : 1;
+  edit.value = value;
+  edit.removed_vertex = gone;
+
+  std::vector<CellId> around(mesh.cells_of(gone).begin(), mesh.cells_of(gone).end());
+  if (*target == End::middle)
+    around.insert(around.end(), mesh.cells_of(kept).begin(), mesh.cells_of(kept).end());
+  else
+    around.insert(around.end(), around_edge.begin(), around_edge.end());
+  std::sort(around.begin(), around.end());
+  around.erase(std::unique(around.begin(), around.end()), around.end());
+  for (const CellId c : around) {
+    edit.removed_cells.push_back(c);
+    const auto& cell = mesh.cell(c);
+    if (!(holds(cell, a) && holds(cell, b))) edit.inserted_cells.push_back({replaced(cell, gone, kept), mesh.body(c)});
+  }
+  for (const FacetId f : mesh.facets_of(gone)) {
+    edit.removed_facets.push_back(f);
+    if (f != facet) edit.inserted_facets.push_back({replaced(mesh.facet(f), gone, kept), mesh.facet_tag(f), f});
+  }
+  if (facet != kNone && *target == End::middle)  // the kept vertex moves, so its other edge changes its length
+    for (const FacetId f : mesh.facets_of(kept)) {
+      if (f == facet) continue;
+      edit.removed_facets.push_back(f);
+      edit.inserted_facets.push_back({mesh.facet(f), mesh.facet_tag(f), f});
+    }
+  if (edit.inserted_cells.empty() || !has_valid_rest_shape(mesh, edit)) return std::nullopt;
+  return edit;
+}
+
+template Proposal<2> propose_collapse<2>(const Mesh<2>&, const Strata<2>&, const EdgeKey&, const QualityRule&);
+template Proposal<3> propose_collapse<3>(const Mesh<3>&, const Strata<3>&, const EdgeKey&, const QualityRule&);
+
+}  // namespace itr

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include "edit_checks.hpp"
+#include "itr/mesh/edge_ring.hpp"
+
+namespace itr {
+
+namespace {
+
+bool are_joined(const Mesh<3>& mesh, VertexId u, VertexId v) {
+  const auto around = mesh.cells_of(u);
+  return std::any_of(around.begin(), around.end(), [&](CellId c) { return holds(mesh.cell(c), v); });
+}
+
+/// A planar polygon of ring vertices around an edge a-b, counterclockwise seen from b, to be cut into triangles, each of
+/// which is the base of a cell to a and of one to b.
+struct Polygon {
+  std::vector<VertexId> vertices;
+  int body;
+};
+
+/// The cut of least cost by dynamic programming over the polygon's stretches (Klincsek 1980).
+class LeastCut {
+ public:
+  LeastCut(const Mesh<3>& mesh, const EdgeKey& edge, const Polygon& polygon, double least_quality, const CellCost& cost)
+      : mesh_(mesh), edge_(edge), polygon_(polygon), least_quality_(least_quality), cost_of_(cost) {
+    const int n = static_cast<int>(polygon.vertices.size());
+    for (int length = 2; length < n; ++length)
+      for (int i = 0; i + length < n; ++i) {
+        Stretch best{.cost = HUGE_VAL};
+        for (int k = i + 1; k < i + length; ++k) {
+          const double parts = stretches_[i][k].cost + stretches_[k][i + length].cost;
+          if (!(parts < HUGE_VAL)) continue;
+          const double cost = parts + triangle_cost(i, k, i + length);
+          if (cost < best.cost) best = {cost, k};
+        }
+        stretches_[i][i + length] = best;
+      }
+  }
+
+  double cost() const { return stretches_[0][polygon_.vertices.size() - 1].cost; }
+  /// Whether only the caller's cost stood in the way of some triangle.
+  bool cost_forbids() const { return cost_forbids_; }
+
+  void append_cells(std::vector<Edit<3>::NewCell>& cells) const {
+    append(0, static_cast<int>(polygon_.vertices.size()) - 1, cells);
+  }
+  /// The edges that the cut makes inside of the polygon.
+  std::vector<EdgeKey> diagonals() const {
+    std::vector<EdgeKey> found;
+    append_diagonals(0, static_cast<int>(polygon_.vertices.size()) - 1, found);
+    return found;
+  }
+
+ private:
+  struct Stretch {  ///< polygon from vertex i to j, closed by the edge i-j
+    double cost = 0;
+    int apex = kNone;  ///< of the triangle at that edge
+  };
+
+  std::array<Mesh<3>::Cell, 2> cells_on(int i, int k, int j) const {
+    const VertexId u = polygon_.vertices[i], v = polygon_.vertices[k], w = polygon_.vertices[j];
+    return {{{u, w, v, edge_[0]}, {u, v, w, edge_[1]}}};
+  }
+  double triangle_cost(int i, int k, int j) {
+    double sum = 0;
+    const auto cells = cells_on(i, k, j);
+    for (const auto& cell : cells) {
+      const double quality = quality_with<3>(mesh_, cell, kNone, Vec<3>::Zero());
+      if (!(quality > 0 && quality >= least_quality_)) return HUGE_VAL;
+    }
+    for (const auto& cell : cells) sum += cost_of_(cell, polygon_.body);
+    if (sum < HUGE_VAL) return sum;
+    cost_forbids_ = true;
+    return HUGE_VAL;
+  }
+  void append(int i, int j, std::vector<Edit<3>::NewCell>& cells) const {
+    if (j - i < 2) return;
+    const int k = stretches_[i][j].apex;
+    for (const auto& cell : cells_on(i, k, j)) cells.push_back({cell, polygon_.body});
+    append(i, k, cells);
+    append(k, j, cells);
+  }
+  void append_diagonals(int i, int j, std::vector<EdgeKey>& found) const {
+    if (j - i < 2) return;
+    const int k = stretches_[i][j].apex;
+    for (const auto& [from, to] : {std::pair(i, k), std::pair(k, j)})
+      if (to - from > 1) found.push_back({polygon_.vertices[from], polygon_.vertices[to]});
+    append_diagonals(i, k, found);
+    append_diagonals(k, j, found);
+  }
+
+  const Mesh<3>& mesh_;
+  EdgeKey edge_;
+  const Polygon& polygon_;
+  double least_quality_;
+  const CellCost& cost_of_;
+  bool cost_forbids_ = false;
+  std::array<std::array<Stretch, kLongestRing + 1>, kLongestRing + 1> stretches_{};
+};
+
+/// The ring as polygons of one body each: itself in the volume, the fan at the surface, one on each side of an interface.
+/// The polygons' closing edges are then in the patch.
+std::vector<Polygon> polygons_of(const Mesh<3>& mesh, const EdgeRing& ring) {
+  const int n = static_cast<int>(ring.vertices.size());
+  const auto body = [&](int i) { return mesh.body(ring.cells[i]); };
+  std::vector<int> cuts;  // ring vertices between cells of different bodies
+  if (ring.closed)
+    for (int i = 0; i < n; ++i)
+      if (body(i) != body((i + n - 1) % n)) cuts.push_back(i);
+  if (cuts.empty()) return {{ring.vertices, body(0)}};
+  std::vector<Polygon> polygons;
+  for (std::size_t p = 0; p < cuts.size(); ++p) {
+    const int begin = cuts[p], end = cuts[(p + 1) % cuts.size()];
+    Polygon polygon{{}, body(begin)};
+    for (int i = begin; i != end; i = (i + 1) % n) polygon.vertices.push_back(ring.vertices[i]);
+    polygon.vertices.push_back(ring.vertices[end]);
+    polygons.push_back(polygon);
+  }
+  return polygons;
+}
+
+/// The two facets at the edge swap in their plane: a-b gives way to u-v.
+void swap_facets(const Mesh<3>& mesh, const Strata<3>& strata, const EdgeRing& ring, Edit<3>& edit) {
+  const auto [a, b] = edit.edge;
+  const auto sheets = strata.sheets_of_edge(mesh, edit.edge);
+  std::array<VertexId, 2> apex{};
+  for (int i = 0; i < 2; ++i)
+    for (const int v : sheets[i].vertices)
+      if (v != a && v != b) apex[i] = v;
+  if (sheets[0].is_boundary) {
+    edit.removed_facets = mesh.facets_of_edge(edit.edge);
+    const FacetId parent = edit.removed_facets[0];
+    const VertexId first = ring.vertices.front(), last = ring.vertices.back();
+    edit.inserted_facets = {{{first, b, last}, mesh.facet_tag(parent), parent},
+                            {{first, last, a}, mesh.facet_tag(parent), parent}};
+  } else {
+    for (const auto& sheet : sheets) edit.removed_interfaces.push_back(ascending(sheet.vertices));
+    for (const VertexId end : {a, b})
+      edit.inserted_interfaces.push_back({ascending(Mesh<3>::Facet{apex[0], apex[1], end}), edit.removed_interfaces[0]});
+  }
+}
+
+}  // namespace
+
+Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, const EdgeKey& edge, const CellCost& cost,
+                                 const QualityRule& rule) {
+  const auto ring = ring_of_edge(mesh, edge);
+  if (!ring) return refused<3>(mesh.cells_of_edge(edge).empty() ? Refusal::gone : Refusal::non_manifold);
+  const Stratum along = strata.edge(mesh, edge);
+  if (along != Stratum::volume && along != Stratum::surface) return refused<3>(Refusal::held);
+  if (ring->vertices.size() > kLongestRing) return refused<3>(Refusal::long_ring);
+  const double least = rule.least(worst_quality<3>(mesh, ring->cells));
+
+  Proposal<3> proposal;
+  Edit<3> edit{.kind = Edit<3>::Kind::swap, .edge = edge, .removed_cells = ring->cells};
+  const auto polygons = polygons_of(mesh, *ring);
+  for (const Polygon& polygon : polygons) {
+    if (polygon.vertices.size() < 3) return refused<3>(Refusal::shape);  // a flat cell on a patch
+    const LeastCut cut(mesh, edge, polygon, least, cost);
+    if (!(cut.cost() < HUGE_VAL)) return refused<3>(cut.cost_forbids() ? Refusal::cost : Refusal::shape);
+    for (const auto& [u, v] : cut.diagonals())
+      if (are_joined(mesh, u, v)) return refused<3>(Refusal::exists);
+    cut.append_cells(edit.inserted_cells);
+    proposal.cost += cut.cost();
+  }
+  if (along == Stratum::surface) {
+    const auto& closing = polygons[0].vertices;
+    if (are_joined(mesh, closing.front(), closing.back())) return refused<3>(Refusal::exists);
+    swap_facets(mesh, strata, *ring, edit);
+  }
+  proposal.edit = std::move(edit);
+  return proposal;
+}
+
+Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet& facet, const QualityRule& rule) {
+  std::vector<CellId> cells;
+  for (const CellId c : mesh.cells_of(facet[0]))
+    if (holds(mesh.cell(c), facet[1]) && holds(mesh.cell(c), facet[2])) cells.push_back(c);
+  if (cells.empty()) return refused<3>(Refusal::gone);
+  if (cells.size() == 1 || mesh.body(cells[0]) != mesh.body(cells[1])) return refused<3>(Refusal::held);
+  const auto opposite = [&](CellId c) {
+    const auto& cell = mesh.cell(c);
+    return *std::find_if(cell.begin(), cell.end(), [&](int v) { return !holds(facet, v); });
+  };
+  const VertexId d = opposite(cells[0]), e = opposite(cells[1]);
+  if (are_joined(mesh, d, e)) return refused<3>(Refusal::exists);
+  Edit<3> edit{.kind = Edit<3>::Kind::swap, .edge = {std::min(d, e), std::max(d, e)}, .removed_cells = cells};
+  const double least = rule.least(worst_quality<3>(mesh, cells));
+  for (const VertexId v : facet) {  // one vertex of the facet after the other gives way to the far end
+    const auto cell = replaced(mesh.cell(cells[0]), v, e);
+    const double quality = quality_with<3>(mesh, cell, kNone, Vec<3>::Zero());
+    if (!(quality > 0 && quality >= least)) return refused<3>(Refusal::shape);
+    edit.inserted_cells.push_back({cell, mesh.body(cells[0])});
+  }
+  return {.edit = std::move(edit)};
+}
+
+std::optional<Edit<2>> make_swap(const Mesh<2>& mesh, const EdgeKey& edge) {
+  const auto cells = mesh.cells_of_edge(edge);
+  if (cells.size() != 2 || mesh.body(cells[0]) != mesh.body(cells[1])) return std::nullopt;
+  std::array<VertexId, 2> opposite;
+  for (int i = 0; i < 2; ++i)
+    for (const int v : mesh.cell(cells[i]))
+      if (v != edge[0] && v != edge[1]) opposite[i] = v;
+  for (const CellId c : mesh.cells_of(opposite[0]))
+    if (holds(mesh.cell(c), opposite[1])) return std::nullopt;  // that diagonal is there already
+  Edit<2> edit{.kind = Edit<2>::Kind::swap, .edge = edge};
+  edit.removed_cells = cells;
+  constexpr double kLeastSwapShare = 0.1;  // of the pair's area, for each triangle
+  const double area = mesh.volume(cells[0]) + mesh.volume(cells[1]);
+  // In each triangle one end of the edge gives way to the other triangle's far vertex; that keeps the orientation.
+  edit.inserted_cells.push_back({replaced(mesh.cell(cells[0]), edge[0], opposite[1]), mesh.body(cells[0])});
+  edit.inserted_cells.push_back({replaced(mesh.cell(cells[0]), edge[1], opposite[1]), mesh.body(cells[0])});
+  for (const auto& cell : edit.inserted_cells) {
+    const std::array<Vec<2>, 3> p{mesh.rest(cell.vertices[0]), mesh.rest(cell.vertices[1]), mesh.rest(cell.vertices[2])};
+    if (orientation(p[0], p[1], p[2]) <= 0 || simplex_volume<2>(p) < kLeastSwapShare * area) return std::nullopt;
+  }
+  return edit;
+}
+
+}  // namespace itr

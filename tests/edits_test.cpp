@@ -1,0 +1,517 @@
+// SPDX-License-Identifier: MIT
+// Strata, and edits of tetrahedral meshes: what they keep, what they refuse and why.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "itr/mesh/edge_ring.hpp"
+#include "random_tets.hpp"
+#include "square_mesh.hpp"
+
+namespace itr {
+namespace {
+
+std::map<Stratum, int> count_strata(const auto& mesh, const auto& strata) {
+  std::map<Stratum, int> count;
+  for (int v = 0; v < mesh.vertex_slots(); ++v) ++count[strata.vertex(v)];
+  return count;
+}
+
+const auto kGrid = [](int n) { return [n](int i, int j, int k) { return Vec<3>(Vec<3>(i, j, k) / n); }; };
+
+TEST(Strata, OfACubeOfTwoBodiesAreItsPlanesAndLines) {
+  // Turned by an angle that no coordinate survives without round-off.
+  const Mat<3> turn = Eigen::AngleAxisd(0.7, Vec<3>(1, 2, 3).normalized()).toRotationMatrix();
+  const auto place = [&](int i, int j, int k) { return Vec<3>(turn * Vec<3>(i, j, k) / 3); };
+  const Mesh<3> one = make_cubes(3, place, [](int, int, int) { return 1; });
+  const Strata<3> strata(one);
+  EXPECT_EQ(strata.find_defect(one), "");
+  EXPECT_EQ(strata.num_patches(), 6);
+  EXPECT_EQ(
+      count_strata(one, strata),
+      (std::map<Stratum, int>{{Stratum::volume, 8}, {Stratum::surface, 24}, {Stratum::feature, 24}, {Stratum::corner, 8}}));
+
+  const Mesh<3> two = make_cubes(3, place, [](int i, int, int) { return i == 0 ? 1 : 2; });
+  const Strata<3> of_two(two);
+  EXPECT_EQ(of_two.find_defect(two), "");
+  EXPECT_EQ(of_two.num_patches(), 11);  // four sides are cut in two
+  // The interface has 4 inner vertices, 8 on its straight rim and 4 corners where the rim turns.
+  EXPECT_EQ(
+      count_strata(two, of_two),
+      (std::map<Stratum, int>{{Stratum::volume, 4}, {Stratum::surface, 20}, {Stratum::feature, 28}, {Stratum::corner, 12}}));
+  for (int v = 0; v < two.vertex_slots(); ++v) {
+    const Mat<3> P = of_two.tangent_projector(two, v);
+    EXPECT_NEAR((P * P - P).norm(), 0, 1e-14);
+    EXPECT_NEAR(P.trace(), std::max(0, 3 - static_cast<int>(of_two.vertex(v))), 1e-14);
+  }
+}
+
+TEST(Strata, FollowTagsShapesAndBodiesThatOnlyTouch) {
+  Mesh<3> tagged = make_cubes(2, kGrid(2), [](int, int, int) { return 1; });
+  for (int f = 0; f < tagged.facet_slots(); ++f) {  // half of the lower side has another tag
+    double x = 0;
+    for (const int v : tagged.facet(f)) x += tagged.rest(v)[0] / 3;
+    if (tagged.facet_tag(f) == 4 && x < 0.5) tagged.set_facet_tag(f, 9);
+  }
+  const Strata<3> of_tags(tagged);
+  EXPECT_EQ(of_tags.num_patches(), 7);
+  // The middle of the lower side is now on a feature, that feature's ends are corners.
+  EXPECT_EQ(
+      count_strata(tagged, of_tags),
+      (std::map<Stratum, int>{{Stratum::volume, 1}, {Stratum::surface, 5}, {Stratum::feature, 11}, {Stratum::corner, 10}}));
+
+  const auto round = [](int i, int j, int k) {
+    const Vec<3> p(i - 2, j - 2, k - 2);
+    return Vec<3>(p.norm() > 0 ? p * p.lpNorm<Eigen::Infinity>() / p.norm() : p);
+  };
+  const Mesh<3> ball = make_cubes(4, round, [](int, int, int) { return 1; });
+  const auto of_ball = count_strata(ball, Strata<3>(ball));
+  EXPECT_EQ(of_ball, (std::map<Stratum, int>{{Stratum::volume, 27}, {Stratum::corner, 98}}));
+
+  const Mesh<3> by_edge = make_cubes(2, kGrid(2), [](int i, int j, int k) { return k == 0 && i == j ? i + 1 : kNone; });
+  const Strata<3> of_edge(by_edge);
+  EXPECT_EQ(count_strata(by_edge, of_edge)[Stratum::non_manifold], 2);
+  const Mesh<3> by_vertex = make_cubes(2, kGrid(2), [](int i, int j, int k) { return i == j && j == k ? 1 : kNone; });
+  EXPECT_EQ(count_strata(by_vertex, Strata<3>(by_vertex))[Stratum::non_manifold], 1);
+}
+
+TEST(Strata, InTwoDimensionsAreStretchesAndCorners) {
+  Grid grid = make_regular_grid(4, 1, [](int, int) { return true; });
+  std::vector<int> body;
+  for (const auto& cell : grid.cells)
+    body.push_back(grid.rest[cell[0]][0] + grid.rest[cell[1]][0] + grid.rest[cell[2]][0] < 1.5 ? 1 : 2);
+  Mesh<2> mesh(grid.rest, grid.cells, body);
+  tag_sides(mesh, 1);
+  const Strata<2> strata(mesh);
+  EXPECT_EQ(strata.find_defect(mesh), "");
+  EXPECT_EQ(strata.num_patches(), 7);
+  EXPECT_EQ(count_strata(mesh, strata),
+            (std::map<Stratum, int>{{Stratum::volume, 6}, {Stratum::surface, 13}, {Stratum::corner, 6}}));
+}
+
+TEST(EdgeRing, IsInCyclicOrderAndEachCellPositive) {
+  std::mt19937 random(1);
+  const Mesh<3> mesh = make_cubes(3, kGrid(3), [](int, int, int) { return 1; });
+  int closed = 0, open = 0;
+  for (const EdgeKey& edge : mesh.edges()) {
+    const auto ring = ring_of_edge(mesh, edge);
+    ASSERT_TRUE(ring);
+    ++(ring->closed ? closed : open);
+    EXPECT_EQ(ring->closed, mesh.facets_of_edge(edge).empty());
+    EXPECT_EQ(ring->vertices.size(), ring->cells.size() + (ring->closed ? 0 : 1));
+    for (std::size_t i = 0; i < ring->cells.size(); ++i) {
+      const VertexId u = ring->vertices[i], v = ring->vertices[(i + 1) % ring->vertices.size()];
+      const Mesh<3>::Cell expected{edge[0], edge[1], u, v};
+      EXPECT_EQ(ascending(mesh.cell(ring->cells[i])), ascending(expected));
+      EXPECT_GT(simplex_volume<3>({mesh.rest(edge[0]), mesh.rest(edge[1]), mesh.rest(u), mesh.rest(v)}), 0);
+    }
+  }
+  EXPECT_GT(closed, 10);
+  EXPECT_GT(open, 10);
+  const Mesh<3> by_edge = make_cubes(2, kGrid(2), [](int i, int j, int k) { return k == 0 && i == j ? 1 : kNone; });
+  int none = 0;
+  for (const EdgeKey& edge : by_edge.edges()) none += !ring_of_edge(by_edge, edge);
+  EXPECT_EQ(none, 1);
+}
+
+/// All that is conserved, on meshes with slivers, holes, several bodies, curved and flat surfaces, bodies that touch by an
+/// edge.
+TEST(Edits3D, KeepBodiesTagsPatchesFeaturesAndTopology) {
+  std::map<Operation, int> done;
+  std::map<Operation, RefusalCounts> refused;
+  int slivers = 0;
+  for (unsigned seed = 0; seed < 30; ++seed) {
+    std::mt19937 random(seed);
+    Mesh<3> mesh = random_tets(2 + static_cast<int>(seed) % 3, random, seed % 2);
+    Strata<3> strata(mesh);
+    ASSERT_EQ(strata.find_defect(mesh), "") << seed;
+    const Invariants before(mesh, strata);
+    slivers += worst_cell(mesh) < 1e-2;
+    for (int i = 0; i < 400; ++i) {
+      const auto operation = static_cast<Operation>(random() % 5);
+      const auto proposal = propose_at_random(mesh, strata, operation, random);
+      EXPECT_EQ(proposal.refusal == Refusal::none, proposal.edit.has_value());
+      if (!proposal) {
+        ++refused[operation][proposal.refusal];
+        continue;
+      }
+      ++done[operation];
+      const auto& value = proposal.edit->value;
+      if (value) {  // fields that are linear in space stay so
+        Vec<3> sum = Vec<3>::Zero();
+        for (int k = 0; k < value->num_parents; ++k) sum += value->weights[k] * mesh.rest(value->parents[k]);
+        EXPECT_LT((sum - value->rest).norm(), 1e-12);
+      }
+      apply(mesh, strata, *proposal.edit);
+      if (i % 50 == 0) {
+        ASSERT_EQ(Invariants(mesh, strata).difference(before, 1e-12), "") << seed << ", edit " << i;
+      }
+    }
+    ASSERT_EQ(mesh.find_defect(), "") << seed;
+    ASSERT_EQ(strata.find_defect(mesh), "") << seed;
+    strata.compact(mesh.compact());
+    ASSERT_EQ(mesh.find_defect(), "") << seed;
+    ASSERT_EQ(strata.find_defect(mesh), "") << seed;
+    EXPECT_EQ(Invariants(mesh, strata).difference(before, 1e-12), "") << seed;
+    const Strata<3> anew(mesh);  // what was carried is what the mesh shows
+    EXPECT_EQ(anew.num_patches(), strata.num_patches());
+    for (int v = 0; v < mesh.vertex_slots(); ++v) EXPECT_EQ(anew.vertex(v), strata.vertex(v)) << seed << ", vertex " << v;
+  }
+  EXPECT_GT(slivers, 5);
+  EXPECT_EQ(done.size(), 5u);
+  for (const auto& [operation, count] : done) EXPECT_GT(count, 100) << static_cast<int>(operation);
+  EXPECT_GT(refused[Operation::collapse][Refusal::held], 0);
+  EXPECT_GT(refused[Operation::collapse][Refusal::link], 0);
+  EXPECT_GT(refused[Operation::collapse][Refusal::non_manifold], 0);
+  EXPECT_GT(refused[Operation::edge_removal][Refusal::held], 0);
+  EXPECT_GT(refused[Operation::edge_removal][Refusal::long_ring], 0);
+  EXPECT_GT(refused[Operation::facet_removal][Refusal::exists], 0);
+  EXPECT_GT(refused[Operation::move][Refusal::outside], 0);
+  for (const auto operation : {Operation::collapse, Operation::edge_removal, Operation::facet_removal, Operation::move})
+    EXPECT_GT(refused[operation][Refusal::shape], 0) << static_cast<int>(operation);
+}
+
+/// The same proposals on triangles.
+TEST(Edits3D, HaveTheSameRulesInTwoDimensions) {
+  std::map<Edit<2>::Kind, int> done;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> noise(-0.05, 0.05);
+    const auto place = [&](int i, int j) {
+      const bool inside = i > 0 && i < 4 && i != 2 && j > 0 && j < 4;
+      return Vec<2>(0.25 * i + (inside ? noise(random) : 0), 0.25 * j + (inside ? noise(random) : 0));
+    };
+    const Grid grid = make_grid(4, place, [&](int, int) { return random() % 2; });
+    std::vector<int> body;
+    for (const auto& cell : grid.cells)
+      body.push_back(grid.rest[cell[0]][0] + grid.rest[cell[1]][0] + grid.rest[cell[2]][0] < 1.5 ? 1 : 2);
+    Mesh<2> mesh(grid.rest, grid.cells, body);
+    tag_sides(mesh, 1);
+    Strata<2> strata(mesh);
+    const auto totals = [&] {
+      std::map<int, double> sum;
+      for (int c = 0; c < mesh.cell_slots(); ++c)
+        if (mesh.is_cell_alive(c)) sum[mesh.body(c)] += mesh.volume(c);
+      for (int f = 0; f < mesh.facet_slots(); ++f)
+        if (mesh.is_facet_alive(f))
+          sum[10 + mesh.facet_tag(f)] += (mesh.rest(mesh.facet(f)[1]) - mesh.rest(mesh.facet(f)[0])).norm();
+      return sum;
+    };
+    const auto before = totals();
+    for (int i = 0; i < 200; ++i) {
+      const auto edges = mesh.edges();
+      const EdgeKey edge = edges[random() % edges.size()];
+      const auto kind = random() % 4;
+      Proposal<2> proposal = kind == 0 ? propose_split<2>(mesh, edge)
+                             : kind == 1
+                                 ? propose_collapse<2>(mesh, strata, edge)
+                                 : propose_move<2>(mesh, strata, edge[0], best_shaped_position<2>(mesh, strata, edge[0], 3));
+      if (kind == 3) proposal = {.edit = make_swap(mesh, edge)};
+      if (!proposal) continue;
+      ++done[proposal.edit->kind];
+      strata.follow(*proposal.edit, mesh.apply(*proposal.edit));
+    }
+    ASSERT_EQ(mesh.find_defect(), "");
+    ASSERT_EQ(strata.find_defect(mesh), "");
+    strata.compact(mesh.compact());
+    const Strata<2> anew(mesh);
+    EXPECT_EQ(anew.num_patches(), 7);
+    for (int v = 0; v < mesh.vertex_slots(); ++v) EXPECT_EQ(anew.vertex(v), strata.vertex(v));
+    for (const auto& [key, sum] : totals()) EXPECT_NEAR(sum, before.at(key), 1e-13);
+  }
+  EXPECT_EQ(done.size(), 4u);
+  for (const auto& [kind, count] : done) EXPECT_GT(count, 20);
+}
+
+/// Two tetrahedra on a triangle, and n around an edge, both turned.
+Mesh<3> two_on_a_triangle() {
+  return {{{0, 0, 0}, {1, 0, 0}, {0.4, 0.9, 0}, {0.4, 0.3, 0.8}, {0.5, 0.3, -0.7}}, {{0, 1, 2, 3}, {0, 2, 1, 4}}, {1, 1}};
+}
+Mesh<3> ring_of(int n, std::mt19937& random, double noise = 0.1) {
+  std::uniform_real_distribution<double> off(-noise, noise);
+  std::vector<Vec<3>> rest = {{0, 0, -1}, {0, 0, 1}};
+  std::vector<Mesh<3>::Cell> cells;
+  for (int i = 0; i < n; ++i) {
+    const double angle = 2 * M_PI * i / n, radius = 1 + off(random);
+    rest.emplace_back(radius * std::cos(angle), radius * std::sin(angle), off(random));
+    cells.push_back({0, 1, 2 + i, 2 + (i + 1) % n});
+  }
+  return {rest, cells, std::vector<int>(cells.size(), 1)};
+}
+
+constexpr QualityRule kAnything{.share = 0, .floor = 0};
+
+TEST(Edits3D, SwapsOfTwoToThreeAndBackAreInverse) {
+  Mesh<3> mesh = two_on_a_triangle();
+  Strata<3> strata(mesh);
+  const auto there = propose_facet_removal(mesh, {0, 1, 2}, kAnything);
+  ASSERT_TRUE(there);
+  EXPECT_EQ(there.edit->edge, (EdgeKey{3, 4}));
+  apply(mesh, strata, *there.edit);
+  EXPECT_EQ(mesh.num_cells(), 3);
+  EXPECT_EQ(mesh.find_defect(), "");
+  EXPECT_EQ(propose_facet_removal(mesh, {0, 1, 2}).refusal, Refusal::gone);
+  const auto back = propose_edge_removal(mesh, strata, {3, 4}, shape_cost(mesh), kAnything);
+  ASSERT_TRUE(back);
+  apply(mesh, strata, *back.edit);
+  EXPECT_EQ(mesh.find_defect(), "");
+  mesh.compact();
+  std::set<Mesh<3>::Cell> cells;
+  for (int c = 0; c < mesh.num_cells(); ++c) cells.insert(ascending(mesh.cell(c)));
+  EXPECT_EQ(cells, (std::set<Mesh<3>::Cell>{{0, 1, 2, 3}, {0, 1, 2, 4}}));
+}
+
+/// All triangulations of a polygon, by brute force.
+double least_sum(int i, int j, const std::function<double(int, int, int)>& cost) {
+  if (j - i < 2) return 0;
+  double best = HUGE_VAL;
+  for (int k = i + 1; k < j; ++k) best = std::min(best, least_sum(i, k, cost) + least_sum(k, j, cost) + cost(i, k, j));
+  return best;
+}
+
+TEST(Edits3D, EdgeRemovalHasTheLeastCostOfAllTriangulations) {
+  std::mt19937 random(3);
+  int forbidden = 0;
+  for (int n = 3; n <= kLongestRing; ++n)
+    for (int repeat = 0; repeat < 40; ++repeat) {
+      Mesh<3> mesh = ring_of(n, random);
+      Strata<3> strata(mesh);
+      const unsigned salt = random();
+      // Any number by the cell's vertices, sometimes infinite, sometimes negative.
+      const CellCost cost = [&](const Mesh<3>::Cell& cell, int body) {
+        EXPECT_EQ(body, 1);
+        unsigned hash = salt;
+        for (const int v : ascending(cell)) hash = (hash ^ static_cast<unsigned>(v)) * 2654435761u;
+        return hash >> 16 & 15 ? (hash >> 8 & 1023) - 100.0 : HUGE_VAL;
+      };
+      const double expected = least_sum(0, n - 1, [&](int i, int k, int j) {
+        return cost({2 + i, 2 + k, 2 + j, 1}, 1) + cost({2 + i, 2 + j, 2 + k, 0}, 1);
+      });
+      const auto proposal = propose_edge_removal(mesh, strata, {0, 1}, cost, kAnything);
+      EXPECT_EQ(proposal.edit.has_value(), expected < HUGE_VAL);
+      if (!proposal) {
+        EXPECT_EQ(proposal.refusal, Refusal::cost);
+        ++forbidden;
+        continue;
+      }
+      EXPECT_EQ(proposal.cost, expected);
+      double sum = 0;
+      for (const auto& cell : proposal.edit->inserted_cells) sum += cost(cell.vertices, cell.body);
+      EXPECT_EQ(sum, expected);
+      EXPECT_EQ(proposal.edit->inserted_cells.size(), 2u * (n - 2));
+      const double volume = mesh.total_volume();
+      apply(mesh, strata, *proposal.edit);
+      EXPECT_EQ(mesh.find_defect(), "");
+      EXPECT_NEAR(mesh.total_volume(), volume, 1e-14);
+    }
+  EXPECT_GT(forbidden, 5);
+}
+
+TEST(Edits3D, EdgesOnPatchesOfTheSurfaceAndOfInterfacesAreRemovedInTheirPlane) {
+  for (const bool two_bodies : {false, true}) {
+    Mesh<3> mesh = make_cubes(3, kGrid(3), [&](int i, int, int) { return two_bodies && i > 0 ? 2 : 1; });
+    Strata<3> strata(mesh);
+    const Invariants before(mesh, strata);
+    int surface = 0, interface = 0;
+    for (const EdgeKey& edge : mesh.edges()) {
+      if (mesh.cells_of_edge(edge).empty() || strata.edge(mesh, edge) != Stratum::surface) continue;
+      const bool on_boundary = !mesh.facets_of_edge(edge).empty();
+      const auto proposal = propose_edge_removal(mesh, strata, edge, shape_cost(mesh), kAnything);
+      if (!proposal) continue;
+      ++(on_boundary ? surface : interface);
+      EXPECT_EQ(proposal.edit->removed_facets.size(), on_boundary ? 2u : 0u);
+      EXPECT_EQ(proposal.edit->inserted_interfaces.size(), on_boundary ? 0u : 2u);
+      apply(mesh, strata, *proposal.edit);
+      ASSERT_EQ(mesh.find_defect(), "");
+      ASSERT_EQ(strata.find_defect(mesh), "");
+    }
+    EXPECT_EQ(Invariants(mesh, strata).difference(before, 1e-13), "");
+    EXPECT_GT(surface, 10);
+    EXPECT_EQ(interface > 0, two_bodies);
+  }
+}
+
+TEST(Edits3D, RefusalsHaveNamesAndReasons) {
+  for (int r = 0; r < kRefusals; ++r) EXPECT_NE(name(static_cast<Refusal>(r)), "");
+  const Mesh<3> cube = make_cubes(2, kGrid(2), [](int i, int, int) { return i + 1; });
+  const Strata<3> strata(cube);
+  const auto at = [&](const Mesh<3>& mesh, double x, double y, double z) {
+    for (int v = 0; v < mesh.vertex_slots(); ++v)
+      if (mesh.rest(v) == Vec<3>(x, y, z)) return v;
+    return kNone;
+  };
+  const auto edge = [&](const Mesh<3>& mesh, const Vec<3>& a, const Vec<3>& b) {
+    const int u = at(mesh, a[0], a[1], a[2]), v = at(mesh, b[0], b[1], b[2]);
+    return EdgeKey{std::min(u, v), std::max(u, v)};
+  };
+  const VertexId centre = at(cube, 0.5, 0.5, 0.5), corner = at(cube, 0, 0, 0);
+  EXPECT_EQ(strata.vertex(centre), Stratum::surface);  // of the interface
+  EXPECT_EQ(propose_collapse<3>(cube, strata, edge(cube, {0, 0, 0}, {1, 1, 0})).refusal, Refusal::gone);
+  EXPECT_EQ(propose_split<3>(cube, edge(cube, {0, 0, 0}, {1, 1, 0})).refusal, Refusal::gone);
+  // A corner along a feature to a feature's vertex: the corner stays, the other goes.
+  const auto along = propose_collapse<3>(cube, strata, edge(cube, {0, 0, 0}, {0, 0.5, 0}), kAnything);
+  ASSERT_TRUE(along);
+  EXPECT_EQ(along.edit->value->vertex, corner);
+  // From the interface to the surface through the volume; the centre may not leave its plane.
+  EXPECT_EQ(propose_collapse<3>(cube, strata, edge(cube, {0, 0, 0}, {0.5, 0.5, 0.5}), kAnything).refusal, Refusal::held);
+  EXPECT_EQ(propose_move<3>(cube, strata, corner, {0.1, 0.1, 0.1}, kAnything).refusal, Refusal::held);
+  const auto move = propose_move<3>(cube, strata, centre, {0.7, 0.6, 0.55}, kAnything);
+  ASSERT_TRUE(move);
+  EXPECT_LT((move.edit->value->rest - Vec<3>(0.5, 0.6, 0.55)).norm(), 1e-15);
+  EXPECT_EQ(propose_move<3>(cube, strata, centre, {0.5, 1.2, 0.5}, kAnything).refusal, Refusal::outside);
+  EXPECT_EQ(propose_edge_removal(cube, strata, edge(cube, {0, 0, 0}, {0, 0.5, 0}), shape_cost(cube)).refusal, Refusal::held);
+  EXPECT_EQ(propose_facet_removal(cube, cube.facet(0)).refusal, Refusal::held);
+
+  const Mesh<3> touching = make_cubes(2, kGrid(2), [](int i, int j, int k) { return k == 0 && i == j ? 1 : kNone; });
+  const Strata<3> of_touching(touching);
+  const EdgeKey shared = edge(touching, {0.5, 0.5, 0}, {0.5, 0.5, 0.5});
+  EXPECT_EQ(of_touching.edge(touching, shared), Stratum::non_manifold);
+  EXPECT_EQ(propose_collapse<3>(touching, of_touching, shared, kAnything).refusal, Refusal::non_manifold);
+  EXPECT_EQ(propose_edge_removal(touching, of_touching, shared, shape_cost(touching)).refusal, Refusal::non_manifold);
+  EXPECT_EQ(propose_move<3>(touching, of_touching, shared[0], {0, 0, 0}).refusal, Refusal::non_manifold);
+  EXPECT_TRUE(propose_split<3>(touching, shared));  // a split is possible, and what it makes is as much held
+  Mesh<3> split = touching;
+  Strata<3> of_split = of_touching;
+  EXPECT_EQ(of_split.vertex(apply(split, of_split, make_split(split, shared))), Stratum::non_manifold);
+
+  std::mt19937 random(5);
+  const Mesh<3> wide = ring_of(kLongestRing + 1, random);
+  EXPECT_EQ(propose_edge_removal(wide, Strata<3>(wide), {0, 1}, shape_cost(wide), kAnything).refusal, Refusal::long_ring);
+}
+
+/// What the link condition refuses in the volume would make a facet with more than two cells, a cell twice, or other holes.
+TEST(Edits3D, LinkConditionRefusesOnlyWhatChangesTheTopology) {
+  const auto faces_of = [](const std::set<Mesh<3>::Cell>& cells) {
+    std::set<std::vector<int>> faces;
+    for (const auto& cell : cells)
+      for (int mask = 1; mask < 16; ++mask) {
+        std::vector<int> face;
+        for (int k = 0; k < 4; ++k)
+          if (mask >> k & 1) face.push_back(cell[k]);
+        faces.insert(face);
+      }
+    return faces;
+  };
+  const auto euler = [](const std::set<std::vector<int>>& faces) {
+    long sum = 0;
+    for (const auto& face : faces) sum += face.size() % 2 ? 1 : -1;
+    return sum;
+  };
+  int refused = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    Mesh<3> mesh = random_tets(3, random, false);
+    Strata<3> strata(mesh);
+    for (int i = 0; i < 300; ++i)
+      if (const auto edit = propose_at_random(mesh, strata, static_cast<Operation>(1 + random() % 4), random))
+        apply(mesh, strata, *edit.edit);
+    strata.compact(mesh.compact());
+    std::set<Mesh<3>::Cell> before;
+    for (int c = 0; c < mesh.cell_slots(); ++c) before.insert(ascending(mesh.cell(c)));
+    for (const EdgeKey& edge : mesh.edges()) {
+      if (strata.edge(mesh, edge) != Stratum::volume) continue;
+      if (propose_collapse<3>(mesh, strata, edge, kAnything).refusal != Refusal::link) continue;
+      ++refused;
+      std::set<Mesh<3>::Cell> after;
+      std::map<Mesh<3>::Facet, int> cells_at;
+      bool is_broken = false;
+      for (auto cell : before) {
+        std::replace(cell.begin(), cell.end(), edge[1], edge[0]);
+        cell = ascending(cell);
+        if (std::adjacent_find(cell.begin(), cell.end()) != cell.end()) continue;
+        is_broken = is_broken || !after.insert(cell).second;
+        for (int k = 0; k < 4; ++k) is_broken = is_broken || ++cells_at[ascending(opposite_facet<3>(cell, k))] > 2;
+      }
+      EXPECT_TRUE(is_broken || euler(faces_of(after)) != euler(faces_of(before))) << seed;
+    }
+  }
+  EXPECT_GT(refused, 20);
+}
+
+TEST(Edits3D, QualityNeverFallsBelowTheFloorOrWhatItWas) {
+  const QualityRule rule{.share = 0.2, .floor = 0.15};
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    std::mt19937 random(seed);
+    Mesh<3> mesh = random_tets(3, random, seed % 2);
+    Strata<3> strata(mesh);
+    const double worst = worst_cell(mesh);
+    for (int i = 0; i < 600; ++i) {
+      const auto operation = static_cast<Operation>(1 + random() % 4);  // all but splits
+      if (const auto proposal = propose_at_random(mesh, strata, operation, random, rule))
+        apply(mesh, strata, *proposal.edit);
+    }
+    EXPECT_GE(worst_cell(mesh), std::min(worst, rule.floor));
+  }
+}
+
+/// Swaps, collapses and moves that only ever improve their cavity's worst cell.
+TEST(Edits3D, SliversOfTheInputCanBeImproved) {
+  int improved = 0, meshes = 0;
+  for (unsigned seed = 1; seed < 12; seed += 2) {
+    std::mt19937 random(seed);
+    Mesh<3> mesh = random_tets(3, random, true);
+    Strata<3> strata(mesh);
+    const double before = worst_cell(mesh);
+    if (before > 0.01) continue;
+    ++meshes;
+    for (int i = 0; i < 4000; ++i) {
+      const auto operation = static_cast<Operation>(1 + random() % 4);
+      if (const auto proposal = propose_at_random(mesh, strata, operation, random, {.share = 1, .floor = 0.3}))
+        apply(mesh, strata, *proposal.edit);
+    }
+    ASSERT_EQ(mesh.find_defect(), "");
+    EXPECT_GE(worst_cell(mesh), before);
+    improved += worst_cell(mesh) > 10 * before;
+  }
+  EXPECT_GT(meshes, 3);
+  EXPECT_EQ(improved, meshes);
+}
+
+TEST(Edits3D, BestShapedPositionIsTheCentreOfARegularStarAndStaysInItsStratum) {
+  std::vector<Vec<3>> rest = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {0.3, -0.2, 0.25}};
+  std::vector<Mesh<3>::Cell> cells;
+  for (const int x : {0, 1})
+    for (const int y : {2, 3})
+      for (const int z : {4, 5}) cells.push_back((x + y + z) % 2 ? Mesh<3>::Cell{6, y, x, z} : Mesh<3>::Cell{6, x, y, z});
+  const Mesh<3> octahedron(rest, cells, std::vector<int>(8, 1));
+  EXPECT_LT(best_shaped_position<3>(octahedron, Strata<3>(octahedron), 6, 12).norm(), 1e-12);  // quadratically
+
+  const Mesh<3> cube = make_cubes(2, kGrid(2), [](int, int, int) { return 1; });
+  Mesh<3> moved = cube;
+  Strata<3> strata(cube);
+  int surface = 0, feature = 0;
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> noise(-0.1, 0.1);
+  for (int v = 0; v < cube.vertex_slots(); ++v) {
+    const auto move = propose_move<3>(moved, strata, v, moved.rest(v) + Vec<3>(noise(random), noise(random), noise(random)));
+    EXPECT_EQ(move.edit.has_value(), strata.vertex(v) != Stratum::corner);
+    if (!move) continue;
+    apply(moved, strata, *move.edit);
+    surface += strata.vertex(v) == Stratum::surface;
+    feature += strata.vertex(v) == Stratum::feature;
+    const Vec<3> best = best_shaped_position<3>(moved, strata, v, 10);
+    const auto measure = [&](const Vec<3>& X) {
+      double sum = 0;
+      for (const CellId c : moved.cells_of(v)) {
+        std::array<Vec<3>, 4> p;
+        for (int k = 0; k < 4; ++k) p[k] = moved.cell(c)[k] == v ? X : moved.rest(moved.cell(c)[k]);
+        double squares = 0;  // tr(J^T J) of a simplex is its squared edges by those of the regular one, up to a factor
+        for (int i = 0; i < 4; ++i)
+          for (int j = 0; j < i; ++j) squares += (p[i] - p[j]).squaredNorm();
+        sum += squares / std::cbrt(std::pow(simplex_volume<3>(p), 2));
+      }
+      return sum;
+    };
+    const Mat<3> P = strata.tangent_projector(moved, v);
+    EXPECT_LT(((Mat<3>::Identity() - P) * (best - cube.rest(v))).norm(), 1e-14);
+    for (int axis = 0; axis < 3; ++axis)  // no way along the stratum leads lower
+      for (const double step : {-1e-4, 1e-4})
+        EXPECT_GE(measure(best + step * P * Vec<3>::Unit(axis)), measure(best) * (1 - 1e-13));
+  }
+  EXPECT_EQ(surface, 6);
+  EXPECT_EQ(feature, 12);
+}
+
+}  // namespace
+}  // namespace itr
