@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "itr/remesh/edits.hpp"
@@ -11,9 +12,23 @@ namespace {
 
 constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
 
+std::optional<Edit<2>> collapse_of(const RemeshSession<2>& session, const EdgeKey& edge) {
+  return make_collapse(session.mesh(), edge);
+}
+std::optional<Edit<3>> collapse_of(const RemeshSession<3>& session, const EdgeKey& edge) {
+  return propose_collapse(session.mesh(), session.strata(), edge).edit;
+}
+
+/// Of a cell whose edges are this long: isosceles and right-angled in 2D, regular in 3D (scene-format §8.5).
+template <int Dim>
+double volume_of(double length) {
+  return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
+}
+
+template <int Dim>
 class Collapser {
  public:
-  Collapser(RemeshSession<2>& session, const EdgeRanks& ranks)
+  Collapser(RemeshSession<Dim>& session, const EdgeRanks& ranks)
       : session_(session),
         options_(session.options().collapse),
         ranks_(ranks),
@@ -53,12 +68,12 @@ class Collapser {
       return false;
     const auto around = session_.mesh().cells_of_edge(edge);
     return std::any_of(around.begin(), around.end(),
-                       [&](CellId c) { return session_.mesh().volume(c) <= longest_ * longest_ / 2; });
+                       [&](CellId c) { return session_.mesh().volume(c) <= volume_of<Dim>(longest_); });
   }
 
   Decision collapse(const EdgeKey& edge) {
     ++session_.report().collapses.tried;
-    const auto edit = make_collapse(session_.mesh(), edge);
+    const auto edit = collapse_of(session_, edge);
     if (!edit) return Decision::by_gate;
     if (!session_.is_in_contact(edge) && session_.is_hopeless(*edit, session_.predict(*edit), options_.acceptance_tolerance))
       return Decision::by_bound;
@@ -75,7 +90,7 @@ class Collapser {
     return Decision::accepted;
   }
 
-  RemeshSession<2>& session_;
+  RemeshSession<Dim>& session_;
   const CollapseOptions& options_;
   const EdgeRanks& ranks_;
   double longest_;
@@ -84,6 +99,12 @@ class Collapser {
 
 }  // namespace
 
-void collapse_edges(RemeshSession<2>& session, const EdgeRanks& ranks) { Collapser(session, ranks).run(); }
+template <int Dim>
+void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks) {
+  Collapser<Dim>(session, ranks).run();
+}
+
+template void collapse_edges(RemeshSession<2>&, const EdgeRanks&);
+template void collapse_edges(RemeshSession<3>&, const EdgeRanks&);
 
 }  // namespace itr

@@ -29,59 +29,55 @@ class Thresholds {
 };
 
 /// Elastic energy times the scaling, a cell.
-std::vector<double> cell_energies(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context) {
+template <int Dim>
+std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
   std::vector<double> energies(mesh.cell_slots(), 0);
   for (int c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
     const Material& material = context.materials.at(mesh.body(c));
-    const CellSet<2>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
-    const Vec<2> barycenter = (mesh.rest(mesh.cell(c)[0]) + mesh.rest(mesh.cell(c)[1]) + mesh.rest(mesh.cell(c)[2])) / 3;
-    energies[c] = context.scaling * mesh.volume(c) *
-                  elastic_density<2>(deformation_gradient<2>(element, fields.x), elastic_moduli<2>(material, barycenter));
+    const typename CellSet<Dim>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
+    Vec<Dim> barycenter = Vec<Dim>::Zero();
+    for (const int v : mesh.cell(c)) barycenter += mesh.rest(v) / (Dim + 1);
+    const Mat<Dim> F = deformation_gradient<Dim>(element, fields.x);
+    energies[c] = context.scaling * mesh.volume(c) * elastic_density<Dim>(F, elastic_moduli<Dim>(material, barycenter));
   }
   return energies;
 }
 
 /// Contact energy (stiffness left out) of each vertex: its share of the pairs that it is part of.
-std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFields<2>& fields,
-                                            const StepContext<2>& context) {
+template <int Dim>
+std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields,
+                                            const StepContext<Dim>& context) {
   const auto& obstacles = context.obstacles;
   const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.x.size());
   std::vector<double> energies(total, 0);
   if (!context.contact.enabled) return energies;
-  CollisionSurface surface;
-  surface.area.assign(total, 0);
-  surface.degree.assign(total, 0);
-  surface.counts.assign(total, 0);
-  const auto add_edge = [&](int a, int b) { surface.edges.push_back({std::min(a, b), std::max(a, b)}); };
+  std::vector<std::array<int, 2>> edges;
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<int> points;
+  std::vector<char> counts(total, 0);
   for (int f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
-    const auto [a, b] = mesh.facet(f);
-    add_edge(a, b);
-    for (const int v : {a, b}) {
-      surface.area[v] += (mesh.rest(b) - mesh.rest(a)).norm() / 2;
-      ++surface.degree[v];
-      surface.counts[v] = 1;
-    }
+    for (const int v : mesh.facet(f)) counts[v] = 1;
+    if constexpr (Dim == 2)
+      edges.push_back(mesh.facet(f));
+    else
+      triangles.push_back(mesh.facet(f));
   }
-  for (int v = 0; v < bodies; ++v)
-    if (surface.counts[v]) surface.vertices.push_back(v);
-  for (const auto& [a, b] : obstacles.edges) {
-    add_edge(bodies + a, bodies + b);
-    for (const int o : {a, b}) {
-      surface.area[bodies + o] += (obstacles.rest[b] - obstacles.rest[a]).norm() / 2;
-      ++surface.degree[bodies + o];
-    }
+  for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
+  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
+  std::vector<Vec<Dim>> rest(total);
+  for (int v = 0; v < bodies; ++v) rest[v] = mesh.rest(v);
+  VectorX x(Dim * total);
+  x.head(Dim * bodies) = fields.x;
+  for (int o = 0; o < total - bodies; ++o) {
+    points.push_back(bodies + o);
+    rest[bodies + o] = obstacles.rest[o];
+    x.segment<Dim>(Dim * (bodies + o)) = obstacles.x[o];
   }
-  for (int v = bodies; v < total; ++v) {
-    if (surface.degree[v] == 0) surface.area[v] = 1;
-    surface.vertices.push_back(v);
-  }
-  std::sort(surface.edges.begin(), surface.edges.end());
-  VectorX x(2 * total);
-  x.head(2 * bodies) = fields.x;
-  for (int o = 0; o < total - bodies; ++o) x.segment<2>(2 * (bodies + o)) = obstacles.x[o];
-  const ContactEnergy<2> contact(surface, context.contact, 1, context.scaling);
+  const CollisionSurface surface =
+      make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
+  const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {
     const double share = context.scaling * contact.pair_energy(s, x) / s.size();
@@ -92,7 +88,8 @@ std::vector<double> vertex_contact_energies(const Mesh<2>& mesh, const RemeshFie
 
 }  // namespace
 
-EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
+template <int Dim>
+EdgeRanks rank_edges(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                      const RemeshOptions& options) {
   const auto edges = mesh.edges();
   if (options.screening == Screening::none) {  // every edge may be split and collapsed
@@ -112,7 +109,10 @@ EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const S
         ++count;
       }
     elastic.push_back(sum / count);
-    const bool on_surface = mesh.find_facet({edge[0], edge[1]}) != kNone;
+    const auto facets = mesh.facets_of(edge[0]);
+    const bool on_surface = std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
+      return std::find(mesh.facet(f).begin(), mesh.facet(f).end(), edge[1]) != mesh.facet(f).end();
+    });
     contact.push_back(on_surface ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
   }
   const bool touching = std::any_of(contact.begin(), contact.end(), [](double e) { return e > 0; });
@@ -127,5 +127,8 @@ EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const S
   }
   return ranks;
 }
+
+template EdgeRanks rank_edges(const Mesh<2>&, const RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&);
+template EdgeRanks rank_edges(const Mesh<3>&, const RemeshFields<3>&, const StepContext<3>&, const RemeshOptions&);
 
 }  // namespace itr

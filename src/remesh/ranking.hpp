@@ -14,7 +14,8 @@ using EdgeRanks = std::unordered_map<EdgeKey, Rank, EdgeKeyHash>;
 
 /// scene-format §8.2: elastic energy of an edge = mean over incident cells, contact energy = mean over its ends; top if
 /// either is among the tops, bottom only if both are at the bottom.
-EdgeRanks rank_edges(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context,
+template <int Dim>
+EdgeRanks rank_edges(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                      const RemeshOptions& options);
 
 }  // namespace itr

@@ -6,9 +6,10 @@
 
 namespace itr {
 
-RemeshReport remesh(Mesh<2>& mesh, RemeshFields<2>& fields, const StepContext<2>& context, const RemeshOptions& options,
-                    RemeshMemory& memory) {
-  RemeshSession<2> session(mesh, fields, context, options, memory);
+template <int Dim>
+RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
+                    const RemeshOptions& options, RemeshMemory& memory) {
+  RemeshSession<Dim> session(mesh, fields, context, options, memory);
   RemeshReport& report = session.report();
   for (int sweep = 0; sweep < options.sweeps; ++sweep) {
     const int before = report.accepted();
@@ -24,5 +25,8 @@ RemeshReport remesh(Mesh<2>& mesh, RemeshFields<2>& fields, const StepContext<2>
   memory = session.memory();
   return report;
 }
+
+template RemeshReport remesh(Mesh<2>&, RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&, RemeshMemory&);
+template RemeshReport remesh(Mesh<3>&, RemeshFields<3>&, const StepContext<3>&, const RemeshOptions&, RemeshMemory&);
 
 }  // namespace itr

@@ -18,7 +18,9 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
       options_(options),
       total_volume_(mesh.total_volume()),
       gate_(mesh, fields, context),
-      refusals_(memory) {}
+      refusals_(memory) {
+  if constexpr (Dim == 3) strata_ = Strata<Dim>(mesh);
+}
 
 template <int Dim>
 bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
@@ -112,6 +114,7 @@ void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
   const VertexId created = mesh_.apply(edit);
   fields_.follow(edit, created);
   gate_.follow(edit, first_facet);
+  if constexpr (Dim == 3) strata_.follow(edit, created);
   for (const auto& [v, x] : verdict.positions) {
     const VertexId vertex = v == kNewVertex ? created : v;
     fields_.x.template segment<Dim>(Dim * vertex) = x;

@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "prediction.hpp"
 #include "queue.hpp"
@@ -24,6 +25,7 @@ class RemeshSession {
   const Mesh<Dim>& mesh() const { return mesh_; }
   const RemeshFields<Dim>& fields() const { return fields_; }
   const StepContext<Dim>& context() const { return context_; }
+  const Strata<Dim>& strata() const { return strata_; }  ///< in 3D only; 2D edits look at the mesh
   const RemeshOptions& options() const { return options_; }
   RemeshReport& report() { return report_; }
   bool has_contact() const { return context_.contact.enabled; }
@@ -92,6 +94,7 @@ class RemeshSession {
   const RemeshOptions& options_;
   double total_volume_;
   Gate<Dim> gate_;
+  Strata<Dim> strata_;
   LocalScratch<Dim> scratch_;
   Refusals refusals_;
   std::vector<CellId> around_;
@@ -105,9 +108,14 @@ inline constexpr double kSameSignal = 1.2;
 
 /// The operations, one file each. They count what they do in session.report(). `ranks` (of the paper's culling; empty where
 /// it is not asked for) are inherited by the edges that splits make.
-void split_edges(RemeshSession<2>& session, EdgeRanks& ranks);
-void collapse_edges(RemeshSession<2>& session, const EdgeRanks& ranks);
+template <int Dim>
+void split_edges(RemeshSession<Dim>& session, EdgeRanks& ranks);
+template <int Dim>
+void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks);
+/// In 3D: edges are removed such that the elastic energy of the new cells is least.
 void swap_edges(RemeshSession<2>& session);
-void smooth_vertices(RemeshSession<2>& session);
+void swap_edges(RemeshSession<3>& session);
+template <int Dim>
+void smooth_vertices(RemeshSession<Dim>& session);
 
 }  // namespace itr

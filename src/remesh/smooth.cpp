@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "itr/energy/elastic/laws.hpp"
+#include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
 #include "session.hpp"
 
@@ -14,23 +16,40 @@ namespace itr {
 namespace {
 
 constexpr double kStep = 0.2;        ///< length of a move, in shortest edges at the vertex
-constexpr double kBadShape = 1.4;    ///< AMIPS measure (1 of an equilateral triangle) from which shapes are bettered
+constexpr double kBadShape = 1.4;    ///< one over the quality of the worst cell from which shapes are bettered
 constexpr double kLeastMove = 0.1;   ///< for that, in shortest edges at the vertex
 constexpr double kSameShape = 1.05;  ///< the same of the worst shape around a vertex
 constexpr double kSameForce = 1.5;   ///< change of the force by which a refused move is tried again
 
-/// Worst AMIPS measure over the ring: how badly its triangles need smoothing.
-double worst_shape(const Mesh<2>& mesh, VertexId vertex) {
-  double worst = 0;
+/// How badly the worst cell at a vertex is shaped: 1 where all are regular.
+template <int Dim>
+double worst_shape(const Mesh<Dim>& mesh, VertexId vertex) {
+  double worst = 1;
   for (const CellId c : mesh.cells_of(vertex)) {
-    double squares = 0;
-    for (int k = 0; k < 3; ++k) squares += (mesh.rest(mesh.cell(c)[k]) - mesh.rest(mesh.cell(c)[(k + 1) % 3])).squaredNorm();
-    worst = std::max(worst, squares / (4 * std::sqrt(3.0) * mesh.volume(c)));
+    std::array<Vec<Dim>, Dim + 1> p;
+    for (int k = 0; k <= Dim; ++k) p[k] = mesh.rest(mesh.cell(c)[k]);
+    worst = std::max(worst, 1 / simplex_quality<Dim>(p));
   }
   return worst;
 }
 
-double shortest_edge(const Mesh<2>& mesh, VertexId vertex) {
+std::optional<Edit<2>> move_of(const RemeshSession<2>& session, VertexId vertex, const Vec<2>& target) {
+  return make_move(session.mesh(), vertex, target);
+}
+std::optional<Edit<3>> move_of(const RemeshSession<3>& session, VertexId vertex, const Vec<3>& target) {
+  return propose_move<3>(session.mesh(), session.strata(), vertex, target).edit;
+}
+
+constexpr int kShapeIterations = 10;
+Vec<2> best_shape(const RemeshSession<2>& session, VertexId vertex) {
+  return best_shaped_position(session.mesh(), vertex, kShapeIterations);
+}
+Vec<3> best_shape(const RemeshSession<3>& session, VertexId vertex) {
+  return best_shaped_position<3>(session.mesh(), session.strata(), vertex, kShapeIterations);
+}
+
+template <int Dim>
+double shortest_edge(const Mesh<Dim>& mesh, VertexId vertex) {
   double shortest = std::numeric_limits<double>::infinity();
   for (const CellId c : mesh.cells_of(vertex))
     for (const int v : mesh.cell(c))
@@ -40,27 +59,31 @@ double shortest_edge(const Mesh<2>& mesh, VertexId vertex) {
 
 /// Derivative of the elastic energy by the rest position of a vertex that takes the deformation along: sum over its cells
 /// of V (W I - F^T P) grad phi (Eshelby 1975), times the scaling.
-Vec<2> configurational_gradient(const RemeshSession<2>& session, VertexId vertex) {
-  const Mesh<2>& mesh = session.mesh();
-  Vec<2> sum = Vec<2>::Zero();
+template <int Dim>
+Vec<Dim> configurational_gradient(const RemeshSession<Dim>& session, VertexId vertex) {
+  const Mesh<Dim>& mesh = session.mesh();
+  Vec<Dim> sum = Vec<Dim>::Zero();
   for (const CellId c : mesh.cells_of(vertex)) {
     const auto& cell = mesh.cell(c);
     const auto k = std::find(cell.begin(), cell.end(), vertex) - cell.begin();
-    const CellSet<2>::Element element{cell, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
-    const Vec<2> gradient = k == 0 ? Vec<2>(-element.inverse_edges.colwise().sum().transpose())
-                                   : Vec<2>(element.inverse_edges.row(k - 1).transpose());
-    const Vec<2> barycenter = (mesh.rest(cell[0]) + mesh.rest(cell[1]) + mesh.rest(cell[2])) / 3;
-    const ElasticModuli moduli = elastic_moduli<2>(session.context().materials.at(mesh.body(c)), barycenter);
-    const Mat<2> F = deformation_gradient<2>(element, session.fields().x);
+    const typename CellSet<Dim>::Element element{cell, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
+    const Vec<Dim> gradient = k == 0 ? Vec<Dim>(-element.inverse_edges.colwise().sum().transpose())
+                                     : Vec<Dim>(element.inverse_edges.row(k - 1).transpose());
+    Vec<Dim> barycenter = Vec<Dim>::Zero();
+    for (const int v : cell) barycenter += mesh.rest(v) / (Dim + 1);
+    const ElasticModuli moduli = elastic_moduli<Dim>(session.context().materials.at(mesh.body(c)), barycenter);
+    const Mat<Dim> F = deformation_gradient<Dim>(element, session.fields().x);
     const double weight = session.context().scaling * element.volume;
-    sum += weight * (elastic_density<2>(F, moduli) * gradient - F.transpose() * (elastic_stress<2>(F, moduli) * gradient));
+    sum +=
+        weight * (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
   }
   return sum;
 }
 
+template <int Dim>
 class Smoother {
  public:
-  explicit Smoother(RemeshSession<2>& session)
+  explicit Smoother(RemeshSession<Dim>& session)
       : session_(session),
         mesh_(session.mesh()),
         options_(session.options().smooth),
@@ -89,7 +112,7 @@ class Smoother {
     }
     std::sort(order.begin(), order.end());
     for (const auto& [promise, v] : order) {
-      const Vec<2> gradient = configurational_gradient(session_, v);
+      const Vec<Dim> gradient = configurational_gradient(session_, v);
       const double force = gradient.norm(), length = kStep * shortest_edge(mesh_, v);
       if (force * length <= least || session_.was_refused(RemeshMemory::smooth, {v, kNone}, force, false)) continue;
       if (!move(v, mesh_.rest(v) - length / force * gradient, worthwhile_))
@@ -98,12 +121,11 @@ class Smoother {
   }
 
   void better_shapes() {
-    constexpr int kIterations = 10;
     for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {
       if (!may_move(v)) continue;
       const double shape = worst_shape(mesh_, v);
       if (shape < kBadShape || session_.was_refused(RemeshMemory::reshape, {v, kNone}, shape, false)) continue;
-      const Vec<2> target = best_shaped_position(mesh_, v, kIterations);
+      const Vec<Dim> target = best_shape(session_, v);
       const bool is_far = (target - mesh_.rest(v)).norm() > kLeastMove * shortest_edge(mesh_, v);
       if (!is_far || !move(v, target, options_.acceptance_tolerance))
         session_.remember(RemeshMemory::reshape, {v, kNone}, {shape / kSameShape, shape * kSameShape, false});
@@ -112,8 +134,8 @@ class Smoother {
 
   bool may_move(VertexId v) const { return mesh_.is_vertex_alive(v) && !mesh_.is_boundary(v); }
 
-  bool move(VertexId v, const Vec<2>& target, double tolerance) {
-    const auto edit = make_move(mesh_, v, target);
+  bool move(VertexId v, const Vec<Dim>& target, double tolerance) {
+    const auto edit = move_of(session_, v, target);
     if (!edit || session_.is_hopeless(*edit, session_.predict(*edit), tolerance)) return false;
     OperationCount& count = session_.report().smooths;
     ++count.tried;
@@ -123,8 +145,8 @@ class Smoother {
     return verdict.accepted();
   }
 
-  RemeshSession<2>& session_;
-  const Mesh<2>& mesh_;
+  RemeshSession<Dim>& session_;
+  const Mesh<Dim>& mesh_;
   const SmoothOptions& options_;
   double worthwhile_;  ///< [J]
   LocalRelaxationOptions one_ring_;
@@ -132,6 +154,12 @@ class Smoother {
 
 }  // namespace
 
-void smooth_vertices(RemeshSession<2>& session) { Smoother(session).run(); }
+template <int Dim>
+void smooth_vertices(RemeshSession<Dim>& session) {
+  Smoother<Dim>(session).run();
+}
+
+template void smooth_vertices(RemeshSession<2>&);
+template void smooth_vertices(RemeshSession<3>&);
 
 }  // namespace itr

@@ -8,9 +8,10 @@ namespace itr {
 
 namespace {
 
+template <int Dim>
 class Splitter {
  public:
-  Splitter(RemeshSession<2>& session, EdgeRanks& ranks)
+  Splitter(RemeshSession<Dim>& session, EdgeRanks& ranks)
       : session_(session),
         options_(session.options().split),
         tolerance_(session.context().scaling * options_.acceptance_tolerance),
@@ -89,7 +90,7 @@ class Splitter {
     }
   }
 
-  RemeshSession<2>& session_;
+  RemeshSession<Dim>& session_;
   const SplitOptions& options_;
   double tolerance_;
   EdgeRanks& ranks_;
@@ -98,6 +99,12 @@ class Splitter {
 
 }  // namespace
 
-void split_edges(RemeshSession<2>& session, EdgeRanks& ranks) { Splitter(session, ranks).run(); }
+template <int Dim>
+void split_edges(RemeshSession<Dim>& session, EdgeRanks& ranks) {
+  Splitter<Dim>(session, ranks).run();
+}
+
+template void split_edges(RemeshSession<2>&, EdgeRanks&);
+template void split_edges(RemeshSession<3>&, EdgeRanks&);
 
 }  // namespace itr

@@ -13,7 +13,8 @@ namespace itr {
 /// On entry x is the solution on the mesh; on return it is feasible and no higher in energy than the operations' tolerances
 /// allow. Cells of ids below the entry's cell_slots() that are still alive were not touched.
 /// `memory` has what was refused before, and is brought up to date.
-RemeshReport remesh(Mesh<2>& mesh, RemeshFields<2>& fields, const StepContext<2>& context, const RemeshOptions& options,
+template <int Dim>
+RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context, const RemeshOptions& options,
                     RemeshMemory& memory);
 
 }  // namespace itr
