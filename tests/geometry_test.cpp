@@ -263,7 +263,7 @@ TEST(Ccd, StopsAtAFastThinObstacleAndLetsSlidingPass) {
   EXPECT_EQ((point_edge_ccd<2>({0, 1e-3}, a, b, {500, 1e-3}, Vec<2>(499, 0), Vec<2>(501, 0))), 1);  // moving together
 }
 
-TYPED_TEST(Geometry, PiecesOfAnIntersectionFillIt) {
+TYPED_TEST(Geometry, OverlapIntegralsAreExact) {
   constexpr int Dim = TypeParam::value;
   std::mt19937 random(5);
   const auto random_simplex = [&] {
@@ -274,19 +274,20 @@ TYPED_TEST(Geometry, PiecesOfAnIntersectionFillIt) {
     } while (simplex_volume<Dim>(p) < 0.05);
     return p;
   };
-  const auto volume = [](const std::vector<std::array<Vec<Dim>, Dim + 1>>& pieces) {
-    double sum = 0;
-    for (const auto& piece : pieces) sum += simplex_volume<Dim>(piece);
-    return sum;
-  };
   for (int i = 0; i < 100; ++i) {
     const auto a = random_simplex(), b = random_simplex();
-    std::vector<std::array<Vec<Dim>, Dim + 1>> ab, ba, aa;
-    intersect_simplices<Dim>(a, b, ab);
-    intersect_simplices<Dim>(b, a, ba);
-    intersect_simplices<Dim>(a, a, aa);
-    EXPECT_NEAR(volume(ab), volume(ba), 1e-13);
-    EXPECT_NEAR(volume(aa), simplex_volume<Dim>(a), 1e-13);
+    OverlapIntegrals<Dim> ab, ba, aa;
+    const bool overlaps = integrate_overlap(Simplex<Dim>(a), Simplex<Dim>(b), ab);
+    EXPECT_EQ(overlaps, integrate_overlap(Simplex<Dim>(b), Simplex<Dim>(a), ba));
+    EXPECT_EQ(overlaps, ab.volume() > 0);
+    EXPECT_TRUE(integrate_overlap(Simplex<Dim>(a), Simplex<Dim>(a), aa));
+    EXPECT_LE((ab.ab - ba.ab.transpose()).norm(), 1e-13);
+    EXPECT_LE((ab.aa - ba.bb).norm() + (ab.bb - ba.aa).norm(), 1e-13);
+    EXPECT_NEAR(ab.aa.sum(), ab.volume(), 1e-13);
+    EXPECT_NEAR(ab.bb.sum(), ab.volume(), 1e-13);
+    const Mat<Dim + 1> mass =
+        simplex_volume<Dim>(a) / ((Dim + 1) * (Dim + 2)) * (Mat<Dim + 1>::Ones() + Mat<Dim + 1>::Identity());
+    EXPECT_LE((aa.ab - mass).norm() + (aa.aa - mass).norm() + (aa.bb - mass).norm(), 1e-13);
     // b cut by a and by what is left of its bounding simplex: compare with sampling.
     const Mat<Dim> in_a = edge_matrix<Dim>(a).inverse(), in_b = edge_matrix<Dim>(b).inverse();
     int hits = 0;
@@ -296,7 +297,27 @@ TYPED_TEST(Geometry, PiecesOfAnIntersectionFillIt) {
       const Vec<Dim> wa = in_a * (X - a[0]), wb = in_b * (X - b[0]);
       hits += wa.minCoeff() >= 0 && wa.sum() <= 1 && wb.minCoeff() >= 0 && wb.sum() <= 1;
     }
-    EXPECT_NEAR(volume(ab), std::pow(2.0, Dim) * hits / kSamples, 0.35);
+    EXPECT_NEAR(ab.volume(), std::pow(2.0, Dim) * hits / kSamples, 0.35);
+  }
+}
+
+TYPED_TEST(Geometry, SimplicesThatOnlyTouchDoNotOverlap) {
+  constexpr int Dim = TypeParam::value;
+  std::array<Vec<Dim>, Dim + 1> a, b;
+  std::mt19937 random(6);
+  for (int i = 0; i < 100; ++i) {
+    do {
+      for (auto& p : a) p = random_point<Dim>(random);
+      if (simplex_volume<Dim>(a) < 0) std::swap(a[0], a[1]);
+    } while (simplex_volume<Dim>(a) < 0.05);
+    b = a;  // the same face, the other corner mirrored
+    Vec<Dim> middle = Vec<Dim>::Zero();
+    for (int k = 0; k < Dim; ++k) middle += a[k] / Dim;
+    b[Dim] = 2 * middle - a[Dim];
+    std::swap(b[0], b[1]);
+    OverlapIntegrals<Dim> none;
+    EXPECT_FALSE(integrate_overlap(Simplex<Dim>(a), Simplex<Dim>(b), none));
+    EXPECT_EQ(none.volume(), 0);
   }
 }
 

@@ -148,7 +148,7 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
   EXPECT_EQ(keys_of(line),
             (std::vector<std::string>{"step", "t", "vertices", "elements", "unknowns", "newton_iterations", "energy",
                                       "energy_before_remesh", "splits", "collapses", "swaps", "smooths", "min_distance",
-                                      "min_volume_ratio", "seconds", "peak_rss_mb", "trial_seconds"}));
+                                      "min_volume_ratio", "history_loss", "seconds", "peak_rss_mb", "trial_seconds"}));
   EXPECT_EQ(keys_of(line["energy"]),
             (std::vector<std::string>{"inertia", "elastic", "body", "contact", "friction", "total"}));
   EXPECT_EQ(keys_of(line["seconds"]), (std::vector<std::string>{"assembly", "linear_solve", "line_search", "ccd", "remesh",

@@ -144,8 +144,7 @@ struct Transfer {
 
   MatrixX project() const {
     TransferReport report;
-    const std::vector<char> none(rest.size(), 0);
-    return project_l2<2>(old_view(), view(), touched, old_values, interpolant, none, report);
+    return project_l2<2>(old_view(), view(), touched, old_values, interpolant, {}, report);
   }
 
   /// Integrals of density * values.

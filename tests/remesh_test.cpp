@@ -5,6 +5,7 @@
 #include <map>
 #include <random>
 
+#include "itr/geometry/intersection.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
@@ -102,6 +103,64 @@ TEST(LocalProblem, HistoryAsAFunctionNeverGainsByForgetting) {
     ++compared;
   }
   EXPECT_GT(compared, 5);
+}
+
+/// Lumped masses of a split mesh integrate inertia otherwise than those before it: that is no gain.
+TEST(LocalProblem, SplitsAloneChangeNoEnergyWithLumpedMassEither) {
+  for (const MassKind mass : {MassKind::consistent, MassKind::lumped})
+    for (unsigned seed = 0; seed < 10; ++seed) {
+      TrialScene scene(seed);
+      scene.context.mass = mass;
+      scene.context.contact.enabled = false;
+      for (Eigen::Index i = 0; i < scene.fields.x.size(); ++i)  // from rest: no cell is inverted
+        scene.fields.x[i] = scene.mesh.rest(static_cast<int>(i / 2))[i % 2] + 1e-3 * std::sin(7.0 * i);
+      const auto edges = scene.mesh.edges();
+      const auto edit = make_split(scene.mesh, edges[scene.random() % edges.size()]);
+      Marks marks;
+      const auto patch = select_patch<2>(scene.mesh, edit.removed_cells, edit.value->rest, 1, {}, marks);
+      LocalView view(scene);
+      const double before = view.problem(patch, edit, false)->value();
+      EXPECT_NEAR(view.problem(patch, edit, true)->value(), before, 1e-13 * std::abs(before)) << "seed " << seed;
+    }
+}
+
+/// A collapse with lumped mass forgets what the old vertices, with their masses, are away from the new function.
+TEST(LocalProblem, ForgottenHistoryUsesTheLumpedMass) {
+  int compared = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    TrialScene scene(seed);
+    scene.context = {.materials = scene.context.materials, .mass = MassKind::lumped, .scaling = 0};
+    scene.fields.x = scene.fields.predictor;
+    const auto edges = scene.mesh.edges();
+    const auto edit = make_collapse(scene.mesh, edges[scene.random() % edges.size()]);
+    if (!edit || edit->value->num_parents != 1) continue;  // onto one of its ends: one vertex disappears
+    Marks marks;
+    const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, edit->value->rest, 1, {}, marks);
+    const double kept = LocalView(scene).problem(patch, *edit, true)->value();
+    if (!std::isfinite(kept)) continue;  // inverted by the random state
+    const VertexId gone = edit->removed_vertex;
+    double mass = 0;
+    for (const CellId c : scene.mesh.cells_of(gone))
+      mass += scene.context.materials.at(scene.mesh.body(c)).density * scene.mesh.volume(c) / 3;
+    Mesh<2> changed = scene.mesh;
+    RemeshFields<2> fields = scene.fields;
+    fields.follow(*edit, changed.apply(*edit));
+    Vec<2> there = Vec<2>::Zero();
+    double deepest = -1;
+    for (const auto& cell : edit->inserted_cells) {
+      std::array<Vec<2>, 3> p;
+      for (int k = 0; k < 3; ++k) p[k] = changed.rest(cell.vertices[k]);
+      const Vec<3> weights = Simplex<2>(p).barycentric(scene.mesh.rest(gone));
+      if (weights.minCoeff() <= deepest) continue;
+      deepest = weights.minCoeff();
+      there.setZero();
+      for (int k = 0; k < 3; ++k) there += weights[k] * fields.predictor.segment<2>(2 * cell.vertices[k]);
+    }
+    const double expected = 0.5 * mass * (there - scene.fields.predictor.segment<2>(2 * gone)).squaredNorm();
+    EXPECT_NEAR(kept, expected, 1e-12 * expected) << "seed " << seed;
+    ++compared;
+  }
+  EXPECT_GT(compared, 3);
 }
 
 /// Linear elasticity has a quadratic energy: the prediction for the new vertex alone is then exact.

@@ -5,17 +5,6 @@
 
 namespace itr {
 
-namespace {
-
-/// Entry of the element mass matrix over its total mass: consistent (1 + delta_ij) / ((d+1)(d+2)), lumped delta_ij / (d+1).
-template <int Dim>
-double mass_share(MassKind kind, bool diagonal) {
-  if (kind == MassKind::lumped) return diagonal ? 1.0 / (Dim + 1) : 0.0;
-  return (diagonal ? 2.0 : 1.0) / ((Dim + 1) * (Dim + 2));
-}
-
-}  // namespace
-
 template <int Dim>
 std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
   std::vector<double> densities;
@@ -40,7 +29,6 @@ void InertiaEnergy<Dim>::set_unrepresented_history(VectorX residual, double loss
 
 template <int Dim>
 double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
-  const double off = mass_share<Dim>(kind_, false), extra = mass_share<Dim>(kind_, true) - off;
   double sum = 0;
   for (std::size_t e = 0; e < mass_.size(); ++e) {
     Vec<Dim> total = Vec<Dim>::Zero();
@@ -50,7 +38,8 @@ double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
       total += d;
       squares += d.squaredNorm();
     }
-    sum += 0.5 * mass_[e] * (off * total.squaredNorm() + extra * squares);
+    const ElementMass<Dim> mass(kind_, mass_[e]);
+    sum += 0.5 * (mass.off * total.squaredNorm() + mass.extra * squares);
   }
   if (residual_.size() > 0) sum += residual_.dot(x - predictor_) + loss_;
   return sum;
@@ -58,13 +47,11 @@ double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
 
 template <int Dim>
 void InertiaEnergy<Dim>::add_mass_product(ConstVectorView x, VectorView y) const {
-  const double off = mass_share<Dim>(kind_, false), extra = mass_share<Dim>(kind_, true) - off;
-  for (std::size_t e = 0; e < mass_.size(); ++e) {
-    Vec<Dim> total = Vec<Dim>::Zero();
-    for (const int v : cells_.elements[e].vertices) total += x.segment<Dim>(Dim * v);
-    for (const int v : cells_.elements[e].vertices)
-      y.segment<Dim>(Dim * v) += mass_[e] * (off * total + extra * x.segment<Dim>(Dim * v));
-  }
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Dim, Eigen::RowMajor>;
+  const Eigen::Map<const Rows> from(x.data(), x.size() / Dim, Dim);
+  Eigen::Map<Rows> to(y.data(), y.size() / Dim, Dim);
+  for (std::size_t e = 0; e < mass_.size(); ++e)
+    ElementMass<Dim>(kind_, mass_[e]).add_product(cells_.elements[e].vertices, from, to);
 }
 
 template <int Dim>
@@ -76,10 +63,11 @@ void InertiaEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 template <int Dim>
 void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
   constexpr int kDofs = Dim * (Dim + 1);
+  const ElementMass<Dim> unit_mass(kind_, 1);
   Mat<kDofs> unit = Mat<kDofs>::Zero();
   for (int i = 0; i <= Dim; ++i)
     for (int j = 0; j <= Dim; ++j)
-      for (int c = 0; c < Dim; ++c) unit(Dim * i + c, Dim * j + c) = mass_share<Dim>(kind_, i == j);
+      for (int c = 0; c < Dim; ++c) unit(Dim * i + c, Dim * j + c) = unit_mass.off + (i == j ? unit_mass.extra : 0);
   sink.add_constant_elements<Dim>(cells_, this, [&](std::size_t e, Mat<kDofs>& block) { block = mass_[e] * unit; });
 }
 

@@ -1,107 +1,113 @@
 // SPDX-License-Identifier: MIT
 #include "itr/geometry/intersection.hpp"
 
-#include <Eigen/Geometry>
 #include <cmath>
-
-#include "itr/geometry/measures.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr double kRoundOff = 1e-15;  ///< of the inputs' volume: pieces below it are noise
+constexpr double kRoundOff = 1e-15;  ///< of the volume of a: pieces below it are noise
+constexpr double kTouching = 1e-14;  ///< of a height: simplices that overlap by less only touch
 
-/// The part of a convex polygon on the left of the line a -> b (Sutherland & Hodgman 1974). Returns the number of corners.
-int clip(const Vec<2>* polygon, int count, const Vec<2>& a, const Vec<2>& b, Vec<2>* clipped) {
-  const auto side = [&](const Vec<2>& p) { return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]); };
-  int kept = 0;
-  double previous = side(polygon[count - 1]);
-  for (int i = 0; i < count; ++i) {
-    const Vec<2>& from = polygon[(i + count - 1) % count];
-    const double here = side(polygon[i]);
-    if ((previous < 0) != (here < 0)) clipped[kept++] = from + previous / (previous - here) * (polygon[i] - from);
-    if (here >= 0) clipped[kept++] = polygon[i];
-    previous = here;
-  }
-  return kept;
-}
+/// A point by its barycentric coordinates in both simplices.
+template <int Dim>
+struct Corner {
+  Vec<Dim + 1> in_a, in_b;
+};
 
-void intersect(const std::array<Vec<2>, 3>& a, const std::array<Vec<2>, 3>& b, std::vector<std::array<Vec<2>, 3>>& pieces) {
-  const double least = kRoundOff * std::min(simplex_volume<2>(a), simplex_volume<2>(b));
-  Vec<2> buffers[2][8];
-  int count = 3, current = 0;
-  std::copy(a.begin(), a.end(), buffers[0]);
-  for (int k = 0; k < 3 && count > 0; ++k, current = 1 - current)
-    count = clip(buffers[current], count, b[k], b[(k + 1) % 3], buffers[1 - current]);
-  for (int i = 1; i + 1 < count; ++i) {
-    const std::array<Vec<2>, 3> piece{buffers[current][0], buffers[current][i], buffers[current][i + 1]};
-    if (simplex_volume<2>(piece) > least) pieces.push_back(piece);
-  }
-}
+/// Clips a simplex by one plane of b after another, depth first, and adds up what is left.
+template <int Dim>
+class Clipper {
+ public:
+  using Piece = std::array<Corner<Dim>, Dim + 1>;
 
-using Tet = std::array<Vec<3>, 4>;
+  explicit Clipper(OverlapIntegrals<Dim>& sum) : sum_(sum) {}
 
-/// The part of a tetrahedron where a linear function, given at its corners, is not negative: at most three tetrahedra.
-void keep_positive(const Tet& tet, const std::array<double, 4>& f, std::vector<Tet>& kept) {
-  std::array<int, 4> in{}, out{};
-  int inside = 0, outside = 0;
-  for (int i = 0; i < 4; ++i) (f[i] >= 0 ? in[inside++] : out[outside++]) = i;
-  const auto cut = [&](int i, int o) { return Vec<3>(tet[i] + f[i] / (f[i] - f[o]) * (tet[o] - tet[i])); };
-  const auto prism = [&](const std::array<Vec<3>, 3>& p, const std::array<Vec<3>, 3>& q) {
-    kept.push_back({p[0], p[1], p[2], q[2]});
-    kept.push_back({p[0], p[1], q[1], q[2]});
-    kept.push_back({p[0], q[0], q[1], q[2]});
-  };
-  switch (inside) {
-    case 4:
-      kept.push_back(tet);
-      break;
-    case 3:
-      prism({tet[in[0]], tet[in[1]], tet[in[2]]}, {cut(in[0], out[0]), cut(in[1], out[0]), cut(in[2], out[0])});
-      break;
-    case 2:
-      prism({tet[in[0]], cut(in[0], out[0]), cut(in[0], out[1])}, {tet[in[1]], cut(in[1], out[0]), cut(in[1], out[1])});
-      break;
-    case 1:
-      kept.push_back({tet[in[0]], cut(in[0], out[0]), cut(in[0], out[1]), cut(in[0], out[2])});
-      break;
-    default:
-      break;
-  }
-}
-
-void intersect(const Tet& a, const Tet& b, std::vector<Tet>& pieces) {
-  static constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-  const double least = kRoundOff * std::min(simplex_volume<3>(a), simplex_volume<3>(b));
-  std::vector<Tet> current{a}, next;
-  for (const auto& face : kFaces) {
-    const Vec<3> normal = (b[face[2]] - b[face[0]]).cross(b[face[1]] - b[face[0]]);  // inward
-    next.clear();
-    for (const Tet& tet : current) {
-      std::array<double, 4> f;
-      for (int i = 0; i < 4; ++i) f[i] = normal.dot(tet[i] - b[face[0]]);
-      keep_positive(tet, f, next);
+  /// What is left of `piece` behind the planes from `plane` on, where a barycentric coordinate of b is not negative.
+  void clip(const Piece& piece, int plane) {
+    if (plane > Dim) return add(piece);
+    Cut cut;
+    for (const auto& corner : piece) (corner.in_b[plane] >= 0 ? cut.in[cut.num_in++] : cut.out[cut.num_out++]) = &corner;
+    if (cut.num_out == 0) return clip(piece, plane + 1);
+    // Simplices of the first k + 1 corners inside and a monotone path through the grid of cut edges, for each k and path.
+    Piece part;
+    for (int k = 0; k < cut.num_in; ++k) {
+      part[k] = *cut.in[k];
+      add_paths(cut, part, k + 1, k, 0, plane);
     }
-    current.swap(next);
   }
-  for (Tet& tet : current) {
-    if (simplex_volume<3>(tet) < 0) std::swap(tet[2], tet[3]);
-    if (simplex_volume<3>(tet) > least) pieces.push_back(tet);
+
+ private:
+  struct Cut {
+    std::array<const Corner<Dim>*, Dim + 1> in, out;
+    int num_in = 0, num_out = 0;
+  };
+
+  static Corner<Dim> cut_edge(const Corner<Dim>& in, const Corner<Dim>& out, int plane) {
+    const double share = in.in_b[plane] / (in.in_b[plane] - out.in_b[plane]);
+    Corner<Dim> point{in.in_a + share * (out.in_a - in.in_a), in.in_b + share * (out.in_b - in.in_b)};
+    point.in_b[plane] = 0;
+    return point;
   }
+
+  void add_paths(const Cut& cut, Piece& part, int filled, int i, int o, int plane) {
+    part[filled] = cut_edge(*cut.in[i], *cut.out[o], plane);
+    if (filled == Dim) return clip(part, plane + 1);
+    if (i + 1 < cut.num_in) add_paths(cut, part, filled + 1, i + 1, o, plane);
+    if (o + 1 < cut.num_out) add_paths(cut, part, filled + 1, i, o + 1, plane);
+  }
+
+  void add(const Piece& piece) {
+    Mat<Dim> edges;
+    for (int k = 0; k < Dim; ++k) edges.col(k) = piece[k + 1].in_a.template tail<Dim>() - piece[0].in_a.template tail<Dim>();
+    const double share = std::abs(edges.determinant());
+    if (share < kRoundOff) return;
+    Vec<Dim + 1> total_a = Vec<Dim + 1>::Zero(), total_b = Vec<Dim + 1>::Zero();
+    for (const auto& corner : piece) {
+      total_a += corner.in_a;
+      total_b += corner.in_b;
+      add_products(share, corner.in_a, corner.in_b);
+    }
+    add_products(share, total_a, total_b);
+  }
+
+  void add_products(double share, const Vec<Dim + 1>& a, const Vec<Dim + 1>& b) {
+    sum_.aa.noalias() += share * a * a.transpose();
+    sum_.ab.noalias() += share * a * b.transpose();
+    sum_.bb.noalias() += share * b * b.transpose();
+  }
+
+  OverlapIntegrals<Dim>& sum_;
+};
+
+/// Whether a plane of `simplex` has all of the other one's corners on its outer side.
+template <int Dim>
+bool separates(const Simplex<Dim>& simplex, const Simplex<Dim>& other) {
+  Vec<Dim + 1> largest = simplex.barycentric(other.corners[0]);
+  for (int k = 1; k <= Dim; ++k) largest = largest.cwiseMax(simplex.barycentric(other.corners[k]));
+  return largest.minCoeff() < kTouching;
 }
 
 }  // namespace
 
 template <int Dim>
-void intersect_simplices(const std::array<Vec<Dim>, Dim + 1>& a, const std::array<Vec<Dim>, Dim + 1>& b,
-                         std::vector<std::array<Vec<Dim>, Dim + 1>>& pieces) {
-  intersect(a, b, pieces);
+bool integrate_overlap(const Simplex<Dim>& a, const Simplex<Dim>& b, OverlapIntegrals<Dim>& integrals) {
+  integrals.aa.setZero();
+  integrals.ab.setZero();
+  integrals.bb.setZero();
+  if (separates(a, b) || separates(b, a)) return false;
+  typename Clipper<Dim>::Piece piece;
+  for (int k = 0; k <= Dim; ++k) piece[k] = {Vec<Dim + 1>::Unit(k), b.barycentric(a.corners[k])};
+  Clipper<Dim>(integrals).clip(piece, 0);
+  const double scale = a.volume / ((Dim + 1) * (Dim + 2));
+  integrals.aa *= scale;
+  integrals.ab *= scale;
+  integrals.bb *= scale;
+  return integrals.volume() > 0;
 }
 
-template void intersect_simplices<2>(const std::array<Vec<2>, 3>&, const std::array<Vec<2>, 3>&,
-                                     std::vector<std::array<Vec<2>, 3>>&);
-template void intersect_simplices<3>(const std::array<Vec<3>, 4>&, const std::array<Vec<3>, 4>&,
-                                     std::vector<std::array<Vec<3>, 4>>&);
+template bool integrate_overlap<2>(const Simplex<2>&, const Simplex<2>&, OverlapIntegrals<2>&);
+template bool integrate_overlap<3>(const Simplex<3>&, const Simplex<3>&, OverlapIntegrals<3>&);
 
 }  // namespace itr

@@ -66,11 +66,11 @@ std::string versions_json() {
 std::string common_members(const StepReport& r) {
   return fmt::format(
       R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"energy":{},"energy_before_remesh":{},)"
-      R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"min_distance":{},"min_volume_ratio":{},"seconds":{},)"
+      R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"min_distance":{},"min_volume_ratio":{},"history_loss":{},"seconds":{},)"
       R"("peak_rss_mb":{})",
       r.vertices, r.elements, r.unknowns, r.newton_iterations, energy_json(r.energy), number(r.energy_before_remesh),
       count_json(r.splits), count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), number(r.min_distance),
-      number(r.min_volume_ratio), seconds_json(r.seconds), number(r.peak_rss_mb));
+      number(r.min_volume_ratio), number(r.history_loss), seconds_json(r.seconds), number(r.peak_rss_mb));
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ void Totals::add(const StepReport& report) {
   const bool is_first = before.vertices == 0;
   total_ = report;
   total_.add_effort(before);
-  if (report.step > 0) energy_decrease_ += report.energy_before_remesh - report.energy.total;
+  if (report.step > 0) gain_ += report.energy_before_remesh - report.energy.total - report.history_loss;
   if (is_first) return;
   total_.min_distance = std::min(before.min_distance, report.min_distance);
   total_.min_volume_ratio = std::min(before.min_volume_ratio, report.min_volume_ratio);
@@ -109,13 +109,14 @@ void for_each_number(Report& r, Visit&& visit) {
   auto& s = r.seconds;
   for (auto* x : {&s.assembly, &s.linear_solve, &s.line_search, &s.ccd, &s.remesh, &s.projection, &s.output, &s.total})
     visit(*x);
-  for (auto* x : {&r.t, &r.energy_before_remesh, &r.min_distance, &r.min_volume_ratio, &r.peak_rss_mb}) visit(*x);
+  for (auto* x : {&r.t, &r.energy_before_remesh, &r.history_loss, &r.min_distance, &r.min_volume_ratio, &r.peak_rss_mb})
+    visit(*x);
 }
 
 }  // namespace
 
 std::vector<double> Totals::save() const {
-  std::vector<double> values = {energy_decrease_};
+  std::vector<double> values = {gain_};
   for_each_number(total_, [&](auto number) { values.push_back(static_cast<double>(number)); });
   return values;
 }
@@ -123,7 +124,7 @@ std::vector<double> Totals::save() const {
 void Totals::restore(const std::vector<double>& values) {
   if (const std::size_t expected = save().size(); values.size() != expected)
     throw InputError({"", "saved totals", std::to_string(values.size()) + " numbers", std::to_string(expected)});
-  energy_decrease_ = values[0];
+  gain_ = values[0];
   std::size_t next = 1;
   for_each_number(total_,
                   [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]); });
@@ -132,11 +133,10 @@ void Totals::restore(const std::vector<double>& values) {
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {
   return fmt::format(
       R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"damped_steps":{},"cut_steps":{},"t":{},{},)"
-      R"("energy_decrease_by_remeshing":{},"norms":{}}})"
+      R"("gain_by_remeshing":{},"norms":{}}})"
       "\n",
       json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(), total_.step,
-      total_.damped_steps, total_.cut_steps, number(total_.t), common_members(total_), number(energy_decrease_),
-      norms_json(norms));
+      total_.damped_steps, total_.cut_steps, number(total_.t), common_members(total_), number(gain_), norms_json(norms));
 }
 
 }  // namespace itr::output

@@ -24,7 +24,7 @@ class Totals {
 
  private:
   StepReport total_;
-  double energy_decrease_ = 0;  ///< sum of energy_before_remesh - total [J]
+  double gain_ = 0;  ///< by remeshing: sum of energy_before_remesh - total - history_loss [J]
 };
 
 }  // namespace itr::output

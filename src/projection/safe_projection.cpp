@@ -4,49 +4,180 @@
 #include <algorithm>
 #include <cmath>
 
+#include "itr/energy/contact/contact.hpp"
 #include "itr/energy/elastic/elastic.hpp"
+#include "itr/energy/inertia.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/projection/volume_barrier.hpp"
 
 namespace itr {
 
 namespace {
-constexpr double kVolumeActivation = 1e-2;   ///< volume ratio below which the barrier acts
-constexpr double kVolumeStiffness = 0.1;     ///< of the largest Young's modulus (the paper's kappa_v)
+
+constexpr double kVolumeActivation = 1e-2;   ///< most volume ratio below which the barrier acts
 constexpr double kRelativeTolerance = 1e-9;  ///< of the way from the interpolant to the unconstrained minimiser
+constexpr double kPenalty = 1e8;             ///< of an integral's change by that of the inertia
+
+/// An integral sum_i m_i (x_i - goal_i) over the free dofs of one part and one axis, which is to vanish.
+struct Integral {
+  std::vector<int> dofs;
+  std::vector<double> masses;
+  double total_mass = 0;
+
+  double defect(ConstVectorView x, const VectorX& goal) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < dofs.size(); ++i) sum += masses[i] * (x[dofs[i]] - goal[dofs[i]]);
+    return sum;
+  }
+  double weight() const { return kPenalty / total_mass; }
+};
+
+/// 1/2 weight * defect^2 for each integral. Its Hessian, of low rank and dense, is PenalisedSystem's to add.
+class IntegralPenalty final : public Energy {
+ public:
+  IntegralPenalty(const std::vector<Integral>& integrals, const VectorX& goal) : integrals_(integrals), goal_(goal) {}
+  std::string_view name() const override { return "integrals"; }
+  double value(ConstVectorView x, Workspace&) const override {
+    double sum = 0;
+    for (const Integral& integral : integrals_) sum += 0.5 * integral.weight() * std::pow(integral.defect(x, goal_), 2);
+    return sum;
+  }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
+    for (const Integral& integral : integrals_) {
+      const double force = integral.weight() * integral.defect(x, goal_);
+      for (std::size_t i = 0; i < integral.dofs.size(); ++i) gradient[integral.dofs[i]] += force * integral.masses[i];
+    }
+  }
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+
+ private:
+  const std::vector<Integral>& integrals_;
+  const VectorX& goal_;
+};
+
+/// (H + C W C^T)^-1 by the formula of Sherman, Morrison and Woodbury, columns of C the masses of the integrals.
+class PenalisedSystem final : public NewtonSystem {
+ public:
+  PenalisedSystem(SparseSystem& system, const std::vector<Integral>& integrals, const DofMap& dofs) : system_(system) {
+    columns_ = MatrixX::Zero(dofs.num_unknowns, static_cast<Eigen::Index>(integrals.size()));
+    inverse_weights_.resize(columns_.cols());
+    for (std::size_t q = 0; q < integrals.size(); ++q) {
+      const auto column = static_cast<Eigen::Index>(q);
+      inverse_weights_[column] = 1 / integrals[q].weight();
+      for (std::size_t i = 0; i < integrals[q].dofs.size(); ++i)
+        columns_(dofs.unknown[integrals[q].dofs[i]], column) = integrals[q].masses[i];
+    }
+  }
+  void assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs, PrescribedMotion& motion,
+                Workspace& workspace) override {
+    system_.assemble(energy, x, psd, dofs, motion, workspace);
+  }
+  linear::Outcome factorize(double shift) override {
+    const linear::Outcome outcome = system_.factorize(shift);
+    if (outcome != linear::Outcome::ok) return outcome;
+    solved_.resize(columns_.rows(), columns_.cols());
+    VectorX solution;
+    for (Eigen::Index q = 0; q < columns_.cols(); ++q) {
+      const linear::SolveReport report = system_.solve(columns_.col(q), solution);
+      if (report.outcome != linear::Outcome::ok) return report.outcome;
+      solved_.col(q) = solution;
+    }
+    MatrixX small = columns_.transpose() * solved_;
+    small.diagonal() += inverse_weights_;
+    small_.compute(small);
+    return linear::Outcome::ok;
+  }
+  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override {
+    const linear::SolveReport report = system_.solve(rhs, solution);
+    solution -= solved_ * small_.solve(columns_.transpose() * solution);
+    return report;
+  }
+  std::string message() const override { return system_.message(); }
+  double diagonal_scale() const override { return system_.diagonal_scale(); }
+
+ private:
+  SparseSystem& system_;
+  MatrixX columns_, solved_;
+  VectorX inverse_weights_;
+  Eigen::LLT<MatrixX> small_;
+};
+
+template <int Dim>
+std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem) {
+  const int patch = static_cast<int>(problem.part.size());
+  const int parts = patch == 0 ? 0 : *std::max_element(problem.part.begin(), problem.part.end()) + 1;
+  VectorX masses = VectorX::Zero(patch);
+  for (const auto& element : problem.cells.elements)
+    for (const int v : element.vertices)
+      masses[v] += problem.materials.at(element.body).density * element.volume / (Dim + 1);
+  std::vector<Integral> integrals(parts * Dim);
+  for (int v = 0; v < patch; ++v)
+    for (int c = 0; c < Dim; ++c) {
+      if (problem.held_dofs[Dim * v + c]) continue;
+      Integral& integral = integrals[Dim * problem.part[v] + c];
+      integral.dofs.push_back(Dim * v + c);
+      integral.masses.push_back(masses[v]);
+      integral.total_mass += masses[v];
+    }
+  std::erase_if(integrals, [](const Integral& integral) { return integral.dofs.empty(); });
+  return integrals;
+}
+
+/// Moves free dofs, all by the same, to where the integrals are; returns whether that is free of contact and inversion.
+bool close_integrals(const std::vector<Integral>& integrals, const VectorX& goal, const Energy& energy, VectorX& x,
+                     Workspace& workspace) {
+  VectorX way = VectorX::Zero(x.size());
+  for (const Integral& integral : integrals) {
+    const double shift = -integral.defect(x, goal) / integral.total_mass;
+    for (const int dof : integral.dofs) way[dof] = shift;
+  }
+  if (energy.max_step(x, way, workspace) < 1 || !std::isfinite(energy.value(x + way, workspace))) return false;
+  x += way;
+  return true;
+}
+
 }  // namespace
 
 template <int Dim>
 VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX& interpolant, const VectorX& projected,
-                       linear::Solver& solver, SafeProjectionReport& report) {
+                       linear::Solver& solver, SafeProjectionReport<Dim>& report) {
   Workspace workspace;
   const VectorX way = projected - interpolant;
-  std::shared_ptr<ContactEnergy<Dim>> contact;
-  if (problem.surface)
-    contact = std::make_shared<ContactEnergy<Dim>>(*problem.surface, problem.contact, problem.contact.barrier_stiffness,
-                                                   problem.scaling);
-  const ElasticEnergy<Dim> inversion(problem.cells, problem.materials, 1);
-  const VolumeBarrier<Dim> volume(problem.cells, kVolumeActivation, 1);
+  double least_ratio = kVolumeActivation * 2, mass = 0, volume = 0;
+  for (const auto& element : problem.cells.elements) {
+    least_ratio = std::min(least_ratio, deformation_gradient<Dim>(element, interpolant).determinant());
+    mass += problem.materials.at(element.body).density * element.volume;
+    volume += element.volume;
+  }
+  const double size = std::pow(volume / problem.cells.elements.size(), 1.0 / Dim);
+  const auto inversion = std::make_shared<ElasticEnergy<Dim>>(problem.cells, problem.materials, 1);
+  const auto keep_volume = std::make_shared<VolumeBarrier<Dim>>(problem.cells, least_ratio / 2, mass / volume * size * size);
+  std::shared_ptr<ContactEnergy<Dim>> keep_distance;
+  if (problem.surface) {
+    ContactOptions contact{.enabled = true, .activation_distance = problem.activation_distance};
+    const double nearest = ContactEnergy<Dim>(*problem.surface, contact, 1, 1).min_distance(interpolant, workspace);
+    contact.activation_distance = std::min(nearest, problem.activation_distance) / 2;
+    // At half of that distance the barrier is as stiff as the mass of a vertex.
+    const double stiffness = mass / problem.part.size() / std::pow(contact.activation_distance, 2);
+    keep_distance = std::make_shared<ContactEnergy<Dim>>(*problem.surface, contact, stiffness, 1);
+  }
   const bool reachable =
-      inversion.max_step(interpolant, way, workspace) == 1 && volume.value(projected, workspace) == 0 &&
-      (!contact || (contact->max_step(interpolant, way, workspace) == 1 && contact->active(projected, workspace).empty()));
+      inversion->max_step(interpolant, way, workspace) == 1 && keep_volume->value(projected, workspace) == 0 &&
+      (!keep_distance ||
+       (keep_distance->max_step(interpolant, way, workspace) == 1 && keep_distance->active(projected, workspace).empty()));
   if (reachable) return projected;
 
   report.used_barriers = true;
-  std::vector<char> held = problem.held_dofs;
-  for (std::size_t v = 0; v < problem.free_vertices.size(); ++v)
-    if (!problem.free_vertices[v])
-      for (int c = 0; c < Dim; ++c) held[Dim * v + c] = 1;
-  const DofMap dofs = DofMap::from_held(held);
-  double stiffness = 0;
-  for (const auto& [body, material] : problem.materials) stiffness = std::max(stiffness, material.youngs_modulus);
+  const std::vector<Integral> integrals = integrals_of(problem);
+  const DofMap dofs = DofMap::from_held(problem.held_dofs);
   EnergySum energy;
   energy.add(std::make_shared<InertiaEnergy<Dim>>(problem.cells, problem.materials, MassKind::consistent, projected));
-  energy.add(std::make_shared<VolumeBarrier<Dim>>(problem.cells, kVolumeActivation,
-                                                  kVolumeStiffness * stiffness * problem.scaling));
-  if (contact) energy.add(contact);
-  SparseSystem system(solver);
-  system.reset(dofs, Dim, stencil_vertices(problem.cells), Dim + 1);
+  energy.add(keep_volume);
+  if (keep_distance) energy.add(keep_distance);
+  energy.add(std::make_shared<IntegralPenalty>(integrals, projected));
+  SparseSystem sparse(solver);
+  sparse.reset(dofs, Dim, stencil_vertices(problem.cells), Dim + 1);
+  PenalisedSystem system(sparse, integrals, dofs);
   NewtonOptions options;
   options.max_iterations = 100;
   options.step_tolerance = kRelativeTolerance * way.norm();
@@ -55,12 +186,14 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   const NewtonSummary summary = minimize(energy, x, dofs, VectorX(), system, options, workspace);
   report.converged = summary.converged();
   report.iterations = summary.iterations;
+  close_integrals(integrals, projected, energy, x, workspace);
+  for (const Integral& integral : integrals) report.lost[integral.dofs[0] % Dim] -= integral.defect(x, projected);
   return x;
 }
 
 template VectorX project_safely<2>(const SafeProjectionProblem<2>&, const VectorX&, const VectorX&, linear::Solver&,
-                                   SafeProjectionReport&);
+                                   SafeProjectionReport<2>&);
 template VectorX project_safely<3>(const SafeProjectionProblem<3>&, const VectorX&, const VectorX&, linear::Solver&,
-                                   SafeProjectionReport&);
+                                   SafeProjectionReport<3>&);
 
 }  // namespace itr

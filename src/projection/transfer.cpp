@@ -2,16 +2,20 @@
 #include "itr/projection/transfer.hpp"
 
 #include <Eigen/LU>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "itr/geometry/bvh.hpp"
 #include "itr/geometry/intersection.hpp"
-#include "itr/geometry/measures.hpp"
 
 namespace itr {
 
 namespace {
+
+/// Nodal values, k together for each vertex.
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 template <int Dim>
 std::array<Vec<Dim>, Dim + 1> corners(const TransferMesh<Dim>& mesh, int cell) {
@@ -27,192 +31,261 @@ Box<Dim> box_of(const std::array<Vec<Dim>, Dim + 1>& p) {
   return box;
 }
 
-/// Barycentric coordinates of points with respect to a simplex.
 template <int Dim>
-class Barycentric {
- public:
-  explicit Barycentric(const std::array<Vec<Dim>, Dim + 1>& p) : origin_(p[0]), inverse_(edge_matrix<Dim>(p).inverse()) {}
-  Vec<Dim + 1> operator()(const Vec<Dim>& X) const {
-    Vec<Dim + 1> weights;
-    weights.template tail<Dim>() = inverse_ * (X - origin_);
-    weights[0] = 1 - weights.template tail<Dim>().sum();
-    return weights;
-  }
-
- private:
-  Vec<Dim> origin_;
-  Mat<Dim> inverse_;
-};
-
-/// Integral over the intersection of two cells of phi_i^new phi_j^old: both are linear on every piece, so the mass matrix of
-/// the piece gives it exactly.
-template <int Dim>
-Mat<Dim + 1> cross_mass(const std::array<Vec<Dim>, Dim + 1>& new_cell, const std::array<Vec<Dim>, Dim + 1>& old_cell,
-                        std::vector<std::array<Vec<Dim>, Dim + 1>>& pieces) {
-  Mat<Dim + 1> sum = Mat<Dim + 1>::Zero();
-  pieces.clear();
-  intersect_simplices<Dim>(new_cell, old_cell, pieces);
-  if (pieces.empty()) return sum;
-  const Barycentric<Dim> in_new(new_cell), in_old(old_cell);
-  for (const auto& piece : pieces) {
-    Mat<Dim + 1> at_new, at_old;  // columns: corners of the piece
-    for (int k = 0; k <= Dim; ++k) {
-      at_new.col(k) = in_new(piece[k]);
-      at_old.col(k) = in_old(piece[k]);
-    }
-    const Vec<Dim + 1> total_new = at_new.rowwise().sum(), total_old = at_old.rowwise().sum();
-    const double weight = simplex_volume<Dim>(piece) / ((Dim + 1) * (Dim + 2));
-    sum += weight * (at_new * at_old.transpose() + total_new * total_old.transpose());
-  }
-  return sum;
+double cell_mass(const TransferMesh<Dim>& mesh, int cell) {
+  return mesh.density[cell] * simplex_volume<Dim>(corners<Dim>(mesh, cell));
 }
 
-/// y += M x with the density-weighted consistent mass of some cells.
-template <int Dim, typename Cells>
-void add_mass_product(const TransferMesh<Dim>& mesh, const Cells& cells, const MatrixX& x, MatrixX& y) {
-  for (const int c : cells) {
-    const auto& cell = mesh.cells[c];
-    const double mass = mesh.density[c] * simplex_volume<Dim>(corners<Dim>(mesh, c)) / ((Dim + 1) * (Dim + 2));
-    Eigen::RowVectorXd total = Eigen::RowVectorXd::Zero(x.cols());
-    for (const int v : cell) total += x.row(v);
-    for (const int v : cell) y.row(v) += mass * (total + x.row(v));
-  }
-}
-
-/// The consistent mass matrix as an operator, with volumes and rows at hand.
+/// The density-weighted mass matrix on the entries that are not fixed, under constraints that prescribe moments of the
+/// solution: integrals of rho p u over each connected part for p = 1 and the coordinates.
 template <int Dim>
-class MassOperator {
+class ConstrainedMass {
  public:
-  MassOperator(const TransferMesh<Dim>& mesh, std::span<const char> fixed) : mesh_(mesh), fixed_(fixed) {
-    diagonal_ = VectorX::Zero(static_cast<Eigen::Index>(mesh.rest.size()));
+  ConstrainedMass(const TransferMesh<Dim>& mesh, std::span<const char> fixed, Eigen::Index columns)
+      : part_(connected_parts(mesh)), columns_(columns) {
+    const auto n = static_cast<Eigen::Index>(mesh.rest.size());
+    VectorX lumped = VectorX::Zero(n);
+    std::vector<Eigen::Triplet<double>> entries;
+    entries.reserve(mesh.cells.size() * (Dim + 1) * (Dim + 1));
     for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
-      share_.push_back(mesh.density[c] * simplex_volume<Dim>(corners<Dim>(mesh, static_cast<int>(c))) /
-                       ((Dim + 1) * (Dim + 2)));
-      for (const int v : mesh.cells[c]) diagonal_[v] += 2 * share_[c];
+      const double mass = cell_mass(mesh, static_cast<int>(c));
+      const ElementMass<Dim> element(MassKind::consistent, mass);
+      for (const int i : mesh.cells[c]) {
+        lumped[i] += mass / (Dim + 1);
+        for (const int j : mesh.cells[c]) entries.emplace_back(i, j, element.off + (i == j ? element.extra : 0));
+      }
     }
+    mass_.resize(n, n);
+    mass_.setFromTriplets(entries.begin(), entries.end());
+    inverse_.resize(n, columns);
+    for (Eigen::Index v = 0; v < n; ++v)
+      for (Eigen::Index k = 0; k < columns; ++k) {
+        const bool is_free = lumped[v] > 0 && (fixed.empty() || !fixed[v * columns + k]);
+        inverse_(v, k) = is_free ? 1 / lumped[v] : 0;
+      }
+    set_polynomials(mesh);
+    weights_ = mass_ * polynomials_;
+    set_grams();
   }
-  bool is_free(Eigen::Index v) const { return !fixed_[v] && diagonal_[v] > 0; }
-  double diagonal(Eigen::Index v) const { return diagonal_[v]; }
-  void apply(const VectorX& x, VectorX& y) const {
-    y.setZero(x.size());
-    for (std::size_t c = 0; c < share_.size(); ++c) {
-      double total = 0;
-      for (const int v : mesh_.cells[c]) total += x[v];
-      for (const int v : mesh_.cells[c]) y[v] += share_[c] * (total + x[v]);
-    }
-    for (Eigen::Index v = 0; v < y.size(); ++v)
-      if (!is_free(v)) y[v] = 0;
+
+  void product(const Rows& x, Rows& y) const { y.noalias() = mass_ * x; }
+  /// Moments by part (Dim + 1 rows) and column: of all entries of a residual, or of a solution.
+  Rows moments_of_residual(const Rows& r) const { return moments(polynomials_, r); }
+  Rows moments(const Rows& d) const { return moments(weights_, d); }
+  /// Adds to d the least change, in the lumped norm, that adds these moments.
+  void add_moments(const Rows& moments, Rows& d) const {
+    const Rows multipliers = solve_grams(moments);
+    for (Eigen::Index v = 0; v < d.rows(); ++v) d.row(v) += inverse_.row(v).cwiseProduct(force(v, multipliers));
+  }
+  /// z = r by the lumped mass, without moments: r loses the forces of the constraints, which would drown the rest (Gould,
+  /// Hribar & Nocedal 2001).
+  void precondition(Rows& r, Rows& z) const {
+    z = r.cwiseProduct(inverse_);
+    const Rows multipliers = solve_grams(moments(z));
+    for (Eigen::Index v = 0; v < r.rows(); ++v) r.row(v) -= force(v, multipliers);
+    z = r.cwiseProduct(inverse_);
+  }
+  /// Integrals of rho u, summed over the parts.
+  VectorX integrals(const Rows& moments) const {
+    VectorX sum = VectorX::Zero(columns_);
+    for (int p = 0; p < num_parts_; ++p) sum += moments.row((Dim + 1) * p).transpose();
+    return sum;
   }
 
  private:
-  const TransferMesh<Dim>& mesh_;
-  std::span<const char> fixed_;
-  std::vector<double> share_;
-  VectorX diagonal_;
-};
-
-/// Jacobi-preconditioned conjugate gradients from zero until the residual no longer falls. The preconditioned consistent
-/// mass matrix has eigenvalues in [1/2, (Dim + 2) / 2] whatever the mesh (Wathen 1987), so some dozens of iterations do.
-template <int Dim>
-VectorX solve_mass(const MassOperator<Dim>& mass, VectorX residual, TransferReport& report) {
-  constexpr int kMaxIterations = 200;
-  constexpr double kRoundOff = 1e-16;
-  const auto precondition = [&](const VectorX& r) {
-    VectorX z = VectorX::Zero(r.size());
-    for (Eigen::Index v = 0; v < r.size(); ++v)
-      if (mass.is_free(v)) z[v] = r[v] / mass.diagonal(v);
-    return z;
-  };
-  for (Eigen::Index v = 0; v < residual.size(); ++v)
-    if (!mass.is_free(v)) residual[v] = 0;
-  VectorX solution = VectorX::Zero(residual.size());
-  const double start = residual.norm();
-  if (start == 0) return solution;
-  VectorX z = precondition(residual), p = z, product;
-  double rz = residual.dot(z);
-  int iteration = 0;
-  for (; iteration < kMaxIterations && residual.norm() > kRoundOff * start; ++iteration) {
-    mass.apply(p, product);
-    const double step = rz / p.dot(product);
-    solution += step * p;
-    residual -= step * product;
-    z = precondition(residual);
-    const double next = residual.dot(z);
-    p = z + next / rz * p;
-    rz = next;
+  /// 1 and the coordinates, about the middle of each part and by its size.
+  void set_polynomials(const TransferMesh<Dim>& mesh) {
+    num_parts_ = part_.empty() ? 0 : *std::max_element(part_.begin(), part_.end()) + 1;
+    std::vector<Box<Dim>> boxes(num_parts_);
+    for (std::size_t v = 0; v < part_.size(); ++v) boxes[part_[v]].include(mesh.rest[v]);
+    polynomials_.resize(inverse_.rows(), Dim + 1);
+    for (std::size_t v = 0; v < part_.size(); ++v) {
+      const Box<Dim>& box = boxes[part_[v]];
+      const Vec<Dim> way = mesh.rest[v] - 0.5 * (box.min + box.max);
+      const double size = (box.max - box.min).norm();
+      polynomials_.row(v) << 1, way.transpose() / (size > 0 ? size : 1);
+    }
   }
-  report.iterations = std::max(report.iterations, iteration);
-  report.relative_residual = std::max(report.relative_residual, residual.norm() / start);
-  return solution;
-}
+
+  void set_grams() {
+    grams_.assign(num_parts_ * columns_, Mat<Dim + 1>::Zero());
+    for (Eigen::Index v = 0; v < inverse_.rows(); ++v)
+      for (Eigen::Index k = 0; k < columns_; ++k)
+        if (inverse_(v, k) > 0)
+          grams_[part_[v] * columns_ + k] += inverse_(v, k) * weights_.row(v).transpose() * weights_.row(v);
+    for (auto& gram : grams_) {  // from here on their inverses
+      const auto lu = Eigen::FullPivLU<Mat<Dim + 1>>(gram).setThreshold(1e-10);
+      const double constant = gram(0, 0);
+      if (lu.isInvertible()) {
+        gram = lu.inverse();
+      } else {
+        gram.setZero();
+        if (constant > 0) gram(0, 0) = 1 / constant;
+      }
+    }
+  }
+
+  /// Of the constraints on a vertex.
+  auto force(Eigen::Index v, const Rows& multipliers) const {
+    return weights_.row(v).lazyProduct(multipliers.middleRows<Dim + 1>((Dim + 1) * part_[v]));
+  }
+
+  template <typename Polynomials>
+  Rows moments(const Polynomials& polynomials, const Rows& values) const {
+    Rows sum = Rows::Zero((Dim + 1) * num_parts_, columns_);
+    for (Eigen::Index v = 0; v < values.rows(); ++v)
+      sum.middleRows<Dim + 1>((Dim + 1) * part_[v]) += polynomials.row(v).transpose().lazyProduct(values.row(v));
+    return sum;
+  }
+
+  Rows solve_grams(const Rows& moments) const {
+    Rows multipliers(moments.rows(), columns_);
+    for (int p = 0; p < num_parts_; ++p)
+      for (Eigen::Index k = 0; k < columns_; ++k)
+        multipliers.block<Dim + 1, 1>((Dim + 1) * p, k) =
+            grams_[p * columns_ + k] * moments.block<Dim + 1, 1>((Dim + 1) * p, k);
+    return multipliers;
+  }
+
+  std::vector<int> part_;  ///< by vertex
+  int num_parts_ = 0;
+  Eigen::Index columns_;
+  Rows inverse_;  ///< of the lumped mass; 0 at fixed entries
+  Eigen::SparseMatrix<double, Eigen::RowMajor> mass_;
+  Eigen::Matrix<double, Eigen::Dynamic, Dim + 1, Eigen::RowMajor> polynomials_, weights_;  ///< nodal values; M times them
+  std::vector<Mat<Dim + 1>> grams_;                                                        ///< by part and column
+};
 
 }  // namespace
 
 template <int Dim>
-MatrixX touched_cross_mass_product(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh,
-                                   const TouchedCells& touched, const MatrixX& u_old) {
-  MatrixX product = MatrixX::Zero(static_cast<Eigen::Index>(new_mesh.rest.size()), u_old.cols());
-  std::vector<Box<Dim>> boxes;
-  for (const int c : touched.old_cells) boxes.push_back(box_of<Dim>(corners<Dim>(old_mesh, c)));
-  const Bvh<Dim> tree(boxes);
-  std::vector<int> hits;
-  std::vector<std::array<Vec<Dim>, Dim + 1>> pieces;
-  for (const int c : touched.new_cells) {
-    const auto p = corners<Dim>(new_mesh, c);
-    hits.clear();
-    tree.query(box_of<Dim>(p), hits);
-    std::sort(hits.begin(), hits.end());
-    for (const int hit : hits) {
-      const int o = touched.old_cells[hit];
-      const Mat<Dim + 1> block = old_mesh.density[o] * cross_mass<Dim>(p, corners<Dim>(old_mesh, o), pieces);
-      for (int i = 0; i <= Dim; ++i)
-        for (int j = 0; j <= Dim; ++j) product.row(new_mesh.cells[c][i]) += block(i, j) * u_old.row(old_mesh.cells[o][j]);
+std::vector<int> connected_parts(const TransferMesh<Dim>& mesh) {
+  std::vector<int> root(mesh.rest.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int v) {
+    while (root[v] != v) v = root[v] = root[root[v]];
+    return v;
+  };
+  for (const auto& cell : mesh.cells)
+    for (int k = 1; k <= Dim; ++k) {
+      const int a = find(cell[0]), b = find(cell[k]);
+      root[std::max(a, b)] = std::min(a, b);
     }
-  }
-  return product;
+  std::vector<int> part(root.size());
+  int parts = 0;
+  for (int v = 0; v < static_cast<int>(root.size()); ++v) part[v] = find(v) == v ? parts++ : part[find(v)];
+  return part;
 }
 
 template <int Dim>
-void patch_cross_mass(const TransferMesh<Dim>& old_patch, const TransferMesh<Dim>& new_patch, MatrixX& A) {
-  A.setZero(static_cast<Eigen::Index>(new_patch.rest.size()), static_cast<Eigen::Index>(old_patch.rest.size()));
-  std::vector<std::array<Vec<Dim>, Dim + 1>> pieces;
-  for (std::size_t c = 0; c < new_patch.cells.size(); ++c) {
-    const auto p = corners<Dim>(new_patch, static_cast<int>(c));
-    const Box<Dim> box = box_of<Dim>(p);
-    for (std::size_t o = 0; o < old_patch.cells.size(); ++o) {
-      const auto q = corners<Dim>(old_patch, static_cast<int>(o));
-      if (!box.overlaps(box_of<Dim>(q))) continue;
-      const Mat<Dim + 1> block = old_patch.density[o] * cross_mass<Dim>(p, q, pieces);
-      for (int i = 0; i <= Dim; ++i)
-        for (int j = 0; j <= Dim; ++j) A(new_patch.cells[c][i], old_patch.cells[o][j]) += block(i, j);
+TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh,
+                                     const TouchedCells& touched, const MatrixX& u_old, const MatrixX& u_bar) {
+  const Eigen::Index k = u_old.cols();
+  TouchedDifference difference{MatrixX::Zero(static_cast<Eigen::Index>(new_mesh.rest.size()), k), VectorX::Zero(k)};
+  std::vector<Box<Dim>> boxes;
+  std::vector<Simplex<Dim>> old_simplices;
+  for (const int c : touched.old_cells) {
+    old_simplices.emplace_back(corners<Dim>(old_mesh, c));
+    boxes.push_back(box_of<Dim>(old_simplices.back().corners));
+  }
+  const Bvh<Dim> tree(boxes);
+  std::vector<int> hits;
+  OverlapIntegrals<Dim> overlap;
+  for (const int c : touched.new_cells) {
+    const auto& new_cell = new_mesh.cells[c];
+    const Simplex<Dim> simplex(corners<Dim>(new_mesh, c));
+    hits.clear();
+    tree.query(box_of<Dim>(simplex.corners), hits);
+    std::sort(hits.begin(), hits.end());
+    for (const int hit : hits) {
+      if (!integrate_overlap(simplex, old_simplices[hit], overlap)) continue;
+      const auto& old_cell = old_mesh.cells[touched.old_cells[hit]];
+      const double density = old_mesh.density[touched.old_cells[hit]];
+      for (Eigen::Index column = 0; column < k; ++column) {
+        // Constants are in both spaces; without them the squares lose no digits.
+        const double shift = u_bar(new_cell[0], column);
+        Vec<Dim + 1> old_values, new_values;
+        for (int i = 0; i <= Dim; ++i) {
+          old_values[i] = u_old(old_cell[i], column) - shift;
+          new_values[i] = u_bar(new_cell[i], column) - shift;
+        }
+        const Vec<Dim + 1> transferred = overlap.ab * old_values, represented = overlap.aa * new_values;
+        for (int i = 0; i <= Dim; ++i)
+          difference.residual(new_cell[i], column) += density * (transferred[i] - represented[i]);
+        difference.squares[column] +=
+            density * (new_values.dot(represented - 2 * transferred) + old_values.dot(overlap.bb * old_values));
+      }
     }
   }
+  return difference;
+}
+
+template <int Dim>
+MatrixX solve_projection(const TransferMesh<Dim>& mesh, const MatrixX& residual, std::span<const char> fixed,
+                         TransferReport& report) {
+  // With the lumped mass as preconditioner (the diagonal but for a factor) the consistent one has eigenvalues in a range
+  // that does not depend on the mesh (Wathen 1987). Steps are without moments, so each iterate has those that it is to have.
+  constexpr int kMaxIterations = 200;
+  constexpr double kRoundOff = 1e-14;
+  const Eigen::Index k = residual.cols();
+  const ConstrainedMass<Dim> mass(mesh, fixed, k);
+  Rows r = residual, z(r.rows(), k), d = Rows::Zero(r.rows(), k), product(r.rows(), k);
+  const Rows moments = mass.moments_of_residual(r);
+  mass.add_moments(moments, d);
+  mass.product(d, product);
+  r -= product;
+  mass.precondition(r, z);
+  Rows p = z;
+  VectorX rz = r.cwiseProduct(z).colwise().sum().transpose(), first = rz, step(k), ratio(k);
+  int iteration = 0;
+  for (; iteration < kMaxIterations && (rz.array() > kRoundOff * kRoundOff * first.array()).any(); ++iteration) {
+    mass.product(p, product);
+    const VectorX curvature = p.cwiseProduct(product).colwise().sum().transpose();
+    for (Eigen::Index c = 0; c < k; ++c) step[c] = curvature[c] > 0 ? rz[c] / curvature[c] : 0;
+    d += p * step.asDiagonal();
+    r -= product * step.asDiagonal();
+    mass.precondition(r, z);
+    const VectorX next = r.cwiseProduct(z).colwise().sum().transpose();
+    for (Eigen::Index c = 0; c < k; ++c) ratio[c] = rz[c] > 0 ? next[c] / rz[c] : 0;
+    p = z + p * ratio.asDiagonal();
+    rz = next;
+  }
+  mass.add_moments(moments - mass.moments(d), d);  // what round-off took
+  report.iterations = std::max(report.iterations, iteration);
+  for (Eigen::Index c = 0; c < k; ++c)
+    if (first[c] > 0)
+      report.relative_residual = std::max(report.relative_residual, std::sqrt(std::max(0.0, rz[c]) / first[c]));
+  report.lost = mass.integrals(moments - mass.moments(d));
+  return d;
+}
+
+template <int Dim>
+VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d) {
+  MatrixX product = MatrixX::Zero(d.rows(), d.cols());
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c)
+    ElementMass<Dim>(MassKind::consistent, cell_mass(mesh, static_cast<int>(c))).add_product(mesh.cells[c], d, product);
+  return d.cwiseProduct(product).colwise().sum().transpose();
 }
 
 template <int Dim>
 MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh, const TouchedCells& touched,
                    const MatrixX& u_old, const MatrixX& u_bar, std::span<const char> fixed, TransferReport& report) {
+  report.lost = VectorX::Zero(u_bar.cols());
   if (touched.new_cells.empty()) return u_bar;
-  const MatrixX transferred = touched_cross_mass_product(old_mesh, new_mesh, touched, u_old);
-  MatrixX represented = MatrixX::Zero(u_bar.rows(), u_bar.cols());
-  add_mass_product(new_mesh, touched.new_cells, u_bar, represented);
-  const MatrixX residual = transferred - represented;
-  const MassOperator<Dim> mass(new_mesh, fixed);
-  MatrixX u_new = u_bar;
-  for (Eigen::Index k = 0; k < u_bar.cols(); ++k) u_new.col(k) += solve_mass<Dim>(mass, residual.col(k), report);
-  // ||u_new - u_old||^2 = ||u_bar - u_old||^2 - ||u_new - u_bar||^2 on the touched cells, by the orthogonality of the
-  // projection.
-  MatrixX old_squares = MatrixX::Zero(u_old.rows(), u_old.cols());
-  add_mass_product(old_mesh, touched.old_cells, u_old, old_squares);
-  report.l2_error_squared = u_old.cwiseProduct(old_squares).sum() + u_bar.cwiseProduct(represented - 2 * transferred).sum() -
-                            (u_new - u_bar).cwiseProduct(residual).sum();
-  return u_new;
+  const TouchedDifference difference = touched_difference(old_mesh, new_mesh, touched, u_old, u_bar);
+  const MatrixX d = solve_projection(new_mesh, difference.residual, fixed, report);
+  // ||u_bar + d - u_old||^2
+  report.l2_error_squared =
+      difference.squares.sum() - 2 * d.cwiseProduct(difference.residual).sum() + mass_squares(new_mesh, d).sum();
+  return u_bar + d;
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                                \
-  template MatrixX touched_cross_mass_product<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, const TouchedCells&, \
-                                                   const MatrixX&);                                                         \
-  template void patch_cross_mass<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, MatrixX&);                        \
+  template std::vector<int> connected_parts<Dim>(const TransferMesh<Dim>&);                                                 \
+  template TouchedDifference touched_difference<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&,                    \
+                                                     const TouchedCells&, const MatrixX&, const MatrixX&);                  \
+  template MatrixX solve_projection<Dim>(const TransferMesh<Dim>&, const MatrixX&, std::span<const char>, TransferReport&); \
+  template VectorX mass_squares<Dim>(const TransferMesh<Dim>&, const MatrixX&);                                             \
   template MatrixX project_l2<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, const TouchedCells&, const MatrixX&, \
                                    const MatrixX&, std::span<const char>, TransferReport&);
 ITR_INSTANTIATE(2)

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "itr/geometry/measures.hpp"
-#include "itr/projection/transfer.hpp"
+#include "itr/projection/forgotten_history.hpp"
 
 namespace itr {
 
@@ -293,7 +293,8 @@ void LocalProblem<Dim>::add_terms() {
   if (has_velocity && state_.fields.velocity_reference.size() > 0)
     history.velocity_reference = gather(state_.fields.velocity_reference, context.obstacles.velocity_reference);
   potential_ = std::make_unique<IncrementalPotential<Dim>>(context, cells_, std::move(history));
-  const bool is_nested = !is_after_ || edit_.kind == Edit<Dim>::Kind::split;
+  // With lumped mass a split changes how inertia is integrated.
+  const bool is_nested = !is_after_ || (edit_.kind == Edit<Dim>::Kind::split && context.mass == MassKind::consistent);
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
     add_unrepresented_history(*potential_->inertia());
   if (has_surface_) {
@@ -335,42 +336,22 @@ void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) c
   for (const VertexId v : old_ids) old_rest.push_back(mesh_.rest(v));
   for (const VertexId v : new_ids) new_rest.push_back(rest_position(of_mesh(v)));
   const TransferMesh<Dim> old_mesh{old_rest, old_cells, old_density}, new_mesh{new_rest, new_cells, new_density};
-  MatrixX A;
-  patch_cross_mass<Dim>(old_mesh, new_mesh, A);
-
-  // Constants are in both spaces; without them the squares below lose no digits.
   const VectorX& predictor = state_.fields.predictor;
-  const Vec<Dim> shift = field_value(predictor, {}, of_mesh(new_ids[0]));
-  MatrixX old_values(old_ids.size(), Dim), new_values(new_ids.size(), Dim);
+  MatrixX old_predictor(old_ids.size(), Dim), new_predictor(new_ids.size(), Dim), new_x(new_ids.size(), Dim);
   for (std::size_t i = 0; i < old_ids.size(); ++i)
-    old_values.row(i) = (predictor.segment<Dim>(Dim * old_ids[i]) - shift).transpose();
-  for (std::size_t i = 0; i < new_ids.size(); ++i)
-    new_values.row(i) = (field_value(predictor, {}, of_mesh(new_ids[i])) - shift).transpose();
-  const auto mass_product = [](const TransferMesh<Dim>& mesh, const MatrixX& values) {
-    MatrixX product = MatrixX::Zero(values.rows(), values.cols());
-    for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
-      const auto& cell = mesh.cells[c];
-      std::array<Vec<Dim>, Dim + 1> p;
-      Eigen::Matrix<double, 1, Dim> total = Eigen::Matrix<double, 1, Dim>::Zero();
-      for (int k = 0; k <= Dim; ++k) {
-        p[k] = mesh.rest[cell[k]];
-        total += values.row(cell[k]);
-      }
-      const double mass = mesh.density[c] * simplex_volume<Dim>(p) / ((Dim + 1) * (Dim + 2));
-      for (const int v : cell) product.row(v) += mass * (total + values.row(v));
-    }
-    return product;
-  };
-  const MatrixX transferred = A * old_values, represented = mass_product(new_mesh, new_values);
-  const MatrixX residual = represented - transferred;
-  VectorX local_residual = VectorX::Zero(Dim * static_cast<int>(vertices_.size()));
+    old_predictor.row(i) = predictor.segment<Dim>(Dim * old_ids[i]).transpose();
+  for (std::size_t i = 0; i < new_ids.size(); ++i) {
+    new_predictor.row(i) = field_value(predictor, {}, of_mesh(new_ids[i])).transpose();
+    new_x.row(i) = field_value(state_.fields.x, {}, of_mesh(new_ids[i])).transpose();
+  }
+  const ForgottenHistory forgotten =
+      forgotten_history<Dim>(state_.context.mass, old_mesh, new_mesh, old_predictor, new_predictor, new_x);
+  VectorX residual = VectorX::Zero(Dim * static_cast<int>(vertices_.size()));
   for (std::size_t i = 0; i < new_ids.size(); ++i) {
     const auto at = std::find(vertices_.begin(), vertices_.end(), of_mesh(new_ids[i])) - vertices_.begin();
-    local_residual.segment<Dim>(Dim * at) = residual.row(i).transpose();
+    residual.segment<Dim>(Dim * at) = forgotten.residual.row(i).transpose();
   }
-  const double loss = 0.5 * (new_values.cwiseProduct(represented - 2 * transferred).sum() +
-                             old_values.cwiseProduct(mass_product(old_mesh, old_values)).sum());
-  inertia.set_unrepresented_history(std::move(local_residual), std::max(0.0, loss));
+  inertia.set_unrepresented_history(std::move(residual), forgotten.loss);
 }
 
 template <int Dim>

@@ -21,6 +21,7 @@ void StepReport::add_effort(const StepReport& before) {
   collapses += before.collapses;
   swaps += before.swaps;
   smooths += before.smooths;
+  history_loss += before.history_loss;
   cut_steps += before.cut_steps;
   damped_steps += before.damped_steps;
   seconds += before.seconds;

@@ -1,92 +1,159 @@
 // SPDX-License-Identifier: MIT
 #include "itr/simulation/history_transfer.hpp"
 
-#include <string>
-
 #include "itr/projection/safe_projection.hpp"
-#include "itr/projection/transfer.hpp"
+#include "itr/projection/transfer_patch.hpp"
+#include "simulation/patch_surface.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr int kFreeRings = 4;  ///< rings around the touched cells that a projection with barriers may move
+/// Rings of vertices around the touched cells that the projection may change. What it would change further away is less by
+/// a factor of about four a ring.
+constexpr int kRings = 3;
 
-struct MeshArrays {
-  std::vector<Vec<2>> rest;
-  std::vector<std::array<int, 3>> cells;
-  std::vector<double> density;
-  MeshArrays(const Mesh<2>& mesh, const std::map<int, Material>& materials) {
-    for (int v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
-    for (int c = 0; c < mesh.cell_slots(); ++c) {
-      cells.push_back(mesh.cell(c));
-      density.push_back(materials.at(mesh.body(c)).density);
-    }
+template <int Dim>
+VectorX interleaved(const MatrixX& rows) {
+  VectorX field(rows.size());
+  for (Eigen::Index v = 0; v < rows.rows(); ++v) field.segment<Dim>(Dim * v) = rows.row(v).transpose();
+  return field;
+}
+
+template <int Dim>
+class HistoryTransfer {
+ public:
+  HistoryTransfer(const Setup<Dim>& setup, const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched)
+      : setup_(setup), mesh_(mesh), patch_(make_transfer_patch(old_mesh, mesh, touched, setup.materials, kRings)) {
+    const auto n = patch_.new_cells.vertices.size();
+    prescribed_.assign(Dim * n, 0);
+    for (std::size_t i = 0; i < n; ++i)
+      for (const FacetId f : mesh.facets_of(patch_.new_cells.vertices[i]))
+        for (const auto& condition : setup.dirichlet)
+          if (condition.tag == mesh.facet_tag(f))
+            for (int c = 0; c < Dim; ++c) prescribed_[Dim * i + c] |= condition.components[c];
   }
-  TransferMesh<2> view() const { return {rest, cells, density}; }
+
+  void add(const VectorX& old_field, const VectorX& interpolant) {
+    old_values_.push_back(patch_.old_cells.gather(old_field));
+    new_values_.push_back(patch_.new_cells.gather(interpolant));
+  }
+
+  /// Projects the first fields that were added into `fields`, of which the first `num_positions` are positions.
+  HistoryTransferReport run(const std::vector<VectorX*>& fields, std::size_t num_positions, linear::Solver& solver) {
+    HistoryTransferReport report;
+    difference_ = touched_difference(patch_.old_cells.view(), patch_.new_cells.view(), patch_.touched, joined(old_values_),
+                                     joined(new_values_));
+    const auto columns = static_cast<Eigen::Index>(Dim * fields.size());
+    std::vector<char> fixed(patch_.new_cells.vertices.size() * columns, 0);
+    for (std::size_t v = 0; v < patch_.new_cells.vertices.size(); ++v)
+      for (Eigen::Index k = 0; k < columns; ++k)
+        fixed[v * columns + k] =
+            patch_.at_rim[v] || (k < static_cast<Eigen::Index>(Dim * num_positions) && prescribed_[Dim * v + k % Dim]);
+    TransferReport transfer;
+    const MatrixX correction =
+        solve_projection(patch_.new_cells.view(), difference_.residual.leftCols(columns), fixed, transfer);
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      const MatrixX projected = new_values_[i] + correction.middleCols<Dim>(static_cast<Eigen::Index>(Dim * i));
+      VectorX goal = interleaved<Dim>(projected);
+      if (i < num_positions) {
+        Vec<Dim> lost = transfer.lost.segment<Dim>(static_cast<Eigen::Index>(Dim * i));
+        goal = positions(*fields[i], interleaved<Dim>(new_values_[i]), std::move(goal), solver, lost, report);
+        report.lost_positions = std::max(report.lost_positions, lost.cwiseAbs().maxCoeff());
+      }
+      for (std::size_t v = 0; v < patch_.new_cells.vertices.size(); ++v)
+        if (!patch_.at_rim[v])
+          fields[i]->template segment<Dim>(Dim * patch_.new_cells.vertices[v]) = goal.segment<Dim>(Dim * v);
+    }
+    return report;
+  }
+
+  /// 1/2 ||old - new||^2 of the last field that was added, which is now `field`.
+  double loss(const VectorX& field) const {
+    const auto first = Dim * static_cast<Eigen::Index>(new_values_.size() - 1);
+    const MatrixX change = patch_.new_cells.gather(field) - new_values_.back();
+    return 0.5 * (difference_.squares.segment<Dim>(first).sum() -
+                  2 * change.cwiseProduct(difference_.residual.middleCols<Dim>(first)).sum() +
+                  mass_squares(patch_.new_cells.view(), change).sum());
+  }
+
+ private:
+  static MatrixX joined(const std::vector<MatrixX>& fields) {
+    MatrixX all(fields[0].rows(), static_cast<Eigen::Index>(Dim * fields.size()));
+    for (std::size_t i = 0; i < fields.size(); ++i) all.middleCols<Dim>(static_cast<Eigen::Index>(Dim * i)) = fields[i];
+    return all;
+  }
+
+  /// The safe way from the interpolant to `goal`; `field` has what is around the patch.
+  VectorX positions(const VectorX& field, VectorX interpolant, VectorX goal, linear::Solver& solver, Vec<Dim>& lost,
+                    HistoryTransferReport& report) const {
+    const auto n = static_cast<Eigen::Index>(patch_.new_cells.vertices.size());
+    std::vector<char> moving(n), held(prescribed_);
+    for (Eigen::Index v = 0; v < n; ++v) {
+      moving[v] = !patch_.at_rim[v];
+      for (int c = 0; c < Dim; ++c) held[Dim * v + c] |= patch_.at_rim[v];
+    }
+    PatchSurface<Dim> surface;
+    CellSet<Dim> cells = patch_.cells;
+    if (setup_.contact.enabled) {
+      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance);
+      cells.num_vertices += static_cast<int>(surface.others.size());
+      interpolant.conservativeResize(Dim * cells.num_vertices);
+      for (std::size_t i = 0; i < surface.others.size(); ++i)
+        interpolant.segment<Dim>(Dim * (n + i)) = field.segment<Dim>(Dim * surface.others[i]);
+      goal.conservativeResize(interpolant.size());
+      goal.tail(interpolant.size() - Dim * n) = interpolant.tail(interpolant.size() - Dim * n);
+      held.resize(interpolant.size(), 1);
+    }
+    SafeProjectionReport<Dim> safe;
+    VectorX x =
+        project_safely<Dim>({cells, surface.empty() ? nullptr : &surface.surface, setup_.materials,
+                             setup_.contact.activation_distance, std::move(held), connected_parts(patch_.new_cells.view())},
+                            interpolant, goal, solver, safe);
+    report.with_barriers += safe.used_barriers;
+    report.not_converged += !safe.converged;
+    lost += safe.lost;
+    return x;
+  }
+
+  const Setup<Dim>& setup_;
+  const Mesh<Dim>& mesh_;
+  TransferPatch<Dim> patch_;
+  std::vector<char> prescribed_;  ///< by dof of the patch
+  std::vector<MatrixX> old_values_, new_values_;
+  TouchedDifference difference_;
 };
-
-MatrixX as_columns(const VectorX& field, int vertices) {
-  MatrixX columns(vertices, 2);
-  for (int v = 0; v < vertices; ++v) columns.row(v) = field.segment<2>(2 * v).transpose();
-  return columns;
-}
-
-void set_from_columns(const MatrixX& columns, VectorX& field) {
-  for (Eigen::Index v = 0; v < columns.rows(); ++v) field.segment<2>(2 * v) = columns.row(v).transpose();
-}
-
-std::vector<char> vertices_near(const Mesh<2>& mesh, const std::vector<int>& cells, int total) {
-  std::vector<char> near(total, 0);
-  for (const int c : cells)
-    for (const int v : mesh.cell(c)) near[v] = 1;
-  for (int ring = 0; ring < kFreeRings; ++ring) {
-    const std::vector<char> last = near;
-    for (int c = 0; c < mesh.cell_slots(); ++c) {
-      const auto& cell = mesh.cell(c);
-      if (last[cell[0]] || last[cell[1]] || last[cell[2]])
-        for (const int v : cell) near[v] = 1;
-    }
-  }
-  return near;
-}
 
 }  // namespace
 
-void transfer_history(const Setup<2>& setup, const Mesh<2>& old_mesh, const History& old_history, const Mesh<2>& mesh,
-                      const TouchedCells& touched, double scaling, linear::Solver& solver, const Logger& logger,
-                      History& history) {
-  const MeshArrays from(old_mesh, setup.materials), to(mesh, setup.materials);
-  const int old_vertices = old_mesh.vertex_slots(), vertices = mesh.vertex_slots();
-  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0).held;
-  std::vector<char> none(vertices, 0), held_vertices(vertices, 0);
-  for (int v = 0; v < vertices; ++v) held_vertices[v] = held[2 * v] || held[2 * v + 1];
-  TransferReport report;
-  const auto project = [&](const VectorX& old_field, const VectorX& interpolant, std::span<const char> fixed) {
-    const MatrixX projected = project_l2<2>(from.view(), to.view(), touched, as_columns(old_field, old_vertices),
-                                            as_columns(interpolant, vertices), fixed, report);
-    VectorX field = interpolant;
-    set_from_columns(projected, field);
-    return field;
+template <int Dim>
+HistoryTransferReport transfer_history(const Setup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
+                                       const Mesh<Dim>& mesh, const TouchedCells& touched, linear::Solver& solver,
+                                       History& history) {
+  HistoryTransfer<Dim> transfer(setup, old_mesh, mesh, touched);
+  std::vector<VectorX*> fields;
+  const auto add = [&](const std::vector<VectorX>& old_fields, std::vector<VectorX>& new_fields) {
+    for (std::size_t i = 0; i < new_fields.size(); ++i) {
+      transfer.add(old_fields[i], new_fields[i]);
+      fields.push_back(&new_fields[i]);
+    }
   };
-  for (std::size_t i = 0; i < history.v.size(); ++i) history.v[i] = project(old_history.v[i], history.v[i], none);
-  for (std::size_t i = 0; i < history.a.size(); ++i) history.a[i] = project(old_history.a[i], history.a[i], none);
-
-  const CellSet<2> cells = whole_mesh(mesh, setup.obstacles.rest);
-  const CollisionSurface surface = collision_surface(mesh, setup.obstacles);
-  const SafeProjectionProblem<2> problem{cells,
-                                         setup.contact.enabled ? &surface : nullptr,
-                                         setup.materials,
-                                         setup.contact,
-                                         scaling,
-                                         vertices_near(mesh, touched.new_cells, cells.num_vertices),
-                                         held};
-  for (std::size_t i = 0; i < history.x.size(); ++i) {
-    SafeProjectionReport safe;
-    history.x[i] =
-        project_safely(problem, history.x[i], project(old_history.x[i], history.x[i], held_vertices), solver, safe);
-    if (!safe.converged) logger.debug("safe projection stopped after " + std::to_string(safe.iterations) + " iterations");
-  }
+  add(old_history.x, history.x);
+  add(old_history.v, history.v);
+  add(old_history.a, history.a);
+  const TimeIntegrator integrator(setup.time);
+  const bool has_inertia = !setup.time.quasistatic && !setup.time.is_static;
+  if (has_inertia) transfer.add(integrator.predictor(old_history), integrator.predictor(history));
+  HistoryTransferReport report = transfer.run(fields, history.x.size(), solver);
+  if (has_inertia) report.loss = std::max(0.0, transfer.loss(integrator.predictor(history)));
+  return report;
 }
+
+#define ITR_INSTANTIATE(Dim)                                                                                \
+  template HistoryTransferReport transfer_history<Dim>(const Setup<Dim>&, const Mesh<Dim>&, const History&, \
+                                                       const Mesh<Dim>&, const TouchedCells&, linear::Solver&, History&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "itr/simulation/remesh_step.hpp"
 
+#include <fmt/format.h>
+
 #include "itr/core/timer.hpp"
+#include "itr/geometry/bvh.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "itr/simulation/history_transfer.hpp"
 #include "itr/time/integrator.hpp"
@@ -9,6 +12,9 @@
 namespace itr {
 
 namespace {
+
+/// Of the mass times the size of the bodies: what round-off explains is not told.
+constexpr double kLossWorthTelling = 1e-12;
 
 /// The bodies' part of a field over bodies and obstacles.
 VectorX head_of(const VectorX& field, int dofs) { return field.head(dofs); }
@@ -63,29 +69,60 @@ RemeshFields<Dim> make_fields(const Setup<Dim>& setup, const State<Dim>& state, 
   return fields;
 }
 
+/// Mass of the bodies times the diameter of where they are [kg m].
+template <int Dim>
+double mass_moment(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
+  double mass = 0;
+  for (int c = 0; c < mesh.cell_slots(); ++c) mass += setup.materials.at(mesh.body(c)).density * mesh.volume(c);
+  Box<Dim> box;
+  for (int v = 0; v < mesh.vertex_slots(); ++v) box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
+  return mass * (box.max - box.min).norm();
+}
+
+/// Logs what the transfer could not keep.
+void tell(const HistoryTransferReport& transfer, double extent, int step, const Logger& logger) {
+  if (transfer.not_converged > 0)
+    logger.warning(
+        fmt::format("step {}: {} of the past positions are valid on the new mesh, but not the nearest to the old "
+                    "ones: their safe projection did not converge",
+                    step, transfer.not_converged));
+  if (transfer.with_barriers > 0)
+    logger.debug(fmt::format("step {}: barriers kept {} of the past positions valid", step, transfer.with_barriers));
+  if (transfer.lost_positions > kLossWorthTelling * extent)
+    logger.warning(
+        fmt::format("step {}: the new mesh loses {:.2e} kg m of the integral of rho x", step, transfer.lost_positions));
+}
+
 }  // namespace
 
 template <int Dim>
-RemeshReport remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const StepProblem<Dim>& problem, double t,
-                                State<Dim>& state, VectorX& x, StepSeconds& seconds, linear::Solver& solver,
-                                const Logger& logger) {
-  const StepContext<Dim> context = make_context(setup, state, problem, x, t, shortest_edge);
-  RemeshFields<Dim> fields = make_fields(setup, state, x);
-  const Mesh<Dim> before = state.mesh;
-  RemeshReport report;
+bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const StepProblem<Dim>& problem, double t,
+                        const State<Dim>& before, State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
+                        const Logger& logger) {
+  const StepContext<Dim> context = make_context(setup, before, problem, x, t, shortest_edge);
+  RemeshFields<Dim> fields = make_fields(setup, before, x);
+  RemeshReport remeshed;
   {
-    const ScopedTimer timer(seconds.remesh);
-    report = remesh(state.mesh, fields, context, setup.remesh, state.remesh_memory);
+    const ScopedTimer timer(report.seconds.remesh);
+    remeshed = remesh(state.mesh, fields, context, setup.remesh, state.remesh_memory);
   }
-  if (!report.changed()) return report;
-  const ScopedTimer timer(seconds.projection);
+  report.splits = remeshed.splits;
+  report.collapses = remeshed.collapses;
+  report.swaps = remeshed.swaps;
+  report.smooths = remeshed.smooths;
+  report.trial_seconds = remeshed.trial_seconds;
+  if (remeshed.bound_by_activation_distance > 0)
+    logger.debug(fmt::format("step {}: {} surface edges are too short to be split: they would be below dhat", state.step,
+                             remeshed.bound_by_activation_distance));
+  if (!remeshed.changed()) return false;
+
+  const ScopedTimer timer(report.seconds.projection);
   TouchedCells touched;
-  for (int c = 0; c < before.cell_slots(); ++c)
+  for (int c = 0; c < before.mesh.cell_slots(); ++c)
     if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
-  const int first_new = before.cell_slots();
   const auto renumbering = state.mesh.compact();
   state.remesh_memory.renumber(renumbering.vertex);
-  for (int c = first_new; c < static_cast<int>(renumbering.cell.size()); ++c)
+  for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
   const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
@@ -96,19 +133,21 @@ RemeshReport remesh_and_project(const Setup<Dim>& setup, double shortest_edge, c
     field.tail(obstacle_dofs) = with_obstacles.tail(obstacle_dofs);
     return field;
   };
-  const History old_history = state.history;
   x = carried(fields.x, x);
   for (std::size_t i = 0; i < state.history.x.size(); ++i)
-    state.history.x[i] = carried(fields.past_positions[i], old_history.x[i]);
+    state.history.x[i] = carried(fields.past_positions[i], before.history.x[i]);
   std::size_t next = 0;
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
-  if (report.coarsened())  // refinement alone: interpolation is exact
-    transfer_history(setup, before, old_history, state.mesh, touched, problem.scaling(), solver, logger, state.history);
-  return report;
+  if (!remeshed.coarsened()) return true;  // refinement alone: interpolation is exact
+  const HistoryTransferReport transfer =
+      transfer_history(setup, before.mesh, before.history, state.mesh, touched, solver, state.history);
+  report.history_loss = transfer.loss / problem.scaling();
+  tell(transfer, mass_moment(setup, state.mesh, x), state.step, logger);
+  return true;
 }
 
-template RemeshReport remesh_and_project<2>(const Setup<2>&, double, const StepProblem<2>&, double, State<2>&, VectorX&,
-                                            StepSeconds&, linear::Solver&, const Logger&);
+template bool remesh_and_project<2>(const Setup<2>&, double, const StepProblem<2>&, double, const State<2>&, State<2>&,
+                                    VectorX&, StepReport&, linear::Solver&, const Logger&);
 
 }  // namespace itr

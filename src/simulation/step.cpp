@@ -117,17 +117,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
     if (setup.remesh.enabled) {
       const State<Dim> unchanged = next;
       const VectorX solution = x;
-      const RemeshReport remeshed =
-          remesh_and_project(setup, shortest_edge, *problem, t, next, x, report.seconds, system.solver(), logger);
-      report.splits = remeshed.splits;
-      report.collapses = remeshed.collapses;
-      report.swaps = remeshed.swaps;
-      report.smooths = remeshed.smooths;
-      report.trial_seconds = remeshed.trial_seconds;
-      if (remeshed.bound_by_activation_distance > 0)
-        logger.debug(fmt::format("step {}: {} surface edges are too short to be split: they would be below dhat", next.step,
-                                 remeshed.bound_by_activation_distance));
-      if (remeshed.changed()) {
+      if (remesh_and_project(setup, shortest_edge, *problem, t, unchanged, next, x, report, system.solver(), logger)) {
         auto problem_before = std::move(problem);
         problem = make_problem();
         summary = solve(VectorX(x));
@@ -139,6 +129,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
           problem = std::move(problem_before);
           for (auto* operations : {&report.splits, &report.collapses, &report.swaps, &report.smooths})
             operations->accepted = 0;
+          report.history_loss = 0;
         }
       }
     }

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <random>
 
 #include "itr/core/parallel.hpp"
@@ -12,8 +13,10 @@
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/geometry/ccd.hpp"
+#include "itr/geometry/intersection.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/newton/newton.hpp"
+#include "itr/projection/transfer_patch.hpp"
 
 namespace {
 
@@ -225,6 +228,56 @@ void CcdQuery(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * kQueries);
 }
 
+/// Integrals over the intersections of one tetrahedron with those around it, a pair each.
+void OverlapPair(benchmark::State& state) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> number(0, 1);
+  std::vector<Simplex<3>> simplices;
+  while (simplices.size() < 64) {
+    std::array<Vec<3>, 4> p;
+    for (auto& q : p) q = Vec<3>(number(random), number(random), number(random));
+    if (simplex_volume<3>(p) > 0.02) simplices.emplace_back(p);
+  }
+  OverlapIntegrals<3> overlap;
+  for (auto _ : state)
+    for (std::size_t i = 1; i < simplices.size(); ++i)
+      benchmark::DoNotOptimize(integrate_overlap(simplices[i - 1], simplices[i], overlap));
+  state.SetItemsProcessed(state.iterations() * static_cast<long>(simplices.size() - 1));
+}
+
+/// An interior vertex of a cube of 6 n^3 tetrahedra is collapsed onto its neighbour; two vector fields are projected.
+void ProjectCoarsening(benchmark::State& state) {
+  const int n = static_cast<int>(state.range(0));
+  const Mesh<3> before = make_cube(n);
+  Mesh<3> mesh = before;
+  const int gone = (n / 2 * (n + 1) + n / 2) * (n + 1) + n / 2, kept = gone + 1;
+  Edit<3> edit{.kind = Edit<3>::Kind::collapse, .edge = {gone, kept}};
+  edit.removed_cells.assign(mesh.cells_of(gone).begin(), mesh.cells_of(gone).end());
+  edit.removed_vertex = gone;
+  for (const CellId c : edit.removed_cells) {
+    auto cell = mesh.cell(c);
+    if (std::find(cell.begin(), cell.end(), kept) != cell.end()) continue;
+    std::replace(cell.begin(), cell.end(), gone, kept);
+    edit.inserted_cells.push_back({cell, 1});
+  }
+  mesh.apply(edit);
+  TouchedCells touched{edit.removed_cells, {}};
+  for (int c = before.cell_slots(); c < mesh.cell_slots(); ++c) touched.new_cells.push_back(c);
+  const VectorX field = VectorX::Random(3 * before.vertex_slots());
+  for (auto _ : state) {
+    const TransferPatch<3> patch = make_transfer_patch(before, mesh, touched, kMaterials, 3);
+    MatrixX u_old(patch.old_cells.vertices.size(), 6), u_bar(patch.new_cells.vertices.size(), 6);
+    u_old << patch.old_cells.gather(field), patch.old_cells.gather(field);
+    u_bar << patch.new_cells.gather(field), patch.new_cells.gather(field);
+    std::vector<char> fixed;
+    for (const char at_rim : patch.at_rim) fixed.insert(fixed.end(), 6, at_rim);
+    TransferReport report;
+    benchmark::DoNotOptimize(
+        project_l2<3>(patch.old_cells.view(), patch.new_cells.view(), patch.touched, u_old, u_bar, fixed, report));
+  }
+  state.counters["tetrahedra"] = static_cast<double>(before.num_cells());
+}
+
 BENCHMARK(ElementEnergy)->Arg(1)->Arg(2)->UseRealTime();
 BENCHMARK(ElementGradient)->Arg(1)->Arg(2)->UseRealTime();
 BENCHMARK(ElementHessian)->ArgNames({"psd", "threads"})->Args({0, 1})->Args({1, 1})->Args({1, 2})->UseRealTime();
@@ -236,6 +289,8 @@ BENCHMARK(ActiveSet)->Arg(1)->Arg(2)->UseRealTime();
 BENCHMARK(StepLimit)->Arg(1)->Arg(2)->UseRealTime();
 BENCHMARK(CcdQuery<false>)->UseRealTime();
 BENCHMARK(CcdQuery<true>)->UseRealTime();
+BENCHMARK(OverlapPair)->UseRealTime();
+BENCHMARK(ProjectCoarsening)->Arg(12)->Arg(25)->Arg(55)->Unit(benchmark::kMicrosecond);
 
 // NOLINTEND(readability-identifier-naming)
 

@@ -151,8 +151,7 @@ void write_projection(const Setup<Dim>& from, const Setup<Dim>& to, const Matrix
     if (const auto found = old_vertex.find(coordinates<Dim>(new_body.rest[v])); found != old_vertex.end())
       start.row(v) = field.row(found->second);
   TransferReport report;
-  const std::vector<char> fixed(new_body.rest.size(), 0);
-  write_array(path, project_l2<Dim>(old_body.view(), new_body.view(), touched, field, start, fixed, report));
+  write_array(path, project_l2<Dim>(old_body.view(), new_body.view(), touched, field, start, {}, report));
   std::printf("touched cells %zu -> %zu, %d iterations, residual %.3g\n", touched.old_cells.size(), touched.new_cells.size(),
               report.iterations, report.relative_residual);
 }

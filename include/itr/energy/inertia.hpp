@@ -6,10 +6,9 @@
 #include "itr/energy/energy.hpp"
 #include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
+#include "itr/fem/mass.hpp"
 
 namespace itr {
-
-enum class MassKind { consistent, lumped };
 
 /// 1/2 (x - xhat)^T M (x - xhat): the body's distance to where it would fly without forces, as a function on the body.
 template <int Dim>
@@ -19,7 +18,7 @@ class InertiaEnergy final : public Energy {
   InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind, VectorX predictor);
 
   /// Adds residual . (x - xhat) + loss, by which the functional becomes 1/2 ||x - xhat_old||^2 for an xhat_old that the
-  /// mesh cannot represent (design §3, rule b): residual = M xhat - A xhat_old, loss = 1/2 ||xhat - xhat_old||^2.
+  /// mesh cannot represent (design §3, rule b): see projection/forgotten_history.hpp.
   void set_unrepresented_history(VectorX residual, double loss);
 
   std::string_view name() const override { return "inertia"; }

@@ -3,17 +3,39 @@
 #pragma once
 
 #include <array>
-#include <vector>
 
 #include "itr/core/types.hpp"
+#include "itr/geometry/measures.hpp"
 
 namespace itr {
 
-/// A simplex decomposition of the intersection of two simplices of positive volume: appends to `pieces` simplices of
-/// positive volume whose volumes sum to that of the intersection to round-off. Pieces smaller than round-off of the
-/// inputs' volume are dropped.
+/// A simplex of positive volume with its barycentric coordinates at hand.
 template <int Dim>
-void intersect_simplices(const std::array<Vec<Dim>, Dim + 1>& a, const std::array<Vec<Dim>, Dim + 1>& b,
-                         std::vector<std::array<Vec<Dim>, Dim + 1>>& pieces);
+struct Simplex {
+  std::array<Vec<Dim>, Dim + 1> corners;
+  Mat<Dim> inverse_edges;
+  double volume;
+
+  explicit Simplex(const std::array<Vec<Dim>, Dim + 1>& p)
+      : corners(p), inverse_edges(edge_matrix<Dim>(p).inverse()), volume(simplex_volume<Dim>(p)) {}
+  Vec<Dim + 1> barycentric(const Vec<Dim>& X) const {
+    Vec<Dim + 1> weights;
+    weights.template tail<Dim>() = inverse_edges * (X - corners[0]);
+    weights[0] = 1 - weights.template tail<Dim>().sum();
+    return weights;
+  }
+};
+
+/// Integrals over the intersection of two simplices a and b of the products of their linear shape functions.
+template <int Dim>
+struct OverlapIntegrals {
+  Mat<Dim + 1> aa, ab, bb;  ///< [m^Dim]; ab(i, j): of shape function i of a times j of b
+  double volume() const { return ab.sum(); }
+};
+
+/// Exact to round-off and free of allocation: a is clipped by the planes of b into simplices, on which the integrands are
+/// quadratic. Returns false, with zeros, where a plane of either separates the two or what is left is round-off.
+template <int Dim>
+bool integrate_overlap(const Simplex<Dim>& a, const Simplex<Dim>& b, OverlapIntegrals<Dim>& integrals);
 
 }  // namespace itr

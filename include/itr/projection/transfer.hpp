@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "itr/core/types.hpp"
+#include "itr/fem/mass.hpp"
 
 namespace itr {
 
-/// A mesh as the transfer sees it: rest positions, cells, density of each cell.
+/// A mesh, or a patch of one, as the transfer sees it: rest positions, cells, density of each cell.
 template <int Dim>
 struct TransferMesh {
   std::span<const Vec<Dim>> rest;                   ///< [m]
@@ -29,25 +30,39 @@ struct TransferReport {
   int iterations = 0;  ///< of the conjugate gradients
   double relative_residual = 0;
   double l2_error_squared = 0;  ///< sum over columns of ||u_new - u_old||^2 in the density-weighted norm
+  VectorX lost;                 ///< by column: integral of rho (u_old - u_new), 0 to round-off unless all vertices are fixed
 };
 
-/// A_ij = integral of rho_old phi_i^new phi_j^old over the intersections of touched cells, applied to columns of nodal
-/// values: returns A u_old on the touched cells only. `u_old` is num_old_vertices x k, the result num_new_vertices x k.
+/// What u_bar lacks of u_old, integrated over the intersections of old and new touched cells, by columns.
+struct TouchedDifference {
+  MatrixX residual;  ///< num_new_vertices x k: integral of rho phi_i^new (u_old - u_bar)
+  VectorX squares;   ///< integral of rho (u_old - u_bar)^2
+};
 template <int Dim>
-MatrixX touched_cross_mass_product(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh,
-                                   const TouchedCells& touched, const MatrixX& u_old);
+TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh,
+                                     const TouchedCells& touched, const MatrixX& u_old, const MatrixX& u_bar);
 
-/// The same integral over one group of old and new cells that cover the same region, for a preview of a single edit:
-/// fills `A` (new_vertices x old_vertices, local numbering).
-/// Cells are given by their rest positions through local vertex indices.
+/// The correction d = u_new - u_bar for a residual as above: least ||u_new - u_old|| among those that vanish where
+/// `fixed` (a flag for each entry, row by row; empty: nowhere) and that keep the integrals of rho u and rho X u over each
+/// connected part of the mesh. Where nothing is fixed that is the L2 projection, which keeps them anyhow; where the mesh
+/// is a patch, fixed at its rim, or a boundary is held, they are kept by constraints (of rho u alone where too few vertices
+/// are free). Conjugate gradients to round-off.
 template <int Dim>
-void patch_cross_mass(const TransferMesh<Dim>& old_patch, const TransferMesh<Dim>& new_patch, MatrixX& A);
+MatrixX solve_projection(const TransferMesh<Dim>& mesh, const MatrixX& residual, std::span<const char> fixed,
+                         TransferReport& report);
 
-/// Density-weighted L2 projection in the local form. `u_bar` (num_new x k) starts as the interpolant; rows of `fixed`
-/// vertices (one flag a new vertex) keep it. Solved by Jacobi-preconditioned conjugate gradients to round-off. Returns
-/// u_new. With no touched cells u_bar is returned bit for bit.
+/// Both: u_new = u_bar + d. `u_old` is num_old_vertices x k, `u_bar` num_new_vertices x k. With no touched cells u_bar is
+/// returned bit for bit.
 template <int Dim>
 MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh, const TouchedCells& touched,
                    const MatrixX& u_old, const MatrixX& u_bar, std::span<const char> fixed, TransferReport& report);
+
+/// By column, d^T M d with the consistent mass.
+template <int Dim>
+VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d);
+
+/// By vertex: the number of its connected part, parts in the order of their first vertices.
+template <int Dim>
+std::vector<int> connected_parts(const TransferMesh<Dim>& mesh);
 
 }  // namespace itr

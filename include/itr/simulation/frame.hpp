@@ -30,6 +30,9 @@ struct StepReport {
   int newton_iterations = 0;
   EnergyReport energy;
   double energy_before_remesh = 0;  ///< total after the first solve [J]
+  /// What the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]: not
+  /// gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
+  double history_loss = 0;
   OperationCount splits, collapses, swaps, smooths;
   double trial_seconds = 0;     ///< median over the trials of these operations; 0 where there were none
   int cut_steps = 0;            ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
@@ -39,7 +42,7 @@ struct StepReport {
   StepSeconds seconds;
   double peak_rss_mb = 0;
 
-  /// Adds the effort of what came before: iterations, operations, damped and cut steps, seconds.
+  /// Adds the effort of what came before: iterations, operations, forgotten history, damped and cut steps, seconds.
   void add_effort(const StepReport& before);
 };
 

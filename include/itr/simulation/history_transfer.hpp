@@ -4,14 +4,25 @@
 #include "itr/core/log.hpp"
 #include "itr/linear/solver.hpp"
 #include "itr/projection/transfer.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "itr/simulation/setup.hpp"
+#include "itr/time/integrator.hpp"
 
 namespace itr {
 
+struct HistoryTransferReport {
+  double loss = 0;            ///< 1/2 ||xhat_old - xhat_new||^2 of the predictor [kg m^2]; 0 where there is no inertia
+  int with_barriers = 0;      ///< past positions that barriers had to keep valid
+  int not_converged = 0;      ///< of these, those whose solve stopped early: valid, but not the nearest
+  double lost_positions = 0;  ///< most that a past position lost of the integral of rho x, a component [kg m]
+};
+
 /// Replaces the bodies' part of `history`, carried along by interpolation onto the compact `mesh`, by its L2 projection from
-/// `old_mesh`: positions safely, velocities and accelerations freely. `touched` are the cells by which the meshes differ.
-void transfer_history(const Setup<2>& setup, const Mesh<2>& old_mesh, const History& old_history, const Mesh<2>& mesh,
-                      const TouchedCells& touched, double scaling, linear::Solver& solver, const Logger& logger,
-                      History& history);
+/// `old_mesh`: positions safely, velocities and accelerations freely. `touched` are the cells by which the meshes differ;
+/// values change on these and some rings around them only. The integrals of rho x, rho v and rho a over each connected part
+/// of that are kept to round-off. Prescribed components of positions stay what they are.
+template <int Dim>
+HistoryTransferReport transfer_history(const Setup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
+                                       const Mesh<Dim>& mesh, const TouchedCells& touched, linear::Solver& solver,
+                                       History& history);
 
 }  // namespace itr

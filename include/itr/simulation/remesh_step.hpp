@@ -4,17 +4,17 @@
 
 #include "itr/core/log.hpp"
 #include "itr/linear/solver.hpp"
-#include "itr/remesh/report.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "itr/simulation/step_problem.hpp"
 
 namespace itr {
 
-/// Remeshes state.mesh, around the solution x of `problem` at time t, and carries state.history and x over to the new mesh.
-/// `shortest_edge` is that of the initial mesh [m]. 2D so far.
+/// Remeshes state.mesh, around the solution x of `problem` at time t, and carries state.history and x over to the new mesh;
+/// `before` is the state as it is. Returns whether anything changed; `report` gets operations, forgotten history and
+/// seconds. `shortest_edge` is that of the initial mesh [m]. 2D so far.
 template <int Dim>
-RemeshReport remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const StepProblem<Dim>& problem, double t,
-                                State<Dim>& state, VectorX& x, StepSeconds& seconds, linear::Solver& solver,
-                                const Logger& logger);
+bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const StepProblem<Dim>& problem, double t,
+                        const State<Dim>& before, State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
+                        const Logger& logger);
 
 }  // namespace itr

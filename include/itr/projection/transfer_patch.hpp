@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// The part of two meshes on which a projection is done: what it costs follows the cells that an edit touched.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "itr/energy/material.hpp"
+#include "itr/fem/cell_set.hpp"
+#include "itr/projection/transfer.hpp"
+
+namespace itr {
+
+/// Some cells of a mesh with a numbering of their own.
+template <int Dim>
+struct TransferCells {
+  std::vector<VertexId> vertices;  ///< ids in the mesh
+  std::vector<Vec<Dim>> rest;
+  std::vector<std::array<int, Dim + 1>> cells;
+  std::vector<double> density;
+
+  TransferMesh<Dim> view() const { return {rest, cells, density}; }
+  /// Rows of values at these vertices, of an interleaved field over the mesh.
+  MatrixX gather(const VectorX& field) const;
+};
+
+template <int Dim>
+struct TransferPatch {
+  TransferCells<Dim> old_cells;  ///< the touched ones
+  TransferCells<Dim> new_cells;  ///< the touched ones, then those around them
+  TouchedCells touched;          ///< in these numberings
+  std::vector<char> at_rim;      ///< by vertex of `new_cells`: it has cells outside the patch
+  CellSet<Dim> cells;            ///< `new_cells` as energies see them
+};
+
+/// `touched` are cells of the two meshes, `mesh` is compact. Free to move are the vertices of touched cells and those up to
+/// `rings` edges away.
+template <int Dim>
+TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched,
+                                       const std::map<int, Material>& materials, int rings);
+
+}  // namespace itr

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+#include "simulation/patch_surface.hpp"
+
+#include <algorithm>
+#include <span>
+#include <unordered_map>
+
+#include "itr/geometry/bvh.hpp"
+
+namespace itr {
+
+template <int Dim>
+PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const TransferPatch<Dim>& patch,
+                                const std::vector<char>& moving, const VectorX& x, const VectorX& goal, double reach) {
+  PatchSurface<Dim> result;
+  const auto& vertices = patch.new_cells.vertices;
+  std::vector<FacetId> own;
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    if (moving[i]) own.insert(own.end(), mesh.facets_of(vertices[i]).begin(), mesh.facets_of(vertices[i]).end());
+  if (own.empty()) return result;
+  std::sort(own.begin(), own.end());
+  own.erase(std::unique(own.begin(), own.end()), own.end());
+
+  std::unordered_map<int, int> known;  // from ids in fields to those in the patch
+  for (std::size_t i = 0; i < vertices.size(); ++i) known[vertices[i]] = static_cast<int>(i);
+  std::vector<Box<Dim>> boxes;
+  for (const FacetId f : own) {
+    Box<Dim> box;
+    for (const VertexId v : mesh.facet(f)) {
+      box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
+      box.include(Vec<Dim>(goal.segment<Dim>(Dim * known.at(v))));
+    }
+    boxes.push_back(box.inflated(reach));
+  }
+  const Bvh<Dim> tree(boxes);
+  std::vector<int> hits;
+  const auto is_near = [&](std::span<const int> ids) {
+    Box<Dim> box;
+    for (const int v : ids) box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
+    hits.clear();
+    tree.query(box, hits);
+    return !hits.empty();
+  };
+
+  std::vector<Vec<Dim>> rest = patch.new_cells.rest;
+  const int bodies = mesh.vertex_slots();
+  const auto local = [&](int v) {
+    const auto [it, is_new] = known.try_emplace(v, static_cast<int>(rest.size()));
+    if (is_new) {
+      rest.push_back(v < bodies ? mesh.rest(v) : obstacles.rest[v - bodies]);
+      result.others.push_back(v);
+    }
+    return it->second;
+  };
+  std::vector<std::array<int, 2>> edges;
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<int> points;
+  const auto add = [&](const auto& primitive, int first) {
+    auto ids = primitive;
+    for (int& v : ids) v += first;
+    if (!is_near(ids)) return;
+    for (int& v : ids) v = local(v);
+    if constexpr (std::tuple_size_v<std::remove_cvref_t<decltype(primitive)>> == 2)
+      edges.push_back(ids);
+    else
+      triangles.push_back(ids);
+  };
+  for (int f = 0; f < mesh.facet_slots(); ++f) add(mesh.facet(f), 0);  // own ones are near themselves
+  for (const auto& edge : obstacles.edges) add(edge, bodies);
+  for (const auto& triangle : obstacles.triangles) add(triangle, bodies);
+  for (int o = 0; o < static_cast<int>(obstacles.rest.size()); ++o)
+    if (const int v = bodies + o; is_near(std::span(&v, 1))) points.push_back(local(v));
+
+  std::vector<char> counts(rest.size(), 0);
+  std::copy(moving.begin(), moving.end(), counts.begin());
+  result.surface = make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
+  return result;
+}
+
+template PatchSurface<2> patch_surface<2>(const Mesh<2>&, const Obstacles<2>&, const TransferPatch<2>&,
+                                          const std::vector<char>&, const VectorX&, const VectorX&, double);
+template PatchSurface<3> patch_surface<3>(const Mesh<3>&, const Obstacles<3>&, const TransferPatch<3>&,
+                                          const std::vector<char>&, const VectorX&, const VectorX&, double);
+
+}  // namespace itr
