@@ -54,7 +54,7 @@ std::vector<char> vertices_near(const Mesh<2>& mesh, const std::vector<int>& cel
 }  // namespace
 
 void transfer_history(const Setup<2>& setup, const Mesh<2>& old_mesh, const History& old_history, const Mesh<2>& mesh,
-                      const TouchedCells& touched, double scaling, linear::Solver& solver, const Logger& logger,
+                      const TouchedCells& touched, const StepProblem<2>& step, linear::Solver& solver, const Logger& logger,
                       History& history) {
   const MeshArrays from(old_mesh, setup.materials), to(mesh, setup.materials);
   const int old_vertices = old_mesh.vertex_slots(), vertices = mesh.vertex_slots();
@@ -74,11 +74,13 @@ void transfer_history(const Setup<2>& setup, const Mesh<2>& old_mesh, const Hist
 
   const CellSet<2> cells = whole_mesh(mesh, setup.obstacles.rest);
   const CollisionSurface surface = collision_surface(mesh, setup.obstacles);
+  ContactOptions contact = setup.contact;
+  contact.barrier_stiffness = step.stiffness().value;
   const SafeProjectionProblem<2> problem{cells,
                                          setup.contact.enabled ? &surface : nullptr,
                                          setup.materials,
-                                         setup.contact,
-                                         scaling,
+                                         contact,
+                                         step.scaling(),
                                          vertices_near(mesh, touched.new_cells, cells.num_vertices),
                                          held};
   for (std::size_t i = 0; i < history.x.size(); ++i) {

@@ -31,6 +31,7 @@ StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, 
   context.mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
   context.scaling = problem.scaling();
   context.contact = setup.contact;
+  context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
   if (!setup.time.is_static) context.damping = setup.damping;
   context.velocity_rate = integrator.velocity_rate(state.history);
   for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
@@ -104,7 +105,7 @@ RemeshReport remesh_and_project(const Setup<Dim>& setup, double shortest_edge, c
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
   if (report.coarsened())  // refinement alone: interpolation is exact
-    transfer_history(setup, before, old_history, state.mesh, touched, problem.scaling(), solver, logger, state.history);
+    transfer_history(setup, before, old_history, state.mesh, touched, problem, solver, logger, state.history);
   return report;
 }
 

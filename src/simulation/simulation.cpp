@@ -26,9 +26,6 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   const auto refuse = [](const char* place, const std::string& found) {
     throw InputError({"", place, found, "something that this version supports"});
   };
-  if (setup.remesh.enabled && setup.contact.enabled && setup.contact.adaptive_stiffness)
-    refuse("/solver/contact/barrier_stiffness",
-           "adaptive stiffness with remeshing, which is not supported yet (give a number)");
   if (setup.remesh.enabled && setup.remesh.sizing_field)
     refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
   if (setup.remesh.enabled && setup.proxy)

@@ -80,7 +80,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
   VectorX x = next.history.x[0];
   const auto make_problem = [&] {
     const ScopedTimer timer(report.seconds.assembly);
-    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, system, state.stiffness);
+    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, system, next.stiffness);
   };
   auto problem = make_problem();
   const auto solve = [&](const VectorX& lagged) {
@@ -115,6 +115,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
 
   if constexpr (Dim == 2) {
     if (setup.remesh.enabled) {
+      next.stiffness = problem->stiffness();
       const State<Dim> unchanged = next;
       const VectorX solution = x;
       const RemeshReport remeshed =
