@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include "itr/geometry/bvh.hpp"
 #include "itr/geometry/ccd.hpp"
+#include "itr/geometry/closed_surface.hpp"
 #include "itr/geometry/distance.hpp"
 #include "itr/geometry/intersection.hpp"
 #include "itr/geometry/measures.hpp"
@@ -24,6 +26,101 @@ template <int Dim>
 Vec<Dim> random_point(std::mt19937& random, double scale = 1) {
   std::uniform_real_distribution<double> coordinate(-scale, scale);
   return Vec<Dim>::NullaryExpr([&] { return coordinate(random); });
+}
+
+/// The boundary of the squares or cubes of unit size that `is_solid` takes, on a lattice whose corners are whole numbers.
+template <int Dim>
+struct LatticeSolid {
+  static constexpr int kSize = 6;  ///< cells lie in [0, kSize)^Dim
+  std::vector<Vec<Dim>> x;
+  std::vector<std::array<int, Dim>> facets;
+  std::function<bool(const Vec<Dim>&)> is_solid;  ///< by the cell's lower corner
+
+  explicit LatticeSolid(std::function<bool(const Vec<Dim>&)> solid) : is_solid(std::move(solid)) {
+    const int points = kSize + 1;
+    for (int i = 0; i < std::pow(points, Dim); ++i) {
+      x.emplace_back();
+      for (int c = 0, rest = i; c < Dim; ++c, rest /= points) x.back()[c] = rest % points;
+    }
+    for (const Vec<Dim>& corner : x)
+      for (int axis = 0; axis < Dim; ++axis)
+        for (const int side : {0, 1}) {
+          Vec<Dim> neighbour = corner;
+          neighbour[axis] += side ? 1 : -1;
+          if (!solid_at(corner) || solid_at(neighbour)) continue;
+          Vec<Dim> base = corner;
+          base[axis] += side;
+          add_side(base, axis, side == 1);
+        }
+  }
+  bool solid_at(const Vec<Dim>& corner) const {
+    return (corner.array() >= 0).all() && (corner.array() < kSize).all() && is_solid(corner);
+  }
+  int id(const Vec<Dim>& p) const {
+    int sum = 0;
+    for (int c = Dim - 1; c >= 0; --c) sum = sum * (kSize + 1) + static_cast<int>(p[c]);
+    return sum;
+  }
+  void add_side(const Vec<Dim>& base, int axis, bool upper) {
+    Vec<Dim> u = Vec<Dim>::Unit((axis + 1) % Dim);
+    if constexpr (Dim == 2) {
+      const bool forward = (axis == 0) == upper;  // counter-clockwise
+      facets.push_back(forward ? std::array{id(base), id(base + u)} : std::array{id(base + u), id(base)});
+    } else {
+      Vec<3> v = Vec<3>::Unit((axis + 2) % 3);
+      if (!upper) std::swap(u, v);
+      facets.push_back({id(base), id(base + u), id(base + u + v)});
+      facets.push_back({id(base), id(base + u + v), id(base + v)});
+    }
+  }
+  /// On a lattice of quarters, where rays meet vertices, edges and facets.
+  void expect_right_windings() const {
+    const ClosedSurface<Dim> closed(x, facets);
+    const int steps = 4 * kSize + 9;
+    int inside = 0;
+    for (int i = 0; i < std::pow(steps, Dim); ++i) {
+      Vec<Dim> p;
+      for (int c = 0, rest = i; c < Dim; ++c, rest /= steps) p[c] = 0.25 * (rest % steps) - 1;
+      int solid = 0, around = 0;  // of the cells around p
+      for (int k = 0; k < (1 << Dim); ++k) {
+        Vec<Dim> nudged = p;
+        for (int c = 0; c < Dim; ++c) nudged[c] += (k >> c) % 2 ? 0.1 : -0.1;
+        solid += solid_at(nudged.array().floor().matrix());
+        ++around;
+      }
+      const bool on_surface = solid != 0 && solid != around;
+      ASSERT_EQ(closed.touches(p), on_surface) << p.transpose();
+      if (on_surface) continue;
+      ASSERT_EQ(closed.winding(p), solid ? 1 : 0) << p.transpose();
+      inside += solid != 0;
+    }
+    EXPECT_GT(inside, 50);
+  }
+};
+
+TYPED_TEST(Geometry, ClosedSurfacesHoldWhatIsInsideOfThem) {
+  constexpr int Dim = TypeParam::value;
+  // Odd, with a cavity and in the cavity another solid: none is inside of a solid.
+  const auto ring = [](const Vec<Dim>& corner, double low, double high) {
+    return (corner.array() >= low).all() && (corner.array() <= high).all();
+  };
+  const LatticeSolid<Dim> solid(
+      [&](const Vec<Dim>& c) { return (!ring(c, 2, 4) && c != Vec<Dim>::Zero()) || ring(c, 3, 3); });
+  solid.expect_right_windings();
+  EXPECT_TRUE(ClosedSurface<Dim>(solid.x, solid.facets).nested().empty());
+  // A solid in a solid is; an open surface has no inside.
+  LatticeSolid<Dim> nested([&](const Vec<Dim>& c) { return ring(c, 0, 5); });
+  const std::size_t outer = nested.facets.size();
+  const LatticeSolid<Dim> small([&](const Vec<Dim>& c) { return ring(c, 2, 3); });
+  nested.facets.insert(nested.facets.end(), small.facets.begin(), small.facets.end());
+  const std::vector<int> found = ClosedSurface<Dim>(nested.x, nested.facets).nested();
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0], small.facets[0][0]);
+  nested.facets.erase(nested.facets.begin() + static_cast<std::ptrdiff_t>(outer) - 1);
+  const ClosedSurface<Dim> open(nested.x, nested.facets);
+  EXPECT_TRUE(open.nested().empty());
+  EXPECT_EQ(open.winding(Vec<Dim>::Constant(1.5)), 0);
+  EXPECT_EQ(open.winding(Vec<Dim>::Constant(2.5)), 1);
 }
 
 template <int Dim>

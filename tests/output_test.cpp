@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -340,6 +341,107 @@ TEST_F(OutputTest, FindsASolidThatPiercesAnObstacle) {
   Solid solid;
   for (int i = 0; i < 4; ++i) solid.x[3 * i + 2] -= 1.5;
   EXPECT_EQ(violations_of(solid).size(), 3u);  // the three edges at the apex
+}
+
+TEST_F(OutputTest, FindsObstaclePointsInABody) {
+  Plane plane;
+  const auto violations_at = [&](double x, double y) {
+    plane.obstacle_x[2] = {x, y};
+    return violations_of(plane);
+  };
+  plane.obstacle_x.emplace_back(0, 0);
+  for (const double x : {0.25, 0.5, 0.75}) {  // also where the ray upward meets vertices
+    EXPECT_TRUE(violations_at(x, -0.25).empty());
+    EXPECT_TRUE(violations_at(x, 1.5).empty());
+    EXPECT_EQ(violations_at(x, 0.5), std::vector<std::string>{"frames/000000.h5: vertex (obstacle 2) is inside of a body"});
+    EXPECT_EQ(violations_at(x, 3), std::vector<std::string>{"frames/000000.h5: vertex (obstacle 2) is on a body"});
+  }
+  for (const double x : {0.0, 1.0}) {
+    EXPECT_EQ(violations_at(x, 0.5).size(), 1u) << "on the side";
+    EXPECT_TRUE(violations_at(x, -0.25).empty());
+  }
+}
+
+TEST_F(OutputTest, FindsObstaclePointsAndEdgesInASolid) {
+  Solid solid;
+  solid.obstacle_x.insert(solid.obstacle_x.end(), {{0.1, 0.1, -0.5}, {0.2, 0.1, -0.5}});
+  for (const bool joined : {false, true}) {
+    if (joined) solid.obstacle_edges.push_back({3, 4});
+    const auto violations_at = [&](double z) {
+      solid.obstacle_x[3][2] = solid.obstacle_x[4][2] = z;
+      return violations_of(solid).size();
+    };
+    EXPECT_EQ(violations_at(-0.5), 0u);
+    EXPECT_EQ(violations_at(0.9), 0u);
+    EXPECT_EQ(violations_at(0.1), 2u);
+    EXPECT_GE(violations_at(0), 1u) << "on it";
+  }
+  solid.obstacle_edges.pop_back();
+  solid.obstacle_x[3] = {0.125, 0.125, -0.5};  // the ray meets an edge, a vertex, and a plane of facets
+  solid.obstacle_x[4] = {0, 0, -0.5};
+  EXPECT_EQ(violations_of(solid).size(), 0u);
+  solid.obstacle_x[3][2] = 0.125;
+  EXPECT_EQ(violations_of(solid).size(), 1u);
+}
+
+TEST_F(OutputTest, FindsABodyInABody) {
+  Plane plane;
+  const auto shrink_into = [&](double y) {  // the upper square
+    for (int i = 4; i < 8; ++i) vertex_of<2>(plane.x, i) = Vec<2>(0.5, y) + 0.1 * (plane.mesh.rest(i) - Vec<2>(0.5, 2.5));
+  };
+  shrink_into(1.5);
+  EXPECT_TRUE(violations_of(plane).empty());
+  shrink_into(0.75);
+  EXPECT_EQ(violations_of(plane),
+            std::vector<std::string>{"frames/000000.h5: the part of the boundary at vertex 4 is inside of a body"});
+
+  Solid solid;
+  const std::vector<Vec<3>> corners = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  std::vector<Vec<3>> rest = corners;
+  for (const Vec<3>& p : corners) rest.push_back(p + Vec<3>(2, 0, 0));
+  solid.mesh = Mesh<3>(rest, {{0, 1, 2, 3}, {4, 5, 6, 7}}, {1, 2});
+  solid.v = VectorX::Zero(24);
+  solid.density = {0, 0};
+  solid.x.resize(24);
+  for (int i = 0; i < 8; ++i) vertex_of<3>(solid.x, i) = rest[i];
+  EXPECT_TRUE(violations_of(solid).empty());
+  for (int i = 0; i < 4; ++i) vertex_of<3>(solid.x, 4 + i) = 0.1 * corners[i] + Vec<3>::Constant(0.2);
+  EXPECT_EQ(violations_of(solid).size(), 1u);
+}
+
+/// A sheet of two triangles as a proxy, folded shut along their common edge.
+TEST_F(OutputTest, FindsTrianglesFoldedOntoTheirNeighbours) {
+  struct Sheet : Solid {
+    std::vector<Vec<3>> proxy_x = {{0, 0, 5}, {1, 0, 5}, {0.25, 1, 5}, {0.75, -1, 5}};
+    std::vector<std::array<int, 2>> proxy_edges = {{0, 1}, {0, 2}, {1, 2}, {0, 3}, {1, 3}};
+    std::vector<std::array<int, 3>> proxy_triangles = {{0, 1, 2}, {1, 0, 3}};
+    FrameView<3> view() const {
+      FrameView<3> frame = Solid::view();
+      frame.proxy = {&proxy_x, &proxy_edges, &proxy_triangles};
+      return frame;
+    }
+  } sheet;
+  EXPECT_TRUE(violations_of(sheet).empty());
+  sheet.proxy_x[3] = {0.75, 1, std::nextafter(5.0, 6.0)};
+  EXPECT_TRUE(violations_of(sheet).empty()) << "open by one unit in the last place";
+  sheet.proxy_x[3][2] = 5;
+  EXPECT_FALSE(violations_of(sheet).empty());
+}
+
+TEST_F(OutputTest, FindsCellsOfNoVolumeAtRest) {
+  Plane plane;
+  for (double& value : plane.x) value += 10;
+  EXPECT_TRUE(violations_of(plane).empty());
+  std::vector<double> rest;
+  for (int i = 0; i < 8; ++i) rest.insert(rest.end(), {plane.mesh.rest(i)[0], plane.mesh.rest(i)[1]});
+  const fs::path frame = folder / "frames/000000.h5";
+  std::string bytes = text_of(frame);
+  const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(rest.data()), 8 * rest.size()));
+  ASSERT_NE(at, std::string::npos);
+  rest[6] = 1.5;  // vertex 3 across the diagonal
+  std::memcpy(bytes.data() + at, rest.data(), 8 * rest.size());
+  std::ofstream(frame, std::ios::binary) << bytes;
+  EXPECT_EQ(certify(folder).violations, std::vector<std::string>{"frames/000000.h5: at rest cell 1 is inverted"});
 }
 
 TEST_F(OutputTest, FindsPositionsThatAreNotNumbers) {

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Sets up, builds and runs all tests but the ones labelled `long`, and the short form of the verification suite. Needs
-# Debian 12 and nothing else.
+# Sets up, builds and runs all tests but the ones labelled `long`, a scene with every invariant asserted, and the short form
+# of the verification suite. Needs Debian 12 and nothing else.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export DEBIAN_FRONTEND=noninteractive
@@ -15,4 +15,14 @@ fi
 cmake --preset release
 cmake --build --preset release -- -j "${ITR_JOBS:-2}"
 ctest --test-dir build/release --output-on-failure --no-tests=error -LE long
+
+# A ball that hits a wall, with remeshing and friction: each edit and each step is checked.
+cmake --preset audit -D ITR_BUILD_TESTS=OFF
+cmake --build --preset audit --target itr -- -j "${ITR_JOBS:-2}"
+audited=build/audit/runs/ball_wall
+build/audit/bin/itr run examples/ball_wall.json -o "$audited" --set /time/tend=0.0008 \
+  --set '/initial_conditions/velocity/0/value=[67, -20]' --set '/geometry/0/transformation/translation=[0.0629, 0]' \
+  --set /contact/friction_coefficient=0.3 --set /space/remesh/split/acceptance_tolerance=1
+build/audit/bin/itr certify "$audited"
+
 python3 verification/run.py --quick

@@ -54,7 +54,8 @@ int list_solvers() {
 int certify(const std::string& directory) {
   const auto certificate = output::certify(directory);
   for (const auto& violation : certificate.violations) fmt::print("{}\n", violation);
-  fmt::print("{} frames: {}\n", certificate.frames, certificate.passed() ? "no intersection, no inversion" : "failed");
+  fmt::print("{} frames, each by itself: {}\n", certificate.frames,
+             certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
   return certificate.passed() ? cli::done : cli::certificate_failed;
 }
 

@@ -24,6 +24,19 @@ bool segments_intersect(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c, const
   return CGAL::do_intersect(Kernel::Segment_2(point(a), point(b)), Kernel::Segment_2(point(c), point(d)));
 }
 
+bool segment_contains(const Vec<2>& a, const Vec<2>& b, const Vec<2>& p) {
+  return Kernel::Segment_2(point(a), point(b)).has_on(point(p));
+}
+
+bool triangle_contains(const Vec<3>& a, const Vec<3>& b, const Vec<3>& c, const Vec<3>& p) {
+  const Kernel::Triangle_3 triangle(point(a), point(b), point(c));
+  return !triangle.is_degenerate() && triangle.has_on(point(p));
+}
+
+bool triangle_contains(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c, const Vec<2>& p) {
+  return orientation(a, b, p) >= 0 && orientation(b, c, p) >= 0 && orientation(c, a, p) >= 0;
+}
+
 bool segment_intersects_triangle(const Vec<3>& p, const Vec<3>& q, const Vec<3>& a, const Vec<3>& b, const Vec<3>& c) {
   return CGAL::do_intersect(Kernel::Segment_3(point(p), point(q)), Kernel::Triangle_3(point(a), point(b), point(c)));
 }

@@ -81,6 +81,18 @@ CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView x) {
   return kNone;
 }
 
+template <int Dim>
+ClosedSurface<Dim> boundary_at(const Mesh<Dim>& mesh, ConstVectorView x) {
+  std::vector<Vec<Dim>> points(mesh.vertex_slots());
+  for (int v = 0; v < mesh.vertex_slots(); ++v) points[v] = x.segment<Dim>(Dim * v);
+  std::vector<typename Mesh<Dim>::Facet> facets;
+  for (int f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.is_facet_alive(f)) facets.push_back(mesh.facet(f));
+  return {std::move(points), facets};
+}
+
+template ClosedSurface<2> boundary_at<2>(const Mesh<2>&, ConstVectorView);
+template ClosedSurface<3> boundary_at<3>(const Mesh<3>&, ConstVectorView);
 template CellId find_inverted<2>(const Mesh<2>&, ConstVectorView);
 template CellId find_inverted<3>(const Mesh<3>&, ConstVectorView);
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The surface is taken from the cells, not from what the frame says it is: a certificate should trust as little as it can.
 // Where a proxy touches in place of the boundary, it is the surface. Obstacles are prescribed, so two of them may cross each
-// other; anything else that shares a point without sharing a vertex is a violation.
+// other; anything else that shares a point without sharing a vertex is a violation, and so are neighbours that lie on each
+// other. What is wholly inside is found by winding numbers.
 #include "itr/output/certify.hpp"
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
 #include "itr/geometry/bvh.hpp"
+#include "itr/geometry/closed_surface.hpp"
 #include "itr/geometry/predicates.hpp"
 
 namespace itr::output {
@@ -26,6 +28,8 @@ template <int Dim>
 struct Surface {
   std::vector<Vec<Dim>> x;
   int num_body_vertices = 0;
+  std::vector<std::array<int, Dim>> own_facets;  ///< of bodies, oriented outward, or of the proxy, as they come
+  bool has_proxy = false;
   const char* own = "";  ///< before the number of a vertex that is no obstacle's
   std::vector<std::array<int, 2>> edges;
   std::vector<std::array<int, 3>> triangles;  ///< 3D only
@@ -52,29 +56,34 @@ std::vector<Vec<Dim>> points(const std::vector<double>& x) {
   return result;
 }
 
-/// Facets with one incident cell, vertices sorted (orientation does not matter to an intersection).
+/// Facets with one incident cell, oriented outward.
 template <int Dim>
 std::vector<std::array<int, Dim>> boundary_facets(const std::vector<std::int64_t>& simplices) {
-  std::vector<std::array<int, Dim>> facets;
+  using Facet = std::array<int, Dim>;
+  std::vector<std::pair<Facet, Facet>> facets;  // sorted, oriented
+  facets.reserve(simplices.size());
   for (std::size_t c = 0; c < simplices.size(); c += Dim + 1) {
     for (int skipped = 0; skipped <= Dim; ++skipped) {
-      std::array<int, Dim> facet;
+      Facet facet;
       for (int k = 0, i = 0; k <= Dim; ++k) {
         if (k != skipped) facet[i++] = static_cast<int>(simplices[c + k]);
       }
+      Facet oriented = facet;
+      if (skipped % 2 == 1) std::swap(oriented[0], oriented[1]);
       std::sort(facet.begin(), facet.end());
-      facets.push_back(facet);
+      facets.emplace_back(facet, oriented);
     }
   }
   std::sort(facets.begin(), facets.end());
-  std::vector<std::array<int, Dim>> once;
+  std::vector<Facet> once;
   for (std::size_t i = 0, j = 0; i < facets.size(); i = j) {
-    while (j < facets.size() && facets[j] == facets[i]) ++j;
-    if (j == i + 1) once.push_back(facets[i]);
+    while (j < facets.size() && facets[j].first == facets[i].first) ++j;
+    if (j == i + 1) once.push_back(facets[i].second);
   }
   return once;
 }
 
+/// Facets as what can intersect, where orientation does not matter.
 void add_facets(const std::vector<std::array<int, 2>>& facets, Surface<2>& surface) { surface.edges = facets; }
 
 void add_facets(const std::vector<std::array<int, 3>>& facets, Surface<3>& surface) {
@@ -100,15 +109,22 @@ void add_surface(const StoredSurface& stored, Surface<Dim>& surface) {
   }
 }
 
+const std::vector<std::array<int, 2>>& facets_of(const Surface<2>& surface) { return surface.edges; }
+const std::vector<std::array<int, 3>>& facets_of(const Surface<3>& surface) { return surface.triangles; }
+
 template <int Dim>
 Surface<Dim> make_surface(const StoredFrame& frame) {
   Surface<Dim> surface;
+  surface.has_proxy = frame.has_proxy;
   if (frame.has_proxy) {
     surface.own = "proxy ";
     add_surface(frame.proxy, surface);
+    surface.own_facets = facets_of(surface);
   } else {
     surface.x = points<Dim>(frame.x);
-    add_facets(boundary_facets<Dim>(frame.simplices), surface);
+    auto facets = surface.own_facets = boundary_facets<Dim>(frame.simplices);
+    for (auto& facet : facets) std::sort(facet.begin(), facet.end());
+    add_facets(facets, surface);
   }
   surface.num_body_vertices = static_cast<int>(surface.x.size());
   add_surface(frame.obstacles, surface);
@@ -118,14 +134,17 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
 int orientation_of(const std::array<Vec<2>, 3>& p) { return orientation(p[0], p[1], p[2]); }
 int orientation_of(const std::array<Vec<3>, 4>& p) { return orientation(p[0], p[1], p[2], p[3]); }
 
+/// `what`: of the cells, where `coordinates` say that their vertices are.
 template <int Dim>
-void check_cells(const StoredFrame& frame, const std::string& name, std::vector<std::string>& violations) {
-  const std::vector<Vec<Dim>> x = points<Dim>(frame.x);
+void check_cells(const StoredFrame& frame, const std::vector<double>& coordinates, const char* what, const std::string& name,
+                 std::vector<std::string>& violations) {
+  const std::vector<Vec<Dim>> x = points<Dim>(coordinates);
   for (std::size_t c = 0; c < frame.simplices.size() / (Dim + 1); ++c) {
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = x[frame.simplices[(Dim + 1) * c + k]];
     const int sign = orientation_of(p);
-    if (sign <= 0) violations.push_back(fmt::format("{}: cell {} is {}", name, c, sign < 0 ? "inverted" : "degenerate"));
+    if (sign <= 0)
+      violations.push_back(fmt::format("{}: {}cell {} is {}", name, what, c, sign < 0 ? "inverted" : "degenerate"));
   }
 }
 
@@ -142,6 +161,24 @@ template <std::size_t N, std::size_t M>
 int num_shared(const std::array<int, N>& a, const std::array<int, M>& b) {
   return static_cast<int>(
       std::count_if(a.begin(), a.end(), [&](int v) { return std::find(b.begin(), b.end(), v) != b.end(); }));
+}
+
+/// Whether an edge and a triangle with one common vertex lie on each other: in one plane, and the edge within the triangle's
+/// angle at that vertex. Exact.
+bool is_folded(const Surface<3>& surface, const std::array<int, 2>& edge, const std::array<int, 3>& triangle) {
+  const int corner =
+      static_cast<int>(std::find_first_of(triangle.begin(), triangle.end(), edge.begin(), edge.end()) - triangle.begin());
+  const Vec<3>&o = surface.x[triangle[corner]], &a = surface.x[triangle[(corner + 1) % 3]],
+        &b = surface.x[triangle[(corner + 2) % 3]], &end = surface.x[edge[edge[0] == triangle[corner] ? 1 : 0]];
+  if (orientation(o, a, b, end) != 0) return false;
+  for (int axis = 0; axis < 3; ++axis) {  // a plane of two axes on which the triangle's shadow has an area
+    const auto shadow = [axis](const Vec<3>& p) { return Vec<2>(p[(axis + 1) % 3], p[(axis + 2) % 3]); };
+    const int turn = orientation(shadow(o), shadow(a), shadow(b));
+    if (turn == 0) continue;
+    return turn * orientation(shadow(o), shadow(a), shadow(end)) >= 0 &&
+           turn * orientation(shadow(o), shadow(end), shadow(b)) >= 0;
+  }
+  return false;
 }
 
 /// Whether two edges with one common vertex lie on each other: in one line, and to the same side of that vertex. Exact.
@@ -185,25 +222,51 @@ void check_surface(const Surface<3>& surface, const std::string& name, std::vect
     tree.query(boxes[i], hits);
     for (const int j : hits) {
       const auto& t = surface.triangles[j];
-      if ((surface.is_obstacle(e) && surface.is_obstacle(t)) || num_shared(e, t) > 0) continue;
+      const int shared = num_shared(e, t);
+      if ((surface.is_obstacle(e) && surface.is_obstacle(t)) || shared > 1) continue;
       const auto& x = surface.x;
-      if (!segment_intersects_triangle(x[e[0]], x[e[1]], x[t[0]], x[t[1]], x[t[2]])) continue;
+      const bool meet =
+          shared == 1 ? is_folded(surface, e, t) : segment_intersects_triangle(x[e[0]], x[e[1]], x[t[0]], x[t[1]], x[t[2]]);
+      if (!meet) continue;
       violations.push_back(fmt::format("{}: edge {} and triangle {} intersect", name, surface.name(e), surface.name(t)));
     }
   }
+}
+
+/// What is wholly inside, where nothing crosses. A surface of obstacles may hold bodies: it is a container.
+template <int Dim>
+void check_insides(const Surface<Dim>& surface, const std::string& name, std::vector<std::string>& violations) {
+  const ClosedSurface<Dim> closed(surface.x, surface.own_facets);
+  const std::string what = surface.has_proxy ? "the proxy" : "a body";
+  const int first = surface.has_proxy ? 0 : surface.num_body_vertices;
+  for (int v = first; v < static_cast<int>(surface.x.size()); ++v) {
+    if (closed.is_vertex(v)) continue;
+    const bool touches = closed.touches(surface.x[v]);
+    if (touches || closed.winding(surface.x[v]) % 2 != 0)
+      violations.push_back(
+          fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v), touches ? "on" : "inside of", what));
+  }
+  if (surface.has_proxy) return;  // need not have an orientation that tells a solid from a cavity
+  for (const int v : closed.nested())
+    violations.push_back(
+        fmt::format("{}: the part of the boundary at vertex {} is inside of a body", name, surface.name(v)));
 }
 
 template <int Dim>
 void check_frame(const StoredFrame& frame, const std::string& name, std::vector<std::string>& violations) {
   // What is not a number compares false with everything, and every predicate after it would pass.
   const auto is_finite = [](double value) { return std::isfinite(value); };
-  for (const auto* x : {&frame.x, &frame.obstacles.x, &frame.proxy.x}) {
+  for (const auto* x : {&frame.rest, &frame.x, &frame.obstacles.x, &frame.proxy.x}) {
     if (std::all_of(x->begin(), x->end(), is_finite)) continue;
     violations.push_back(name + ": a position is not finite");
     return;
   }
-  check_cells<Dim>(frame, name, violations);
-  check_surface(make_surface<Dim>(frame), name, violations);
+  const std::size_t before = violations.size();
+  check_cells<Dim>(frame, frame.rest, "at rest ", name, violations);
+  check_cells<Dim>(frame, frame.x, "", name, violations);
+  const Surface<Dim> surface = make_surface<Dim>(frame);
+  check_surface(surface, name, violations);
+  if (violations.size() == before) check_insides(surface, name, violations);
 }
 
 std::vector<fs::path> frame_files(const fs::path& directory) {

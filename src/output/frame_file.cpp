@@ -160,6 +160,11 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
   frame.dim = x.columns;
   frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
+  hdf5::Table<double> rest = file.read_doubles("/mesh/rest");
+  require_shape(path, "/mesh/rest", rest.columns, frame.dim);
+  if (rest.rows() != x.rows())
+    throw InputError({path.string(), "/mesh/rest", std::to_string(rest.rows()) + " rows", std::to_string(x.rows())});
+  frame.rest = std::move(rest.values);
   frame.x = std::move(x.values);
   frame.obstacles = read_surface(path, file, "/obstacles", frame.dim);
   frame.has_proxy = file.contains("/proxy");

@@ -46,6 +46,7 @@ struct StoredSurface {
 /// What a certificate needs of a stored frame. Indices are checked: all within range.
 struct StoredFrame {
   int dim = 0;
+  std::vector<double> rest;             ///< n x dim, row-major [m]
   std::vector<double> x;                ///< n x dim, row-major [m]
   std::vector<std::int64_t> simplices;  ///< m x (dim + 1)
   StoredSurface obstacles;

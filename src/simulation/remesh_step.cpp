@@ -37,6 +37,7 @@ StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, 
   context.mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
   context.scaling = problem.scaling();
   context.contact = setup.contact;
+  context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
   if (!setup.time.is_static) context.damping = setup.damping;
   context.velocity_rate = integrator.velocity_rate(state.history);
   for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);

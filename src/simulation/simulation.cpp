@@ -26,9 +26,6 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   const auto refuse = [](const char* place, const std::string& found) {
     throw InputError({"", place, found, "something that this version supports"});
   };
-  if (setup.remesh.enabled && setup.contact.enabled && setup.contact.adaptive_stiffness)
-    refuse("/solver/contact/barrier_stiffness",
-           "adaptive stiffness with remeshing, which is not supported yet (give a number)");
   if (setup.remesh.enabled && setup.remesh.sizing_field)
     refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
   if (setup.remesh.enabled && setup.proxy)
@@ -53,6 +50,20 @@ void check_proxy(const Setup<Dim>& setup) {
   throw InputError({"", "weights of the collision mesh", text(weights.rows(), weights.cols()), text(rows, columns)});
 }
 
+/// Where no surfaces cross: what is wholly inside of a body.
+template <int Dim>
+void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
+  if (setup.proxy) return;
+  const auto refuse = [](const char* what, const Vec<Dim>& p) {
+    throw InputError({"", "initial state", what + (" inside of a body, at " + describe(p)), "surfaces that do not touch"});
+  };
+  const VectorX& x = state.history.x[0];
+  const ClosedSurface<Dim> boundary = boundary_at(state.mesh, x);
+  for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
+  for (Eigen::Index i = Dim * state.mesh.vertex_slots(); i < x.size(); i += Dim)
+    if (const Vec<Dim> p = x.segment<Dim>(i); boundary.touches(p) || boundary.winding(p) != 0) refuse("an obstacle", p);
+}
+
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!setup.contact.enabled) return;
@@ -66,7 +77,7 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   };
   constexpr std::size_t kMostNamed = 5;
   const auto pairs = find_intersections<Dim>(surface, x, kMostNamed + 1);
-  if (pairs.empty()) return;
+  if (pairs.empty()) return refuse_enclosed(setup, state);
   std::string found;
   for (std::size_t i = 0; i < std::min(pairs.size(), kMostNamed); ++i) {
     const auto [first, second] = pairs[i];

@@ -10,7 +10,7 @@
 
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
-#include "itr/mesh/validate.hpp"
+#include "itr/simulation/invariants.hpp"
 #include "itr/simulation/remesh_step.hpp"
 
 namespace itr {
@@ -32,6 +32,10 @@ void add_seconds(const NewtonSummary& summary, StepSeconds& seconds) {
   seconds.ccd += summary.ccd_seconds;
 }
 
+std::string reason_of(const NewtonSummary& summary) {
+  return std::string(to_string(summary.termination)) + ": " + summary.message;
+}
+
 /// Whether a step of the trapezoidal rule, solved to x, stays within TimeOptions::energy_growth_limit. Books what it
 /// creates.
 template <int Dim>
@@ -46,14 +50,13 @@ bool keeps_energy(const Setup<Dim>& setup, StepProblem<Dim>& problem, const Newt
   return true;
 }
 
-/// The invariants: exact, on every configuration that the state holds.
+/// That of the present positions and of those that the history holds.
 template <int Dim>
-std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
-  if (find_inverted<Dim>(mesh, x) != kNone) return "an inverted cell";
-  if (!setup.contact.enabled) return {};
-  const ContactSurface<Dim> contact = contact_surface(setup, mesh);
-  if (has_intersection<Dim>(contact.surface, contact.positions(x))) return "an intersection";
-  return {};
+std::string find_violation(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
+  std::string violation = find_violation(setup, state.mesh, x);
+  for (const VectorX& past : state.history.x)
+    if (violation.empty()) violation = find_violation(setup, state.mesh, past);
+  return violation;
 }
 
 }  // namespace
@@ -72,7 +75,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
   report.t = next.t;
   const auto fail = [&](const NewtonSummary& summary) {
     result.ok = false;
-    result.reason = std::string(to_string(summary.termination)) + ": " + summary.message;
+    result.reason = reason_of(summary);
     report.seconds.total = seconds_now() - start;
     return result;
   };
@@ -80,7 +83,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
   VectorX x = next.history.x[0];
   const auto make_problem = [&] {
     const ScopedTimer timer(report.seconds.assembly);
-    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, system, state.stiffness);
+    return std::make_unique<StepProblem<Dim>>(setup, next.mesh, next.history, t, system, next.stiffness);
   };
   auto problem = make_problem();
   const auto solve = [&](const VectorX& lagged) {
@@ -115,15 +118,17 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
 
   if constexpr (Dim == 2) {
     if (setup.remesh.enabled) {
+      next.stiffness = problem->stiffness();
       const State<Dim> unchanged = next;
       const VectorX solution = x;
       if (remesh_and_project(setup, shortest_edge, *problem, t, unchanged, next, x, report, system.solver(), logger)) {
         auto problem_before = std::move(problem);
         problem = make_problem();
         summary = solve(VectorX(x));
-        if (!summary.converged()) {
-          logger.warning("step " + std::to_string(next.step) + ": the remeshed step did not converge (" + summary.message +
-                         "), keeping the mesh as it was");
+        const std::string failure = summary.converged() ? find_violation(setup, next, x) : reason_of(summary);
+        if (!failure.empty()) {
+          logger.warning(
+              fmt::format("step {}: keeping the mesh as it was, the remeshed step failed: {}", next.step, failure));
           next = unchanged;
           x = solution;
           problem = std::move(problem_before);
@@ -135,7 +140,7 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
     }
   }
 
-  ITR_AUDIT(find_violation(setup, next.mesh, x).empty(), find_violation(setup, next.mesh, x));
+  ITR_AUDIT(find_violation(setup, next, x).empty(), find_violation(setup, next, x));
   {
     const ScopedTimer timer(report.seconds.assembly);
     report.energy = problem->report(x);

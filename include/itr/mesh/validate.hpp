@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "itr/geometry/closed_surface.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
@@ -21,5 +22,9 @@ std::vector<std::array<int, 2>> find_intersections(ConstVectorView positions, st
 /// The first cell (index among alive ids) that is not positively oriented at these positions, decided exactly; kNone: none.
 template <int Dim>
 CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView positions);
+
+/// The boundary of the mesh at these positions.
+template <int Dim>
+ClosedSurface<Dim> boundary_at(const Mesh<Dim>& mesh, ConstVectorView positions);
 
 }  // namespace itr

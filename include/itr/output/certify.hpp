@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Re-checks stored frames with exact predicates: no intersection of surfaces, no inverted cell.
+// Re-checks stored frames with exact predicates, each by itself: every cell has a positive volume, at rest and now; no
+// surfaces share a point but that of a common vertex or edge; no obstacle (points and edges too) is inside of a body or of a
+// closed proxy, and no body inside of a body. What happens between two frames it cannot see: a point that has gone through a
+// body by the next frame is a matter of the steps.
 #pragma once
 
 #include <filesystem>
