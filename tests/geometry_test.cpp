@@ -125,9 +125,8 @@ TYPED_TEST(Geometry, ClosedSurfacesHoldWhatIsInsideOfThem) {
 
 template <int Dim>
 std::vector<PairKind> pair_kinds() {
-  std::vector<PairKind> kinds = {PairKind::vertex_vertex, PairKind::edge_vertex};
-  if (Dim == 3) kinds.insert(kinds.end(), {PairKind::face_vertex, PairKind::edge_edge});
-  return kinds;
+  if (Dim == 2) return {PairKind::vertex_vertex, PairKind::edge_vertex};
+  return {PairKind::vertex_vertex, PairKind::edge_vertex, PairKind::face_vertex, PairKind::edge_edge};
 }
 
 template <int Dim>

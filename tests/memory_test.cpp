@@ -12,6 +12,9 @@
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which reserve address space without bound
 namespace itr::linear {
+
+inline void PrintTo(const BackendInfo& info, std::ostream* out) { *out << info.name; }
+
 namespace {
 
 /// So many bytes of address space more than the process has; all there is when it goes out of scope.

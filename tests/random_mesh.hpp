@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <ostream>
 #include <random>
 #include <vector>
 
@@ -67,13 +68,56 @@ inline std::optional<Edit<2>> random_edit(const Mesh<2>& mesh, std::mt19937& ran
   return edit_at(mesh, random() % 4, which);
 }
 
+inline std::ostream& operator<<(std::ostream& out, Edit<2>::Kind kind) {
+  constexpr const char* kNames[] = {"split", "collapse", "swap", "smooth"};
+  return out << kNames[static_cast<int>(kind)];
+}
+inline std::ostream& operator<<(std::ostream& out, HistoryRule rule) {
+  return out << (rule == HistoryRule::function ? "function" : "interpolated");
+}
+inline std::ostream& operator<<(std::ostream& out, Screening screening) {
+  constexpr const char* kNames[] = {"energy-percentile", "bounds", "none"};
+  return out << kNames[static_cast<int>(screening)];
+}
+
+/// What a TrialScene has beside elasticity, inertia, dead loads and contact with an obstacle at rest.
+struct Terms {
+  bool friction = false, held = false, pressure = false, damping = false, second_body = false, lumped = false,
+       moving_obstacle = false;
+};
+inline std::ostream& operator<<(std::ostream& out, const Terms& terms) {
+  return out << "friction " << terms.friction << ", held " << terms.held << ", pressure " << terms.pressure << ", damping "
+             << terms.damping << ", second body " << terms.second_body << ", lumped " << terms.lumped << ", moving obstacle "
+             << terms.moving_obstacle;
+}
+
+/// The same with body 3, of facet tag 5, right of it: apart by less than what TrialScene's contact reaches.
+inline Mesh<2> with_second_body(const Mesh<2>& first, std::mt19937& random) {
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  std::vector<int> body;
+  for (int v = 0; v < first.vertex_slots(); ++v) rest.push_back(first.rest(v));
+  for (int c = 0; c < first.cell_slots(); ++c) cells.push_back(first.cell(c)), body.push_back(first.body(c));
+  const Grid second = make_grid(
+      3, [](int i, int j) { return Vec<2>(1.02 + 0.15 * i, 0.23 + 0.15 * j); }, [&](int, int) { return random() % 2; });
+  const int offset = static_cast<int>(rest.size());
+  rest.insert(rest.end(), second.rest.begin(), second.rest.end());
+  for (const auto& [i, j, k] : second.cells) cells.push_back({offset + i, offset + j, offset + k}), body.push_back(3);
+  Mesh<2> mesh(rest, cells, body);
+  tag_sides(mesh, 1);
+  for (int f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.facet(f)[0] >= offset) mesh.set_facet_tag(f, 5);
+  return mesh;
+}
+
 /// A body above an obstacle line, within dhat of it, with a random state.
 struct TrialScene {
   std::mt19937 random;
   Mesh<2> mesh;
   RemeshFields<2> fields;
   StepContext<2> context;
-  explicit TrialScene(unsigned seed, int n = 6) : random(seed), mesh(random_mesh(n, random)) {
+  explicit TrialScene(unsigned seed, int n = 6, const Terms& terms = {}) : random(seed), mesh(random_mesh(n, random)) {
+    if (terms.second_body) mesh = with_second_body(mesh, random);
     context.materials[1] = {.youngs_modulus = 10, .poisson_ratio = 0.3, .density = 2};
     context.materials[2] = {.youngs_modulus = 1000, .poisson_ratio = 0.4, .density = 5};
     context.scaling = 0.01;
@@ -93,6 +137,29 @@ struct TrialScene {
     fields.predictor = fields.velocity_reference = fields.x;
     for (Eigen::Index i = 0; i < fields.x.size(); ++i) fields.predictor[i] += noise(random);
     fields.past_positions = {fields.predictor};
+    add(terms);
+  }
+
+ private:
+  void add(const Terms& terms) {
+    context.materials[3] = {.youngs_modulus = 50, .poisson_ratio = 0.3, .density = 1};
+    if (terms.friction) context.contact.friction_coefficient = 0.4, context.contact.friction_velocity = 0.02;
+    if (terms.held) context.held_components = {{1, {true, false}}, {4, {true, true}}};
+    if (terms.pressure) context.loads.pressures.emplace_back(3, [](const Vec<2>& X) { return 0.5 + X[1]; });
+    if (terms.damping)
+      context.damping = {{.term = DampingOptions::Term::elastic, .coefficient = 0.03},
+                         {.term = DampingOptions::Term::contact, .coefficient = 0.03}};
+    if (terms.lumped) context.mass = MassKind::lumped;
+    if (terms.moving_obstacle)
+      for (std::size_t o = 0; o < context.obstacles.x.size(); ++o) {
+        context.obstacles.velocity_reference[o] -= Vec<2>(0.01, 0.005);
+        context.obstacles.past_x[0][o] -= Vec<2>(0.01, 0.005);
+      }
+    if (!terms.friction && !terms.damping) return;
+    context.velocity_rate = 10;
+    std::uniform_real_distribution<double> noise(-0.003, 0.003);
+    for (Eigen::Index i = 0; i < fields.x.size(); ++i)
+      fields.velocity_reference[i] += noise(random) - (i % 2 == 0 ? 0.004 : 0);
   }
 };
 

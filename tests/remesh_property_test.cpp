@@ -12,6 +12,7 @@
 #include "itr/projection/transfer.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
+#include "random_terms.hpp"
 #include "remesh/patch.hpp"
 
 namespace itr {
@@ -235,14 +236,14 @@ OperationCount total(const RemeshReport& report) {
 
 Kind draw_kind() { return *rc::gen::element(Kind::split, Kind::collapse, Kind::swap, Kind::smooth); }
 
-TrialScene draw_scene() {
-  TrialScene scene(*rc::gen::noShrink(rc::gen::inRange(0u, 1000000u)), *rc::gen::element(4, 6));
+TrialScene draw_scene(const Terms& terms = {}) {
+  TrialScene scene(*rc::gen::noShrink(rc::gen::inRange(0u, 1000000u)), *rc::gen::element(4, 6), terms);
   RC_PRE(find_inverted<2>(scene.mesh, scene.fields.x) == kNone);
   return scene;
 }
 
 RC_GTEST_PROP(TrialProperties, RejectedTrialsLeaveNoTrace, ()) {
-  TrialScene scene = draw_scene();
+  TrialScene scene = draw_scene(draw_terms());
   const Mesh<2> mesh = scene.mesh;
   const RemeshFields<2> fields = scene.fields;
   const auto history = *rc::gen::element(HistoryRule::function, HistoryRule::interpolated);
@@ -345,9 +346,10 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
 
 RC_GTEST_PROP(TrialProperties, RemeshingHasTheSameBitsForOneAndTwoThreads, ()) {
   const unsigned seed = *rc::gen::noShrink(rc::gen::inRange(0u, 1000000u));
-  const auto run = [seed](int threads) {
+  const Terms terms = draw_terms();
+  const auto run = [&](int threads) {
     const ThreadLimit limit(threads);
-    TrialScene scene(seed, 12);  // 288 cells: more than one block of a parallel loop
+    TrialScene scene(seed, 12, terms);  // 288 cells: more than one block of a parallel loop
     RemeshOptions options;
     options.split.culling_threshold = 0.9;
     options.split.acceptance_tolerance = 1e-3;

@@ -15,6 +15,17 @@
 #include "square_mesh.hpp"
 
 namespace itr {
+
+inline void PrintTo(const TimeOptions& time, std::ostream* out) {
+  constexpr const char* kNames[] = {"ImplicitEuler", "ImplicitNewmark", "BDF"};
+  *out << kNames[static_cast<int>(time.integrator)];
+  if (time.integrator == Integrator::bdf) *out << time.bdf_order;
+}
+inline void PrintTo(MaterialLaw law, std::ostream* out) {
+  constexpr const char* kNames[] = {"NeoHookean", "LinearElasticity", "SaintVenant", "FixedCorotational", "MooneyRivlin"};
+  *out << kNames[static_cast<int>(law)];
+}
+
 namespace {
 
 /// Diagonals alternate.
@@ -138,16 +149,11 @@ TEST_P(Integrators, KeepMomentumThroughRemeshing) {
   EXPECT_GT(done.splits + done.coarsenings, 10);
 }
 
-std::string integrator_name(const ::testing::TestParamInfo<TimeOptions>& info) {
-  return info.param.integrator == Integrator::newmark ? "newmark"
-         : info.param.integrator == Integrator::bdf   ? "bdf2"
-                                                      : "euler";
-}
 INSTANTIATE_TEST_SUITE_P(All, Integrators,
                          ::testing::Values(TimeOptions{.integrator = Integrator::implicit_euler},
                                            TimeOptions{.integrator = Integrator::newmark},
                                            TimeOptions{.integrator = Integrator::bdf, .bdf_order = 2}),
-                         integrator_name);
+                         ::testing::PrintToStringParamName());
 
 /// The largest mechanical energy of a supersonic impact by the trapezoidal rule, relative to that at the start.
 struct ImpactEnergy {
@@ -232,7 +238,8 @@ TEST_P(Laws, KeepMomentumThroughRemeshing) {
 INSTANTIATE_TEST_SUITE_P(All, Laws,
                          ::testing::Values(MaterialLaw::neo_hookean, MaterialLaw::linear,
                                            MaterialLaw::saint_venant_kirchhoff, MaterialLaw::fixed_corotated,
-                                           MaterialLaw::mooney_rivlin));
+                                           MaterialLaw::mooney_rivlin),
+                         ::testing::PrintToStringParamName());
 
 TEST(Simulation, ImpactWithRemeshingNeverIntersects) {
   auto setup = impact();
@@ -595,7 +602,7 @@ INSTANTIATE_TEST_SUITE_P(All, StepCuts,
                          ::testing::Values(TimeOptions{.integrator = Integrator::implicit_euler},
                                            TimeOptions{.integrator = Integrator::newmark},
                                            TimeOptions{.integrator = Integrator::bdf, .bdf_order = 2}),
-                         integrator_name);
+                         ::testing::PrintToStringParamName());
 
 TEST(Simulation, StaticsAreCutIntoSmallerLoads) {
   auto setup = free_square(3);

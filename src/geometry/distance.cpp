@@ -286,7 +286,8 @@ CrossSquared edge_cross_squared_with_gradient(const Vec<3>* x) {
   const Vec<3> u = x[1] - x[0], v = x[3] - x[2], n = u.cross(v);
   const Vec<3> du = 2 * v.cross(n), dv = 2 * n.cross(u);
   CrossSquared result{n.squaredNorm(), {}};
-  result.gradient << -du, du, -dv, dv;
+  const Vec<3> parts[] = {-du, du, -dv, dv};
+  for (int k = 0; k < 4; ++k) result.gradient.segment<3>(3 * k) = parts[k];
   return result;
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/quoted.hpp"
 #include "itr/core/error.hpp"
 
 namespace itr {
@@ -58,7 +59,7 @@ class Cursor {
 
   void expect_end(const std::string& name) {
     const std::string_view found = word();
-    if (found != "$End" + name) fail("'" + std::string(found.substr(0, 40)) + "'", "$End" + name);
+    if (found != "$End" + name) fail(quoted(found.substr(0, 40)), "$End" + name);
   }
 
   /// A number as it is in memory, little endian.
@@ -82,7 +83,7 @@ class Cursor {
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error != std::errc() || end != digits.data() + digits.size()) {
       position_ = begin;
-      fail(token.empty() ? "the end of the file" : "'" + std::string(token.substr(0, 40)) + "'", "a number");
+      fail(token.empty() ? "the end of the file" : quoted(token.substr(0, 40)), "a number");
     }
     return value;
   }

@@ -41,7 +41,7 @@ class MshReader {
   }
 
   void read_section(std::string_view section) {
-    if (section.front() != '$') in_.fail("'" + std::string(section.substr(0, 40)) + "'", "a section, such as $Nodes");
+    if (section.front() != '$') in_.fail(quoted(section.substr(0, 40)), "a section, such as $Nodes");
     const std::string name(section.substr(1));
     if (name != "Entities" && name != "Nodes" && name != "Elements") return in_.skip_section(name);
     if (name == "Entities" && !is_new_) return in_.skip_section(name);

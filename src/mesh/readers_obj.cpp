@@ -2,6 +2,7 @@
 // Wavefront .obj: vertices, triangles, polylines. Texture coordinates, normals, groups and materials are passed over.
 #include <charconv>
 
+#include "core/quoted.hpp"
 #include "readers.hpp"
 
 namespace itr {
@@ -46,7 +47,7 @@ class ObjReader {
     for (std::string_view token = word(); !token.empty() && count < 3; token = word()) {
       const std::string_view digits = token.front() == '+' ? token.substr(1) : token;
       const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), vertex[count++]);
-      if (error != std::errc() || end != digits.data() + digits.size()) fail("'" + std::string(token) + "'", "a coordinate");
+      if (error != std::errc() || end != digits.data() + digits.size()) fail(quoted(token), "a coordinate");
     }
     if (count < 2) fail("a vertex with fewer than 2 coordinates", "2 or 3");
     mesh_.vertices.push_back(vertex);
@@ -60,9 +61,9 @@ class ObjReader {
       int index = 0;
       const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), index);
       if (error != std::errc() || end != digits.data() + digits.size() || index == 0)
-        fail("'" + std::string(token) + "'", "a vertex index, from 1");
+        fail(quoted(token), "a vertex index, from 1");
       const int vertex = index > 0 ? index - 1 : static_cast<int>(mesh_.vertices.size()) + index;
-      if (vertex < 0) fail("'" + std::string(token) + "'", "an index of a vertex before this line");
+      if (vertex < 0) fail(quoted(token), "an index of a vertex before this line");
       result.push_back(vertex);
     }
     return result;

@@ -43,9 +43,9 @@ struct Surface {
   }
   template <std::size_t N>
   std::string name(const std::array<int, N>& simplex) const {
-    std::string text = "(" + name(simplex[0]);
-    for (std::size_t k = 1; k < N; ++k) text += ", " + name(simplex[k]);
-    return text + ")";
+    std::string text = name(simplex[0]);
+    for (std::size_t k = 1; k < N; ++k) text.append(", ").append(name(simplex[k]));
+    return fmt::format("({})", text);
   }
 };
 

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/quoted.hpp"
+
 namespace itr::scene {
 
 namespace {
@@ -100,7 +102,7 @@ class ExpressionParser {
 
   void parse() {
     list();
-    if (next() != '\0') fail("'" + std::string(1, next()) + "'", "an operator or the end");
+    if (next() != '\0') fail(quoted(next()), "an operator or the end");
   }
 
  private:
@@ -159,7 +161,7 @@ class ExpressionParser {
       list();
       expect(')');
     } else {
-      fail(c == '\0' ? "the end" : "'" + std::string(1, c) + "'", "a number, a name or '('");
+      fail(c == '\0' ? "the end" : quoted(c), "a number, a name or '('");
     }
     --nesting_;
   }
@@ -168,7 +170,7 @@ class ExpressionParser {
     double value = 0;
     const char* begin = text_.data() + position_;
     const auto [end, error] = std::from_chars(begin, text_.data() + text_.size(), value);
-    if (error != std::errc()) fail("'" + std::string(text_.substr(position_)) + "'", "a number");
+    if (error != std::errc()) fail(quoted(text_.substr(position_)), "a number");
     position_ += static_cast<std::size_t>(end - begin);
     emit({Code::number, 0, 0, value}, 1);
   }
@@ -215,8 +217,7 @@ class ExpressionParser {
       sum();
     }
     if (next() != ')')
-      fail("'" + std::string(1, next()) + "'",
-           "')' after " + std::to_string(function.arity) + " argument(s) of " + std::string(function.name));
+      fail(quoted(next()), "')' after " + std::to_string(function.arity) + " argument(s) of " + std::string(function.name));
     expect(')');
   }
 
@@ -232,7 +233,7 @@ class ExpressionParser {
   }
 
   void expect(char c) {
-    if (!take(c)) fail(next() == '\0' ? "the end" : "'" + std::string(1, next()) + "'", "'" + std::string(1, c) + "'");
+    if (!take(c)) fail(next() == '\0' ? "the end" : quoted(next()), quoted(c));
   }
 
   void emit(Expression::Instruction instruction, int growth) {

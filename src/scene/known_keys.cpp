@@ -203,7 +203,7 @@ class KeyTable {
  private:
   void add(const Group& group, const std::string& key) {
     const auto mark = key.find_first_of("=:");
-    const std::string pattern = group.prefix + ("/" + key.substr(0, mark));
+    const std::string pattern = std::string(group.prefix).append("/").append(key, 0, mark);
     Entry& entry = entries_[pattern] = {group.role, Json()};
     if (mark != std::string::npos && key[mark] == '=') entry.only = Json::parse(key.substr(mark + 1));
     if (mark != std::string::npos && key[mark] == ':') entry.kind = &kind_of(key.substr(mark + 1));

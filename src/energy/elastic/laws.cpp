@@ -33,7 +33,7 @@ EigenSystem<Dim> linear_eigensystem(const LameParameters& lame) {
   system.modes[k++] = Mat<Dim>::Identity() / std::sqrt(double(Dim));
   for (int i = 1; i < Dim; ++i) {  // (1, -1, 0) / sqrt 2, (1, 1, -2) / sqrt 6
     Vec<Dim> diagonal = Vec<Dim>::Zero();
-    diagonal.head(i).setOnes();
+    for (int j = 0; j < i; ++j) diagonal[j] = 1;
     diagonal[i] = -i;
     system.values[k] = 2 * lame.mu;
     system.modes[k++] = Mat<Dim>(diagonal.normalized().asDiagonal());
