@@ -63,6 +63,10 @@ StepReport report_of(int step) {
   report.elements = 4;
   report.unknowns = 16;
   report.newton_iterations = 3;
+  report.factorizations = 1;
+  report.linear_solves = 3;
+  report.reused_factors = 2;
+  report.linear_iterations = 11;
   report.splits = {10, 2};
   report.energy.total = 1.0 / 3;
   report.energy_before_remesh = 4.0 / 3;
@@ -147,7 +151,8 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
 
   const Json line = Json::parse(text_of(folder / "steps.jsonl"));
   EXPECT_EQ(keys_of(line),
-            (std::vector<std::string>{"step", "t", "vertices", "elements", "unknowns", "newton_iterations", "energy",
+            (std::vector<std::string>{"step", "t", "vertices", "elements", "unknowns", "newton_iterations",
+                                      "factorizations", "linear_solves", "reused_factors", "linear_iterations", "energy",
                                       "energy_before_remesh", "splits", "collapses", "swaps", "smooths", "min_distance",
                                       "min_volume_ratio", "history_loss", "seconds", "peak_rss_mb", "trial_seconds"}));
   EXPECT_EQ(keys_of(line["energy"]),
@@ -181,6 +186,10 @@ TEST_F(OutputTest, SummaryHasTotalsAndNorms) {
   EXPECT_EQ(summary["threads"], 1);
   EXPECT_EQ(summary["steps"], 3);
   EXPECT_EQ(summary["newton_iterations"], 12);
+  EXPECT_EQ(summary["factorizations"], 4);
+  EXPECT_EQ(summary["linear_solves"], 12);
+  EXPECT_EQ(summary["reused_factors"], 8);
+  EXPECT_EQ(summary["linear_iterations"], 44);
   EXPECT_EQ(summary["splits"]["tried"], 40);
   EXPECT_EQ(summary["seconds"]["total"], 1.0);
   EXPECT_EQ(summary["min_distance"], 0.125);

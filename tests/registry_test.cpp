@@ -61,10 +61,10 @@ TEST_F(MumpsTest, OnItsOwnRankOutlivesAConnection) {
 TEST(Registry, NamesOfOthersMapToOurs) {
   EXPECT_EQ(Registry::canonical_name(""), "eigen:ldlt");
   EXPECT_EQ(Registry::canonical_name("eigen"), "eigen:ldlt");
-  EXPECT_EQ(Registry::canonical_name("cholmod"), "cholmod:supernodal");
+  EXPECT_EQ(Registry::canonical_name("cholmod"), "cholmod");
   EXPECT_EQ(Registry::canonical_name("Eigen::SimplicialLDLT"), "eigen:ldlt");
   EXPECT_EQ(Registry::canonical_name("Eigen::SparseLU"), "eigen:lu");
-  EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod:supernodal");
+  EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod");
   for (const char* name : {"Eigen::PardisoLLT", "Eigen::AccelerateLDLT", "Hypre", "AMGCL", "Trilinos"})
     EXPECT_EQ(Registry::canonical_name(name), "") << name;
 }

@@ -152,11 +152,13 @@ TEST_F(SceneTest, OutputAndSpeedNeverStopAScene) {
   const Scene scene = read_scene(square(json::parse(R"({
     "output": {"anything": {"at": ["all"]}, "directory": "out", "paraview": {"skip_frame": 4}},
     "tests": {"err_l2": 1}, "solver": {"max_threads": 2, "contact": {"CCD": {"broad_phase": "HG"}},
-    "linear": {"solver": ["Eigen::PardisoLLT", "mumps"]}}})")));
+    "linear": {"solver": ["Eigen::PardisoLLT", "mumps"], "reuse_factors": false}}})")));
 
   EXPECT_EQ(scene.directory, "out");
   EXPECT_EQ(scene.output.skip_frames, 4);
   EXPECT_EQ(scene.max_threads, 2);
+  EXPECT_FALSE(std::get<itr::Setup<2>>(scene.setup).linear.reuse_factors);
+  EXPECT_TRUE(std::get<itr::Setup<2>>(read_scene(square({})).setup).linear.reuse_factors);
   EXPECT_EQ(std::get<itr::Setup<2>>(scene.setup).linear.solvers, (std::vector<std::string>{"Eigen::PardisoLLT", "mumps"}));
 }
 

@@ -250,11 +250,11 @@ TEST(Choice, ChecksFallbacksAndOptionsBeforeAnythingRuns) {
 /// Under the name that auto takes for large systems: notes its options, or cannot be created.
 void add_large(Registry& registry, SolverOptions* seen) {
   BackendInfo info;
-  info.name = "cholmod:supernodal";
+  info.name = "cholmod";
   registry.add(info, [=](const SolverOptions& options) -> std::unique_ptr<Solver> {
     if (!seen) throw InputError({"", "linear solver", "no licence", "a licence"});
     *seen = options;
-    return make_checked_solver("cholmod:supernodal", {}, std::make_unique<Scripted>(Scripted::Script{}));
+    return make_checked_solver("cholmod", {}, std::make_unique<Scripted>(Scripted::Script{}));
   });
 }
 
@@ -306,7 +306,7 @@ auto there(std::set<std::string> names) {
 
 TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
   const auto all =
-      there({"eigen:ldlt", "dense", "eigen:cg", "cholmod:supernodal", "mumps", "mumps:spd", "umfpack", "belos:muelu"});
+      there({"eigen:ldlt", "dense", "eigen:cg", "cholmod", "mumps", "mumps:spd", "umfpack", "belos:muelu"});
   const auto none = there({"eigen:ldlt", "dense", "eigen:cg"});
   constexpr double kGiB = 1024.0 * 1024 * 1024;
   const MatrixTraits tiny{30, 200, 2, false, kGiB}, small{2000, 16'000, 2, false, kGiB},
@@ -314,12 +314,12 @@ TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
       indefinite{200'000, 1'600'000, 2, true, 64 * kGiB}, huge{3'000'000, 70'000'000, 3, false, 16 * kGiB};
   EXPECT_EQ(pick_solver(tiny, all).name, "dense");
   EXPECT_EQ(pick_solver(small, all).name, "eigen:ldlt");
-  EXPECT_EQ(pick_solver(large, all).name, "cholmod:supernodal");
-  EXPECT_EQ(pick_solver(large_3d, all).name, "cholmod:supernodal");
+  EXPECT_EQ(pick_solver(large, all).name, "cholmod");
+  EXPECT_EQ(pick_solver(large_3d, all).name, "cholmod");
   EXPECT_EQ(pick_solver(large_3d, there({"eigen:ldlt", "mumps:spd"})).name, "mumps:spd");
   EXPECT_EQ(pick_solver(large, none).name, "eigen:ldlt");
   EXPECT_EQ(pick_solver(indefinite, all).name, "mumps");
-  EXPECT_EQ(pick_solver(indefinite, there({"eigen:ldlt", "cholmod:supernodal", "umfpack"})).name, "umfpack");
+  EXPECT_EQ(pick_solver(indefinite, there({"eigen:ldlt", "cholmod", "umfpack"})).name, "umfpack");
   EXPECT_EQ(pick_solver(indefinite, none).name, "eigen:ldlt");
   EXPECT_EQ(pick_solver(huge, all).name, "belos:muelu");
   EXPECT_EQ(pick_solver(huge, none).name, "eigen:cg");
@@ -337,7 +337,7 @@ TEST(Auto, AsksOnlyAboutSolversInQuestion) {  // an answer may load a module of 
   pick_solver({2000, 16'000, 2, false, kMemory}, all);
   EXPECT_TRUE(asked.empty());
   pick_solver({30'000, 700'000, 3, false, kMemory}, all);
-  EXPECT_EQ(asked, std::vector<std::string>{"cholmod:supernodal"});
+  EXPECT_EQ(asked, std::vector<std::string>{"cholmod"});
 }
 
 // Fill of the squares and cubes of verification/scaling/results.csv, METIS.
@@ -389,7 +389,7 @@ TEST(Simulations, OfDifferentSolversInThreadsDoNotDisturbEachOther) {
   Registry registry;
   registry.allow_mpi_start();
   std::vector<std::string> names;
-  for (const char* name : {"eigen:ldlt", "cholmod:supernodal", "mumps", "amesos2:klu2", "umfpack", "belos:muelu"})
+  for (const char* name : {"eigen:ldlt", "cholmod", "mumps", "amesos2:klu2", "umfpack", "belos:muelu"})
     if (registry.find(name).available) names.push_back(name);
   std::vector<Masticated> alone, together(names.size());
   for (const auto& name : names) alone.push_back(masticate(registry, name));

@@ -158,12 +158,14 @@ const char* version() {
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
+  using Choice = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_AUTO>>;
   using Supernodal = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL>>;
   using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
   constexpr const char* kOptions = "ordering=auto|amd|metis|natural";
   static const itr_engine engines[] = {
+      Choice::row("cholmod", version(), "GPL-2.0+", ITR_KEEPS_ORDER, kOptions),
       Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", ITR_KEEPS_ORDER, kOptions),
       Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", ITR_KEEPS_ORDER, kOptions)};
-  static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
+  static const itr_module module{ITR_BACKEND_ABI_VERSION, sizeof engines / sizeof engines[0], engines};
   return &module;
 }

@@ -57,6 +57,15 @@ void show_progress(const StepReport& report, int steps) {
   }
 }
 
+std::string describe_solves(const StepReport& totals) {
+  std::string text = fmt::format("{} Newton iterations, {} linear systems, {} factorizations", totals.newton_iterations,
+                                 totals.linear_solves, totals.factorizations);
+  if (totals.reused_factors > 0)
+    text +=
+        fmt::format("; earlier factors solved {} systems in {} iterations", totals.reused_factors, totals.linear_iterations);
+  return text;
+}
+
 std::string resume_hint(const std::string& directory) {
   return fmt::format("`itr run` with --resume goes on from the last saved state in {}", directory);
 }
@@ -112,7 +121,7 @@ class Run {
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     if (outcome == kFinished) {
-      fmt::print("{} steps in {}\n", simulation_.state().step, directory_);
+      fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
       return done;
     }
     fmt::print(stderr, "itr: {}; {}\n", outcome, resume_hint(directory_));

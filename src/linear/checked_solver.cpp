@@ -119,6 +119,11 @@ class CheckedSolver final : public Solver {
     const std::size_t n = pattern_.order;
     SolveReport report{solve_once(B, X, columns), 0};
     if (report.outcome != Outcome::ok && report.outcome != Outcome::not_converged) return {note(report.outcome), kUnknown};
+    if (std::isinf(asked)) {  // nobody asks for the residual
+      report.relative_residual = kUnknown;
+      report.outcome = is_finite(X) ? Outcome::ok : note(Outcome::not_converged, "the solution is not finite");
+      return report;
+    }
     bool finite = true;
     for (int c = 0; c < columns; ++c) {
       const double residual = refine(B.subspan(c * n, n), X.subspan(c * n, n), asked);

@@ -224,7 +224,7 @@ Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char
       if (is_there(name)) return {name, "large, and it may be indefinite"};
     return {"eigen:ldlt", "it may be indefinite, and neither mumps nor umfpack is there"};
   }
-  for (const char* name : {"cholmod:supernodal", "mumps:spd"})
+  for (const char* name : {"cholmod", "mumps:spd"})
     if (is_there(name)) return {name, "large: dense blocks of the factor pay"};
   return {"eigen:ldlt", "neither cholmod nor mumps is there"};
 }

@@ -62,18 +62,6 @@ std::vector<T> read_array(const std::filesystem::path& file) {
   return values;
 }
 
-/// Columns one after another, each with its diagonal first and ascending rows below it.
-bool is_lower_triangle(const SparsityPattern& pattern) {
-  const auto& [order, starts, rows] = pattern;
-  if (order < 0 || starts.front() != 0 || starts.back() != static_cast<int>(rows.size())) return false;
-  for (int j = 0; j < order; ++j) {
-    if (starts[j] < 0 || starts[j] >= starts[j + 1] || starts[j + 1] > starts.back() || rows[starts[j]] != j) return false;
-    for (int p = starts[j] + 1; p < starts[j + 1]; ++p)
-      if (rows[p] <= rows[p - 1] || rows[p] >= order) return false;
-  }
-  return true;
-}
-
 class DumpingSolver final : public Forwarding {
  public:
   DumpingSolver(std::unique_ptr<Solver> solver, std::filesystem::path folder, int every)
@@ -112,6 +100,17 @@ class DumpingSolver final : public Forwarding {
 };
 
 }  // namespace
+
+bool is_lower_triangle(const SparsityPattern& pattern) {
+  const auto& [order, starts, rows] = pattern;
+  if (order < 0 || starts.front() != 0 || starts.back() != static_cast<int>(rows.size())) return false;
+  for (int j = 0; j < order; ++j) {
+    if (starts[j] < 0 || starts[j] >= starts[j + 1] || starts[j + 1] > starts.back() || rows[starts[j]] != j) return false;
+    for (int p = starts[j] + 1; p < starts[j + 1]; ++p)
+      if (rows[p] <= rows[p - 1] || rows[p] >= order) return false;
+  }
+  return true;
+}
 
 void write_system(const std::filesystem::path& folder, const DumpedSystem& system) {
   std::error_code error;

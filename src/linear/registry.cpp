@@ -43,6 +43,7 @@ struct Known {
   const char* packages;
 };
 constexpr Known kKnown[] = {
+    {"cholmod", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
     {"cholmod:supernodal", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
     {"cholmod:simplicial", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
     {"umfpack", "itr_backend_umfpack", "libsuitesparse-dev libopenblas-dev"},
@@ -198,16 +199,15 @@ std::vector<BackendInfo> Registry::list() {
 std::string Registry::canonical_name(const std::string& name) {
   static const std::map<std::string, std::string> kAliases = {{"", "eigen:ldlt"},
                                                               {"eigen", "eigen:ldlt"},
-                                                              {"cholmod", "cholmod:supernodal"},
                                                               {"amesos2", "amesos2:klu2"},
                                                               {"belos", "belos:muelu"},
                                                               {"Eigen::SimplicialLDLT", "eigen:ldlt"},
                                                               {"Eigen::SimplicialLLT", "eigen:llt"},
                                                               {"Eigen::SparseLU", "eigen:lu"},
                                                               {"Eigen::ConjugateGradient", "eigen:cg"},
-                                                              {"Eigen::CholmodSupernodalLLT", "cholmod:supernodal"},
+                                                              {"Eigen::CholmodSupernodalLLT", "cholmod"},
                                                               {"Eigen::CholmodSimplicialLLT", "cholmod:simplicial"},
-                                                              {"Eigen::CholmodDecomposition", "cholmod:supernodal"},
+                                                              {"Eigen::CholmodDecomposition", "cholmod"},
                                                               {"Eigen::UmfPackLU", "umfpack"}};
   const auto it = kAliases.find(name);
   if (it != kAliases.end()) return it->second;

@@ -286,11 +286,11 @@ class Minimizer {
       model_curvature_ = motion_.curvature;
       return true;
     }
-    outcome_ = system_.factorize(shift);
-    if (outcome_ != linear::Outcome::ok) return give_reason();
     VectorX rhs = -motion_.coupling, solution;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
+    outcome_ = system_.prepare(shift, rhs);
+    if (outcome_ != linear::Outcome::ok) return give_reason();
     const auto report = system_.solve(rhs, solution);
     outcome_ = report.outcome;
     if ((outcome_ != linear::Outcome::ok && outcome_ != linear::Outcome::not_converged) || !solution.allFinite())

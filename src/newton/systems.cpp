@@ -6,6 +6,13 @@
 
 namespace itr {
 
+namespace {
+
+// Far below what a Newton direction needs; stiff contacts cannot reach much less, and refining there costs solves.
+constexpr double kAskedResidual = 1e-8;
+
+}  // namespace
+
 void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                            PrescribedMotion& motion, Workspace& workspace) {
   hessian_.setZero(dofs.num_unknowns, dofs.num_unknowns);
@@ -53,24 +60,37 @@ void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjecti
   }
 }
 
+linear::Outcome SparseSystem::analyze() {
+  if (!pattern_changed_) return linear::Outcome::ok;
+  const linear::AnalyzeHints hints{
+      .block_size = dim_, .dofs = dofs_, .coordinates = coordinates_, .may_keep_order = may_keep_order_};
+  const auto outcome = solver_.analyze(assembler_.pattern(), hints);
+  if (outcome != linear::Outcome::ok) return outcome;
+  pattern_changed_ = false;
+  may_keep_order_ = true;
+  return outcome;
+}
+
+std::span<const double> SparseSystem::shifted(double shift) {
+  if (shift == 0) return assembler_.values();
+  shifted_.assign(assembler_.values().begin(), assembler_.values().end());
+  for (int j = 0; j < assembler_.pattern().order; ++j) shifted_[assembler_.pattern().column_starts[j]] += shift;
+  return shifted_;
+}
+
 linear::Outcome SparseSystem::factorize(double shift) {
-  if (pattern_changed_) {
-    const linear::AnalyzeHints hints{
-        .block_size = dim_, .dofs = dofs_, .coordinates = coordinates_, .may_keep_order = may_keep_order_};
-    const auto outcome = solver_.analyze(assembler_.pattern(), hints);
-    if (outcome != linear::Outcome::ok) return outcome;
-    pattern_changed_ = false;
-    may_keep_order_ = true;
-  }
-  if (shift == 0) return solver_.factorize(assembler_.values());
-  std::vector<double> shifted(assembler_.values().begin(), assembler_.values().end());
-  for (int j = 0; j < assembler_.pattern().order; ++j) shifted[assembler_.pattern().column_starts[j]] += shift;
-  return solver_.factorize(shifted);
+  const auto outcome = analyze();
+  return outcome == linear::Outcome::ok ? solver_.factorize(shifted(shift)) : outcome;
+}
+
+linear::Outcome SparseSystem::prepare(double shift, const VectorX& rhs) {
+  if (!reusing_) return factorize(shift);
+  const auto outcome = analyze();
+  if (outcome != linear::Outcome::ok) return outcome;
+  return reusing_->prepare(shifted(shift), {rhs.data(), static_cast<std::size_t>(rhs.size())}, kAskedResidual);
 }
 
 linear::SolveReport SparseSystem::solve(const VectorX& rhs, VectorX& solution) {
-  // Far below what a Newton direction needs; stiff contacts cannot reach much less, and refining there costs solves.
-  constexpr double kAskedResidual = 1e-8;
   solution.resize(rhs.size());
   return solver_.solve({rhs.data(), static_cast<std::size_t>(rhs.size())},
                        {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kAskedResidual);

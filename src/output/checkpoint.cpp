@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 3;
+constexpr std::int64_t kFormat = 4;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -96,6 +96,46 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
   return memory;
 }
 
+void write_factor(hdf5::File& file, const linear::FactorRecord& factor) {
+  file.write("/checkpoint/factor_record",
+             std::array{factor.spent, double(factor.served), double(factor.iterations), double(factor.pause),
+                        double(factor.next_pause)},
+             0);
+  if (!factor.matrix) return;
+  const auto& pattern = *factor.matrix->pattern;
+  const auto write = [&](const char* name, const std::vector<int>& numbers) {
+    file.write(name, std::vector<std::int64_t>(numbers.begin(), numbers.end()), 0);
+  };
+  write("/checkpoint/factor/starts", pattern.column_starts);
+  write("/checkpoint/factor/rows", pattern.row_indices);
+  file.write("/checkpoint/factor/values", factor.matrix->values, 0);
+  file.write("/checkpoint/factor/block_size", std::array{std::int64_t{factor.matrix->block_size}}, 0);
+}
+
+linear::FactorRecord read_factor(const fs::path& path, const hdf5::File& file) {
+  const auto numbers = file.read_doubles("/checkpoint/factor_record").values;
+  if (numbers.size() != 5)
+    throw InputError({path.string(), "/checkpoint/factor_record", std::to_string(numbers.size()) + " numbers", "5"});
+  linear::FactorRecord factor;
+  factor.spent = numbers[0];
+  factor.served = static_cast<int>(numbers[1]);
+  factor.iterations = static_cast<int>(numbers[2]);
+  factor.pause = static_cast<int>(numbers[3]);
+  factor.next_pause = static_cast<int>(numbers[4]);
+  if (!file.contains("/checkpoint/factor")) return factor;
+  linear::SparsityPattern pattern;
+  pattern.column_starts = read_ints(file, "/checkpoint/factor/starts");
+  pattern.row_indices = read_ints(file, "/checkpoint/factor/rows");
+  pattern.order = static_cast<int>(pattern.column_starts.size()) - 1;
+  const auto block_size = read_ints(file, "/checkpoint/factor/block_size");
+  if (block_size.size() == 1)
+    factor.matrix = linear::make_factored_matrix(std::move(pattern), file.read_doubles("/checkpoint/factor/values").values,
+                                                 block_size[0]);
+  if (!factor.matrix)
+    throw InputError({path.string(), "/checkpoint/factor", "arrays that are no lower triangle", "the matrix of a factor"});
+  return factor;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -116,6 +156,7 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
   file.write("/checkpoint/energy_guard", std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0}, 0);
   write_memory(file, state.remesh_memory);
+  write_factor(file, state.factor);
   file.write("/checkpoint/totals", progress.totals, 0);
   file.write_text("/checkpoint/scene", std::string(progress.scene));
   file.write_text("/checkpoint/backend", std::string(progress.backend));
@@ -168,6 +209,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.created_energy = guard[0];
   state.history.damp_next = guard[1] != 0;
   state.remesh_memory = read_memory(saved.file, file, state.mesh.vertex_slots());
+  state.factor = read_factor(saved.file, file);
   state.step = static_cast<int>(file.read_integer_attribute("step"));
   state.t = file.read_double_attribute("t");
   checkpoint.totals = file.read_doubles("/checkpoint/totals").values;

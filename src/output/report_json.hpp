@@ -19,6 +19,7 @@ class Totals {
   /// All of it as numbers, for a checkpoint, and back. Throws InputError for a wrong length.
   std::vector<double> save() const;
   void restore(const std::vector<double>& values);
+  const StepReport& report() const { return total_; }
   /// The text of summary.json.
   std::string summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const;
 

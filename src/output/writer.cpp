@@ -169,6 +169,8 @@ void Writer::save(const FrameView<Dim>& frame, const State<Dim>& state) {
   impl_->index(frame, state.step, state.t);
 }
 
+const StepReport& Writer::totals() const { return impl_->totals.report(); }
+
 void Writer::finish(const std::string& outcome) {
   impl_->series.write();
   write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, outcome, impl_->norms));

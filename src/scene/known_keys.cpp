@@ -109,7 +109,7 @@ constexpr Group kGroups[] = {
 
     {"/solver", Role::ignored, "max_threads"},
     {"/solver/rayleigh_damping/*", Role::read, "form stiffness stiffness_ratio lagging_iterations"},
-    {"/solver/linear", Role::read, "solver fallback options"},
+    {"/solver/linear", Role::read, "solver fallback options reuse_factors:boolean"},
     {"/solver/linear", Role::ignored, "precond enable_overwrite_solver max_iter tolerance Eigen AMGCL Hypre Pardiso MUMPS"},
     {"/solver/contact", Role::read,
      "barrier_stiffness initial_barrier_stiffness friction_iterations:integer friction_convergence_tol:non_negative"},

@@ -214,6 +214,7 @@ LinearOptions read_linear(const Node& root) {
     if (!name.string("").empty()) names.push_back(name.string(""));
   if (!names.empty()) options.solvers = names;
   for (const Node& name : node["fallback"].items()) options.fallback.push_back(name.string(""));
+  options.reuse_factors = node["reuse_factors"].boolean(options.reuse_factors);
   const Node of_solvers = node["options"];
   if (!of_solvers.exists()) return options;
   if (!of_solvers.json().is_object()) of_solvers.fail("an object of solver names");

@@ -17,6 +17,10 @@ StepSeconds& StepSeconds::operator+=(const StepSeconds& other) {
 
 void StepReport::add_effort(const StepReport& before) {
   newton_iterations += before.newton_iterations;
+  linear_solves += before.linear_solves;
+  factorizations += before.factorizations;
+  reused_factors += before.reused_factors;
+  linear_iterations += before.linear_iterations;
   splits += before.splits;
   collapses += before.collapses;
   swaps += before.swaps;

@@ -153,7 +153,8 @@ template <int Dim>
 struct Simulation<Dim>::Impl {
   Setup<Dim> setup;
   Logger logger;
-  std::unique_ptr<linear::Solver> solver;
+  std::unique_ptr<linear::Solver> direct;  ///< or iterative
+  std::unique_ptr<linear::ReusingSolver> solver;
   std::unique_ptr<SparseSystem> system;  ///< keeps what it knows of the mesh from step to step
   State<Dim> state;
   double shortest_edge = 0;  ///< of the initial mesh [m]
@@ -175,7 +176,10 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   check_proxy(setup);
   impl_->setup = std::move(setup);
   impl_->logger = std::move(logger);
-  impl_->solver = linear::choose_solver(impl_->setup.linear, !impl_->setup.newton.project_to_psd, registry, impl_->logger);
+  const LinearOptions& linear = impl_->setup.linear;
+  impl_->direct = linear::choose_solver(linear, !impl_->setup.newton.project_to_psd, registry, impl_->logger);
+  impl_->solver =
+      std::make_unique<linear::ReusingSolver>(*impl_->direct, linear.reuse_factors && linear.dump_folder.empty());
   impl_->system = std::make_unique<SparseSystem>(*impl_->solver);
   impl_->state = initial_state(impl_->setup);
   refuse_intersections(impl_->setup, impl_->state);
@@ -213,7 +217,8 @@ StepReport Simulation<Dim>::initial_report() const {
 
 template <int Dim>
 StepResult Simulation<Dim>::advance() {
-  StepResult result = take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->system, impl_->logger, impl_->state);
+  StepResult result =
+      take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->system, *impl_->solver, impl_->logger, impl_->state);
   if (result.ok) impl_->forces = result.forces;
   return result;
 }

@@ -25,6 +25,13 @@ namespace {
 
 constexpr double kPoorResidual = 1e-6;  ///< of a linear solve, relative: a hundred times what Newton asks for
 
+void add_solves(const linear::SolveCounts& from, const linear::SolveCounts& to, StepReport& report) {
+  report.linear_solves += to.solves - from.solves;
+  report.factorizations += to.factorizations - from.factorizations;
+  report.reused_factors += to.reused - from.reused;
+  report.linear_iterations += to.iterations - from.iterations;
+}
+
 void add_seconds(const NewtonSummary& summary, StepSeconds& seconds) {
   seconds.assembly += summary.assembly_seconds;
   seconds.linear_solve += summary.linear_seconds;
@@ -62,8 +69,8 @@ std::string find_violation(const Setup<Dim>& setup, const State<Dim>& state, con
 }  // namespace
 
 template <int Dim>
-StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, const Logger& logger,
-                     State<Dim>& state) {
+StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
+                     const Logger& logger, State<Dim>& state) {
   StepResult result;
   StepReport& report = result.report;
   const double start = seconds_now();
@@ -73,7 +80,13 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
   const double t = next.t;
   report.step = next.step;
   report.t = next.t;
+  {
+    const ScopedTimer timer(report.seconds.linear_solve);
+    solver.restore(state.factor);
+  }
+  const linear::SolveCounts solves_before = solver.counts();
   const auto fail = [&](const NewtonSummary& summary) {
+    add_solves(solves_before, solver.counts(), report);
     result.ok = false;
     result.reason = reason_of(summary);
     report.seconds.total = seconds_now() - start;
@@ -151,6 +164,8 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
     report.min_volume_ratio = min_volume_ratio(problem->cells(), x);
     if (setup.fields.any_forces()) result.forces = problem->forces(x);
   }
+  add_solves(solves_before, solver.counts(), report);
+  next.factor = solver.record();
   next.stiffness = problem->stiffness();
   TimeIntegrator(setup.time).push(std::move(x), next.history);
   state = std::move(next);
@@ -181,9 +196,9 @@ Setup<Dim> halved(const Setup<Dim>& setup, const State<Dim>& state) {
 }  // namespace
 
 template <int Dim>
-StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, const Logger& logger,
-                              State<Dim>& state) {
-  StepResult whole = take_step(setup, shortest_edge, system, logger, state);
+StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system,
+                              linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state) {
+  StepResult whole = take_step(setup, shortest_edge, system, solver, logger, state);
   if (whole.ok || setup.time.step_cuts == 0) return whole;
   const Setup<Dim> half = halved(setup, state);
   logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
@@ -195,7 +210,7 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
   NodalForces forces;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
-    StepResult result = take_step_in_parts(half, shortest_edge, system, logger, part);
+    StepResult result = take_step_in_parts(half, shortest_edge, system, solver, logger, part);
     parts += std::max(1, result.report.cut_steps);
     result.report.add_effort(effort);
     if (!result.ok) return result;
@@ -210,9 +225,11 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
   return whole;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                \
-  template StepResult take_step<Dim>(const Setup<Dim>&, double, SparseSystem&, const Logger&, State<Dim>&); \
-  template StepResult take_step_in_parts<Dim>(const Setup<Dim>&, double, SparseSystem&, const Logger&, State<Dim>&);
+#define ITR_INSTANTIATE(Dim)                                                                                          \
+  template StepResult take_step<Dim>(const Setup<Dim>&, double, SparseSystem&, linear::ReusingSolver&, const Logger&, \
+                                     State<Dim>&);                                                                    \
+  template StepResult take_step_in_parts<Dim>(const Setup<Dim>&, double, SparseSystem&, linear::ReusingSolver&,       \
+                                              const Logger&, State<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -20,6 +20,10 @@ struct DumpedSystem {
   AnalyzeHints hints() const { return {.block_size = block_size, .dofs = dofs, .coordinates = coordinates}; }
 };
 
+/// Columns one after another, each with its diagonal first and ascending rows below it: what was read from a file may be
+/// anything.
+bool is_lower_triangle(const SparsityPattern& pattern);
+
 /// Both throw InputError for what cannot be written or read.
 void write_system(const std::filesystem::path& folder, const DumpedSystem& system);
 DumpedSystem read_system(const std::filesystem::path& folder);

@@ -44,7 +44,7 @@ class Registry {
   void add(BackendInfo info, SolverFactory factory);
   /// All rows, present and absent, sorted by name, built-in ones first.
   std::vector<BackendInfo> list();
-  /// Our name for a name of ours or of PolyFEM's ("cholmod" -> "cholmod:supernodal", "Eigen::SimplicialLDLT" ->
+  /// Our name for a name of ours or of PolyFEM's ("amesos2" -> "amesos2:klu2", "Eigen::SimplicialLDLT" ->
   /// "eigen:ldlt"); empty where there is no equal.
   static std::string canonical_name(const std::string& name);
   /// A new solver; "auto" picks at each analysis (choice.hpp). Throws InputError (lists present and absent ones) if there is

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "itr/energy/energy.hpp"
-#include "itr/linear/solver.hpp"
+#include "itr/linear/reuse.hpp"
 #include "itr/newton/options.hpp"
 
 namespace itr {
@@ -22,6 +22,8 @@ class NewtonSystem {
                         PrescribedMotion& motion, Workspace& workspace) = 0;
   /// Factorises Hessian + shift * I.
   virtual linear::Outcome factorize(double shift) = 0;
+  /// Does that, or else finds by other means what solve(rhs) is to return; its outcome says the same of the matrix.
+  virtual linear::Outcome prepare(double shift, const VectorX& rhs) = 0;
   virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
   /// Who failed and why, after an outcome that was not ok.
   virtual std::string message() const = 0;
@@ -34,6 +36,7 @@ class DenseSystem final : public NewtonSystem {
  public:
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
+  linear::Outcome prepare(double shift, const VectorX&) override { return factorize(shift); }
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
   std::string message() const override { return "dense Cholesky"; }
   double diagonal_scale() const override;
@@ -48,19 +51,27 @@ class SparseSystem final : public NewtonSystem {
  public:
   /// `solver` must outlive this.
   explicit SparseSystem(linear::Solver& solver) : solver_(solver) {}
+  /// Its factors may serve several systems.
+  explicit SparseSystem(linear::ReusingSolver& solver) : solver_(solver), reusing_(&solver) {}
   /// For the unknowns of `dofs` and elements of the vertices `stencils`, `stencil_size` each: cheap where they are as
   /// before.
   void reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size);
   linear::Solver& solver() { return solver_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
+  linear::Outcome prepare(double shift, const VectorX& rhs) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
   std::string message() const override;
   double diagonal_scale() const override;
 
  private:
+  linear::Outcome analyze();
+  std::span<const double> shifted(double shift);
+
   linear::Solver& solver_;
+  linear::ReusingSolver* reusing_ = nullptr;
   SparseAssembler assembler_;
+  std::vector<double> shifted_;
   bool pattern_changed_ = true;
   bool may_keep_order_ = false;  ///< not over resets: a resumed run begins with one
   int dim_ = 1;

@@ -48,6 +48,8 @@ class Writer {
   /// Saves the state after the step that was written last.
   template <int Dim>
   void save(const FrameView<Dim>& frame, const State<Dim>& state);
+  /// Sums over the run as in summary.json, what was before --resume included.
+  const StepReport& totals() const;
   /// `outcome` is "finished" or the reason why the simulation stopped. Writes summary.json with totals, threads, versions
   /// and norms of the last frame.
   void finish(const std::string& outcome);

@@ -28,6 +28,10 @@ struct StepReport {
   double t = 0;  ///< [s]
   int vertices = 0, elements = 0, unknowns = 0;
   int newton_iterations = 0;
+  int linear_solves = 0;      ///< systems of the whole mesh: Newton's, and those of the safe projection
+  int factorizations = 0;     ///< for them
+  int reused_factors = 0;     ///< systems that a factor of an earlier one solved
+  int linear_iterations = 0;  ///< of conjugate gradients over such factors, failed attempts included
   EnergyReport energy;
   double energy_before_remesh = 0;  ///< total after the first solve [J]
   /// What the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]: not

@@ -9,6 +9,7 @@
 #include "itr/core/log.hpp"
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/linear/registry.hpp"
+#include "itr/linear/reuse.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/remesh/memory.hpp"
 #include "itr/simulation/frame.hpp"
@@ -25,10 +26,11 @@ struct State {
   Mesh<Dim> mesh;   ///< compact
   History history;  ///< history.x[0] is the present
   int step = 0;
-  double t = 0;                ///< [s]
-  BarrierStiffness stiffness;  ///< where it is adaptive
-  RemeshMemory remesh_memory;  ///< what remeshing refused, and need not ask again
-  double created_energy = 0;   ///< balance of Newmark's steps, see StepProblem::created_energy [J]
+  double t = 0;                 ///< [s]
+  BarrierStiffness stiffness;   ///< where it is adaptive
+  RemeshMemory remesh_memory;   ///< what remeshing refused, and need not ask again
+  linear::FactorRecord factor;  ///< that may serve the next step
+  double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 
 struct StepResult {

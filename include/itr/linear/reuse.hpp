@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// Factors that serve more than one system: the last one preconditions conjugate gradients on the next matrix, as long as
+// that is cheaper than a factorisation.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "itr/linear/solver.hpp"
+
+namespace itr::linear {
+
+/// What a factor was made of.
+struct FactoredMatrix {
+  std::shared_ptr<const SparsityPattern> pattern;  ///< never null
+  std::vector<double> values;
+  int block_size = 1;
+};
+
+/// Null where the arrays are no lower triangle: for those that were read from a file.
+std::shared_ptr<const FactoredMatrix> make_factored_matrix(SparsityPattern pattern, std::vector<double> values,
+                                                           int block_size);
+
+/// A factor, and what it has been worth: a value. Whoever has it can make the factor again, and goes on with the same bits.
+struct FactorRecord {
+  std::shared_ptr<const FactoredMatrix> matrix;  ///< null: there is none
+  double spent = 0;                              ///< on it and on the systems that it served [s, by counts]
+  int served = 0;                                ///< systems
+  int iterations = 0;                            ///< of the last of them
+  int pause = 0, next_pause = 1;                 ///< systems that are not tried, now and after the next failure
+};
+
+/// Of all systems since the start.
+struct SolveCounts {
+  int factorizations = 0;
+  int solves = 0;      ///< systems that were solved
+  int reused = 0;      ///< of these, by a factor that was there
+  int iterations = 0;  ///< of conjugate gradients over such factors, failed attempts included
+};
+
+/// A solver over a direct one. A matrix that is the last one bit by bit is not factorised again. Another one of the same
+/// order, whatever its pattern, may be given to conjugate gradients with the last factor as preconditioner (prepare); where
+/// they take too long or meet a direction of no positive curvature, the matrix is factorised.
+///
+/// What is tried depends on counts (flops of a factorisation, entries of a factor, iterations), never on time. A matrix
+/// that iterations solved is positive definite: they start from an error with a part in every direction, and with positive
+/// curvatures throughout, the part in a direction of negative curvature could not have shrunk. (The residual does not show
+/// one whose curvature is below some 1e-4 of the factor's.)
+///
+/// Over an iterative solver it only counts.
+class ReusingSolver final : public Solver {
+ public:
+  /// `solver` must outlive this. Without `reuses` every matrix that is not the last one is factorised.
+  ReusingSolver(Solver& solver, bool reuses) : solver_(solver), reuses_(reuses) {}
+
+  std::string_view name() const override { return solver_.name(); }
+  Capabilities capabilities() const override { return solver_.capabilities(); }
+  Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override;
+  Outcome factorize(std::span<const double> values) override;
+  /// Factorises, or else solves the system of the right-hand side b to the asked residual by iterations, for solve() to
+  /// return. Either way ok says of the matrix what it says after factorize().
+  Outcome prepare(std::span<const double> values, std::span<const double> b, double asked_residual);
+  SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked_residual) override;
+  Statistics statistics() const override;
+  std::string message() const override;
+
+  /// The factor for a saved state; none where its fill-reducing order came from an earlier pattern, so that it could not be
+  /// made again from its matrix alone.
+  FactorRecord record() const;
+  /// Goes on from a record: with the factor that is there where it is that one, else it is made again, or dropped.
+  void restore(const FactorRecord& record);
+  const SolveCounts& counts() const { return counts_; }
+
+ private:
+  bool take_in(std::span<const double> values);
+  bool is_worth_trying();
+  Outcome analyze_now();
+  Outcome factorize_now();
+  bool iterate(std::span<const double> b, double asked);
+  int run(double target, int most);
+  bool precondition(std::span<const double> residual, std::span<double> z);
+  int most_iterations() const;
+  double iteration_cost() const;
+  double factorization_cost() const;
+
+  Solver& solver_;
+  bool reuses_;
+  FactorRecord factor_;
+  bool has_own_order_ = false;  ///< the order of solver_'s analysis came from the pattern analysed, not from an earlier one
+  bool is_analyzed_ = false;    ///< the pattern below by solver_
+  std::shared_ptr<const SparsityPattern> pattern_;
+  std::vector<double> values_;
+  int block_size_ = 1;
+  std::vector<int> dofs_;
+  std::vector<double> coordinates_;
+  bool may_keep_order_ = true;  ///< so said every call of analyze since solver_ analysed last
+  bool is_old_ = false;         ///< the factor was there before the values were given
+  bool is_refused_ = false;     ///< the matrix is known not to be positive definite, and is not factorised
+  std::vector<double> b_, x_;   ///< the system that iterations solved
+  SolveReport report_;          ///< of that; b_ is empty where the matrix is factorised
+  std::vector<double> r_, z_, p_, q_;
+  int iterations_ = 0;  ///< of the last solve
+  SolveCounts counts_;
+};
+
+}  // namespace itr::linear

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: MIT
+// Factors that serve more than one system: what is solved, what is found out about a matrix, what is remembered.
+#include "itr/linear/reuse.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "linear_systems.hpp"
+
+namespace itr::linear {
+namespace {
+
+constexpr double kAsked = 1e-8;
+
+/// A block large enough for iterations to be cheaper than a factorisation by any engine's count.
+const Elastic& block() {
+  static const Elastic result = elasticity(3, 9, 0.3);
+  return result;
+}
+
+/// As stiff as the block in each place but for a share of up to `change` of its own.
+std::vector<double> changed(const Elastic& system, double change) {
+  std::vector<double> values = system.values;
+  for (int j = 0; j < system.pattern.order; ++j) values[system.pattern.column_starts[j]] *= 1 + change * (j % 7) / 6;
+  return values;
+}
+
+std::vector<double> load(int order) {
+  std::vector<double> b(order);
+  for (int i = 0; i < order; ++i) b[i] = std::sin(i);
+  return b;
+}
+
+double residual(const SparsityPattern& pattern, const std::vector<double>& values, const std::vector<double>& x,
+                const std::vector<double>& b) {
+  std::vector<double> r = b;
+  for (int j = 0; j < pattern.order; ++j)
+    for (int p = pattern.column_starts[j]; p < pattern.column_starts[j + 1]; ++p) {
+      const int i = pattern.row_indices[p];
+      r[i] -= values[p] * x[j];
+      if (i != j) r[j] -= values[p] * x[i];
+    }
+  double sum = 0, scale = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    sum += r[i] * r[i];
+    scale += b[i] * b[i];
+  }
+  return std::sqrt(sum / scale);
+}
+
+struct Engines : ::testing::TestWithParam<std::string> {
+  Registry registry = full_registry();
+  std::unique_ptr<Solver> direct = registry.create(GetParam());
+};
+
+std::vector<std::string> direct_solvers() {
+  std::vector<std::string> names;
+  for (const auto& info : full_registry().list())
+    if (info.available && !info.capabilities.iterative) names.push_back(info.name);
+  return names;
+}
+
+TEST_P(Engines, AnUnchangedMatrixIsFactorisedOnce) {
+  ReusingSolver solver(*direct, false);
+  const auto b = load(block().pattern.order);
+  std::vector<double> x(b.size()), y(b.size());
+  for (auto* solution : {&x, &y}) {
+    ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
+    ASSERT_EQ(solver.factorize(block().values), Outcome::ok);
+    ASSERT_EQ(solver.solve(b, *solution, 1, kAsked).outcome, Outcome::ok);
+  }
+  EXPECT_EQ(x, y);
+  EXPECT_EQ(solver.counts().factorizations, 1);
+  EXPECT_EQ(solver.counts().solves, 2);
+  EXPECT_EQ(solver.counts().reused, 1);
+}
+
+TEST_P(Engines, AFactorSolvesWhatIsLikeIt) {
+  ReusingSolver solver(*direct, true);
+  const auto b = load(block().pattern.order);
+  std::vector<double> x(b.size());
+  ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
+  for (const double change : {0.0, 0.01, 0.02}) {
+    const auto values = changed(block(), change);
+    ASSERT_EQ(solver.prepare(values, b, kAsked), Outcome::ok);
+    const SolveReport report = solver.solve(b, x, 1, kAsked);
+    ASSERT_EQ(report.outcome, Outcome::ok) << solver.message();
+    const double achieved = residual(block().pattern, values, x, b);
+    EXPECT_LE(achieved, kAsked);
+    EXPECT_NEAR(report.relative_residual, achieved, 1e-3 * kAsked);
+  }
+  EXPECT_EQ(solver.counts().factorizations, 1);
+  EXPECT_EQ(solver.counts().reused, 2);
+  EXPECT_GT(solver.counts().iterations, 2);
+}
+
+TEST_P(Engines, AGrownPatternDoesNotMatter) {
+  ReusingSolver solver(*direct, true);
+  const int n = block().pattern.order;
+  // A spring between the first and the last unknown, as a contact would be.
+  Elastic touched = block();
+  auto& [order, starts, rows] = touched.pattern;
+  rows.insert(rows.begin() + starts[1], n - 1);
+  touched.values.insert(touched.values.begin() + starts[1], -1);
+  for (int j = 1; j <= n; ++j) ++starts[j];
+  touched.values[0] += 1;
+  touched.values.back() += 1;
+  const auto b = load(n);
+  std::vector<double> x(n);
+  for (const Elastic* system : {&block(), const_cast<const Elastic*>(&touched)}) {
+    ASSERT_EQ(solver.analyze(system->pattern, system->hints()), Outcome::ok);
+    ASSERT_EQ(solver.prepare(system->values, b, kAsked), Outcome::ok);
+    ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+  }
+  EXPECT_LE(residual(touched.pattern, touched.values, x, b), kAsked);
+  EXPECT_EQ(solver.counts().factorizations, 1);
+}
+
+/// The matrix has a negative eigenvalue in a direction that neither the right-hand side nor the rest of it knows of.
+TEST_P(Engines, IndefinitenessIsSeenInEveryDirection) {
+  ReusingSolver solver(*direct, true);
+  Elastic system = block();
+  auto& [order, starts, rows] = system.pattern;
+  ++order;  // one more unknown, on its own
+  starts.push_back(starts.back() + 1);
+  rows.push_back(order - 1);
+  system.values.push_back(1);
+  std::vector<double> b = load(order), x(order);
+  b.back() = 0;
+  ASSERT_EQ(solver.analyze(system.pattern, {}), Outcome::ok);
+  ASSERT_EQ(solver.prepare(system.values, b, kAsked), Outcome::ok);
+  ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+  system.values.back() = -1e-3;
+  Outcome outcome = solver.prepare(system.values, b, kAsked);
+  if (solver.capabilities().indefinite)
+    EXPECT_EQ(outcome, Outcome::ok);
+  else
+    EXPECT_EQ(outcome, Outcome::not_positive_definite);
+}
+
+TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
+  ReusingSolver solver(*direct, true);
+  const auto b = load(block().pattern.order);
+  std::vector<double> x(b.size());
+  ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
+  for (const double change : {0.0, 1e6}) {
+    const auto values = changed(block(), change);
+    ASSERT_EQ(solver.prepare(values, b, kAsked), Outcome::ok);
+    ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    EXPECT_LE(residual(block().pattern, values, x, b), kAsked);
+  }
+  EXPECT_EQ(solver.counts().factorizations, 2);
+}
+
+/// Whoever goes on from a record solves what comes with the same bits.
+TEST_P(Engines, ARecordIsAllThatMatters) {
+  const auto b = load(block().pattern.order);
+  const auto other = registry.create(GetParam());
+  ReusingSolver through(*direct, true), resumed(*other, true);
+  const auto solve = [&](ReusingSolver& solver, double change) {
+    std::vector<double> x(b.size());
+    EXPECT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
+    EXPECT_EQ(solver.prepare(changed(block(), change), b, kAsked), Outcome::ok);
+    EXPECT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    return x;
+  };
+  for (const double change : {0.0, 0.01, 0.02}) solve(through, change);
+  ASSERT_TRUE(through.record().matrix);
+  resumed.restore(through.record());
+  EXPECT_EQ(resumed.counts().factorizations, 0) << "of a system that was counted before";
+  for (const double change : {0.03, 0.04, 5.0, 5.1}) {
+    const auto before = through.counts();
+    EXPECT_EQ(solve(through, change), solve(resumed, change)) << change;
+    EXPECT_EQ(through.counts().factorizations - 1, resumed.counts().factorizations) << change;
+    EXPECT_GE(through.counts().solves, before.solves);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Table, Engines, ::testing::ValuesIn(direct_solvers()),
+                         [](const auto& info) { return as_test_name(info.param); });
+
+TEST(Record, IsEmptyWhereAnOrderCameFromAnEarlierPattern) {
+  Registry registry = full_registry();
+  if (!registry.is_ready("cholmod")) GTEST_SKIP() << "no CHOLMOD";
+  const auto direct = registry.create("cholmod");
+  ReusingSolver solver(*direct, true);
+  for (const bool may_keep_order : {false, true}) {
+    AnalyzeHints hints = block().hints();
+    hints.may_keep_order = may_keep_order;
+    Elastic system = block();
+    if (may_keep_order) {  // another pattern, and so far off that it is factorised
+      system.pattern.row_indices.insert(system.pattern.row_indices.begin() + system.pattern.column_starts[1],
+                                        system.pattern.order - 1);
+      system.values.insert(system.values.begin() + system.pattern.column_starts[1], 1e-9);
+      for (int j = 1; j <= system.pattern.order; ++j) ++system.pattern.column_starts[j];
+      system.values = changed(system, 1e6);
+    }
+    const auto b = load(system.pattern.order);
+    std::vector<double> x(b.size());
+    ASSERT_EQ(solver.analyze(system.pattern, hints), Outcome::ok);
+    ASSERT_EQ(solver.prepare(system.values, b, kAsked), Outcome::ok);
+    ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    EXPECT_EQ(solver.record().matrix == nullptr, may_keep_order);
+  }
+  EXPECT_EQ(solver.counts().factorizations, 2);
+}
+
+}  // namespace
+}  // namespace itr::linear
