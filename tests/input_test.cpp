@@ -111,8 +111,10 @@ TEST(Explain, WarnsOfWhatLooksWrong) {
   EXPECT_NE(explain(ball + "--set /contact/dhat=0.1").find("at the start is below d-hat"), std::string::npos);
   EXPECT_NE(explain(ball + "--set /materials/E=1").find("are moduli in Pa?"), std::string::npos);
   EXPECT_NE(explain(ball + "--set '/geometry/0/transformation/scale=[0.04, 0.0004]'").find("slivers"), std::string::npos);
-  EXPECT_NE(explain(ball + "--set /geometry/0/transformation/scale=40000").find("are lengths in metres?"),
-            std::string::npos);
+  EXPECT_NE(
+      explain(ball + "--set /geometry/0/transformation/scale=40000 --set '/geometry/1/transformation/translation=[1e5, 0]'")
+          .find("are lengths in metres?"),
+      std::string::npos);
 }
 
 TEST(Explain, NamesTheSolverThatRunWouldTake) {

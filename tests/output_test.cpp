@@ -150,11 +150,17 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
   make_writer().write(Plane().view(), report);
 
   const Json line = Json::parse(text_of(folder / "steps.jsonl"));
-  EXPECT_EQ(keys_of(line),
-            (std::vector<std::string>{"step", "t", "vertices", "elements", "unknowns", "newton_iterations",
-                                      "factorizations", "linear_solves", "reused_factors", "linear_iterations", "energy",
-                                      "energy_before_remesh", "splits", "collapses", "swaps", "smooths", "min_distance",
-                                      "min_volume_ratio", "history_loss", "seconds", "peak_rss_mb", "trial_seconds"}));
+  EXPECT_EQ(keys_of(line), (std::vector<std::string>{"step",           "t",
+                                                     "vertices",       "elements",
+                                                     "unknowns",       "newton_iterations",
+                                                     "factorizations", "linear_solves",
+                                                     "reused_factors", "linear_iterations",
+                                                     "energy",         "energy_before_remesh",
+                                                     "splits",         "collapses",
+                                                     "swaps",          "smooths",
+                                                     "min_distance",   "min_volume_ratio",
+                                                     "history_loss",   "seconds",
+                                                     "peak_rss_mb",    "trial_seconds"}));
   EXPECT_EQ(keys_of(line["energy"]),
             (std::vector<std::string>{"inertia", "elastic", "body", "contact", "friction", "total"}));
   EXPECT_EQ(keys_of(line["seconds"]), (std::vector<std::string>{"assembly", "linear_solve", "line_search", "ccd", "remesh",

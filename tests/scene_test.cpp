@@ -158,7 +158,7 @@ TEST_F(SceneTest, OutputAndSpeedNeverStopAScene) {
   EXPECT_EQ(scene.output.skip_frames, 4);
   EXPECT_EQ(scene.max_threads, 2);
   EXPECT_FALSE(std::get<itr::Setup<2>>(scene.setup).linear.reuse_factors);
-  EXPECT_TRUE(std::get<itr::Setup<2>>(read_scene(square({})).setup).linear.reuse_factors);
+  EXPECT_TRUE(std::get<itr::Setup<2>>(read_scene(square(json::object())).setup).linear.reuse_factors);
   EXPECT_EQ(std::get<itr::Setup<2>>(scene.setup).linear.solvers, (std::vector<std::string>{"Eigen::PardisoLLT", "mumps"}));
 }
 

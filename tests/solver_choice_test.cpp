@@ -305,8 +305,7 @@ auto there(std::set<std::string> names) {
 }
 
 TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
-  const auto all =
-      there({"eigen:ldlt", "dense", "eigen:cg", "cholmod", "mumps", "mumps:spd", "umfpack", "belos:muelu"});
+  const auto all = there({"eigen:ldlt", "dense", "eigen:cg", "cholmod", "mumps", "mumps:spd", "umfpack", "belos:muelu"});
   const auto none = there({"eigen:ldlt", "dense", "eigen:cg"});
   constexpr double kGiB = 1024.0 * 1024 * 1024;
   const MatrixTraits tiny{30, 200, 2, false, kGiB}, small{2000, 16'000, 2, false, kGiB},

@@ -136,7 +136,7 @@ void Totals::restore(const std::vector<double>& values) {
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {
   return fmt::format(
       R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"damped_steps":{},"cut_steps":{},"t":{},{},)"
-      R"("gain_by_remeshing":{},"norms":{}}})"
+      R"("energy_decrease_by_remeshing":{},"norms":{}}})"
       "\n",
       json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(), total_.step,
       total_.damped_steps, total_.cut_steps, number(total_.t), common_members(total_), number(gain_), norms_json(norms));

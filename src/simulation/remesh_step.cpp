@@ -148,7 +148,11 @@ bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const Ste
   return true;
 }
 
-template bool remesh_and_project<2>(const Setup<2>&, double, const StepProblem<2>&, double, const State<2>&, State<2>&,
-                                    VectorX&, StepReport&, linear::Solver&, const Logger&);
+#define ITR_INSTANTIATE(Dim)                                                                                           \
+  template bool remesh_and_project<Dim>(const Setup<Dim>&, double, const StepProblem<Dim>&, double, const State<Dim>&, \
+                                        State<Dim>&, VectorX&, StepReport&, linear::Solver&, const Logger&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr

@@ -35,9 +35,6 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   for (const auto& [body, material] : setup.materials)
     if (setup.remesh.enabled && material.density_at)
       refuse("/materials", "a density that varies in space (id " + std::to_string(body) + ") where the mesh changes");
-  if constexpr (Dim == 3) {
-    if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing in 3D, which is not supported yet");
-  }
 }
 
 template <int Dim>

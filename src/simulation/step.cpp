@@ -129,26 +129,23 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
     report.energy_before_remesh = problem->report(x).total;
   }
 
-  if constexpr (Dim == 2) {
-    if (setup.remesh.enabled) {
-      next.stiffness = problem->stiffness();
-      const State<Dim> unchanged = next;
-      const VectorX solution = x;
-      if (remesh_and_project(setup, shortest_edge, *problem, t, unchanged, next, x, report, system.solver(), logger)) {
-        auto problem_before = std::move(problem);
-        problem = make_problem();
-        summary = solve(VectorX(x));
-        const std::string failure = summary.converged() ? find_violation(setup, next, x) : reason_of(summary);
-        if (!failure.empty()) {
-          logger.warning(
-              fmt::format("step {}: keeping the mesh as it was, the remeshed step failed: {}", next.step, failure));
-          next = unchanged;
-          x = solution;
-          problem = std::move(problem_before);
-          for (auto* operations : {&report.splits, &report.collapses, &report.swaps, &report.smooths})
-            operations->accepted = 0;
-          report.history_loss = 0;
-        }
+  if (setup.remesh.enabled) {
+    next.stiffness = problem->stiffness();
+    const State<Dim> unchanged = next;
+    const VectorX solution = x;
+    if (remesh_and_project(setup, shortest_edge, *problem, t, unchanged, next, x, report, system.solver(), logger)) {
+      auto problem_before = std::move(problem);
+      problem = make_problem();
+      summary = solve(VectorX(x));
+      const std::string failure = summary.converged() ? find_violation(setup, next, x) : reason_of(summary);
+      if (!failure.empty()) {
+        logger.warning(fmt::format("step {}: keeping the mesh as it was, the remeshed step failed: {}", next.step, failure));
+        next = unchanged;
+        x = solution;
+        problem = std::move(problem_before);
+        for (auto* operations : {&report.splits, &report.collapses, &report.swaps, &report.smooths})
+          operations->accepted = 0;
+        report.history_loss = 0;
       }
     }
   }

@@ -191,7 +191,7 @@ def table(rows):
         lines.append(
             f"| {r['case']} | {r['steps']} steps, {end} | {r['seconds_per_step']:.4f} | {cell(r['reference_seconds'], '.4g')} "
             f"| {cell(ratio, '.0f')} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
-            f"| {cell(r['reference_gain'], '.4g')} | {r['history_loss']:.3g} | {r['trials']} / {r['accepted']} "
+            f"| {cell(r['reference_gain'], '.4g')} | {cell(r.get('history_loss'), '.3g')} | {r['trials']} / {r['accepted']} "
             f"| {r['microseconds_per_trial'] if r['trials'] else 0:.0f} | {100 * r['remesh_share']:.0f} % "
             f"| {r['peak_rss_mb']:.0f} ({cell(r['reference_mb'], '.0f')}) |")
     return "\n".join(lines)
