@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-bash tests/install_packages.sh
+bash tests/install_packages.sh --minimal
 cmake --preset release
 cmake --build --preset release --target itr -- -j "$(nproc)"
 

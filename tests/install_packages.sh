@@ -1,21 +1,30 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Installs the Debian 12 packages that the build, the tests and the examples need. Asks apt for what is missing only, so a
-# machine that has all of them needs neither root nor a network.
+# Installs Debian 12 packages: with --minimal those of the command with its built-in solvers and of the pictures, else all
+# that solver modules, tests and the verification suite need too. Asks apt for what is missing only, so a machine that has
+# all of them needs neither root nor a network.
 set -euo pipefail
 
 packages=(
-  g++ cmake ninja-build ccache
+  g++ cmake ninja-build
   libeigen3-dev libtbb-dev libhdf5-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
   libcgal-dev libgmp-dev libmpfr-dev
+  python3 python3-h5py python3-matplotlib python3-numpy
+)
+optional=(
+  ccache
   libsuitesparse-dev libopenblas-dev
   libmumps-dev libmumps-ptscotch-dev libptscotch-dev libopenmpi-dev openmpi-bin
   libtrilinos-{amesos2,tpetra,shylu,teuchos,kokkos,kokkos-kernels,epetra,epetraext,triutils,zoltan,trilinosss}-dev
   libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
-  python3 python3-h5py python3-matplotlib python3-numpy python3-pil
-  python3-dolfinx python3-meshio python3-scipy python3-sympy
+  python3-pil python3-dolfinx python3-meshio python3-scipy python3-sympy
 )
+case "${1:-}" in
+  "") packages+=("${optional[@]}") ;;
+  --minimal) ;;
+  *) echo "usage: $0 [--minimal]" >&2; exit 2 ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do
