@@ -7,7 +7,7 @@ from harness.suite import Result, compare
 TITLE = "Wave in a bar"
 QUANTITY = "wave speed from the arrival at the middle; speed behind the front; tip displacement over a period"
 REFERENCE = "d'Alembert: c = sqrt(E / rho), the free end reaches twice the static displacement at t = 2 L / c"
-TOLERANCE = "1 %"
+TOLERANCE = "on 400 cells: speeds 4e-6; tip 5e-4 in L2, its largest value 2.5e-3"
 NEEDS = ("meshio", "h5py")
 
 E, RHO, LENGTH, STRESS = 1e6, 100.0, 1.0, 10.0  # strain 1e-5: linear
@@ -39,12 +39,15 @@ def results(context):
         particle_speed, offset = np.polyfit(t[between], at_middle[between], 1)
         arrival = -offset / particle_speed
         note = f"{n} cells along the bar"
-        yield compare(f"{dim}D wave speed [m/s]", float(LENGTH / 2 / arrival), float(SPEED), 0.01, note)
-        yield compare(f"{dim}D particle speed behind the front [m/s]", float(particle_speed), STRESS / (RHO * SPEED), 0.01)
+        coarser = 400 / n  # errors grow with powers that coarser meshes showed
+        yield compare(f"{dim}D wave speed [m/s]", float(LENGTH / 2 / arrival), float(SPEED), 4e-6 * coarser**1.5, note)
+        yield compare(f"{dim}D particle speed behind the front [m/s]", float(particle_speed), STRESS / (RHO * SPEED),
+                      4e-6 * coarser**1.5)
         static = STRESS * LENGTH / E
         exact = 2 * static * (1 - np.abs(1 - t * SPEED / (2 * LENGTH)))
-        yield Result(f"{dim}D tip displacement, L2 in time", float(np.linalg.norm(at_tip - exact) / np.linalg.norm(exact)), 0.01)
-        yield compare(f"{dim}D largest tip displacement [m]", float(at_tip.max()), 2 * static, 0.01)
+        yield Result(f"{dim}D tip displacement, L2 in time", float(np.linalg.norm(at_tip - exact) / np.linalg.norm(exact)),
+                     5e-4 * coarser)
+        yield compare(f"{dim}D largest tip displacement [m]", float(at_tip.max()), 2 * static, 2.5e-3 * coarser**0.65)
         if dim == 2:
             context.figure("tip", lambda axes: draw(axes, t * SPEED / LENGTH, at_tip / static, exact / static))
 

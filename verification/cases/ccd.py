@@ -3,17 +3,21 @@
 from harness.suite import Result
 
 TITLE = "Collision queries"
-QUANTITY = "collisions missed; times of 0 for primitives that start apart; false positives"
+QUANTITY = "collisions missed; times of 0 for primitives that start apart; false positives by queries without a collision"
 REFERENCE = "exact answers of the data set of Wang et al. 2021"
-TOLERANCE = "no miss, no zero; 2 % false positives"
+TOLERANCE = "no miss, no zero; false positives 2 % as sharp as it can be, 15 % as a simulation asks (it keeps a fifth of each gap)"
 NEEDS = ()
+
+MOST = {"sharp": 0.02, "product": 0.15}
 
 
 def results(context):
     for line in context.call("ccd_queries", context.data("ccd-queries")).splitlines():
         words = line.split()
-        kind, count, missed, positives, zeros, nanoseconds = words[0], *(int(words[k]) for k in (1, 3, 5, 8, 12))
-        yield Result(f"{kind}, missed", missed, 0, missed, note=f"{count} queries, {positives} false positives, {nanoseconds} ns each")
-        yield Result(f"{kind}, zero when separated", zeros, 0, zeros)
+        setting, kind, count, missed, zeros, positives, negatives, nanoseconds = \
+            *words[:2], *(int(words[k]) for k in (2, 4, 6, 9, 13, 14))
+        yield Result(f"{setting}, {kind}, missed", missed, 0, missed,
+                     note=f"{count} queries, {positives} false positives of {negatives}, {nanoseconds} ns each")
+        yield Result(f"{setting}, {kind}, zero when separated", zeros, 0, zeros)
         if kind == "all":
-            yield Result("share of false positives", positives / count, 0.02, positives)
+            yield Result(f"{setting}, share of false positives", positives / negatives, MOST[setting], positives)

@@ -5,13 +5,13 @@ from harness.contact import (barrier_pressure, gap_of_pressure, vertex_lengths, 
                              write_line)
 from harness.fields import consistent_mass_product, fitted_order, gradients, volumes
 from harness.scenes import box_mesh, run_scene, scene, write_mesh
-from harness.suite import Result, excess
+from harness.suite import Result, compare, excess
 
 TITLE = "Contact: weight, slope, patch test"
 QUANTITY = ("sum of contact forces against the weight; threshold and acceleration of a block on a slope; stress of two blocks "
             "under pressure against the uniform one, L2")
 REFERENCE = "statics; Coulomb's law; the uniform stress"
-TOLERANCE = "weight 1e-8; acceleration 1 % of g sin; uniform stress as dhat vanishes, at first order"
+TOLERANCE = "weight 1e-8; creep and acceleration 1e-4; uniform stress as dhat vanishes, at first order"
 NEEDS = ("meshio", "h5py")
 
 G = 9.81
@@ -58,14 +58,14 @@ def slope(context):
         t, speed = np.array([(f.t, consistent_mass_product(f.rest, f.cells, rho, f.v).sum(axis=0)[0] / (rho * size[0] * size[1]))
                              for f in run.frames()]).T
         if share < 1:
-            yield Result(f"slope, tan = {share} mu: speed after {end} s over eps_v", abs(float(speed[-1] / epsv)), 1.0,
-                         note="creeps, as smoothed friction does")
+            # Smoothed friction (1 - (1 - v / eps_v)^2 of Coulomb's) holds the block's weight at this speed.
+            creep = 1 - np.sqrt(1 - share)
+            yield compare(f"slope, tan = {share} mu: speed of creep over eps_v", float(speed[-1] / epsv), float(creep), 1e-4)
         else:
             later = t > end / 2
             found = float(np.polyfit(t[later], speed[later], 1)[0])
             exact = G * (np.sin(angle) - mu * np.cos(angle))
-            yield Result(f"slope, tan = {share} mu: acceleration [m/s^2]", abs(found - exact) / (G * np.sin(angle)), 1e-2,
-                         found, float(exact), f"{abs(found / exact - 1):.1e} relative")
+            yield compare(f"slope, tan = {share} mu: acceleration [m/s^2]", found, float(exact), 1e-4)
 
 
 PRESSURE, YOUNG = 1e3, 1e6
@@ -99,10 +99,10 @@ def patch(context, below, above, dhat):
 def results(context):
     yield from weight(context)
     yield from slope(context)
-    gaps = [1e-5, 1e-6, 1e-7]
+    gaps = [1e-5, 1e-6, 1e-7, 1e-8]
     meshes = [(8, 8), (8, 12), (8, 11)] if context.quick else [(8, 8), (8, 12), (8, 11), (16, 24), (32, 48)]
     for below, above in meshes:
         found = [patch(context, below, above, dhat) for dhat in gaps]
-        order = float(fitted_order(gaps[1:], found[1:]))  # before, the gap is no small part of a cell
+        order = float(fitted_order(gaps[1:], found[1:]))  # at 1e-5 the gap is no small part of a cell
         yield Result(f"patch test, {below} cells on {above}, order of the stress's error in dhat", excess(1, order), 0.1, order,
-                     1, "errors " + ", ".join(f"{e:.2e}" for e in found) + " for dhat of 1e-5, 1e-6, 1e-7")
+                     1, "errors " + ", ".join(f"{e:.2e}" for e in found) + " for dhat of 1e-5 to 1e-8")
