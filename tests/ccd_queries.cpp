@@ -26,7 +26,7 @@ namespace {
 using itr::Vec;
 
 constexpr double kMostFalsePositives[] = {0.02, 0.15};  ///< sharp, of a simulation; by the queries that do not collide
-constexpr double kSharp = 1e-10;             ///< 1e-6 calls near passes hits; from 1e-14 on round-off misses some
+constexpr double kSharp = 1e-10;                        ///< 1e-6 calls near passes hits; from 1e-14 on round-off misses some
 
 struct Query {
   std::array<Vec<3>, 8> points;  ///< four at t = 0, then four at t = 1
@@ -169,8 +169,8 @@ int run_folders(int count, char** folders) {
     for (const auto& file : csv_files(folders[i])) files.push_back(file);
   const Tally sharp = run_files(files, "sharp", {.min_separation_ratio = kSharp}), product = run_files(files, "product", {});
   const bool wrong = sharp.misses + sharp.zeros + product.misses + product.zeros > 0;
-  const bool too_many = sharp.false_positive_share() > kMostFalsePositives[0] ||
-                        product.false_positive_share() > kMostFalsePositives[1];
+  const bool too_many =
+      sharp.false_positive_share() > kMostFalsePositives[0] || product.false_positive_share() > kMostFalsePositives[1];
   return wrong || too_many ? 1 : 0;
 }
 

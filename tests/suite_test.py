@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The verification suite judges: what it must not let pass. Argument: the source folder."""
+import importlib.util
 import math
 import pathlib
 import sys
@@ -57,6 +58,29 @@ class Judgement(unittest.TestCase):
         self.assertEqual(entry["status"], "skipped")
         self.assertIn("no such scene is not there (--shared)", entry["message"])
         self.assertEqual(run_case(results(2.0))["status"], "failed")
+
+
+class Bars(unittest.TestCase):
+    ROW = {"case": "a", "finished": True, "certified": True, "gain": 10.0, "energy_total": -100.0, "vertices": 50,
+           "processor_seconds_per_step": 6.0}
+
+    def missed(self, bars, **changes):
+        spec = importlib.util.spec_from_file_location("paper_run", SOURCE / "verification/paper/run.py")
+        paper = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(paper)
+        paper.BARS = {"a": bars}
+        return len(paper.misses({**self.ROW, **changes}, {"a": self.ROW, "b": {"processor_seconds_per_step": 2.0}}))
+
+    def test_each_bar_can_be_missed(self):
+        met = {"gain": 10, "energy": -100, "vertices": 50, "seconds": ("b", 3)}
+        self.assertEqual(self.missed(met), 0)
+        for key, bar in (("gain", 10.1), ("energy", -100.1), ("energy", (-100.1, 1e-4)), ("energy", (-99.9, 1e-4)),
+                         ("vertices", 49), ("seconds", ("b", 2.9))):
+            self.assertEqual(self.missed({**met, key: bar}), 1, (key, bar))
+        self.assertEqual(self.missed({**met, "energy": (-100.001, 1e-4)}), 0)
+        for changes in ({"finished": False}, {"certified": False}, {"energy_total": math.nan},
+                        {"processor_seconds_per_step": math.nan}):
+            self.assertEqual(self.missed(met, **changes), 1, changes)
 
 
 class Report(unittest.TestCase):

@@ -14,7 +14,6 @@ import json
 import os
 import pathlib
 import shutil
-import subprocess
 import sys
 import time
 
@@ -24,6 +23,7 @@ if importlib.util.find_spec("dolfinx") is None and os.path.exists(SYSTEM_PYTHON)
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
+from harness import stored as provenance  # noqa: E402
 from harness.report import write_report  # noqa: E402
 from harness.suite import Context, load_cases, run_case, save_json  # noqa: E402
 
@@ -36,8 +36,7 @@ def versions(build):
     for name in ("dolfinx", "numpy", "scipy", "h5py", "meshio", "matplotlib"):
         if importlib.util.find_spec(name):
             found[name] = importlib.import_module(name).__version__
-    commit = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True, text=True)
-    found["itr"] = commit.stdout.strip() or str(build)
+    found["itr"] = provenance.commit() or str(build)
     return found
 
 

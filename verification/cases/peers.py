@@ -10,7 +10,6 @@ QUANTITY = "largest deviation of five norms of the final displacement, relative"
 REFERENCE = "the values that PolyFEM stores with each scene"
 TOLERANCE = "each scene's own margin; refused scenes count as failed"
 NEEDS = ()
-QUICK = False  # some scenes take minutes
 
 
 def results(context):

@@ -11,10 +11,13 @@ import csv
 import json
 import pathlib
 import subprocess
+import sys
 import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent))
+from harness import stored  # noqa: E402
 
 SCENES = [
     ("masticator 2D, h = 0.1", "masticator/h=0.1-noremesh.json", []),
@@ -60,7 +63,8 @@ def main():
     for name, scene, sets in SCENES:
         for variant, keys in VARIANTS:
             with tempfile.TemporaryDirectory() as scratch:
-                row = {"scene": name, "variant": variant, **run(options, scene, sets, keys, pathlib.Path(scratch) / "out")}
+                row = {"scene": name, "variant": variant, **run(options, scene, sets, keys, pathlib.Path(scratch) / "out"),
+                       "commit": stored.commit()}
             rows.append(row)
             print(row, flush=True)
     with open(HERE / "results.csv", "w", newline="") as file:

@@ -20,6 +20,8 @@ import scipy.sparse
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent))
+from harness import stored  # noqa: E402
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
                    OMPI_MCA_rmaps_base_oversubscribe="1", OMPI_MCA_mpi_yield_when_idle="1")
 SIZES = {2: (20, 40, 80, 160, 320, 440), 3: (6, 9, 13, 19, 25, 31, 43)}  # cells along an edge of the square, of the cube
@@ -28,7 +30,7 @@ RANKS = (1, 2, 4)
 MUMPS = ("mumps:spd", ["ordering=scotch"])
 ANALYSES = [("cholmod:supernodal", ["ordering=amd"]), ("cholmod:supernodal", ["ordering=metis"]), MUMPS]
 KEYS = ["dim", "unknowns", "nonzeros", "solver", "options", "ranks", "what", "factor_nonzeros", "flops", "factor_mb",
-        "largest_rank_mb", "residual", "outcome"]
+        "largest_rank_mb", "residual", "outcome", "commit"]
 
 
 def simplices(dim, cells):
@@ -205,7 +207,7 @@ def main():
     with open(arguments.output / "results.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, KEYS, extrasaction="ignore")
         writer.writeheader()
-        writer.writerows(rows)
+        writer.writerows({**row, "commit": stored.commit()} for row in rows)
     (arguments.output / "model.json").write_text(json.dumps(laws, indent=1) + "\n", encoding="utf-8")
     text = tables(rows, laws, memory)
     (arguments.output / "tables.md").write_text(text, encoding="utf-8")
