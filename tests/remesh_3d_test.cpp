@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+// Trials and whole remeshing in 3D: a patch sees what the whole mesh sees, and the state stays valid.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <random>
+
+#include "itr/core/parallel.hpp"
+#include "itr/mesh/validate.hpp"
+#include "itr/remesh/remesher.hpp"
+#include "random_tets.hpp"
+#include "remesh/patch.hpp"
+#include "remesh/trial.hpp"
+
+namespace itr {
+namespace {
+
+/// A turned cube with holes and bodies over an obstacle triangle, within dhat of its lowest vertex.
+struct TetScene {
+  std::mt19937 random;
+  Mesh<3> mesh;
+  RemeshFields<3> fields;
+  StepContext<3> context;
+  explicit TetScene(unsigned seed, int n = 3) : random(seed), mesh(random_tets(n, random, false)) {
+    for (const int body : {1, 2, 3}) context.materials[body] = {.youngs_modulus = 1000, .poisson_ratio = 0.3, .density = 2};
+    context.scaling = 0.01;
+    context.contact = {.enabled = true, .activation_distance = 0.02, .convergent = true, .barrier_stiffness = 50};
+    context.contact.friction_coefficient = 0.2;
+    context.newton.step_tolerance = 1e-9;
+    context.shortest_edge = 0.1;
+    context.loads.acceleration = [](const Vec<3>&) { return Vec<3>(0, 0, -5); };
+    std::uniform_real_distribution<double> noise(-0.006, 0.006);
+    fields.x.resize(3 * mesh.vertex_slots());
+    double lowest = std::numeric_limits<double>::infinity();
+    for (int v = 0; v < mesh.vertex_slots(); ++v)
+      for (int c = 0; c < 3; ++c) fields.x[3 * v + c] = mesh.rest(v)[c] + noise(random);
+    for (int v = 0; v < mesh.vertex_slots(); ++v) lowest = std::min(lowest, fields.x[3 * v + 2]);
+    fields.predictor = fields.velocity_reference = fields.x;
+    for (double& x : fields.predictor) x += noise(random);
+    fields.past_positions = {fields.x};
+    auto& obstacles = context.obstacles;
+    const double z = lowest - 0.01;
+    obstacles.rest = obstacles.x = obstacles.velocity_reference = {{-9, -9, z}, {9, -9, z}, {0, 9, z}};
+    obstacles.triangles = {{0, 1, 2}};
+    obstacles.edges = {{0, 1}, {1, 2}, {0, 2}};
+    obstacles.past_x = {obstacles.x};
+  }
+};
+
+/// All terms on the whole of a mesh, built without any patch.
+double whole_energy(const Mesh<3>& slots, const RemeshFields<3>& slot_fields, const StepContext<3>& context) {
+  Mesh<3> mesh = slots;
+  const auto map = mesh.compact();
+  const int bodies = mesh.vertex_slots();
+  const auto& obstacles = context.obstacles;
+  const auto compacted = [&](const VectorX& field, const std::vector<Vec<3>>& extra) {
+    VectorX kept(3 * (bodies + extra.size()));
+    for (std::size_t v = 0; v < map.vertex.size(); ++v)
+      if (map.vertex[v] != kNone) kept.segment<3>(3 * map.vertex[v]) = field.segment<3>(3 * static_cast<int>(v));
+    for (std::size_t o = 0; o < extra.size(); ++o) kept.segment<3>(3 * (bodies + static_cast<int>(o))) = extra[o];
+    return kept;
+  };
+  const CellSet<3> cells = whole_mesh(mesh, obstacles.rest);
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<char> counts(cells.num_vertices, 0);
+  for (int f = 0; f < mesh.facet_slots(); ++f) {
+    triangles.push_back(mesh.facet(f));
+    for (const int v : mesh.facet(f)) counts[v] = 1;
+  }
+  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
+  const CollisionSurface surface = make_collision_surface<3>({}, triangles, {}, cells.rest, counts);
+  IncrementalPotential<3> potential(context, cells,
+                                    {compacted(slot_fields.predictor, obstacles.x),
+                                     compacted(slot_fields.velocity_reference, obstacles.velocity_reference)});
+  potential.add_contact(surface, context.contact.barrier_stiffness);
+  const VectorX x = compacted(slot_fields.x, obstacles.x);
+  Workspace workspace;
+  return potential.sum(potential.lag(x, workspace)).value(x, workspace);
+}
+
+std::optional<Edit<3>> random_edit(const TetScene& scene, const Strata<3>& strata, std::mt19937& random) {
+  const auto edges = scene.mesh.edges();
+  const EdgeKey edge = edges[random() % edges.size()];
+  switch (random() % 4) {
+    case 0:
+      return make_split(scene.mesh, edge);
+    case 1:
+      return propose_collapse(scene.mesh, strata, edge).edit;
+    case 2:
+      return propose_edge_removal(scene.mesh, strata, edge, shape_cost(scene.mesh)).edit;
+    default:
+      return propose_move<3>(scene.mesh, strata, edge[0], scene.mesh.rest(edge[0]) + Vec<3>(0.01, -0.02, 0.01)).edit;
+  }
+}
+
+TEST(LocalProblem3d, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
+  int compared = 0, in_contact = 0;
+  for (unsigned seed = 0; compared < 150; ++seed) {
+    TetScene scene(seed);
+    if (find_inverted<3>(scene.mesh, scene.fields.x) != kNone) continue;
+    const double global_before = whole_energy(scene.mesh, scene.fields, scene.context);
+    if (!std::isfinite(global_before)) continue;
+    const Strata<3> strata(scene.mesh);
+    const Gate<3> gate(scene.mesh, scene.fields, scene.context);
+    const RemeshState<3> state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::interpolated};
+    LocalScratch<3> scratch;
+    Marks marks;
+    for (int i = 0; i < 10; ++i) {
+      const auto edit = random_edit(scene, strata, scene.random);
+      if (!edit || !gate.passes(*edit, scratch.hits)) continue;
+      const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
+      LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
+      const double local = after.value() - before.value();
+      Mesh<3> changed = scene.mesh;
+      RemeshFields<3> fields = scene.fields;
+      fields.follow(*edit, changed.apply(*edit));
+      const double global = whole_energy(changed, fields, scene.context) - global_before;
+      ASSERT_NEAR(local, global, 1e-11 * global_before) << "seed " << seed << ", edit " << i;
+      ++compared;
+      in_contact += before.touches_contact();
+    }
+  }
+  EXPECT_GT(in_contact, 10);
+}
+
+TEST(Bounds3d, OfOneVertexNeverExceedWhatAPatchGains) {
+  int compared = 0;
+  for (unsigned seed = 0; compared < 300; ++seed) {
+    TetScene scene(seed);
+    if (find_inverted<3>(scene.mesh, scene.fields.x) != kNone) continue;
+    const Strata<3> strata(scene.mesh);
+    const Gate<3> gate(scene.mesh, scene.fields, scene.context);
+    const RemeshState<3> state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::function};
+    LocalScratch<3> scratch;
+    Marks marks;
+    for (int i = 0; i < 20; ++i) {
+      const auto edit = random_edit(scene, strata, scene.random);
+      if (!edit || !gate.passes(*edit, scratch.hits)) continue;
+      const double bound = gain_of_vertex<3>(state, *edit, scratch);
+      const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
+      LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
+      const double energy = before.value();
+      const double gain = energy - (after.has_unknowns() ? after.relax(100).energy : after.value());
+      if (!std::isfinite(bound) || !std::isfinite(gain)) continue;
+      ASSERT_LE(bound, gain + 1e-11 * std::abs(energy)) << "seed " << seed << ", edit " << i;
+      ++compared;
+    }
+  }
+}
+
+TEST(Remesh3d, KeepsVolumesAndTheStateValidAndHasTheSameBitsForOneAndTwoThreads) {
+  int split = 0, collapsed = 0, swapped = 0, moved = 0;
+  for (const unsigned seed : {1u, 5u, 8u}) {
+    const auto run = [&](int threads) {
+      const ThreadLimit limit(threads);
+      TetScene scene(seed, 4);
+      EXPECT_EQ(find_inverted<3>(scene.mesh, scene.fields.x), kNone);
+      RemeshOptions options;
+      options.split.acceptance_tolerance = 2e-3;
+      options.split.max_depth = 1;
+      options.collapse.acceptance_tolerance = -1e-3;
+      options.collapse.rel_max_edge_length = 100;
+      options.swap.enabled = options.smooth.enabled = true;
+      const Strata<3> strata(scene.mesh);
+      const Invariants before(scene.mesh, strata);
+      RemeshMemory memory;
+      const RemeshReport report = remesh(scene.mesh, scene.fields, scene.context, options, memory);
+      EXPECT_EQ(scene.mesh.find_defect(), "");
+      EXPECT_EQ(find_inverted<3>(scene.mesh, scene.fields.x), kNone);
+      EXPECT_TRUE(std::isfinite(whole_energy(scene.mesh, scene.fields, scene.context)));
+      const Invariants after(scene.mesh, Strata<3>(scene.mesh));
+      for (const auto& [body, volume] : before.volume) EXPECT_NEAR(after.volume.at(body), volume, 1e-12);
+      for (const auto& [tag, area] : before.area) EXPECT_NEAR(after.area.at(tag), area, 1e-12);
+      split += report.splits.accepted;
+      collapsed += report.collapses.accepted;
+      swapped += report.swaps.accepted;
+      moved += report.smooths.accepted;
+      return scene.fields.x;
+    };
+    const VectorX one = run(1), two = run(2);
+    ASSERT_EQ(one.size(), two.size());
+    EXPECT_TRUE((one.array() == two.array()).all());
+  }
+  EXPECT_GT(split, 0);
+  EXPECT_GT(collapsed, 0);
+  EXPECT_GT(swapped, 0);
+  EXPECT_GT(moved, 0);
+}
+
+}  // namespace
+}  // namespace itr
