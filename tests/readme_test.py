@@ -26,8 +26,8 @@ class Refusals(unittest.TestCase):
             self.assertIn(name, words)
         places = re.findall(r'refuse\("(/[^"]+)"', (SOURCE / "src/simulation/simulation.cpp").read_text())
         self.assertTrue(places)
-        for place in places:
-            self.assertIn(place, words)
+        named = re.findall(r"\(`(/[\w/]+)`\)", section)
+        self.assertEqual(set(named), set(places), "combinations named, and those that are refused")
 
 
 if __name__ == "__main__":
