@@ -10,6 +10,7 @@
 #include "itr/projection/safe_projection.hpp"
 #include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/history_transfer.hpp"
+#include "random_cube.hpp"
 #include "random_mesh.hpp"
 
 namespace itr {
@@ -242,6 +243,79 @@ TEST(HistoryTransfer, LossIsTheDistanceOfThePredictors) {
           .squares;
   EXPECT_GT(report.loss, 1e-6);
   EXPECT_NEAR(report.loss, squares.sum() / 2, 1e-10 * report.loss);
+}
+
+/// In 3D, a plate right below a body whose lower side is wavy.
+TEST(HistoryTransfer, ForcedBarrierIn3D) {
+  constexpr double kDensity = 3;
+  linear::Registry registry;
+  const auto solver = registry.create("eigen:llt");
+  const auto integral = [](const Mesh<3>& mesh, const VectorX& u) {
+    Vec<3> sum = Vec<3>::Zero();
+    for (int c = 0; c < mesh.cell_slots(); ++c)
+      for (const int v : mesh.cell(c)) sum += kDensity * mesh.volume(c) / 4 * u.segment<3>(3 * v);
+    return sum;
+  };
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    std::mt19937 random(seed);
+    const Mesh<3> old_mesh = make_cube(5, random, 0.15);
+    itr::Setup<3> setup;
+    setup.materials[1] = {.youngs_modulus = 1e5, .density = kDensity};
+    setup.contact = {.enabled = true, .activation_distance = 1e-2};
+    setup.time = {.dt = 0.01};
+    const int n = old_mesh.vertex_slots();
+    VectorX x(3 * (n + 3)), rates = VectorX::Random(x.size());
+    double lowest = 1;
+    for (int v = 0; v < n; ++v) {
+      const Vec<3> X = old_mesh.rest(v);
+      const double wave = std::sin(17 * X[0] + seed) * std::cos(13 * X[1]) * std::exp(-3 * X[2]);
+      x.segment<3>(3 * v) = X + Vec<3>(0, 0, (X[2] > 0.1 ? 0.06 : 0.03) * wave);
+      lowest = std::min(lowest, x[3 * v + 2]);
+    }
+    const double z = lowest - 1e-7;
+    setup.obstacles.rest = {{-5, -5, z}, {9, -5, z}, {-5, 9, z}};
+    setup.obstacles.triangles = {{0, 1, 2}};
+    for (int o = 0; o < 3; ++o) x.segment<3>(3 * (n + o)) = setup.obstacles.rest[o];
+
+    Mesh<3> mesh = old_mesh;
+    int done = 0;
+    for (int i = 0; i < 4000 && done < 12; ++i) {  // above the lower side: what interpolation carries along stays there
+      const VertexId gone = static_cast<int>(random() % n);
+      if (!mesh.is_vertex_alive(gone) || mesh.is_boundary(gone) || mesh.rest(gone)[2] > 0.5) continue;
+      const auto around = mesh.cells_of(gone);
+      const VertexId kept = mesh.cell(around[random() % around.size()])[random() % 4];
+      const auto edit = kept == gone ? std::nullopt : collapse(mesh, gone, kept);
+      if (!edit) continue;
+      Mesh<3> changed = mesh;
+      changed.apply(*edit);
+      if (find_inverted<3>(changed, x.head(3 * n)) != kNone) continue;
+      mesh = std::move(changed);
+      ++done;
+    }
+    ASSERT_EQ(done, 12);
+    TouchedCells touched;
+    for (int c = 0; c < old_mesh.cell_slots(); ++c)
+      if (!mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
+    const auto map = mesh.compact();
+    for (int c = old_mesh.cell_slots(); c < static_cast<int>(map.cell.size()); ++c)
+      if (map.cell[c] != kNone) touched.new_cells.push_back(map.cell[c]);
+    const auto carried = [&](const VectorX& field) {
+      VectorX kept(3 * (mesh.vertex_slots() + 3));
+      for (int v = 0; v < n; ++v)
+        if (map.vertex[v] != kNone) kept.segment<3>(3 * map.vertex[v]) = field.segment<3>(3 * v);
+      kept.tail<9>() = field.tail<9>();
+      return kept;
+    };
+    const History old_history{.x = {x}, .v = {rates}};
+    History history{.x = {carried(x)}, .v = {carried(rates)}};
+    const auto report = transfer_history(setup, old_mesh, old_history, mesh, touched, *solver, history);
+    EXPECT_EQ(report.with_barriers, 1) << seed;
+    EXPECT_EQ(report.not_converged, 0) << seed;
+    EXPECT_LE((integral(mesh, history.x[0]) - integral(old_mesh, x)).norm(), kRoundOff * kDensity);
+    EXPECT_LE((integral(mesh, history.v[0]) - integral(old_mesh, rates)).norm(), kRoundOff * kDensity);
+    EXPECT_EQ(find_inverted<3>(mesh, history.x[0].head(3 * mesh.vertex_slots())), kNone);
+    EXPECT_FALSE(has_intersection<3>(collision_surface(mesh, setup.obstacles), history.x[0])) << seed;
+  }
 }
 
 }  // namespace
