@@ -54,7 +54,7 @@ struct Scene {
     for (int i = 0; i < bodies; ++i) x.segment<2>(2 * i) = old_mesh.rest(i);
     for (int o = 0; o < 2; ++o) x.segment<2>(2 * (bodies + o)) = setup.obstacles.rest[o];
     v.tail(4).setZero();
-    old_history = {.x = {x}, .v = {v}};
+    old_history = {.x = {x}, .v = {v}, .a = {}};
   }
 
   /// The first body, bent.
@@ -100,7 +100,8 @@ struct Scene {
       return field;
     };
     history = {.x = {carried(fields.past_positions[0], old_history.x[0])},
-               .v = {carried(fields.past_rates[0], old_history.v[0])}};
+               .v = {carried(fields.past_rates[0], old_history.v[0])},
+               .a = {}};
   }
 
   HistoryTransferReport transfer() {
@@ -184,7 +185,7 @@ TEST(HistoryTransfer, ForcedBarrierKeepsIntegralsAndValidity) {
 /// Rollers prescribe one component: the other one is free.
 TEST(HistoryTransfer, BodyOnRollersSlides) {
   Scene scene(3);
-  scene.setup.dirichlet = {{.tag = 2, .components = {false, true}}};
+  scene.setup.dirichlet = {{.tag = 2, .components = {false, true}, .displacement = {}}};
   for (int f = 0; f < scene.old_mesh.facet_slots(); ++f) {
     const auto& facet = scene.old_mesh.facet(f);
     const bool bottom = scene.old_mesh.rest(facet[0])[1] == 0 && scene.old_mesh.rest(facet[1])[1] == 0;
@@ -306,8 +307,8 @@ TEST(HistoryTransfer, ForcedBarrierIn3D) {
       kept.tail<9>() = field.tail<9>();
       return kept;
     };
-    const History old_history{.x = {x}, .v = {rates}};
-    History history{.x = {carried(x)}, .v = {carried(rates)}};
+    const History old_history{.x = {x}, .v = {rates}, .a = {}};
+    History history{.x = {carried(x)}, .v = {carried(rates)}, .a = {}};
     const auto report = transfer_history(setup, old_mesh, old_history, mesh, touched, *solver, history);
     EXPECT_EQ(report.with_barriers, 1) << seed;
     EXPECT_EQ(report.not_converged, 0) << seed;

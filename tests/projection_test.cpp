@@ -140,7 +140,7 @@ TEST(Transfer, LocalFormEqualsTheGlobalOne) {
 struct Coarsening {
   Mesh<3> mesh;
   std::map<int, Material> materials{{1, {.density = 7}}};
-  TransferReport report;
+  TransferReport report{};
   Eigen::Index patch_vertices = 0;
 
   bool apply(const Edit<3>& edit, MatrixX& u) {
