@@ -229,13 +229,14 @@ void LocalProblem<Dim>::add_surface() {
   };
 
   // Facets at what changes: how far they may move says what else is to be known.
-  std::vector<FacetId> own;
+  std::vector<FacetId> facets;
+  scratch_.facets.clear(mesh_.facet_slots());
+  const auto take_star = [&](VertexId v) {
+    for (const FacetId f : mesh_.facets_of(v))
+      if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
+  };
   for (std::size_t i = 0; i < num_changing; ++i)
-    if (changes_[i] && vertices_[i].kind == Kind::of_mesh)
-      for (const FacetId f : mesh_.facets_of(vertices_[i].id))
-        if (!is_removed(f)) own.push_back(f);
-  std::sort(own.begin(), own.end());
-  own.erase(std::unique(own.begin(), own.end()), own.end());
+    if (changes_[i] && vertices_[i].kind == Kind::of_mesh) take_star(vertices_[i].id);
   Box<Dim> box;
   double longest = 0;
   const auto include = [&](const Facet& facet) {
@@ -247,7 +248,7 @@ void LocalProblem<Dim>::add_surface() {
       longest = std::max(longest, (p[k] - p[(k + 1) % Dim]).norm());
     }
   };
-  for (const FacetId f : own) include(mesh_.facet(f));
+  for (const FacetId f : facets) include(mesh_.facet(f));
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets) include(facet.vertices);
   const double dhat = state_.context.contact.activation_distance, room = std::max(2 * dhat, 0.25 * longest);
@@ -255,23 +256,20 @@ void LocalProblem<Dim>::add_surface() {
   seen_ = room_.inflated(dhat);
   state_.surface.query(seen_, scratch_.hits);
 
-  std::vector<FacetId> facets = std::move(own);
   for (const FacetId f : scratch_.hits.facets)
-    for (const int v : mesh_.facet(f))
-      for (const FacetId g : mesh_.facets_of(v))
-        if (!is_removed(g)) facets.push_back(g);
+    for (const int v : mesh_.facet(f)) take_star(v);
   std::sort(facets.begin(), facets.end());
-  facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
   for (const FacetId f : facets) add_facet(mesh_.facet(f));
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets) add_facet(facet.vertices);
   const ObstaclePrimitives& obstacles = state_.surface.primitives();
   std::vector<int> primitives;
+  scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
   for (const int i : scratch_.hits.obstacles)
     for (const int v : obstacles.all[i].ids())
-      primitives.insert(primitives.end(), obstacles.at_vertex[v].begin(), obstacles.at_vertex[v].end());
+      for (const int j : obstacles.at_vertex[v])
+        if (scratch_.primitives.mark(j)) primitives.push_back(j);
   std::sort(primitives.begin(), primitives.end());
-  primitives.erase(std::unique(primitives.begin(), primitives.end()), primitives.end());
   for (const int i : primitives) {
     std::array<int, 3> ids{};
     for (int k = 0; k < obstacles.all[i].size; ++k) ids[k] = local({Kind::of_obstacle, obstacles.all[i].vertices[k]});

@@ -40,7 +40,7 @@ template <int Dim>
 struct LocalScratch {
   std::vector<int> local_of;           ///< by vertex slot: local id, valid where `known` is marked
   std::vector<int> local_of_obstacle;  ///< the same of the obstacles' vertices
-  Marks known, known_obstacles, cells, patch;
+  Marks known, known_obstacles, cells, patch, facets, primitives;
   typename SurfaceIndex<Dim>::Hits hits;
   DenseSystem system;
 };

@@ -2,6 +2,7 @@
 #include "candidates.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 #include "itr/core/parallel.hpp"
 
@@ -10,8 +11,8 @@ namespace itr {
 namespace {
 
 constexpr std::size_t kBlock = 128;
-constexpr double kWasteful = 4;          ///< boxes this much roomier than a motion needs are made anew
-constexpr std::size_t kFewPairs = 4096;  ///< so many are looked at one by one: cheaper than a tree
+constexpr double kWasteful = 4;           ///< boxes this much roomier than a motion needs are made anew
+constexpr std::size_t kFewPairs = 16384;  ///< so many are looked at one by one: cheaper than a tree
 
 template <int Dim>
 Vec<Dim> at(ConstVectorView x, int v) {
@@ -50,7 +51,24 @@ bool contains(const std::array<int, N>& primitive, int v) {
   return std::find(primitive.begin(), primitive.end(), v) != primitive.end();
 }
 
-bool are_few(std::size_t a, std::size_t b) { return a * b < kFewPairs; }
+/// How many of these count.
+template <typename Primitives>
+std::size_t number_that_counts(const CollisionSurface& surface, const Primitives& primitives) {
+  return static_cast<std::size_t>(
+      std::count_if(primitives.begin(), primitives.end(), [&](const auto& p) { return counts(surface, p); }));
+}
+
+/// Whether pairs of these with the vertices are so few, of what counts with everything.
+template <std::size_t N>
+bool are_few(const CollisionSurface& surface, const std::vector<std::array<int, N>>& primitives) {
+  const auto& vertices = surface.vertices;
+  return number_that_counts(surface, vertices) * primitives.size() +
+             vertices.size() * number_that_counts(surface, primitives) <
+         kFewPairs;
+}
+bool are_few_edge_pairs(const CollisionSurface& surface) {
+  return number_that_counts(surface, surface.edges) * surface.edges.size() < kFewPairs;
+}
 
 /// (vertex, primitive) for all that overlap, share no vertex, and of which one counts. `tree` is not needed for few pairs.
 template <int Dim, std::size_t N>
@@ -62,10 +80,14 @@ std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
     return !contains(primitives[i], v) && (counts(surface, v) || counts(surface, primitives[i]));
   };
   std::vector<std::array<int, 2>> pairs;
-  if (are_few(surface.vertices.size(), primitives.size())) {
+  if (are_few(surface, primitives)) {
+    std::vector<int> all(primitives.size()), counting;
+    std::iota(all.begin(), all.end(), 0);
+    for (const int i : all)
+      if (counts(surface, primitives[i])) counting.push_back(i);
     for (const int v : surface.vertices)
-      for (std::size_t i = 0; i < primitives.size(); ++i)
-        if (vertex_boxes[v].overlaps(boxes[i]) && matters(v, static_cast<int>(i))) pairs.push_back({v, static_cast<int>(i)});
+      for (const int i : counts(surface, v) ? all : counting)
+        if (vertex_boxes[v].overlaps(boxes[i]) && matters(v, i)) pairs.push_back({v, i});
     return pairs;
   }
   Box<Dim> counting;  // what does not count only meets what does
@@ -85,7 +107,7 @@ template <int Dim>
 std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes,
                                            const Bvh<Dim>& tree) {
   const auto& edges = surface.edges;
-  const bool few = are_few(edges.size(), edges.size());
+  const bool few = are_few_edge_pairs(surface);
   return collect(edges.size(), [&](int e, std::vector<std::array<int, 2>>& found) {
     if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
     const auto consider = [&](int f) {
@@ -152,19 +174,19 @@ void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVector
   surface_ = &surface;
   const auto edge_boxes = boxes_of<Dim>(surface.edges, reach_);
   const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);
-  const auto update_tree = [&](const std::vector<Box<Dim>>& boxes, std::size_t others, Bvh<Dim>& tree) {
-    if (are_few(boxes.size(), others)) return;
+  const auto update_tree = [&](const std::vector<Box<Dim>>& boxes, bool few, Bvh<Dim>& tree) {
+    if (few) return;
     if (keep_trees && tree.size() == static_cast<int>(boxes.size()))
       tree.refit(boxes);
     else
       tree.build(boxes);
   };
-  const std::size_t num_vertices = surface.vertices.size();
+  const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
   parallel_blocks(2, 1, [&](std::size_t task, std::size_t) {
     if (task == 0)
-      update_tree(edge_boxes, Dim == 2 ? num_vertices : edge_boxes.size(), edge_tree_);
+      update_tree(edge_boxes, few_edges, edge_tree_);
     else
-      update_tree(triangle_boxes, num_vertices, triangle_tree_);
+      update_tree(triangle_boxes, are_few(surface, surface.triangles), triangle_tree_);
   });
   if constexpr (Dim == 2) {
     vertex_edges_ = vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes, edge_tree_);
