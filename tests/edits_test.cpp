@@ -429,6 +429,34 @@ TEST(Edits3D, LinkConditionRefusesOnlyWhatChangesTheTopology) {
   EXPECT_GT(refused, 20);
 }
 
+/// A sliver flat on a patch: its inner triangle a-b-u has all edges on the surface. Collapsing one of them would lay the
+/// facets beyond onto each other, which only the link condition among facets sees.
+TEST(Edits3D, LinkConditionOfPatchesSeesSliversOnThem) {
+  const Mesh<3> cube = make_cubes(3, kGrid(3), [](int, int, int) { return 1; });
+  const Strata<3> of_cube(cube);
+  int slivers = 0;
+  for (FacetId f = 0; f < cube.facet_slots(); ++f) {
+    const auto [a, b, u] = cube.facet(f);
+    if (cube.facet_tag(f) != 5 || of_cube.vertex(a) != Stratum::surface) continue;
+    std::vector<Vec<3>> rest;
+    std::vector<Mesh<3>::Cell> cells;
+    for (int v = 0; v < cube.vertex_slots(); ++v) rest.push_back(cube.rest(v));
+    for (int c = 0; c < cube.cell_slots(); ++c) cells.push_back(cube.cell(c));
+    cells.push_back({a, b, u, static_cast<int>(rest.size())});
+    rest.push_back((rest[a] + rest[b] + rest[u]) / 3 + Vec<3>(0, 0, 1e-13));
+    const Mesh<3> mesh(rest, cells, std::vector<int>(cells.size(), 1));
+    const Strata<3> strata(mesh);
+    EXPECT_EQ(strata.num_patches(), 6);
+    for (const VertexId end : {b, u}) {
+      const EdgeKey edge{std::min(a, end), std::max(a, end)};
+      EXPECT_EQ(strata.edge(mesh, edge), Stratum::surface);
+      EXPECT_EQ(propose_collapse<3>(mesh, strata, edge, kAnything).refusal, Refusal::link);
+    }
+    ++slivers;
+  }
+  EXPECT_GT(slivers, 3);
+}
+
 TEST(Edits3D, QualityNeverFallsBelowTheFloorOrWhatItWas) {
   const QualityRule rule{.share = 0.2, .floor = 0.15};
   for (unsigned seed = 0; seed < 12; ++seed) {

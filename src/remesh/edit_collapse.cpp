@@ -172,6 +172,9 @@ Edit<Dim> make_edit(const Mesh<Dim>& mesh, const EdgeKey& edge, const Merge<Dim>
   edit.removed_vertex = gone;
 
   const auto around = mesh.cells_of(gone);
+  const std::size_t most = around.size() + (moves ? mesh.cells_of(kept).size() : 0);
+  edit.removed_cells.reserve(most);
+  edit.inserted_cells.reserve(most);
   edit.removed_cells.assign(around.begin(), around.end());
   if (moves)
     for (const CellId c : mesh.cells_of(kept))

@@ -151,6 +151,8 @@ Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, Ver
     if (!(quality > 0 && quality >= least)) return refused<Dim>(Refusal::shape);
   }
   edit.value = value;
+  edit.removed_cells.reserve(around.size());
+  edit.inserted_cells.reserve(around.size());
   for (const CellId c : around) {
     edit.removed_cells.push_back(c);
     edit.inserted_cells.push_back({mesh.cell(c), mesh.body(c)});

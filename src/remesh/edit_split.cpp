@@ -8,6 +8,7 @@ Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   const auto [a, b] = edge;
   Edit<Dim> edit{.kind = Edit<Dim>::Kind::split, .edge = edge};
   edit.removed_cells = mesh.cells_of_edge(edge);
+  edit.inserted_cells.reserve(2 * edit.removed_cells.size());
   for (const CellId c : edit.removed_cells)
     for (const int end : {a, b}) edit.inserted_cells.push_back({replaced(mesh.cell(c), end, kNewVertex), mesh.body(c)});
   for (const FacetId f : mesh.facets_of(a)) {
