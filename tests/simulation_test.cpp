@@ -431,7 +431,8 @@ Flight fly(bool reuse_factors, int resume_after = 0) {
   while (!simulation->finished()) {
     const auto step = simulation->advance();
     EXPECT_TRUE(step.ok) << step.reason;
-    EXPECT_EQ(step.report.linear_solves, step.report.newton_iterations + 1);  // the last one says that it is enough
+    EXPECT_GE(step.report.linear_solves, step.report.newton_iterations);
+    EXPECT_LE(step.report.factorizations + step.report.reused_factors, step.report.linear_solves);
     flight.iterations += step.report.newton_iterations;
     flight.factorizations += step.report.factorizations;
     flight.reused += step.report.reused_factors;
