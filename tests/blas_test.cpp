@@ -80,5 +80,22 @@ TEST(Kernels, OfOldCpusComeWithAdvice) {
   EXPECT_EQ(advice_on_blas_kernels("Prescott").empty(), fitting_blas_kernels() == nullptr);
 }
 
+/// Dense blocks pay from some flops an entry of the factor: not in a small 2D system.
+TEST(Cholmod, ChoosesByFlops) {
+  Registry registry = full_registry();
+  if (!registry.is_ready("cholmod")) GTEST_SKIP() << "no CHOLMOD";
+  const auto bytes = [&](const char* name, const Elastic& system) {
+    const auto solver = registry.create(name);
+    EXPECT_EQ(solver->analyze(system.pattern, system.hints()), Outcome::ok);
+    EXPECT_EQ(solver->factorize(system.values), Outcome::ok);
+    return solver->statistics().factor_bytes;
+  };
+  const Elastic sheet = elasticity(2, 8, 0.3), cube = elasticity(3, 9, 0.3);
+  EXPECT_EQ(bytes("cholmod", sheet), bytes("cholmod:simplicial", sheet));
+  EXPECT_NE(bytes("cholmod", sheet), bytes("cholmod:supernodal", sheet));
+  EXPECT_EQ(bytes("cholmod", cube), bytes("cholmod:supernodal", cube));
+  EXPECT_NE(bytes("cholmod", cube), bytes("cholmod:simplicial", cube));
+}
+
 }  // namespace
 }  // namespace itr::linear

@@ -415,6 +415,48 @@ TEST(Simulation, HasTheSameBitsForOneAndTwoThreads) {
   EXPECT_TRUE(same(one.v[0], two.v[0]));
 }
 
+/// A square that turns and swings in free flight: its matrix changes little from step to step.
+struct Flight {
+  VectorX x;
+  int iterations = 0, factorizations = 0, reused = 0;
+};
+
+Flight fly(bool reuse_factors, int resume_after = 0) {
+  auto setup = free_square(32);
+  setup.initial_velocity = {{1, [](const Vec<2>& X, double) { return Vec<2>(X[1], 0.3 * X[0] - 0.1); }}};
+  setup.linear.reuse_factors = reuse_factors;
+  linear::Registry registry;
+  auto simulation = std::make_unique<Simulation<2>>(setup, registry);
+  Flight flight;
+  while (!simulation->finished()) {
+    const auto step = simulation->advance();
+    EXPECT_TRUE(step.ok) << step.reason;
+    EXPECT_GE(step.report.linear_solves, step.report.newton_iterations);
+    EXPECT_LE(step.report.factorizations + step.report.reused_factors, step.report.linear_solves);
+    flight.iterations += step.report.newton_iterations;
+    flight.factorizations += step.report.factorizations;
+    flight.reused += step.report.reused_factors;
+    if (step.report.step != resume_after) continue;
+    const State<2> state = simulation->state();
+    simulation = std::make_unique<Simulation<2>>(setup, registry);
+    simulation->restore(state);
+  }
+  flight.x = simulation->state().history.x[0];
+  return flight;
+}
+
+TEST(Simulation, AFactorServesManyStepsAndChangesNothing) {
+  const Flight kept = fly(true), anew = fly(false);
+  EXPECT_LE(kept.factorizations, 3);
+  EXPECT_GT(kept.reused, 5 * kept.factorizations);
+  EXPECT_GE(anew.factorizations, anew.iterations);
+  EXPECT_EQ(kept.iterations, anew.iterations);
+  EXPECT_LE((kept.x - anew.x).lpNorm<Eigen::Infinity>(), 1e-10 * 0.2);
+  const Flight resumed = fly(true, 4);
+  EXPECT_EQ(kept.x, resumed.x) << "other bits after a restore";
+  EXPECT_EQ(kept.factorizations, resumed.factorizations);
+}
+
 TEST(Simulation, RefusesWhatRemeshingCannotCarryAlong) {
   linear::Registry registry;
   const auto refused = [&](const auto& setup) {
