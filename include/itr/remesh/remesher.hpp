@@ -14,7 +14,7 @@ namespace itr {
 /// allow. Cells of ids below the entry's cell_slots() that are still alive were not touched.
 /// `memory` has what was refused before, and is brought up to date.
 template <int Dim>
-RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context, const RemeshOptions& options,
-                    RemeshMemory& memory);
+RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
+                    const RemeshOptions& options, RemeshMemory& memory);
 
 }  // namespace itr
