@@ -15,7 +15,7 @@ def results(context):
     for line in context.call("ccd_queries", context.data("ccd-queries")).splitlines():
         words = line.split()
         setting, kind, count, missed, zeros, positives, negatives, nanoseconds = \
-            *words[:2], *(int(words[k]) for k in (2, 4, 6, 9, 13, 14))
+            *words[:2], *(int(words[k]) for k in (2, 4, 6, 10, 14, 15))
         yield Result(f"{setting}, {kind}, missed", missed, 0, missed,
                      note=f"{count} queries, {positives} false positives of {negatives}, {nanoseconds} ns each")
         yield Result(f"{setting}, {kind}, zero when separated", zeros, 0, zeros)
