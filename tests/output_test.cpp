@@ -159,8 +159,9 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
                                                      "splits",         "collapses",
                                                      "swaps",          "smooths",
                                                      "min_distance",   "min_volume_ratio",
-                                                     "history_loss",   "seconds",
-                                                     "peak_rss_mb",    "trial_seconds"}));
+                                                     "history_loss",   "damped_steps",
+                                                     "seconds",        "peak_rss_mb",
+                                                     "trial_seconds"}));
   EXPECT_EQ(keys_of(line["energy"]),
             (std::vector<std::string>{"inertia", "elastic", "body", "contact", "friction", "total"}));
   EXPECT_EQ(keys_of(line["seconds"]), (std::vector<std::string>{"assembly", "linear_solve", "line_search", "ccd", "remesh",

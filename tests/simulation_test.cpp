@@ -155,61 +155,6 @@ INSTANTIATE_TEST_SUITE_P(All, Integrators,
                                            TimeOptions{.integrator = Integrator::bdf, .bdf_order = 2}),
                          ::testing::PrintToStringParamName());
 
-/// The largest mechanical energy of a supersonic impact by the trapezoidal rule, relative to that at the start.
-struct ImpactEnergy {
-  double growth = 1;
-  int damped_steps = 0;
-  bool ok = true;
-};
-
-ImpactEnergy supersonic_impact(double energy_growth_limit) {
-  auto setup = impact();
-  setup.time = {.integrator = Integrator::newmark, .energy_growth_limit = energy_growth_limit, .dt = 5e-4, .steps = 60};
-  setup.contact.friction_coefficient = 0;
-  setup.initial_velocity = {{1, [](const Vec<2>&, double) { return Vec<2>(0, -12); }}};  // waves travel at 4.6 m/s
-  linear::Registry registry;
-  Simulation<2> simulation(setup, registry);
-  const auto solver = registry.create("eigen");
-  const auto energy = [&] {
-    const State<2>& state = simulation.state();
-    SparseSystem system(*solver);
-    StepProblem<2> problem(setup, state.mesh, state.history, state.t, system);
-    return problem.mechanical_energy(state.history.x[0], state.history.v[0]);
-  };
-  const double start = energy();
-  ImpactEnergy result;
-  while (!simulation.finished() && result.ok) {
-    const auto step = simulation.advance();
-    result.ok = step.ok;
-    result.damped_steps += step.report.damped_steps;
-    result.growth = std::max(result.growth, energy() / start);
-  }
-  return result;
-}
-
-TEST(Simulation, NewmarkCreatesNoEnergyInASupersonicImpact) {
-  const ImpactEnergy guarded = supersonic_impact(0.05);
-  EXPECT_TRUE(guarded.ok);
-  EXPECT_GT(guarded.damped_steps, 0);
-  EXPECT_LT(guarded.growth, 1.06);
-  const ImpactEnergy plain = supersonic_impact(std::numeric_limits<double>::infinity());
-  EXPECT_EQ(plain.damped_steps, 0);
-  EXPECT_TRUE(!plain.ok || plain.growth > 1.2) << "this impact does not need the guard: growth " << plain.growth;
-}
-
-TEST(Simulation, NewmarkIsLeftAloneWhereItKeepsEnergy) {
-  auto setup = free_square(4);
-  setup.time = {.integrator = Integrator::newmark, .dt = 2e-3, .steps = 200};
-  setup.initial_velocity = {{1, [](const Vec<2>& X, double) { return Vec<2>(X[1], X[0] - 0.1); }}};
-  linear::Registry registry;
-  Simulation<2> simulation(setup, registry);
-  while (!simulation.finished()) {
-    const auto step = simulation.advance();
-    ASSERT_TRUE(step.ok) << step.reason;
-    EXPECT_EQ(step.report.damped_steps, 0);
-  }
-}
-
 /// A body of two materials, one of them `law` with moduli that vary, remeshed as it deforms.
 class Laws : public ::testing::TestWithParam<MaterialLaw> {};
 

@@ -67,12 +67,12 @@ std::string common_members(const StepReport& r) {
   return fmt::format(
       R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"factorizations":{},"linear_solves":{},)"
       R"("reused_factors":{},"linear_iterations":{},"energy":{},"energy_before_remesh":{},)"
-      R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"min_distance":{},"min_volume_ratio":{},"history_loss":{},"seconds":{},)"
-      R"("peak_rss_mb":{})",
+      R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"min_distance":{},"min_volume_ratio":{},"history_loss":{},)"
+      R"("damped_steps":{},"seconds":{},"peak_rss_mb":{})",
       r.vertices, r.elements, r.unknowns, r.newton_iterations, r.factorizations, r.linear_solves, r.reused_factors,
       r.linear_iterations, energy_json(r.energy), number(r.energy_before_remesh), count_json(r.splits),
       count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), number(r.min_distance),
-      number(r.min_volume_ratio), number(r.history_loss), seconds_json(r.seconds), number(r.peak_rss_mb));
+      number(r.min_volume_ratio), number(r.history_loss), r.damped_steps, seconds_json(r.seconds), number(r.peak_rss_mb));
 }
 
 }  // namespace
@@ -135,11 +135,11 @@ void Totals::restore(const std::vector<double>& values) {
 
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {
   return fmt::format(
-      R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"damped_steps":{},"cut_steps":{},"t":{},{},)"
+      R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"cut_steps":{},"t":{},{},)"
       R"("energy_decrease_by_remeshing":{},"norms":{}}})"
       "\n",
       json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(), total_.step,
-      total_.damped_steps, total_.cut_steps, number(total_.t), common_members(total_), number(gain_), norms_json(norms));
+      total_.cut_steps, number(total_.t), common_members(total_), number(gain_), norms_json(norms));
 }
 
 }  // namespace itr::output

@@ -31,4 +31,9 @@ void StepReport::add_effort(const StepReport& before) {
   seconds += before.seconds;
 }
 
+void StepReport::forget_operations() {
+  for (auto* operations : {&splits, &collapses, &swaps, &smooths}) operations->accepted = 0;
+  history_loss = 0;
+}
+
 }  // namespace itr

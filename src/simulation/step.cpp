@@ -10,6 +10,7 @@
 
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
+#include "itr/simulation/energy_guard.hpp"
 #include "itr/simulation/invariants.hpp"
 #include "itr/simulation/remesh_step.hpp"
 
@@ -43,20 +44,6 @@ std::string reason_of(const NewtonSummary& summary) {
   return std::string(to_string(summary.termination)) + ": " + summary.message;
 }
 
-/// Whether a step of the trapezoidal rule, solved to x, stays within TimeOptions::energy_growth_limit. Books what it
-/// creates.
-template <int Dim>
-bool keeps_energy(const Setup<Dim>& setup, StepProblem<Dim>& problem, const NewtonSummary& summary, const VectorX& x,
-                  State<Dim>& state) {
-  const History& history = state.history;
-  if (!std::isfinite(setup.time.energy_growth_limit) || !TimeIntegrator(setup.time).is_trapezoidal(history)) return true;
-  if (!summary.converged()) return false;
-  const double created = state.created_energy + problem.created_energy(history, x);
-  if (created > setup.time.energy_growth_limit * problem.mechanical_energy(history.x[0], history.v[0])) return false;
-  state.created_energy = created;
-  return true;
-}
-
 /// That of the present positions and of those that the history holds.
 template <int Dim>
 std::string find_violation(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
@@ -66,16 +53,18 @@ std::string find_violation(const Setup<Dim>& setup, const State<Dim>& state, con
   return violation;
 }
 
-}  // namespace
-
+/// take_step by the integrator of the setup or, `damped`, by implicit Euler. Where EnergyGuard forbids the step it is not
+/// ok, and `creates_energy`.
 template <int Dim>
-StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
-                     const Logger& logger, State<Dim>& state) {
+StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
+                        const Logger& logger, bool damped, bool& creates_energy, State<Dim>& state) {
   StepResult result;
   StepReport& report = result.report;
   const double start = seconds_now();
+  EnergyGuard<Dim> guard(setup, state);
   State<Dim> next = state;
   next.step = state.step + 1;
+  next.history.damp_next = damped;
   next.t = setup.time.t0 + next.step * setup.time.dt;
   const double t = next.t;
   report.step = next.step;
@@ -85,12 +74,16 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
     solver.restore(state.factor);
   }
   const linear::SolveCounts solves_before = solver.counts();
-  const auto fail = [&](const NewtonSummary& summary) {
+  const auto fail = [&](std::string reason) {
     add_solves(solves_before, solver.counts(), report);
     result.ok = false;
-    result.reason = reason_of(summary);
+    result.reason = std::move(reason);
     report.seconds.total = seconds_now() - start;
     return result;
+  };
+  const auto forbid = [&] {
+    creates_energy = true;
+    return fail("it would create energy");
   };
 
   VectorX x = next.history.x[0];
@@ -113,17 +106,8 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
     return summary;
   };
   NewtonSummary summary = solve(state.history.x[0]);
-  if (!keeps_energy(setup, *problem, summary, x, next)) {
-    logger.warning("step " + std::to_string(next.step) +
-                   ": Newmark would create energy here, implicit Euler takes this step");
-    next.history.damp_next = true;
-    x = state.history.x[0];
-    problem = make_problem();
-    summary = solve(state.history.x[0]);
-    report.damped_steps = 1;
-    next.created_energy = std::max(0.0, next.created_energy + problem->created_energy(next.history, x));
-  }
-  if (!summary.converged()) return fail(summary);
+  if (!summary.converged()) return fail(reason_of(summary));
+  if (!guard.allows(*problem, next.history, x)) return forbid();
   {
     const ScopedTimer timer(report.seconds.assembly);
     report.energy_before_remesh = problem->report(x).total;
@@ -143,13 +127,13 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
         next = unchanged;
         x = solution;
         problem = std::move(problem_before);
-        for (auto* operations : {&report.splits, &report.collapses, &report.swaps, &report.smooths})
-          operations->accepted = 0;
-        report.history_loss = 0;
+        report.forget_operations();
       }
     }
   }
 
+  if (setup.remesh.enabled && !guard.allows(*problem, next.history, x)) return forbid();  // as it ends
+  next.created_energy = guard.created_energy();
   ITR_AUDIT(find_violation(setup, next, x).empty(), find_violation(setup, next, x));
   {
     const ScopedTimer timer(report.seconds.assembly);
@@ -168,6 +152,24 @@ StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem
   state = std::move(next);
   report.peak_rss_mb = peak_rss_mb();
   report.seconds.total = seconds_now() - start;
+  return result;
+}
+
+}  // namespace
+
+template <int Dim>
+StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
+                     const Logger& logger, State<Dim>& state, bool damped) {
+  bool creates_energy = false;
+  StepResult result = attempt_step(setup, shortest_edge, system, solver, logger, damped, creates_energy, state);
+  if (!creates_energy) return result;
+  logger.warning(
+      fmt::format("step {}: Newmark would create energy here, implicit Euler takes this step", result.report.step));
+  StepReport effort = result.report;
+  effort.forget_operations();
+  result = attempt_step(setup, shortest_edge, system, solver, logger, true, creates_energy, state);
+  result.report.add_effort(effort);
+  result.report.damped_steps = 1;
   return result;
 }
 
@@ -194,8 +196,8 @@ Setup<Dim> halved(const Setup<Dim>& setup, const State<Dim>& state) {
 
 template <int Dim>
 StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system,
-                              linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state) {
-  StepResult whole = take_step(setup, shortest_edge, system, solver, logger, state);
+                              linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state, bool damped) {
+  StepResult whole = take_step(setup, shortest_edge, system, solver, logger, state, damped);
   if (whole.ok || setup.time.step_cuts == 0) return whole;
   const Setup<Dim> half = halved(setup, state);
   logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
@@ -207,7 +209,7 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
   NodalForces forces;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
-    StepResult result = take_step_in_parts(half, shortest_edge, system, solver, logger, part);
+    StepResult result = take_step_in_parts(half, shortest_edge, system, solver, logger, part, true);
     parts += std::max(1, result.report.cut_steps);
     result.report.add_effort(effort);
     if (!result.ok) return result;
@@ -224,9 +226,9 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
 
 #define ITR_INSTANTIATE(Dim)                                                                                          \
   template StepResult take_step<Dim>(const Setup<Dim>&, double, SparseSystem&, linear::ReusingSolver&, const Logger&, \
-                                     State<Dim>&);                                                                    \
+                                     State<Dim>&, bool);                                                              \
   template StepResult take_step_in_parts<Dim>(const Setup<Dim>&, double, SparseSystem&, linear::ReusingSolver&,       \
-                                              const Logger&, State<Dim>&);
+                                              const Logger&, State<Dim>&, bool);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -16,11 +16,12 @@ namespace itr {
 
 namespace {
 
-constexpr double kFixedPoint = 1e-12;      ///< rounds of lagging that move nothing by more than this are over [m]
-constexpr std::size_t kLongestCycle = 16;  ///< rounds that are remembered
-constexpr int kPressureRounds = 50;        ///< most, where pressure has no potential
-constexpr int kPatience = 30;              ///< rounds without a smaller residual after which lagging will not converge
-constexpr double kSameState = 1e-3;        ///< of a solve's step tolerance: states nearer than that are one
+constexpr double kFixedPoint = 1e-12;        ///< rounds of lagging that move nothing by more than this are over [m]
+constexpr std::size_t kLongestCycle = 16;    ///< rounds that are remembered
+constexpr int kPressureRounds = 50;          ///< most, where pressure has no potential
+constexpr int kPatience = 30;                ///< rounds without a smaller residual after which lagging will not converge
+constexpr double kSameState = 1e-3;          ///< of a solve's step tolerance: states nearer than that are one
+constexpr double kEnergyResolution = 1e-14;  ///< of moduli times volume
 
 /// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
 bool has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance) {
@@ -443,6 +444,14 @@ double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
   double energy = elastic_->value(x, workspace_) / scaling_;
   if (contact_) energy += contact_of_dofs_->value(x, workspace_) / scaling_;
   return energy + 0.5 * v.dot(momentum(v));
+}
+
+/// Densities are differences of terms as large as the moduli.
+template <int Dim>
+double StepProblem<Dim>::energy_resolution() const {
+  double stiffness = 0;
+  for (const auto& element : cells_.elements) stiffness += element.volume * setup_.materials.at(element.body).youngs_modulus;
+  return kEnergyResolution * stiffness;
 }
 
 template <int Dim>

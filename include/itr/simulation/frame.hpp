@@ -48,6 +48,8 @@ struct StepReport {
 
   /// Adds the effort of what came before: iterations, operations, forgotten history, damped and cut steps, seconds.
   void add_effort(const StepReport& before);
+  /// Of a mesh that was dropped: none was accepted.
+  void forget_operations();
 };
 
 /// Forces on the bodies' vertices at the end of a step, interleaved [N]; 2D: by thickness. Their sum with the elastic forces

@@ -8,15 +8,16 @@
 namespace itr {
 
 /// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again.
-/// `shortest_edge` is that of the initial mesh [m], `solver` that of `system`. On failure `state` is left as it was.
+/// `shortest_edge` is that of the initial mesh [m], `solver` that of `system`. `damped`: Newmark leaves the step
+/// to implicit Euler. On failure `state` is left as it was.
 template <int Dim>
 StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
-                     const Logger& logger, State<Dim>& state);
+                     const Logger& logger, State<Dim>& state, bool damped = false);
 
 /// That, with a step whose solve fails cut into smaller ones, as TimeOptions::step_cuts allows and `logger` is told.
 template <int Dim>
 StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system,
-                              linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state);
+                              linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state, bool damped = false);
 
 /// Most memory that this process has held [MB].
 double peak_rss_mb();

@@ -57,6 +57,8 @@ class StepProblem {
   double created_energy(const History& history, const VectorX& x);
   /// Kinetic, elastic and contact energy [J].
   double mechanical_energy(const VectorX& x, const VectorX& v);
+  /// Elastic energies that differ by less are the same to round-off, whatever their values [J].
+  double energy_resolution() const;
   const BarrierStiffness& stiffness() const { return stiffness_; }
   const DofMap& dofs() const { return dofs_; }
   const CellSet<Dim>& cells() const { return cells_; }
