@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "itr/linear/choice.hpp"
+
 namespace itr {
 namespace {
 
@@ -50,6 +52,70 @@ TEST(Newton, LeavesASaddleInFewSteps) {
   EXPECT_TRUE(summary.converged()) << summary.message;
   EXPECT_LT(summary.iterations, 60);  // growing by a hundredth a step it would be a thousand
   EXPECT_LE((x.array() - std::sqrt(c)).abs().maxCoeff(), 1e-9);
+}
+
+/// The second dof's descent outweighs that the first one goes up, to the saddle.
+TEST(Newton, IsNotDrawnToASaddleByASolverThatAllowsIt) {
+  const double c = 1e-2;
+  linear::Registry registry;
+  for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "eigen:cg"}) {
+    const auto solver = registry.create(name);
+    SparseSystem system(*solver);
+    const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
+    system.reset(dofs, 2, {}, 3);
+    VectorX x = Vec<2>(1e-6, 0.3);
+    NewtonOptions options;
+    options.step_tolerance = 1e-10;
+    options.gradient_tolerance = options.first_gradient_tolerance = 0;
+    Workspace workspace;
+    const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
+    EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
+    EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-6) << name;  // the saddle is at 0
+  }
+}
+
+/// The same, with the way that PolyFEM goes by an L D L^T: to the saddle, by whatever engine.
+TEST(Newton, TakesIndefiniteDirectionsWithAnySolverWhereAskedTo) {
+  linear::Registry registry;
+  for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "dense"}) {
+    const auto solver = linear::choose_solver({.solvers = {name}}, true, registry, {});
+    SparseSystem system(*solver);
+    const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
+    system.reset(dofs, 2, {}, 3);
+    VectorX x = Vec<2>(1e-6, 0.3);
+    NewtonOptions options;
+    options.indefinite = IndefiniteHessian::accept;
+    options.step_tolerance = 1e-10;
+    options.gradient_tolerance = options.first_gradient_tolerance = 0;
+    Workspace workspace;
+    const NewtonSummary summary = minimize(DoubleWell(1e-2), x, dofs, VectorX(), system, options, workspace);
+    EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
+    EXPECT_LE(std::abs(x[0]), 1e-9) << name;
+    EXPECT_LE(std::abs(x[1] - 0.1), 1e-9) << name;
+    EXPECT_EQ(summary.indefinite > 0, solver->capabilities().tells_definiteness) << name;
+  }
+}
+
+/// The gradient is below its tolerance at the saddle, but the last factorisation has seen a negative eigenvalue.
+TEST(Newton, CallsNoSaddleConverged) {
+  const double c = 1e-2;
+  linear::Registry registry;
+  for (const char* name : {"eigen:llt", "eigen:ldlt"})
+    for (const double tolerance : {1e-4, 0.0}) {
+      const auto solver = registry.create(name);
+      SparseSystem system(*solver);
+      const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
+      system.reset(dofs, 2, {}, 3);
+      VectorX x = Vec<2>(1e-12, 0.3);
+      NewtonOptions options;
+      options.gradient_tolerance = options.first_gradient_tolerance = tolerance;
+      options.step_tolerance = 1e-4;
+      Workspace workspace;
+      const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
+      EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
+      EXPECT_GT(summary.indefinite, 0) << name;
+      EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-2 * std::sqrt(c)) << name;
+    }
 }
 
 /// A quadratic whose gradient has noise that no step removes.

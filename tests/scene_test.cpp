@@ -272,6 +272,24 @@ TEST_F(SceneTest, WaysToProjectTheHessian) {
   EXPECT_GT(newton({{"force_psd_projection", false}}).projected_iterations, 0);
   EXPECT_THROW(newton({{"force_psd_projection", true}, {"use_psd_projection", false}}), itr::InputError);
   EXPECT_FALSE(newton({{"extend_steps", false}}).extend_steps);
+  EXPECT_EQ(newton({{"indefinite", "accept"}}).indefinite, IndefiniteHessian::accept);
+  EXPECT_EQ(newton(json::object()).indefinite, IndefiniteHessian::project);
+}
+
+/// The known norms of peers' scenes are those of an L D L^T, which takes indefinite directions.
+TEST_F(SceneTest, WayThroughIndefiniteHessiansIsThatOfAnLdltThatTheSceneNamesFirst) {
+  const auto way = [&](const json& solvers, const json& newton = json::object()) {
+    return read2(square({{"solver", {{"linear", {{"solver", solvers}}}, {"nonlinear", {{"Newton", newton}}}}}}))
+        .newton.indefinite;
+  };
+  for (const char* name : {"Eigen::SimplicialLDLT", "Eigen::PardisoLDLT", "Eigen::AccelerateLDLT"}) {
+    EXPECT_EQ(way(name), IndefiniteHessian::accept);
+    EXPECT_EQ(way({name, "Eigen::CholmodSupernodalLLT"}), IndefiniteHessian::accept);
+    EXPECT_EQ(way({"Eigen::CholmodSupernodalLLT", name}), IndefiniteHessian::project);
+    EXPECT_EQ(way(name, {{"indefinite", "project"}}), IndefiniteHessian::project);
+  }
+  for (const char* name : {"eigen:ldlt", "mumps", "cholmod", "Eigen::PardisoLLT"})
+    EXPECT_EQ(way({name, "eigen"}), IndefiniteHessian::project) << name;
 }
 
 TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
@@ -334,6 +352,20 @@ TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {
   EXPECT_TRUE(read2(square(given)).contact.adaptive_stiffness);
 }
 
+/// In kilometres a body of 0.1 mm has an extent of 1e-7.
+TEST_F(SceneTest, SmallBodiesHaveSidesAndAreNotFlat) {
+  write("small.obj", "v 0 0 0\nv 1e-7 0 0\nv 1e-7 1e-7 0\nv 0 1e-7 0\nf 1 2 3\nf 1 4 3\n");
+  const json geometry = {{"mesh", "small.obj"}, {"volume_selection", 1}, {"surface_selection", {{"threshold", -1}}}};
+  const itr::Setup<2> setup = read2(square({{"geometry", json::array({geometry})}}));
+  EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({2, 3})), 4);
+  EXPECT_EQ(setup.mesh.facet_tag(setup.mesh.find_facet({1, 2})), 3);
+  write("bent.obj", "v 0 0 0\nv 1e-6 0 0\nv 1e-6 1e-6 5e-7\nv 0 1e-6 0\nf 1 2 3\nf 1 4 3\n");
+  EXPECT_EQ(wrong_place({{"geometry", {{"mesh", "bent.obj"}}}}), "/geometry/mesh");
+  write("long.obj", "v 0 0 0\nv 1e6 0 0\nv 1e6 1e6 1e-3\nv 0 1e6 0\nf 1 2 3\nf 1 4 3\n");
+  EXPECT_EQ(read2(square({{"geometry", json::array({{{"mesh", "long.obj"}, {"volume_selection", 1}}})}})).mesh.num_cells(),
+            2);
+}
+
 TEST_F(SceneTest, SelectionsOfSurfacesAndVolumes) {
   const auto tags = [&](const json& selection) {
     const json geometry = {{"mesh", "square.obj"}, {"volume_selection", 1}, {"surface_selection", selection}};
@@ -348,6 +380,7 @@ TEST_F(SceneTest, SelectionsOfSurfacesAndVolumes) {
   EXPECT_EQ(tags(5), (Tags{5, 5, 5, 5}));
   EXPECT_EQ(tags({{"threshold", 0.001}}), (Tags{2, 3, 4, 1}));
   EXPECT_EQ(tags({{"threshold", 0.001}, {"id_offset", 10}}), (Tags{12, 13, 14, 11}));
+  EXPECT_EQ(tags({{"threshold", -1}}), (Tags{2, 3, 4, 1}));
   EXPECT_EQ(tags({{"id", 9}, {"axis", "-y"}, {"position", 0.1}}), (Tags{9, kNoTag, kNoTag, kNoTag}));
   EXPECT_EQ(tags({{"id", 9}, {"axis", 2}, {"position", 0.9}, {"relative", true}}), (Tags{kNoTag, kNoTag, 9, kNoTag}));
   EXPECT_EQ(tags(json::parse(R"([{"id": 1, "box": [[0.4, -1], [0.6, 0.1]]}, {"id": 2, "center": [1, 0.5], "radius": 0.1},

@@ -163,9 +163,9 @@ extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_
   using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
   constexpr const char* kOptions = "ordering=auto|amd|metis|natural";
   static const itr_engine engines[] = {
-      Choice::row("cholmod", version(), "GPL-2.0+", ITR_KEEPS_ORDER, kOptions),
-      Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", ITR_KEEPS_ORDER, kOptions),
-      Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", ITR_KEEPS_ORDER, kOptions)};
+      Choice::row("cholmod", version(), "GPL-2.0+", ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS, kOptions),
+      Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS, kOptions),
+      Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS, kOptions)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, sizeof engines / sizeof engines[0], engines};
   return &module;
 }

@@ -168,6 +168,7 @@ class Mumps {
     result.largest_bytes = 1e6 * infog(mumps_, is_factorized_ ? 21 : 16);
     result.factor_bytes = 1e6 * infog(mumps_, is_factorized_ ? 22 : 17);
     result.flops = is_factorized_ ? mumps_.rinfog[2] : foreseen_flops();
+    result.negative_pivots = is_factorized_ ? infog(mumps_, 12) : 0;
     return result;
   }
   const char* message() const { return text_.data(); }
@@ -359,8 +360,9 @@ const char* version() {
 
 extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
   static const char* const text = version();
-  static const itr_engine engines[] = {row<2>("mumps", text, ITR_INDEFINITE | ITR_MPI | ITR_KEEPS_ORDER),
-                                       row<1>("mumps:spd", text, ITR_MPI | ITR_KEEPS_ORDER)};
+  static const itr_engine engines[] = {
+      row<2>("mumps", text, ITR_INDEFINITE | ITR_MPI | ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS),
+      row<1>("mumps:spd", text, ITR_MPI | ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, 2, engines};
   return &module;
 }

@@ -276,7 +276,8 @@ class Muelu {
 }  // namespace
 
 itr_engine muelu_row(const char* version) {
-  return kokkos_row<Muelu>("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE, linear::IterationOptions::kNames);
+  return kokkos_row<Muelu>("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE | ITR_TELLS_DEFINITENESS,
+                           linear::IterationOptions::kNames);
 }
 
 }  // namespace itr::backends

@@ -130,7 +130,7 @@ class TachoEngine {
 }  // namespace
 
 itr_engine tacho_row(const char* version) {
-  return kokkos_row<TachoEngine>("amesos2:tacho", version, "BSD-3-Clause", 0, "");
+  return kokkos_row<TachoEngine>("amesos2:tacho", version, "BSD-3-Clause", ITR_TELLS_DEFINITENESS, "");
 }
 
 }  // namespace itr::backends

@@ -190,7 +190,7 @@ class Explanation {
     };
     linear::MatrixTraits matrix;
     matrix.block_size = Dim;
-    matrix.may_be_indefinite = !setup_.newton.project_to_psd;
+    matrix.may_be_indefinite = setup_.newton.indefinite == IndefiniteHessian::accept;
     for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) {
       matrix.order += free(v);
       matrix.nonzeros += free(v) * (free(v) + 1) / 2;

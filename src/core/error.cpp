@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "itr/core/error.hpp"
 
+#include <limits>
+
 #include "itr/core/check.hpp"
+#include "itr/core/count.hpp"
 
 namespace itr {
 
@@ -17,6 +20,14 @@ std::string describe(const InputError::Parts& parts) {
 }  // namespace
 
 InputError::InputError(Parts parts) : std::runtime_error(describe(parts)), parts_(std::move(parts)) {}
+
+int as_index(std::size_t count, const char* what) {
+  constexpr int kMost = std::numeric_limits<int>::max();
+  if (count > static_cast<std::size_t>(kMost))
+    throw InputError(
+        {"", what, std::to_string(count), "at most " + std::to_string(kMost) + ", which indices of 32 bits reach"});
+  return static_cast<int>(count);
+}
 
 namespace detail {
 void check_failed(const char* condition, const char* file, int line, const std::string& values) {

@@ -4,7 +4,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "itr/core/count.hpp"
+
 namespace itr {
+
+namespace {
+constexpr const char* kNonzeros = "nonzeros of the Newton system";
+}  // namespace
 
 DofMap DofMap::from_held(const std::vector<char>& held) {
   DofMap map;
@@ -46,7 +52,7 @@ void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stenci
       for (const int w : around)
         for (int d = 0; d < dim; ++d)
           if (const int row = unknown_[dim * w + d]; row >= column) pattern_.row_indices.push_back(row);
-      pattern_.column_starts.push_back(static_cast<int>(pattern_.row_indices.size()));
+      pattern_.column_starts.push_back(as_index(pattern_.row_indices.size(), kNonzeros));
     }
   }
   base_ = pattern_;
@@ -161,16 +167,16 @@ bool SparseAssembler::finish() {
         const int row = take_old ? pattern_.row_indices[p] : overflow_[next].row;
         const double value = take_old ? values_[p] : overflow_[next++].value;
         const bool same_row =
-            static_cast<int>(grown.row_indices.size()) > grown.column_starts.back() && grown.row_indices.back() == row;
+            std::cmp_greater(grown.row_indices.size(), grown.column_starts.back()) && grown.row_indices.back() == row;
         if (same_row) {
           values.back() += value;
         } else {
           grown.row_indices.push_back(row);
           values.push_back(value);
         }
-        if (take_old) moved[p++] = static_cast<int>(grown.row_indices.size()) - 1;
+        if (take_old) moved[p++] = as_index(grown.row_indices.size(), kNonzeros) - 1;
       }
-      grown.column_starts.push_back(static_cast<int>(grown.row_indices.size()));
+      grown.column_starts.push_back(as_index(grown.row_indices.size(), kNonzeros));
     }
     if (place_.empty()) {
       place_ = std::move(moved);

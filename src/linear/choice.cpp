@@ -284,7 +284,7 @@ std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_
   for (const auto& [name, values] : options_of)
     if (may_run(name) && registry.is_ready(name)) registry.create(name, values);
 
-  auto solver = make(first);
+  auto solver = may_be_indefinite ? with_indefinite(make(first), registry) : make(first);
   if (!others.empty()) solver = std::make_unique<FallbackSolver>(std::move(solver), std::move(others), make, logger);
   if (!options.dump_folder.empty()) solver = make_dumping_solver(std::move(solver), options.dump_folder, options.dump_every);
   return solver;

@@ -123,7 +123,11 @@ class Ldlt final : public EigenEngine<Eigen::SimplicialLDLT<Sparse>> {
     solver_->factorize(matrix_);
     return solver_->info() == Eigen::Success ? check_pivots(matrix_, *solver_) : Outcome::singular;
   }
-  Statistics factor_statistics() const override { return sparse_factor(solver_->matrixL().nestedExpression().nonZeros()); }
+  Statistics factor_statistics() const override {
+    Statistics statistics = sparse_factor(solver_->matrixL().nestedExpression().nonZeros());
+    statistics.negative_pivots = static_cast<int>((solver_->vectorD().array() < 0).count());
+    return statistics;
+  }
 };
 
 class Llt final : public EigenEngine<Eigen::SimplicialLLT<Sparse>> {

@@ -42,7 +42,12 @@ class ModuleEngine final : public Engine {
   Statistics statistics() const override {
     itr_statistics s{};
     if (self_) table_.statistics(self_, &s);
-    return {s.factor_nonzeros, s.factor_bytes, s.largest_bytes, s.flops, static_cast<int>(s.iterations)};
+    return {s.factor_nonzeros,
+            s.factor_bytes,
+            s.largest_bytes,
+            s.flops,
+            static_cast<int>(s.iterations),
+            static_cast<int>(s.negative_pivots)};
   }
   std::string message() const override { return self_ ? table_.message(self_) : "no memory for the solver"; }
 
@@ -116,9 +121,10 @@ std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
   std::vector<ModuleRow> rows;
   for (int i = 0; i < module->num_engines; ++i) {
     const itr_engine& engine = module->engines[i];
-    const Capabilities capabilities{(engine.capabilities & ITR_INDEFINITE) != 0, (engine.capabilities & ITR_ITERATIVE) != 0,
-                                    (engine.capabilities & ITR_THREADS) != 0, (engine.capabilities & ITR_MPI) != 0,
-                                    (engine.capabilities & ITR_KEEPS_ORDER) != 0};
+    const Capabilities capabilities{
+        (engine.capabilities & ITR_INDEFINITE) != 0,  (engine.capabilities & ITR_ITERATIVE) != 0,
+        (engine.capabilities & ITR_THREADS) != 0,     (engine.capabilities & ITR_MPI) != 0,
+        (engine.capabilities & ITR_KEEPS_ORDER) != 0, (engine.capabilities & ITR_TELLS_DEFINITENESS) != 0};
     const std::string version = engine.library_version + (kernels.empty() ? "" : " for " + kernels);
     rows.push_back(
         {{engine.name, version, engine.license, engine.options, capabilities, true, "", advice_on_blas_kernels(kernels)},

@@ -165,11 +165,11 @@ Registry::Registry() : Registry(module_folders()) {}
 
 Registry::Registry(std::vector<std::filesystem::path> folders) : impl_(std::make_unique<Impl>()) {
   impl_->folders = std::move(folders);
-  impl_->rows.push_back(built_in("eigen:ldlt", {.indefinite = true}, make_eigen_ldlt));
-  impl_->rows.push_back(built_in("eigen:llt", {}, make_eigen_llt));
+  impl_->rows.push_back(built_in("eigen:ldlt", {.indefinite = true, .tells_definiteness = true}, make_eigen_ldlt));
+  impl_->rows.push_back(built_in("eigen:llt", {.tells_definiteness = true}, make_eigen_llt));
   impl_->rows.push_back(built_in("eigen:lu", {.indefinite = true}, make_eigen_lu));
   impl_->rows.push_back(built_in("eigen:cg", {.iterative = true}, make_eigen_cg, IterationOptions::kNames));
-  impl_->rows.push_back(built_in("dense", {}, make_dense));
+  impl_->rows.push_back(built_in("dense", {.tells_definiteness = true}, make_dense));
 }
 Registry::~Registry() = default;
 Registry::Registry(Registry&&) noexcept = default;

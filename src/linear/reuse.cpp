@@ -158,6 +158,7 @@ std::string ReusingSolver::message() const {
 Statistics ReusingSolver::statistics() const {
   Statistics statistics = solver_.statistics();
   statistics.iterations = iterations_;
+  if (!b_.empty()) statistics.negative_pivots = 0;  // of the matrix, not of the factor
   return statistics;
 }
 

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "curvature.hpp"
 #include "itr/core/timer.hpp"
 
 namespace itr {
@@ -35,6 +36,7 @@ const char* to_string(Termination termination) {
 
 void NewtonSummary::add_effort(const NewtonSummary& other) {
   iterations += other.iterations;
+  indefinite += other.indefinite;
   assembly_seconds += other.assembly_seconds;
   linear_seconds += other.linear_seconds;
   line_search_seconds += other.line_search_seconds;
@@ -48,6 +50,7 @@ constexpr double kArmijo = 1e-4;
 constexpr double kRoundOff = 1e-9;     ///< relative change of energy below which slopes tell more
 constexpr double kUnresolved = 1e-14;  ///< relative change of energy that a sum of many terms does not resolve
 constexpr const char* kAtRoundOff = "converged to the round-off of the energy, above the tolerances asked for";
+constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
 constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less than that
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
@@ -74,11 +77,18 @@ class Minimizer {
       compute_remaining();
       compute_gradient();
       if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
-      if (!moving_ && has_small_gradient()) return stop(Termination::gradient);
+      if (!moving_ && has_small_gradient()) {
+        if (!is_at_saddle()) return stop(Termination::gradient);
+        if (!leave_saddle()) return stop(Termination::round_off, kFlatSaddle);
+        continue;
+      }
       if (!compute_direction())
         return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
-      if (!moving_ && has_small_step()) return stop(Termination::step);
-      if (!moving_ && decrement() < options_.decrement_tolerance) return stop(Termination::decrement);
+      if (const bool by_step = has_small_step(); by_step || (!moving_ && decrement() < options_.decrement_tolerance)) {
+        if (!is_at_saddle()) return stop(by_step ? Termination::step : Termination::decrement);
+        if (!leave_saddle()) return stop(Termination::round_off, kFlatSaddle);
+        continue;
+      }
       if (is_lost_in_round_off()) return stop(Termination::round_off, kAtRoundOff);
       const double before = value_;
       if (!line_search() && !retry_projected()) {
@@ -195,6 +205,7 @@ class Minimizer {
   }
 
   bool has_small_step() {
+    if (moving_) return false;
     if (first_step_ < 0) first_step_ = summary_.step_norm;
     return summary_.step_norm < options_.step_tolerance ||
            (summary_.iterations > 0 && summary_.step_norm < options_.relative_step_tolerance * first_step_);
@@ -253,7 +264,9 @@ class Minimizer {
   }
 
   bool compute_direction() {
-    projected_ = options_.project_to_psd && (psd_iterations_ > 0 || options_.projected_iterations == 0);
+    // A direction of the true Hessian is only taken where it is known to lead to a minimum, not to a saddle.
+    const bool may_be_true = options_.indefinite == IndefiniteHessian::accept || system_.tells_definiteness();
+    projected_ = options_.project_to_psd && (psd_iterations_ > 0 || options_.projected_iterations == 0 || !may_be_true);
     if (psd_iterations_ > 0) --psd_iterations_;
     if (!projected_ && try_direction(PsdProjection::none, 0)) return true;
     if (options_.project_to_psd) {
@@ -274,7 +287,64 @@ class Minimizer {
       const ScopedTimer timer(summary_.assembly_seconds);
       system_.assemble(energy_, x_, psd, dofs_, motion_, workspace_);
     }
-    return factor_and_solve(shift);
+    const bool found = factor_and_solve(shift);
+    if (psd == PsdProjection::none) note_definiteness();
+    return found;
+  }
+
+  /// Of the true Hessian at x, which was factorised last.
+  void note_definiteness() {
+    is_indefinite_ = outcome_ == linear::Outcome::not_positive_definite || system_.negative_pivots() > 0;
+    is_known_here_ = true;
+    summary_.indefinite += is_indefinite_;
+  }
+
+  /// Whether a factorisation says that x is no minimum. Asked only where the last one of a true Hessian said so.
+  bool is_at_saddle() {
+    if (options_.indefinite == IndefiniteHessian::accept || !is_indefinite_ || dofs_.num_unknowns == 0) return false;
+    if (is_known_here_) return true;
+    {
+      const ScopedTimer timer(summary_.assembly_seconds);
+      system_.assemble(energy_, x_, PsdProjection::none, dofs_, motion_, workspace_);
+    }
+    const ScopedTimer timer(summary_.linear_seconds);
+    outcome_ = system_.factorize(0);
+    note_definiteness();
+    return is_indefinite_;
+  }
+
+  /// Goes along an eigenvector of a negative eigenvalue as long as that lowers the energy.
+  bool leave_saddle() {
+    {
+      const ScopedTimer timer(summary_.assembly_seconds);
+      system_.assemble(energy_, x_, PsdProjection::none, dofs_, motion_, workspace_);
+    }
+    VectorX direction;
+    double curvature = 0;
+    {
+      const ScopedTimer timer(summary_.linear_seconds);
+      curvature = find_negative_curvature(system_, dofs_.num_unknowns, direction);
+    }
+    if (!(curvature < 0)) return false;
+    step_.setZero(x_.size());
+    for (Eigen::Index i = 0; i < x_.size(); ++i)
+      if (dofs_.unknown[i] != kNone) step_[i] = direction[dofs_.unknown[i]];
+    if (step_.dot(gradient_) > 0) step_ = -step_;
+    // From the shortest way that the energy resolves on.
+    step_ *= std::max(options_.step_tolerance, std::sqrt(2 * kRoundOff * std::abs(value_) / -curvature));
+    for (int k = 0; k < kMostDoublings; ++k, step_ *= 2) {
+      {
+        const ScopedTimer timer(summary_.ccd_seconds);
+        if (energy_.max_step(x_, step_, workspace_) < 1) return false;
+      }
+      candidate_ = x_ + step_;
+      const double value = timed_value(candidate_);
+      if (!(value < value_)) continue;
+      accept(value);
+      go_on();
+      return true;
+    }
+    return false;
   }
 
   /// Solves for the full step; true where it is one of descent.
@@ -291,6 +361,12 @@ class Minimizer {
       if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
     outcome_ = system_.prepare(shift, rhs);
     if (outcome_ != linear::Outcome::ok) return give_reason();
+    // Not only Cholesky must see it: along eigenvectors of negative eigenvalues Newton's step goes up to a saddle.
+    if (options_.indefinite == IndefiniteHessian::project && system_.negative_pivots() > 0) {
+      outcome_ = linear::Outcome::not_positive_definite;
+      failure_ = " (linear solve: " + std::to_string(system_.negative_pivots()) + " negative eigenvalues)";
+      return false;
+    }
     const auto report = system_.solve(rhs, solution);
     outcome_ = report.outcome;
     if ((outcome_ != linear::Outcome::ok && outcome_ != linear::Outcome::not_converged) || !solution.allFinite())
@@ -362,6 +438,7 @@ class Minimizer {
   void accept(double value) {
     x_.swap(candidate_);
     value_ = value;
+    is_known_here_ = false;
   }
 
   /// Where the energy fell in a straight line over a full step (the projected Hessian is much stiffer than the true one, as
@@ -418,6 +495,8 @@ class Minimizer {
   bool relaxing_ = false;  ///< this iteration leaves them where they are
   bool relax_next_ = false;
   bool projected_ = false;
+  bool is_indefinite_ = false;  ///< the true Hessian that was factorised last
+  bool is_known_here_ = false;  ///< that one was of x
   int psd_iterations_ = 0;
   int blocked_ = 0;
   double first_gradient_ = -1, first_step_ = -1;  ///< norms with the held dofs in place; below 0: not there yet

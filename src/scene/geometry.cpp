@@ -16,7 +16,7 @@ namespace itr::scene {
 
 namespace {
 
-constexpr double kFlat = 1e-5;         ///< least extent in z of a surface that is no 2D mesh [m], PolyFEM's
+constexpr double kFlat = 1e-5;         ///< least extent in z of a surface that is no 2D mesh, relative to its largest one
 constexpr double kLeastShape = 1e-13;  ///< cells with less volume, relative to longest edge^Dim, are degenerate
 constexpr std::size_t kMostCells = 200'000'000;
 
@@ -167,7 +167,7 @@ int dimension_of(const Node& geometry, const MeshFile& file) {
   if (file.triangles.empty()) geometry["mesh"].fail("a mesh without cells", "triangles (2D) or tetrahedra (3D)");
   const Box<3> box = bounding_box<3>(file.vertices);
   const bool is_surface_format = std::filesystem::path(geometry["mesh"].string("")).extension() != ".msh";
-  if (is_surface_format && box.sizes()[2] >= kFlat)
+  if (is_surface_format && box.sizes()[2] >= kFlat * box.sizes().maxCoeff())
     geometry["mesh"].fail("a surface mesh, " + abbreviate(geometry["mesh"].json()), "tetrahedra, or a flat mesh (2D)");
   return 2;
 }

@@ -134,7 +134,7 @@ constexpr Group kGroups[] = {
      "default_init_step_size step_ratio Armijo RobustArmijo"},
     {"/solver/nonlinear/Newton", Role::read,
      "use_psd_projection:boolean force_psd_projection:boolean psd_projection:string projected_iterations:integer "
-     "extend_steps:boolean"},
+     "extend_steps:boolean indefinite:string"},
     {"/solver/nonlinear/Newton", Role::ignored,
      "residual_tolerance reg_weight_min reg_weight_max reg_weight_inc use_psd_projection_in_regularized"},
 

@@ -178,6 +178,14 @@ void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptio
   options.energy_steps = nonlinear["advanced"]["f_delta_step_tol"].integer_at_least(1, 100);
 }
 
+/// Peers' norms were made by an L D L^T, which takes indefinite directions: such a scene asks for the same with any solver.
+IndefiniteHessian indefinite_by_solver(const Node& root) {
+  const auto names = root["solver"]["linear"]["solver"].items();
+  const std::string first = names.empty() ? "" : names.front().string("");
+  const bool is_ldlt = first.starts_with("Eigen::") && first.ends_with("LDLT");
+  return is_ldlt ? IndefiniteHessian::accept : IndefiniteHessian::project;
+}
+
 }  // namespace
 
 NewtonOptions read_newton(const Node& root, double characteristic_length, const SceneScale& scale) {
@@ -202,6 +210,8 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
     if (!options.project_to_psd) force.fail("true", "false beside use_psd_projection = false");
     options.projected_iterations = 0;
   }
+  options.indefinite = static_cast<IndefiniteHessian>(
+      newton["indefinite"].choice({"project", "accept"}, static_cast<int>(indefinite_by_solver(root))));
   options.extend_steps = newton["extend_steps"].boolean(options.extend_steps);
   return options;
 }
@@ -242,7 +252,7 @@ RemeshOptions read_remesh(const Node& root) {
   read_acceptance(split, options.split.enabled, options.split.acceptance_tolerance);
   options.split.culling_threshold = read_share(split["culling_threshold"], options.split.culling_threshold);
   options.split.max_depth = split["max_depth"].integer_at_least(0, options.split.max_depth);
-  options.split.min_edge_length = split["min_edge_length"].non_negative(options.split.min_edge_length);
+  if (split.has("min_edge_length")) options.split.min_edge_length = split["min_edge_length"].non_negative(0);
 
   read_acceptance(collapse, options.collapse.enabled, options.collapse.acceptance_tolerance);
   options.collapse.culling_threshold = read_share(collapse["culling_threshold"], options.collapse.culling_threshold);

@@ -5,6 +5,10 @@
 
 namespace itr::scene {
 
+namespace {
+constexpr double kNear = 1e-7;  ///< of the geometry's diagonal: how far from a side a threshold below 0 selects
+}  // namespace
+
 int read_id(const Node& node, int fallback) {
   if (node.exists() && node.json().is_string()) node.fail("an integer: files of ids are not supported yet");
   const int id = node.integer(fallback);
@@ -54,7 +58,8 @@ typename Selection<Dim>::Rule Selection<Dim>::read_rule(const Node& node) const 
 /// Sides of the bounding box: left 1, bottom 2, right 3, top 4, back 5, front 6; the rest 7.
 template <int Dim>
 typename Selection<Dim>::Rule Selection<Dim>::read_threshold(const Node& node) const {
-  const double given = node["threshold"].number(0), threshold = given < 0 ? 1e-7 : given;
+  const double given = node["threshold"].number(0);
+  const double threshold = given < 0 ? kNear * box_.diagonal().norm() : given;
   const int offset = node["id_offset"].integer(0);
   return [box = box_, threshold, offset](const Vec<Dim>& p, int) {
     const auto is_near = [&](double a, double b) { return std::abs(a - b) < threshold; };

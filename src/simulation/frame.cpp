@@ -21,11 +21,13 @@ void StepReport::add_effort(const StepReport& before) {
   factorizations += before.factorizations;
   reused_factors += before.reused_factors;
   linear_iterations += before.linear_iterations;
+  indefinite += before.indefinite;
   splits += before.splits;
   collapses += before.collapses;
   swaps += before.swaps;
   smooths += before.smooths;
   history_loss += before.history_loss;
+  bound_by_dhat += before.bound_by_dhat;
   cut_steps += before.cut_steps;
   damped_steps += before.damped_steps;
   seconds += before.seconds;

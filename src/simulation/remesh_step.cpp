@@ -112,9 +112,7 @@ bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const Ste
   report.swaps = remeshed.swaps;
   report.smooths = remeshed.smooths;
   report.trial_seconds = remeshed.trial_seconds;
-  if (remeshed.bound_by_activation_distance > 0)
-    logger.debug(fmt::format("step {}: {} surface edges are too short to be split: they would be below dhat", state.step,
-                             remeshed.bound_by_activation_distance));
+  report.bound_by_dhat = remeshed.bound_by_activation_distance;
   if (!remeshed.changed()) return false;
 
   const ScopedTimer timer(report.seconds.projection);

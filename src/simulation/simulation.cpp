@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/linear/choice.hpp"
@@ -13,6 +14,8 @@
 namespace itr {
 
 namespace {
+
+constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest, where the setup says nothing
 
 template <int Dim>
 std::string describe(const Vec<Dim>& p) {
@@ -116,34 +119,6 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   return state;
 }
 
-/// Makes a0 solve M a0 = f - grad Psi at the start (held dofs keep theirs).
-template <int Dim>
-void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, SparseSystem& system) {
-  const CellSet<Dim> cells = whole_mesh(state.mesh, setup.obstacles.rest);
-  const DofMap dofs = DofMap::from_held(held_dofs(setup, state.mesh, state.t).held);
-  VectorX& a = state.history.a[0];
-  EnergySum sum;
-  const VectorX zero = VectorX::Zero(a.size());
-  sum.add(std::make_shared<InertiaEnergy<Dim>>(cells, setup.materials,
-                                               setup.lump_mass ? MassKind::lumped : MassKind::consistent, zero));
-  VectorX force = VectorX::Zero(a.size());
-  Workspace workspace;
-  ElasticEnergy<Dim>(cells, setup.materials, 1).add_gradient(state.history.x[0], force, workspace);
-  if (const auto loads = loads_at(setup, state.t); loads.has_dead_loads())
-    force -= LoadEnergy<Dim>(cells, setup.materials, loads, 1).forces();
-  if (const auto loads = loads_at(setup, state.t); !loads.pressures.empty())
-    PressureEnergy<Dim>(cells, loads, state.history.x[0], 1).add_gradient(state.history.x[0], force, workspace);
-  system.reset(dofs, Dim, stencil_vertices(cells), Dim + 1);
-  PrescribedMotion motion;
-  VectorX rhs(dofs.num_unknowns), solution;
-  system.assemble(sum, zero, PsdProjection::none, dofs, motion, workspace);
-  for (Eigen::Index i = 0; i < a.size(); ++i)
-    if (dofs.unknown[i] != kNone) rhs[dofs.unknown[i]] = -force[i];
-  if (system.factorize(0) != linear::Outcome::ok || system.solve(rhs, solution).outcome != linear::Outcome::ok) return;
-  for (Eigen::Index i = 0; i < a.size(); ++i)
-    if (dofs.unknown[i] != kNone) a[i] = solution[dofs.unknown[i]];
-}
-
 }  // namespace
 
 template <int Dim>
@@ -172,9 +147,12 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   refuse_unsupported(setup);
   check_proxy(setup);
   impl_->setup = std::move(setup);
+  if (double& length = impl_->setup.remesh.split.min_edge_length; length < 0)
+    length = kLeastSplitEdge * rest_diagonal(impl_->setup.mesh);
   impl_->logger = std::move(logger);
   const LinearOptions& linear = impl_->setup.linear;
-  impl_->direct = linear::choose_solver(linear, !impl_->setup.newton.project_to_psd, registry, impl_->logger);
+  impl_->direct =
+      linear::choose_solver(linear, impl_->setup.newton.indefinite == IndefiniteHessian::accept, registry, impl_->logger);
   impl_->solver =
       std::make_unique<linear::ReusingSolver>(*impl_->direct, linear.reuse_factors && linear.dump_folder.empty());
   impl_->system = std::make_unique<SparseSystem>(*impl_->solver);

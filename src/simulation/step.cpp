@@ -96,6 +96,7 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
     NewtonSummary summary = problem->solve(x, lagged);
     add_seconds(summary, report.seconds);
     report.newton_iterations += summary.iterations;
+    report.indefinite += summary.indefinite;
     if (summary.converged() && !summary.message.empty())
       logger.warning(fmt::format("step {}: {}", next.step, summary.message));
     if (summary.linear_residual > kPoorResidual)

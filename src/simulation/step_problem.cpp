@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "itr/simulation/step_problem.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -16,7 +17,7 @@ namespace itr {
 
 namespace {
 
-constexpr double kFixedPoint = 1e-12;        ///< rounds of lagging that move nothing by more than this are over [m]
+constexpr double kFixedPoint = 1e-12;        ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
 constexpr std::size_t kLongestCycle = 16;    ///< rounds that are remembered
 constexpr int kPressureRounds = 50;          ///< most, where pressure has no potential
 constexpr int kPatience = 30;                ///< rounds without a smaller residual after which lagging will not converge
@@ -24,8 +25,8 @@ constexpr double kSameState = 1e-3;          ///< of a solve's step tolerance: s
 constexpr double kEnergyResolution = 1e-14;  ///< of moduli times volume
 
 /// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
-bool has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance) {
-  if ((x - previous.back()).lpNorm<Eigen::Infinity>() <= kFixedPoint) return true;
+bool has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance, double diagonal) {
+  if ((x - previous.back()).lpNorm<Eigen::Infinity>() <= kFixedPoint * diagonal) return true;
   return std::any_of(previous.begin(), previous.end() - 1,
                      [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
 }
@@ -78,6 +79,14 @@ HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t
 }
 
 template <int Dim>
+double rest_diagonal(const Mesh<Dim>& mesh) {
+  Eigen::AlignedBox<double, Dim> box;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    if (mesh.is_vertex_alive(v)) box.extend(mesh.rest(v));
+  return box.diagonal().norm();
+}
+
+template <int Dim>
 StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
                               SparseSystem& system, const BarrierStiffness& stiffness)
     : setup_(setup),
@@ -85,6 +94,7 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
       cells_(whole_mesh(mesh, setup.obstacles.rest)),
       held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
+      diagonal_(rest_diagonal(mesh)),
       stiffness_(stiffness),
       system_(system) {
   const TimeIntegrator integrator(setup.time);
@@ -366,7 +376,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
                         std::to_string(round) + " rounds, asked " + std::to_string(tolerance);
       break;
     }
-    if (has_recurred(x, previous, setup_.newton.step_tolerance)) break;
+    if (has_recurred(x, previous, setup_.newton.step_tolerance, diagonal_)) break;
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
     previous.push_back(x);
     lagged_ = std::move(next_lagged);
@@ -411,6 +421,20 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   for (Eigen::Index i = 0; i < bodies; ++i)
     if (dofs_.unknown[i] != kNone) forces.reaction[i] = 0;
   return forces;
+}
+
+template <int Dim>
+VectorX StepProblem<Dim>::total_force(const VectorX& x, const VectorX& v) {
+  velocity_.reference = x - v / velocity_.rate;
+  if (adaptive_) initialize_stiffness(x);
+  lagged_ = lag(x);
+  EnergySum sum;
+  const EnergySum all = sum_with(lagged_);
+  for (const auto& term : all.terms())
+    if (term != inertia_) sum.add(term);
+  VectorX gradient = VectorX::Zero(x.size());
+  sum.add_gradient(x, gradient, workspace_);
+  return -gradient / scaling_;
 }
 
 template <int Dim>
@@ -470,6 +494,7 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   template class StepProblem<Dim>;                                                    \
   template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                       \
   template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double); \
+  template double rest_diagonal<Dim>(const Mesh<Dim>&);                               \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define ITR_BACKEND_ABI_VERSION 3
+#define ITR_BACKEND_ABI_VERSION 4
 #define ITR_BACKEND_ENTRY "itr_backend_module"
 
 /* Names as in C. NOLINTBEGIN(readability-identifier-naming) */
@@ -21,8 +21,15 @@ extern "C" {
 /* Outcomes, as itr::linear::Outcome. */
 enum { ITR_OK, ITR_NOT_POSITIVE_DEFINITE, ITR_SINGULAR, ITR_NON_FINITE, ITR_OUT_OF_MEMORY, ITR_NOT_CONVERGED, ITR_FAILED };
 
-/* Capability bits. */
-enum { ITR_INDEFINITE = 1, ITR_ITERATIVE = 2, ITR_THREADS = 4, ITR_MPI = 8, ITR_KEEPS_ORDER = 16 };
+/* Capability bits. ITR_TELLS_DEFINITENESS: ITR_NOT_POSITIVE_DEFINITE or negative_pivots tells of every matrix that is not. */
+enum {
+  ITR_INDEFINITE = 1,
+  ITR_ITERATIVE = 2,
+  ITR_THREADS = 4,
+  ITR_MPI = 8,
+  ITR_KEEPS_ORDER = 16,
+  ITR_TELLS_DEFINITENESS = 32
+};
 
 /* Lower triangle with the diagonal, by columns, rows ascending. */
 typedef struct itr_pattern {
@@ -44,10 +51,11 @@ typedef struct itr_hints {
 /* What the last factorisation and solve took; zero where the library does not tell. */
 typedef struct itr_statistics {
   double factor_nonzeros;
-  double factor_bytes;  /* summed over the ranks */
-  double largest_bytes; /* of any one rank */
-  double flops;         /* of the factorisation */
-  double iterations;    /* of the last solve */
+  double factor_bytes;    /* summed over the ranks */
+  double largest_bytes;   /* of any one rank */
+  double flops;           /* of the factorisation */
+  double iterations;      /* of the last solve */
+  double negative_pivots; /* of the last factorisation L D L^T: as many as negative eigenvalues */
 } itr_statistics;
 
 typedef struct itr_engine {

@@ -44,7 +44,11 @@ std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefin
 /// over.
 std::string choose_name(const LinearOptions& options, Registry& registry);
 
-/// The solver that `options` ask for, with its fallbacks behind it. Throws InputError as choose_name, and for options that
+/// `solver`, with eigen:ldlt for matrices that it refuses as not positive definite; itself where it refuses none.
+std::unique_ptr<Solver> with_indefinite(std::unique_ptr<Solver> solver, Registry& registry);
+
+/// The solver that `options` ask for, with its fallbacks behind it; one that solves indefinite systems too where they
+/// `may_be_indefinite`. Throws InputError as choose_name, and for options that
 /// a solver which may run does not have. `registry` must outlive the solver.
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
                                       const Logger& logger);

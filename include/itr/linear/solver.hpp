@@ -39,7 +39,8 @@ struct Capabilities {
   bool iterative = false;
   bool threads = false;
   bool mpi = false;
-  bool keeps_order = false;  ///< makes use of AnalyzeHints::may_keep_order
+  bool keeps_order = false;         ///< makes use of AnalyzeHints::may_keep_order
+  bool tells_definiteness = false;  ///< by the outcome or by Statistics::negative_pivots
 };
 
 /// What may help an analysis; all optional.
@@ -59,6 +60,7 @@ struct Statistics {
   double largest_bytes = 0;  ///< of any one rank
   double flops = 0;          ///< of the factorisation
   int iterations = 0;        ///< of the last solve
+  int negative_pivots = 0;   ///< of the last factorisation L D L^T: as many as negative eigenvalues
 };
 
 /// Options of a backend by name, as `itr solvers` lists them: {"ordering", "metis"}.

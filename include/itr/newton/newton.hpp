@@ -25,6 +25,10 @@ class NewtonSystem {
   /// Does that, or else finds by other means what solve(rhs) is to return; its outcome says the same of the matrix.
   virtual linear::Outcome prepare(double shift, const VectorX& rhs) = 0;
   virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
+  /// Whether factorize, solve or negative_pivots tells of every matrix that is not positive definite.
+  virtual bool tells_definiteness() const { return true; }
+  /// Of the last factorisation: as many as negative eigenvalues of the matrix; 0 where the solver does not count them.
+  virtual int negative_pivots() const { return 0; }
   /// Who failed and why, after an outcome that was not ok.
   virtual std::string message() const = 0;
   /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
@@ -61,6 +65,8 @@ class SparseSystem final : public NewtonSystem {
   linear::Outcome factorize(double shift) override;
   linear::Outcome prepare(double shift, const VectorX& rhs) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
+  int negative_pivots() const override { return solver_.statistics().negative_pivots; }
   std::string message() const override;
   double diagonal_scale() const override;
 
@@ -95,6 +101,7 @@ struct NewtonSummary {
   Termination termination = Termination::iterations;
   bool converged() const { return termination <= Termination::round_off; }
   int iterations = 0;
+  int indefinite = 0;          ///< factorised Hessians with negative eigenvalues, where the solver tells
   double energy = 0;           ///< at the end
   double gradient_norm = 0;    ///< over the unknowns, at the last evaluation, in the options' norm
   double step_norm = 0;        ///< of the last full step, in the options' norm

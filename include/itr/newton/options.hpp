@@ -13,6 +13,15 @@ enum class NewtonNorm {
   linf        ///< max |g/D|, max |p|
 };
 
+/// What Newton does where the Hessian has negative eigenvalues, whatever the linear solver.
+enum class IndefiniteHessian {
+  /// Looks for a minimum: projects the Hessian, and calls no state converged while a factorisation says that its Hessian is
+  /// indefinite. With solvers that cannot tell, Hessians are always projected.
+  project,
+  /// Takes the true Hessian's direction where it is one of descent, as PolyFEM does with an L D L^T: may end at a saddle.
+  accept
+};
+
 /// When a solve has converged, and how it searches. Tolerances are those of the scene (scene-format §7.2, §7.3) already
 /// multiplied by what its vocabulary multiplies them with; 0 turns a test off.
 struct NewtonOptions {
@@ -27,6 +36,7 @@ struct NewtonOptions {
   double energy_tolerance = 0;              ///< stop after `energy_steps` steps in a row that change less [J s^2]
   int energy_steps = 100;
   LineSearch line_search = LineSearch::robust_armijo;
+  IndefiniteHessian indefinite = IndefiniteHessian::project;
   bool project_to_psd = true;         ///< project stencils' Hessians to semi-definite ones where the sum is not definite
   bool absolute_eigenvalues = false;  ///< by changing the sign of negative eigenvalues instead of clamping them
   int projected_iterations = 5;       ///< iterations with it before the true Hessian is tried again; 0: it never is

@@ -21,8 +21,8 @@ struct SplitOptions {
   bool enabled = true;
   double acceptance_tolerance = 1e-3;  ///< least energy decrease [J]
   double culling_threshold = 0.95;
-  int max_depth = 3;              ///< generations of one edge a step
-  double min_edge_length = 1e-6;  ///< shorter rest edges are not split [m]
+  int max_depth = 3;            ///< generations of one edge a step
+  double min_edge_length = -1;  ///< shorter rest edges are not split [m]; below 0: 1e-6 of the bodies' diagonal at rest
 };
 
 struct CollapseOptions {

@@ -32,12 +32,14 @@ struct StepReport {
   int factorizations = 0;     ///< for them
   int reused_factors = 0;     ///< systems that a factor of an earlier one solved
   int linear_iterations = 0;  ///< of conjugate gradients over such factors, failed attempts included
+  int indefinite = 0;         ///< factorised Hessians with negative eigenvalues, where the solver tells
   EnergyReport energy;
   double energy_before_remesh = 0;  ///< total after the first solve [J]
   /// What the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]: not
   /// gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
   double history_loss = 0;
   OperationCount splits, collapses, swaps, smooths;
+  int bound_by_dhat = 0;        ///< surface edges that were not split because the halves would be below dhat
   double trial_seconds = 0;     ///< median over the trials of these operations; 0 where there were none
   int cut_steps = 0;            ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
   int damped_steps = 0;         ///< Newmark only: 1 if taken by implicit Euler, to keep energy from growing

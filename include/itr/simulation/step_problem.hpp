@@ -35,6 +35,10 @@ struct HeldDofs {
 template <int Dim>
 HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t);
 
+/// Of the bounding box of the bodies at rest [m].
+template <int Dim>
+double rest_diagonal(const Mesh<Dim>& mesh);
+
 template <int Dim>
 class StepProblem {
  public:
@@ -52,6 +56,8 @@ class StepProblem {
   double min_distance(const VectorX& x);
   /// At a solution x, those that the setup asks for, as they were in the solve.
   NodalForces forces(const VectorX& x);
+  /// Of all terms but inertia, where the bodies are at x and move with v [N]. Lags what is lagged there.
+  VectorX total_force(const VectorX& x, const VectorX& v);
   /// What the integrator (the trapezoidal rule or implicit Euler) adds to the mechanical energy by a step to x [J]: its work
   /// is a mean of the forces at both ends times the way, the potential's is the integral along it. Friction and loads aside.
   double created_energy(const History& history, const VectorX& x);
@@ -102,6 +108,7 @@ class StepProblem {
   std::shared_ptr<ContactEnergy<Dim>> contact_;       ///< over the vertices of the surface
   std::shared_ptr<const Energy> contact_of_dofs_;     ///< the same over those of the problem
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
+  double diagonal_;                                   ///< of the bodies at rest [m]
   BarrierStiffness stiffness_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
   LaggedTerms lagged_;    ///< of the last solve
