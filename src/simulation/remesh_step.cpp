@@ -31,15 +31,8 @@ StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, 
                               const VectorX& x, double t, double shortest_edge) {
   const TimeIntegrator integrator(setup.time);
   StepContext<Dim> context;
-  context.materials = setup.materials;
-  context.loads = loads_at(setup, t);
-  context.has_inertia = !setup.time.quasistatic && !setup.time.is_static;
-  context.mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
-  context.scaling = problem.scaling();
-  context.contact = setup.contact;
+  static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, t);
   context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
-  if (!setup.time.is_static) context.damping = setup.damping;
-  context.velocity_rate = integrator.velocity_rate(state.history);
   for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
   context.newton = setup.newton;
   context.shortest_edge = shortest_edge;

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "itr/core/timer.hpp"
-#include "itr/energy/mapped.hpp"
 
 namespace itr {
 
@@ -87,98 +86,48 @@ double rest_diagonal(const Mesh<Dim>& mesh) {
 }
 
 template <int Dim>
+PotentialTerms<Dim> potential_terms(const Setup<Dim>& setup, const History& history, double t) {
+  const TimeIntegrator integrator(setup.time);
+  return {.materials = setup.materials,
+          .loads = loads_at(setup, t),
+          .has_inertia = !setup.time.quasistatic && !setup.time.is_static,
+          .mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+          .scaling = integrator.scaling(history),
+          .contact = setup.contact,
+          .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
+          .velocity_rate = integrator.velocity_rate(history)};
+}
+
+template <int Dim>
 StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
                               SparseSystem& system, const BarrierStiffness& stiffness)
     : setup_(setup),
-      loads_at_end_(loads_at(setup, t)),
+      terms_(potential_terms(setup, history, t)),
       cells_(whole_mesh(mesh, setup.obstacles.rest)),
       held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
+      potential_(terms_, cells_,
+                 {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
+                  .velocity_reference = TimeIntegrator(setup.time).velocity_reference(history)}),
       diagonal_(rest_diagonal(mesh)),
       stiffness_(stiffness),
       system_(system) {
-  const TimeIntegrator integrator(setup.time);
-  scaling_ = integrator.scaling(history);
-  if (!setup.time.quasistatic && !setup.time.is_static)
-    inertia_ = std::make_shared<InertiaEnergy<Dim>>(
-        cells_, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent, integrator.predictor(history));
-  elastic_ = std::make_shared<ElasticEnergy<Dim>>(cells_, setup.materials, scaling_);
-  if (loads_at_end_.has_dead_loads())
-    loads_ = std::make_shared<LoadEnergy<Dim>>(cells_, setup.materials, loads_at_end_, scaling_);
   if (setup.contact.enabled) {
     surface_ = contact_surface(setup, mesh);
     if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
-    contact_ = std::make_shared<ContactEnergy<Dim>>(surface_.surface, setup.contact, stiffness_.value, scaling_);
-    contact_of_dofs_ = of_dofs(contact_);
+    potential_.add_contact(surface_.surface, stiffness_.value, surface_.map);
     if (setup.contact.adaptive_stiffness)
-      adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_.surface, setup.contact, average_mass(), scaling_,
+      adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_.surface, setup.contact, average_mass(), terms_.scaling,
                                                            surface_.map.get());
   }
-  velocity_ = {integrator.velocity_rate(history), integrator.velocity_reference(history)};
   system_.reset(dofs_, Dim, stencil_vertices(cells_), Dim + 1);
-}
-
-/// A term over the vertices of the surface as one over those of the problem.
-template <int Dim>
-std::shared_ptr<const Energy> StepProblem<Dim>::of_dofs(std::shared_ptr<const Energy> term) const {
-  if (!surface_.map) return term;
-  return std::make_shared<MappedEnergy<Dim>>(std::move(term), surface_.map);
-}
-
-template <int Dim>
-VelocityRule StepProblem<Dim>::velocity_of_surface() const {
-  return {velocity_.rate, surface_.positions(velocity_.reference)};
-}
-
-template <int Dim>
-std::shared_ptr<const Energy> StepProblem<Dim>::lag_friction(const VectorX& x) {
-  if (!has_friction()) return nullptr;
-  const auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, surface_.positions(x), workspace_, setup_.contact,
-                                                              velocity_of_surface(), scaling_);
-  return friction->empty() ? nullptr : of_dofs(friction);
-}
-
-template <int Dim>
-typename StepProblem<Dim>::LaggedTerms StepProblem<Dim>::lag(const VectorX& x) {
-  LaggedTerms terms;
-  terms.friction = lag_friction(x);
-  if (!loads_at_end_.pressures.empty()) {
-    terms.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, loads_at_end_, x, scaling_);
-    if (terms.pressure->empty()) terms.pressure.reset();
-  }
-  for (const DampingOptions& options : setup_.damping) {
-    if (setup_.time.is_static) continue;
-    if (options.term != DampingOptions::Term::contact)
-      terms.damping.push_back(
-          std::make_shared<DampingEnergy<Dim>>(*elastic_, x, options.coefficient, velocity_, workspace_));
-    else if (contact_)
-      terms.damping.push_back(of_dofs(std::make_shared<DampingEnergy<Dim>>(
-          *contact_, surface_.positions(x), options.coefficient, velocity_of_surface(), workspace_)));
-  }
-  return terms;
-}
-
-template <int Dim>
-EnergySum StepProblem<Dim>::sum_with(const LaggedTerms& lagged) const {
-  EnergySum sum;
-  const auto add = [&](const std::shared_ptr<const Energy>& term) {
-    if (term) sum.add(term);
-  };
-  add(inertia_);
-  add(elastic_);
-  add(loads_);
-  add(contact_of_dofs_);
-  add(lagged.friction);
-  add(lagged.pressure);
-  for (const auto& term : lagged.damping) add(term);
-  return sum;
 }
 
 /// Sum of all entries of the mass matrix by its number of rows, obstacles' included; 1 where there is none [kg].
 template <int Dim>
 double StepProblem<Dim>::average_mass() const {
   const Eigen::Index rows = held_.target.size();
-  return inertia_ ? momentum(VectorX::Ones(rows)).sum() / static_cast<double>(rows) : 1;
+  return potential_.inertia() ? momentum(VectorX::Ones(rows)).sum() / static_cast<double>(rows) : 1;
 }
 
 /// Balances the barrier against the other terms at x. At obstacles the reference implementation's gradient is their
@@ -186,16 +135,16 @@ double StepProblem<Dim>::average_mass() const {
 template <int Dim>
 void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   VectorX gradient = VectorX::Zero(x.size());
-  if (inertia_) inertia_->add_gradient(x, gradient, workspace_);
-  elastic_->add_gradient(x, gradient, workspace_);
-  if (loads_) loads_->add_gradient(x, gradient, workspace_);
+  if (potential_.inertia()) potential_.inertia()->add_gradient(x, gradient, workspace_);
+  potential_.elastic()->add_gradient(x, gradient, workspace_);
+  if (potential_.loads()) potential_.loads()->add_gradient(x, gradient, workspace_);
   if (lagged_.pressure) lagged_.pressure->add_gradient(x, gradient, workspace_);
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
   for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
     gradient.template segment<Dim>(bodies + Dim * o) =
-        -scaling_ * (held_.target.template segment<Dim>(bodies + Dim * o) - setup_.obstacles.rest[o]);
+        -terms_.scaling * (held_.target.template segment<Dim>(bodies + Dim * o) - setup_.obstacles.rest[o]);
   adaptive_->initialize(surface_.positions(x), gradient, stiffness_, workspace_);
-  contact_->set_stiffness(stiffness_.value);
+  potential_.contact()->set_stiffness(stiffness_.value);
 }
 
 /// x with held dofs at their targets, where the straight way there is free.
@@ -204,8 +153,8 @@ VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
   VectorX start = x;
   for (Eigen::Index i = 0; i < x.size(); ++i)
     if (dofs_.unknown[i] == kNone) start[i] = held_.target[i];
-  const bool free =
-      std::isfinite(elastic_->value(start, workspace_)) && contact_of_dofs_->max_step(x, start - x, workspace_) == 1;
+  const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
+                    potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
   return free ? start : x;
 }
 
@@ -237,9 +186,9 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
   };
   const VectorX& step = summary.failed_step;
   if (step.size() == x.size() && step.allFinite()) {
-    const StepLimit cell = elastic_->step_limit(x, step);
+    const StepLimit cell = potential_.elastic()->step_limit(x, step);
     StepLimit pair;
-    if (contact_) pair = contact_->step_limit(on_surface, surface_.motion(step), workspace_);
+    if (potential_.contact()) pair = potential_.contact()->step_limit(on_surface, surface_.motion(step), workspace_);
     const bool is_pair = pair.step < cell.step;
     const StepLimit& limit = is_pair ? pair : cell;
     if (limit.step < 1)
@@ -254,7 +203,7 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
     for (const auto& term : sum.terms()) {
       VectorX gradient = VectorX::Zero(x.size());
       term->add_gradient(x, gradient, workspace_);
-      const Vec<Dim> force = gradient.template segment<Dim>(Dim * v) / scaling_;
+      const Vec<Dim> force = gradient.template segment<Dim>(Dim * v) / terms_.scaling;
       total += force;
       if (force.norm() > largest) {
         largest = force.norm();
@@ -280,11 +229,11 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
     if (!stencil.empty()) text << "; its cell " << name_vertices(stencil, x) << " has the volume ratio " << least;
     least = std::numeric_limits<double>::infinity();
     stencil = {};
-    if (contact_)
-      for (const ContactStencil& s : contact_->active(on_surface, workspace_)) {
+    if (potential_.contact())
+      for (const ContactStencil& s : potential_.contact()->active(on_surface, workspace_)) {
         const std::span<const int> pair(s.vertices.data(), s.size());
         if (!acts_on_it(pair)) continue;
-        const double distance = std::sqrt(contact_->distance(s, on_surface).squared);
+        const double distance = std::sqrt(potential_.contact()->distance(s, on_surface).squared);
         if (distance >= least) continue;
         least = distance;
         stencil = pair;
@@ -299,7 +248,7 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
 /// regression values of peers' scenes.
 template <int Dim>
 NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x) {
-  const EnergySum sum = sum_with(lagged_);
+  const EnergySum sum = potential_.sum(lagged_);
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = &norm_weights_};
   if (!adaptive_)
@@ -310,22 +259,17 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x) {
   extras.after_step = [&](const VectorX& iterate) {
     if (std::exchange(is_first, false) || setup_.time.is_static) return false;
     const bool changed = adaptive_->update(surface_.positions(iterate), stiffness_, workspace_);
-    if (changed) contact_->set_stiffness(stiffness_.value);
+    if (changed) potential_.contact()->set_stiffness(stiffness_.value);
     return changed;
   };
   return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
-}
-
-template <int Dim>
-bool StepProblem<Dim>::has_friction() const {
-  return contact_ && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
 }
 
 /// How often the step may be solved, each time with what is lagged at the solution before.
 template <int Dim>
 int StepProblem<Dim>::most_rounds() const {
   int rounds = 1;
-  if (has_friction())
+  if (potential_.has_friction())
     rounds = setup_.contact.friction_iterations < 0 ? std::numeric_limits<int>::max() : setup_.contact.friction_iterations;
   if (!lagged_.damping.empty())
     for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
@@ -340,7 +284,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
     const ScopedTimer timer(lagging_seconds);
     const bool is_first_step = std::isinf(stiffness_.largest);
     if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
-    lagged_ = lag(lagged_x);
+    lagged_ = potential_.lag(lagged_x, workspace_);
   }
   NewtonSummary summary = minimize_lagged(x);
   summary.assembly_seconds += lagging_seconds;
@@ -348,22 +292,22 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
   std::vector<VectorX> previous = {lagged_x};  // newest last
   VectorX best = x;
-  LaggedTerms best_lagged = lagged_;
+  Lagged best_lagged = lagged_;
   double least = std::numeric_limits<double>::infinity();
   int best_round = 0;
   for (int round = 1; summary.converged() && round < rounds; ++round) {
-    LaggedTerms next_lagged;
+    Lagged next_lagged;
     VectorX gradient = VectorX::Zero(x.size());
     {
       const ScopedTimer timer(summary.assembly_seconds);
-      next_lagged = lag(x);
-      sum_with(next_lagged).add_gradient(x, gradient, workspace_);
+      next_lagged = potential_.lag(x, workspace_);
+      potential_.sum(next_lagged).add_gradient(x, gradient, workspace_);
     }
     double norm = 0;
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
     norm = std::sqrt(norm);
-    if (has_friction() && norm <= tolerance) break;
+    if (potential_.has_friction() && norm <= tolerance) break;
     if (norm < least) {
       least = norm;
       best = x;
@@ -392,12 +336,12 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
 template <int Dim>
 EnergyReport StepProblem<Dim>::report(const VectorX& x) {
   EnergyReport report;
-  const auto value = [&](const auto& term) { return term ? term->value(x, workspace_) / scaling_ : 0.0; };
-  report.inertia = value(inertia_);
-  report.elastic = value(elastic_);
-  report.body = value(loads_) + value(lagged_.pressure);
-  report.contact = value(contact_of_dofs_);
-  report.friction = value(lag_friction(x));
+  const auto value = [&](const auto& term) { return term ? term->value(x, workspace_) / terms_.scaling : 0.0; };
+  report.inertia = value(potential_.inertia());
+  report.elastic = value(potential_.elastic());
+  report.body = value(potential_.loads()) + value(lagged_.pressure);
+  report.contact = value(potential_.contact_of_cells());
+  report.friction = value(potential_.lag_friction(x, workspace_));
   for (const auto& term : lagged_.damping) report.damping += value(term);
   report.total = report.inertia + report.elastic + report.body + report.contact + report.friction + report.damping;
   return report;
@@ -409,14 +353,14 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   const auto force = [&](const Energy* term) {
     VectorX gradient = VectorX::Zero(x.size());
     if (term) term->add_gradient(x, gradient, workspace_);
-    return VectorX(-gradient.head(bodies) / scaling_);
+    return VectorX(-gradient.head(bodies) / terms_.scaling);
   };
   NodalForces forces;
   const FieldOptions& asked = setup_.fields;
-  if (asked.contact_forces) forces.contact = force(contact_of_dofs_.get());
+  if (asked.contact_forces) forces.contact = force(potential_.contact_of_cells().get());
   if (asked.friction_forces) forces.friction = force(lagged_.friction.get());
   if (!asked.reaction_forces) return forces;
-  const EnergySum all = sum_with(lagged_);
+  const EnergySum all = potential_.sum(lagged_);
   forces.reaction = -force(&all);
   for (Eigen::Index i = 0; i < bodies; ++i)
     if (dofs_.unknown[i] != kNone) forces.reaction[i] = 0;
@@ -425,16 +369,16 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
 
 template <int Dim>
 VectorX StepProblem<Dim>::total_force(const VectorX& x, const VectorX& v) {
-  velocity_.reference = x - v / velocity_.rate;
+  potential_.set_velocity_reference(x - v / terms_.velocity_rate);
   if (adaptive_) initialize_stiffness(x);
-  lagged_ = lag(x);
+  lagged_ = potential_.lag(x, workspace_);
   EnergySum sum;
-  const EnergySum all = sum_with(lagged_);
+  const EnergySum all = potential_.sum(lagged_);
   for (const auto& term : all.terms())
-    if (term != inertia_) sum.add(term);
+    if (term != potential_.inertia()) sum.add(term);
   VectorX gradient = VectorX::Zero(x.size());
   sum.add_gradient(x, gradient, workspace_);
-  return -gradient / scaling_;
+  return -gradient / terms_.scaling;
 }
 
 template <int Dim>
@@ -448,9 +392,9 @@ double StepProblem<Dim>::created_energy(const History& history, const VectorX& x
     term.add_gradient(x, gradient, workspace_);
     term.add_gradient(trapezoidal ? x0 : x, gradient, workspace_);
   };
-  add(*elastic_);
-  if (contact_) add(*contact_of_dofs_);
-  const double created = (rise - 0.5 * gradient.dot(x - x0)) / scaling_;
+  add(*potential_.elastic());
+  if (potential_.contact()) add(*potential_.contact_of_cells());
+  const double created = (rise - 0.5 * gradient.dot(x - x0)) / terms_.scaling;
   if (trapezoidal) return created;
   const VectorX change = TimeIntegrator(setup_.time).velocity(x, history) - v0;
   return created - 0.5 * change.dot(momentum(change));
@@ -459,14 +403,14 @@ double StepProblem<Dim>::created_energy(const History& history, const VectorX& x
 template <int Dim>
 VectorX StepProblem<Dim>::momentum(const VectorX& v) const {
   VectorX result = VectorX::Zero(v.size());
-  if (inertia_) inertia_->add_mass_product(v, result);
+  if (potential_.inertia()) potential_.inertia()->add_mass_product(v, result);
   return result;
 }
 
 template <int Dim>
 double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
-  double energy = elastic_->value(x, workspace_) / scaling_;
-  if (contact_) energy += contact_of_dofs_->value(x, workspace_) / scaling_;
+  double energy = potential_.elastic()->value(x, workspace_) / terms_.scaling;
+  if (potential_.contact()) energy += potential_.contact_of_cells()->value(x, workspace_) / terms_.scaling;
   return energy + 0.5 * v.dot(momentum(v));
 }
 
@@ -480,7 +424,8 @@ double StepProblem<Dim>::energy_resolution() const {
 
 template <int Dim>
 double StepProblem<Dim>::min_distance(const VectorX& x) {
-  return contact_ ? contact_->min_distance(surface_.positions(x), workspace_) : std::numeric_limits<double>::infinity();
+  return potential_.contact() ? potential_.contact()->min_distance(surface_.positions(x), workspace_)
+                              : std::numeric_limits<double>::infinity();
 }
 
 template <int Dim>
@@ -490,11 +435,12 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   return least;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                          \
-  template class StepProblem<Dim>;                                                    \
-  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                       \
-  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double); \
-  template double rest_diagonal<Dim>(const Mesh<Dim>&);                               \
+#define ITR_INSTANTIATE(Dim)                                                                    \
+  template class StepProblem<Dim>;                                                              \
+  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                                 \
+  template PotentialTerms<Dim> potential_terms<Dim>(const Setup<Dim>&, const History&, double); \
+  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double);           \
+  template double rest_diagonal<Dim>(const Mesh<Dim>&);                                         \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "itr/energy/contact/contact.hpp"
@@ -45,6 +46,9 @@ class IncrementalPotential {
 
   /// Adds contact among the vertices of `surface`: those of the cells, or (with a `map` from theirs) of its own.
   void add_contact(const CollisionSurface& surface, double stiffness, std::shared_ptr<const VertexMap<Dim>> map = nullptr);
+
+  /// Lagged terms from here on are of velocities that vanish at these positions [m].
+  void set_velocity_reference(VectorX x) { history_.velocity_reference = std::move(x); }
 
   /// Terms that depend on an earlier iterate; null or empty where the scene has none.
   struct Lagged {

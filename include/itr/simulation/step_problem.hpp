@@ -5,14 +5,8 @@
 #include <span>
 #include <string>
 
-#include "itr/energy/contact/contact.hpp"
-#include "itr/energy/contact/friction.hpp"
 #include "itr/energy/contact/stiffness.hpp"
-#include "itr/energy/damping.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/pressure.hpp"
+#include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/frame.hpp"
@@ -24,6 +18,10 @@ namespace itr {
 /// Loads of a setup at time t.
 template <int Dim>
 Loads<Dim> loads_at(const Setup<Dim>& setup, double t);
+
+/// What acts in the step that ends at time t, as every scope of it sees it.
+template <int Dim>
+PotentialTerms<Dim> potential_terms(const Setup<Dim>& setup, const History& history, double t);
 
 /// Which dofs are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two conditions
 /// the one with the larger tag wins.
@@ -69,49 +67,32 @@ class StepProblem {
   const DofMap& dofs() const { return dofs_; }
   const CellSet<Dim>& cells() const { return cells_; }
   const CollisionSurface& surface() const { return surface_.surface; }
-  double scaling() const { return scaling_; }
+  double scaling() const { return terms_.scaling; }
 
  private:
-  /// What depends on an earlier iterate of the step; null where the scene has none.
-  struct LaggedTerms {
-    std::shared_ptr<const Energy> friction;
-    std::shared_ptr<PressureEnergy<Dim>> pressure;
-    std::vector<std::shared_ptr<const Energy>> damping;
-  };
-  std::shared_ptr<const Energy> of_dofs(std::shared_ptr<const Energy> term) const;
-  VelocityRule velocity_of_surface() const;
-  std::shared_ptr<const Energy> lag_friction(const VectorX& x);
-  LaggedTerms lag(const VectorX& x);
-  EnergySum sum_with(const LaggedTerms& lagged) const;
+  using Lagged = typename IncrementalPotential<Dim>::Lagged;
   NewtonSummary minimize_lagged(VectorX& x);
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   std::string name_vertices(std::span<const int> vertices, const VectorX& x, const char* own = "") const;
   void initialize_stiffness(const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
-  bool has_friction() const;
   int most_rounds() const;
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;
 
   const Setup<Dim>& setup_;
-  Loads<Dim> loads_at_end_;
+  PotentialTerms<Dim> terms_;
   CellSet<Dim> cells_;
   ContactSurface<Dim> surface_;
   HeldDofs<Dim> held_;
   DofMap dofs_;
-  double scaling_;
-  VelocityRule velocity_;
+  IncrementalPotential<Dim> potential_;
   Workspace workspace_;
-  std::shared_ptr<InertiaEnergy<Dim>> inertia_;
-  std::shared_ptr<ElasticEnergy<Dim>> elastic_;
-  std::shared_ptr<LoadEnergy<Dim>> loads_;
-  std::shared_ptr<ContactEnergy<Dim>> contact_;       ///< over the vertices of the surface
-  std::shared_ptr<const Energy> contact_of_dofs_;     ///< the same over those of the problem
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   double diagonal_;                                   ///< of the bodies at rest [m]
   BarrierStiffness stiffness_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
-  LaggedTerms lagged_;    ///< of the last solve
+  Lagged lagged_;         ///< of the last solve
   SparseSystem& system_;
 };
 
