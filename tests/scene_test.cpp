@@ -271,6 +271,7 @@ TEST_F(SceneTest, WaysToProjectTheHessian) {
   EXPECT_EQ(newton({{"force_psd_projection", true}}).projected_iterations, 0);
   EXPECT_GT(newton({{"force_psd_projection", false}}).projected_iterations, 0);
   EXPECT_THROW(newton({{"force_psd_projection", true}, {"use_psd_projection", false}}), itr::InputError);
+  EXPECT_EQ(read2(square({{"solver", {{"nonlinear", {{"iterations_per_strategy", 1}}}}}})).newton.projected_iterations, 2);
   EXPECT_FALSE(newton({{"extend_steps", false}}).extend_steps);
   EXPECT_EQ(newton({{"indefinite", "accept"}}).indefinite, IndefiniteHessian::accept);
   EXPECT_EQ(newton(json::object()).indefinite, IndefiniteHessian::project);

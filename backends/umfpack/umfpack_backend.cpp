@@ -19,7 +19,8 @@ class Umfpack {
   Umfpack() {
     umfpack_dl_defaults(control_.data());
     control_[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;
-    control_[UMFPACK_IRSTEP] = 0;  // residuals are checked and refined by our side for all backends
+    control_[UMFPACK_SCALE] = UMFPACK_SCALE_NONE;  // that of rows would make a symmetric matrix unsymmetric
+    control_[UMFPACK_IRSTEP] = 0;                  // residuals are checked and refined by our side for all backends
   }
   ~Umfpack() {
     umfpack_dl_free_symbolic(&symbolic_);

@@ -17,6 +17,9 @@ namespace itr {
 namespace {
 
 constexpr double kParallel = 1e-24;  ///< squared sine of the angle of edges that count as parallel
+/// Closest points that are outside a feature by less than this (barycentric) count as inside: the distance is the same to
+/// its square, and round-off does not decide between the features' second derivatives, which differ.
+constexpr double kOnBoundary = 1e-11;
 
 enum class OnEdge { start, end, inside };
 
@@ -24,8 +27,9 @@ template <int Dim>
 OnEdge closest_on_edge(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b) {
   const Vec<Dim> e = b - a;
   const double along = e.dot(p - a);
-  if (!(along > 0)) return OnEdge::start;
-  return along < e.squaredNorm() ? OnEdge::inside : OnEdge::end;
+  const double length_squared = e.squaredNorm();
+  if (!(along > -kOnBoundary * length_squared)) return OnEdge::start;
+  return along < (1 + kOnBoundary) * length_squared ? OnEdge::inside : OnEdge::end;
 }
 
 template <int Dim>
@@ -76,7 +80,9 @@ struct Foot {
   bool inside = false;
   Foot(const Vec<3>& p, const Vec<3>& a, const Vec<3>& b, const Vec<3>& c)
       : normal((b - a).cross(c - a)), area_squared(normal.squaredNorm()) {
-    const auto left_of = [&](const Vec<3>& u, const Vec<3>& v) { return normal.dot((v - u).cross(p - u)) >= 0; };
+    const auto left_of = [&](const Vec<3>& u, const Vec<3>& v) {
+      return normal.dot((v - u).cross(p - u)) >= -kOnBoundary * area_squared;
+    };
     inside = area_squared > 0 && left_of(a, b) && left_of(b, c) && left_of(c, a);
   }
 };
@@ -93,7 +99,8 @@ struct CommonPerpendicular {
     exists = true;
   }
   bool exists = false;
-  bool inside() const { return exists && s >= 0 && s <= 1 && t >= 0 && t <= 1; }
+  static bool on_edge(double s) { return s >= -kOnBoundary && s <= 1 + kOnBoundary; }
+  bool inside() const { return exists && on_edge(s) && on_edge(t); }
 };
 
 /// dc/dbeta: columns are the parameters.

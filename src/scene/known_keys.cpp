@@ -124,7 +124,8 @@ constexpr Group kGroups[] = {
     {"/solver/nonlinear", Role::read,
      "x_delta_tol:non_negative grad_norm_tol:non_negative rel_grad_norm_tol:non_negative rel_x_delta_tol:non_negative "
      "newton_decrement_tol:non_negative norm_type:string first_grad_norm_tol:non_negative"},
-    {"/solver/nonlinear", Role::ignored, "iterations_per_strategy use_grad_norm"},
+    {"/solver/nonlinear", Role::read, "iterations_per_strategy:count"},
+    {"/solver/nonlinear", Role::ignored, "use_grad_norm"},
     {"/solver/nonlinear/advanced", Role::read,
      "first_grad_norm_tol:non_negative f_delta:non_negative f_delta_tol:non_negative f_delta_step_tol"},
     {"/solver/nonlinear/advanced", Role::ignored, "derivative_along_delta_x_tol apply_gradient_fd gradient_fd_eps"},

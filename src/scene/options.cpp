@@ -205,6 +205,9 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
   const Node newton = nonlinear["Newton"];
   options.project_to_psd = newton["use_psd_projection"].boolean(true);
   options.absolute_eigenvalues = newton["psd_projection"].choice({"clamp", "absolute"}, 0) == 1;
+  // PolyFEM leaves a fallback strategy after one step more than that.
+  options.projected_iterations =
+      1 + nonlinear["iterations_per_strategy"].integer_at_least(1, options.projected_iterations - 1);
   options.projected_iterations = newton["projected_iterations"].integer_at_least(0, options.projected_iterations);
   if (const Node force = newton["force_psd_projection"]; force.boolean(false)) {
     if (!options.project_to_psd) force.fail("true", "false beside use_psd_projection = false");
