@@ -277,11 +277,23 @@ int StepProblem<Dim>::most_rounds() const {
   return rounds;
 }
 
+/// Bodies go about where inertia leads them, what is held to its target.
+template <int Dim>
+void StepProblem<Dim>::foresee_contact(const VectorX& x) {
+  if (!potential_.contact()) return;
+  VectorX way = VectorX::Zero(x.size());
+  if (potential_.inertia()) way = potential_.inertia()->predictor() - x;
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    if (dofs_.unknown[i] == kNone) way[i] = held_.target[i] - x[i];
+  potential_.contact()->foresee(surface_.positions(x), surface_.motion(way), workspace_);
+}
+
 template <int Dim>
 NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
   double lagging_seconds = 0;
   {
     const ScopedTimer timer(lagging_seconds);
+    foresee_contact(x);
     const bool is_first_step = std::isinf(stiffness_.largest);
     if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
     lagged_ = potential_.lag(lagged_x, workspace_);

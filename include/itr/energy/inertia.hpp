@@ -21,6 +21,7 @@ class InertiaEnergy final : public Energy {
   /// mesh cannot represent (design §3, rule b): see projection/forgotten_history.hpp.
   void set_unrepresented_history(VectorX residual, double loss);
 
+  const VectorX& predictor() const { return predictor_; }
   std::string_view name() const override { return "inertia"; }
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;

@@ -75,6 +75,7 @@ class StepProblem {
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   std::string name_vertices(std::span<const int> vertices, const VectorX& x, const char* own = "") const;
   void initialize_stiffness(const VectorX& x);
+  void foresee_contact(const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
   int most_rounds() const;
   VectorX momentum(const VectorX& v) const;

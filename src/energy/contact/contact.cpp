@@ -336,6 +336,11 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
 }
 
 template <int Dim>
+void ContactEnergy<Dim>::foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const {
+  workspace.get<ContactCandidates<Dim>>().update(surface_, x, &dx, dhat_);
+}
+
+template <int Dim>
 StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
   const VectorX motion = dx, end = x + dx;
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
