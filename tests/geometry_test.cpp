@@ -226,6 +226,7 @@ TEST(Geometry3, PairDistanceIsTheLeastOverAllPoints) {
       if (i % 5 == 0) x[3] = x[2] + (x[1] - x[0]) + 1e-9 * random_point<3>(random);  // nearly parallel edges, slivers
       if (i % 7 == 0) x[3] = x[2];                                                   // degenerate
       const double squared = pair_distance_squared<3>(kind, x.data());
+      EXPECT_LE(box_distance_squared<3>(kind, x.data()), squared * (1 + 1e-12));
       EXPECT_NEAR(std::sqrt(squared), std::sqrt(sampled_distance_squared(kind, x)), 2e-4) << i;
       const ClosestFeatures closest = closest_features<3>(kind, x.data());
       std::array<Vec<3>, 4> features;

@@ -68,7 +68,7 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
   for (int i = 0; i <= Dim; ++i)
     for (int j = 0; j <= Dim; ++j)
       for (int c = 0; c < Dim; ++c) unit(Dim * i + c, Dim * j + c) = unit_mass.off + (i == j ? unit_mass.extra : 0);
-  sink.add_constant_elements<Dim>(cells_, this, [&](std::size_t e, Mat<kDofs>& block) { block = mass_[e] * unit; });
+  sink.add_multiples<Dim>(cells_, mass_, unit);
 }
 
 template <int Dim>

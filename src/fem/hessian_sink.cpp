@@ -20,13 +20,13 @@ DofMap DofMap::from_held(const std::vector<char>& held) {
 }
 
 void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
-  kept_key_ = nullptr;
   place_.clear();
   changed_ = true;
   if (dim == dim_ && stencil_size == stencil_size_ && dofs.unknown == unknown_ && stencils == stencils_) {
     pattern_ = base_;
     return;
   }
+  kept_key_.clear();
   pattern_ = {};
   gathers_.clear();
   unknown_ = dofs.unknown;
@@ -105,8 +105,8 @@ void SparseAssembler::add_batch(std::size_t first, const double* blocks) {
   });
 }
 
-bool SparseAssembler::add_kept(const void* key) {
-  if (kept_key_ != key || key == nullptr) return false;
+bool SparseAssembler::add_kept(const std::vector<double>& key) {
+  if (kept_key_.empty() || kept_key_ != key) return false;
   for (std::size_t k = 0; k < kept_.size(); ++k) values_[place(static_cast<int>(k))] += kept_[k];
   return true;
 }
@@ -116,12 +116,12 @@ void SparseAssembler::begin_keeping() {
   std::fill(values_.begin(), values_.end(), 0.0);
 }
 
-void SparseAssembler::end_keeping(const void* key) {
-  kept_key_ = key;
+void SparseAssembler::end_keeping(std::vector<double> key) {
+  kept_key_ = std::move(key);
   kept_.resize(base_.row_indices.size());
   for (std::size_t k = 0; k < kept_.size(); ++k) kept_[k] = values_[place(static_cast<int>(k))];
   values_ = others_;
-  add_kept(key);
+  add_kept(kept_key_);
 }
 
 void SparseAssembler::begin() {

@@ -238,6 +238,15 @@ Eigen::Matrix<double, 4 * Dim, Dim + 2> pair_distance_range(PairKind kind, const
 }
 
 template <int Dim>
+double box_distance_squared(PairKind kind, const Vec<Dim>* x) {
+  const int first = kind == PairKind::edge_edge ? 2 : 1, size = pair_size(kind);
+  Vec<Dim> low = x[0], high = x[0], other_low = x[first], other_high = x[first];
+  if (first == 2) low = low.cwiseMin(x[1]), high = high.cwiseMax(x[1]);
+  for (int k = first + 1; k < size; ++k) other_low = other_low.cwiseMin(x[k]), other_high = other_high.cwiseMax(x[k]);
+  return (low - other_high).cwiseMax(other_low - high).cwiseMax(0.0).squaredNorm();
+}
+
+template <int Dim>
 double pair_distance_squared(PairKind kind, const Vec<Dim>* x) {
   switch (kind) {
     case PairKind::vertex_vertex:
@@ -317,6 +326,7 @@ Mat<12> edge_cross_squared_hessian(const Vec<3>* x) {
   template PairDistance<Dim> pair_distance<Dim>(PairKind, const Vec<Dim>*);                                          \
   template Mat<4 * (Dim)> pair_distance_hessian<Dim>(PairKind, const Vec<Dim>*);                                     \
   template Eigen::Matrix<double, 4 * (Dim), (Dim) + 2> pair_distance_range<Dim>(PairKind, const PairDistance<Dim>&); \
+  template double box_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                              \
   template double pair_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                             \
   template double point_edge_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);
 ITR_INSTANTIATE(2)

@@ -43,11 +43,12 @@ class SparseAssembler {
   /// of its batch.
   void add_batch(std::size_t first, const double* blocks);
 
-  /// A part of the matrix that is the same each time: adds what was kept under `key`, if it was.
-  bool add_kept(const void* key);
-  /// What is added between the two (to entries of the base pattern only) is kept under `key`, until the next reset.
+  /// A part of the matrix that is the same each time: adds what was kept for `key`, by whose values it is determined, if
+  /// the stencils are still those that it was kept with.
+  bool add_kept(const std::vector<double>& key);
+  /// What is added between the two (to entries of the base pattern only) is kept for `key`.
   void begin_keeping();
-  void end_keeping(const void* key);
+  void end_keeping(std::vector<double> key);
 
   /// Takes in entries that the pattern did not have. Returns whether the pattern changed since the last call.
   bool finish();
@@ -79,7 +80,7 @@ class SparseAssembler {
   std::vector<int> place_;  ///< of the base's entries in the present pattern; empty: the same
   std::vector<Gather> gathers_;
   std::vector<double> kept_, others_;  ///< by the base's entries; what was there before begin_keeping
-  const void* kept_key_ = nullptr;
+  std::vector<double> kept_key_;       ///< empty: nothing is kept
 };
 
 /// A step that held dofs are made to take, and what it does to the Newton system of the unknowns.
@@ -130,14 +131,17 @@ class HessianSink {
       add_batch<Dim>(cells, first, std::span<const Block>(blocks).first(count));
     }
   }
-  /// The same where the blocks are those of the last time with this key.
-  template <int Dim, typename Fill>
-  void add_constant_elements(const CellSet<Dim>& cells, const void* key, const Fill& fill) {
+  /// One block times a factor for each element: a sum that is kept, and made anew only where it changes.
+  template <int Dim>
+  void add_multiples(const CellSet<Dim>& cells, const std::vector<double>& factors, const Mat<Dim*(Dim + 1)>& block) {
+    const auto fill = [&](std::size_t e, Mat<Dim*(Dim + 1)>& multiple) { multiple = factors[e] * block; };
     if (!sparse_ || motion_) return add_elements<Dim>(cells, fill);
+    std::vector<double> key(factors);
+    key.insert(key.end(), block.data(), block.data() + block.size());
     if (sparse_->add_kept(key)) return;
     sparse_->begin_keeping();
     add_elements<Dim>(cells, fill);
-    sparse_->end_keeping(key);
+    sparse_->end_keeping(std::move(key));
   }
 
  private:

@@ -49,6 +49,10 @@ Mat<4 * Dim> pair_distance_hessian(PairKind kind, const Vec<Dim>* x);
 template <int Dim>
 Eigen::Matrix<double, 4 * Dim, Dim + 2> pair_distance_range(PairKind kind, const PairDistance<Dim>& pair);
 
+/// What the boxes around a pair's two primitives leave of their squared distance: never more than it.
+template <int Dim>
+double box_distance_squared(PairKind kind, const Vec<Dim>* x);
+
 /// Squared distance of a pair, whatever its closest features.
 template <int Dim>
 double pair_distance_squared(PairKind kind, const Vec<Dim>* x);

@@ -97,6 +97,10 @@ class ActiveSet {
     const auto [a, b] = surface_.edges[edge];
     return point_edge_distance_squared<Dim>(at<Dim>(x_, v), at<Dim>(x_, a), at<Dim>(x_, b)) < reach_squared_;
   }
+  bool is_near(PairKind kind, const std::array<Vec<Dim>, 4>& p) const {
+    return box_distance_squared<Dim>(kind, p.data()) < reach_squared_ &&
+           pair_distance_squared<Dim>(kind, p.data()) < reach_squared_;
+  }
   bool are_near(int p, int q) const { return (at<Dim>(x_, p) - at<Dim>(x_, q)).squaredNorm() < reach_squared_; }
   bool are_adjacent(int p, int q) const {
     return std::binary_search(surface_.edges.begin(), surface_.edges.end(), Ids{std::min(p, q), std::max(p, q)});
@@ -165,7 +169,7 @@ class ActiveSet {
       const auto [v, f] = pairs[i];
       const auto& t = surface_.triangles[f];
       const std::array<Vec<Dim>, 4> p{at<Dim>(x_, v), at<Dim>(x_, t[0]), at<Dim>(x_, t[1]), at<Dim>(x_, t[2])};
-      if (pair_distance_squared<Dim>(PairKind::face_vertex, p.data()) >= reach_squared_) return;
+      if (!is_near(PairKind::face_vertex, p)) return;
       const auto closest = closest_features<Dim>(PairKind::face_vertex, p.data());
       part.stencils.push_back(reduced({v, t[0], t[1], t[2]}, closest, convergent_ ? surface_.area[v] / 4 : 1));
       if (!convergent_) return;
@@ -215,7 +219,7 @@ class ActiveSet {
     const auto visit = [&](std::size_t i, Part& part) {
       const auto [a, b] = pairs[i];
       const EdgePair pair = edge_pair(a, b);
-      if (pair_distance_squared<3>(PairKind::edge_edge, pair.p.data()) >= reach_squared_) return;
+      if (!is_near(PairKind::edge_edge, pair.p)) return;
       const auto closest = closest_features<3>(PairKind::edge_edge, pair.p.data());
       const double threshold = mollifier_threshold(a, b);
       const double weight = convergent_ ? (surface_.edge_area[a] + surface_.edge_area[b]) / 4 : 1;

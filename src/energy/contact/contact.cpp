@@ -195,11 +195,12 @@ template <int Dim>
 double ContactEnergy<Dim>::min_distance(ConstVectorView x, Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
   candidates.update(surface_, x, nullptr, dhat_);
-  double smallest = kInfinity;
+  double smallest = dhat_ * dhat_;
   for (const auto& [kind, pairs] : candidates.all())
     for (const auto& pair : *pairs) {
       const auto p = gather<Dim>(vertices_of(surface_, kind, pair), pair_size(kind), x);
-      smallest = std::min(smallest, pair_distance_squared<Dim>(kind, p.data()));
+      if (box_distance_squared<Dim>(kind, p.data()) < smallest)
+        smallest = std::min(smallest, pair_distance_squared<Dim>(kind, p.data()));
     }
   return smallest < dhat_ * dhat_ ? std::sqrt(smallest) : kInfinity;
 }
