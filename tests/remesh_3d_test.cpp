@@ -2,6 +2,7 @@
 // Trials and whole remeshing in 3D: a patch sees what the whole mesh sees, and the state stays valid.
 #include <gtest/gtest.h>
 
+#include <map>
 #include <memory>
 #include <random>
 
@@ -121,6 +122,111 @@ TEST(LocalProblem3d, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
     }
   }
   EXPECT_GT(in_contact, 10);
+}
+
+TEST(LocalProblem3d, RelaxationLowersTheGlobalEnergyByWhatItReports) {
+  int compared = 0, in_contact = 0, clear = 0;
+  for (unsigned seed = 0; compared < 60; ++seed) {
+    TetScene scene(seed);
+    scene.context.contact.friction_coefficient = 0;  // lagged where a relaxation starts
+    if (find_inverted<3>(scene.mesh, scene.fields.x) != kNone) continue;
+    if (!std::isfinite(whole_energy(scene.mesh, scene.fields, scene.context))) continue;
+    const Strata<3> strata(scene.mesh);
+    const Gate<3> gate(scene.mesh, scene.fields, scene.context);
+    const RemeshState<3> state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::interpolated};
+    LocalScratch<3> scratch;
+    Marks marks;
+    for (int i = 0; i < 5; ++i) {
+      const auto edit = random_edit(scene, strata, scene.random);
+      if (!edit || !gate.passes(*edit, scratch.hits)) continue;
+      const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
+      LocalProblem<3> after(state, patch, *edit, true, scratch);
+      if (!after.has_unknowns()) continue;
+      Mesh<3> changed = scene.mesh;
+      RemeshFields<3> fields = scene.fields;
+      const VertexId created = changed.apply(*edit);
+      fields.follow(*edit, created);
+      const double local_before = after.value(), global_before = whole_energy(changed, fields, scene.context);
+      const double fall = local_before - after.relax(20).energy;
+      for (const auto& [v, x] : after.positions()) fields.x.segment<3>(3 * (v == kNewVertex ? created : v)) = x;
+      ASSERT_NEAR(fall, global_before - whole_energy(changed, fields, scene.context), 1e-10 * global_before)
+          << "seed " << seed << ", edit " << i;
+      ++compared;
+      ++(after.touches_contact() ? in_contact : clear);
+    }
+  }
+  EXPECT_GT(in_contact, 10);
+  EXPECT_GT(clear, 10);
+}
+
+TEST(ContactReach3d, DistancesOfPiecesAreThoseOfAllTheirPrimitives) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const auto point = [&] { return Vec<3>(uniform(random), uniform(random), uniform(random)); };
+  int near = 0;
+  for (int i = 0; i < 3000; ++i) {
+    SurfacePiece<3> a, b;
+    const int shared = i % 3;
+    for (int k = 0; k < 3; ++k) a.add(point(), k);
+    for (int k = 0; k < 3; ++k) b.add(k < shared ? a.p[2 - k] : point(), k < shared ? 2 - k : 10 + k);
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 3; ++k) {
+      if (!b.has(a.id[k])) least = std::min(least, point_triangle_distance_squared(a.p[k], b.p[0], b.p[1], b.p[2]));
+      if (!a.has(b.id[k])) least = std::min(least, point_triangle_distance_squared(b.p[k], a.p[0], a.p[1], a.p[2]));
+      for (int l = 0; l < 3; ++l) {
+        const std::array u{a.id[k], a.id[(k + 1) % 3]}, w{b.id[l], b.id[(l + 1) % 3]};
+        if (u[0] != w[0] && u[0] != w[1] && u[1] != w[0] && u[1] != w[1])
+          least = std::min(least, edge_edge_distance_squared(a.p[k], a.p[(k + 1) % 3], b.p[l], b.p[(l + 1) % 3]));
+      }
+    }
+    const double reach = 0.5 * uniform(random);
+    EXPECT_DOUBLE_EQ(distance_below(a, b, reach), std::min(reach, std::sqrt(least)));
+    EXPECT_EQ(come_near(a, b, reach), least < reach * reach);
+    near += least < reach * reach;
+  }
+  EXPECT_GT(near, 500);
+}
+
+TEST(ContactReach3d, NeighbourhoodsAreKeptThroughEditsAndMoves) {
+  int compared = 0, edited = 0;
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    TetScene scene(seed);
+    Strata<3> strata(scene.mesh);
+    Gate<3> gate(scene.mesh, scene.fields, scene.context);
+    const SurfaceIndex<3>& surface = gate.present();
+    Neighbourhoods<3> kept;
+    SurfaceIndex<3>::Hits hits;
+    const double radius = 0.7 * surface.span();
+    for (int i = 0; i < 60; ++i) {
+      const auto edit = random_edit(scene, strata, scene.random);
+      if (!edit || !gate.passes(*edit, hits)) continue;
+      const int first = scene.mesh.facet_slots();
+      const VertexId created = scene.mesh.apply(*edit);
+      scene.fields.follow(*edit, created);
+      gate.follow(*edit, first);
+      strata.follow(*edit, created);
+      const VertexId moved = scene.mesh.facet(scene.mesh.facet_slots() - 1)[0];
+      if (moved != kNone) {
+        scene.fields.x.segment<3>(3 * moved) += Vec<3>(0.001, 0.002, -0.001);
+        gate.move(moved);
+      }
+      ++edited;
+      Neighbourhoods<3> fresh;
+      for (FacetId f = 0; f < scene.mesh.facet_slots(); ++f) {
+        if (!scene.mesh.is_facet_alive(f)) continue;
+        std::map<int, double> expected;
+        for (const auto& [piece, distance] : fresh.near(surface, f, radius, hits)) expected[piece] = distance;
+        for (const auto& [piece, distance] : kept.near(surface, f, radius, hits)) {
+          ASSERT_TRUE(expected.contains(piece)) << "seed " << seed << ", edit " << i;
+          ASSERT_EQ(distance, expected[piece]);
+          compared += static_cast<int>(expected.erase(piece));
+        }
+        ASSERT_TRUE(expected.empty()) << "seed " << seed << ", edit " << i << ": not known to be near facet " << f;
+      }
+    }
+  }
+  EXPECT_GT(edited, 50);
+  EXPECT_GT(compared, 1000);
 }
 
 TEST(Bounds3d, OfOneVertexNeverExceedWhatAPatchGains) {

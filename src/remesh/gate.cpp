@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "contact_reach.hpp"
 #include "itr/geometry/predicates.hpp"
 
 namespace itr {
@@ -16,27 +17,14 @@ int orientation_of(const std::array<Vec<Dim>, Dim + 1>& p) {
   if constexpr (Dim == 3) return orientation(p[0], p[1], p[2], p[3]);
 }
 
-/// A simplex of the surface or of an obstacle, with ids that say which corners two of them share.
-template <int Dim>
-struct Piece {
-  std::array<Vec<Dim>, 3> p;
-  std::array<long, 3> id;
-  int size = 0;
-  void add(const Vec<Dim>& point, long number) {
-    p[size] = point;
-    id[size++] = number;
-  }
-  bool has(long number) const { return std::find(id.begin(), id.begin() + size, number) != id.begin() + size; }
-};
-
-bool meet(const Piece<2>& a, const Piece<2>& b) {
+bool meet(const SurfacePiece<2>& a, const SurfacePiece<2>& b) {
   for (int k = 0; k < a.size; ++k)
     if (b.has(a.id[k])) return false;
   return a.size == 2 && b.size == 2 && segments_intersect(a.p[0], a.p[1], b.p[0], b.p[1]);
 }
 
 /// Whether an edge of `a` that shares no corner with the triangle `b` crosses it.
-bool crosses(const Piece<3>& a, const Piece<3>& b) {
+bool crosses(const SurfacePiece<3>& a, const SurfacePiece<3>& b) {
   if (b.size < 3 || a.size < 2) return false;
   for (int k = 0; k < (a.size == 3 ? 3 : 1); ++k) {
     const int l = (k + 1) % a.size;
@@ -45,7 +33,7 @@ bool crosses(const Piece<3>& a, const Piece<3>& b) {
   }
   return false;
 }
-bool meet(const Piece<3>& a, const Piece<3>& b) { return crosses(a, b) || crosses(b, a); }
+bool meet(const SurfacePiece<3>& a, const SurfacePiece<3>& b) { return crosses(a, b) || crosses(b, a); }
 
 /// Whether a point lies in a closed simplex of whatever orientation, or flat.
 template <int Dim>
@@ -67,7 +55,8 @@ template <int Dim>
 Gate<Dim>::Gate(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context)
     : mesh_(mesh), has_contact_(context.contact.enabled), primitives_(ObstaclePrimitives::make<Dim>(context.obstacles)) {
   configurations_.reserve(1 + fields.past_positions.size());
-  configurations_.push_back({&fields.x, {mesh, fields.x, primitives_, context.obstacles.x}});
+  const double span = has_contact_ ? span_of_clearances(mesh, fields.x, context.contact.activation_distance) : 0;
+  configurations_.push_back({&fields.x, {mesh, fields.x, primitives_, context.obstacles.x, span}});
   for (std::size_t i = 0; i < fields.past_positions.size(); ++i)
     configurations_.push_back(
         {&fields.past_positions[i], {mesh, fields.past_positions[i], primitives_, context.obstacles.past_x[i]}});
@@ -134,17 +123,18 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
     });
   };
 
-  std::vector<Piece<Dim>> inserted;
+  std::vector<SurfacePiece<Dim>> inserted;
   for (const auto& facet : edit.inserted_facets) {
-    Piece<Dim>& piece = inserted.emplace_back();
+    SurfacePiece<Dim>& piece = inserted.emplace_back();
     for (const VertexId v : facet.vertices) piece.add(after(v), v);
   }
-  const auto is_free_of = [&](const Piece<Dim>& other) {
-    return std::none_of(inserted.begin(), inserted.end(), [&](const Piece<Dim>& piece) { return meet(piece, other); });
+  const auto is_free_of = [&](const SurfacePiece<Dim>& other) {
+    return std::none_of(inserted.begin(), inserted.end(),
+                        [&](const SurfacePiece<Dim>& piece) { return meet(piece, other); });
   };
   for (const FacetId f : hits.facets) {
     if (std::find(edit.removed_facets.begin(), edit.removed_facets.end(), f) != edit.removed_facets.end()) continue;
-    Piece<Dim> piece;
+    SurfacePiece<Dim> piece;
     for (const VertexId v : mesh_.facet(f)) {
       piece.add(after(v), v);
       if (!is_part(v) && is_swept(after(v))) return false;
@@ -152,9 +142,9 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
     if (!is_free_of(piece)) return false;
   }
   for (const int i : hits.obstacles) {
-    Piece<Dim> piece;
+    SurfacePiece<Dim> piece;
     for (const int v : primitives_.all[i].ids()) {
-      piece.add(surface.obstacle_at(v), -1L - v);
+      piece.add(surface.obstacle_at(v), SurfacePiece<Dim>::id_of_obstacle(v));
       if (is_swept(surface.obstacle_at(v))) return false;
     }
     if (!is_free_of(piece)) return false;

@@ -11,30 +11,33 @@ namespace itr {
 
 namespace {
 
-/// Keeps vertices of the surface where the patch knows everything that they could touch: an energy of value zero that only
-/// limits steps.
+/// Keeps vertices of the surface where the patch knows everything that they could touch, no further than `room` from where
+/// they started: an energy of value zero that only limits steps.
 template <int Dim>
 class MotionBound final : public Energy {
  public:
-  MotionBound(const std::vector<char>& bounded, const Box<Dim>& room) : bounded_(bounded), room_(room) {}
+  MotionBound(std::vector<int> bounded, VectorX start, double room)
+      : bounded_(std::move(bounded)), start_(std::move(start)), room_(room) {}
   std::string_view name() const override { return "motion bound"; }
   double value(ConstVectorView, Workspace&) const override { return 0; }
   void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
   void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override {
     double step = 1;
-    for (std::size_t v = 0; v < bounded_.size(); ++v)
-      for (int c = 0; bounded_[v] && c < Dim; ++c) {
-        const double from = x[Dim * static_cast<int>(v) + c], move = dx[Dim * static_cast<int>(v) + c];
-        const double room = move > 0 ? room_.max[c] - from : from - room_.min[c];
-        if (std::abs(move) > room) step = std::min(step, 0.99 * room / std::abs(move));
-      }
+    for (const int v : bounded_) {
+      const Vec<Dim> move = dx.segment<Dim>(Dim * v), away = x.segment<Dim>(Dim * v) - start_.segment<Dim>(Dim * v);
+      if ((away + step * move).norm() <= room_) continue;
+      // Where the way leaves the ball: |away + t move| = room.
+      const double a = move.squaredNorm(), b = away.dot(move), c = std::max(0.0, room_ * room_ - away.squaredNorm());
+      step = std::min(step, 0.99 * c / (b + std::sqrt(b * b + a * c)));
+    }
     return step;
   }
 
  private:
-  const std::vector<char>& bounded_;
-  const Box<Dim>& room_;
+  std::vector<int> bounded_;
+  VectorX start_;
+  double room_;
 };
 
 }  // namespace
@@ -98,6 +101,12 @@ int LocalProblem<Dim>::local(LocalVertex v) {
   if (v.kind == Kind::of_mesh) scratch_.local_of[v.id] = id;
   if (v.kind == Kind::of_obstacle) scratch_.local_of_obstacle[v.id] = id;
   return id;
+}
+
+template <int Dim>
+bool LocalProblem<Dim>::is_free(int i) const {
+  const auto* unknown = &dofs_.unknown[Dim * i];
+  return std::any_of(unknown, unknown + Dim, [](int u) { return u != kNone; });
 }
 
 template <int Dim>
@@ -185,13 +194,8 @@ void LocalProblem<Dim>::hold_vertices() {
 template <int Dim>
 std::vector<char> LocalProblem<Dim>::vertices_whose_contacts_change() {
   std::vector<char> changes(vertices_.size(), 0);
-  const auto is_free = [&](std::size_t i) {
-    for (int c = 0; c < Dim; ++c)
-      if (dofs_.unknown[Dim * i + c] != kNone) return true;
-    return false;
-  };
   for (std::size_t i = 0; i < vertices_.size(); ++i)
-    if (vertices_[i].kind == Kind::of_mesh && mesh_.is_boundary(vertices_[i].id)) changes[i] = is_free(i);
+    if (vertices_[i].kind == Kind::of_mesh && mesh_.is_boundary(vertices_[i].id)) changes[i] = is_free(static_cast<int>(i));
   const auto mark = [&](VertexId v) {
     if (v == kNewVertex && !is_after_) return;
     if (is_after_ && v == edit_.removed_vertex) return;
@@ -204,13 +208,42 @@ std::vector<char> LocalProblem<Dim>::vertices_whose_contacts_change() {
   return changes;
 }
 
+/// Hands over the facets at what changes, and looks for what they could touch.
+template <int Dim>
+void LocalProblem<Dim>::find_contacts() {
+  ContactReach<Dim>& reach = scratch_.reach;
+  reach.clear(mesh_.facet_slots());
+  const auto add = [&](const typename MeshTypes<Dim>::Facet& facet, FacetId f) {
+    SurfacePiece<Dim> piece;
+    bool moves = false;
+    for (const VertexId v : facet) {
+      piece.add(field_value(state_.fields.x, {}, {v == kNewVertex ? Kind::created : Kind::of_mesh, v}), v);
+      moves = moves || (v == kNewVertex || scratch_.known[v] ? is_free(local(v)) : false);
+    }
+    reach.add(piece, f, moves);
+  };
+  scratch_.facets.clear(mesh_.facet_slots());
+  for (std::size_t i = 0; i < changes_.size(); ++i) {
+    if (!changes_[i] || vertices_[i].kind != Kind::of_mesh) continue;
+    for (const FacetId f : mesh_.facets_of(vertices_[i].id))
+      if (scratch_.facets.mark(f) && !is_removed(f)) add(mesh_.facet(f), f);
+  }
+  if (is_after_)
+    for (const auto& facet : edit_.inserted_facets) add(facet.vertices, kNone);
+  reach.find(state_.surface, scratch_.neighbourhoods, state_.context.contact.activation_distance, scratch_.hits,
+             [&](FacetId f) { return is_removed(f); });
+}
+
 /// The part of the surface that can touch what changes, with the stars of its vertices: contact is weighted by them.
 template <int Dim>
 void LocalProblem<Dim>::add_surface() {
   changes_ = vertices_whose_contacts_change();
-  const std::size_t num_changing = changes_.size();
   if (std::find(changes_.begin(), changes_.end(), 1) == changes_.end()) return;
+  find_contacts();
   has_surface_ = true;
+  const ContactReach<Dim>& reach = scratch_.reach;
+  touches_contact_ = !reach.touching().empty();
+  if (!touches_contact_) return;
 
   using Facet = typename MeshTypes<Dim>::Facet;
   std::vector<std::array<int, 2>> edges;
@@ -227,48 +260,27 @@ void LocalProblem<Dim>::add_surface() {
     for (int k = 0; k < Dim; ++k) ids[k] = local(facet[k]);
     add(ids, Dim);
   };
-
-  // Facets at what changes: how far they may move says what else is to be known.
   std::vector<FacetId> facets;
+  std::vector<int> primitives;
+  const ObstaclePrimitives& obstacles = state_.surface.primitives();
   scratch_.facets.clear(mesh_.facet_slots());
-  const auto take_star = [&](VertexId v) {
-    for (const FacetId f : mesh_.facets_of(v))
-      if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
-  };
-  for (std::size_t i = 0; i < num_changing; ++i)
-    if (changes_[i] && vertices_[i].kind == Kind::of_mesh) take_star(vertices_[i].id);
-  Box<Dim> box;
-  double longest = 0;
-  const auto include = [&](const Facet& facet) {
-    std::array<Vec<Dim>, Dim> p;
-    for (int k = 0; k < Dim; ++k)
-      p[k] = field_value(state_.fields.x, {}, {facet[k] == kNewVertex ? Kind::created : Kind::of_mesh, facet[k]});
-    for (int k = 0; k < Dim; ++k) {
-      box.include(p[k]);
-      longest = std::max(longest, (p[k] - p[(k + 1) % Dim]).norm());
+  scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
+  for (const int id : reach.touching()) {
+    if (id == kNewVertex) continue;
+    if (id < 0) {
+      for (const int i : obstacles.at_vertex[SurfacePiece<Dim>::id_of_obstacle(id)])
+        if (scratch_.primitives.mark(i)) primitives.push_back(i);
+      continue;
     }
-  };
-  for (const FacetId f : facets) include(mesh_.facet(f));
-  if (is_after_)
-    for (const auto& facet : edit_.inserted_facets) include(facet.vertices);
-  const double dhat = state_.context.contact.activation_distance, room = std::max(2 * dhat, 0.25 * longest);
-  room_ = box.inflated(room);
-  seen_ = room_.inflated(dhat);
-  state_.surface.query(seen_, scratch_.hits);
-
-  for (const FacetId f : scratch_.hits.facets)
-    for (const int v : mesh_.facet(f)) take_star(v);
+    for (const FacetId f : mesh_.facets_of(id))
+      if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
+  }
   std::sort(facets.begin(), facets.end());
   for (const FacetId f : facets) add_facet(mesh_.facet(f));
   if (is_after_)
-    for (const auto& facet : edit_.inserted_facets) add_facet(facet.vertices);
-  const ObstaclePrimitives& obstacles = state_.surface.primitives();
-  std::vector<int> primitives;
-  scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
-  for (const int i : scratch_.hits.obstacles)
-    for (const int v : obstacles.all[i].ids())
-      for (const int j : obstacles.at_vertex[v])
-        if (scratch_.primitives.mark(j)) primitives.push_back(j);
+    for (const auto& facet : edit_.inserted_facets)
+      if (std::any_of(facet.vertices.begin(), facet.vertices.end(), [&](int v) { return reach.touches(v); }))
+        add_facet(facet.vertices);
   std::sort(primitives.begin(), primitives.end());
   for (const int i : primitives) {
     std::array<int, 3> ids{};
@@ -287,7 +299,7 @@ void LocalProblem<Dim>::add_terms() {
   x_ = gather(state_.fields.x, context.obstacles.x);
   PotentialHistory history;
   if (context.has_inertia) history.predictor = gather(state_.fields.predictor, {});
-  const bool has_velocity = has_surface_ || !context.damping.empty();  // friction or damping can act
+  const bool has_velocity = touches_contact_ || !context.damping.empty();  // friction or damping can act
   if (has_velocity && state_.fields.velocity_reference.size() > 0)
     history.velocity_reference = gather(state_.fields.velocity_reference, context.obstacles.velocity_reference);
   potential_ = std::make_unique<IncrementalPotential<Dim>>(context, cells_, std::move(history));
@@ -296,10 +308,13 @@ void LocalProblem<Dim>::add_terms() {
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
     add_unrepresented_history(*potential_->inertia());
   if (has_surface_) {
-    energy_.add(std::make_shared<MotionBound<Dim>>(changes_, room_));  // first: contact then looks no further than that
-    potential_->add_contact(surface_, context.contact.barrier_stiffness);
-    touches_contact_ = potential_->contact()->has_candidates(x_, workspace_);
+    std::vector<int> bounded;
+    for (std::size_t i = 0; i < changes_.size(); ++i)
+      if (changes_[i] && is_free(static_cast<int>(i))) bounded.push_back(static_cast<int>(i));
+    // First: contact then looks no further than that.
+    energy_.add(std::make_shared<MotionBound<Dim>>(std::move(bounded), x_, scratch_.reach.room()));
   }
+  if (touches_contact_) potential_->add_contact(surface_, context.contact.barrier_stiffness);
   const EnergySum sum = potential_->sum(potential_->lag(x_, workspace_));
   for (const auto& term : sum.terms()) energy_.add(term);
 }
@@ -365,11 +380,8 @@ NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
 template <int Dim>
 std::vector<typename LocalProblem<Dim>::Position> LocalProblem<Dim>::positions() const {
   std::vector<Position> moved;
-  for (std::size_t i = 0; i < vertices_.size(); ++i) {
-    const auto* unknown = &dofs_.unknown[Dim * i];
-    if (std::any_of(unknown, unknown + Dim, [](int u) { return u != kNone; }))
-      moved.push_back({vertices_[i].id, x_.segment<Dim>(Dim * static_cast<int>(i))});
-  }
+  for (int i = 0; i < static_cast<int>(vertices_.size()); ++i)
+    if (is_free(i)) moved.push_back({vertices_[i].id, x_.segment<Dim>(Dim * i)});
   return moved;
 }
 

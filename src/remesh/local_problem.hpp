@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "contact_reach.hpp"
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/remesh/fields.hpp"
 #include "marks.hpp"
-#include "surface_index.hpp"
 
 namespace itr {
 
@@ -42,6 +42,8 @@ struct LocalScratch {
   std::vector<int> local_of_obstacle;  ///< the same of the obstacles' vertices
   Marks known, known_obstacles, cells, patch, facets, primitives;
   typename SurfaceIndex<Dim>::Hits hits;
+  Neighbourhoods<Dim> neighbourhoods;
+  ContactReach<Dim> reach;
   DenseSystem system;
 };
 
@@ -60,7 +62,7 @@ class LocalProblem {
   NewtonSummary relax(int max_iterations);
   bool has_unknowns() const { return dofs_.num_unknowns > 0; }
   int num_unknowns() const { return dofs_.num_unknowns; }
-  /// Whether any contact pair can come within reach.
+  /// Whether anything that the patch changes could touch something.
   bool touches_contact() const { return touches_contact_; }
 
   struct Position {
@@ -69,8 +71,6 @@ class LocalProblem {
   };
   /// Where vertices are that have a free component.
   std::vector<Position> positions() const;
-  /// Of the surface that this problem looked at (empty without contact).
-  const Box<Dim>& seen() const { return seen_; }
 
  private:
   using Kind = LocalVertex::Kind;
@@ -79,6 +79,7 @@ class LocalProblem {
   void add_cells(std::span<const CellId> patch);
   void add_loaded_facets();
   void hold_vertices();
+  void find_contacts();
   void add_surface();
   std::vector<char> vertices_whose_contacts_change();
   VectorX gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values) const;
@@ -87,6 +88,7 @@ class LocalProblem {
   bool is_value_vertex(const LocalVertex& v) const;
   Vec<Dim> rest_position(const LocalVertex& v) const;
   Vec<Dim> field_value(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, const LocalVertex& v) const;
+  bool is_free(int i) const;
   bool is_removed(FacetId f) const;
 
   const RemeshState<Dim>& state_;
@@ -104,8 +106,6 @@ class LocalProblem {
   EnergySum energy_;
   std::unique_ptr<IncrementalPotential<Dim>> potential_;
   std::vector<char> changes_;  ///< by local vertex: whether its contacts can change
-  Box<Dim> room_;              ///< where those may move
-  Box<Dim> seen_;
   Workspace workspace_;
 };
 

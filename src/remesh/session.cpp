@@ -32,14 +32,12 @@ bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
 
 template <int Dim>
 bool RemeshSession<Dim>::is_in_contact(const EdgeKey& e) {
-  if (!has_contact() || !is_surface(e)) return false;
-  Box<Dim> box;
-  for (const int v : e) box.include(Vec<Dim>(fields_.x.template segment<Dim>(Dim * v)));
-  gate_.present().query(box.inflated(context_.contact.activation_distance), scratch_.hits);
-  if (!scratch_.hits.obstacles.empty()) return true;
-  return std::any_of(scratch_.hits.facets.begin(), scratch_.hits.facets.end(), [&](FacetId f) {
-    const auto& facet = mesh_.facet(f);
-    return std::none_of(facet.begin(), facet.end(), [&](int v) { return v == e[0] || v == e[1]; });
+  if (!has_contact()) return false;
+  const double dhat = context_.contact.activation_distance;
+  const auto facets = mesh_.facets_of(e[0]);
+  return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
+    return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() &&
+           scratch_.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch_.hits);
   });
 }
 
@@ -102,7 +100,7 @@ Verdict<Dim> RemeshSession<Dim>::attempt(const Edit<Dim>& edit, const Vec<Dim>& 
   const RemeshState<Dim> state = this->state();
   TrialOptions trial{.required = context_.scaling * tolerance, .local = local};
   if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth && edit.value)
-    trial.patch_over_vertex = patch_over_vertex(largest_poisson_ratio(edit));
+    trial.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit));
   Verdict<Dim> verdict = preview<Dim>(state, gate_, edit, center, total_volume_, trial, scratch_);
   if (verdict.accepted()) commit(edit, verdict);
   return verdict;

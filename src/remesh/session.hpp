@@ -69,7 +69,8 @@ class RemeshSession {
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
   /// Whether a prediction says that a patch cannot gain the tolerance [J] either.
   bool is_hopeless(const Edit<Dim>& edit, double predicted, double tolerance) const {
-    return screens() && at_most(predicted, patch_over_vertex(largest_poisson_ratio(edit))) < context_.scaling * tolerance;
+    return screens() &&
+           at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(edit))) < context_.scaling * tolerance;
   }
 
   /// Tries an edit that has to gain `tolerance` [J], and commits it where it does. Returns the verdict; the patch of an

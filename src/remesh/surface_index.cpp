@@ -34,8 +34,9 @@ ObstaclePrimitives ObstaclePrimitives::make(const typename StepContext<Dim>::Obs
 
 template <int Dim>
 SurfaceIndex<Dim>::SurfaceIndex(const Mesh<Dim>& mesh, const VectorX& x, const ObstaclePrimitives& primitives,
-                                const std::vector<Vec<Dim>>& obstacle_x)
-    : mesh_(&mesh), x_(&x), primitives_(&primitives), obstacle_x_(&obstacle_x) {
+                                const std::vector<Vec<Dim>>& obstacle_x, double span)
+    : mesh_(&mesh), x_(&x), primitives_(&primitives), obstacle_x_(&obstacle_x), span_(span) {
+  stamps_.assign(mesh.facet_slots(), now_);
   std::vector<Box<Dim>> boxes(mesh.facet_slots());
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.is_facet_alive(f)) boxes[f] = box_of(f);
@@ -54,6 +55,20 @@ Box<Dim> SurfaceIndex<Dim>::box_of(FacetId f) const {
 }
 
 template <int Dim>
+SurfacePiece<Dim> SurfaceIndex<Dim>::piece(FacetId f) const {
+  SurfacePiece<Dim> piece;
+  for (const int v : mesh_->facet(f)) piece.add(at(v), v);
+  return piece;
+}
+
+template <int Dim>
+SurfacePiece<Dim> SurfaceIndex<Dim>::obstacle_piece(int primitive) const {
+  SurfacePiece<Dim> piece;
+  for (const int v : primitives_->all[primitive].ids()) piece.add(obstacle_at(v), SurfacePiece<Dim>::id_of_obstacle(v));
+  return piece;
+}
+
+template <int Dim>
 void SurfaceIndex<Dim>::query(const Box<Dim>& box, Hits& hits) const {
   hits.facets.clear();
   hits.obstacles.clear();
@@ -64,14 +79,39 @@ void SurfaceIndex<Dim>::query(const Box<Dim>& box, Hits& hits) const {
 }
 
 template <int Dim>
+void SurfaceIndex<Dim>::stamp_near(const Box<Dim>& box) {
+  if (span_ == 0) return;
+  stamped_.clear();
+  facets_.query(box.inflated(span_), stamped_);
+  for (const FacetId f : stamped_) stamps_[f] = now_;
+}
+
+template <int Dim>
 void SurfaceIndex<Dim>::follow(std::span<const FacetId> removed, FacetId first_new) {
-  for (const FacetId f : removed) facets_.remove(f);
-  for (FacetId f = first_new; f < mesh_->facet_slots(); ++f) facets_.insert(f, box_of(f));
+  ++now_;
+  stamps_.resize(mesh_->facet_slots(), now_);
+  for (const FacetId f : removed) {
+    stamp_near(facets_.box(f));
+    facets_.remove(f);
+  }
+  for (FacetId f = first_new; f < mesh_->facet_slots(); ++f) {
+    const Box<Dim> box = box_of(f);
+    facets_.insert(f, box);
+    stamp_near(box);
+  }
 }
 
 template <int Dim>
 void SurfaceIndex<Dim>::move(VertexId v) {
-  for (const FacetId f : mesh_->facets_of(v)) facets_.update(f, box_of(f));
+  ++now_;
+  Box<Dim> around;
+  for (const FacetId f : mesh_->facets_of(v)) {
+    const Box<Dim> box = box_of(f);
+    around.include(facets_.box(f));
+    around.include(box);
+    facets_.update(f, box);
+  }
+  stamp_near(around);
 }
 
 template ObstaclePrimitives ObstaclePrimitives::make<2>(const StepContext<2>::ObstacleGeometry&);

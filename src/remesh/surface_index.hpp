@@ -9,6 +9,7 @@
 
 #include "itr/geometry/dynamic_tree.hpp"
 #include "itr/remesh/fields.hpp"
+#include "surface_piece.hpp"
 
 namespace itr {
 
@@ -34,9 +35,9 @@ class SurfaceIndex {
     std::vector<int> obstacles;   ///< indices of primitives, ascending
   };
 
-  /// At these positions of the mesh's vertices and the obstacles'; all of it must outlive this.
+  /// At these positions of the mesh's vertices and the obstacles'; all of it must outlive this. `span` [m]: see stamp().
   SurfaceIndex(const Mesh<Dim>& mesh, const VectorX& x, const ObstaclePrimitives& primitives,
-               const std::vector<Vec<Dim>>& obstacle_x);
+               const std::vector<Vec<Dim>>& obstacle_x, double span = 0);
 
   /// Whatever has a bounding box that meets `box`. Several may ask at once.
   void query(const Box<Dim>& box, Hits& hits) const;
@@ -49,14 +50,24 @@ class SurfaceIndex {
   Vec<Dim> at(VertexId v) const { return x_->template segment<Dim>(Dim * v); }
   const Vec<Dim>& obstacle_at(int v) const { return (*obstacle_x_)[v]; }
   const ObstaclePrimitives& primitives() const { return *primitives_; }
+  /// Changes (and is never 0) whenever something changes nearer than span() to the facet.
+  unsigned stamp(FacetId f) const { return stamps_[f]; }
+  double span() const { return span_; }
+  SurfacePiece<Dim> piece(FacetId f) const;
+  SurfacePiece<Dim> obstacle_piece(int primitive) const;
 
  private:
   Box<Dim> box_of(FacetId f) const;
+  void stamp_near(const Box<Dim>& box);
 
   const Mesh<Dim>* mesh_;
   const VectorX* x_;
   const ObstaclePrimitives* primitives_;
   const std::vector<Vec<Dim>>* obstacle_x_;
+  double span_;
+  std::vector<unsigned> stamps_;
+  unsigned now_ = 1;
+  std::vector<FacetId> stamped_;
   DynamicTree<Dim> facets_;
   Bvh<Dim> obstacles_;
 };

@@ -22,7 +22,6 @@ struct Comparison {
   double gain = -std::numeric_limits<double>::infinity();
   bool touches_contact = false;
   bool has_unknowns = false;
-  Box<Dim> seen;
 };
 
 /// `settle`, called with the side after the edit where it gains `required`, may go on with it.
@@ -34,8 +33,6 @@ Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> p
   Comparison<Dim> result;
   result.touches_contact = before.touches_contact() || after.touches_contact();
   result.has_unknowns = after.has_unknowns();
-  result.seen = before.seen();
-  result.seen.include(after.seen());
   const int effort = result.touches_contact ? contact_iterations : iterations;
   const double energy_before = before.value();
   const double energy_after = after.has_unknowns() ? after.relax(effort).energy : after.value();
@@ -89,7 +86,8 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
       verdict.decision = Decision::by_bound;
       verdict.gain = bound.gain;
       verdict.touches_contact = bound.touches_contact;
-      return at_most(bound.gain, surface_touches ? kPatchOverVertexInContact : options.patch_over_vertex) < options.required;
+      return at_most(bound.gain, surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex) <
+             options.required;
     };
     // What the new mesh cannot represent of the history takes the longest to find: first without.
     const bool is_nested = edit.kind == Edit<Dim>::Kind::split || state.history == HistoryRule::interpolated;
@@ -102,7 +100,6 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
   verdict.patch = select_patch<Dim>(state.mesh, edit.removed_cells, center, total_volume, options.local, scratch.patch);
   if (is_enough) {
     LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
-    verdict.seen = after.seen();
     verdict.touches_contact = after.touches_contact();
     finish(after);
     return verdict;
@@ -111,7 +108,6 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
                                   options.local.max_contact_iterations, scratch, finish);
   verdict.gain = found.gain;
   verdict.touches_contact = found.touches_contact;
-  verdict.seen = found.seen;
   verdict.was_relaxed = true;
   if (!verdict.accepted()) verdict.decision = found.has_unknowns ? Decision::by_energy : Decision::no_unknowns;
   return verdict;

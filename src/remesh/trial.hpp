@@ -25,7 +25,6 @@ struct Verdict {
   double gain = 0;           ///< decrease of the energy that was found [J, times the scaling]; negative: increase
   bool touches_contact = false;
   std::vector<CellId> patch{};                                    ///< that was read
-  Box<Dim> seen{};                                                ///< of the surface
   std::vector<typename LocalProblem<Dim>::Position> positions{};  ///< where accepted
   bool accepted() const { return decision == Decision::accepted; }
 };

@@ -101,6 +101,8 @@ BARS = {
     # Less than the reference gains (47.2 J), and a lower energy: a mesh that is adapted earlier has less to gain later.
     "ball-wall 2D to t=0.0024": {"gain": 30, "energy": 458.33, "vertices": 1600},
     "masticator h=0.1 to t=3, swaps and smoothing, tolerance 0.1": {"energy": 3125.9, "vertices": 800},
+    "ball-wall 3D to t=0.00132": {"gain": 0.0161, "vertices": 2800},
+    "masticator 3D to t=1.1": {"gain": 3.22, "vertices": 1100},
     "twisting-beam to t=0.2, tolerance 10": {"gain": 2463, "vertices": 1100},
     "ball-wall 2D fixed mesh to t=0.0024": {"energy": (462.161, 1e-5)},
     "1-square-dbc fixed mesh": {"energy": (201.109, 1e-5)},

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// Which parts of the surface can touch where an edit and the relaxation after it change it: most patches of a mesh touch
+// nothing, and need no contact.
+#pragma once
+
+#include <vector>
+
+#include "marks.hpp"
+#include "surface_index.hpp"
+
+namespace itr {
+
+/// What is worth knowing of clearances on this surface [m]: the `span` of its index.
+template <int Dim>
+double span_of_clearances(const Mesh<Dim>& mesh, const VectorX& x, double dhat);
+
+/// What lies near each facet, and how far away. Found on demand, and kept as long as nothing changes there.
+template <int Dim>
+class Neighbourhoods {
+ public:
+  using Hits = typename SurfaceIndex<Dim>::Hits;
+  struct Near {
+    int piece;        ///< a facet, or of_obstacle(primitive)
+    double distance;  ///< see distance_below [m]
+  };
+  static constexpr int of_obstacle(int primitive) { return kNone - 1 - primitive; }  ///< and back
+
+  /// All that the facet could touch nearer than `radius` [m], at most the surface's span, and perhaps more.
+  std::span<const Near> near(const SurfaceIndex<Dim>& surface, FacetId f, double radius, Hits& hits);
+  /// Whether something is nearer than dhat [m].
+  bool is_in_contact(const SurfaceIndex<Dim>& surface, FacetId f, double dhat, Hits& hits);
+
+ private:
+  struct Entry {
+    std::vector<Near> near;
+    double radius = 0;
+    unsigned stamp = 0;
+  };
+  std::vector<Entry> entries_;  ///< by facet
+};
+
+/// What the facets of one patch could touch.
+template <int Dim>
+class ContactReach {
+ public:
+  using Hits = typename SurfaceIndex<Dim>::Hits;
+
+  /// Forgets the last patch; the mesh has so many facets.
+  void clear(int facet_slots);
+  /// A facet that is replaced or one of whose vertices is free: then it moves. `facet`: its id, kNone where the edit inserts
+  /// it.
+  void add(const SurfacePiece<Dim>& piece, FacetId facet, bool moves);
+  /// Looks for all that what was added could touch, among itself and elsewhere, but for facets that are gone
+  /// (`is_gone(facet)`), where no vertex moves further than room() from where it is. `dhat` [m].
+  template <typename IsGone>
+  void find(const SurfaceIndex<Dim>& surface, Neighbourhoods<Dim>& neighbourhoods, double dhat, Hits& hits,
+            const IsGone& is_gone) {
+    choose_room(dhat, surface.span());
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+      if (own_[i].facet == kNone) {
+        look_around(surface, static_cast<int>(i), hits, is_gone);
+        continue;
+      }
+      for (const auto& [other, distance] : neighbourhoods.near(surface, own_[i].facet, dhat + 2 * room_, hits)) {
+        const bool is_obstacle = other < 0;
+        if ((!is_obstacle && is_gone(other)) || distance >= reach(own_[i].moves, !is_obstacle && moves(other))) continue;
+        mark(own_[i].piece);
+        mark(is_obstacle ? surface.obstacle_piece(Neighbourhoods<Dim>::of_obstacle(other)) : surface.piece(other));
+      }
+    }
+    sort();
+  }
+  /// How far vertices may move [m].
+  double room() const { return room_; }
+  /// Vertices of what can touch, ascending by their ids in pieces.
+  const std::vector<int>& touching() const { return touching_; }
+  bool touches(int id) const { return std::binary_search(touching_.begin(), touching_.end(), id); }
+
+ private:
+  struct Own {
+    SurfacePiece<Dim> piece;
+    FacetId facet;
+    bool moves;
+  };
+  void choose_room(double dhat, double span);
+  bool moves(FacetId f) const { return known_[f] && own_[own_of_[f]].moves; }
+  double reach(bool first_moves, bool second_moves) const { return dhat_ + (first_moves + second_moves) * room_; }
+  void compare(int own, const SurfacePiece<Dim>& other, bool other_moves) {
+    if (!come_near(own_[own].piece, other, reach(own_[own].moves, other_moves))) return;
+    mark(own_[own].piece);
+    mark(other);
+  }
+  /// Compares a facet that the edit inserts with all others.
+  template <typename IsGone>
+  void look_around(const SurfaceIndex<Dim>& surface, int inserted, Hits& hits, const IsGone& is_gone) {
+    surface.query(own_[inserted].piece.box.inflated(reach(own_[inserted].moves, true)), hits);
+    for (const FacetId f : hits.facets)
+      if (!is_gone(f)) compare(inserted, surface.piece(f), moves(f));
+    for (const int i : hits.obstacles) compare(inserted, surface.obstacle_piece(i), false);
+    for (int i = 0; i < inserted; ++i)
+      if (own_[i].facet == kNone) compare(inserted, own_[i].piece, own_[i].moves);
+  }
+  void mark(const SurfacePiece<Dim>& piece) {
+    touching_.insert(touching_.end(), piece.id.begin(), piece.id.begin() + piece.size);
+  }
+  void sort();
+
+  std::vector<Own> own_;
+  Marks known_;
+  std::vector<int> own_of_;  ///< by facet, where it is known
+  std::vector<int> touching_;
+  double dhat_ = 0, room_ = 0;
+};
+
+extern template class Neighbourhoods<2>;
+extern template class Neighbourhoods<3>;
+extern template class ContactReach<2>;
+extern template class ContactReach<3>;
+
+}  // namespace itr

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+#include "surface_piece.hpp"
+
+#include <cmath>
+#include <initializer_list>
+
+namespace itr {
+
+namespace {
+
+/// Whether the boxes around some points of two pieces are further apart than `reach`: most pairs are, and this is cheap.
+template <int Dim>
+bool is_apart(const SurfacePiece<Dim>& a, std::initializer_list<int> i, const SurfacePiece<Dim>& b,
+              std::initializer_list<int> j, double reach) {
+  const auto coordinate = [](const SurfacePiece<Dim>& piece, int c) { return [&piece, c](int k) { return piece.p[k][c]; }; };
+  const auto least = [](std::initializer_list<int> ids, const auto& of) {
+    double value = of(*ids.begin());
+    for (const int k : ids) value = std::min(value, of(k));
+    return value;
+  };
+  const auto most = [](std::initializer_list<int> ids, const auto& of) {
+    double value = of(*ids.begin());
+    for (const int k : ids) value = std::max(value, of(k));
+    return value;
+  };
+  for (int c = 0; c < Dim; ++c)
+    if (least(i, coordinate(a, c)) - most(j, coordinate(b, c)) > reach ||
+        least(j, coordinate(b, c)) - most(i, coordinate(a, c)) > reach)
+      return true;
+  return false;
+}
+
+/// Calls visit(squared distance) for pairs of primitives that may be within `reach`, which it gives back as it is then;
+/// negative where it wants no more.
+template <typename Visit>
+void visit_vertices(const SurfacePiece<2>& a, const SurfacePiece<2>& b, double& reach, const Visit& visit) {
+  if (b.size < 2) return;
+  for (int k = 0; k < a.size && reach >= 0; ++k)
+    if (!b.has(a.id[k]) && !is_apart(a, {k}, b, {0, 1}, reach))
+      reach = visit(point_edge_distance_squared<2>(a.p[k], b.p[0], b.p[1]));
+}
+
+template <typename Visit>
+void visit_vertices(const SurfacePiece<3>& a, const SurfacePiece<3>& b, double& reach, const Visit& visit) {
+  if (b.size < 3) return;
+  for (int k = 0; k < a.size && reach >= 0; ++k)
+    if (!b.has(a.id[k]) && !is_apart(a, {k}, b, {0, 1, 2}, reach))
+      reach = visit(point_triangle_distance_squared(a.p[k], b.p[0], b.p[1], b.p[2]));
+}
+
+template <typename Visit>
+void visit_edges(const SurfacePiece<3>& a, const SurfacePiece<3>& b, double& reach, const Visit& visit) {
+  const auto edges = [](const SurfacePiece<3>& piece) { return piece.size == 3 ? 3 : piece.size - 1; };
+  for (int i = 0; i < edges(a); ++i) {
+    const int i1 = (i + 1) % a.size;
+    for (int j = 0; j < edges(b) && reach >= 0; ++j) {
+      const int j1 = (j + 1) % b.size;
+      const bool meet = a.id[i] == b.id[j] || a.id[i] == b.id[j1] || a.id[i1] == b.id[j] || a.id[i1] == b.id[j1];
+      if (!meet && !is_apart(a, {i, i1}, b, {j, j1}, reach))
+        reach = visit(edge_edge_distance_squared(a.p[i], a.p[i1], b.p[j], b.p[j1]));
+    }
+  }
+}
+
+template <int Dim, typename Visit>
+void visit_pairs(const SurfacePiece<Dim>& a, const SurfacePiece<Dim>& b, double reach, const Visit& visit) {
+  visit_vertices(a, b, reach, visit);
+  visit_vertices(b, a, reach, visit);
+  if constexpr (Dim == 3) visit_edges(a, b, reach, visit);
+}
+
+}  // namespace
+
+template <int Dim>
+double distance_below(const SurfacePiece<Dim>& a, const SurfacePiece<Dim>& b, double limit) {
+  if (!a.box.inflated(limit).overlaps(b.box)) return limit;
+  visit_pairs(a, b, limit, [&](double squared) {
+    if (squared < limit * limit) limit = std::sqrt(squared);
+    return limit;
+  });
+  return limit;
+}
+
+template <int Dim>
+bool come_near(const SurfacePiece<Dim>& a, const SurfacePiece<Dim>& b, double reach) {
+  if (!a.box.inflated(reach).overlaps(b.box)) return false;
+  bool near = false;
+  visit_pairs(a, b, reach, [&](double squared) {
+    near = squared < reach * reach;
+    return near ? -1.0 : reach;
+  });
+  return near;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                  \
+  template double distance_below(const SurfacePiece<Dim>&, const SurfacePiece<Dim>&, double); \
+  template bool come_near(const SurfacePiece<Dim>&, const SurfacePiece<Dim>&, double);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr
