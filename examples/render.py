@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Draws what `itr run` left in a folder: the deformed mesh, cells coloured by elastic energy density, obstacles in grey.
+"""Draws what `itr run` left in a folder: the deformed mesh, cells coloured by a field, obstacles in grey.
 
-usage: render.py RESULTS [-o out.png] [--frames i,j,k] [--animation out.gif]
+usage: render.py RESULTS [-o out.png] [--frames i,j,k] [--animation out.gif] [--field NAME]
 
-Without --frames: the first stored step, the one with the largest elastic energy, and the last.
+Without --frames: the first stored step, the one with the largest elastic energy, and the last. NAME is any dataset of the
+frames' /fields: of vectors and tensors the magnitude counts, of fields on vertices the mean of a cell's. Default:
+elastic_density, on a logarithmic scale.
 """
 
 import argparse
@@ -17,38 +19,45 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LogNorm, Normalize
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from PIL import Image
 
 DECADES = 5  # of energy density that the colours span below its maximum
 MAX_ANIMATION_FRAMES = 150
+ANIMATION_DPI = 90
 
 
 class Frame:
     """One frames/NNNNNN.h5."""
 
-    def __init__(self, path):
+    def __init__(self, path, field="elastic_density"):
         with h5py.File(path, "r") as file:
+            if field not in file["/fields"]:
+                raise SystemExit(f"{path}: no field {field}; there are {', '.join(file['/fields'])} (SCENES.md, "
+                                 "/output/paraview/options, says how to ask for others)")
             self.step, self.t = int(file.attrs["step"]), float(file.attrs["t"])
             self.x = file["/fields/x"][:]
             self.cells = file["/mesh/simplices"][:]
-            self.density = file["/fields/elastic_density"][:]
+            values = file["/fields"][field][:]
+            self.unit = file["/fields"][field].attrs.get("unit", "")
             self.obstacle_x = file["/obstacles/x"][:]
             self.obstacle_edges = file["/obstacles/edges"][:]
             self.obstacle_faces = file["/obstacles/faces"][:]
         self.dim = self.x.shape[1]
+        values = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
+        self.values = values if len(values) == len(self.cells) else values[self.cells].mean(axis=1)
 
     def polygons(self):
-        """Corner positions of what is drawn, and its density: triangles of a plane mesh, boundary faces of a solid one."""
+        """Corner positions of what is drawn, and its values: triangles of a plane mesh, boundary faces of a solid one."""
         if self.dim == 2:
-            return self.x[self.cells], self.density
+            return self.x[self.cells], self.values
         faces = np.concatenate([np.delete(self.cells, k, axis=1) for k in range(4)])
         owner = np.tile(np.arange(len(self.cells)), 4)
         _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
         outer = first[count == 1]
-        return self.x[faces[outer]], self.density[owner[outer]]
+        return self.x[faces[outer]], self.values[owner[outer]]
 
 
 def frame_paths(folder):
@@ -81,8 +90,10 @@ def choose_frames(folder, paths, asked):
     return sorted({steps[0], *during, steps[-1]})
 
 
-def common_norm(frames):
-    largest = max((frame.density.max(initial=0) for frame in frames), default=0) or 1
+def common_norm(frames, is_logarithmic):
+    largest = max((frame.values.max(initial=0) for frame in frames), default=0) or 1
+    if not is_logarithmic:
+        return Normalize(min(frame.values.min(initial=0) for frame in frames), largest)
     return LogNorm(largest / 10**DECADES, largest, clip=True)
 
 
@@ -97,8 +108,8 @@ def common_box(frames):
 def draw_plane(axes, frame, norm):
     # An obstacle from triangles comes as its boundary edges: grey lines, heavier than the mesh.
     axes.add_collection(LineCollection(frame.obstacle_x[frame.obstacle_edges], colors="0.35", linewidths=1.8))
-    polygons, density = frame.polygons()
-    cells = PolyCollection(polygons, array=density, cmap="YlOrRd", norm=norm, edgecolors="0.1", linewidths=0.25)
+    polygons, values = frame.polygons()
+    cells = PolyCollection(polygons, array=values, cmap="YlOrRd", norm=norm, edgecolors="0.1", linewidths=0.25)
     axes.add_collection(cells)
     axes.set_aspect("equal")
     return cells
@@ -107,9 +118,9 @@ def draw_plane(axes, frame, norm):
 def draw_solid(axes, frame, norm):
     if len(frame.obstacle_faces):
         axes.add_collection3d(Poly3DCollection(frame.obstacle_x[frame.obstacle_faces], facecolors=(0.6, 0.6, 0.6, 0.25)))
-    polygons, density = frame.polygons()
+    polygons, values = frame.polygons()
     cells = Poly3DCollection(polygons, cmap="YlOrRd", norm=norm, edgecolors="0.1", linewidths=0.2)
-    cells.set_array(density)
+    cells.set_array(values)
     axes.add_collection3d(cells)
     return cells
 
@@ -141,28 +152,43 @@ def make_axes(frames, box, count):
     return figure, axes.ravel()
 
 
-def render_picture(frames, path):
-    norm, box = common_norm(frames), common_box(frames)
+def label(frames, field):
+    unit = frames[0].unit
+    return field.replace("_", " ") + (f" [{unit}]" if unit else "")
+
+
+def is_logarithmic(field):
+    return field == "elastic_density"
+
+
+def render_picture(frames, path, field):
+    norm, box = common_norm(frames, is_logarithmic(field)), common_box(frames)
     figure, axes = make_axes(frames, box, len(frames))
     for panel, frame in zip(axes, frames):
         cells = draw(panel, frame, norm, box)
-    figure.colorbar(cells, ax=list(axes), label=f"elastic energy density [J/m^{frames[0].dim}]", shrink=0.8)
+    figure.colorbar(cells, ax=list(axes), label=label(frames, field), shrink=0.8)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=150)
     plt.close(figure)
 
 
-def render_animation(frames, path, frames_per_second):
-    norm, box = common_norm(frames), common_box(frames)
+def render_animation(frames, path, frames_per_second, field):
+    """The layout is found once: frame after frame only what moves is drawn, and taken off the canvas."""
+    norm, box = common_norm(frames, is_logarithmic(field)), common_box(frames)
     figure, (axes,) = make_axes(frames, box, 1)
-    figure.colorbar(draw(axes, frames[0], norm, box), ax=axes, label=f"elastic energy density [J/m^{frames[0].dim}]")
-
-    def show(frame):
-        axes.clear()
+    figure.set_dpi(ANIMATION_DPI)
+    figure.colorbar(draw(axes, frames[0], norm, box), ax=axes, label=label(frames, field))
+    figure.canvas.draw()
+    figure.set_layout_engine("none")
+    pictures = []
+    for frame in frames:
+        for artist in list(axes.collections):
+            artist.remove()
         draw(axes, frame, norm, box)
-
-    animation = FuncAnimation(figure, show, frames=frames, init_func=lambda: None)
-    animation.save(path, writer=PillowWriter(frames_per_second), dpi=90)
+        figure.canvas.draw()
+        pictures.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB").quantize(64, dither=Image.Dither.NONE))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / frames_per_second), loop=0)
     plt.close(figure)
 
 
@@ -172,19 +198,20 @@ def main():
     parser.add_argument("-o", "--output", type=pathlib.Path, help="default: RESULTS/picture.png")
     parser.add_argument("--frames", help="steps to show, as i,j,k")
     parser.add_argument("--animation", type=pathlib.Path, help="a .gif of all stored steps")
+    parser.add_argument("--field", default="elastic_density", help="dataset of /fields that colours cells")
     parser.add_argument("--fps", type=int, default=15, help="of the animation")
     arguments = parser.parse_args()
 
     paths = frame_paths(arguments.results)
     if arguments.animation:
         stride = -(-len(paths) // MAX_ANIMATION_FRAMES)
-        frames = [Frame(paths[step]) for step in sorted(paths)[::stride]]
-        render_animation(frames, arguments.animation, arguments.fps)
+        frames = [Frame(paths[step], arguments.field) for step in sorted(paths)[::stride]]
+        render_animation(frames, arguments.animation, arguments.fps, arguments.field)
         print(arguments.animation)
     if arguments.output or not arguments.animation:
         output = arguments.output or arguments.results / "picture.png"
         chosen = choose_frames(arguments.results, paths, arguments.frames)
-        render_picture([Frame(paths[step]) for step in chosen], output)
+        render_picture([Frame(paths[step], arguments.field) for step in chosen], output, arguments.field)
         print(output)
 
 
