@@ -9,6 +9,6 @@ bash tests/install_packages.sh --minimal
 cmake --preset release
 cmake --build --preset release --target itr -- -j "$(nproc)"
 
-build/release/bin/itr run examples/masticator.json -o results/masticator --solver eigen
+build/release/bin/itr run examples/masticator.json -o results/masticator --overwrite --solver eigen
 /usr/bin/python3 examples/render.py results/masticator -o results/masticator/masticator.png
 echo "The picture is $PWD/results/masticator/masticator.png"
