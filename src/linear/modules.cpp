@@ -10,6 +10,9 @@
 #include "blas_kernels.hpp"
 #include "itr/linear/engine.hpp"
 
+/// The folder of the prefix that a program was linked against: the installed package compiles it into the program.
+extern "C" __attribute__((weak)) const char* itr_installed_backends();
+
 namespace itr::linear {
 
 namespace {
@@ -93,12 +96,7 @@ std::vector<std::filesystem::path> module_folders() {
     folders.push_back(file.parent_path() / "itr" / "backends");
     folders.push_back(file.parent_path().parent_path() / "lib" / "itr" / "backends");
   }
-#ifdef ITR_INSTALL_BACKEND_DIR
-  folders.emplace_back(ITR_INSTALL_BACKEND_DIR);
-#endif
-#ifdef ITR_BUILD_BACKEND_DIR
-  folders.emplace_back(ITR_BUILD_BACKEND_DIR);
-#endif
+  if (itr_installed_backends) folders.emplace_back(itr_installed_backends());
   return folders;
 }
 

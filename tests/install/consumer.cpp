@@ -23,9 +23,12 @@ itr::Setup<2> falling_square() {
 
 }  // namespace
 
-int main() {
+/// Its argument is the linear solver, if there is one.
+int main(int argc, char** argv) {
   itr::linear::Registry registry;
-  itr::Simulation<2> simulation(falling_square(), registry);
+  itr::Setup<2> setup = falling_square();
+  if (argc > 1) setup.linear.solvers = {argv[1]};
+  itr::Simulation<2> simulation(setup, registry);
   while (!simulation.finished()) {
     const itr::StepResult result = simulation.advance();
     if (!result.ok) {
