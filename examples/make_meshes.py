@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Makes the meshes of the example scenes: near-equilateral triangulations of a beam, a square and a disc and a cube of
-tetrahedra (Gmsh .msh 2.2), and Cook's membrane, a box, a line and a floor (.obj). The results are committed; run it again
+"""Makes the meshes of the example scenes: near-equilateral triangulations of a beam, a square and a disc, a cube and a bar
+of tetrahedra (Gmsh .msh 2.2), and Cook's membrane, a box, a line and a floor (.obj). The results are committed; run it again
 after a change here.
 
 usage: make_meshes.py [-o DIR]
@@ -76,12 +76,14 @@ def ring(inner, outer):
     return triangles
 
 
-def cube(n):
-    """n x n x n boxes of a unit cube centred at the origin, each cut into six tetrahedra around a diagonal."""
-    number = np.arange((n + 1)**3).reshape(n + 1, n + 1, n + 1)
-    points = np.stack(np.unravel_index(number.ravel(), number.shape), axis=1) / n - 0.5
+def boxes(shape, extents):
+    """`shape` boxes along the axes of a block centred at the origin, each cut into six tetrahedra around a diagonal."""
+    shape, extents = np.array(shape), np.array(extents)
+    counts = shape + 1
+    number = np.arange(counts.prod()).reshape(counts)
+    points = np.stack(np.unravel_index(number.ravel(), counts), axis=1) / shape * extents - extents / 2
     tetrahedra = []
-    for i, j, k in np.ndindex(n, n, n):
+    for i, j, k in np.ndindex(*shape):
         for a, b, c in itertools.permutations(np.eye(3, dtype=int)):
             corners = [(0, 0, 0), a, a + b, a + b + c]
             tetrahedron = [number[i + x, j + y, k + z] for x, y, z in corners]
@@ -130,7 +132,8 @@ def main():
     write_msh(folder / "disc.msh", *disc(0.5, 0.1))
     write_obj(folder / "cook.obj", [(0, 0), (48, 44), (48, 60), (0, 44)], faces=[(0, 1, 3), (1, 2, 3)])
     write_obj(folder / "box.obj", [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], faces=[(0, 1, 2), (0, 2, 3)])
-    write_msh(folder / "cube.msh", *cube(3))
+    write_msh(folder / "cube.msh", *boxes((3, 3, 3), (1, 1, 1)))
+    write_msh(folder / "bar.msh", *boxes((12, 3, 3), (4, 1, 1)))
     write_obj(folder / "floor.obj", [(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], faces=[(0, 2, 1), (0, 3, 2)])
     write_obj(folder / "line.obj", [(-0.5, 0), (0.5, 0)], lines=[(0, 1)])
 

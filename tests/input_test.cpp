@@ -32,7 +32,12 @@ bool has_type(const Json& value, const std::string& type) {
 /// The keywords that our schema uses; a null member is an absent one.
 bool is_valid(const Json& value, const Json& schema) {
   for (const auto& [keyword, argument] : schema.items()) {
-    if (keyword == "type" && !has_type(value, argument)) return false;
+    if (keyword == "type" && argument.is_string() && !has_type(value, argument)) return false;
+    if (keyword == "type" && argument.is_array() &&
+        std::none_of(argument.begin(), argument.end(), [&](const Json& type) { return has_type(value, type); }))
+      return false;
+    if (keyword == "enum" && std::find(argument.begin(), argument.end(), value) == argument.end()) return false;
+    if (keyword == "maximum" && !(value <= argument)) return false;
     if (keyword == "const" && value != argument) return false;
     if (keyword == "not" && is_valid(value, argument)) return false;
     if (keyword == "minimum" && !(value >= argument)) return false;
@@ -57,8 +62,9 @@ Json read_json(const fs::path& file) { return Json::parse(std::ifstream(file), n
 
 std::vector<fs::path> example_scenes() {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(fs::path(ITR_SOURCE_DIR) / "examples"))
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  for (const char* folder : {"examples", "examples/tasks"})
+    for (const auto& entry : fs::directory_iterator(fs::path(ITR_SOURCE_DIR) / folder))
+      if (entry.path().extension() == ".json") files.push_back(entry.path());
   return files;
 }
 
@@ -72,14 +78,17 @@ TEST(Schema, RefusesWhatTheReaderRefuses) {
   const Json schema = Json::parse(scene::json_schema());
   const fs::path file = fs::path(ITR_SOURCE_DIR) / "examples/masticator.json";
   const Json good = read_json(file);
-  const std::array<std::pair<const char*, Json>, 8> wrong = {{{"/time/dt", -1},
-                                                              {"/time/dtt", 1},
-                                                              {"/contact/dhat", 0},
-                                                              {"/contact/enabled", 1},
-                                                              {"/contact/friction_coefficient", -0.1},
-                                                              {"/solver/nonlinear/max_iterations", 0},
-                                                              {"/solver/rayleigh_damping", {1}},
-                                                              {"/space/remesh/split/max_depth", 0.5}}};
+  const std::array<std::pair<const char*, Json>, 11> wrong = {{{"/time/dt", -1},
+                                                               {"/time/dtt", 1},
+                                                               {"/contact/dhat", 0},
+                                                               {"/contact/enabled", 1},
+                                                               {"/contact/friction_coefficient", -0.1},
+                                                               {"/solver/nonlinear/max_iterations", 0},
+                                                               {"/solver/rayleigh_damping", {1}},
+                                                               {"/space/remesh/split/max_depth", 0.5},
+                                                               {"/time/integrator", "RK4"},
+                                                               {"/space/remesh/split/culling_threshold", 2},
+                                                               {"/output/paraview/options/contact_force", true}}};
   for (const auto& [pointer, value] : wrong) {
     Json scene = good;
     scene[Json::json_pointer(pointer)] = value;
@@ -103,6 +112,24 @@ TEST(Explain, SaysWhatIsModelledAndWhy) {
        {"inertia    no   /time/quasistatic", "elastic    yes  always", "contact    no   /contact/enabled is false",
         "body       yes  1 tractions", "144 of 162 (18 held)", "warnings\n  none"})
     EXPECT_NE(text.find(line), std::string::npos) << line << "\n" << text;
+}
+
+/// Those that a newcomer begins with say nothing of mistakes, and run.
+TEST(Explain, WarnsOfNothingInTheTasks) {
+  for (const char* task : {"drop", "press", "roll", "twist"}) {
+    const std::string text = explain(fmt::format("tasks/{}.json", task));
+    EXPECT_NE(text.find("warnings\n  none"), std::string::npos) << task << "\n" << text;
+  }
+}
+
+TEST(Explain, SaysInWordsWhatWillHappen) {
+  const std::string text = explain(
+      "ball_wall.json --set '/boundary_conditions/rhs=[0, 9.81]' --threads 1 -o nowhere --resume "
+      "--set /solver/contact/barrier_stiffness=null "
+      "--set /space/remesh/split/acceptance_tolerance=null");
+  for (const char* words : {"bodies accelerate by (0, -9.81) m/s^2", "plane stress", "total mass", "waves run at up to",
+                            "of its amplitude a period", "barrier stiffness 1e+05", "split tolerance"})
+    EXPECT_NE(text.find(words), std::string::npos) << words << "\n" << text;
 }
 
 TEST(Explain, WarnsOfWhatLooksWrong) {

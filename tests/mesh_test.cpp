@@ -134,8 +134,10 @@ TEST(Mesh, RefusesWhatIsNoMeshAndNamesTheCell) {
   EXPECT_EQ(refusal<2>({{0, 0}, {1, 0}, {2, 0}}, {{0, 1, 2}}).find("cell 0: rest volume 0"), 0u);
   EXPECT_EQ(refusal<2>({{0, 0}, {1, 0}, {0, HUGE_VAL}}, {{0, 1, 2}}).find("cell 0: rest volume"), 0u);
   EXPECT_EQ(refusal<2>({{0, 0}, {1, 0}, {0, std::nan("")}}, {{0, 1, 2}}).find("cell 0: rest volume"), 0u);
-  EXPECT_EQ(refusal<2>({{0, 0}, {1, 0}, {0, 1}, {1, 1}, {0.5, 2}}, {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}}),
+  EXPECT_EQ(refusal<2>({{0, 0}, {1, 0}, {0, 1}, {1, -1}, {0.5, 2}}, {{0, 1, 2}, {0, 3, 1}, {0, 1, 4}}),
             "cell 2: a facet with more than two cells");
+  EXPECT_EQ(refusal<2>({{0, 0}, {1, 0}, {0, 1}, {1, 1}}, {{0, 1, 2}, {0, 1, 3}}),
+            "cell 1: a cell that lies on another one of the same facet, or is there twice");
   const std::vector<Vec<3>> tetrahedron = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   EXPECT_EQ(refusal<3>(tetrahedron, {{0, 1, 2, 3}}), "");
   EXPECT_EQ(refusal<3>(tetrahedron, {{0, 2, 1, 3}}).find("cell 0: rest volume -0.1666"), 0u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `itr run` leaves in a folder (design §5), and that a certificate finds what is wrong in it.
+// What `itr run` leaves in a folder (CONVENTIONS.md, "Output"), and that a certificate finds what is wrong in it.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -122,6 +122,13 @@ TEST_F(OutputTest, FrameHoldsTheStateWithTheAgreedNames) {
 
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(folder / "frames/000007.h5");
+  const std::vector<std::pair<std::string, std::string>> units = {{"/mesh/rest", "m"},
+                                                                  {"/fields/x", "m"},
+                                                                  {"/fields/u", "m"},
+                                                                  {"/fields/v", "m/s"},
+                                                                  {"/fields/elastic_density", "J/m^2"},
+                                                                  {"/obstacles/x", "m"}};
+  for (const auto& [name, unit] : units) EXPECT_EQ(file.read_text_attribute(name, "unit"), unit) << name;
   const auto x = file.read_doubles("/fields/x");
   EXPECT_EQ(x.columns, 2);
   EXPECT_EQ(file.shape("/fields/x").columns, 2);

@@ -6,7 +6,7 @@
 
 Scenes run as they are. With --solver all of them run with that engine instead, with several with one after the other: an
 engine changes no result.
-A scene passes if its five norms of the final displacement (scene-format §9; linf_grad is wrong in the reference and left out)
+A scene passes if its five norms of the final displacement (CONVENTIONS.md, "Norms"; linf_grad is wrong in the reference and left out)
 are within the margin; `miss` says which norm is off and by how much; `refused` is what `itr` does not support, with its reason;
 `stopped` is a simulation that could not go on. Exit status 1 if a scene misses or stops, 0 otherwise.
 """
@@ -79,7 +79,7 @@ def run(scene_file, solver, args):
     reference = json.loads(scene_file.read_text())["tests"]
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(args.keep) / scene_file.stem if args.keep else pathlib.Path(scratch)
-        command = [args.itr, "run", str(scene_file), "-o", str(folder), "--threads", "1"]
+        command = [args.itr, "run", str(scene_file), "-o", str(folder), "--overwrite", "--threads", "1"]
         command += ["--solver", solver] if solver else []
         command += ["--set", "/output/paraview/skip_frame=1000000"]
         if override:

@@ -35,6 +35,11 @@ const std::vector<std::pair<const char*, std::string>> kFiles = {
     {"text.msh", "this is no mesh\n"},
     {"mesh.stl", "solid\n"},
     {"folder/empty.obj", ""},
+    {"twice.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 3 4 1\n"},
+    {"loose.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n"},
+    {"tilted.msh", std::string(kMsh) + "$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 1\n$EndNodes\n"
+                                       "$Elements\n1\n1 2 2 3 1 1 2 3\n$EndElements\n"},
+    {"wall.obj", "v -1 -1 -1\nv 2 -1 -1\nv -1 -1 2\nf 1 2 3\n"},
 };
 
 struct Refusal {
@@ -52,6 +57,8 @@ Json material(const char* key, const Json& value) {
   return {{"materials", {one}}};
 }
 Json velocity(const Json& value) { return {{"initial_conditions", {{"velocity", {{{"id", 1}, {"value", value}}}}}}}; }
+Json output(const char* key, const Json& value) { return {{"output", {{key, value}}}}; }
+Json option(const char* key) { return output("paraview", {{"options", {{key, true}}}}); }
 Json rhs(const Json& value) { return {{"boundary_conditions", {{"rhs", value}}}}; }
 Json contact(const char* key, const Json& value) { return {{"contact", {{"enabled", true}, {key, value}}}}; }
 Json overlapping() {
@@ -128,25 +135,61 @@ const std::vector<Refusal> kRefusals = {
      "\"friction_coefficient\" perhaps"},
     {"key in a wrong place", {{"dhat", 1}}, "scene.json", "/dhat", "unknown key", "/contact/dhat"},
     {"wrong type", {{"contact", {{"enabled", "yes"}}}}, "scene.json", "/contact/enabled", "yes", "true or false"},
+    {"unknown output", output("foo", 1), "scene.json", "/output/foo", "unknown key", "known here: advanced"},
+    {"singular force", option("contact_force"), "scene.json", "/options/contact_force", "unknown key", "\"contact_forces\""},
+    {"von Mises", option("von_mises"), "scene.json", "/options/von_mises", "unknown key", "scalar_values"},
+    {"wrong option", output("paraview", {{"options", {{"momentum", 1}}}}), "scene.json", "/momentum", "1", "true or false"},
+    {"no frames", output("paraview", {{"skip_frame", 0}}), "scene.json", "/output/paraview/skip_frame", "0", ">= 1"},
+    {"wrong period", output("checkpoint_period", "often"), "scene.json", "/checkpoint_period", "often", "number"},
+    {"element that is there twice", geometry("twice.obj"), "scene.json", "/geometry/0/mesh", "cell 2", "do not overlap"},
+    {"elements without common vertices", geometry("loose.obj"), "scene.json", "/geometry/0/mesh",
+     "share no vertices: 6 of them at 4 places", "merge those that coincide"},
+    {"tilted plane", geometry("tilted.msh"), "scene.json", "/geometry/0/mesh", "surface mesh", "all vertices at one z"},
+    {"surface in space for a plane scene",
+     {{"geometry", {{{"mesh", "square.obj"}, {"volume_selection", 1}}, {{"mesh", "wall.obj"}, {"is_obstacle", true}}}}},
+     "scene.json",
+     "/geometry/1/mesh",
+     "a surface in space",
+     "a line or a flat mesh"},
+    {"negative split tolerance",
+     {{"space", {{"remesh", {{"enabled", true}, {"split", {{"acceptance_tolerance", -1}}}}}}}},
+     "scene.json",
+     "/space/remesh/split/acceptance_tolerance",
+     "-1",
+     "> 0"},
+    {"solver that is meant",
+     {{"solver", {{"linear", {{"solver", "choldmod"}}}}}},
+     "scene.json",
+     "/solver/linear/solver",
+     "choldmod",
+     "\"cholmod\" perhaps"},
     {"no geometry", {{"geometry", nullptr}}, "scene.json", "/geometry", "nothing", "geometries"},
     {"no materials", {{"materials", nullptr}}, "scene.json", "/materials", "nothing", "materials"},
 };
 
 std::ostream& operator<<(std::ostream& out, const Refusal& refusal) { return out << refusal.name; }
 
-class Refusals : public ::testing::TestWithParam<Refusal> {
+std::string name_of(std::string name) {
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  return name;
+}
+
+class RefusalFolder : public ::testing::Test {
  protected:
-  Refusals() : folder_(fs::path(::testing::TempDir()) / ("itr_refusal_" + std::to_string(::getpid()))) {
+  RefusalFolder() : folder_(fs::path(::testing::TempDir()) / ("itr_refusal_" + std::to_string(::getpid()))) {
     fs::create_directories(folder_ / "folder");
     for (const auto& [name, text] : kFiles) std::ofstream(folder_ / name) << text;
   }
-  ~Refusals() override { fs::remove_all(folder_); }
+  ~RefusalFolder() override { fs::remove_all(folder_); }
 
   /// Exit status and message.
-  std::pair<int, std::string> run(const std::string& scene) const {
+  std::pair<int, std::string> run(const std::string& scene, const std::string& what = "run") const {
     std::ofstream(folder_ / "scene.json") << scene;
-    const std::string command = std::string(ITR_BINARY_DIR) + "/bin/itr run " + (folder_ / "scene.json").string() + " -o " +
-                                (folder_ / "results").string() + " 2>&1";
+    return command(what + " " + (folder_ / "scene.json").string() + " -o " + (folder_ / "results").string());
+  }
+  static std::pair<int, std::string> command(const std::string& arguments) {
+    const std::string command = std::string(ITR_BINARY_DIR) + "/bin/itr " + arguments + " 2>&1";
     FILE* pipe = popen(command.c_str(), "r");
     std::string text;
     for (std::array<char, 4096> buffer; std::fgets(buffer.data(), buffer.size(), pipe);) text += buffer.data();
@@ -161,6 +204,8 @@ class Refusals : public ::testing::TestWithParam<Refusal> {
 
   fs::path folder_;
 };
+
+class Refusals : public RefusalFolder, public ::testing::WithParamInterface<Refusal> {};
 
 TEST_P(Refusals, SayFilePlaceFoundAndExpected) {
   const Refusal& refusal = GetParam();
@@ -181,16 +226,62 @@ TEST_P(Refusals, SayFilePlaceFoundAndExpected) {
   EXPECT_NE(message.substr(expected_at).find(refusal.expected), std::string::npos) << message;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Refusals, ::testing::ValuesIn(kRefusals), [](const auto& info) {
-  std::string name = info.param.name;
-  for (char& c : name)
-    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, Refusals, ::testing::ValuesIn(kRefusals),
+                         [](const auto& info) { return name_of(info.param.name); });
 
-TEST_F(Refusals, GoodSceneRuns) {
+TEST_F(Refusals, GoodSceneRunsWithoutAWarning) {
   const auto [status, message] = run(good_scene().dump());
   EXPECT_EQ(status, 0) << message;
+  EXPECT_EQ(message.find("step 1/10"), 0u) << message;
+}
+
+/// What runs, but is perhaps not meant: `run` says so as `explain` does.
+struct Suspicion {
+  const char* name;
+  Json changes;
+  std::string warning;
+};
+
+const std::vector<Suspicion> kSuspicions = {
+    {"contact that is off", {{"contact", {{"dhat", 0.01}}}}, "/contact: without \"enabled\": true nothing collides"},
+    {"no density", material("rho", nullptr), "/materials/0/rho: not given, so it is 1"},
+    {"odd density", material("rho", 1.1), "are densities in kg/m^3?"},
+    {"odd modulus", material("E", 500), "are moduli in Pa?"},
+    {"end between steps", {{"time", {{"tend", 1.03}}}}, "the run ends at 1.1 s"},
+    {"third component", rhs({0, 0, 9.81}), "has more components than a 2D scene"},
+    {"one component", velocity({1}), "has too few components for a 2D scene"},
+    {"gravity upwards", rhs({0, -9.81}), "gravity down y is [0, 9.81]"},
+    {"nothing held", {{"time", {{"quasistatic", true}}}}, "nothing keeps them in place"},
+    {"solver of others", {{"solver", {{"linear", {{"solver", "Hypre"}}}}}}, "no \"Hypre\" here, eigen:ldlt takes its place"},
+    {"options of another solver",
+     {{"solver", {{"linear", {{"solver", "eigen:llt"}, {"options", {{"eigen:cg", {{"tolerance", 1e-9}}}}}}}}}},
+     "/solver/linear/options/eigen:cg: that solver is not used, eigen:llt is"},
+    {"output that is not written", option("acceleration"), "/output/paraview/options/acceleration: is not written"},
+};
+
+std::ostream& operator<<(std::ostream& out, const Suspicion& suspicion) { return out << suspicion.name; }
+
+class Suspicions : public RefusalFolder, public ::testing::WithParamInterface<Suspicion> {};
+
+TEST_P(Suspicions, AreSaidByRunAndExplain) {
+  Json scene = good_scene();
+  scene["time"]["tend"] = 0.2;
+  scene.merge_patch(GetParam().changes);
+  const auto [status, message] = run(scene.dump());
+  EXPECT_EQ(status, 0) << message;
+  EXPECT_NE(message.find(GetParam().warning), std::string::npos) << message;
+  const auto [explained, text] = run(scene.dump(), "explain");
+  EXPECT_EQ(explained, 0) << text;
+  EXPECT_NE(text.find(GetParam().warning), std::string::npos) << text;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Suspicions, ::testing::ValuesIn(kSuspicions),
+                         [](const auto& info) { return name_of(info.param.name); });
+
+TEST_F(Refusals, CommandThatIsMeant) {
+  const auto [status, message] = command("rum scene.json");
+  EXPECT_EQ(status, 2);
+  EXPECT_NE(message.find("no such command: rum; expected run perhaps; one of run, explain"), std::string::npos) << message;
 }
 
 TEST_F(Refusals, NumbersThatNoDoubleHolds) {  // found by fuzz_input

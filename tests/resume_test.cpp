@@ -20,6 +20,7 @@
 #include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
+#include "itr/output/checkpoint.hpp"
 #include "output/frame_file.hpp"
 
 namespace itr::output {
@@ -229,6 +230,99 @@ TEST_F(InterruptTest, AnotherSceneIsRefusedWithWhatDiffers) {
   EXPECT_EQ(second.wait(), 2);
   EXPECT_NE(second.said().find("/materials/nu: was 0.45, is 0.3"), std::string::npos) << second.said();
   expect_readable(run);
+}
+
+/// A longer end is no other scene: a finished run goes on, to the bits of one that was longer from the start.
+TEST_F(InterruptTest, ALongerEndGoesOnAfterAFinishedRun) {
+  const fs::path whole = folder / "whole", run = folder / "run";
+  Case which = kStopped;
+  ASSERT_EQ(start(arguments(which, whole, 30)).wait(), 0);
+  which.steps = 25;
+  ASSERT_EQ(start(arguments(which, run, 30)).wait(), 0);
+  ASSERT_EQ(results_of(run).size(), 26u);
+  which.steps = kStopped.steps;
+  const Command longer = start(arguments(which, run, 30, true));
+  ASSERT_EQ(longer.wait(), 0) << longer.said();
+  EXPECT_NE(longer.said().find("/time/time_steps: was 25, is 60"), std::string::npos) << longer.said();
+  EXPECT_NE(longer.said().find("going on after step 25"), std::string::npos) << longer.said();
+  expect_same_results(whole, run);
+}
+
+/// With tend and time_steps alone, another tend is another step.
+TEST_F(InterruptTest, AnotherStepIsAnotherScene) {
+  Case which = kStopped;
+  which.time = R"("tend":0.0012)";
+  const fs::path run = folder / "run";
+  ASSERT_EQ(stop_at(start(arguments(which, run, 0)), run, 5, SIGINT), 3);
+  which.time = R"("tend":0.0024)";
+  const Command second = start(arguments(which, run, 0, true));
+  EXPECT_EQ(second.wait(), 2);
+  EXPECT_NE(second.said().find("/time/tend: was 0.0012, is 0.0024"), std::string::npos) << second.said();
+}
+
+/// A step that fails says what would change that, and that does change it.
+TEST_F(InterruptTest, WhatAFailedStepRecommendsIsAllowedAndHelps) {
+  Case which = kStopped;
+  which.sets = kImpact + Arguments{"/space/remesh/enabled=false", "/solver/nonlinear/max_iterations=3"};
+  const fs::path run = folder / "run";
+  const Command first = start(arguments(which, run, 30));
+  ASSERT_EQ(first.wait(), 3) << first.said();
+  EXPECT_NE(first.said().find("--allow-changes and --set /time/step_cuts=4"), std::string::npos) << first.said();
+  const int failed = static_cast<int>(results_of(run).size());
+  ASSERT_LT(failed, which.steps);
+  which.sets.back() = "/solver/nonlinear/max_iterations=300";
+  const Command refused = start(arguments(which, run, 30, true));
+  EXPECT_EQ(refused.wait(), 2);
+  EXPECT_NE(refused.said().find("--allow-changes"), std::string::npos) << refused.said();
+  const Command allowed = start(arguments(which, run, 30, true) + Arguments{"--allow-changes", "--solver", "eigen:llt"});
+  EXPECT_EQ(allowed.wait(), 0) << allowed.said();
+  EXPECT_EQ(results_of(run).size(), static_cast<std::size_t>(which.steps + 1));
+}
+
+TEST_F(InterruptTest, ResultsAreNotErasedUnasked) {
+  Case which = kStopped;
+  which.steps = 3;
+  const fs::path run = folder / "run";
+  ASSERT_EQ(start(arguments(which, run, 30)).wait(), 0);
+  const auto lines = results_of(run);
+  const Command again = start(arguments(which, run, 30));
+  EXPECT_EQ(again.wait(), 2);
+  EXPECT_NE(again.said().find("--overwrite"), std::string::npos) << again.said();
+  EXPECT_NE(again.said().find("--resume"), std::string::npos) << again.said();
+  EXPECT_EQ(results_of(run), lines);
+  which.steps = 2;
+  const Command over = start(arguments(which, run, 30) + Arguments{"--overwrite"});
+  EXPECT_EQ(over.wait(), 0) << over.said();
+  EXPECT_EQ(results_of(run).size(), 3u);
+}
+
+/// A step that remeshes for many seconds: patches of thousands of cells.
+TEST_F(InterruptTest, TheSecondSignalIsHeardWithinRemeshing) {
+  const Case slow{"slow",
+                  "masticator.json",
+                  5,
+                  R"("dt":0.05)",
+                  {"/geometry/0/n_refs=2", "/space/remesh/screening=\"none\"",
+                   R"(/space/remesh/local_relaxation={"local_mesh_n_ring":9,"local_mesh_max_cells":2000})",
+                   R"j(/initial_conditions/velocity=[{"id":0,"value":["sin(7*x)",0]}])j"}};
+  const fs::path run = folder / "run";
+  const Command command = start(arguments(slow, run, 0));
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (count_lines(run / "steps.jsonl") < 1 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  const int steps = count_lines(run / "steps.jsonl");
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  command.send(SIGINT);
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  EXPECT_NE(command.said().find("finishing the step; again to stop now"), std::string::npos) << command.said();
+  const auto second = std::chrono::steady_clock::now();
+  command.send(SIGINT);
+  EXPECT_EQ(command.wait(), 3) << command.said();
+  EXPECT_LT(std::chrono::steady_clock::now() - second, std::chrono::seconds(10));
+  EXPECT_NE(command.said().find("which is dropped"), std::string::npos) << command.said();
+  expect_readable(run);
+  EXPECT_EQ(count_lines(run / "steps.jsonl"), steps) << "it was no long step";
+  EXPECT_TRUE(find_saved_state(run).has_value());
 }
 
 /// As after an update of itr that changed the format of saved states.

@@ -652,6 +652,18 @@ TEST(Simulation, HeldVerticesThatCannotArriveEndTheStepWithTheReason) {
   }
 }
 
+/// The line reaches far to one side: the mean of its ends and the vertex is nowhere near the contact.
+TEST(Simulation, TheReasonNamesThePlaceOfAContact) {
+  linear::Registry registry;
+  auto setup = pressed_square(0.3);
+  setup.obstacles.rest[1][0] *= 100;
+  const auto result = Simulation<2>(setup, registry).advance();
+  ASSERT_FALSE(result.ok);
+  const auto at = result.reason.find("obstacle 1 near (");
+  ASSERT_NE(at, std::string::npos) << result.reason;
+  EXPECT_LT(std::abs(std::stod(result.reason.substr(at + 17))), 0.21) << result.reason;
+}
+
 TEST(Simulation, TheReasonNamesVerticesOfAProxy) {
   linear::Registry registry;
   auto setup = pressed_square(0.3);

@@ -12,18 +12,14 @@
 #include "itr/core/error.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/linear/choice.hpp"
+#include "itr/simulation/advice.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "itr/simulation/step_problem.hpp"
+#include "solver_choice.hpp"
 
 namespace itr::cli {
 
 namespace {
-
-constexpr double kSliver = 0.1;                  ///< quality below which an element is one
-constexpr double kLargeRatio = 1e3;              ///< of stiffnesses or of element sizes, from which systems are hard
-constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
-constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
-constexpr double kUsualModulus[] = {1e2, 1e13};  ///< [Pa]
 
 const char* name_of(MaterialLaw law) {
   switch (law) {
@@ -75,11 +71,19 @@ class Explanation {
  public:
   /// Throws InputError for what `run` would refuse.
   Explanation(const Setup<Dim>& setup, linear::Registry& registry, std::vector<std::string> warnings)
-      : setup_(setup), registry_(registry), simulation_(setup, registry_), warnings_(std::move(warnings)) {}
+      : registry_(registry),
+        simulation_(setup, registry_, Logger([this](LogLevel, std::string_view text) { chosen_.emplace_back(text); })),
+        setup_(simulation_.setup()),
+        warnings_(std::move(warnings)) {
+    for (std::string& found : find_suspicious(simulation_)) warnings_.push_back(std::move(found));
+  }
 
   void print() {
     bodies();
     fmt::print("time\n  {}\n", describe(setup_.time));
+    fmt::print("in words\n");
+    for (const auto& sentence : foretell(setup_)) fmt::print("  {}\n", sentence);
+    for (const auto& sentence : chosen_) fmt::print("  {}\n", sentence);
     terms();
     const linear::MatrixTraits matrix = unknowns();
     fmt::print("linear solver\n  {}\n", solver(matrix));
@@ -103,14 +107,12 @@ class Explanation {
     std::map<int, Sum> sums;
     double worst = 1, shortest = std::numeric_limits<double>::infinity(), longest = 0;
     CellId worst_cell = 0;
-    int slivers = 0;
     const Mesh<Dim>& mesh = setup_.mesh;
     for (CellId c = 0; c < mesh.cell_slots(); ++c) {
       Sum& sum = sums[mesh.body(c)];
       ++sum.cells;
       sum.volume += mesh.volume(c);
       const double q = simplex_quality<Dim>(corners(c));
-      slivers += q < kSliver;
       if (q < worst) worst = q, worst_cell = c;
     }
     for (const auto& [a, b] : mesh.edges()) {
@@ -119,42 +121,20 @@ class Explanation {
       longest = std::max(longest, length);
     }
     fmt::print("bodies ({}D)\n", Dim);
-    double softest = std::numeric_limits<double>::infinity(), stiffest = 0;
     for (const auto& [id, sum] : sums) {
       const Material& material = setup_.materials.at(id);
       fmt::print("  id {}: {} elements, {} {:.4g} m^{}, {}, E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^{}, mass {:.4g} kg\n",
                  id, sum.cells, Dim == 2 ? "area" : "volume", sum.volume, Dim, name_of(material.law),
                  material.youngs_modulus, material.poisson_ratio, material.density, Dim, material.density * sum.volume);
-      softest = std::min(softest, material.youngs_modulus);
-      stiffest = std::max(stiffest, material.youngs_modulus);
-      check_units(id, material);
     }
     fmt::print("  {} vertices, {} elements, edges {:.4g} to {:.4g} m, worst quality {:.3g} (1: regular; element {})\n",
                mesh.num_vertices(), mesh.num_cells(), shortest, longest, worst, worst_cell);
-    if (slivers > 0)
-      warn("{} slivers (quality below {}), the worst is element {} with {:.2g}", slivers, kSliver, worst_cell, worst);
-    if (stiffest > kLargeRatio * softest) warn("stiffness ratio {:.2g} between bodies", stiffest / softest);
-    if (longest > kLargeRatio * shortest) warn("edges differ in length by a factor of {:.2g}", longest / shortest);
-    Vec<Dim> low = mesh.rest(0), high = low;
-    for (int v = 0; v < mesh.vertex_slots(); ++v) {
-      low = low.cwiseMin(mesh.rest(v));
-      high = high.cwiseMax(mesh.rest(v));
-    }
-    const double size = (high - low).maxCoeff();
-    if (size < kUsualLength[0] || size > kUsualLength[1]) warn("the bodies span {:.3g} m: are lengths in metres?", size);
   }
 
   std::array<Vec<Dim>, Dim + 1> corners(CellId c) const {
     std::array<Vec<Dim>, Dim + 1> corners;
     for (int i = 0; i <= Dim; ++i) corners[i] = setup_.mesh.rest(setup_.mesh.cell(c)[i]);
     return corners;
-  }
-
-  void check_units(int id, const Material& material) {
-    if (material.youngs_modulus < kUsualModulus[0] || material.youngs_modulus > kUsualModulus[1])
-      warn("body {}: E = {:.3g} Pa is unusual: are moduli in Pa?", id, material.youngs_modulus);
-    if (Dim == 3 && (material.density < kUsualDensity[0] || material.density > kUsualDensity[1]))
-      warn("body {}: rho = {:.3g} kg/m^3 is unusual: are densities in kg/m^3?", id, material.density);
   }
 
   void terms() {
@@ -201,7 +181,6 @@ class Explanation {
                matrix.order, bodies, bodies - matrix.order, kEntryBytes * static_cast<double>(matrix.nonzeros) / kMegabyte,
                linear::estimate_factor_bytes(matrix) / kMegabyte,
                setup_.remesh.enabled ? ", more as the mesh is refined" : "");
-    if (matrix.order == 0) warn("every vertex is held: there is nothing to solve for");
     return matrix;
   }
 
@@ -235,27 +214,13 @@ class Explanation {
     const double dhat = setup_.contact.activation_distance;
     Workspace workspace;
     const ContactEnergy<Dim> energy(surface, setup_.contact, 1, 1);
-    const auto active = energy.active(x, workspace).size();
-    const double gap = energy.min_distance(x, workspace);
-    fmt::print("; d-hat {:.4g} m, {} pairs nearer than that at the start\n", dhat, active);
-    if (gap < dhat)
-      warn("gap {:.3g} m at the start is below d-hat = {:.3g} m: surfaces push each other from the start", gap, dhat);
-    double shortest = std::numeric_limits<double>::infinity();
-    const auto rest = [&](int v) { return setup_.proxy ? setup_.proxy->rest[v] : setup_.mesh.rest(v); };
-    for (const auto& [a, b] : surface.edges)
-      if (surface.counts[a]) shortest = std::min(shortest, (rest(a) - rest(b)).norm());
-    if (dhat > shortest)
-      warn("d-hat = {:.3g} m is above the shortest surface edge, {:.3g} m: surfaces feel themselves", dhat, shortest);
+    fmt::print("; d-hat {:.4g} m, {} pairs nearer than that at the start\n", dhat, energy.active(x, workspace).size());
   }
 
-  template <typename... Args>
-  void warn(fmt::format_string<Args...> text, Args&&... args) {
-    warnings_.push_back(fmt::format(text, std::forward<Args>(args)...));
-  }
-
-  const Setup<Dim>& setup_;
   linear::Registry& registry_;
+  std::vector<std::string> chosen_;  ///< what the simulation says of what the scene leaves open
   const Simulation<Dim> simulation_;
+  const Setup<Dim>& setup_;
   std::vector<std::string> warnings_;
 };
 
@@ -267,7 +232,8 @@ int explain(const RunOptions& options) {
   registry.allow_mpi_start();
   std::visit(
       [&](auto& setup) {
-        if (!options.solver.empty()) setup.linear.solvers = {options.solver};
+        const SolverChoice choice = choose_solver(setup.linear, options, registry);
+        for (const auto& warning : choice.warnings) scene.warnings.push_back(warning);
         Explanation(setup, registry, scene.warnings).print();
       },
       scene.setup);

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 
@@ -12,6 +13,7 @@
 #include "itr/output/certify.hpp"
 #include "ranks.hpp"
 #include "run.hpp"
+#include "scene/node.hpp"
 
 namespace {
 
@@ -59,6 +61,37 @@ int certify(const std::string& directory) {
   return certificate.passed() ? cli::done : cli::certificate_failed;
 }
 
+/// What `run` and `explain` are told of a scene.
+void add_scene_options(CLI::App& command, cli::RunOptions& options, std::vector<std::string>& sets) {
+  command.add_option("scene", options.scene, "scene file (JSON), see SCENES.md")->required();
+  command.add_option("-o,--output", options.directory, "result folder (default: the scene's, or results/<scene>)");
+  command.add_option("--solver", options.solver, "linear solver, see `itr solvers`");
+  command.add_option("--threads", options.threads, "number of threads (0: all)")->check(CLI::NonNegativeNumber);
+  command.add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
+      ->allow_extra_args(false);
+  command.add_option("--dump-systems", options.dump_folder, "folder for the linear systems, to study solvers with");
+  command.add_option("--dump-every", options.dump_every, "with --dump-systems: each so many-th")->check(CLI::PositiveNumber);
+  auto* overwrite = command.add_flag("--overwrite", options.overwrite, "replace the results that the folder has");
+  auto* resume = command.add_flag("--resume", options.resume,
+                                  "go on from the newest state that the folder has, or from the beginning; tend may change");
+  command
+      .add_flag("--allow-changes", options.allow_changes,
+                "with --resume: another solver, other tolerances, /time/step_cuts, /space/remesh too")
+      ->needs(resume);
+  resume->excludes(overwrite);
+}
+
+/// A word that is no command gets the one that was meant.
+void check_command(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  std::vector<std::string> names;
+  for (const auto* command : app.get_subcommands([](const CLI::App*) { return true; })) names.push_back(command->get_name());
+  if (std::find(names.begin(), names.end(), argv[1]) != names.end()) return;
+  const std::string near = scene::nearest_name(argv[1], names);
+  throw InputError({"", "itr", fmt::format("no such command: {}", argv[1]),
+                    fmt::format("{}one of {}", near.empty() ? "" : near + " perhaps; ", fmt::join(names, ", "))});
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App app("In-Timestep Remeshing for contacting elastodynamics");
   app.require_subcommand(1);
@@ -66,25 +99,17 @@ int dispatch(int argc, char** argv) {
   cli::RunOptions options;
   std::vector<std::string> sets;
   std::string directory;
+  bool as_page = false;
   auto* run = app.add_subcommand("run", "simulate a scene");
-  run->add_option("scene", options.scene, "scene file (JSON)")->required();
-  run->add_option("-o,--output", options.directory, "result folder (default: the scene's, or results/<scene>)");
-  run->add_option("--solver", options.solver, "linear solver, see `itr solvers`");
-  run->add_option("--threads", options.threads, "number of threads (0: all)")->check(CLI::NonNegativeNumber);
-  run->add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
-      ->allow_extra_args(false);
-  run->add_option("--dump-systems", options.dump_folder, "folder for the linear systems, to study solvers with");
-  run->add_option("--dump-every", options.dump_every, "with --dump-systems: each so many-th")->check(CLI::PositiveNumber);
-  run->add_flag("--resume", options.resume, "go on from the newest state that the folder has, or from the beginning");
+  add_scene_options(*run, options, sets);
+  auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing; takes options of run");
+  add_scene_options(*explain, options, sets);
+  auto* schema = app.add_subcommand("schema", "JSON Schema of scenes");
+  schema->add_flag("--markdown", as_page, "the same as a page to read: SCENES.md");
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
-  auto* schema = app.add_subcommand("schema", "JSON Schema of scenes");
-  auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing");
-  explain->add_option("scene", options.scene, "scene file (JSON)")->required();
-  explain->add_option("--solver", options.solver, "linear solver, see `itr solvers`");
-  explain->add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
-      ->allow_extra_args(false);
+  check_command(app, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
@@ -98,7 +123,7 @@ int dispatch(int argc, char** argv) {
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
   if (*schema) {
-    fmt::print("{}\n", scene::json_schema());
+    fmt::print("{}{}", as_page ? scene::reference_page() : scene::json_schema(), as_page ? "" : "\n");
     return cli::done;
   }
   for (const auto& text : sets) options.overrides.push_back(parse_override(text));

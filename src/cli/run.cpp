@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -12,20 +13,31 @@
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/core/timer.hpp"
-#include "itr/linear/choice.hpp"
 #include "itr/output/writer.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/simulation/advice.hpp"
 #include "ranks.hpp"
+#include "solver_choice.hpp"
 
 namespace itr::cli {
 
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
+std::atomic<bool> stop_now = false;  // what a solve looks at
 
-/// The step is finished and saved; who cannot wait sends the signal again.
+template <std::size_t N>
+void say(const char (&text)[N]) {  // all that a signal's handler may do
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text, N - 1);
+}
+
+/// The step is finished and saved; the second signal drops it, and the third is the system's.
 void on_interrupt(int signal) {
-  interrupted = 1;
+  if (!interrupted) {
+    interrupted = 1;
+    return say("\nitr: finishing the step; again to stop now\n");
+  }
+  stop_now = true;
+  say("\nitr: dropping the step\n");
   std::signal(signal, SIG_DFL);
 }
 
@@ -66,24 +78,43 @@ std::string describe_solves(const StepReport& totals) {
   return text;
 }
 
-std::string resume_hint(const std::string& directory) {
-  return fmt::format("`itr run` with --resume goes on from the last saved state in {}", directory);
+/// Which changes of the scene a run that goes on allows. Throws InputError for the others.
+void check_changes(const std::vector<scene::Change>& changes, const RunOptions& options, const output::SavedState& saved) {
+  using Of = scene::Change::Of;
+  std::string text;
+  bool could_be_allowed = true;
+  for (const auto& change : changes) {
+    if (change.of == Of::length || (change.of == Of::solving && options.allow_changes)) {
+      spdlog::info("another scene than before: {}", change.text);
+      continue;
+    }
+    text += "\n  " + change.text;
+    could_be_allowed = could_be_allowed && change.of == Of::solving;
+  }
+  if (text.empty()) return;
+  throw InputError({options.scene.string(), "--resume", "another scene than that of the saved state:" + text,
+                    fmt::format("the scene of {}{}", saved.file.string(),
+                                could_be_allowed ? ", or --allow-changes: these are of how steps are solved"
+                                                 : "; /time/tend may change, and with --allow-changes /time/step_cuts, "
+                                                   "/solver and /space/remesh")});
 }
 
 /// The state to go on from; none without --resume or where the folder has no frames.
 std::optional<output::SavedState> find_resumable(const scene::Scene& scene, const std::string& directory,
                                                  const RunOptions& options) {
-  if (!options.resume) return std::nullopt;
+  if (!options.resume) {
+    if (!options.overwrite && output::has_results(directory))
+      throw InputError({directory, "output folder", "results of an earlier run",
+                        "--overwrite to replace them, --resume to go on, or another folder (-o)"});
+    return std::nullopt;
+  }
   auto saved = output::find_saved_state(directory);
   if (!saved) {
     spdlog::info("no saved state in {}: starting from the beginning", directory);
     return std::nullopt;
   }
-  const auto changes = scene::find_changes(saved->scene, scene.identity);
-  if (changes.empty()) return saved;
-  std::string text = "another scene than that of the saved state:";
-  for (const auto& change : changes) text += "\n  " + change;
-  throw InputError({options.scene.string(), "--resume", text, "the scene of " + saved->file.string()});
+  check_changes(scene::find_changes(saved->scene, scene.identity), options, *saved);
+  return saved;
 }
 
 template <int Dim>
@@ -92,10 +123,12 @@ class Run {
   Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
       linear::Registry& registry)
       : directory_(std::move(directory)), simulation_(std::move(setup), registry, make_logger()) {
+    for (const auto& warning : find_suspicious(simulation_)) spdlog::warn("{}", warning);
     const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
     if (const auto saved = find_resumable(scene, directory_, options)) {
-      if (saved->backend != info.backend)
-        throw InputError({directory_, "--resume", "solver " + info.backend, saved->backend + ", as before"});
+      if (saved->backend != info.backend && !options.allow_changes)
+        throw InputError(
+            {directory_, "--resume", "solver " + info.backend, saved->backend + ", as before, or --allow-changes"});
       output::Checkpoint<Dim> checkpoint = output::read_checkpoint<Dim>(*saved);
       simulation_.restore(checkpoint.state);
       writer_ = std::make_unique<output::Writer>(directory_, scene.output, info, checkpoint);
@@ -110,11 +143,11 @@ class Run {
   int run() {
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
-    std::string outcome;
+    std::string outcome, advice = "`itr run` with --resume goes on from the last saved state in " + directory_;
     try {
-      outcome = advance();
+      outcome = advance(advice);
       if (outcome != kFinished && !is_saved_) save();
-      writer_->finish(outcome);
+      writer_->finish(outcome, simulation_.solver_name_in_use());
     } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
       outcome = fmt::format("stopped at step {}, whose files could not all be written: {}", simulation_.state().step,
                             error.what());
@@ -124,21 +157,29 @@ class Run {
       fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
       return done;
     }
-    fmt::print(stderr, "itr: {}; {}\n", outcome, resume_hint(directory_));
+    fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
     return simulation_stopped;
   }
 
  private:
   static constexpr const char* kFinished = "finished";
 
-  /// Until the end or until something stops it; says what.
-  std::string advance() {
+  /// Until the end or until something stops it; says what, and in `advice` what can be done.
+  std::string advance(std::string& advice) {
     const int steps = simulation_.setup().time.steps;
     while (!simulation_.finished()) {
       const StepResult result = simulation_.advance();
-      if (!result.ok)
+      if (!result.ok && stop_now)
+        return fmt::format("interrupted in step {}, which is dropped", simulation_.state().step + 1);
+      if (!result.ok) {
+        advice = fmt::format(
+            "the state before it is saved in {}. To go on, change how steps are solved: `itr run` with --resume "
+            "--allow-changes and --set /time/step_cuts=4 (smaller steps where one fails), more "
+            "/solver/nonlinear/max_iterations, or another tolerance or solver; a smaller /time/dt needs a new run",
+            directory_);
         return fmt::format("stopped in step {} (t = {:.6g} s): {}", simulation_.state().step + 1,
                            simulation_.state().t + simulation_.setup().time.dt, result.reason);
+      }
       write(result.report);
       show_progress(result.report, steps);
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
@@ -167,16 +208,6 @@ class Run {
   bool is_saved_ = false;  ///< whether the present state is
 };
 
-/// The name of the solver that is there; a wrong one is an error where it was asked for.
-std::string choose_solver_name(const LinearOptions& linear, const RunOptions& options, linear::Registry& registry) {
-  try {
-    return linear::choose_name(linear, registry);
-  } catch (const InputError& error) {
-    const char* place = options.solver.empty() ? "/solver/linear/solver" : "--solver";
-    throw InputError({"", place, error.parts().found, error.parts().expected});
-  }
-}
-
 }  // namespace
 
 int run(const RunOptions& options) {
@@ -190,12 +221,13 @@ int run(const RunOptions& options) {
   registry.allow_mpi_start();
   return std::visit(
       [&](auto& setup) {
-        if (!options.solver.empty()) setup.linear.solvers = {options.solver};
         setup.linear.dump_folder = options.dump_folder;
         setup.linear.dump_every = options.dump_every;
-        const std::string solver = choose_solver_name(setup.linear, options, registry);
-        if (this_launch().rank > 0) return serve(registry, solver);
-        const RankSession session(registry, solver);
+        setup.newton.cancel = &stop_now;
+        const SolverChoice solver = choose_solver(setup.linear, options, registry);
+        if (this_launch().rank > 0) return serve(registry, solver.name);
+        for (const auto& warning : solver.warnings) spdlog::warn("{}", warning);
+        const RankSession session(registry, solver.name);
         return Run(std::move(setup), scene, directory, options, num_threads(), registry).run();
       },
       scene.setup);

@@ -17,7 +17,9 @@ struct RunOptions {
   std::string dump_folder;  ///< of linear systems; empty: none
   int dump_every = 1;
   std::vector<scene::Override> overrides;
-  bool resume = false;  ///< go on from the newest saved state of the folder, if there is one
+  bool resume = false;         ///< go on from the newest saved state of the folder, if there is one
+  bool allow_changes = false;  ///< then also with another solver, other tolerances, step cuts
+  bool overwrite = false;      ///< replace what the folder has
 };
 
 enum ExitStatus { done = 0, bad_input = 2, simulation_stopped = 3, certificate_failed = 4 };

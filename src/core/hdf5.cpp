@@ -19,6 +19,14 @@ InputError unusable(const std::filesystem::path& path, const std::string& place,
   return InputError({path.string(), place, "HDF5 could not do it", expected});
 }
 
+/// Of variable length: what readers such as h5py give out as text and not as bytes.
+Handle text_type() {
+  Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.id(), H5T_VARIABLE);
+  H5Tset_cset(type.id(), H5T_CSET_UTF8);
+  return type;
+}
+
 }  // namespace
 
 Session::Session() : lock_(library_mutex()) {
@@ -84,6 +92,15 @@ void File::write_attribute(const std::string& object, const char* name, std::spa
   require(attribute.is_valid() && H5Awrite(attribute.id(), H5T_NATIVE_INT64, values.data()) >= 0, object + ", " + name);
 }
 
+void File::write_attribute(const std::string& object, const char* name, const std::string& text) {
+  const Handle type = text_type(), space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(
+      H5Acreate_by_name(file_.id(), object.c_str(), name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+      H5Aclose);
+  const char* start = text.c_str();
+  require(attribute.is_valid() && H5Awrite(attribute.id(), type.id(), &start) >= 0, object + ", " + name);
+}
+
 void File::link_file(const std::string& name, const std::string& relative_path) {
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(links.id(), 1);
@@ -110,6 +127,15 @@ bool File::contains(const std::string& name) const { return H5Lexists(file_.id()
 void File::read_attribute_raw(const char* name, hid_t type, void* value) const {
   const Handle attribute(H5Aopen(file_.id(), name, H5P_DEFAULT), H5Aclose);
   require(attribute.is_valid() && H5Aread(attribute.id(), type, value) >= 0, name);
+}
+
+std::string File::read_text_attribute(const std::string& object, const char* name) const {
+  const Handle attribute(H5Aopen_by_name(file_.id(), object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  char* start = nullptr;
+  require(attribute.is_valid() && H5Aread(attribute.id(), text_type().id(), &start) >= 0, object + ", " + name);
+  std::string text(start);
+  H5free_memory(start);
+  return text;
 }
 
 std::int64_t File::read_integer_attribute(const char* name) const {

@@ -75,6 +75,8 @@ class File {
   void write_attribute(const char* name, std::int64_t value);
   /// The numbers of an attribute of a group or dataset that is there.
   void write_attribute(const std::string& object, const char* name, std::span<const std::int64_t> values);
+  /// Text of a dataset that is there: its unit, say.
+  void write_attribute(const std::string& object, const char* name, const std::string& text);
   /// Link `name` here to the root of another file, by a path relative to this file's folder.
   void link_file(const std::string& name, const std::string& relative_path);
   void unlink(const std::string& name);
@@ -87,6 +89,7 @@ class File {
   double read_double_attribute(const char* name) const;
   std::vector<std::int64_t> read_integers_attribute(const std::string& object, const char* name) const;
   std::string read_text(const std::string& name) const;
+  std::string read_text_attribute(const std::string& object, const char* name) const;
   /// Of a dataset, without reading it.
   Shape shape(const std::string& name) const;
   Table<double> read_doubles(const std::string& name) const;

@@ -60,6 +60,9 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
       const Facet facet = opposite_facet<Dim>(cells[c], k);
       auto& entry = facets.try_emplace(ascending(facet), 0, facet).first->second;
       if (++entry.first > 2) throw InputError({"", place(), "a facet with more than two cells", "a manifold mesh"});
+      if (entry.first == 2 && is_even(facet) == is_even(entry.second))
+        throw InputError({"", place(), "a cell that lies on another one of the same facet, or is there twice",
+                          "cells that do not overlap"});
     }
   }
   for (const auto& [key, entry] : facets)

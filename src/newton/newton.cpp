@@ -30,6 +30,8 @@ const char* to_string(Termination termination) {
       return "no step lowers the energy";
     case Termination::infeasible:
       return "not feasible";
+    case Termination::cancelled:
+      return "cancelled";
   }
   return "";
 }
@@ -74,6 +76,7 @@ class Minimizer {
     value_ = timed_value(x_);
     if (!std::isfinite(value_)) return stop(Termination::infeasible, "the energy at the start is not finite");
     for (summary_.iterations = 0; summary_.iterations < options_.max_iterations; ++summary_.iterations) {
+      if (options_.is_cancelled()) return stop(Termination::cancelled);
       compute_remaining();
       compute_gradient();
       if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
@@ -463,9 +466,9 @@ class Minimizer {
     if (options_.line_search == LineSearch::backtracking && !advancing) return change < 0;
     if (change <= kArmijo * step * slope) return true;
     if (advancing || options_.line_search == LineSearch::armijo) return false;
-    // PolyFEM's "RobustArmijo" (scene-format §7; Hager & Zhang): where the energy changes little, in either direction, a
-    // slope that still falls at the end will do. That refuses full steps to the minimum of a quadratic: where energies say
-    // nothing at all, a slope that shrinks to half is enough.
+    // PolyFEM's "RobustArmijo" (CONVENTIONS.md, "Tolerances"; Hager & Zhang): where the energy changes little, in either
+    // direction, a slope that still falls at the end will do. That refuses full steps to the minimum of a quadratic: where
+    // energies say nothing at all, a slope that shrinks to half is enough.
     const double change_of_energy = std::abs(value - value_);
     if (change_of_energy > 0.1 * std::abs(value_)) return false;
     const double after = free_dot(step_, gradient_at(candidate_));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The part of a frame from which a run goes on with the same bits (design §5): group /checkpoint beside /mesh.
+// The part of a frame from which a run goes on with the same bits (CONVENTIONS.md, "Output"): group /checkpoint beside
+// /mesh.
 #pragma once
 
 #include <span>

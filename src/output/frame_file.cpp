@@ -34,9 +34,16 @@ void write_mesh(hdf5::File& file, const Mesh<Dim>& mesh, ConstVectorView rest) {
     if (mesh.is_facet_alive(f)) surface.insert(surface.end(), mesh.facet(f).begin(), mesh.facet(f).end());
   }
   file.write("/mesh/rest", as_span(rest), Dim);
+  file.write_attribute("/mesh/rest", "unit", std::string("m"));
   file.write("/mesh/simplices", simplices, Dim + 1);
   file.write("/mesh/body", body, 0);
   file.write("/mesh/surface", surface, Dim);
+}
+
+/// A dataset with the attribute `unit`.
+void write_values(hdf5::File& file, const std::string& name, std::span<const double> values, int columns, const char* unit) {
+  file.write(name, values, columns);
+  file.write_attribute(name, "unit", std::string(unit));
 }
 
 template <std::size_t N>
@@ -51,7 +58,7 @@ void write_surface(hdf5::File& file, const std::string& group, const std::vector
                    const std::vector<std::array<int, 2>>& edges, const std::vector<std::array<int, 3>>& triangles) {
   std::vector<double> x;
   for (const Vec<Dim>& p : positions) x.insert(x.end(), p.data(), p.data() + Dim);
-  file.write(group + "/x", x, Dim);
+  write_values(file, group + "/x", x, Dim, "m");
   write_index_rows(file, group + "/edges", edges);
   write_index_rows(file, group + "/faces", triangles);
 }
@@ -70,16 +77,16 @@ void require_range(const std::filesystem::path& path, const std::string& name, c
 
 template <int Dim>
 void write_asked(hdf5::File& file, const AskedFields& asked) {
-  const auto write = [&](const char* name, std::span<const double> values, int columns) {
-    if (!values.empty()) file.write(name, values, columns);
+  const auto write = [&](const char* name, std::span<const double> values, int columns, const char* unit) {
+    if (!values.empty()) write_values(file, name, values, columns, unit);
   };
-  write("/fields/contact_force", as_span(asked.forces.contact), Dim);
-  write("/fields/friction_force", as_span(asked.forces.friction), Dim);
-  write("/fields/reaction_force", as_span(asked.forces.reaction), Dim);
-  write("/fields/von_mises", asked.von_mises, 0);
-  write("/fields/stress", asked.stress, Dim * Dim);
-  write("/totals/kinetic_energy", asked.kinetic_energy, 0);
-  write("/totals/momentum", asked.momentum, 0);
+  write("/fields/contact_force", as_span(asked.forces.contact), Dim, "N");
+  write("/fields/friction_force", as_span(asked.forces.friction), Dim, "N");
+  write("/fields/reaction_force", as_span(asked.forces.reaction), Dim, "N");
+  write("/fields/von_mises", asked.von_mises, 0, "Pa");
+  write("/fields/stress", asked.stress, Dim * Dim, "Pa");
+  write("/totals/kinetic_energy", asked.kinetic_energy, 0, "J");
+  write("/totals/momentum", asked.momentum, 0, "kg m/s");
 }
 
 Integers read_indices(const std::filesystem::path& path, const hdf5::File& file, const std::string& name, int columns,
@@ -116,10 +123,10 @@ void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame,
   file.write_attribute("step", static_cast<std::int64_t>(step));
   file.write_attribute("t", t);
   write_mesh(file, mesh, rest);
-  file.write("/fields/x", as_span(frame.x), Dim);
-  file.write("/fields/u", as_span(u), Dim);
-  file.write("/fields/v", as_span(frame.v), Dim);
-  file.write("/fields/elastic_density", frame.elastic_density, 0);
+  write_values(file, "/fields/x", as_span(frame.x), Dim, "m");
+  write_values(file, "/fields/u", as_span(u), Dim, "m");
+  write_values(file, "/fields/v", as_span(frame.v), Dim, "m/s");
+  write_values(file, "/fields/elastic_density", frame.elastic_density, 0, Dim == 2 ? "J/m^2" : "J/m^3");
   if (frame.asked) write_asked<Dim>(file, *frame.asked);
   write_surface<Dim>(file, "/obstacles", frame.obstacle_x, frame.obstacle_edges, frame.obstacle_triangles);
   if (frame.proxy.x) write_surface<Dim>(file, "/proxy", *frame.proxy.x, *frame.proxy.edges, *frame.proxy.triangles);

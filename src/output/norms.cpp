@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Norms of the displacement u = x - X: one centroid point a cell is what the regression scenes' reference values use
-// (scene-format §9).
+// (CONVENTIONS.md, "Norms").
 #include <algorithm>
 #include <cmath>
 

@@ -134,13 +134,15 @@ void Totals::restore(const std::vector<double>& values) {
                   [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]); });
 }
 
-std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const {
+std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,
+                                 const DisplacementNorms& norms) const {
   return fmt::format(
-      R"({{"scene":{},"outcome":{},"backend":{},"threads":{},"versions":{},"steps":{},"cut_steps":{},"t":{},{},)"
+      R"({{"scene":{},"outcome":{},"backend":{},"solver":{},"threads":{},"versions":{},"steps":{},"cut_steps":{},"t":{},{},)"
       R"("energy_decrease_by_remeshing":{},"norms":{}}})"
       "\n",
-      json_string(info.scene), json_string(outcome), json_string(info.backend), info.threads, versions_json(), total_.step,
-      total_.cut_steps, number(total_.t), common_members(total_), number(gain_), norms_json(norms));
+      json_string(info.scene), json_string(outcome), json_string(info.backend), json_string(solver), info.threads,
+      versions_json(), total_.step, total_.cut_steps, number(total_.t), common_members(total_), number(gain_),
+      norms_json(norms));
 }
 
 }  // namespace itr::output

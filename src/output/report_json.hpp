@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reports as JSON text with the names that design §5 promises.
+// Reports as JSON text with the names that CONVENTIONS.md, "Output" promises.
 #pragma once
 
 #include <string>
@@ -21,7 +21,8 @@ class Totals {
   void restore(const std::vector<double>& values);
   const StepReport& report() const { return total_; }
   /// The text of summary.json.
-  std::string summary_json(const RunInfo& info, const std::string& outcome, const DisplacementNorms& norms) const;
+  std::string summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,
+                           const DisplacementNorms& norms) const;
 
  private:
   StepReport total_;

@@ -171,9 +171,10 @@ void Writer::save(const FrameView<Dim>& frame, const State<Dim>& state) {
 
 const StepReport& Writer::totals() const { return impl_->totals.report(); }
 
-void Writer::finish(const std::string& outcome) {
+void Writer::finish(const std::string& outcome, const std::string& solver) {
   impl_->series.write();
-  write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, outcome, impl_->norms));
+  const std::string& used = solver.empty() ? impl_->info.backend : solver;
+  write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, outcome, used, impl_->norms));
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                     \

@@ -19,7 +19,7 @@ std::optional<Edit<3>> collapse_of(const RemeshSession<3>& session, const EdgeKe
   return propose_collapse(session.mesh(), session.strata(), edge).edit;
 }
 
-/// Of a cell whose edges are this long: isosceles and right-angled in 2D, regular in 3D (scene-format §8.5).
+/// Of a cell whose edges are this long: isosceles and right-angled in 2D, regular in 3D (CONVENTIONS.md, "Remeshing").
 template <int Dim>
 double volume_of(double length) {
   return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
@@ -37,6 +37,7 @@ class Collapser {
   void run() {
     for (const EdgeKey& edge : session_.mesh().edges()) push(edge);
     while (const auto edge = queue_.pop()) {
+      if (session_.is_cancelled()) return;
       if (!may_be_collapsed(*edge)) continue;
       const double signal = session_.roughness(*edge);
       const bool in_contact = session_.is_in_contact(*edge);

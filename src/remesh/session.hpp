@@ -29,6 +29,7 @@ class RemeshSession {
   const RemeshOptions& options() const { return options_; }
   RemeshReport& report() { return report_; }
   bool has_contact() const { return context_.contact.enabled; }
+  bool is_cancelled() const { return context_.newton.is_cancelled(); }
 
   double rest_length(const EdgeKey& e) const { return (mesh_.rest(e[0]) - mesh_.rest(e[1])).norm(); }
   double length(const EdgeKey& e) const {

@@ -112,6 +112,7 @@ class Smoother {
     }
     std::sort(order.begin(), order.end());
     for (const auto& [promise, v] : order) {
+      if (session_.is_cancelled()) return;
       const Vec<Dim> gradient = configurational_gradient(session_, v);
       const double force = gradient.norm(), length = kStep * shortest_edge(mesh_, v);
       if (force * length <= least || session_.was_refused(RemeshMemory::smooth, {v, kNone}, force, false)) continue;
@@ -122,6 +123,7 @@ class Smoother {
 
   void better_shapes() {
     for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {
+      if (session_.is_cancelled()) return;
       if (!may_move(v)) continue;
       const double shape = worst_shape(mesh_, v);
       if (shape < kBadShape || session_.was_refused(RemeshMemory::reshape, {v, kNone}, shape, false)) continue;

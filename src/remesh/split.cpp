@@ -19,8 +19,10 @@ class Splitter {
 
   void run() {
     for (const EdgeKey& edge : session_.mesh().edges()) push(edge);
-    while (const auto edge = queue_.pop())
+    while (const auto edge = queue_.pop()) {
+      if (session_.is_cancelled()) return;
       if (may_be_split(*edge)) split(*edge);
+    }
     session_.forget_depths();
   }
 

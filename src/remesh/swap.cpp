@@ -72,6 +72,7 @@ void swap_edges(RemeshSession<2>& session) {
     if (!session.is_surface(edge)) queue.push(edge, valence_gain(mesh, edge));
   std::unordered_map<EdgeKey, int, EdgeKeyHash> tries;
   while (const auto edge = queue.pop()) {
+    if (session.is_cancelled()) return;
     if (!session.exists(*edge) || tries[*edge]++ >= options.max_depth) continue;
     const auto edit = make_swap(mesh, *edge);
     if (!edit) continue;

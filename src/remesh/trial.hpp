@@ -35,10 +35,10 @@ struct TrialOptions {
   LocalRelaxationOptions local;
 };
 
-/// The decrease of the energy by the edit (design §3, rules a-d; paper eq. 11): both sides have one support and get the
-/// same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex that it sets free:
-/// what that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it refuses. A patch
-/// decides what lies between.
+/// The decrease of the energy by the edit (CONVENTIONS.md, "Remeshing", rules a-d; paper eq. 11): both sides have one
+/// support and get the same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex
+/// that it sets free: what that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it
+/// refuses. A patch decides what lies between.
 template <int Dim>
 Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
                      double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `contact/collision_mesh`: a surface that touches in place of the bodies' boundary (scene-format §6.2).
+// `contact/collision_mesh`: a surface that touches in place of the bodies' boundary (CONVENTIONS.md, "Contact").
 #pragma once
 
 #include <optional>

@@ -47,6 +47,7 @@ class ConditionReader {
   void read_body_acceleration() {
     const Node rhs = boundary_["rhs"];
     if (!rhs.exists()) return;
+    warn_of_components(rhs, Dim, warnings_);
     const ValueFunction<Dim> value = read_function<Dim>(rhs, -1);
     if (value.is_zero) return;
     check_defined<Dim>(value.function, all_vertices(), times(), rhs);
@@ -56,6 +57,7 @@ class ConditionReader {
   void read_dirichlet() {
     std::set<int> seen;
     for (const Node& node : boundary_["dirichlet_boundary"].items()) {
+      warn_of_components(node["value"], Dim, warnings_);
       const Function function = read_value(node);
       const std::array<bool, Dim> components = read_components(node["dimension"]);
       const bool is_free = std::none_of(components.begin(), components.end(), [](bool b) { return b; });
@@ -69,6 +71,7 @@ class ConditionReader {
   void read_neumann() {
     std::set<int> seen;
     for (const Node& node : boundary_["neumann_boundary"].items()) {
+      warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
       for (const int tag : tags_of(node, seen)) {
         check_defined<Dim>(value.function, vertices_with(tag), times(), node["value"]);
@@ -94,6 +97,7 @@ class ConditionReader {
   /// The first entry with an obstacle's id moves it; obstacle_displacements come before dirichlet_boundary.
   void read_motions(ObstacleGeometry<Dim>& geometry) {
     std::vector<Node> entries = boundary_["obstacle_displacements"].items();
+    for (const Node& node : entries) warn_of_components(node["value"], Dim, warnings_);
     for (const Node& node : entries)
       if (!is_all(node["id"]) && !obstacle_ids_.contains(read_condition_id(node["id"]))) warn_unused(node);
     for (const Node& node : boundary_["dirichlet_boundary"].items()) entries.push_back(node);
@@ -123,6 +127,7 @@ class ConditionReader {
     for (const Node& node : initial_[name].items()) {
       if (!node.has("id")) node["id"].fail("the id of a body");
       const int body = read_id(node["id"], 0);
+      warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"]);
       if (!bodies_.contains(body)) warn_unused(node);
       if (!seen.insert(body).second) {

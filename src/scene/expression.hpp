@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The expression language of scene files (scene-format §4.3): tinyexpr's grammar and functions, and PolyFEM's additions.
-// Parsed once into a program for a stack of numbers.
+// The expression language of scene files (CONVENTIONS.md, "Expressions"): tinyexpr's grammar and functions, and PolyFEM's
+// additions. Parsed once into a program for a stack of numbers.
 #pragma once
 
 #include <stdexcept>

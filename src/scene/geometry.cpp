@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <set>
 #include <sstream>
+#include <utility>
 
 #include "itr/mesh/refine.hpp"
 #include "selection.hpp"
@@ -16,7 +18,7 @@ namespace itr::scene {
 
 namespace {
 
-constexpr double kFlat = 1e-5;         ///< least extent in z of a surface that is no 2D mesh, relative to its largest one
+constexpr double kFlat = 1e-5;         ///< extent in z of a flat mesh, relative to its size: at most
 constexpr double kLeastShape = 1e-13;  ///< cells with less volume, relative to longest edge^Dim, are degenerate
 constexpr std::size_t kMostCells = 200'000'000;
 
@@ -76,6 +78,25 @@ void orient_cells(const Node& geometry, const std::vector<Vec<Dim>>& points, boo
   };
   refuse("degenerate", degenerate);
   refuse("inverted", inverted);
+}
+
+/// Refuses what formats without indices leave: every cell with vertices of its own, where others have theirs.
+template <int Dim>
+void check_connected(const Node& geometry, const std::vector<Vec<Dim>>& points,
+                     const std::vector<typename Mesh<Dim>::Cell>& cells) {
+  if (cells.size() < 2) return;
+  std::vector<char> is_used(points.size(), 0);
+  for (const auto& cell : cells)
+    for (const int v : cell)
+      if (std::exchange(is_used[v], 1)) return;
+  const auto less = [](const Vec<Dim>& a, const Vec<Dim>& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  };
+  const std::set<Vec<Dim>, decltype(less)> places(points.begin(), points.end(), less);
+  if (places.size() < points.size())
+    geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + " whose elements share no vertices: " +
+                              std::to_string(points.size()) + " of them at " + std::to_string(places.size()) + " places",
+                          "a mesh whose elements share vertices (merge those that coincide)");
 }
 
 /// Removes points that no cell uses; returns how many there were.
@@ -155,6 +176,7 @@ void read_body(const Node& geometry, const MeshFile& file, Collected<Dim>& all, 
   std::vector<typename Mesh<Dim>::Cell> cells = cells_of(file, Vec<Dim>());
   const bool is_mirror = transform<Dim>(points, geometry);
   const Box<Dim> box = bounding_box<Dim>(points);
+  check_connected<Dim>(geometry, points, cells);
   orient_cells<Dim>(geometry, points, is_mirror, cells);
   if (const std::size_t unused = drop_unused<Dim>(points, cells); unused > 0)
     warnings.push_back(geometry["mesh"].pointer() + ": " + std::to_string(unused) + " vertices in no cell are left out");
@@ -165,14 +187,18 @@ void read_body(const Node& geometry, const MeshFile& file, Collected<Dim>& all, 
 int dimension_of(const Node& geometry, const MeshFile& file) {
   if (!file.tetrahedra.empty()) return 3;
   if (file.triangles.empty()) geometry["mesh"].fail("a mesh without cells", "triangles (2D) or tetrahedra (3D)");
-  const Box<3> box = bounding_box<3>(file.vertices);
-  const bool is_surface_format = std::filesystem::path(geometry["mesh"].string("")).extension() != ".msh";
-  if (is_surface_format && box.sizes()[2] >= kFlat * box.sizes().maxCoeff())
-    geometry["mesh"].fail("a surface mesh, " + abbreviate(geometry["mesh"].json()), "tetrahedra, or a flat mesh (2D)");
+  if (!is_flat(file))
+    geometry["mesh"].fail("a surface mesh, " + abbreviate(geometry["mesh"].json()),
+                          "tetrahedra, or a flat mesh: all vertices at one z (2D)");
   return 2;
 }
 
 }  // namespace
+
+bool is_flat(const MeshFile& file) {
+  const Vec<3> extent = bounding_box<3>(file.vertices).sizes();
+  return extent[2] <= kFlat * extent.maxCoeff();
+}
 
 std::filesystem::path MeshFiles::find(const Node& name, const char* what) {
   if (!name.exists()) name.fail(what);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `geometry` of a scene: the bodies' mesh and the obstacles (scene-format §2).
+// `geometry` of a scene: the bodies' mesh and the obstacles (CONVENTIONS.md, "Meshes").
 #pragma once
 
 #include <map>
@@ -32,6 +32,9 @@ struct Geometries {
   std::vector<Node> bodies, obstacles;
 };
 Geometries list_geometries(const Node& root);
+
+/// Whether all vertices are at one z: a mesh or surface of a 2D scene.
+bool is_flat(const MeshFile& file);
 
 /// 2 or 3: what all bodies' meshes agree on.
 int find_dimension(const Geometries& geometries, MeshFiles& files);

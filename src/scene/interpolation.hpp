@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The factor g(t) that scales a boundary value over time (scene-format §4.2).
+// The factor g(t) that scales a boundary value over time (CONVENTIONS.md, "Conditions").
 #pragma once
 
 #include <vector>

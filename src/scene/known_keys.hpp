@@ -5,8 +5,8 @@
 
 namespace itr::scene {
 
-/// Refuses unknown keys (naming the nearest known one), and known ones that ask for what is not supported yet. After it,
-/// every key of the document is one that a reader of this module honours, or one that cannot change a result.
-void check_keys(const Document& document);
+/// Throws InputError for the first key of the document that we do not know, whose value is not what it must be, or that asks
+/// for something unsupported. Warns of what is asked for in vain.
+void check_keys(const Document& document, std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

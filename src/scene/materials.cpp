@@ -197,6 +197,10 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
   const Node node = root["materials"];
   if (!node.exists()) node.fail("the materials of the bodies");
   const auto points = barycenters_by_body(mesh);
+  const bool has_inertia = root.has("time") && !root["time"]["quasistatic"].boolean(false);
+  for (const Node& entry : node.items())
+    if ((has_inertia || root["boundary_conditions"].has("rhs")) && !entry.has("rho"))
+      warnings.push_back(entry["rho"].pointer() + ": not given, so it is 1 kg/m^3");
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id
     MaterialReader reader(node, Dim);

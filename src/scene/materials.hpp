@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `materials` of a scene (scene-format §3).
+// `materials` of a scene (CONVENTIONS.md, "Materials").
 #pragma once
 
 #include <map>

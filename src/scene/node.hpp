@@ -21,8 +21,8 @@ struct Document {
   std::filesystem::path root;  ///< effective root_path
   Json json;
 
-  /// Absolute, else relative to `root`, else (if only there is such a file) to the working directory. Unlike scene-format
-  /// §1.3 the root comes first: what a scene means must not depend on where the command is run.
+  /// Absolute, else relative to `root`, else (if only there is such a file) to the working directory. Unlike in
+  /// PolyFEM the root comes first: what a scene means must not depend on where the command is run.
   std::filesystem::path resolve(const std::string& path) const;
 };
 
@@ -79,5 +79,8 @@ class Node {
   const Json* json_;
   std::string pointer_;
 };
+
+/// Warns of the components of a vector beyond `dimension` that are not 0, and of missing ones.
+void warn_of_components(const Node& vector, int dimension, std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

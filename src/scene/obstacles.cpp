@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Obstacles: collision-only surfaces out of mesh files (scene-format §2.6).
+// Obstacles: collision-only surfaces out of mesh files (CONVENTIONS.md, "Meshes").
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -162,6 +162,9 @@ void append(const Surface& surface, const std::vector<Vec<Dim>>& points, const V
 
 template <int Dim>
 void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<Dim>& out) {
+  if (Dim == 2 && !is_flat(file))
+    geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + ", a surface in space, where no body has tetrahedra (2D)",
+                          "a line or a flat mesh");
   std::vector<Vec<Dim>> points = points_of<Dim>(file);
   transform<Dim>(points, geometry);
   const Box<Dim> box = bounding_box<Dim>(points);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <sstream>
 
 namespace itr::scene {
 
@@ -39,7 +40,7 @@ void read_integrator(const Node& node, TimeOptions& options) {
 }
 
 /// Two of tend, dt, time_steps; a third must agree with them.
-void read_steps(const Node& time, TimeOptions& options) {
+void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>& warnings) {
   const Node tend = time["tend"], dt = time["dt"], steps = time["time_steps"];
   if (tend.exists() + dt.exists() + steps.exists() < 2) time.fail(abbreviate(time.json()), "two of tend, dt and time_steps");
   if (tend.exists() && !(tend.number(0) > options.t0)) tend.fail("a time after t0 = " + std::to_string(options.t0));
@@ -57,6 +58,11 @@ void read_steps(const Node& time, TimeOptions& options) {
   const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
   if (count > kMostSteps) dt.fail("at most 1e9 steps");
   options.steps = static_cast<int>(count);
+  if (count == nearest) return;
+  std::ostringstream end;
+  end << tend.pointer() << ": " << tend.number(0) << " s is no whole number of steps: the run ends at "
+      << options.t0 + count * options.dt << " s";
+  warnings.push_back(end.str());
 }
 
 void read_acceptance(const Node& node, bool& enabled, double& tolerance) {
@@ -72,7 +78,7 @@ double read_share(const Node& node, double fallback) {
 
 }  // namespace
 
-TimeOptions read_time(const Node& root) {
+TimeOptions read_time(const Node& root, std::vector<std::string>& warnings) {
   TimeOptions options;
   const Node time = root["time"];
   if (!time.exists()) {
@@ -83,7 +89,7 @@ TimeOptions read_time(const Node& root) {
   options.quasistatic = time["quasistatic"].boolean(false);
   options.step_cuts = time["step_cuts"].integer_at_least(0, 0);
   if (options.step_cuts > kMostCuts) time["step_cuts"].fail("at most " + std::to_string(kMostCuts));
-  read_steps(time, options);
+  read_steps(time, options, warnings);
   read_integrator(time["integrator"], options);
   return options;
 }
@@ -96,6 +102,8 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   const Node contact = root["contact"], solver = root["solver"]["contact"];
   ContactOptions options;
   options.enabled = contact["enabled"].boolean(false);
+  if (contact.exists() && !contact.has("enabled") && !contact.json().empty())
+    warnings.push_back(contact.pointer() + ": without \"enabled\": true nothing collides");
   options.activation_distance = contact["dhat"].positive(1e-3);
   const double share = contact["dhat_percentage"].positive(0.8);
   if (options.enabled && options.activation_distance > shortest_edge) {
@@ -109,12 +117,10 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
   options.friction_velocity = contact["epsv"].positive(1e-3);
   const Node stiffness = solver["barrier_stiffness"];
-  options.adaptive_stiffness = !stiffness.exists() || stiffness.json() == "adaptive";
-  options.barrier_stiffness = solver["initial_barrier_stiffness"].positive(1);
-  if (!options.adaptive_stiffness) {
-    if (!stiffness.json().is_number()) stiffness.fail("a number > 0, or \"adaptive\"");
-    options.barrier_stiffness = stiffness.positive(1);
-  }
+  const bool is_remeshed = root["space"]["remesh"]["enabled"].boolean(false);
+  options.adaptive_stiffness = stiffness.exists() ? stiffness.json() == "adaptive" : !is_remeshed;
+  if (options.adaptive_stiffness) options.barrier_stiffness = solver["initial_barrier_stiffness"].positive(1);
+  if (stiffness.exists() && !options.adaptive_stiffness) options.barrier_stiffness = stiffness.positive(1);
   options.friction_iterations = solver["friction_iterations"].integer(1);
   options.friction_tolerance = solver["friction_convergence_tol"].non_negative(1e-2);
   return options;
@@ -140,7 +146,7 @@ Node first_gradient_node(const Node& nonlinear) {
                                               : nonlinear["advanced"]["first_grad_norm_tol"];
 }
 
-/// scene-format §7.2: tolerances in the paper's sense, Euclidean norms times h.
+/// CONVENTIONS.md, "Tolerances": tolerances in the paper's sense, Euclidean norms times h.
 void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& options) {
   const Node advanced = nonlinear["advanced"];
   options.step_tolerance = length * nonlinear["x_delta"].non_negative(0);
@@ -151,7 +157,7 @@ void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& 
   options.energy_steps = advanced["f_delta_step_tol"].integer_at_least(1, 100);
 }
 
-/// scene-format §7.3: norms that do not depend on the mesh, tolerances times the scene's scales.
+/// CONVENTIONS.md, "Tolerances": norms that do not depend on the mesh, tolerances times the scene's scales.
 void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptions& options) {
   const Node nonlinear = root["solver"]["nonlinear"], advanced = root["solver"]["advanced"];
   const Node given_length = advanced["characteristic_length"];
@@ -250,6 +256,7 @@ RemeshOptions read_remesh(const Node& root) {
       node["screening"].choice({"energy-percentile", "bounds", "none"}, static_cast<int>(options.screening)));
   options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));
   options.sweeps = node["sweeps"].integer_at_least(1, 1);
+  options.relative_tolerance = node["relative_tolerance"].positive(options.relative_tolerance);
 
   const Node split = node["split"], collapse = node["collapse"], swap = node["swap"], smooth = node["smooth"];
   read_acceptance(split, options.split.enabled, options.split.acceptance_tolerance);
@@ -278,13 +285,10 @@ RemeshOptions read_remesh(const Node& root) {
 }
 
 OutputOptions read_output(const Node& root) {
-  // Output keys never stop a scene: what is no positive integer is passed over.
-  const Node skip = root["output"]["paraview"]["skip_frame"];
-  const bool is_usable = skip.exists() && skip.json().is_number_integer() && skip.json() > 0 && skip.json() < 1e9;
+  const Node output = root["output"];
   OutputOptions options;
-  if (is_usable) options.skip_frames = skip.integer(1);
-  const Node period = root["output"]["checkpoint_period"];
-  if (period.exists() && period.json().is_number() && period.json() >= 0) options.checkpoint_period = period.number(30);
+  options.skip_frames = output["paraview"]["skip_frame"].integer_at_least(1, options.skip_frames);
+  options.checkpoint_period = output["checkpoint_period"].non_negative(options.checkpoint_period);
   return options;
 }
 
@@ -306,8 +310,7 @@ std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& ti
 
 FieldOptions read_fields(const Node& root) {
   const Node asked = root["output"]["paraview"]["options"];
-  // As all of /output, what is wrong here never stops a scene.
-  const auto is_asked = [&](const char* key) { return asked.has(key) && asked[key].json() == true; };
+  const auto is_asked = [&](const char* key) { return asked[key].boolean(false); };
   return {.contact_forces = is_asked("contact_forces"),
           .friction_forces = is_asked("friction_forces"),
           .reaction_forces = is_asked("reaction_forces"),

@@ -7,8 +7,8 @@
 
 namespace itr::scene {
 
-TimeOptions read_time(const Node& root);
-/// The length that PolyFEM multiplies tolerances with: h, or 1 for statics (scene-format §1.5).
+TimeOptions read_time(const Node& root, std::vector<std::string>& warnings);
+/// The length that PolyFEM multiplies tolerances with: h, or 1 for statics (CONVENTIONS.md, "Tolerances").
 double characteristic_length(const Node& root, const TimeOptions& time);
 
 /// `shortest_edge` of the rest surfaces, obstacles included: dhat shrinks below it unless the scene gives it (§6.1).

@@ -48,7 +48,7 @@ double body_diagonal(const Mesh<Dim>& mesh) {
 template <int Dim>
 Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
   Setup<Dim> setup;
-  setup.time = read_time(root);
+  setup.time = read_time(root, warnings);
   setup.remesh = read_remesh(root);
   setup.linear = read_linear(root);
   setup.damping = read_damping(root, setup.time);
@@ -58,6 +58,10 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
 
   BodyGeometry<Dim> bodies = read_bodies<Dim>(geometries, files, warnings);
   setup.mesh = std::move(bodies.mesh);
+  for (const auto* list : {&geometries.bodies, &geometries.obstacles})
+    for (const Node& geometry : *list)
+      for (const char* key : {"translation", "dimensions", "scale"})
+        warn_of_components(geometry["transformation"][key], Dim, warnings);
   setup.point_tags = std::move(bodies.point_tags);
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
@@ -65,17 +69,6 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;
-}
-
-int read_max_threads(const Node& root) {
-  const Node node = root["solver"]["max_threads"];
-  const bool is_usable = node.exists() && node.json().is_number_integer() && node.json() > 0 && node.json() < 1e6;
-  return is_usable ? node.integer(0) : 0;
-}
-
-std::string read_directory(const Node& root) {
-  const Node node = root["output"]["directory"];
-  return node.exists() && node.json().is_string() ? node.string("") : "";
 }
 
 std::string make_identity(const Node& root, const Geometries& geometries, MeshFiles& files) {
@@ -97,35 +90,49 @@ std::string make_identity(const Node& root, const Geometries& geometries, MeshFi
 
 }  // namespace
 
-std::vector<std::string> find_changes(const std::string& before, const std::string& now) {
+namespace {
+
+/// With dt given, tend and time_steps only say how many steps there are.
+Change::Of kind_of_change(const std::string& path, bool has_step) {
+  if (path == "/time/tend" || path == "/time/time_steps") return has_step ? Change::Of::length : Change::Of::scene;
+  for (const char* prefix : {"/solver", "/space/remesh", "/time/step_cuts"})
+    if (path.starts_with(prefix)) return Change::Of::solving;
+  return Change::Of::scene;
+}
+
+}  // namespace
+
+std::vector<Change> find_changes(const std::string& before, const std::string& now) {
   const Json old_scene = Json::parse(before, nullptr, false), new_scene = Json::parse(now, nullptr, false);
-  if (old_scene.is_discarded()) return {"the scene of the saved state cannot be read"};
-  std::vector<std::string> changes;
+  if (old_scene.is_discarded()) return {{"the scene of the saved state cannot be read"}};
+  const Json::json_pointer step("/time/dt");
+  const bool has_step = old_scene.contains(step) && new_scene.contains(step);
+  std::vector<Change> changes;
   for (const Json& change : Json::diff(old_scene, new_scene)) {
     const std::string path = change["path"], operation = change["op"];
     const Json::json_pointer pointer(path);
     if (path.starts_with("/files/")) {
-      changes.push_back(pointer.back() + ": the file has another content");
+      changes.push_back({pointer.back() + ": the file has another content"});
       continue;
     }
     const auto value_in = [&](const Json& scene) { return scene.contains(pointer) ? abbreviate(scene[pointer]) : "absent"; };
-    changes.push_back(path + ": was " + value_in(old_scene) + ", is " +
-                      (operation == "remove" ? "absent" : abbreviate(change["value"])));
+    changes.push_back(
+        {path + ": was " + value_in(old_scene) + ", is " + (operation == "remove" ? "absent" : abbreviate(change["value"])),
+         kind_of_change(path, has_step)});
   }
   return changes;
 }
 
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides) {
   const Document document = load_document(file, overrides);
-  check_keys(document);
+  Scene scene;
+  check_keys(document, scene.warnings);
   const Node root(document);
   MeshFiles files;
   const Geometries geometries = list_geometries(root);
-
-  Scene scene;
   scene.output = read_output(root);
-  scene.max_threads = read_max_threads(root);
-  scene.directory = read_directory(root);
+  scene.max_threads = root["solver"]["max_threads"].integer_at_least(0, 0);
+  scene.directory = root["output"]["directory"].string("");
   scene.identity = make_identity(root, geometries, files);
   if (find_dimension(geometries, files) == 2)
     scene.setup = read_setup<2>(root, geometries, files, scene.warnings);

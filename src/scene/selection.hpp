@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which ids parts of a mesh get (scene-format §2.5).
+// Which ids parts of a mesh get (CONVENTIONS.md, "Meshes").
 #pragma once
 
 #include <functional>

@@ -15,8 +15,6 @@ namespace itr {
 
 namespace {
 
-constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest, where the setup says nothing
-
 template <int Dim>
 std::string describe(const Vec<Dim>& p) {
   std::string text = "(";
@@ -38,16 +36,6 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   for (const auto& [body, material] : setup.materials)
     if (setup.remesh.enabled && material.density_at)
       refuse("/materials", "a density that varies in space (id " + std::to_string(body) + ") where the mesh changes");
-}
-
-template <int Dim>
-void check_proxy(const Setup<Dim>& setup) {
-  if (!setup.proxy) return;
-  const auto& weights = setup.proxy->weights;
-  const auto rows = static_cast<Eigen::Index>(setup.proxy->rest.size()), columns = Eigen::Index{setup.mesh.num_vertices()};
-  if (weights.rows() == rows && weights.cols() == columns) return;
-  const auto text = [](Eigen::Index r, Eigen::Index c) { return std::to_string(r) + " x " + std::to_string(c); };
-  throw InputError({"", "weights of the collision mesh", text(weights.rows(), weights.cols()), text(rows, columns)});
 }
 
 /// Where no surfaces cross: what is wholly inside of a body.
@@ -145,10 +133,9 @@ template <int Dim>
 // It is moved: NOLINTNEXTLINE(performance-unnecessary-value-param)
 Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger) : impl_(std::make_unique<Impl>()) {
   refuse_unsupported(setup);
-  check_proxy(setup);
+  setup.validate();
+  for (const std::string& chosen : setup.choose_defaults()) logger.info(chosen);
   impl_->setup = std::move(setup);
-  if (double& length = impl_->setup.remesh.split.min_edge_length; length < 0)
-    length = kLeastSplitEdge * rest_diagonal(impl_->setup.mesh);
   impl_->logger = std::move(logger);
   const LinearOptions& linear = impl_->setup.linear;
   impl_->direct =
@@ -235,6 +222,11 @@ const Setup<Dim>& Simulation<Dim>::setup() const {
 template <int Dim>
 std::string Simulation<Dim>::solver_name() const {
   return std::string(impl_->solver->name());
+}
+
+template <int Dim>
+std::string Simulation<Dim>::solver_name_in_use() const {
+  return std::string(impl_->solver->name_in_use());
 }
 
 template <int Dim>

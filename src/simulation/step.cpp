@@ -123,7 +123,7 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
       problem = make_problem();
       summary = solve(VectorX(x));
       const std::string failure = summary.converged() ? find_violation(setup, next, x) : reason_of(summary);
-      if (!failure.empty()) {
+      if (!failure.empty() && !setup.newton.is_cancelled()) {
         logger.warning(fmt::format("step {}: keeping the mesh as it was, the remeshed step failed: {}", next.step, failure));
         next = unchanged;
         x = solution;
@@ -133,6 +133,10 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
     }
   }
 
+  if (setup.newton.is_cancelled()) {
+    summary.termination = Termination::cancelled;
+    return fail(reason_of(summary));
+  }
   if (setup.remesh.enabled && !guard.allows(*problem, next.history, x)) return forbid();  // as it ends
   next.created_energy = guard.created_energy();
   ITR_AUDIT(find_violation(setup, next, x).empty(), find_violation(setup, next, x));
@@ -199,7 +203,7 @@ template <int Dim>
 StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system,
                               linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state, bool damped) {
   StepResult whole = take_step(setup, shortest_edge, system, solver, logger, state, damped);
-  if (whole.ok || setup.time.step_cuts == 0) return whole;
+  if (whole.ok || setup.time.step_cuts == 0 || setup.newton.is_cancelled()) return whole;
   const Setup<Dim> half = halved(setup, state);
   logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
                  "), cutting it into two of " + std::to_string(half.time.dt) + " s");

@@ -131,7 +131,7 @@ double StepProblem<Dim>::average_mass() const {
 }
 
 /// Balances the barrier against the other terms at x. At obstacles the reference implementation's gradient is their
-/// prescribed displacement (scene-format §6.5): it is part of its schedule.
+/// prescribed displacement (CONVENTIONS.md, "Barrier stiffness"): it is part of its schedule.
 template <int Dim>
 void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   VectorX gradient = VectorX::Zero(x.size());
@@ -158,18 +158,45 @@ VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
   return free ? start : x;
 }
 
-/// "12 13 obstacle 4 near (0.1, 0.2)", of vertices at x: the problem's, or the surface's (those of a proxy: "proxy 12").
+namespace {
+
 template <int Dim>
-std::string StepProblem<Dim>::name_vertices(std::span<const int> vertices, const VectorX& x, const char* own) const {
+Vec<Dim> middle_of(std::span<const int> vertices, const VectorX& x) {
+  Vec<Dim> middle = Vec<Dim>::Zero();
+  for (const int v : vertices) middle += x.template segment<Dim>(Dim * v) / static_cast<double>(vertices.size());
+  return middle;
+}
+
+/// Between the closest points of a pair.
+template <int Dim>
+Vec<Dim> place_of_pair(PairKind kind, std::span<const int> vertices, const VectorX& x) {
+  std::array<Vec<Dim>, 4> positions, closest;
+  for (std::size_t i = 0; i < vertices.size(); ++i) positions[i] = x.template segment<Dim>(Dim * vertices[i]);
+  const ClosestFeatures features = closest_features<Dim>(kind, positions.data());
+  for (int i = 0; i < pair_size(features.kind); ++i) closest[i] = positions[features.local[i]];
+  const PairDistance<Dim> distance = pair_distance<Dim>(features.kind, closest.data());
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (int i = 0; i < pair_size(features.kind); ++i) sum += std::abs(distance.coefficients[i]) * closest[i];
+  return sum / distance.coefficients.template lpNorm<1>();
+}
+
+PairKind kind_of_pair(const StepLimit& limit) {
+  if (limit.vertices.size() == 3) return PairKind::edge_vertex;
+  if (limit.vertices.size() == 2) return PairKind::vertex_vertex;
+  return limit.kind == "edge-edge pair" ? PairKind::edge_edge : PairKind::face_vertex;
+}
+
+}  // namespace
+
+/// "12 13 obstacle 4 near (0.1, 0.2)": vertices at x, the problem's, or the surface's (those of a proxy: "proxy 12").
+template <int Dim>
+std::string StepProblem<Dim>::name_vertices(std::span<const int> vertices, const VectorX& x, const Vec<Dim>& place,
+                                            const char* own) const {
   const int bodies = static_cast<int>(x.size() / Dim) - static_cast<int>(setup_.obstacles.rest.size());
   std::ostringstream text;
-  Vec<Dim> middle = Vec<Dim>::Zero();
-  for (const int v : vertices) {
-    text << (v < bodies ? own : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
-    middle += x.template segment<Dim>(Dim * v) / static_cast<double>(vertices.size());
-  }
+  for (const int v : vertices) text << (v < bodies ? own : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
   text << "near (";
-  for (int c = 0; c < Dim; ++c) text << (c > 0 ? ", " : "") << middle[c];
+  for (int c = 0; c < Dim; ++c) text << (c > 0 ? ", " : "") << place[c];
   text << ')';
   return text.str();
 }
@@ -181,8 +208,11 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
   if (summary.converged()) return summary;
   std::ostringstream text;
   const VectorX on_surface = surface_.positions(x);
-  const auto name_pair = [&](std::span<const int> vertices) {
-    return name_vertices(vertices, on_surface, surface_.map ? "proxy " : "");
+  const auto name_pair = [&](PairKind kind, std::span<const int> vertices) {
+    return name_vertices(vertices, on_surface, place_of_pair<Dim>(kind, vertices, on_surface), surface_.map ? "proxy " : "");
+  };
+  const auto name_middle = [&](std::span<const int> vertices) {
+    return name_vertices(vertices, x, middle_of<Dim>(vertices, x));
   };
   const VectorX& step = summary.failed_step;
   if (step.size() == x.size() && step.allFinite()) {
@@ -193,7 +223,7 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
     const StepLimit& limit = is_pair ? pair : cell;
     if (limit.step < 1)
       text << "; " << limit.step << " of the last Newton step is free, limited by the " << limit.kind << ' '
-           << (is_pair ? name_pair(limit.vertices) : name_vertices(limit.vertices, x));
+           << (is_pair ? name_pair(kind_of_pair(limit), limit.vertices) : name_middle(limit.vertices));
   }
   if (summary.worst_dof != kNone) {
     const int v = summary.worst_dof / Dim;
@@ -210,7 +240,7 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
         name = term->name();
       }
     }
-    text << "; the largest residual, " << total.norm() << " N, is at vertex " << name_vertices(std::array{v}, x)
+    text << "; the largest residual, " << total.norm() << " N, is at vertex " << name_middle(std::array{v})
          << ", where the largest force, " << largest << " N, is that of the term '" << name << '\'';
     const auto has = [v](const auto& vertices) { return std::find(vertices.begin(), vertices.end(), v) != vertices.end(); };
     const auto acts_on_it = [&](std::span<const int> pair) {
@@ -226,9 +256,10 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
       least = ratio;
       stencil = element.vertices;
     }
-    if (!stencil.empty()) text << "; its cell " << name_vertices(stencil, x) << " has the volume ratio " << least;
+    if (!stencil.empty()) text << "; its cell " << name_middle(stencil) << " has the volume ratio " << least;
     least = std::numeric_limits<double>::infinity();
     stencil = {};
+    PairKind kind{};
     if (potential_.contact())
       for (const ContactStencil& s : potential_.contact()->active(on_surface, workspace_)) {
         const std::span<const int> pair(s.vertices.data(), s.size());
@@ -237,8 +268,9 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
         if (distance >= least) continue;
         least = distance;
         stencil = pair;
+        kind = s.kind;
       }
-    if (!stencil.empty()) text << "; its contact pair " << name_pair(stencil) << " has the distance " << least << " m";
+    if (!stencil.empty()) text << "; its contact pair " << name_pair(kind, stencil) << " has the distance " << least << " m";
   }
   summary.message += text.str();
   return summary;

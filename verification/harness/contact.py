@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The contact barrier in its convergent form, from its formula (scene-format, sections 6.3 and 6.4)."""
+"""The contact barrier in its convergent form, from its formula (CONVENTIONS.md, "Contact")."""
 import numpy as np
 
 

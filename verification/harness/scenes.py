@@ -93,7 +93,7 @@ def run_scene(context, name, content, *overrides):
     folder = context.folder / name
     path = write_scene(context, name, content) if isinstance(content, dict) else content
     arguments = [argument for override in overrides for argument in ("--set", override)]
-    context.call("itr", "run", path, "-o", folder, "--threads", 1, *arguments)
+    context.call("itr", "run", path, "-o", folder, "--overwrite", "--threads", 1, *arguments)
     if not (folder / "summary.json").exists():
         raise Failure(f"{folder} has no summary.json")
     return Run(folder)

@@ -40,7 +40,8 @@ VARIANTS = [
 
 
 def run(options, scene, sets, keys, folder):
-    command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--threads", "1"]
+    command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--overwrite",
+               "--threads", "1"]
     for assignment in sets + [KEY + key for key in keys]:
         command += ["--set", assignment]
     try:

@@ -154,7 +154,8 @@ def median_trial(steps):
 def run(case, options):
     name, scene, sets, reference = case
     folder = options.results / name.replace(" ", "_").replace("=", "").replace(",", "").replace(".", "").replace("'", "")
-    command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--threads", "1"]
+    command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--overwrite",
+               "--threads", "1"]
     for assignment in sets:
         command += ["--set", assignment]
     before = os.times()

@@ -18,7 +18,7 @@ class InertiaEnergy final : public Energy {
   InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind, VectorX predictor);
 
   /// Adds residual . (x - xhat) + loss, by which the functional becomes 1/2 ||x - xhat_old||^2 for an xhat_old that the
-  /// mesh cannot represent (design §3, rule b): see projection/forgotten_history.hpp.
+  /// mesh cannot represent (CONVENTIONS.md, "Remeshing", rule b): see projection/forgotten_history.hpp.
   void set_unrepresented_history(VectorX residual, double loss);
 
   const VectorX& predictor() const { return predictor_; }

@@ -54,6 +54,7 @@ class ReusingSolver final : public Solver {
   ReusingSolver(Solver& solver, bool reuses) : solver_(solver), reuses_(reuses) {}
 
   std::string_view name() const override { return solver_.name(); }
+  std::string_view name_in_use() const override { return solver_.name_in_use(); }
   Capabilities capabilities() const override { return solver_.capabilities(); }
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override;
   Outcome factorize(std::span<const double> values) override;

@@ -76,6 +76,8 @@ class Solver {
  public:
   virtual ~Solver() = default;
   virtual std::string_view name() const = 0;  ///< "eigen:ldlt"
+  /// Who answers now, behind `name`: what `auto` has picked, a fallback that has taken over.
+  virtual std::string_view name_in_use() const { return name(); }
   virtual Capabilities capabilities() const = 0;
   /// Once per pattern; a direct solver does nothing for the pattern that it analysed last. The pattern is copied where the
   /// solver needs it later.

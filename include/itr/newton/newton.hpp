@@ -93,7 +93,8 @@ enum class Termination {
   round_off,   ///< what a full step would gain is below the round-off of the energy
   iterations,  ///< out of iterations
   no_descent,  ///< no direction or no step that lowers the energy, and the gradient is not small
-  infeasible   ///< the start is not feasible or a number is not finite
+  infeasible,  ///< the start is not feasible or a number is not finite
+  cancelled    ///< as NewtonOptions::cancel asks for
 };
 const char* to_string(Termination termination);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <atomic>
+
 namespace itr {
 
 enum class LineSearch { backtracking, armijo, robust_armijo };
@@ -22,7 +24,7 @@ enum class IndefiniteHessian {
   accept
 };
 
-/// When a solve has converged, and how it searches. Tolerances are those of the scene (scene-format §7.2, §7.3) already
+/// When a solve has converged, and how it searches. Tolerances are those of the scene (CONVENTIONS.md, "Tolerances") already
 /// multiplied by what its vocabulary multiplies them with; 0 turns a test off.
 struct NewtonOptions {
   int max_iterations = 500;
@@ -41,6 +43,11 @@ struct NewtonOptions {
   bool absolute_eigenvalues = false;  ///< by changing the sign of negative eigenvalues instead of clamping them
   int projected_iterations = 5;       ///< iterations with it before the true Hessian is tried again; 0: it never is
   bool extend_steps = true;           ///< go on along a step over which the energy fell in a straight line
+  /// Where it becomes true, solves end before their next iteration, not converged, and a step is not done. It must outlive
+  /// them and may be set by another thread or a signal's handler. Null: nobody can.
+  const std::atomic<bool>* cancel = nullptr;
+
+  bool is_cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }
 };
 
 }  // namespace itr

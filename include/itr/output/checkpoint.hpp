@@ -19,6 +19,9 @@ struct SavedState {
   int dim = 0;
 };
 
+/// Whether a run has left something in the folder.
+bool has_results(const std::filesystem::path& directory);
+
 /// The newest state in DIR/frames that can be read; none where there are no frames. Throws InputError where there are frames
 /// but none of them has a state that can be read (another version wrote them, or they are damaged).
 std::optional<SavedState> find_saved_state(const std::filesystem::path& directory);

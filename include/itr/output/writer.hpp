@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Writes what a simulation shows into a folder: frames/NNNNNN.h5, sim.h5, sim.xdmf, steps.jsonl, summary.json (design §5).
-// Reads state, never changes it.
+// Writes what a simulation shows into a folder: frames/NNNNNN.h5, sim.h5, sim.xdmf, steps.jsonl, summary.json
+// (CONVENTIONS.md, "Output"). Reads state, never changes it.
 #pragma once
 
 #include <filesystem>
@@ -13,8 +13,8 @@
 
 namespace itr::output {
 
-/// Norms of the final displacement as scene-format §9 defines them (rest integrals, one centroid point a cell; linf_grad is
-/// the true maximum).
+/// Norms of the final displacement as CONVENTIONS.md, "Norms" defines them (rest integrals, one centroid point a cell;
+/// linf_grad is the true maximum).
 struct DisplacementNorms {
   double l2 = 0, h1 = 0, h1_semi = 0, linf = 0, linf_grad = 0, lp = 0;
 };
@@ -50,9 +50,9 @@ class Writer {
   void save(const FrameView<Dim>& frame, const State<Dim>& state);
   /// Sums over the run as in summary.json, what was before --resume included.
   const StepReport& totals() const;
-  /// `outcome` is "finished" or the reason why the simulation stopped. Writes summary.json with totals, threads, versions
-  /// and norms of the last frame.
-  void finish(const std::string& outcome);
+  /// `outcome` is "finished" or the reason why the simulation stopped, `solver` who solved at the end (empty: the backend).
+  /// Writes summary.json with totals, threads, versions and norms of the last frame.
+  void finish(const std::string& outcome, const std::string& solver = {});
 
  private:
   struct Impl;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What an edit of the mesh forgets of the predictor, for the trial that decides about the edit (design §3, rule b).
+// What an edit of the mesh forgets of the predictor, for the trial that decides about the edit (CONVENTIONS.md, "Remeshing",
+// rule b).
 #pragma once
 
 #include "itr/fem/mass.hpp"

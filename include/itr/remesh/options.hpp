@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Options of in-timestep remeshing, with the paper's defaults (scene-format §8.1).
+// Options of in-timestep remeshing, with the paper's defaults (CONVENTIONS.md, "Remeshing").
 #pragma once
 
 namespace itr {
@@ -19,7 +19,7 @@ enum class HistoryRule {
 
 struct SplitOptions {
   bool enabled = true;
-  double acceptance_tolerance = 1e-3;  ///< least energy decrease [J]
+  double acceptance_tolerance = 0;  ///< least energy decrease [J]; 0: as Setup::choose_defaults says
   double culling_threshold = 0.95;
   int max_depth = 3;            ///< generations of one edge a step
   double min_edge_length = -1;  ///< shorter rest edges are not split [m]; below 0: 1e-6 of the bodies' diagonal at rest
@@ -56,12 +56,13 @@ struct LocalRelaxationOptions {
 
 struct RemeshOptions {
   bool enabled = false;
-  bool sizing_field = false;  ///< the baseline of scene-format §8.7 instead of energies
+  bool sizing_field = false;  ///< the baseline of CONVENTIONS.md, "Remeshing", instead of energies
   SplitOptions split;
   CollapseOptions collapse;
   SwapOptions swap;
   SmoothOptions smooth;
   LocalRelaxationOptions local;
+  double relative_tolerance = 1e-4;  ///< what choose_defaults takes of the scene's energy for a split
   Screening screening = Screening::bounds;
   HistoryRule history = HistoryRule::function;
   int sweeps = 1;

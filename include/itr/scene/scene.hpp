@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Scene files (PolyFEM's JSON, the subset in scene-format.md) into typed setups. The only module that knows JSON and
+// Scene files (PolyFEM's JSON, the keys in SCENES.md) into typed setups. The only module that knows JSON and
 // expressions. Everything wrong with a scene is an InputError, thrown before anything is computed.
 #pragma once
 
@@ -28,13 +28,23 @@ struct Scene {
   std::string identity;               ///< JSON of all that the results depend on: the merged scene, hashes of its files
 };
 
-/// What two identities differ in, a line each, with JSON pointers; empty: nothing.
-std::vector<std::string> find_changes(const std::string& before, const std::string& now);
+/// One difference between two identities, with its JSON pointer, and what it is of.
+struct Change {
+  std::string text;
+  enum class Of {
+    length,   ///< how long the run is: the steps are the same
+    solving,  ///< how steps are solved: solver, tolerances, step cuts, remeshing
+    scene     ///< what is simulated
+  } of = Of::scene;
+};
+std::vector<Change> find_changes(const std::string& before, const std::string& now);
 
 /// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides = {});
 
 /// The JSON Schema (draft 7) of scenes, made from the table that `read` checks keys and values against.
 std::string json_schema();
+/// The page SCENES.md, made from the same table.
+std::string reference_page();
 
 }  // namespace itr::scene

@@ -106,6 +106,21 @@ struct Setup {
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   FieldOptions fields;
   bool lump_mass = false;
+
+  /// Fills in what is left open, and says what with, a sentence each. Barrier stiffness 0: adaptive; with remeshing a tenth
+  /// of the stiffest body's modulus [Pa], or what that is in the other form. Split tolerance 0: relative_tolerance times an
+  /// energy of the scene, the lesser of 1 % of sum(E V), which bodies have at strains of a tenth, and, where nothing
+  /// prescribed feeds it, of what it has at the start and gravity gives; collapses then may cost a hundredth of that. Least
+  /// edge to split below 0: 1e-6 of the bodies' diagonal. A Simulation calls it.
+  std::vector<std::string> choose_defaults();
+  /// Throws InputError for the first thing that cannot be simulated: what is out of range, missing, or not finite. Places
+  /// are those of a scene file where it has them. A Simulation calls it.
+  void validate() const;
 };
+
+extern template std::vector<std::string> Setup<2>::choose_defaults();
+extern template std::vector<std::string> Setup<3>::choose_defaults();
+extern template void Setup<2>::validate() const;
+extern template void Setup<3>::validate() const;
 
 }  // namespace itr

@@ -59,7 +59,8 @@ class Simulation {
 
   const State<Dim>& state() const;
   const Setup<Dim>& setup() const;
-  std::string solver_name() const;
+  std::string solver_name() const;         ///< as it was asked for: "auto", say
+  std::string solver_name_in_use() const;  ///< who answers now
   /// Calls `observer` with the present state as output sees it.
   template <typename Observer>
   void observe(Observer&& observer) const {

@@ -73,7 +73,8 @@ class StepProblem {
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   NewtonSummary minimize_lagged(VectorX& x);
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
-  std::string name_vertices(std::span<const int> vertices, const VectorX& x, const char* own = "") const;
+  std::string name_vertices(std::span<const int> vertices, const VectorX& x, const Vec<Dim>& place,
+                            const char* own = "") const;
   void initialize_stiffness(const VectorX& x);
   void foresee_contact(const VectorX& x);
   VectorX start_of_solve(const VectorX& x);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Implicit time integrators as minimisation: predictor x-hat, scaling alpha h^2, and how velocity and acceleration follow
-// from new positions (design §3, scene-format §5).
+// from new positions (CONVENTIONS.md, "Time").
 #pragma once
 
 #include <vector>

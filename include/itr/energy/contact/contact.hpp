@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Contact barrier of IPC (Li et al. 2020) between surface primitives, in both forms of scene-format §6.3 and §6.4: vertices
+// Contact barrier of IPC (Li et al. 2020) between surface primitives, in both forms of CONVENTIONS.md, "Contact": vertices
 // and edges in 2D, vertices and triangles, edges and edges in 3D.
 #pragma once
 

@@ -7,7 +7,7 @@
 namespace itr {
 
 /// Smoothed Coulomb friction with normal forces, tangents and closest points lagged at the positions where it was made
-/// (scene-format §6.7). A new lag is a new object.
+/// (CONVENTIONS.md, "Friction"). A new lag is a new object.
 template <int Dim>
 class FrictionEnergy final : public Energy {
  public:

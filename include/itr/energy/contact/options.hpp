@@ -3,13 +3,13 @@
 
 namespace itr {
 
-/// Contact and friction (IPC). See scene-format §6 for the exact sums.
+/// Contact and friction (IPC). CONVENTIONS.md, "Contact", has the exact sums.
 struct ContactOptions {
   bool enabled = false;
   double activation_distance = 1e-3;  ///< dhat [m]: the barrier acts below it
   bool convergent = false;            ///< area weights, duplicate-region correction, 1/dhat^3: kappa is a pressure [Pa]
-  double barrier_stiffness = 1;       ///< kappa
-  bool adaptive_stiffness = false;    ///< kappa by the schedule of scene-format §6.5, from barrier_stiffness on
+  double barrier_stiffness = 0;       ///< kappa; 0: as Setup::choose_defaults says
+  bool adaptive_stiffness = false;    ///< from barrier_stiffness on as CONVENTIONS.md, "Barrier stiffness", says
   double friction_coefficient = 0;    ///< mu
   double friction_velocity = 1e-3;    ///< eps_v [m/s]: below it friction is smoothed
   int friction_iterations = 1;        ///< most lagging rounds a step; negative: no limit; 0: no friction

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Barrier stiffness that follows the scene (scene-format §6.5, after IPC's supplement): large enough for gaps that round-off
-// can resolve, small enough for Newton, and doubled while contacts close below a billionth of the scene.
+// Barrier stiffness that follows the scene (CONVENTIONS.md, "Barrier stiffness", after IPC's supplement): large enough for
+// gaps that round-off can resolve, small enough for Newton, and doubled while contacts close below a billionth of the scene.
 #pragma once
 
 #include <limits>

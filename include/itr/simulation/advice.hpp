@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// What is legal in a setup but looks like a mistake, and what will happen, in words.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "itr/simulation/simulation.hpp"
+
+namespace itr {
+
+/// Units that are unusual, bad meshes, bodies that nothing holds, surfaces that push each other from the start: a sentence
+/// each.
+template <int Dim>
+std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation);
+
+/// Accelerations, masses, waves against steps and elements, damping: a sentence each.
+template <int Dim>
+std::vector<std::string> foretell(const Setup<Dim>& setup);
+
+}  // namespace itr

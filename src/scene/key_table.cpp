@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+#include "key_table.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+#include "itr/core/check.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+Json scalar_schema() { return {{"type", {"number", "string"}}}; }
+Json list_of(const Json& item) { return {{"type", "array"}, {"items", item}}; }
+Json any_of(const Json& a, const Json& b) { return {{"anyOf", {a, b}}}; }
+Json number_schema() { return {{"type", "number"}}; }
+Json id_schema() { return {{"type", "integer"}, {"minimum", 0}}; }
+
+void check_names(const Node& node) {
+  for (const Node& name : node.items()) name.string("");
+}
+
+void check_stiffness(const Node& node) {
+  if (node.json() == "adaptive") return;
+  if (!node.json().is_number()) node.fail("a number > 0, or \"adaptive\"");
+  node.positive(1);
+}
+
+const std::vector<Kind>& kinds() {
+  static const std::vector<Kind> kinds = {
+      {"number", [](const Node& node) { node.number(0); }, number_schema(), "number"},
+      {"positive", [](const Node& node) { node.positive(1); }, {{"type", "number"}, {"exclusiveMinimum", 0}}, "number > 0"},
+      {"non_negative", [](const Node& node) { node.non_negative(0); }, {{"type", "number"}, {"minimum", 0}}, "number >= 0"},
+      {"share", nullptr, {{"type", "number"}, {"minimum", 0}, {"maximum", 1}}, "number of [0, 1]"},
+      {"integer", [](const Node& node) { node.integer(0); }, {{"type", "integer"}}, "integer"},
+      {"natural", [](const Node& node) { node.integer_at_least(0, 0); }, id_schema(), "integer >= 0"},
+      {"count",
+       [](const Node& node) { node.integer_at_least(1, 1); },
+       {{"type", "integer"}, {"minimum", 1}},
+       "integer >= 1"},
+      {"boolean", [](const Node& node) { node.boolean(false); }, {{"type", "boolean"}}, "boolean"},
+      {"string", [](const Node& node) { node.string(""); }, {{"type", "string"}}, "string"},
+      {"path", [](const Node& node) { node.string(""); }, {{"type", "string"}}, "path"},
+      {"names", check_names, any_of({{"type", "string"}}, list_of({{"type", "string"}})), "name or list of names"},
+      {"number or expression", nullptr, scalar_schema(), "number or expression"},
+      {"vector", nullptr, list_of(scalar_schema()), "list of numbers or expressions, one a component"},
+      {"number or numbers", nullptr, any_of(number_schema(), list_of(number_schema())), "number or list of numbers"},
+      {"numbers", nullptr, list_of(number_schema()), "list of numbers"},
+      {"booleans", nullptr, list_of({{"type", "boolean"}}), "list of booleans"},
+      {"counts", nullptr, any_of(id_schema(), list_of(id_schema())), "list of integers >= 1, one an axis"},
+      {"points", nullptr, list_of(list_of(number_schema())), "two lists of numbers"},
+      {"axis", nullptr, {{"type", {"integer", "string"}}}, "integer or string"},
+      {"id", nullptr, id_schema(), "integer >= 0"},
+      {"id or ids", nullptr, any_of(id_schema(), list_of(id_schema())), "integer or list of integers"},
+      {"id or all", nullptr, any_of(id_schema(), {{"const", "all"}}), "integer or \"all\""},
+      {"positive or adaptive", check_stiffness,
+       any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "adaptive"}}), "number > 0 or \"adaptive\""},
+      {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }, {{"const", "consistent"}}, "\"consistent\""},
+      {"order", nullptr, any_of({{"const", 1}}, {{"type", {"array", "object"}}}), "1"},
+      {"list", nullptr, Json::object(), "list"},  // of what its rows with `*` say
+      {"object", nullptr, {{"type", "object"}}, "object"},
+      {"", nullptr, Json::object(), "object"}};
+  return kinds;
+}
+
+}  // namespace
+
+std::vector<std::string> expand(const std::string& pointer) {
+  const auto open = pointer.find('{');
+  if (open == std::string::npos) return {pointer};
+  const auto close = pointer.find('}', open);
+  std::istringstream names(pointer.substr(open + 1, close - open - 1));
+  std::vector<std::string> patterns;
+  for (std::string name; std::getline(names, name, ',');)
+    for (const std::string& rest : expand(pointer.substr(close + 1)))
+      patterns.push_back(pointer.substr(0, open) + name + rest);
+  return patterns;
+}
+
+Kind kind_of(const Key& key) {
+  const std::string name = key.kind;
+  if (name.find('|') == std::string::npos) {
+    const auto found = std::find_if(kinds().begin(), kinds().end(), [&](const Kind& kind) { return name == kind.name; });
+    ITR_CHECK(found != kinds().end(), key.pointer, name);
+    return *found;
+  }
+  Kind kind{name, nullptr, {}, ""};
+  std::istringstream words(name);
+  for (std::string word; std::getline(words, word, '|');) {
+    kind.choices.push_back(word);
+    kind.words += (kind.words.empty() ? "" : ", ") + word;
+  }
+  kind.schema = {{"enum", kind.choices}};
+  return kind;
+}
+
+KeyTable::KeyTable() {
+  for (const Key& key : keys()) {
+    const std::string fallback = key.fallback;
+    const Entry entry{&key, kind_of(key), Json::parse(fallback.starts_with('(') ? "" : fallback, nullptr, false)};
+    for (const std::string& pattern : expand(key.pointer)) {
+      ITR_CHECK(entries_.emplace(pattern, entry).second, "two rows for", pattern);
+      for (std::string child = pattern; !child.empty();) {
+        const auto slash = child.rfind('/');
+        children_[child.substr(0, slash)].insert(child.substr(slash + 1));
+        child.resize(slash);
+      }
+    }
+  }
+}
+
+const Entry* KeyTable::find(const std::string& pattern) const {
+  const auto found = entries_.find(pattern);
+  return found == entries_.end() ? nullptr : &found->second;
+}
+
+const std::set<std::string>* KeyTable::children(const std::string& pattern) const {
+  const auto found = children_.find(pattern);
+  return found == children_.end() ? nullptr : &found->second;
+}
+
+std::string KeyTable::place_of(const std::string& key) const {
+  for (const auto& [pattern, entry] : entries_)
+    if (pattern.ends_with("/" + key)) return pattern;
+  return "";
+}
+
+const KeyTable& key_table() {
+  static const KeyTable table;
+  return table;
+}
+
+}  // namespace itr::scene

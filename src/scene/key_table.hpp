@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+// The table of all keys of a scene: what the reader checks against, what the schema and the page SCENES.md are made of.
+#pragma once
+
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "node.hpp"
+
+namespace itr::scene {
+
+enum class Role {
+  read,       ///< honoured
+  ignored,    ///< speed, or how PolyFEM gets to a result that does not depend on it; with all that is below
+  unwritten,  ///< output that PolyFEM has and we do not: a warning where it is asked for
+  only,       ///< supported with one value, its default
+  refused     ///< changes results, not built
+};
+
+/// A row. New keys come with their reader and a test; after that `itr schema --markdown > SCENES.md`.
+struct Key {
+  const char* pointer;  ///< `*` stands for the elements of a list, `{a,b}` for either
+  Role role;
+  const char* kind;      ///< of its values: the name of a Kind, or "a|b|c" for one of these words; empty: an object
+  const char* fallback;  ///< JSON of the default, or words in parentheses; empty: none
+  const char* unit;
+  const char* meaning;
+};
+std::span<const Key> keys();
+
+/// What a value may be: as the reader checks it and as the schema says it.
+struct Kind {
+  std::string name;
+  void (*check)(const Node&);  ///< null: its reader does
+  Json schema;
+  std::string words;                   ///< for the page
+  std::vector<std::string> choices{};  ///< the words that are allowed, if only some are
+};
+
+/// A pattern without braces.
+struct Entry {
+  const Key* key = nullptr;
+  Kind kind;
+  Json fallback;  ///< discarded where it is none or words
+};
+
+class KeyTable {
+ public:
+  KeyTable();
+  /// Null where there is no such pattern.
+  const Entry* find(const std::string& pattern) const;
+  /// Keys that may stand below a pattern, or null if none may.
+  const std::set<std::string>* children(const std::string& pattern) const;
+  /// A pointer elsewhere in the scene with this key, or nothing.
+  std::string place_of(const std::string& key) const;
+
+ private:
+  std::map<std::string, Entry> entries_;
+  std::map<std::string, std::set<std::string>> children_;
+};
+const KeyTable& key_table();
+
+/// The patterns of a row: braces expanded.
+std::vector<std::string> expand(const std::string& pointer);
+/// Of a row's kind.
+Kind kind_of(const Key& key);
+
+}  // namespace itr::scene

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// What the table of keys says to others: a JSON Schema, and the page SCENES.md.
+#include <algorithm>
+
+#include "itr/scene/scene.hpp"
+#include "key_table.hpp"
+
+namespace itr::scene {
+
+namespace {
+
+void describe(const Entry& entry, Json& schema) {
+  std::string text = entry.key->meaning;
+  if (const std::string unit = entry.key->unit; !unit.empty()) text += " [" + unit + "]";
+  schema["description"] = text;
+  if (!entry.fallback.is_discarded()) schema["default"] = entry.fallback;
+}
+
+Json schema_of(const std::string& pattern);
+
+Json object_schema(const std::string& pattern, const std::set<std::string>& children) {
+  Json object = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
+  for (const auto& key : children) object["properties"][key] = schema_of(std::string(pattern).append("/").append(key));
+  return object;
+}
+
+/// Of the values at a pattern: what check_keys lets pass.
+Json schema_of(const std::string& pattern) {
+  const Entry* entry = key_table().find(pattern);
+  const std::set<std::string>* children = key_table().children(pattern);
+  Json schema = Json::object();
+  if (entry && entry->key->role == Role::only) {
+    schema["const"] = entry->fallback;
+  } else if (entry && entry->key->role == Role::refused) {
+    schema["not"] = Json::object();
+  } else if (entry && entry->key->role == Role::read && !children) {
+    schema = entry->kind.schema;
+  } else if (children && children->contains("*")) {
+    const Json item = schema_of(pattern + "/*");
+    schema["anyOf"] = {{{"type", "array"}, {"items", item}}, item};  // one that stands for a list of one
+  } else if (children) {
+    schema = object_schema(pattern, *children);
+    if (entry && *entry->key->kind) schema = {{"anyOf", {schema, entry->kind.schema}}};
+  }
+  if (entry) describe(*entry, schema);
+  return schema;
+}
+
+/// Of a row: where it stands, without the key itself.
+std::string parent_of(const std::string& pointer) {
+  int depth = 0;
+  for (std::size_t i = pointer.size(); i-- > 0;) {
+    if (pointer[i] == '}') ++depth;
+    if (pointer[i] == '{') --depth;
+    if (pointer[i] == '/' && depth == 0) return pointer.substr(0, i);
+  }
+  return "";
+}
+
+std::string in_cell(const std::string& text) {
+  std::string cell;
+  for (const char c : text) {
+    if (c == '|') cell += '\\';
+    cell += c;
+  }
+  return cell;
+}
+
+std::string row(const Key& key) {
+  const std::string pointer = key.pointer, parent = parent_of(pointer);
+  std::string names, fallback = key.fallback;
+  for (const std::string& name : expand(pointer.substr(parent.size() + 1)))
+    names += (names.empty() ? "`" : ", `") + name + "`";
+  if (!fallback.empty() && fallback[0] != '(') fallback = "`" + fallback + "`";
+  return "| " + names + " | " + in_cell(kind_of(key).words) + " | " + in_cell(fallback) + " | " + key.unit + " | " +
+         in_cell(key.meaning) + " |\n";
+}
+
+/// Of a list: what it is was said of the list.
+bool is_item(const Key& key) { return std::string(key.pointer).ends_with("/*"); }
+
+std::string tables_of_what_is_read() {
+  std::vector<std::string> parents = {""};
+  for (const Key& key : keys())
+    if (const std::string parent = parent_of(key.pointer);
+        key.role == Role::read && !is_item(key) && std::find(parents.begin(), parents.end(), parent) == parents.end())
+      parents.push_back(parent);
+  std::string text;
+  for (const std::string& parent : parents) {
+    text += "\n## `" + (parent.empty() ? "/" : parent) +
+            "`\n\n| key | value | default | unit | meaning |\n|---|---|---|---|---|\n";
+    for (const Key& key : keys())
+      if (key.role == Role::read && parent_of(key.pointer) == parent && !is_item(key)) text += row(key);
+  }
+  return text;
+}
+
+std::string list_of_others(Role role) {
+  std::string text;
+  for (const Key& key : keys()) {
+    if (key.role != role) continue;
+    text += "- `" + std::string(key.pointer) + "`";
+    if (role == Role::only) text += " = `" + std::string(key.fallback) + "`";
+    text += ": " + std::string(key.meaning) + "\n";
+  }
+  return text;
+}
+
+constexpr const char* kIntroduction = R"(# Scenes: all keys
+
+Made by `itr schema --markdown` from the table that scenes are checked against; a test holds this page against it.
+`itr schema` is the same as JSON Schema, for editors. CONVENTIONS.md says what signs, dimensions, laws and tolerances mean,
+examples/README.md has a scene for each of some tasks.
+
+Scenes are JSON in PolyFEM's format. `*` stands for the elements of a list, where one that stands alone is a list of one;
+`{a,b}` for either. A key that is not here is an error, with the nearest that is.
+
+A file may build on another: `"common": "base.json"` takes that file's keys, the file's own ones merged over them (objects key by
+key, lists as a whole, `null` removes); then `"patch"` is applied, a list of JSON Patch operations. Paths are relative to
+`root_path`, by default the folder of the file that is run. `--set /json/pointer=VALUE` acts after that.
+
+An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^`, and the functions that CONVENTIONS.md lists.
+)";
+
+}  // namespace
+
+std::string json_schema() {
+  Json schema = object_schema("", *key_table().children(""));
+  schema["$schema"] = "http://json-schema.org/draft-07/schema#";
+  schema["title"] = "Scene of ITR, after `common` and `patch` are merged";
+  schema["required"] = {"geometry", "materials"};
+  // Beside what the merged scene has, a file may say how it is merged.
+  schema["properties"]["root_path"] = {{"type", "string"}, {"description", "what paths are relative to"}};
+  schema["properties"]["common"] = {{"type", "string"}, {"description", "file that this one is merged over"}};
+  schema["properties"]["patch"] = {{"type", "array"}, {"description", "JSON Patch, applied after merging"}};
+  return schema.dump(2);
+}
+
+std::string reference_page() {
+  return std::string(kIntroduction) + tables_of_what_is_read() +
+         "\n## With one value\n\nKnown, and an error where they have another value than this.\n\n" +
+         list_of_others(Role::only) + "\n## Not supported\n\nKnown, and an error.\n\n" + list_of_others(Role::refused) +
+         "\n## Not written\n\nA warning where it is asked for.\n\n" + list_of_others(Role::unwritten) +
+         "\n## Without effect\n\nKnown, and passed over.\n\n" + list_of_others(Role::ignored);
+}
+
+}  // namespace itr::scene

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// Setup::choose_defaults.
+#include <fmt/format.h>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+#include "itr/simulation/setup.hpp"
+#include "itr/simulation/step_problem.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kSoftness = 0.1;         ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
+constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest
+constexpr double kUsualStrain2 = 0.01;    ///< square of the strain at which bodies are expected to store energy
+
+template <int Dim>
+double facet_measure(const Mesh<Dim>& mesh, FacetId f) {
+  const auto& facet = mesh.facet(f);
+  const Vec<Dim> a = mesh.rest(facet[1]) - mesh.rest(facet[0]);
+  if constexpr (Dim == 2) {
+    return a.norm();
+  } else {
+    return a.cross(Vec<Dim>(mesh.rest(facet[2]) - mesh.rest(facet[0]))).norm() / 2;
+  }
+}
+
+/// Mean surface of a vertex on the boundary [m], [m^2].
+template <int Dim>
+double mean_vertex_area(const Mesh<Dim>& mesh) {
+  double area = 0;
+  int vertices = 0;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.is_facet_alive(f)) area += facet_measure<Dim>(mesh, f);
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
+  return area / std::max(1, vertices);
+}
+
+template <int Dim>
+Vec<Dim> rest_center(const Mesh<Dim>& mesh, CellId c) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const int v : mesh.cell(c)) sum += mesh.rest(v);
+  return sum / (Dim + 1);
+}
+
+/// Kinetic energy at the start, and what gravity gives over the size of the scene [J]; 0 where something else feeds it.
+template <int Dim>
+double available_energy(const Setup<Dim>& setup) {
+  if (!setup.neumann.empty() || !setup.pressure.empty() || !setup.dirichlet.empty() || !setup.obstacles.motions.empty())
+    return 0;
+  const Mesh<Dim>& mesh = setup.mesh;
+  Vec<Dim> low = mesh.rest(0), high = low;
+  for (const Vec<Dim>& p : setup.obstacles.rest) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) low = low.cwiseMin(mesh.rest(v)), high = high.cwiseMax(mesh.rest(v));
+  double energy = 0;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    const double mass = setup.materials.at(mesh.body(c)).density * mesh.volume(c);
+    const Vec<Dim> X = rest_center(mesh, c);
+    if (setup.body_acceleration) energy += mass * setup.body_acceleration(X, setup.time.t0).cwiseAbs().dot(high - low);
+    for (const auto& condition : setup.initial_velocity)
+      if (condition.body == mesh.body(c)) {
+        energy += mass / 2 * condition.value(X, 0).squaredNorm();
+        break;
+      }
+  }
+  return energy;
+}
+
+template <int Dim>
+std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
+  if (!setup.remesh.enabled) {
+    contact.adaptive_stiffness = true;
+    contact.barrier_stiffness = 1;
+    return {};
+  }
+  double stiffest = 0;
+  for (const auto& [body, material] : setup.materials) stiffest = std::max(stiffest, material.youngs_modulus);
+  contact.barrier_stiffness = kSoftness * stiffest;
+  if (!contact.convergent)  // a vertex's surface presses by 2 pairs of weight 1, not by its area over dhat^3
+    contact.barrier_stiffness *= mean_vertex_area(setup.mesh) / (2 * std::pow(contact.activation_distance, 3));
+  return fmt::format(
+      "barrier stiffness {:.3g}: a tenth of the stiffest modulus, {:.3g} Pa; "
+      "/solver/contact/barrier_stiffness sets another",
+      contact.barrier_stiffness, stiffest);
+}
+
+template <int Dim>
+std::string choose_tolerances(const Setup<Dim>& setup, RemeshOptions& remesh) {
+  double energy = 0;
+  for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
+    if (setup.mesh.is_cell_alive(c))
+      energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
+  if (const double available = available_energy(setup); available > 0) energy = std::min(energy, available);
+  remesh.split.acceptance_tolerance = remesh.relative_tolerance * energy;
+  if (remesh.collapse.acceptance_tolerance == CollapseOptions{}.acceptance_tolerance)
+    remesh.collapse.acceptance_tolerance = -0.01 * remesh.split.acceptance_tolerance;
+  return fmt::format(
+      "split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J; collapses may cost {:.2g} J; "
+      "/space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
+      remesh.split.acceptance_tolerance, remesh.relative_tolerance, energy, -remesh.collapse.acceptance_tolerance);
+}
+
+}  // namespace
+
+template <int Dim>
+std::vector<std::string> Setup<Dim>::choose_defaults() {
+  std::vector<std::string> words;
+  if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
+  if (contact.enabled && contact.barrier_stiffness == 0)
+    if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
+  if (double& length = remesh.split.min_edge_length; length < 0) length = kLeastSplitEdge * rest_diagonal(mesh);
+  if (remesh.enabled && remesh.split.acceptance_tolerance == 0) words.push_back(choose_tolerances(*this, remesh));
+  return words;
+}
+
+template std::vector<std::string> Setup<2>::choose_defaults();
+template std::vector<std::string> Setup<3>::choose_defaults();
+
+}  // namespace itr

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+#include "itr/simulation/setup.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "itr/core/error.hpp"
+
+namespace itr {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& place, const std::string& found, const std::string& expected) {
+  throw InputError({"", place, found, expected});
+}
+
+void require(bool ok, const std::string& place, double found, const std::string& expected) {
+  if (!ok || !std::isfinite(found)) refuse(place, fmt::format("{:g}", found), expected);
+}
+
+void require_positive(const std::string& place, double value) { require(value > 0, place, value, "a number > 0"); }
+void require_not_negative(const std::string& place, double value) { require(value >= 0, place, value, "a number >= 0"); }
+void require_at_least(const std::string& place, int value, int least) {
+  require(value >= least, place, value, fmt::format("an integer >= {}", least));
+}
+
+std::string element(const char* list, std::size_t index) { return fmt::format("{}[{}]", list, index); }
+
+void check_time(const TimeOptions& time) {
+  require_positive("/time/dt", time.dt);
+  require(true, "/time/t0", time.t0, "a number");
+  require_at_least("/time/time_steps", time.steps, 1);
+  require(time.bdf_order >= 1 && time.bdf_order <= 6, "/time/integrator/steps", time.bdf_order, "1 to 6");
+  require(time.newmark_beta > 0 && time.newmark_beta <= 0.5, "/time/integrator/beta", time.newmark_beta,
+          "a number of (0, 0.5]");
+  require(time.newmark_gamma > 0 && time.newmark_gamma <= 1, "/time/integrator/gamma", time.newmark_gamma,
+          "a number of (0, 1]");
+  if (!(time.energy_growth_limit > 0))
+    refuse("/time/integrator/energy_growth_limit", fmt::format("{}", time.energy_growth_limit), "a number > 0");
+  require(time.step_cuts >= 0 && time.step_cuts <= 20, "/time/step_cuts", time.step_cuts, "0 to 20");
+}
+
+void check_contact(const ContactOptions& contact) {
+  if (!contact.enabled) return;
+  require_positive("/contact/dhat", contact.activation_distance);
+  require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
+  require_not_negative("/contact/friction_coefficient", contact.friction_coefficient);
+  require_positive("/contact/epsv", contact.friction_velocity);
+  require_not_negative("/solver/contact/friction_convergence_tol", contact.friction_tolerance);
+}
+
+void check_newton(const NewtonOptions& newton) {
+  require_at_least("/solver/nonlinear/max_iterations", newton.max_iterations, 1);
+  require_not_negative("newton.step_tolerance", newton.step_tolerance);
+  require_not_negative("newton.gradient_tolerance", newton.gradient_tolerance);
+  require_not_negative("newton.first_gradient_tolerance", newton.first_gradient_tolerance);
+  require_not_negative("newton.relative_step_tolerance", newton.relative_step_tolerance);
+  require_not_negative("newton.relative_gradient_tolerance", newton.relative_gradient_tolerance);
+  require_not_negative("newton.decrement_tolerance", newton.decrement_tolerance);
+  require_not_negative("newton.energy_tolerance", newton.energy_tolerance);
+}
+
+void check_remeshing(const RemeshOptions& remesh) {
+  if (!remesh.enabled) return;
+  const auto share = [](const char* place, double value) {
+    require(value >= 0 && value <= 1, place, value, "a number of [0, 1]");
+  };
+  require_not_negative("/space/remesh/split/acceptance_tolerance", remesh.split.acceptance_tolerance);
+  require(true, "/space/remesh/collapse/acceptance_tolerance", remesh.collapse.acceptance_tolerance, "a number");
+  share("/space/remesh/split/culling_threshold", remesh.split.culling_threshold);
+  share("/space/remesh/collapse/culling_threshold", remesh.collapse.culling_threshold);
+  share("/space/remesh/local_relaxation/local_mesh_rel_area", remesh.local.relative_volume);
+  require_at_least("/space/remesh/split/max_depth", remesh.split.max_depth, 0);
+  require_at_least("/space/remesh/collapse/max_depth", remesh.collapse.max_depth, 0);
+  require_at_least("/space/remesh/swap/max_depth", remesh.swap.max_depth, 0);
+  require_at_least("/space/remesh/smooth/max_iters", remesh.smooth.max_iterations, 1);
+  require_at_least("/space/remesh/local_relaxation/local_mesh_n_ring", remesh.local.rings, 0);
+  require_at_least("/space/remesh/local_relaxation/max_nl_iterations", remesh.local.max_iterations, 1);
+  require_at_least("/space/remesh/sweeps", remesh.sweeps, 1);
+}
+
+template <std::size_t N>
+void check_primitives(const char* list, const std::vector<std::array<int, N>>& primitives, std::size_t vertices) {
+  for (std::size_t i = 0; i < primitives.size(); ++i)
+    for (const int v : primitives[i])
+      if (v < 0 || static_cast<std::size_t>(v) >= vertices)
+        refuse(element(list, i), fmt::format("vertex {}", v), fmt::format("0 to {} - 1", vertices));
+}
+
+template <int Dim>
+void check_positions(const char* list, const std::vector<Vec<Dim>>& positions) {
+  for (std::size_t v = 0; v < positions.size(); ++v)
+    if (!positions[v].allFinite()) refuse(element(list, v), "a position that is not finite", "numbers");
+}
+
+template <int Dim>
+void check_obstacles(const Obstacles<Dim>& obstacles) {
+  check_positions<Dim>("obstacles.rest", obstacles.rest);
+  check_primitives("obstacles.edges", obstacles.edges, obstacles.rest.size());
+  check_primitives("obstacles.triangles", obstacles.triangles, obstacles.rest.size());
+  if (obstacles.motion.size() != obstacles.rest.size())
+    refuse("obstacles.motion", fmt::format("{} entries", obstacles.motion.size()),
+           fmt::format("{}, one a vertex", obstacles.rest.size()));
+  const int motions = static_cast<int>(obstacles.motions.size());
+  for (std::size_t v = 0; v < obstacles.motion.size(); ++v)
+    if (obstacles.motion[v] != kNone && (obstacles.motion[v] < 0 || obstacles.motion[v] >= motions))
+      refuse(element("obstacles.motion", v), std::to_string(obstacles.motion[v]),
+             fmt::format("kNone, or 0 to {} - 1", motions));
+  for (std::size_t i = 0; i < obstacles.motions.size(); ++i)
+    if (!obstacles.motions[i]) refuse(element("obstacles.motions", i), "no function", "one of position and time");
+}
+
+template <typename List, typename Member>
+void check_functions(const char* name, const List& list, Member member) {
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (!(list[i].*member)) refuse(element(name, i), "no function", "one of position and time");
+}
+
+template <int Dim>
+void check_materials(const Setup<Dim>& setup) {
+  std::set<int> bodies;
+  for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
+    if (setup.mesh.is_cell_alive(c)) bodies.insert(setup.mesh.body(c));
+  for (const int body : bodies)
+    if (!setup.materials.contains(body))
+      refuse("/materials", fmt::format("no material with the id {}, which elements have", body), "one for every body");
+  for (const auto& [id, material] : setup.materials) {
+    const std::string place = fmt::format("/materials (id {})", id);
+    const double nu = material.poisson_ratio;
+    require_positive(place + "/E", material.youngs_modulus);
+    require(nu > -1 && nu < 0.5, place + "/nu", nu, "a number of (-1, 0.5)");
+    require_positive(place + "/rho", material.density);
+  }
+}
+
+template <int Dim>
+void check_proxy(const Setup<Dim>& setup) {
+  if (!setup.proxy) return;
+  const CollisionProxy<Dim>& proxy = *setup.proxy;
+  const auto rows = static_cast<Eigen::Index>(proxy.rest.size()), columns = Eigen::Index{setup.mesh.num_vertices()};
+  if (proxy.weights.rows() != rows || proxy.weights.cols() != columns)
+    refuse("weights of the collision mesh", fmt::format("{} x {}", proxy.weights.rows(), proxy.weights.cols()),
+           fmt::format("{} x {}", rows, columns));
+  check_primitives("proxy.edges", proxy.edges, proxy.rest.size());
+  check_primitives("proxy.triangles", proxy.triangles, proxy.rest.size());
+}
+
+}  // namespace
+
+template <int Dim>
+void Setup<Dim>::validate() const {
+  if (mesh.num_cells() == 0) refuse("mesh", "no cells", "at least one");
+  check_time(time);
+  check_contact(contact);
+  check_newton(newton);
+  check_remeshing(remesh);
+  check_materials(*this);
+  check_obstacles(obstacles);
+  check_proxy(*this);
+  linear.validate();
+  if (!point_tags.empty() && point_tags.size() != static_cast<std::size_t>(mesh.vertex_slots()))
+    refuse("point_tags", fmt::format("{} entries", point_tags.size()), fmt::format("{}, one a vertex", mesh.vertex_slots()));
+  check_functions("dirichlet", dirichlet, &DirichletCondition<Dim>::displacement);
+  check_functions("neumann", neumann, &NeumannCondition<Dim>::traction);
+  check_functions("pressure", pressure, &PressureCondition<Dim>::pressure);
+  for (const auto& [name, list] :
+       {std::pair{"initial_displacement", &initial_displacement}, std::pair{"initial_velocity", &initial_velocity},
+        std::pair{"initial_acceleration", &initial_acceleration}})
+    check_functions(name, *list, &InitialCondition<Dim>::value);
+  for (std::size_t i = 0; i < damping.size(); ++i) {
+    require_not_negative(element("damping", i) + ".coefficient", damping[i].coefficient);
+    require_at_least(element("damping", i) + ".lagging_rounds", damping[i].lagging_rounds, 1);
+  }
+}
+
+template void Setup<2>::validate() const;
+template void Setup<3>::validate() const;
+
+}  // namespace itr

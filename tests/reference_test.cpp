@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+// What the table of keys says of a scene is true: pages are current, every key has a type, defaults are those of the reader.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "itr/scene/scene.hpp"
+#include "scene/key_table.hpp"
+
+namespace itr::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+TEST(Reference, CommittedPageIsTheCurrentOne) {
+  EXPECT_EQ(text_of(fs::path(ITR_SOURCE_DIR) / "SCENES.md"), reference_page())
+      << "build/release/bin/itr schema --markdown > SCENES.md";
+}
+
+/// Calls `visit` with every schema of a value that is read.
+template <typename Visit>
+void for_each_value(const Json& schema, const std::string& pointer, const Visit& visit) {
+  const bool is_inner = schema.contains("properties");
+  if (is_inner)
+    for (const auto& [key, member] : schema["properties"].items()) for_each_value(member, pointer + "/" + key, visit);
+  if (schema.contains("anyOf"))
+    for (const Json& one : schema["anyOf"]) for_each_value(one, pointer, visit);
+  if (schema.contains("items")) for_each_value(schema["items"], pointer + "/*", visit);
+  if (!is_inner) visit(pointer, schema);
+}
+
+TEST(Reference, EveryPropertyOfTheSchemaSaysWhatItMayBe) {
+  int count = 0;
+  for_each_value(Json::parse(json_schema()), "", [&](const std::string& pointer, const Json& schema) {
+    ++count;
+    EXPECT_FALSE(schema.empty()) << pointer;
+    const Entry* entry = key_table().find(pointer);
+    if (!entry || entry->key->role != Role::read || !schema.contains("description")) return;
+    EXPECT_TRUE(schema.contains("type") || schema.contains("enum") || schema.contains("anyOf") || schema.contains("const"))
+        << pointer;
+  });
+  EXPECT_GT(count, 300);
+}
+
+TEST(Reference, EveryKeyHasAMeaning) {
+  for (const Key& key : keys()) {
+    if (std::string(key.pointer).ends_with("/enabled")) continue;  // says it itself
+    EXPECT_GT(std::string(key.meaning).size(), 0u) << key.pointer;
+  }
+}
+
+/// All options of a setup in one text.
+std::string options_of(const Scene& scene) {
+  const auto& s = std::get<Setup<2>>(scene.setup);
+  const auto& [t, c, n, r] = std::tie(s.time, s.contact, s.newton, s.remesh);
+  std::string text =
+      fmt::format("{} {} {} {} {} {} {} {} {} {} {}|", static_cast<int>(t.integrator), t.bdf_order, t.newmark_beta,
+                  t.newmark_gamma, t.energy_growth_limit, t.quasistatic, t.is_static, t.step_cuts, t.t0, t.dt, t.steps);
+  text += fmt::format("{} {} {} {} {} {} {} {} {}|", c.enabled, c.activation_distance, c.convergent, c.barrier_stiffness,
+                      c.adaptive_stiffness, c.friction_coefficient, c.friction_velocity, c.friction_iterations,
+                      c.friction_tolerance);
+  text += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}|", n.max_iterations, static_cast<int>(n.norm),
+                      n.step_tolerance, n.gradient_tolerance, n.first_gradient_tolerance, n.relative_step_tolerance,
+                      n.relative_gradient_tolerance, n.decrement_tolerance, n.energy_tolerance, n.energy_steps,
+                      static_cast<int>(n.line_search), n.project_to_psd, n.absolute_eigenvalues, n.projected_iterations,
+                      n.extend_steps, static_cast<int>(n.indefinite));
+  text +=
+      fmt::format("{} {} {} {} {} {}|{} {} {} {} {}|{} {} {} {} {} {}|{} {} {}|{} {} {}|{} {} {}|", r.enabled,
+                  r.sizing_field, static_cast<int>(r.screening), static_cast<int>(r.history), r.sweeps, r.relative_tolerance,
+                  r.split.enabled, r.split.acceptance_tolerance, r.split.culling_threshold, r.split.max_depth,
+                  r.split.min_edge_length, r.collapse.enabled, r.collapse.acceptance_tolerance, r.collapse.culling_threshold,
+                  r.collapse.max_depth, r.collapse.rel_max_edge_length, r.collapse.abs_max_edge_length, r.swap.enabled,
+                  r.swap.acceptance_tolerance, r.swap.max_depth, r.smooth.enabled, r.smooth.acceptance_tolerance,
+                  r.smooth.max_iterations, r.local.rings, r.local.relative_volume, r.local.max_iterations);
+  text += fmt::format("{} {} {} {} {} {}|", s.lump_mass, s.mesh.num_vertices(), fmt::join(s.linear.solvers, ","),
+                      s.linear.fallback.size(), s.linear.options.size(), s.damping.size());
+  text += fmt::format(
+      "{} {} {} {} {}|", scene.output.skip_frames, scene.output.checkpoint_period, scene.max_threads, scene.directory,
+      s.fields.any_forces() || s.fields.von_mises || s.fields.stress || s.fields.kinetic_energy || s.fields.momentum);
+  for (VertexId v = 0; v < s.mesh.vertex_slots(); ++v) text += fmt::format("{} {} ", s.mesh.rest(v)[0], s.mesh.rest(v)[1]);
+  return text;
+}
+
+class Defaults : public ::testing::Test {
+ protected:
+  Defaults() : folder_(fs::path(::testing::TempDir()) / ("itr_defaults_" + std::to_string(::getpid()))) {
+    fs::create_directories(folder_);
+    std::ofstream(folder_ / "square.obj") << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+  }
+  ~Defaults() override { fs::remove_all(folder_); }
+
+  std::string options(const Json& scene) const {
+    std::ofstream(folder_ / "scene.json") << scene.dump();
+    return options_of(read(folder_ / "scene.json"));
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Defaults, OfTheTableAreThoseOfTheReader) {
+  const Json base = Json::parse(R"({
+    "geometry": [{"mesh": "square.obj"}], "materials": {"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000},
+    "time": {"dt": 0.1, "tend": 1}})");
+  int checked = 0;
+  for (const Key& key : keys())
+    for (const std::string& pattern : expand(key.pointer)) {
+      const Entry& entry = *key_table().find(pattern);
+      const bool is_option = pattern.starts_with("/time/") || pattern.starts_with("/contact/") ||
+                             pattern.starts_with("/solver/") || pattern.starts_with("/space/") ||
+                             pattern.starts_with("/output/") || pattern.starts_with("/geometry/*/transformation") ||
+                             pattern.starts_with("/geometry/*/advanced") || pattern == "/geometry/*/n_refs";
+      const bool is_of_list = pattern.find("/*", 12) != std::string::npos;
+      if (key.role != Role::read || entry.fallback.is_discarded() || !is_option || is_of_list) continue;
+      if (pattern.starts_with("/contact/collision_mesh")) continue;  // there is none
+      Json scene = base;
+      if (pattern.ends_with("/beta") || pattern.ends_with("/gamma") || pattern.ends_with("_growth_limit"))
+        scene["time"]["integrator"]["type"] = "ImplicitNewmark";
+      if (pattern.ends_with("/steps")) scene["time"]["integrator"]["type"] = "BDF";
+      Json& nonlinear = scene["solver"]["nonlinear"];  // with the vocabulary of tolerances that the key is of
+      if (pattern.ends_with("/x_delta") || pattern.ends_with("/f_delta"))
+        nonlinear["grad_norm"] = 1e-8;
+      else if (pattern.ends_with("/grad_norm"))
+        nonlinear["x_delta"] = 0;
+      std::string pointer = pattern;
+      if (const auto star = pointer.find('*'); star != std::string::npos) pointer[star] = '0';
+      const std::string absent = options(scene);
+      scene[Json::json_pointer(pointer)] = entry.fallback;
+      EXPECT_EQ(options(scene), absent) << pattern << " = " << entry.fallback;
+      ++checked;
+    }
+  EXPECT_GT(checked, 80);
+}
+
+/// What a reader of the repository cannot open is not cited in it.
+TEST(Reference, NoCitationsOfWhatIsNotHere) {
+  const fs::path root = ITR_SOURCE_DIR;
+  const std::string absent[] = {std::string("scene-") + "format", std::string("design ") + "\u00a7",
+                                std::string("design") + ".md"};
+  for (const char* folder : {"include", "src", "tests", "examples", "backends", "verification/harness"})
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+      const auto extension = entry.path().extension();
+      if (extension != ".hpp" && extension != ".cpp" && extension != ".py" && extension != ".h") continue;
+      const std::string text = text_of(entry.path());
+      for (const std::string& citation : absent)
+        EXPECT_EQ(text.find(citation), text.npos) << entry.path() << ": " << citation;
+    }
+}
+
+}  // namespace
+}  // namespace itr::scene

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""examples/render.py draws runs: pictures by any field, an animation of all frames, and it says which fields there are.
+
+usage: render_test.py ITR EXAMPLES
+"""
+
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import numpy
+from PIL import Image
+
+
+def check_colours(examples, frame):
+    """What colours a cell: its value, or the mean of its vertices' magnitudes."""
+    sys.path.insert(0, str(examples))
+    from render import Frame
+
+    with h5py.File(frame) as file:
+        cells = file["/mesh/simplices"][:]
+        speed = numpy.linalg.norm(file["/fields/v"][:], axis=1)
+        stress = file["/fields/von_mises"][:]
+    assert stress.max() > 0
+    numpy.testing.assert_array_equal(Frame(frame, "von_mises").values, stress)
+    numpy.testing.assert_allclose(Frame(frame, "v").values, [speed[cell].mean() for cell in cells])
+    assert (Frame(frame, "v").unit, Frame(frame, "von_mises").unit) == ("m/s", "Pa")
+
+
+def main():
+    itr, examples = sys.argv[1], pathlib.Path(sys.argv[2])
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = pathlib.Path(scratch)
+        command = [itr, "run", examples / "ball_wall.json", "-o", folder / "run", "--threads", "1"]
+        for text in ("/time/tend=0.0002", "/output/paraview/options/scalar_values=true"):
+            command += ["--set", text]
+        subprocess.run(command, check=True, capture_output=True)
+        stored = sorted((folder / "run/frames").glob("*.h5"))
+        frames = len(stored)
+        assert frames > 3, frames
+        check_colours(examples, stored[-1])
+
+        def render(*arguments, status=0):
+            done = subprocess.run([sys.executable, examples / "render.py", folder / "run", *arguments], capture_output=True,
+                                  text=True)
+            assert done.returncode == status, done.stderr
+            return done.stderr
+
+        render("-o", folder / "speed.png", "--field", "v")
+        with Image.open(folder / "speed.png") as picture:
+            assert len(picture.convert("RGB").getcolors(maxcolors=1 << 24)) > 100, "an empty picture"
+        render("--animation", folder / "all.gif")
+        with Image.open(folder / "all.gif") as animation:
+            assert animation.n_frames == frames, (animation.n_frames, frames)
+        message = render("--field", "pressure", status=1)
+        assert "no field pressure; there are" in message and "von_mises" in message, message
+
+
+if __name__ == "__main__":
+    main()
