@@ -27,6 +27,7 @@ from PIL import Image
 DECADES = 5  # of energy density that the colours span below its maximum
 MAX_ANIMATION_FRAMES = 150
 ANIMATION_DPI = 90
+UP = [2, 0, 1]  # order of the axes in 3D, where matplotlib draws the last one upwards: y is
 
 
 class Frame:
@@ -117,9 +118,10 @@ def draw_plane(axes, frame, norm):
 
 def draw_solid(axes, frame, norm):
     if len(frame.obstacle_faces):
-        axes.add_collection3d(Poly3DCollection(frame.obstacle_x[frame.obstacle_faces], facecolors=(0.6, 0.6, 0.6, 0.25)))
+        axes.add_collection3d(
+            Poly3DCollection(frame.obstacle_x[frame.obstacle_faces][..., UP], facecolors=(0.6, 0.6, 0.6, 0.25)))
     polygons, values = frame.polygons()
-    cells = Poly3DCollection(polygons, cmap="YlOrRd", norm=norm, edgecolors="0.1", linewidths=0.2)
+    cells = Poly3DCollection(polygons[..., UP], cmap="YlOrRd", norm=norm, edgecolors="0.1", linewidths=0.2)
     cells.set_array(values)
     axes.add_collection3d(cells)
     return cells
@@ -128,12 +130,15 @@ def draw_solid(axes, frame, norm):
 def draw(axes, frame, norm, box):
     low, high = box
     cells = draw_plane(axes, frame, norm) if frame.dim == 2 else draw_solid(axes, frame, norm)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
     if frame.dim == 3:
+        low, high = low[UP], high[UP]
         axes.set_zlim(low[2], high[2])
         axes.set_box_aspect(high - low)
-        axes.view_init(elev=20, azim=-60, vertical_axis="y")
+        axes.view_init(elev=20, azim=-30)
+        for name, index in zip("xyz", UP):
+            axes.set(**{f"{name}label": "xyz"[index]})
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
     axes.set_title(f"step {frame.step}, t = {frame.t:.4g} s: {len(frame.x)} vertices, {len(frame.cells)} cells", fontsize=9)
     axes.tick_params(labelsize=7)
     return cells
@@ -186,7 +191,8 @@ def render_animation(frames, path, frames_per_second, field):
             artist.remove()
         draw(axes, frame, norm, box)
         figure.canvas.draw()
-        pictures.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB").quantize(64, dither=Image.Dither.NONE))
+        picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
+        pictures.append(picture.quantize(64, dither=Image.Dither.NONE))
     path.parent.mkdir(parents=True, exist_ok=True)
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / frames_per_second), loop=0)
     plt.close(figure)

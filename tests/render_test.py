@@ -8,6 +8,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import types
 
 import h5py
 import numpy
@@ -29,6 +30,24 @@ def check_colours(examples, frame):
     assert (Frame(frame, "v").unit, Frame(frame, "von_mises").unit) == ("m/s", "Pa")
 
 
+def check_lengths_in_space(examples):
+    """A unit has one length along all three axes (Gauss: the squares of its projections, as complex numbers, sum to 0)."""
+    from matplotlib.colors import LogNorm
+    from mpl_toolkits.mplot3d import proj3d
+    from render import draw, make_axes
+
+    corners = numpy.array([[0, 0, 0], [4, 0, 0], [0, 2, 0], [0, 0, 1]], float)
+    frame = types.SimpleNamespace(dim=3, step=0, t=0, x=corners, cells=[[0, 1, 2, 3]], obstacle_faces=[],
+                                  polygons=lambda: (corners[None, :3], numpy.ones(1)))
+    box = corners.min(axis=0), corners.max(axis=0)
+    axes = make_axes([frame], box, 1)[1][0]
+    draw(axes, frame, LogNorm(0.1, 1), box)
+    axes.set_proj_type("ortho")
+    x, y, _ = proj3d.proj_transform(*numpy.vstack([numpy.zeros(3), numpy.eye(3)]).T, axes.get_proj())
+    units = (x[1:] - x[0]) + 1j * (y[1:] - y[0])
+    assert abs((units**2).sum()) < 1e-9 * (abs(units)**2).sum(), units
+
+
 def main():
     itr, examples = sys.argv[1], pathlib.Path(sys.argv[2])
     with tempfile.TemporaryDirectory() as scratch:
@@ -41,6 +60,7 @@ def main():
         frames = len(stored)
         assert frames > 3, frames
         check_colours(examples, stored[-1])
+        check_lengths_in_space(examples)
 
         def render(*arguments, status=0):
             done = subprocess.run([sys.executable, examples / "render.py", folder / "run", *arguments], capture_output=True,
