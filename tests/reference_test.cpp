@@ -142,6 +142,31 @@ TEST_F(Defaults, OfTheTableAreThoseOfTheReader) {
   EXPECT_GT(checked, 80);
 }
 
+/// A setup that a program fills in by hand means what a scene with as little in it means (but for Newton's tolerances).
+TEST_F(Defaults, OfSetupsAreThoseOfScenes) {
+  for (const bool remeshes : {false, true}) {
+    std::ofstream(folder_ / "scene.json") << fmt::format(
+        R"({{"geometry": [{{"mesh": "square.obj"}}], "time": {{"dt": 0.1, "tend": 1}}, "contact": {{"enabled": true}},
+        "space": {{"remesh": {{"enabled": {}}}}},
+        "materials": {{"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000}}}})",
+        remeshes);
+    Scene scene = read(folder_ / "scene.json");
+    auto& read = std::get<itr::Setup<2>>(scene.setup);
+    itr::Setup<2> setup;
+    setup.mesh = read.mesh;
+    setup.materials = read.materials;
+    setup.newton = read.newton;
+    setup.time.dt = 0.1;
+    setup.time.steps = 10;
+    setup.contact.enabled = true;
+    setup.remesh.enabled = remeshes;
+    EXPECT_EQ(setup.choose_defaults(), read.choose_defaults());
+    const std::string of_scene = options_of(scene);
+    read = setup;
+    EXPECT_EQ(options_of(scene), of_scene);
+  }
+}
+
 /// What a reader of the repository cannot open is not cited in it.
 TEST(Reference, NoCitationsOfWhatIsNotHere) {
   const fs::path root = ITR_SOURCE_DIR;

@@ -235,6 +235,17 @@ TEST_F(Refusals, GoodSceneRunsWithoutAWarning) {
   EXPECT_EQ(message.find("step 1/10"), 0u) << message;
 }
 
+TEST_F(Refusals, SummaryNamesTheSolverThatAutoTook) {
+  std::ofstream(folder_ / "scene.json") << good_scene().dump();
+  const fs::path results = folder_ / "results";
+  const auto [status, message] =
+      command("run " + (folder_ / "scene.json").string() + " --solver auto -o " + results.string());
+  ASSERT_EQ(status, 0) << message;
+  const Json summary = Json::parse(std::ifstream(results / "summary.json"));
+  EXPECT_EQ(summary["backend"], "auto");
+  EXPECT_EQ(summary["solver"], "dense");  // of 8 unknowns
+}
+
 /// What runs, but is perhaps not meant: `run` says so as `explain` does.
 struct Suspicion {
   const char* name;
