@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 
 #include "itr/linear/choice.hpp"
@@ -165,6 +166,28 @@ TEST(Newton, CallsBackAfterEachStepAndTakesInAChangedEnergy) {
   const NewtonSummary summary = minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace, extras);
   EXPECT_TRUE(summary.converged());
   EXPECT_EQ(calls, summary.iterations);
+}
+
+TEST(Newton, EndsBeforeTheNextIterationWhereItIsCancelled) {
+  VectorX x = VectorX::Constant(4, 2.0);
+  const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+  DenseSystem system;
+  std::atomic<bool> cancel = false;
+  NewtonOptions options;
+  options.step_tolerance = 1e-10;
+  options.gradient_tolerance = options.first_gradient_tolerance = 0;
+  options.cancel = &cancel;
+  Workspace workspace;
+  int calls = 0;
+  const NewtonExtras extras{.after_step = [&](const VectorX&) {
+    cancel = ++calls == 2;
+    return true;
+  }};
+  const NewtonSummary summary = minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace, extras);
+  EXPECT_EQ(summary.termination, Termination::cancelled);
+  EXPECT_FALSE(summary.converged());
+  EXPECT_EQ(summary.iterations, 2);
+  EXPECT_EQ(calls, 2);
 }
 
 TEST(Newton, MeasuresGradientsAndStepsInTheNormOfItsOptions) {
