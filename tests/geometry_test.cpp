@@ -218,6 +218,25 @@ double sampled_distance_squared(PairKind kind, const std::array<Vec<3>, 4>& x) {
   return best;
 }
 
+/// Which of two features with other second derivatives a pair has on their border, round-off does not say.
+TEST(Geometry3, RoundOffDoesNotChooseBetweenFeatures) {
+  const double gap = 1e-3, round_off = 1e-15;
+  const auto kind_at = [&](PairKind kind, const Vec<3>& p, const Vec<3>& q) {
+    const std::array<Vec<3>, 4> triangle{p, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, edges{p, q, {0, 0, 0}, {1, 0, 0}};
+    return closest_features<3>(kind, kind == PairKind::edge_edge ? edges.data() : triangle.data()).kind;
+  };
+  for (const double side : {-round_off, 0.0, round_off}) {
+    EXPECT_EQ(kind_at(PairKind::face_vertex, {0.3, side, gap}, {}), PairKind::face_vertex) << side;
+    EXPECT_EQ(kind_at(PairKind::edge_vertex, {side, 0, gap}, {}), PairKind::edge_vertex) << side;
+    EXPECT_EQ(kind_at(PairKind::edge_edge, {side, -1, gap}, {side, 1, gap}), PairKind::edge_edge) << side;
+  }
+  for (const double out : {1e-6 * gap, gap}) {
+    EXPECT_EQ(kind_at(PairKind::face_vertex, {0.3, -out, gap}, {}), PairKind::edge_vertex) << out;
+    EXPECT_EQ(kind_at(PairKind::edge_vertex, {-out, 0, gap}, {}), PairKind::vertex_vertex) << out;
+    EXPECT_EQ(kind_at(PairKind::edge_edge, {-out, -1, gap}, {-out, 1, gap}), PairKind::edge_vertex) << out;
+  }
+}
+
 TEST(Geometry3, PairDistanceIsTheLeastOverAllPoints) {
   std::mt19937 random(7);
   for (int i = 0; i < 500; ++i)

@@ -17,9 +17,10 @@ namespace itr {
 namespace {
 
 constexpr double kParallel = 1e-24;  ///< squared sine of the angle of edges that count as parallel
-/// Closest points that are outside a feature by less than this (barycentric) count as inside: the distance is the same to
-/// its square, and round-off does not decide between the features' second derivatives, which differ.
-constexpr double kOnBoundary = 1e-11;
+/// Closest points that are outside a feature by less than this share of the distance count as inside: the distance is the
+/// same to its square, its gradient to this, and round-off does not decide between the features' second derivatives, which
+/// differ.
+constexpr double kOnBoundary = 1e-9;
 
 enum class OnEdge { start, end, inside };
 
@@ -27,9 +28,12 @@ template <int Dim>
 OnEdge closest_on_edge(const Vec<Dim>& p, const Vec<Dim>& a, const Vec<Dim>& b) {
   const Vec<Dim> e = b - a;
   const double along = e.dot(p - a);
-  const double length_squared = e.squaredNorm();
-  if (!(along > -kOnBoundary * length_squared)) return OnEdge::start;
-  return along < (1 + kOnBoundary) * length_squared ? OnEdge::inside : OnEdge::end;
+  const double beyond = along - e.squaredNorm();
+  if (along > 0 && beyond < 0) return OnEdge::inside;
+  const Vec<Dim>& end = along > 0 ? b : a;
+  const double out = along > 0 ? beyond : -along;  // times the edge's length
+  if (out * out < kOnBoundary * kOnBoundary * e.squaredNorm() * (p - end).squaredNorm()) return OnEdge::inside;
+  return along > 0 ? OnEdge::end : OnEdge::start;
 }
 
 template <int Dim>
@@ -80,8 +84,10 @@ struct Foot {
   bool inside = false;
   Foot(const Vec<3>& p, const Vec<3>& a, const Vec<3>& b, const Vec<3>& c)
       : normal((b - a).cross(c - a)), area_squared(normal.squaredNorm()) {
+    const double slack = kOnBoundary * std::abs(normal.dot(p - a));
     const auto left_of = [&](const Vec<3>& u, const Vec<3>& v) {
-      return normal.dot((v - u).cross(p - u)) >= -kOnBoundary * area_squared;
+      const double side = normal.dot((v - u).cross(p - u));
+      return side >= 0 || side > -slack * (v - u).norm();
     };
     inside = area_squared > 0 && left_of(a, b) && left_of(b, c) && left_of(c, a);
   }
@@ -99,8 +105,16 @@ struct CommonPerpendicular {
     exists = true;
   }
   bool exists = false;
-  static bool on_edge(double s) { return s >= -kOnBoundary && s <= 1 + kOnBoundary; }
-  bool inside() const { return exists && on_edge(s) && on_edge(t); }
+  bool inside() const {
+    if (!exists) return false;
+    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) return true;
+    const double slack = kOnBoundary * std::abs(normal.dot(w)) / std::sqrt(n);
+    const auto on_edge = [slack](double s, const Vec<3>& e) {
+      const double out = std::max(-s, s - 1);
+      return out <= 0 || out * e.norm() < slack;
+    };
+    return on_edge(s, u) && on_edge(t, v);
+  }
 };
 
 /// dc/dbeta: columns are the parameters.
