@@ -560,16 +560,18 @@ TEST_F(SceneTest, RemeshOptions) {
   const RemeshOptions options = read2(square({{"space", {{"remesh", json::parse(R"({
       "enabled": true, "type": "sizing_field", "screening": "none", "sweeps": 2, "history": "interpolated",
       "split": {"acceptance_tolerance": 0.4}, "collapse": {"rel_max_edge_length": 3}, "swap": {"enabled": true},
-      "smooth": {"max_iters": 4}, "local_relaxation": {"local_mesh_n_ring": 3}})")}}}}))
+      "smooth": {"max_iters": 4}, "local_relaxation": {"local_mesh_n_ring": 3},
+      "sizing_field": {"rel_min_edge_length": 0.02}})")}}}}))
                                     .remesh;
 
-  EXPECT_TRUE(options.enabled && options.sizing_field && options.swap.enabled);
+  EXPECT_TRUE(options.enabled && options.sizing_field.enabled && options.swap.enabled);
   EXPECT_EQ(options.screening, Screening::none);
   EXPECT_EQ(options.history, HistoryRule::interpolated);
   EXPECT_EQ(options.split.acceptance_tolerance, 0.4);
   EXPECT_EQ(options.collapse.rel_max_edge_length, 3);
   EXPECT_EQ(options.smooth.max_iterations, 4);
   EXPECT_EQ(options.local.rings, 3);
+  EXPECT_EQ(options.sizing_field.rel_min_edge_length, 0.02);
 }
 
 }  // namespace

@@ -8,10 +8,6 @@
 
 namespace itr {
 
-namespace {
-
-constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
-
 std::optional<Edit<2>> collapse_of(const RemeshSession<2>& session, const EdgeKey& edge) {
   return make_collapse(session.mesh(), edge);
 }
@@ -19,26 +15,21 @@ std::optional<Edit<3>> collapse_of(const RemeshSession<3>& session, const EdgeKe
   return propose_collapse(session.mesh(), session.strata(), edge).edit;
 }
 
-/// Of a cell whose edges are this long: isosceles and right-angled in 2D, regular in 3D (CONVENTIONS.md, "Remeshing").
-template <int Dim>
-double volume_of(double length) {
-  return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
-}
+namespace {
+
+constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
 
 template <int Dim>
 class Collapser {
  public:
   Collapser(RemeshSession<Dim>& session, const EdgeRanks& ranks)
-      : session_(session),
-        options_(session.options().collapse),
-        ranks_(ranks),
-        longest_(std::min(options_.abs_max_edge_length, options_.rel_max_edge_length * session.context().shortest_edge)) {}
+      : session_(session), options_(session.options().collapse), ranks_(ranks) {}
 
   void run() {
     for (const EdgeKey& edge : session_.mesh().edges()) push(edge);
     while (const auto edge = queue_.pop()) {
       if (session_.is_cancelled()) return;
-      if (!may_be_collapsed(*edge)) continue;
+      if (!session_.may_be_collapsed(*edge) || session_.depth(*edge) >= options_.max_depth) continue;
       const double signal = session_.roughness(*edge);
       const bool in_contact = session_.is_in_contact(*edge);
       if (session_.was_refused(RemeshMemory::collapse, *edge, signal, in_contact)) continue;
@@ -64,14 +55,6 @@ class Collapser {
            session_.rest_length(edge) < kTinyEdge * session_.context().shortest_edge;
   }
 
-  bool may_be_collapsed(const EdgeKey& edge) const {
-    if (!session_.exists(edge) || session_.rest_length(edge) > longest_ || session_.depth(edge) >= options_.max_depth)
-      return false;
-    const auto around = session_.mesh().cells_of_edge(edge);
-    return std::any_of(around.begin(), around.end(),
-                       [&](CellId c) { return session_.mesh().volume(c) <= volume_of<Dim>(longest_); });
-  }
-
   Decision collapse(const EdgeKey& edge) {
     ++session_.report().collapses.tried;
     const auto edit = collapse_of(session_, edge);
@@ -94,7 +77,6 @@ class Collapser {
   RemeshSession<Dim>& session_;
   const CollapseOptions& options_;
   const EdgeRanks& ranks_;
-  double longest_;
   EdgeQueue queue_;
 };
 

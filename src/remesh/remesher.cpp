@@ -15,8 +15,12 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
     const int before = report.accepted();
     EdgeRanks ranks;
     if (options.screening == Screening::energy_percentile) ranks = rank_edges(mesh, fields, context, options);
-    if (options.split.enabled) split_edges(session, ranks);
-    if (options.collapse.enabled) collapse_edges(session, ranks);
+    if (options.sizing_field.enabled) {
+      follow_sizing_field(session);
+    } else {
+      if (options.split.enabled) split_edges(session, ranks);
+      if (options.collapse.enabled) collapse_edges(session, ranks);
+    }
     if (options.swap.enabled) swap_edges(session);
     if (options.smooth.enabled) smooth_vertices(session);
     if (report.accepted() == before) break;

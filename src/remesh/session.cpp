@@ -2,12 +2,23 @@
 #include "session.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/validate.hpp"
 
 namespace itr {
+
+namespace {
+
+/// Of a cell whose edges are this long: isosceles and right-angled in 2D, regular in 3D (CONVENTIONS.md, "Remeshing").
+template <int Dim>
+double volume_of(double length) {
+  return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
+}
+
+}  // namespace
 
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
@@ -31,6 +42,25 @@ bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
 }
 
 template <int Dim>
+bool RemeshSession<Dim>::may_be_split(const EdgeKey& e) {
+  if (!exists(e) || rest_length(e) < options_.split.min_edge_length) return false;
+  if (!has_contact() || !is_surface(e)) return true;
+  const double dhat = context_.contact.activation_distance;
+  if (rest_length(e) >= 2 * dhat && length(e) >= 2 * dhat) return true;
+  ++report_.bound_by_activation_distance;
+  return false;
+}
+
+template <int Dim>
+bool RemeshSession<Dim>::may_be_collapsed(const EdgeKey& e) const {
+  const CollapseOptions& collapse = options_.collapse;
+  const double longest = std::min(collapse.abs_max_edge_length, collapse.rel_max_edge_length * context_.shortest_edge);
+  if (!exists(e) || rest_length(e) > longest) return false;
+  const auto around = mesh_.cells_of_edge(e);
+  return std::any_of(around.begin(), around.end(), [&](CellId c) { return mesh_.volume(c) <= volume_of<Dim>(longest); });
+}
+
+template <int Dim>
 bool RemeshSession<Dim>::is_in_contact(const EdgeKey& e) {
   if (!has_contact()) return false;
   const double dhat = context_.contact.activation_distance;
@@ -39,6 +69,40 @@ bool RemeshSession<Dim>::is_in_contact(const EdgeKey& e) {
     return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() &&
            scratch_.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch_.hits);
   });
+}
+
+template <int Dim>
+typename RemeshSession<Dim>::PieceInContact RemeshSession<Dim>::piece(FacetId f) const {
+  PieceInContact piece{gate_.present().piece(f), {}};
+  for (const int v : mesh_.facet(f)) piece.rest.add(mesh_.rest(v), v);
+  return piece;
+}
+
+template <int Dim>
+std::vector<typename RemeshSession<Dim>::PieceInContact> RemeshSession<Dim>::pieces_in_contact(FacetId f) {
+  const SurfaceIndex<Dim>& surface = gate_.present();
+  const double dhat = context_.contact.activation_distance;
+  std::vector<PieceInContact> pieces;
+  for (const auto& [other, distance] : scratch_.neighbourhoods.near(surface, f, dhat, scratch_.hits)) {
+    if (distance >= dhat) continue;
+    if (other >= 0) {
+      pieces.push_back(piece(other));
+      continue;
+    }
+    const int primitive = Neighbourhoods<Dim>::of_obstacle(other);
+    PieceInContact& obstacle = pieces.emplace_back(PieceInContact{surface.obstacle_piece(primitive), {}});
+    for (const int v : surface.primitives().all[primitive].ids())
+      obstacle.rest.add(context_.obstacles.rest[v], SurfacePiece<Dim>::id_of_obstacle(v));
+  }
+  return pieces;
+}
+
+template <int Dim>
+bool RemeshSession<Dim>::apply_if_valid(const Edit<Dim>& edit) {
+  Verdict<Dim> verdict;
+  if (!gate_.passes(edit, scratch_.hits)) return false;
+  commit(edit, verdict);
+  return true;
 }
 
 template <int Dim>

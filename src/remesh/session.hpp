@@ -39,6 +39,10 @@ class RemeshSession {
     return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty();
   }
   bool is_surface(const EdgeKey& e) const;
+  /// Whether an edge is there and as long as it has to be for a split; counts those that are too short on the surface.
+  bool may_be_split(const EdgeKey& e);
+  /// Whether an edge is there and short enough for a collapse.
+  bool may_be_collapsed(const EdgeKey& e) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
   bool is_in_contact(const EdgeKey& e);
 
@@ -81,6 +85,17 @@ class RemeshSession {
     return attempt(edit, center, tolerance, options_.local);
   }
 
+  /// Commits an edit as it is, nothing relaxed, where the gate lets it pass. Returns whether it did.
+  bool apply_if_valid(const Edit<Dim>& edit);
+
+  /// Facets and obstacles at present nearer than dhat to a facet of the surface, each also as it is at rest.
+  struct PieceInContact {
+    SurfacePiece<Dim> now, rest;
+  };
+  std::vector<PieceInContact> pieces_in_contact(FacetId f);
+  /// A facet, now and at rest.
+  PieceInContact piece(FacetId f) const;
+
   /// Edges of those cells that are alive, ascending.
   std::vector<EdgeKey> edges_of(std::span<const CellId> cells) const;
   double median_trial_seconds();
@@ -119,5 +134,12 @@ void swap_edges(RemeshSession<2>& session);
 void swap_edges(RemeshSession<3>& session);
 template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session);
+/// The baseline: splits and collapses by a sizing field instead of energies.
+template <int Dim>
+void follow_sizing_field(RemeshSession<Dim>& session);
+
+/// The collapse of an edge, where one is possible.
+std::optional<Edit<2>> collapse_of(const RemeshSession<2>& session, const EdgeKey& edge);
+std::optional<Edit<3>> collapse_of(const RemeshSession<3>& session, const EdgeKey& edge);
 
 }  // namespace itr

@@ -45,13 +45,7 @@ class Splitter {
   }
 
   bool may_be_split(const EdgeKey& edge) {
-    if (!session_.exists(edge) || session_.depth(edge) >= options_.max_depth) return false;
-    if (session_.rest_length(edge) < options_.min_edge_length) return false;
-    if (!session_.has_contact() || !session_.is_surface(edge)) return true;
-    const double dhat = session_.context().contact.activation_distance;
-    if (session_.rest_length(edge) >= 2 * dhat && session_.length(edge) >= 2 * dhat) return true;
-    ++session_.report().bound_by_activation_distance;
-    return false;
+    return session_.exists(edge) && session_.depth(edge) < options_.max_depth && session_.may_be_split(edge);
   }
 
   void split(const EdgeKey& edge) {

@@ -264,7 +264,11 @@ constexpr Key kKeys[] = {
     {"/space/advanced/{quadrature_order,mass_quadrature_order,n_boundary_samples}", only, "", "-1", "", "exact"},
 
     {"/space/remesh/enabled", read, "boolean", "false", "", "in-timestep remeshing"},
-    {"/space/remesh/type", read, "physics|sizing_field", "\"physics\"", "", "sizing_field is not supported yet"},
+    {"/space/remesh/type", read, "physics|sizing_field", "\"physics\"", "",
+     "what decides about splits and collapses: energies, or lengths of edges, the baseline that the paper compares with "
+     "(CONVENTIONS.md)"},
+    {"/space/remesh/sizing_field/rel_min_edge_length", read, "non_negative", "0.01", "",
+     "shorter edges are not split, in longest sides of the bodies' box: in contact nothing else ends it"},
     {"/space/remesh/screening", read, "energy-percentile|bounds|none", "\"bounds\"", "",
      "which edges are tried and what decides: those at the top by energy, by patches that relax (the paper); every edge, by "
      "what one vertex alone gains and by patches where that does not tell; every edge by patches, which takes longer"},

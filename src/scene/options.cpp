@@ -251,7 +251,9 @@ RemeshOptions read_remesh(const Node& root) {
   const Node node = root["space"]["remesh"];
   RemeshOptions options;
   options.enabled = node["enabled"].boolean(false);
-  options.sizing_field = node["type"].choice({"physics", "sizing_field"}, 0) == 1;
+  options.sizing_field.enabled = node["type"].choice({"physics", "sizing_field"}, 0) == 1;
+  options.sizing_field.rel_min_edge_length =
+      node["sizing_field"]["rel_min_edge_length"].non_negative(options.sizing_field.rel_min_edge_length);
   options.screening = static_cast<Screening>(
       node["screening"].choice({"energy-percentile", "bounds", "none"}, static_cast<int>(options.screening)));
   options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));

@@ -36,6 +36,9 @@ StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, 
   for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
   context.newton = setup.newton;
   context.shortest_edge = shortest_edge;
+  if (setup.remesh.sizing_field.enabled)
+    for (const auto& [a, b] : setup.mesh.edges())
+      context.longest_edge = std::max(context.longest_edge, (setup.mesh.rest(a) - setup.mesh.rest(b)).norm());
   const int bodies = state.mesh.vertex_slots();
   auto& obstacles = context.obstacles;
   obstacles.rest = setup.obstacles.rest;

@@ -27,8 +27,6 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   const auto refuse = [](const char* place, const std::string& found) {
     throw InputError({"", place, found, "something that this version supports"});
   };
-  if (setup.remesh.enabled && setup.remesh.sizing_field)
-    refuse("/space/remesh/type", "the sizing-field baseline, which is not supported yet");
   if (setup.remesh.enabled && setup.proxy)
     refuse("/contact/collision_mesh", "a collision mesh where the bodies' mesh changes");
   if (setup.remesh.enabled && !setup.point_tags.empty())

@@ -70,6 +70,8 @@ CASES = [
      ["/time/tend=3", "/space/remesh/enabled=false", "/geometry/0/n_refs=2"], None),
     ("masticator h=0.1 to t=3, uniform n_refs 3", "masticator/h=0.1.json",
      ["/time/tend=3", "/space/remesh/enabled=false", "/geometry/0/n_refs=3"], None),
+    ("masticator h=0.1, sizing field", "masticator/h=0.1-sizing-field.json", [], None),  # the reference dies in step 56
+    ("drop-bar, sizing field", "spikes2d/drop-bar.json", [], (0.2, None, 43)),
     ("ball-wall 3D to t=0.00132", "ball-wall/3D.json", ["/time/tend=0.00132"], (3.47, 0.0161, 311)),
     ("masticator 3D to t=1.1", "masticator/3D.json", ["/time/tend=1.1"], (9.47, 3.22, 227)),
     ("twisting-beam to t=0.2, tolerance 10", "twisting-beam/twisting-beam.json",
@@ -101,6 +103,8 @@ BARS = {
     # Less than the reference gains (47.2 J), and a lower energy: a mesh that is adapted earlier has less to gain later.
     "ball-wall 2D to t=0.0024": {"gain": 30, "energy": 458.33, "vertices": 1600},
     "masticator h=0.1 to t=3, swaps and smoothing, tolerance 0.1": {"energy": 3125.9, "vertices": 800},
+    "masticator h=0.1, sizing field": {"vertices": 700},
+    "drop-bar, sizing field": {"vertices": 1400},
     "ball-wall 3D to t=0.00132": {"gain": 0.0161, "vertices": 2800},
     "masticator 3D to t=1.1": {"gain": 3.22, "vertices": 1100},
     "twisting-beam to t=0.2, tolerance 10": {"gain": 2463, "vertices": 1100},

@@ -44,7 +44,7 @@ template <int Dim>
 struct StepContext : PotentialTerms<Dim> {
   std::map<int, std::array<bool, Dim>> held_components;  ///< by facet tag
   NewtonOptions newton;
-  double shortest_edge = 0;  ///< of the initial mesh [m]
+  double shortest_edge = 0, longest_edge = 0;  ///< of the initial mesh [m]
 
   struct ObstacleGeometry {
     std::vector<Vec<Dim>> rest;

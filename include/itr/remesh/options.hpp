@@ -54,9 +54,16 @@ struct LocalRelaxationOptions {
   int max_contact_iterations = 4;  ///< the same where the patch touches contact
 };
 
+/// The baseline of CONVENTIONS.md, "Remeshing", where lengths of edges decide instead of energies.
+struct SizingFieldOptions {
+  bool enabled = false;
+  /// Shorter rest edges are not split, in longest sides of the bodies' box at rest: in contact nothing else ends it.
+  double rel_min_edge_length = 0.01;
+};
+
 struct RemeshOptions {
   bool enabled = false;
-  bool sizing_field = false;  ///< the baseline of CONVENTIONS.md, "Remeshing", instead of energies
+  SizingFieldOptions sizing_field;
   SplitOptions split;
   CollapseOptions collapse;
   SwapOptions swap;
