@@ -33,6 +33,8 @@ const char* name_of(MaterialLaw law) {
       return "fixed corotated";
     case MaterialLaw::mooney_rivlin:
       return "Mooney-Rivlin";
+    case MaterialLaw::own:
+      return "own";
   }
   return "";
 }

@@ -16,6 +16,8 @@ IncrementalPotential<Dim>::IncrementalPotential(const PotentialTerms<Dim>& terms
   elastic_ = std::make_shared<ElasticEnergy<Dim>>(cells, terms.materials, terms.scaling);
   if (terms.loads.has_dead_loads())
     loads_ = std::make_shared<LoadEnergy<Dim>>(cells, terms.materials, terms.loads, terms.scaling);
+  for (const auto& make : terms.host)
+    if (auto term = make(cells, terms.t, terms.scaling)) host_.push_back(std::move(term));
 }
 
 template <int Dim>
@@ -62,6 +64,7 @@ typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(const 
       lagged.damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(*contact_, on_surface(x), options.coefficient,
                                                                              velocity_of_surface(), workspace)));
   }
+  if (terms_.follower) lagged.follower = terms_.follower(x);
   return lagged;
 }
 
@@ -74,6 +77,8 @@ EnergySum IncrementalPotential<Dim>::sum(const Lagged& lagged) const {
   add(inertia_);
   add(elastic_);
   add(loads_);
+  for (const auto& term : host_) add(term);
+  add(lagged.follower);
   add(contact_of_cells_);
   add(lagged.friction);
   add(lagged.pressure);

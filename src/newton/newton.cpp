@@ -106,6 +106,9 @@ class Minimizer {
       }
       const bool stalled = has_stalled(before);
       if (extras_.after_step && extras_.after_step(x_)) value_ = timed_value(x_);
+      if (extras_.on_iteration &&
+          !extras_.on_iteration({summary_.iterations + 1, value_, summary_.gradient_norm, summary_.step_norm}))
+        return stop(Termination::cancelled, "as the program asked");
       if (stalled) {
         ++summary_.iterations;
         return stop(Termination::energy);

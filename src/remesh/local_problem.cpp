@@ -51,7 +51,8 @@ LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const C
   if (static_cast<int>(scratch_.local_of.size()) < mesh_.vertex_slots()) scratch_.local_of.resize(2 * mesh_.vertex_slots());
   scratch_.local_of_obstacle.resize(state.context.obstacles.x.size());
   add_cells(patch);
-  if (!state.context.loads.tractions.empty() || !state.context.loads.pressures.empty()) add_loaded_facets();
+  const Loads<Dim>& loads = state.context.loads;
+  if (!loads.tractions.empty() || !loads.pressures.empty() || !state.context.host.empty()) add_loaded_facets();
   hold_vertices();
   if (state.context.contact.enabled) add_surface();
   add_terms();

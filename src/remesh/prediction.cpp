@@ -144,7 +144,7 @@ template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
   const StepContext<Dim>& context = state.context;
-  if (!context.loads.pressures.empty() || !context.damping.empty()) return kUnknown;
+  if (!context.loads.pressures.empty() || !context.damping.empty() || !context.host.empty()) return kUnknown;
   const VertexId set = edit.value ? edit.value->vertex : kNone;
   const auto at = [&](const VectorX& field, VertexId v, bool after) {
     return after && v == set ? RemeshFields<Dim>::interpolate(field, *edit.value) : Vec<Dim>(field.segment<Dim>(Dim * v));

@@ -21,7 +21,7 @@ inline constexpr double kPatchOverVertexInContact = Dim == 2 ? 30 : 10;
 
 /// What an edit is predicted to gain when only the vertex that it sets relaxes, to second order: a microsecond. Elasticity,
 /// inertia (history interpolated) and dead loads; contact and friction left out. [J, times the scaling]
-/// Infinite where the scene has pressure or damping, of which it knows nothing.
+/// Infinite where the scene has pressure, damping or terms of the program, of which it knows nothing.
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 

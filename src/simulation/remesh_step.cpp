@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "itr/core/timer.hpp"
+#include "itr/energy/point_forces.hpp"
 #include "itr/geometry/bvh.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "itr/simulation/history_transfer.hpp"
@@ -32,6 +33,12 @@ StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, 
   const TimeIntegrator integrator(setup.time);
   StepContext<Dim> context;
   static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, t);
+  if (setup.follower.forces) {
+    const int dofs = Dim * state.mesh.vertex_slots();
+    VectorX forces = VectorX::Zero(dofs);
+    setup.follower.forces(state.mesh, x.head(dofs), t, forces);
+    context.host.push_back(point_forces<Dim>(state.mesh, forces));
+  }
   context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
   for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
   context.newton = setup.newton;
@@ -93,9 +100,10 @@ void tell(const HistoryTransferReport& transfer, double extent, int step, const 
 }  // namespace
 
 template <int Dim>
-bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const StepProblem<Dim>& problem, double t,
-                        const State<Dim>& before, State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
-                        const Logger& logger) {
+std::optional<MeshRenumbering> remesh_and_project(const Setup<Dim>& setup, double shortest_edge,
+                                                  const StepProblem<Dim>& problem, double t, const State<Dim>& before,
+                                                  State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
+                                                  const Logger& logger) {
   const StepContext<Dim> context = make_context(setup, before, problem, x, t, shortest_edge);
   RemeshFields<Dim> fields = make_fields(setup, before, x);
   RemeshReport remeshed;
@@ -109,13 +117,14 @@ bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const Ste
   report.smooths = remeshed.smooths;
   report.trial_seconds = remeshed.trial_seconds;
   report.bound_by_dhat = remeshed.bound_by_activation_distance;
-  if (!remeshed.changed()) return false;
+  if (!remeshed.changed()) return std::nullopt;
 
   const ScopedTimer timer(report.seconds.projection);
   TouchedCells touched;
   for (int c = 0; c < before.mesh.cell_slots(); ++c)
     if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
-  const auto renumbering = state.mesh.compact();
+  auto [vertex, cell, facet] = state.mesh.compact();
+  MeshRenumbering renumbering{std::move(vertex), std::move(cell), std::move(facet)};
   state.remesh_memory.renumber(renumbering.vertex);
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
@@ -134,17 +143,18 @@ bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const Ste
   std::size_t next = 0;
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
-  if (!remeshed.coarsened()) return true;  // refinement alone: interpolation is exact
+  if (!remeshed.coarsened()) return renumbering;  // refinement alone: interpolation is exact
   const HistoryTransferReport transfer =
       transfer_history(setup, before.mesh, before.history, state.mesh, touched, solver, state.history);
   report.history_loss = transfer.loss / problem.scaling();
   tell(transfer, mass_moment(setup, state.mesh, x), state.step, logger);
-  return true;
+  return renumbering;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                           \
-  template bool remesh_and_project<Dim>(const Setup<Dim>&, double, const StepProblem<Dim>&, double, const State<Dim>&, \
-                                        State<Dim>&, VectorX&, StepReport&, linear::Solver&, const Logger&);
+#define ITR_INSTANTIATE(Dim)                                                                                          \
+  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const Setup<Dim>&, double, const StepProblem<Dim>&, \
+                                                                  double, const State<Dim>&, State<Dim>&, VectorX&,   \
+                                                                  StepReport&, linear::Solver&, const Logger&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

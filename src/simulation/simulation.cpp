@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
@@ -113,16 +114,47 @@ struct Simulation<Dim>::Impl {
   Logger logger;
   std::unique_ptr<linear::Solver> direct;  ///< or iterative
   std::unique_ptr<linear::ReusingSolver> solver;
-  std::unique_ptr<SparseSystem> system;  ///< keeps what it knows of the mesh from step to step
-  State<Dim> state;
-  double shortest_edge = 0;  ///< of the initial mesh [m]
-  NodalForces forces;        ///< of the last step
+  std::unique_ptr<SparseSystem> system;                                ///< keeps what it knows of the mesh from step to step
+  std::shared_ptr<State<Dim>> state = std::make_shared<State<Dim>>();  ///< snapshots may share it
+  double shortest_edge = 0;                                            ///< of the initial mesh [m]
+  NodalForces forces;                                                  ///< of the last step
+  double first_dt = 1;                                                 ///< what the setup's tolerances are for [s]
+  NewtonOptions first_newton;
+  std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
+
+  /// Steps from now on have this length.
+  void set_step(double dt) {
+    TimeOptions& time = setup.time;
+    if (!(dt > 0) || !std::isfinite(dt)) throw InputError({"", "dt", std::to_string(dt), "a number > 0"});
+    if (dt == time.dt) return;
+    time.t0 = state->t;
+    time.first_step = state->step;
+    time.dt = dt;
+    scale_tolerances();
+    if (time.integrator != Integrator::bdf || state->history.x.size() == 1) return;
+    own_state();
+    state->history.x.resize(1);
+    state->history.v.resize(1);
+  }
+
+  void scale_tolerances() {
+    if (setup.newton.norm != NewtonNorm::euclidean || setup.time.is_static) return;
+    const double factor = setup.time.dt / first_dt;
+    setup.newton.step_tolerance = factor * first_newton.step_tolerance;
+    setup.newton.gradient_tolerance = factor * first_newton.gradient_tolerance;
+    setup.newton.first_gradient_tolerance = factor * first_newton.first_gradient_tolerance;
+  }
+
+  /// Before the state changes: snapshots keep theirs.
+  void own_state() {
+    if (state.use_count() > 1) state = std::make_shared<State<Dim>>(*state);
+  }
 
   /// Those of a state that no step of this simulation led to.
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
-    StepProblem<Dim> problem(setup, state.mesh, state.history, state.t, *system, state.stiffness);
-    forces = problem.forces(state.history.x[0]);
+    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *system, state->stiffness);
+    forces = problem.forces(state->history.x[0]);
     forces.reaction.setZero();
   }
 };
@@ -141,13 +173,15 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   impl_->solver =
       std::make_unique<linear::ReusingSolver>(*impl_->direct, linear.reuse_factors && linear.dump_folder.empty());
   impl_->system = std::make_unique<SparseSystem>(*impl_->solver);
-  impl_->state = initial_state(impl_->setup);
-  refuse_intersections(impl_->setup, impl_->state);
-  if (impl_->setup.consistent_initial_acceleration && !impl_->state.history.a.empty())
-    set_consistent_acceleration(impl_->setup, impl_->state, *impl_->system);
+  impl_->first_dt = impl_->setup.time.dt;
+  impl_->first_newton = impl_->setup.newton;
+  *impl_->state = initial_state(impl_->setup);
+  refuse_intersections(impl_->setup, *impl_->state);
+  if (impl_->setup.consistent_initial_acceleration && !impl_->state->history.a.empty())
+    set_consistent_acceleration(impl_->setup, *impl_->state, *impl_->system);
   impl_->set_forces_at_rest();
   impl_->shortest_edge = std::numeric_limits<double>::infinity();
-  const auto& mesh = impl_->state.mesh;
+  const auto& mesh = impl_->state->mesh;
   for (const auto& [a, b] : mesh.edges())
     impl_->shortest_edge = std::min(impl_->shortest_edge, (mesh.rest(a) - mesh.rest(b)).norm());
 }
@@ -160,7 +194,7 @@ Simulation<Dim>::Simulation(Simulation&&) noexcept = default;
 template <int Dim>
 StepReport Simulation<Dim>::initial_report() const {
   StepReport report;
-  const State<Dim>& state = impl_->state;
+  const State<Dim>& state = *impl_->state;
   report.step = state.step;
   report.t = state.t;
   report.vertices = state.mesh.num_vertices();
@@ -176,11 +210,61 @@ StepReport Simulation<Dim>::initial_report() const {
 }
 
 template <int Dim>
-StepResult Simulation<Dim>::advance() {
+StepResult Simulation<Dim>::adapt(double dt) {
+  impl_->set_step(dt);
+  State<Dim> end = *impl_->state;
+  const auto start = std::make_shared<State<Dim>>();
   StepResult result =
-      take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->system, *impl_->solver, impl_->logger, impl_->state);
-  if (result.ok) impl_->forces = result.forces;
+      take_step(impl_->setup, impl_->shortest_edge, *impl_->system, *impl_->solver, impl_->logger, end, false, start.get());
+  if (!result.ok || result.renumbering.empty()) return result;
+  const std::shared_ptr<const State<Dim>> before = std::exchange(impl_->state, start);
+  impl_->set_forces_at_rest();
+  if (impl_->on_mesh_change)
+    impl_->on_mesh_change(describe_change(before->mesh, start->mesh, result.renumbering), before->mesh);
   return result;
+}
+
+template <int Dim>
+StepResult Simulation<Dim>::advance() {
+  const std::shared_ptr<const State<Dim>> before =
+      impl_->on_mesh_change && impl_->setup.remesh.enabled ? impl_->state : nullptr;
+  impl_->own_state();
+  StepResult result =
+      take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->system, *impl_->solver, impl_->logger, *impl_->state);
+  if (!result.ok) return result;
+  impl_->forces = result.forces;
+  if (before && !result.renumbering.empty())
+    impl_->on_mesh_change(describe_change(before->mesh, impl_->state->mesh, result.renumbering), before->mesh);
+  return result;
+}
+
+template <int Dim>
+StepResult Simulation<Dim>::advance(double dt) {
+  impl_->set_step(dt);
+  return advance();
+}
+
+template <int Dim>
+Setup<Dim>& Simulation<Dim>::conditions() {
+  return impl_->setup;
+}
+
+template <int Dim>
+void Simulation<Dim>::on_mesh_change(std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> listener) {
+  impl_->on_mesh_change = std::move(listener);
+}
+
+template <int Dim>
+Snapshot<Dim> Simulation<Dim>::save() const {
+  return {impl_->state, impl_->setup.time, impl_->forces};
+}
+
+template <int Dim>
+void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
+  impl_->state = std::const_pointer_cast<State<Dim>>(snapshot.state);  // own_state() before it changes
+  impl_->setup.time = snapshot.time;
+  impl_->scale_tolerances();
+  impl_->forces = snapshot.forces;
 }
 
 template <int Dim>
@@ -194,27 +278,32 @@ void Simulation<Dim>::restore(State<Dim> state) {
     for (const VectorX& field : *fields)
       if (field.size() != size) refuse("length of a saved field", field.size(), size);
   if (history.x.empty() || history.v.empty()) refuse("saved states", history.x.size(), 1);
-  if (history.a.empty() != impl_->state.history.a.empty())
-    refuse("saved accelerations", history.a.size(), impl_->state.history.a.size());
+  if (history.a.empty() != impl_->state->history.a.empty())
+    refuse("saved accelerations", history.a.size(), impl_->state->history.a.size());
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
     if (!impl_->setup.materials.contains(state.mesh.body(c))) refuse("body of a saved cell", state.mesh.body(c), 0);
-  impl_->state = std::move(state);
+  impl_->state = std::make_shared<State<Dim>>(std::move(state));
   impl_->set_forces_at_rest();
 }
 
 template <int Dim>
 bool Simulation<Dim>::finished() const {
-  return impl_->state.step >= impl_->setup.time.steps;
+  return impl_->state->step >= impl_->setup.time.steps;
 }
 
 template <int Dim>
 const State<Dim>& Simulation<Dim>::state() const {
-  return impl_->state;
+  return *impl_->state;
 }
 
 template <int Dim>
 const Setup<Dim>& Simulation<Dim>::setup() const {
   return impl_->setup;
+}
+
+template <int Dim>
+const NodalForces& Simulation<Dim>::forces() const {
+  return impl_->forces;
 }
 
 template <int Dim>
@@ -229,7 +318,7 @@ std::string Simulation<Dim>::solver_name_in_use() const {
 
 template <int Dim>
 typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
-  const State<Dim>& state = impl_->state;
+  const State<Dim>& state = *impl_->state;
   const int bodies = state.mesh.vertex_slots();
   FrameData data;
   data.x = state.history.x[0].head(Dim * bodies);

@@ -57,7 +57,8 @@ std::string find_violation(const Setup<Dim>& setup, const State<Dim>& state, con
 /// ok, and `creates_energy`.
 template <int Dim>
 StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
-                        const Logger& logger, bool damped, bool& creates_energy, State<Dim>& state) {
+                        const Logger& logger, bool damped, bool& creates_energy, State<Dim>& state,
+                        State<Dim>* start_of_step) {
   StepResult result;
   StepReport& report = result.report;
   const double start = seconds_now();
@@ -65,7 +66,7 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
   State<Dim> next = state;
   next.step = state.step + 1;
   next.history.damp_next = damped;
-  next.t = setup.time.t0 + next.step * setup.time.dt;
+  next.t = setup.time.time_after(next.step);
   const double t = next.t;
   report.step = next.step;
   report.t = next.t;
@@ -75,6 +76,7 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
   }
   const linear::SolveCounts solves_before = solver.counts();
   const auto fail = [&](std::string reason) {
+    result.renumbering = {};
     add_solves(solves_before, solver.counts(), report);
     result.ok = false;
     result.reason = std::move(reason);
@@ -107,6 +109,7 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
     return summary;
   };
   NewtonSummary summary = solve(state.history.x[0]);
+  result.cancelled = summary.termination == Termination::cancelled;
   if (!summary.converged()) return fail(reason_of(summary));
   if (!guard.allows(*problem, next.history, x)) return forbid();
   {
@@ -118,22 +121,28 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
     next.stiffness = problem->stiffness();
     const State<Dim> unchanged = next;
     const VectorX solution = x;
-    if (remesh_and_project(setup, shortest_edge, *problem, t, unchanged, next, x, report, system.solver(), logger)) {
+    if (auto renumbering =
+            remesh_and_project(setup, shortest_edge, *problem, t, unchanged, next, x, report, system.solver(), logger)) {
+      result.renumbering = std::move(*renumbering);
       auto problem_before = std::move(problem);
       problem = make_problem();
       summary = solve(VectorX(x));
+      result.cancelled = summary.termination == Termination::cancelled;
+      if (result.cancelled) return fail(reason_of(summary));
       const std::string failure = summary.converged() ? find_violation(setup, next, x) : reason_of(summary);
-      if (!failure.empty() && !setup.newton.is_cancelled()) {
+      if (!failure.empty()) {
         logger.warning(fmt::format("step {}: keeping the mesh as it was, the remeshed step failed: {}", next.step, failure));
         next = unchanged;
         x = solution;
         problem = std::move(problem_before);
         report.forget_operations();
+        result.renumbering = {};
       }
     }
   }
 
   if (setup.newton.is_cancelled()) {
+    result.cancelled = true;
     summary.termination = Termination::cancelled;
     return fail(reason_of(summary));
   }
@@ -153,6 +162,14 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
   add_solves(solves_before, solver.counts(), report);
   next.factor = solver.record();
   next.stiffness = problem->stiffness();
+  if (start_of_step) {
+    *start_of_step = next;
+    start_of_step->step = state.step;
+    start_of_step->t = state.t;
+    start_of_step->stiffness = state.stiffness;
+    start_of_step->created_energy = state.created_energy;
+    start_of_step->history.damp_next = state.history.damp_next;
+  }
   TimeIntegrator(setup.time).push(std::move(x), next.history);
   state = std::move(next);
   report.peak_rss_mb = peak_rss_mb();
@@ -164,15 +181,15 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
 
 template <int Dim>
 StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
-                     const Logger& logger, State<Dim>& state, bool damped) {
+                     const Logger& logger, State<Dim>& state, bool damped, State<Dim>* start) {
   bool creates_energy = false;
-  StepResult result = attempt_step(setup, shortest_edge, system, solver, logger, damped, creates_energy, state);
+  StepResult result = attempt_step(setup, shortest_edge, system, solver, logger, damped, creates_energy, state, start);
   if (!creates_energy) return result;
   logger.warning(
       fmt::format("step {}: Newmark would create energy here, implicit Euler takes this step", result.report.step));
   StepReport effort = result.report;
   effort.forget_operations();
-  result = attempt_step(setup, shortest_edge, system, solver, logger, true, creates_energy, state);
+  result = attempt_step(setup, shortest_edge, system, solver, logger, true, creates_energy, state, start);
   result.report.add_effort(effort);
   result.report.damped_steps = 1;
   return result;
@@ -185,6 +202,7 @@ template <int Dim>
 Setup<Dim> halved(const Setup<Dim>& setup, const State<Dim>& state) {
   Setup<Dim> half = setup;
   half.time.t0 = state.t;
+  half.time.first_step = 0;
   half.time.dt = setup.time.dt / 2;
   half.time.steps = 2;
   --half.time.step_cuts;
@@ -203,7 +221,7 @@ template <int Dim>
 StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system,
                               linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state, bool damped) {
   StepResult whole = take_step(setup, shortest_edge, system, solver, logger, state, damped);
-  if (whole.ok || setup.time.step_cuts == 0 || setup.newton.is_cancelled()) return whole;
+  if (whole.ok || whole.cancelled || setup.time.step_cuts == 0) return whole;
   const Setup<Dim> half = halved(setup, state);
   logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
                  "), cutting it into two of " + std::to_string(half.time.dt) + " s");
@@ -212,6 +230,7 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
   if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);
   StepReport effort = whole.report;
   NodalForces forces;
+  MeshRenumbering renumbering;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
     StepResult result = take_step_in_parts(half, shortest_edge, system, solver, logger, part, true);
@@ -220,18 +239,20 @@ StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, Spa
     if (!result.ok) return result;
     effort = result.report;
     forces = std::move(result.forces);
+    if (!result.renumbering.empty())
+      renumbering = renumbering.empty() ? std::move(result.renumbering) : compose(renumbering, result.renumbering);
   }
-  whole = {.reason = {}, .report = effort, .forces = std::move(forces)};
+  whole = {.reason = {}, .report = effort, .forces = std::move(forces), .renumbering = std::move(renumbering)};
   whole.report.cut_steps = parts;
   whole.report.step = part.step = state.step + 1;
-  whole.report.t = part.t = setup.time.t0 + part.step * setup.time.dt;
+  whole.report.t = part.t = setup.time.time_after(part.step);
   state = std::move(part);
   return whole;
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                          \
   template StepResult take_step<Dim>(const Setup<Dim>&, double, SparseSystem&, linear::ReusingSolver&, const Logger&, \
-                                     State<Dim>&, bool);                                                              \
+                                     State<Dim>&, bool, State<Dim>*);                                                 \
   template StepResult take_step_in_parts<Dim>(const Setup<Dim>&, double, SparseSystem&, linear::ReusingSolver&,       \
                                               const Logger&, State<Dim>&, bool);
 ITR_INSTANTIATE(2)

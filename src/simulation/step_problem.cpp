@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "itr/core/timer.hpp"
+#include "itr/energy/follower.hpp"
 
 namespace itr {
 
@@ -95,7 +96,9 @@ PotentialTerms<Dim> potential_terms(const Setup<Dim>& setup, const History& hist
           .scaling = integrator.scaling(history),
           .contact = setup.contact,
           .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
-          .velocity_rate = integrator.velocity_rate(history)};
+          .velocity_rate = integrator.velocity_rate(history),
+          .host = setup.terms,
+          .t = t};
 }
 
 template <int Dim>
@@ -112,6 +115,10 @@ StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, co
       diagonal_(rest_diagonal(mesh)),
       stiffness_(stiffness),
       system_(system) {
+  if (setup.follower.forces)
+    terms_.follower = [this, &mesh, t](const VectorX& x) {
+      return lag_follower(setup_.follower, mesh, x, t, terms_.scaling);
+    };
   if (setup.contact.enabled) {
     surface_ = contact_surface(setup, mesh);
     if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
@@ -139,6 +146,8 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   potential_.elastic()->add_gradient(x, gradient, workspace_);
   if (potential_.loads()) potential_.loads()->add_gradient(x, gradient, workspace_);
   if (lagged_.pressure) lagged_.pressure->add_gradient(x, gradient, workspace_);
+  for (const auto& term : potential_.host()) term->add_gradient(x, gradient, workspace_);
+  if (lagged_.follower) lagged_.follower->add_gradient(x, gradient, workspace_);
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
   for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
     gradient.template segment<Dim>(bodies + Dim * o) =
@@ -282,7 +291,7 @@ template <int Dim>
 NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x) {
   const EnergySum sum = potential_.sum(lagged_);
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
-  NewtonExtras extras{.norm_weights = &norm_weights_};
+  NewtonExtras extras{.norm_weights = &norm_weights_, .on_iteration = setup_.on_iteration};
   if (!adaptive_)
     return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
   initialize_stiffness(x);
@@ -306,6 +315,7 @@ int StepProblem<Dim>::most_rounds() const {
   if (!lagged_.damping.empty())
     for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
   if (lagged_.pressure && lagged_.pressure->is_lagged(dofs_)) rounds = std::max(rounds, kPressureRounds);
+  if (lagged_.follower) rounds = std::max(rounds, kPressureRounds);
   return rounds;
 }
 
@@ -387,7 +397,10 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
   report.contact = value(potential_.contact_of_cells());
   report.friction = value(potential_.lag_friction(x, workspace_));
   for (const auto& term : lagged_.damping) report.damping += value(term);
+  for (const auto& term : potential_.host()) report.host += value(term);
+  report.host += value(lagged_.follower);
   report.total = report.inertia + report.elastic + report.body + report.contact + report.friction + report.damping;
+  report.total += report.host;
   return report;
 }
 
@@ -403,6 +416,15 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   const FieldOptions& asked = setup_.fields;
   if (asked.contact_forces) forces.contact = force(potential_.contact_of_cells().get());
   if (asked.friction_forces) forces.friction = force(lagged_.friction.get());
+  if (asked.applied_forces) {
+    const Loads<Dim> tractions{{}, terms_.loads.tractions, {}};
+    EnergySum applied;
+    applied.add(std::make_shared<LoadEnergy<Dim>>(cells_, setup_.materials, tractions, terms_.scaling));
+    for (const auto& term : potential_.host()) applied.add(term);
+    if (lagged_.pressure) applied.add(lagged_.pressure);
+    if (lagged_.follower) applied.add(lagged_.follower);
+    forces.applied = force(&applied);
+  }
   if (!asked.reaction_forces) return forces;
   const EnergySum all = potential_.sum(lagged_);
   forces.reaction = -force(&all);
@@ -438,6 +460,7 @@ double StepProblem<Dim>::created_energy(const History& history, const VectorX& x
   };
   add(*potential_.elastic());
   if (potential_.contact()) add(*potential_.contact_of_cells());
+  for (const auto& term : potential_.host()) add(*term);
   const double created = (rise - 0.5 * gradient.dot(x - x0)) / terms_.scaling;
   if (trapezoidal) return created;
   const VectorX change = TimeIntegrator(setup_.time).velocity(x, history) - v0;

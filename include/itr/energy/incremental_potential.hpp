@@ -2,6 +2,7 @@
 // The terms of the incremental potential (paper eq. 4), listed once for every scope: the whole mesh, a patch, one vertex.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/damping.hpp"
 #include "itr/energy/elastic/elastic.hpp"
+#include "itr/energy/host_terms.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/energy/load.hpp"
 #include "itr/energy/material.hpp"
@@ -30,6 +32,10 @@ struct PotentialTerms {
   ContactOptions contact;
   std::vector<DampingOptions> damping;  ///< empty in statics
   double velocity_rate = 1;             ///< of VelocityRule [1/s]
+  std::vector<TermFactory<Dim>> host;   ///< what the program adds
+  double t = 0;                         ///< at the end of the step, for them [s]
+  /// Its forces of positions, linearised at those of the cells' vertices; empty: none. On the whole mesh only.
+  std::function<std::shared_ptr<const Energy>(const VectorX& x)> follower;
 };
 
 /// Where the vertices of a scope come from: interleaved over its vertices, obstacles included.
@@ -55,6 +61,7 @@ class IncrementalPotential {
     std::shared_ptr<const Energy> friction;
     std::shared_ptr<PressureEnergy<Dim>> pressure;
     std::vector<std::shared_ptr<const Energy>> damping;
+    std::shared_ptr<const Energy> follower;
   };
   /// Those lagged at x.
   Lagged lag(const VectorX& x, Workspace& workspace) const;
@@ -68,7 +75,8 @@ class IncrementalPotential {
   const std::shared_ptr<InertiaEnergy<Dim>>& inertia() const { return inertia_; }
   const std::shared_ptr<ElasticEnergy<Dim>>& elastic() const { return elastic_; }
   const std::shared_ptr<LoadEnergy<Dim>>& loads() const { return loads_; }
-  const std::shared_ptr<ContactEnergy<Dim>>& contact() const { return contact_; }  ///< over the surface's vertices
+  const std::shared_ptr<ContactEnergy<Dim>>& contact() const { return contact_; }   ///< over the surface's vertices
+  const std::vector<std::shared_ptr<const Energy>>& host() const { return host_; }  ///< what the program adds
   const std::shared_ptr<const Energy>& contact_of_cells() const { return contact_of_cells_; }  ///< over the cells' vertices
 
  private:
@@ -86,6 +94,7 @@ class IncrementalPotential {
   std::shared_ptr<LoadEnergy<Dim>> loads_;
   std::shared_ptr<ContactEnergy<Dim>> contact_;
   std::shared_ptr<const Energy> contact_of_cells_;
+  std::vector<std::shared_ptr<const Energy>> host_;
 };
 
 extern template class IncrementalPotential<2>;

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include "itr/core/types.hpp"
 
 namespace itr {
 
 /// Stored-energy densities; their formulas are in energy/elastic/laws.hpp.
-enum class MaterialLaw { neo_hookean, linear, saint_venant_kirchhoff, fixed_corotated, mooney_rivlin };
+enum class MaterialLaw { neo_hookean, linear, saint_venant_kirchhoff, fixed_corotated, mooney_rivlin, own };
 
 /// A scalar function of rest position X [m]; in 2D X_3 = 0. Empty: none.
 using SpaceFunction = std::function<double(const Vec<3>& X)>;
@@ -22,6 +23,18 @@ struct MooneyRivlinModuli {
   double volume_d = 0;  ///< d of d (J - 1)^2 [Pa]
 };
 
+/// A stored-energy density W(F) of a program's own, for F of det F > 0 (other F are infinite). Called from several threads
+/// at a time. W is to be frame-indifferent: W(R F) = W(F).
+class OwnLaw {
+ public:
+  virtual ~OwnLaw() = default;
+  virtual double density(const Eigen::Ref<const MatrixX>& F) const = 0;  ///< [J/m^Dim]
+  /// First Piola-Kirchhoff stress dW/dF, Dim x Dim [Pa].
+  virtual void stress(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> P) const = 0;
+  /// d2W/dF2, Dim^2 x Dim^2, symmetric: F by columns [Pa].
+  virtual void hessian(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> H) const = 0;
+};
+
 /// What a body is made of. In 2D all is per unit thickness.
 struct Material {
   MaterialLaw law = MaterialLaw::neo_hookean;
@@ -30,6 +43,7 @@ struct Material {
   double density = 1;           ///< rho [kg/m^3]; 2D: [kg/m^2]
   bool plane_strain = false;    ///< 2D: lambda = E nu / ((1 + nu)(1 - 2 nu)) instead of nu E / (1 - nu^2)
   MooneyRivlinModuli mooney_rivlin{};
+  std::shared_ptr<const OwnLaw> own{};  ///< of MaterialLaw::own; E and nu then are those of small strains, a scale
 
   /// Where they are there, they take the place of the constants above; sampled at an element's rest barycentre.
   SpaceFunction youngs_modulus_at{}, poisson_ratio_at{}, density_at{};

@@ -94,7 +94,7 @@ enum class Termination {
   iterations,  ///< out of iterations
   no_descent,  ///< no direction or no step that lowers the energy, and the gradient is not small
   infeasible,  ///< the start is not feasible or a number is not finite
-  cancelled    ///< as NewtonOptions::cancel asks for
+  cancelled    ///< as NewtonOptions::cancel or NewtonExtras::on_iteration asks for
 };
 const char* to_string(Termination termination);
 
@@ -120,6 +120,8 @@ struct NewtonExtras {
   const VectorX* norm_weights = nullptr;  ///< D of NewtonNorm by dof; may be null for the Euclidean one
   /// Called with each accepted iterate; says whether it changed the energy.
   std::function<bool(const VectorX& x)> after_step{};
+  /// Called after each iteration; false ends the solve, not converged.
+  std::function<bool(const NewtonProgress& progress)> on_iteration{};
 };
 
 /// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as

@@ -24,6 +24,14 @@ enum class IndefiniteHessian {
   accept
 };
 
+/// Where a solve is, after an iteration.
+struct NewtonProgress {
+  int iteration = 0;         ///< 1 after the first
+  double energy = 0;         ///< [J s^2]
+  double gradient_norm = 0;  ///< before the iteration, and that of its full step: in the options' norm
+  double step_norm = 0;
+};
+
 /// When a solve has converged, and how it searches. Tolerances are those of the scene (CONVENTIONS.md, "Tolerances") already
 /// multiplied by what its vocabulary multiplies them with; 0 turns a test off.
 struct NewtonOptions {

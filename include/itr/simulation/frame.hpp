@@ -15,6 +15,7 @@ namespace itr {
 /// Terms of the incremental potential divided by alpha h^2 [J], after the last solve of the step.
 struct EnergyReport {
   double inertia = 0, elastic = 0, body = 0, contact = 0, friction = 0, damping = 0, total = 0;
+  double host = 0;  ///< of what the program adds, Setup::terms and Setup::follower: part of the total
 };
 
 /// Wall-clock seconds of one step. The parts are disjoint and sum to the total but for what nobody names.
@@ -59,6 +60,7 @@ struct StepReport {
 struct NodalForces {
   VectorX contact, friction;
   VectorX reaction;  ///< of what holds a vertex in its prescribed directions; 0 elsewhere, and before the first step
+  VectorX applied;   ///< of tractions, pressures and what the program adds; not of body forces
 };
 
 /// Fields that a scene may ask for (FieldOptions); empty where it does not.

@@ -10,11 +10,12 @@
 namespace itr {
 
 /// Remeshes state.mesh, around the solution x of `problem` at time t, and carries state.history and x over to the new mesh;
-/// `before` is the state as it is. Returns whether anything changed; `report` gets operations, forgotten history and
-/// seconds. `shortest_edge` is that of the initial mesh [m]. 2D so far.
+/// `before` is the state as it is. Returns what became of its ids; nothing where nothing changed. `report` gets operations,
+/// forgotten history and seconds. `shortest_edge` is that of the initial mesh [m].
 template <int Dim>
-bool remesh_and_project(const Setup<Dim>& setup, double shortest_edge, const StepProblem<Dim>& problem, double t,
-                        const State<Dim>& before, State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
-                        const Logger& logger);
+std::optional<MeshRenumbering> remesh_and_project(const Setup<Dim>& setup, double shortest_edge,
+                                                  const StepProblem<Dim>& problem, double t, const State<Dim>& before,
+                                                  State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
+                                                  const Logger& logger);
 
 }  // namespace itr

@@ -13,6 +13,7 @@
 
 #include "itr/energy/contact/options.hpp"
 #include "itr/energy/damping_options.hpp"
+#include "itr/energy/host_terms.hpp"
 #include "itr/energy/material.hpp"
 #include "itr/linear/options.hpp"
 #include "itr/mesh/mesh.hpp"
@@ -79,7 +80,8 @@ struct FieldOptions {
   bool contact_forces = false, friction_forces = false, reaction_forces = false;
   bool von_mises = false, stress = false;
   bool kinetic_energy = false, momentum = false;
-  bool any_forces() const { return contact_forces || friction_forces || reaction_forces; }
+  bool applied_forces = false;
+  bool any_forces() const { return contact_forces || friction_forces || reaction_forces || applied_forces; }
 };
 
 template <int Dim>
@@ -106,6 +108,12 @@ struct Setup {
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   FieldOptions fields;
   bool lump_mass = false;
+
+  // What only a program can add.
+  std::vector<TermFactory<Dim>> terms;
+  FollowerForces<Dim> follower;
+  /// Called after each Newton iteration of a whole mesh; false ends the step, which is then not done. Empty: nobody asks.
+  std::function<bool(const NewtonProgress&)> on_iteration;
 
   /// Fills in what is left open, and says what with, a sentence each. Barrier stiffness 0: adaptive; with remeshing a tenth
   /// of the stiffest body's modulus [Pa], or what that is in the other form. Split tolerance 0: relative_tolerance times an

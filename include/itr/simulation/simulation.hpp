@@ -13,6 +13,7 @@
 #include "itr/newton/newton.hpp"
 #include "itr/remesh/memory.hpp"
 #include "itr/simulation/frame.hpp"
+#include "itr/simulation/mesh_change.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/time/integrator.hpp"
 
@@ -35,9 +36,19 @@ struct State {
 
 struct StepResult {
   bool ok = true;
-  std::string reason;  ///< where not ok: why the step could not be done; the state is that before the step
+  bool cancelled = false;  ///< not ok because Setup::on_iteration or NewtonOptions::cancel said so
+  std::string reason;      ///< where not ok: why the step could not be done; the state is that before the step
   StepReport report;
-  NodalForces forces;  ///< those that the setup asks for
+  NodalForces forces;           ///< those that the setup asks for
+  MeshRenumbering renumbering;  ///< of the mesh, where the step changed it; else empty
+};
+
+/// A simulation as it stood: to go back to, as often as one likes. Cheap to have and to copy.
+template <int Dim>
+struct Snapshot {
+  std::shared_ptr<const State<Dim>> state;
+  TimeOptions time;
+  NodalForces forces;
 };
 
 template <int Dim>
@@ -53,12 +64,30 @@ class Simulation {
   StepReport initial_report() const;
   /// One time step with remeshing inside it. Numerical failure is a result with a reason.
   StepResult advance();
+  /// The same by another length of the step than before [s], which is that of steps from now on. Newton's Euclidean
+  /// tolerances go with it, from what the setup has for its own; BDF begins with order 1 again. Throws InputError for a
+  /// length that is not positive.
+  StepResult advance(double dt);
+  /// Finds the mesh of a step of the length dt and stays at its start, on the new mesh: for a program that goes over the
+  /// step several times, remesh.enabled off, from what save() has then. As advance() but for that; steps are not cut.
+  StepResult adapt(double dt);
   bool finished() const;
+  /// What acts from the next step on may be changed between steps: values of conditions, loads, motions of obstacles, terms,
+  /// remesh.enabled. Mesh, bodies, numbers of vertices, contact, solver and integrator may not.
+  Setup<Dim>& conditions();
+  /// Called after each step that changed the mesh, with the mesh before; the new one is state().mesh. Null: nobody is told.
+  void on_mesh_change(std::function<void(const MeshChange<Dim>& change, const Mesh<Dim>& before)> listener);
+
+  /// All that the next steps depend on, but for what conditions() and the program have set: with the same of that, steps
+  /// after restore() have the bits of those after save(). Takes no time; the next step copies the state once.
+  Snapshot<Dim> save() const;
+  void restore(const Snapshot<Dim>& snapshot);
   /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup.
   void restore(State<Dim> state);
 
   const State<Dim>& state() const;
   const Setup<Dim>& setup() const;
+  const NodalForces& forces() const;       ///< at the end of the last step, those that the setup asks for
   std::string solver_name() const;         ///< as it was asked for: "auto", say
   std::string solver_name_in_use() const;  ///< who answers now
   /// Calls `observer` with the present state as output sees it.

@@ -21,9 +21,12 @@ struct TimeOptions {
   /// A step whose solve fails is cut into two of half its length, and these again, so many times; 0: the simulation stops.
   /// In BDF and Newmark the smaller steps are of implicit Euler, and BDF's order grows again from 1 after them.
   int step_cuts = 0;
-  double t0 = 0;  ///< [s]
-  double dt = 1;  ///< h [s]
-  int steps = 1;  ///< number of steps
+  double t0 = 0;       ///< [s]
+  double dt = 1;       ///< h [s]
+  int steps = 1;       ///< number of steps
+  int first_step = 0;  ///< after which it is t0: steps after it have the length dt, those before it had others
+
+  double time_after(int step) const { return t0 + (step - first_step) * dt; }  ///< [s]
 };
 
 }  // namespace itr

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/elastic/laws.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
@@ -50,6 +51,19 @@ EigenSystem<Dim> linear_eigensystem(const LameParameters& lame) {
   return system;
 }
 
+template <int Dim>
+EigenSystem<Dim> own_eigensystem(const Mat<Dim>& F, const OwnLaw& law) {
+  MatrixX H(Dim * Dim, Dim * Dim);
+  law.hessian(F, H);
+  const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(H);
+  EigenSystem<Dim> system;
+  for (int k = 0; k < Dim * Dim; ++k) {
+    system.values[k] = eigen.eigenvalues()[k];
+    system.modes[k] = Eigen::Map<const Mat<Dim>>(eigen.eigenvectors().col(k).data());
+  }
+  return system;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -57,7 +71,10 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   double E = material.youngs_modulus, nu = material.poisson_ratio;
   if (material.youngs_modulus_at) E = material.youngs_modulus_at(in_space<Dim>(X));
   if (material.poisson_ratio_at) nu = material.poisson_ratio_at(in_space<Dim>(X));
-  return {material.law, {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)}, material.mooney_rivlin};
+  return {material.law,
+          {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
+          material.mooney_rivlin,
+          material.own.get()};
 }
 
 template <int Dim>
@@ -79,6 +96,8 @@ double elastic_density(const Mat<Dim>& F, const ElasticModuli& moduli) {
       return saint_venant_density<Dim>(F, lame);
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_density<Dim>(F, lame);
+    case MaterialLaw::own:
+      return moduli.own->density(F);
     default:
       return mooney_rivlin_density<Dim>(F, moduli.mooney_rivlin);
   }
@@ -98,6 +117,11 @@ Mat<Dim> elastic_stress(const Mat<Dim>& F, const ElasticModuli& moduli) {
       return saint_venant_stress<Dim>(F, lame);
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_stress<Dim>(F, lame);
+    case MaterialLaw::own: {
+      MatrixX P(Dim, Dim);
+      moduli.own->stress(F, P);
+      return P;
+    }
     default:
       return mooney_rivlin_stress<Dim>(F, moduli.mooney_rivlin);
   }
@@ -107,6 +131,7 @@ template <int Dim>
 EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& moduli) {
   if (moduli.law == MaterialLaw::neo_hookean) return neo_hookean_eigensystem<Dim>(F, moduli.lame);
   if (moduli.law == MaterialLaw::linear) return linear_eigensystem<Dim>(moduli.lame);
+  if (moduli.law == MaterialLaw::own) return own_eigensystem<Dim>(F, *moduli.own);
   const SingularValues<Dim> svd = singular_values(F);
   switch (moduli.law) {
     case MaterialLaw::saint_venant_kirchhoff:

@@ -19,6 +19,7 @@ struct ElasticModuli {
   MaterialLaw law = MaterialLaw::neo_hookean;
   LameParameters lame{};
   MooneyRivlinModuli mooney_rivlin{};
+  const OwnLaw* own = nullptr;  ///< of MaterialLaw::own: the material's
 };
 
 /// Of a material at rest position X.

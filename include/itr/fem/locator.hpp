@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Where points of the rest shape are in a mesh, and functions that are linear on its cells.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "itr/mesh/mesh.hpp"
+
+namespace itr {
+
+/// Finds cells by rest positions. It copies what it needs: the mesh may change afterwards.
+template <int Dim>
+class Locator {
+ public:
+  /// Of some cells, or of all alive ones.
+  Locator(const Mesh<Dim>& mesh, std::span<const CellId> cells);
+  explicit Locator(const Mesh<Dim>& mesh);
+  ~Locator();
+  Locator(Locator&&) noexcept;
+
+  struct Place {
+    CellId cell = kNone;                       ///< kNone: there are no cells (of that body)
+    std::array<VertexId, Dim + 1> vertices{};  ///< of the cell
+    std::array<double, Dim + 1> weights{};     ///< barycentric: >= 0, of sum 1; exactly 1 and 0 at a vertex
+  };
+  /// The cell that has X [m], of those that share it the one it is deepest in; outside of all, a nearest one. `body`: among
+  /// the cells of this body only, kNone: of any.
+  Place find(const Vec<Dim>& X, int body = kNone) const;
+  /// Length of nodal fields: the vertex slots of the mesh.
+  int num_vertices() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The function of rest position with these values at the vertices, linear on cells. `values`: `components` for each vertex,
+/// interleaved. What it returns may be called by several threads at a time.
+template <int Dim>
+std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values);
+
+extern template class Locator<2>;
+extern template class Locator<3>;
+
+}  // namespace itr

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/follower.hpp"
+
+#include <Eigen/Eigenvalues>
+
+namespace itr {
+
+template <int Dim>
+LinearizedForces<Dim>::LinearizedForces(VectorX forces, VectorX lagged_x, double scale)
+    : forces_(std::move(forces)), lagged_x_(std::move(lagged_x)), scale_(scale) {
+  const Eigen::Index given = forces_.size();
+  forces_.conservativeResize(lagged_x_.size());
+  forces_.tail(lagged_x_.size() - given).setZero();
+}
+
+template <int Dim>
+void LinearizedForces<Dim>::add_stiffness(std::span<const int> vertices, const double* block) {
+  const auto size = Dim * static_cast<Eigen::Index>(vertices.size());
+  const Eigen::Map<const MatrixX> K(block, size, size);
+  blocks_.push_back({{vertices.begin(), vertices.end()}, 0.5 * (K + K.transpose())});
+}
+
+template <int Dim>
+template <typename F>
+void LinearizedForces<Dim>::for_each(ConstVectorView x, F&& f) const {
+  VectorX d;
+  for (const Block& block : blocks_) {
+    d.resize(block.stiffness.rows());
+    for (std::size_t k = 0; k < block.vertices.size(); ++k)
+      d.segment<Dim>(Dim * static_cast<int>(k)) =
+          x.segment<Dim>(Dim * block.vertices[k]) - lagged_x_.segment<Dim>(Dim * block.vertices[k]);
+    f(block, d);
+  }
+}
+
+template <int Dim>
+double LinearizedForces<Dim>::value(ConstVectorView x, Workspace&) const {
+  double value = -forces_.dot(x - lagged_x_);
+  for_each(x, [&](const Block& block, const VectorX& d) { value += 0.5 * d.dot(block.stiffness * d); });
+  return scale_ * value;
+}
+
+template <int Dim>
+void LinearizedForces<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
+  gradient -= scale_ * forces_;
+  for_each(x, [&](const Block& block, const VectorX& d) {
+    const VectorX g = scale_ * (block.stiffness * d);
+    for (std::size_t k = 0; k < block.vertices.size(); ++k)
+      gradient.segment<Dim>(Dim * block.vertices[k]) += g.segment<Dim>(Dim * static_cast<int>(k));
+  });
+}
+
+template <int Dim>
+void LinearizedForces<Dim>::add_hessian(ConstVectorView, PsdProjection psd, HessianSink& sink, Workspace&) const {
+  for (const Block& block : blocks_) {
+    MatrixX H = scale_ * block.stiffness;
+    if (psd != PsdProjection::none) {
+      const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(H);
+      const VectorX values = eigen.eigenvalues().unaryExpr([&](double value) { return projected(value, psd); });
+      H = eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
+    }
+    sink.add<Dim>(block.vertices, H.data());
+  }
+}
+
+template <int Dim>
+std::shared_ptr<const Energy> lag_follower(const FollowerForces<Dim>& follower, const Mesh<Dim>& mesh, const VectorX& x,
+                                           double t, double scale) {
+  const Eigen::Index bodies = Dim * mesh.vertex_slots();
+  VectorX forces = VectorX::Zero(bodies);
+  follower.forces(mesh, x.head(bodies), t, forces);
+  auto energy = std::make_shared<LinearizedForces<Dim>>(std::move(forces), x, scale);
+  if (follower.stiffness)
+    follower.stiffness(mesh, x.head(bodies), t,
+                       [&](std::span<const int> vertices, const double* block) { energy->add_stiffness(vertices, block); });
+  return energy;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                             \
+  template class LinearizedForces<Dim>;                                                                                  \
+  template std::shared_ptr<const Energy> lag_follower<Dim>(const FollowerForces<Dim>&, const Mesh<Dim>&, const VectorX&, \
+                                                           double, double);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

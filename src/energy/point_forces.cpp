@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+#include "itr/energy/point_forces.hpp"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "itr/core/error.hpp"
+#include "itr/energy/energy.hpp"
+#include "itr/fem/cell_set.hpp"
+#include "itr/geometry/bvh.hpp"
+
+namespace itr {
+
+namespace {
+
+/// -scale f . (x - X).
+template <int Dim>
+class PointForces final : public Energy {
+ public:
+  PointForces(VectorX forces, double rest_work, double scale)
+      : forces_(std::move(forces)), rest_work_(rest_work), scale_(scale) {}
+  std::string_view name() const override { return "host forces"; }
+  double value(ConstVectorView x, Workspace&) const override { return -scale_ * (forces_.dot(x) - rest_work_); }
+  void add_gradient(ConstVectorView, VectorView gradient, Workspace&) const override { gradient -= scale_ * forces_; }
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+
+ private:
+  VectorX forces_;
+  double rest_work_;  ///< f . X [J]
+  double scale_;
+};
+
+template <int Dim>
+struct Points {
+  std::vector<Vec<Dim>> X;
+  std::vector<Vec<Dim>> force;
+  std::vector<int> body;  ///< of one of the cells of the vertex
+  Bvh<Dim> tree;
+};
+
+template <int Dim>
+std::array<double, Dim + 1> weights_in(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element,
+                                       const Vec<Dim>& X) {
+  const Vec<Dim> local = element.inverse_edges * (X - cells.rest[element.vertices[0]]);
+  std::array<double, Dim + 1> weights{1 - local.sum()};
+  for (int k = 0; k < Dim; ++k) weights[k + 1] = local[k];
+  return weights;
+}
+
+constexpr double kInside = -1e-9;  ///< least weight of a point in a cell
+
+/// Adds the forces of the points that are in some cell of the set: each to the cell that it is deepest in.
+template <int Dim>
+void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& forces) {
+  struct Best {
+    double depth;
+    std::size_t element;
+    std::array<double, Dim + 1> weights;
+  };
+  std::map<int, Best> best;
+  std::vector<int> hits;
+  for (std::size_t e = 0; e < cells.elements.size(); ++e) {
+    const auto& element = cells.elements[e];
+    Box<Dim> box;
+    for (const int v : element.vertices) box.include(cells.rest[v]);
+    hits.clear();
+    points.tree.query(box.inflated(1e-9 * (box.max - box.min).norm()), hits);
+    for (const int i : hits) {
+      if (points.body[i] != element.body) continue;
+      const auto weights = weights_in(cells, element, points.X[i]);
+      const double depth = *std::min_element(weights.begin(), weights.end());
+      if (depth < kInside) continue;
+      const auto [it, is_new] = best.try_emplace(i, Best{depth, e, weights});
+      if (!is_new && depth > it->second.depth) it->second = {depth, e, weights};
+    }
+  }
+  for (const auto& [i, place] : best)
+    for (int k = 0; k <= Dim; ++k)
+      forces.segment<Dim>(Dim * cells.elements[place.element].vertices[k]) += place.weights[k] * points.force[i];
+}
+
+/// Whether the points are the first vertices of the set, one by one.
+template <int Dim>
+bool are_vertices(const std::vector<Vec<Dim>>& X, const std::vector<Vec<Dim>>& rest) {
+  return X.size() <= rest.size() && std::equal(X.begin(), X.end(), rest.begin());
+}
+
+}  // namespace
+
+template <int Dim>
+TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces) {
+  const int n = mesh.vertex_slots();
+  if (forces.size() != Eigen::Index{Dim} * n)
+    throw InputError({"", "forces", std::to_string(forces.size()) + " numbers",
+                      std::to_string(Dim * n) + ", " + std::to_string(Dim) + " a vertex"});
+  const auto all = std::make_shared<std::vector<Vec<Dim>>>();
+  const auto given = std::make_shared<const VectorX>(forces);
+  const auto loaded = std::make_shared<Points<Dim>>();
+  std::vector<Box<Dim>> boxes;
+  for (int v = 0; v < n; ++v) {
+    const Vec<Dim> f = forces.segment<Dim>(Dim * v), X = mesh.rest(v);
+    if (!f.allFinite())
+      throw InputError({"", "forces[" + std::to_string(v) + "]", "a number that is not finite", "numbers"});
+    all->push_back(X);
+    if (f.isZero(0)) continue;
+    loaded->X.push_back(X);
+    loaded->force.push_back(f);
+    loaded->body.push_back(mesh.cells_of(v).empty() ? 0 : mesh.body(mesh.cells_of(v)[0]));
+    boxes.push_back({X, X});
+  }
+  loaded->tree.build(boxes);
+  return [=](const CellSet<Dim>& cells, double, double scale) -> std::shared_ptr<const Energy> {
+    if (loaded->X.empty()) return nullptr;
+    VectorX nodal = VectorX::Zero(Dim * static_cast<Eigen::Index>(cells.rest.size()));
+    if (are_vertices<Dim>(*all, cells.rest))
+      nodal.head(given->size()) = *given;
+    else
+      add_located(*loaded, cells, nodal);
+    if (nodal.isZero(0)) return nullptr;
+    double rest_work = 0;
+    for (std::size_t v = 0; v < cells.rest.size(); ++v)
+      rest_work += nodal.segment<Dim>(Dim * static_cast<int>(v)).dot(cells.rest[v]);
+    return std::make_shared<PointForces<Dim>>(std::move(nodal), rest_work, scale);
+  };
+}
+
+template TermFactory<2> point_forces<2>(const Mesh<2>&, ConstVectorView);
+template TermFactory<3> point_forces<3>(const Mesh<3>&, ConstVectorView);
+
+}  // namespace itr
