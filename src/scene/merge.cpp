@@ -149,4 +149,11 @@ Document load_document(const fs::path& file, const std::vector<Override>& overri
   return document;
 }
 
+Document parse_document(const std::string& text, const std::string& name, const std::vector<Override>& overrides) {
+  Document document{name, ".", parse(text, name)};
+  for (const Override& override : overrides) apply_override(document.json, override);
+  remove_null_members(document.json);
+  return document;
+}
+
 }  // namespace itr::scene

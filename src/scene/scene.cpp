@@ -45,9 +45,9 @@ double body_diagonal(const Mesh<Dim>& mesh) {
   return bounding_box<Dim>(points).diagonal().norm();
 }
 
+/// All but geometry and the contact that comes with it.
 template <int Dim>
-Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
-  Setup<Dim> setup;
+void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup, std::vector<std::string>& warnings) {
   setup.time = read_time(root, warnings);
   setup.remesh = read_remesh(root);
   setup.linear = read_linear(root);
@@ -55,7 +55,14 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.fields = read_fields(root);
   setup.lump_mass = read_lump_mass(root);
   check_space(root);
+  setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
+  setup.materials = read_materials(root, setup.mesh, warnings);
+  read_conditions<Dim>(root, std::move(obstacles), setup, warnings);
+}
 
+template <int Dim>
+Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
+  Setup<Dim> setup;
   BodyGeometry<Dim> bodies = read_bodies<Dim>(geometries, files, warnings);
   setup.mesh = std::move(bodies.mesh);
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
@@ -63,9 +70,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
       for (const char* key : {"translation", "dimensions", "scale"})
         warn_of_components(geometry["transformation"][key], Dim, warnings);
   setup.point_tags = std::move(bodies.point_tags);
-  setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
-  setup.materials = read_materials(root, setup.mesh, warnings);
-  read_conditions<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
+  read_model<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;
@@ -140,5 +145,29 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
     scene.setup = read_setup<3>(root, geometries, files, scene.warnings);
   return scene;
 }
+
+template <int Dim>
+Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const std::vector<Override>& overrides,
+                      std::vector<std::string>& warnings) {
+  const Document document = parse_document(options, "options", overrides);
+  check_keys(document, warnings);
+  const Node root(document);
+  for (const char* key : {"geometry", "output"})
+    if (root.has(key)) root[key].fail("the key", "no such key: the program brings these itself");
+  Setup<Dim> setup;
+  setup.mesh = std::move(geometry.mesh);
+  geometry.obstacles.motion.assign(geometry.obstacles.rest.size(), kNone);
+  read_model<Dim>(root, {std::move(geometry.obstacles), std::move(geometry.id)}, setup, warnings);
+  setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
+  return setup;
+}
+
+int read_max_threads(const std::string& options, const std::vector<Override>& overrides) {
+  const Document document = parse_document(options, "options", overrides);
+  return Node(document)["solver"]["max_threads"].integer_at_least(0, 0);
+}
+
+template Setup<2> make_setup<2>(Geometry<2>, const std::string&, const std::vector<Override>&, std::vector<std::string>&);
+template Setup<3> make_setup<3>(Geometry<3>, const std::string&, const std::vector<Override>&, std::vector<std::string>&);
 
 }  // namespace itr::scene

@@ -42,6 +42,22 @@ std::vector<Change> find_changes(const std::string& before, const std::string& n
 /// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides = {});
 
+/// What a program brings itself.
+template <int Dim>
+struct Geometry {
+  Mesh<Dim> mesh;            ///< with the facet tags that conditions refer to as `id`
+  Obstacles<Dim> obstacles;  ///< without motions
+  std::vector<int> id;       ///< by obstacle vertex, as of a `surface_selection`; kNoTag: none
+};
+
+/// A setup from a mesh and the other keys of a scene, as JSON text: materials, time, contact, conditions, ... Throws
+/// InputError as read(), and for keys of geometry and output. `warnings` gets what is legal but suspicious.
+template <int Dim>
+Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const std::vector<Override>& overrides,
+                      std::vector<std::string>& warnings);
+/// Its `solver/max_threads`; 0: all.
+int read_max_threads(const std::string& options, const std::vector<Override>& overrides);
+
 /// The JSON Schema (draft 7) of scenes, made from the table that `read` checks keys and values against.
 std::string json_schema();
 /// The page SCENES.md, made from the same table.

@@ -1,0 +1,472 @@
+// SPDX-License-Identifier: MIT
+#include "itr/embed/any_simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+
+#include "itr/core/error.hpp"
+#include "itr/core/parallel.hpp"
+#include "itr/energy/point_forces.hpp"
+#include "itr/fem/locator.hpp"
+#include "itr/simulation/resultant.hpp"
+
+namespace itr {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& place, const std::string& found, const std::string& expected) {
+  throw InputError({"", place, found, expected});
+}
+
+void check_array(const std::string& name, std::span<const double> values, std::size_t length) {
+  if (values.size() != length) refuse(name, fmt::format("{} numbers", values.size()), std::to_string(length));
+  for (std::size_t i = 0; i < length; ++i)
+    if (!std::isfinite(values[i])) refuse(fmt::format("{}[{}]", name, i), fmt::format("{}", values[i]), "a finite number");
+}
+
+template <int Dim>
+SpaceTimeFunction<Dim> as_vector(HostFunction f) {
+  if (!f) return nullptr;
+  return [f = std::move(f)](const Vec<Dim>& X, double t) {
+    Vec<Dim> value = Vec<Dim>::Zero();
+    f(X.data(), t, value.data());
+    return value;
+  };
+}
+
+VectorX as_field(std::span<const double> values) {
+  return Eigen::Map<const VectorX>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+template <int Dim>
+VectorX rest_of(const Mesh<Dim>& mesh) {
+  VectorX X(Dim * mesh.vertex_slots());
+  for (int v = 0; v < mesh.vertex_slots(); ++v) X.segment<Dim>(Dim * v) = mesh.rest(v);
+  return X;
+}
+
+/// Puts a condition in the place of the one with its tag; a null one goes.
+template <typename Condition>
+void replace(std::vector<Condition>& conditions, Condition condition, bool is_null) {
+  std::erase_if(conditions, [&](const Condition& c) { return c.tag == condition.tag; });
+  if (!is_null) conditions.push_back(std::move(condition));
+}
+
+}  // namespace
+
+struct AnySimulation::Impl {
+  /// What belongs to one dimension.
+  template <int Dim>
+  struct Of {
+    Simulation<Dim> simulation;
+    std::shared_ptr<const Locator<Dim>> locator;  ///< of the present mesh, once needed
+    std::map<std::string, std::vector<int>> obstacle_vertices;
+
+    const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
+    SpaceTimeFunction<Dim> nodal(const std::string& name, std::span<const double> values) {
+      check_array(name, values, static_cast<std::size_t>(Dim * mesh().vertex_slots()));
+      if (!locator) locator = std::make_shared<Locator<Dim>>(mesh());
+      return [f = nodal_function<Dim>(locator, as_field(values))](const Vec<Dim>& X, double) { return Vec<Dim>(f(X)); };
+    }
+  };
+
+  std::shared_ptr<linear::Registry> registry;
+  std::vector<std::string> warnings;  ///< before `of`, which fills it
+  std::map<std::string, int> boundaries;
+  bool any_id = false;  ///< boundaries are named by their ids
+  std::variant<Of<2>, Of<3>> of;
+  bool remeshes = false;
+  int forces_index = kNone;  ///< of the term of set_forces
+  int max_threads = 0;
+  StepReport report;
+
+  template <int Dim>
+  static Of<Dim> make(const Model& model, linear::Registry& registry, const Logger& logger,
+                      std::vector<std::string>& warnings) {
+    Setup<Dim> setup = model.setup<Dim>(warnings);
+    return {Simulation<Dim>(std::move(setup), registry, logger), nullptr, {}};
+  }
+  using Either = std::variant<Of<2>, Of<3>>;
+
+  template <typename F>
+  decltype(auto) visit(F&& f) {
+    return std::visit(std::forward<F>(f), of);
+  }
+  template <typename F>
+  decltype(auto) visit(F&& f) const {
+    return std::visit(std::forward<F>(f), of);
+  }
+
+  Impl(const Model& model, const Logger& logger, std::shared_ptr<linear::Registry> given)
+      : registry(given ? std::move(given) : std::make_shared<linear::Registry>()),
+        of(model.dimension_ == 2 ? Either(make<2>(model, *registry, logger, warnings))
+                                 : Either(make<3>(model, *registry, logger, warnings))),
+        max_threads(model.max_threads()) {
+    for (const auto& part : model.boundaries_) boundaries[part.name] = part.id;
+    any_id = model.scene_.has_value();
+    int first = 0;
+    for (const auto& part : model.obstacles_) {
+      const int count = static_cast<int>(part.vertices.size()) / model.dimension_;
+      visit([&](auto& d) {
+        for (int v = 0; v < count; ++v) d.obstacle_vertices[part.name].push_back(first + v);
+      });
+      first += count;
+    }
+    visit([&](auto& d) {
+      remeshes = d.simulation.setup().remesh.enabled;
+      report = d.simulation.initial_report();
+    });
+  }
+
+  int tag(const std::string& name) const {
+    if (const auto found = boundaries.find(name); found != boundaries.end()) return found->second;
+    int id = 0;
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
+    if (any_id && error == std::errc() && end == name.data() + name.size()) return id;
+    std::string known;
+    for (const auto& [other, ignored] : boundaries) known += (known.empty() ? "'" : ", '") + other + "'";
+    refuse("boundary", "'" + name + "'", any_id ? "the id of a surface" : known.empty() ? "none: there are none" : known);
+  }
+
+  template <typename D>
+  static const std::vector<int>& obstacle(const D& d, const std::string& name) {
+    const auto found = d.obstacle_vertices.find(name);
+    if (found != d.obstacle_vertices.end()) return found->second;
+    std::string known;
+    for (const auto& [other, ignored] : d.obstacle_vertices) known += (known.empty() ? "'" : ", '") + other + "'";
+    refuse("obstacle", "'" + name + "'", known.empty() ? "none: the model has none that it added" : known);
+  }
+};
+
+AnySimulation::AnySimulation(const Model& model, Logger logger, std::shared_ptr<linear::Registry> registry)
+    : impl_(std::make_unique<Impl>(model, logger, std::move(registry))) {
+  for (const std::string& warning : impl_->warnings) logger.warning(warning);
+}
+AnySimulation::~AnySimulation() = default;
+AnySimulation::AnySimulation(AnySimulation&&) noexcept = default;
+
+int AnySimulation::dimension() const { return impl_->of.index() == 0 ? 2 : 3; }
+
+template <>
+Simulation<2>& AnySimulation::as<2>() {
+  return std::get<0>(impl_->of).simulation;
+}
+template <>
+Simulation<3>& AnySimulation::as<3>() {
+  return std::get<1>(impl_->of).simulation;
+}
+
+StepResult AnySimulation::step(double dt) {
+  std::optional<ThreadLimit> limit;
+  if (impl_->max_threads > 0) limit.emplace(impl_->max_threads);
+  return impl_->visit([&](auto& d) {
+    StepResult result = dt == 0 ? d.simulation.advance() : d.simulation.advance(dt);
+    if (!result.ok) return result;
+    if (!result.renumbering.empty()) d.locator = nullptr;
+    impl_->report = result.report;
+    return result;
+  });
+}
+
+StepResult AnySimulation::adapt(double dt) {
+  std::optional<ThreadLimit> limit;
+  if (impl_->max_threads > 0) limit.emplace(impl_->max_threads);
+  return impl_->visit([&](auto& d) {
+    StepResult result = d.simulation.adapt(dt);
+    d.locator = nullptr;
+    return result;
+  });
+}
+
+double AnySimulation::step_length() const {
+  return impl_->visit([](const auto& d) { return d.simulation.setup().time.dt; });
+}
+double AnySimulation::time() const {
+  return impl_->visit([](const auto& d) { return d.simulation.state().t; });
+}
+int AnySimulation::steps() const {
+  return impl_->visit([](const auto& d) { return d.simulation.state().step; });
+}
+bool AnySimulation::finished() const {
+  return impl_->visit([](const auto& d) { return d.simulation.finished(); });
+}
+const StepReport& AnySimulation::report() const { return impl_->report; }
+const std::vector<std::string>& AnySimulation::warnings() const { return impl_->warnings; }
+
+namespace {
+
+template <int Dim>
+void hold(Setup<Dim>& setup, int tag, std::span<const int> mask, SpaceTimeFunction<Dim> displacement) {
+  if (mask.size() != Dim) refuse("mask", fmt::format("{} numbers", mask.size()), std::to_string(Dim));
+  DirichletCondition<Dim> condition{tag, {}, std::move(displacement)};
+  for (int c = 0; c < Dim; ++c) condition.components[c] = mask[c] != 0;
+  const bool is_free = std::none_of(mask.begin(), mask.end(), [](int flag) { return flag != 0; });
+  if (!is_free && !condition.displacement) refuse("displacement", "no function", "one of position and time");
+  replace(setup.dirichlet, std::move(condition), is_free);
+}
+
+}  // namespace
+
+void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement) {
+  const int tag = impl_->tag(boundary);
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    hold<Dim>(d.simulation.conditions(), tag, mask, as_vector<Dim>(std::move(displacement)));
+  });
+}
+
+void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, std::span<const double> displacements) {
+  const int tag = impl_->tag(boundary);
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    hold<Dim>(d.simulation.conditions(), tag, mask, d.nodal("displacements", displacements));
+  });
+}
+
+void AnySimulation::set_traction(const std::string& boundary, HostFunction traction) {
+  const int tag = impl_->tag(boundary);
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    NeumannCondition<Dim> condition{tag, as_vector<Dim>(std::move(traction))};
+    const bool is_null = !condition.traction;
+    replace(d.simulation.conditions().neumann, std::move(condition), is_null);
+  });
+}
+
+void AnySimulation::set_traction(const std::string& boundary, std::span<const double> tractions) {
+  const int tag = impl_->tag(boundary);
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    replace(d.simulation.conditions().neumann, {tag, d.nodal("tractions", tractions)}, false);
+  });
+}
+
+void AnySimulation::set_pressure(const std::string& boundary, HostFunction pressure) {
+  const int tag = impl_->tag(boundary);
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    const bool is_null = !pressure;
+    const auto scalar = [f = std::move(pressure)](const Vec<Dim>& X, double t) {
+      double value = 0;
+      f(X.data(), t, &value);
+      return value;
+    };
+    replace(d.simulation.conditions().pressure, {tag, scalar}, is_null);
+  });
+}
+
+void AnySimulation::set_acceleration(HostFunction acceleration) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    d.simulation.conditions().body_acceleration = as_vector<Dim>(std::move(acceleration));
+  });
+}
+
+namespace {
+
+/// Drops motions that no vertex has any more.
+template <int Dim>
+void tidy(Obstacles<Dim>& obstacles) {
+  std::vector<int> place(obstacles.motions.size(), kNone);
+  std::vector<SpaceTimeFunction<Dim>> used;
+  for (int& motion : obstacles.motion) {
+    if (motion == kNone) continue;
+    if (place[motion] == kNone) {
+      place[motion] = static_cast<int>(used.size());
+      used.push_back(std::move(obstacles.motions[motion]));
+    }
+    motion = place[motion];
+  }
+  obstacles.motions = std::move(used);
+}
+
+}  // namespace
+
+void AnySimulation::move_obstacle(const std::string& obstacle, HostFunction displacement) {
+  if (!displacement) refuse("displacement", "no function", "one of position and time");
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    const std::vector<int>& vertices = Impl::obstacle(d, obstacle);
+    auto& obstacles = d.simulation.conditions().obstacles;
+    for (const int v : vertices) obstacles.motion[v] = static_cast<int>(obstacles.motions.size());
+    obstacles.motions.push_back(as_vector<Dim>(std::move(displacement)));
+    tidy(obstacles);
+  });
+}
+
+void AnySimulation::move_obstacle(const std::string& obstacle, std::span<const double> positions) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    const std::vector<int>& vertices = Impl::obstacle(d, obstacle);
+    check_array("positions", positions, Dim * vertices.size());
+    auto& obstacles = d.simulation.conditions().obstacles;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      const Vec<Dim> motion = Eigen::Map<const Vec<Dim>>(positions.data() + Dim * i) - obstacles.rest[vertices[i]];
+      obstacles.motion[vertices[i]] = static_cast<int>(obstacles.motions.size());
+      obstacles.motions.push_back([motion](const Vec<Dim>&, double) { return motion; });
+    }
+    tidy(obstacles);
+  });
+}
+
+void AnySimulation::set_forces(std::span<const double> forces) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    auto& terms = d.simulation.conditions().terms;
+    if (impl_->forces_index == kNone) {
+      if (forces.empty()) return;
+      impl_->forces_index = static_cast<int>(terms.size());
+      terms.emplace_back();
+    }
+    terms[impl_->forces_index] = forces.empty()
+                                     ? TermFactory<Dim>([](const CellSet<Dim>&, double, double) { return nullptr; })
+                                     : point_forces<Dim>(d.mesh(), as_field(forces));
+  });
+}
+
+void AnySimulation::set_follower_forces(ForceFunction forces, StiffnessFunction stiffness) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    FollowerForces<Dim>& follower = d.simulation.conditions().follower;
+    follower = {};
+    if (forces)
+      follower.forces = [f = std::move(forces)](const Mesh<Dim>& mesh, ConstVectorView x, double t, VectorView result) {
+        f(rest_of(mesh), x, t, result);
+      };
+    if (stiffness)
+      follower.stiffness = [f = std::move(stiffness)](const Mesh<Dim>& mesh, ConstVectorView x, double t,
+                                                      const StiffnessReceiver& add) { f(rest_of(mesh), x, t, add); };
+  });
+}
+
+void AnySimulation::set_velocities(std::span<const double> velocities) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    check_array("velocities", velocities, static_cast<std::size_t>(Dim * num_vertices()));
+    State<Dim> state = d.simulation.state();
+    state.history.v[0].head(static_cast<Eigen::Index>(velocities.size())) = as_field(velocities);
+    d.simulation.restore(std::move(state));
+  });
+}
+
+void AnySimulation::freeze_mesh(bool frozen) {
+  impl_->visit([&](auto& d) { d.simulation.conditions().remesh.enabled = impl_->remeshes && !frozen; });
+}
+
+int AnySimulation::num_vertices() const {
+  return impl_->visit([](const auto& d) { return d.mesh().num_vertices(); });
+}
+int AnySimulation::num_cells() const {
+  return impl_->visit([](const auto& d) { return d.mesh().num_cells(); });
+}
+int AnySimulation::num_facets() const {
+  return impl_->visit([](const auto& d) { return d.mesh().num_facets(); });
+}
+std::span<const double> AnySimulation::positions() const {
+  return impl_->visit([&](const auto& d) {
+    return std::span(d.simulation.state().history.x[0].data(), static_cast<std::size_t>(dimension() * num_vertices()));
+  });
+}
+std::span<const double> AnySimulation::velocities() const {
+  return impl_->visit([&](const auto& d) {
+    return std::span(d.simulation.state().history.v[0].data(), static_cast<std::size_t>(dimension() * num_vertices()));
+  });
+}
+std::vector<double> AnySimulation::rest_positions() const {
+  return impl_->visit([](const auto& d) {
+    const VectorX X = rest_of(d.mesh());
+    return std::vector<double>(X.begin(), X.end());
+  });
+}
+
+std::vector<int> AnySimulation::cells() const {
+  std::vector<int> ids;
+  impl_->visit([&](const auto& d) {
+    for (CellId c = 0; c < d.mesh().cell_slots(); ++c)
+      ids.insert(ids.end(), d.mesh().cell(c).begin(), d.mesh().cell(c).end());
+  });
+  return ids;
+}
+std::vector<int> AnySimulation::bodies() const {
+  std::vector<int> ids;
+  impl_->visit([&](const auto& d) {
+    for (CellId c = 0; c < d.mesh().cell_slots(); ++c) ids.push_back(d.mesh().body(c));
+  });
+  return ids;
+}
+std::vector<int> AnySimulation::facets() const {
+  std::vector<int> ids;
+  impl_->visit([&](const auto& d) {
+    for (FacetId f = 0; f < d.mesh().facet_slots(); ++f)
+      ids.insert(ids.end(), d.mesh().facet(f).begin(), d.mesh().facet(f).end());
+  });
+  return ids;
+}
+std::vector<int> AnySimulation::facet_boundaries() const {
+  std::vector<int> ids;
+  impl_->visit([&](const auto& d) {
+    for (FacetId f = 0; f < d.mesh().facet_slots(); ++f)
+      ids.push_back(d.mesh().facet_tag(f) == kNoTag ? -1 : d.mesh().facet_tag(f));
+  });
+  return ids;
+}
+std::vector<double> AnySimulation::obstacle_positions() const {
+  return impl_->visit([&](const auto& d) {
+    const VectorX& x = d.simulation.state().history.x[0];
+    return std::vector<double>(x.begin() + dimension() * num_vertices(), x.end());
+  });
+}
+
+void AnySimulation::watch_forces(bool watched) {
+  impl_->visit([&](auto& d) {
+    FieldOptions& fields = d.simulation.conditions().fields;
+    fields.contact_forces = fields.friction_forces = fields.reaction_forces = fields.applied_forces = watched;
+  });
+}
+const NodalForces& AnySimulation::forces() const {
+  return impl_->visit([](const auto& d) -> const NodalForces& { return d.simulation.forces(); });
+}
+
+AnySimulation::Resultants AnySimulation::resultant(std::span<const std::string> boundaries,
+                                                   std::span<const double> about) const {
+  std::vector<int> tags;
+  for (const std::string& name : boundaries) tags.push_back(impl_->tag(name));
+  return impl_->visit([&]<int Dim>(const Impl::Of<Dim>& d) {
+    check_array("about", about, Dim);
+    const auto sum = itr::resultant<Dim>(d.simulation, tags, Vec<Dim>(about.data()));
+    return Resultants{{sum.force.begin(), sum.force.end()}, {sum.moment.begin(), sum.moment.end()}};
+  });
+}
+AnySimulation::Resultants AnySimulation::resultant(const std::string& boundary) const {
+  const std::array<double, 3> origin{};
+  return resultant(std::span(&boundary, 1), std::span(origin).first(static_cast<std::size_t>(dimension())));
+}
+
+std::vector<double> AnySimulation::elastic_density() const {
+  std::vector<double> values;
+  impl_->visit([&](const auto& d) { d.simulation.observe([&](const auto& frame) { values = frame.elastic_density; }); });
+  return values;
+}
+AnySimulation::Saved AnySimulation::save() const {
+  return impl_->visit([](const auto& d) { return Saved(d.simulation.save()); });
+}
+void AnySimulation::restore(const Saved& saved) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    const auto* snapshot = std::get_if<Snapshot<Dim>>(&saved);
+    if (!snapshot) refuse("saved state", "one of another dimension", fmt::format("one in {}D", Dim));
+    d.simulation.restore(*snapshot);
+    d.locator = nullptr;
+  });
+}
+
+void AnySimulation::on_iteration(std::function<bool(const NewtonProgress&)> listener) {
+  impl_->visit([&](auto& d) { d.simulation.conditions().on_iteration = std::move(listener); });
+}
+
+void AnySimulation::on_mesh_change(std::function<void(const AnyMeshChange&)> listener) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    if (!listener) return d.simulation.on_mesh_change(nullptr);
+    // The simulation may be moved, its implementation not.
+    d.simulation.on_mesh_change(
+        [listener = std::move(listener), &d](const MeshChange<Dim>& change, const Mesh<Dim>& before) {
+          d.locator = nullptr;
+          listener({change.vertex, change.cell, change.facet, change.facet_parent, change.interpolation,
+                    [&](const MatrixX& fields) { return project_fields(before, d.mesh(), change, fields); }});
+        });
+  });
+}
+
+}  // namespace itr

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: MIT
+// itr.h over AnySimulation: no exception leaves it.
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "itr/core/error.hpp"
+#include "itr/embed/any_simulation.hpp"
+#include "itr/itr.h"
+
+struct itr_model {
+  itr::Model model;
+  std::string message;
+};
+struct itr_simulation {
+  itr::AnySimulation simulation;
+  std::string message;
+};
+struct itr_snapshot {
+  itr::AnySimulation::Saved saved;
+};
+
+namespace {
+
+void note(std::string& message, const char* text) noexcept {
+  try {
+    message = text;
+  } catch (const std::bad_alloc&) {
+    message.clear();
+  }
+}
+
+/// Runs f, which returns a status or nothing.
+template <typename F>
+itr_status guarded(std::string& message, F&& f) noexcept {
+  try {
+    if constexpr (std::is_void_v<decltype(f())>) {
+      f();
+      return ITR_SUCCESS;
+    } else {
+      return f();
+    }
+  } catch (const itr::InputError& error) {
+    note(message, error.what());
+    return ITR_BAD_INPUT;
+  } catch (const std::exception& error) {
+    note(message, error.what());
+  } catch (...) {
+    note(message, "an unknown error");
+  }
+  return ITR_ERROR;
+}
+
+template <typename T>
+void require(const T* pointer, const char* name) {
+  if (!pointer) throw itr::InputError({"", name, "NULL", "an argument"});
+}
+
+template <typename T>
+std::span<const T> array(const char* name, const T* values, std::size_t size) {
+  if (size > 0) require(values, name);
+  return {values, size};
+}
+
+itr::HostFunction as_function(itr_function function, void* user) {
+  if (!function) return nullptr;
+  return [=](const double* X, double t, double* value) { function(X, t, value, user); };
+}
+
+std::size_t dimension_of(const itr_simulation* s) { return static_cast<std::size_t>(s->simulation.dimension()); }
+std::size_t nodal_size(const itr_simulation* s) {
+  return dimension_of(s) * static_cast<std::size_t>(s->simulation.num_vertices());
+}
+
+/// f on the simulation below; a NULL handle is an error without a place for its message.
+template <typename F>
+itr_status with(itr_simulation* s, F&& f) noexcept {
+  if (!s) return ITR_BAD_INPUT;
+  return guarded(s->message, [&] { return f(s->simulation); });
+}
+template <typename F>
+itr_status with(itr_model* m, F&& f) noexcept {
+  if (!m) return ITR_BAD_INPUT;
+  return guarded(m->message, [&] { return f(m->model); });
+}
+
+itr_status status_of(const itr::StepResult& result, std::string& message) {
+  if (result.ok) return ITR_SUCCESS;
+  message = result.reason;
+  return result.cancelled ? ITR_CANCELLED : ITR_STOPPED;
+}
+
+template <typename T>
+void copy(const std::vector<T>& values, const char* name, T* result) {
+  require(result, name);
+  std::copy(values.begin(), values.end(), result);
+}
+
+}  // namespace
+
+const char* itr_version(void) { return ITR_VERSION; }
+
+itr_model* itr_model_create(int dimension) {
+  try {
+    return new itr_model{itr::Model(dimension), {}};
+  } catch (...) {
+    return nullptr;
+  }
+}
+void itr_model_destroy(itr_model* model) { delete model; }
+const char* itr_model_message(const itr_model* model) { return model ? model->message.c_str() : "no model"; }
+
+itr_status itr_model_read_scene(itr_model* model, const char* file) {
+  return with(model, [&](itr::Model& m) {
+    require(file, "file");
+    m = itr::Model::from_scene(file);
+  });
+}
+itr_status itr_model_set_options(itr_model* model, const char* json) {
+  return with(model, [&](itr::Model& m) {
+    require(json, "json");
+    m.set_options(json);
+  });
+}
+itr_status itr_model_set_option(itr_model* model, const char* pointer, const char* value) {
+  return with(model, [&](itr::Model& m) {
+    require(pointer, "pointer");
+    require(value, "value");
+    m.set_option(pointer, value);
+  });
+}
+itr_status itr_model_set_number(itr_model* model, const char* pointer, double value) {
+  return with(model, [&](itr::Model& m) {
+    require(pointer, "pointer");
+    m.set_option(pointer, nlohmann::json(value).dump());
+  });
+}
+itr_status itr_model_set_mesh(itr_model* model, size_t num_vertices, const double* vertices, size_t num_cells,
+                              const int* cells, const int* bodies) {
+  return with(model, [&](itr::Model& m) {
+    const auto d = static_cast<std::size_t>(m.dimension());
+    const auto points = array("vertices", vertices, d * num_vertices);
+    m.set_mesh(points, array("cells", cells, (d + 1) * num_cells),
+               bodies ? std::span(bodies, num_cells) : std::span<const int>());
+  });
+}
+itr_status itr_model_add_boundary(itr_model* model, const char* name, size_t num_facets, const int* facets, int* id) {
+  return with(model, [&](itr::Model& m) {
+    require(name, "name");
+    const int given = m.add_boundary(name, array("facets", facets, num_facets * static_cast<std::size_t>(m.dimension())));
+    if (id) *id = given;
+  });
+}
+itr_status itr_model_add_boundary_box(itr_model* model, const char* name, const double* box_min, const double* box_max,
+                                      int* id) {
+  return with(model, [&](itr::Model& m) {
+    require(name, "name");
+    const auto d = static_cast<std::size_t>(m.dimension());
+    const int given = m.add_boundary(name, array("box_min", box_min, d), array("box_max", box_max, d));
+    if (id) *id = given;
+  });
+}
+itr_status itr_model_add_obstacle(itr_model* model, const char* name, size_t num_vertices, const double* vertices,
+                                  size_t num_edges, const int* edges, size_t num_triangles, const int* triangles, int* id) {
+  return with(model, [&](itr::Model& m) {
+    require(name, "name");
+    const int given =
+        m.add_obstacle(name, array("vertices", vertices, num_vertices * static_cast<std::size_t>(m.dimension())),
+                       array("edges", edges, 2 * num_edges), array("triangles", triangles, 3 * num_triangles));
+    if (id) *id = given;
+  });
+}
+
+itr_status itr_simulation_create(itr_model* model, itr_log_function log, void* user, itr_simulation** simulation) {
+  return with(model, [&](itr::Model& m) {
+    require(simulation, "simulation");
+    *simulation = nullptr;
+    itr::Logger logger;
+    if (log)
+      logger = itr::Logger([=](itr::LogLevel level, std::string_view text) {
+        log(static_cast<int>(level), std::string(text).c_str(), user);
+      });
+    *simulation = new itr_simulation{itr::AnySimulation(m, std::move(logger)), {}};
+  });
+}
+void itr_simulation_destroy(itr_simulation* simulation) { delete simulation; }
+const char* itr_simulation_message(const itr_simulation* simulation) {
+  return simulation ? simulation->message.c_str() : "no simulation";
+}
+
+itr_status itr_step(itr_simulation* simulation, double dt) {
+  return with(simulation, [&](itr::AnySimulation& s) { return status_of(s.step(dt), simulation->message); });
+}
+itr_status itr_adapt(itr_simulation* simulation, double dt) {
+  return with(simulation, [&](itr::AnySimulation& s) { return status_of(s.adapt(dt), simulation->message); });
+}
+double itr_time(const itr_simulation* simulation) { return simulation->simulation.time(); }
+int itr_steps(const itr_simulation* simulation) { return simulation->simulation.steps(); }
+int itr_finished(const itr_simulation* simulation) { return simulation->simulation.finished() ? 1 : 0; }
+int itr_dimension(const itr_simulation* simulation) { return simulation->simulation.dimension(); }
+
+itr_status itr_fix(itr_simulation* simulation, const char* boundary, const int* mask, itr_function displacement,
+                   void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(boundary, "boundary");
+    s.fix(boundary, array("mask", mask, dimension_of(simulation)), as_function(displacement, user));
+  });
+}
+itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, const int* mask, const double* displacements) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(boundary, "boundary");
+    s.fix(boundary, array("mask", mask, dimension_of(simulation)),
+          array("displacements", displacements, nodal_size(simulation)));
+  });
+}
+itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, itr_function traction, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(boundary, "boundary");
+    s.set_traction(boundary, as_function(traction, user));
+  });
+}
+itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, const double* tractions) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(boundary, "boundary");
+    s.set_traction(boundary, array("tractions", tractions, nodal_size(simulation)));
+  });
+}
+itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, itr_function pressure, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(boundary, "boundary");
+    s.set_pressure(boundary, as_function(pressure, user));
+  });
+}
+itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) { s.set_acceleration(as_function(acceleration, user)); });
+}
+itr_status itr_move_obstacle(itr_simulation* simulation, const char* obstacle, itr_function displacement, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(obstacle, "obstacle");
+    s.move_obstacle(obstacle, as_function(displacement, user));
+  });
+}
+itr_status itr_move_obstacle_to(itr_simulation* simulation, const char* obstacle, size_t num_vertices,
+                                const double* positions) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(obstacle, "obstacle");
+    s.move_obstacle(obstacle, array("positions", positions, num_vertices * dimension_of(simulation)));
+  });
+}
+itr_status itr_set_forces(itr_simulation* simulation, const double* forces) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    s.set_forces(forces ? std::span(forces, nodal_size(simulation)) : std::span<const double>());
+  });
+}
+itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    if (!forces) return s.set_follower_forces(nullptr);
+    const auto d = dimension_of(simulation);
+    s.set_follower_forces([=](itr::ConstVectorView X, itr::ConstVectorView x, double t, itr::VectorView f) {
+      forces(static_cast<std::size_t>(x.size()) / d, X.data(), x.data(), t, f.data(), user);
+    });
+  });
+}
+itr_status itr_set_velocities(itr_simulation* simulation, const double* velocities) {
+  return with(simulation,
+              [&](itr::AnySimulation& s) { s.set_velocities(array("velocities", velocities, nodal_size(simulation))); });
+}
+itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen) {
+  return with(simulation, [&](itr::AnySimulation& s) { s.freeze_mesh(frozen != 0); });
+}
+
+size_t itr_num_vertices(const itr_simulation* simulation) {
+  return static_cast<std::size_t>(simulation->simulation.num_vertices());
+}
+size_t itr_num_cells(const itr_simulation* simulation) {
+  return static_cast<std::size_t>(simulation->simulation.num_cells());
+}
+size_t itr_num_facets(const itr_simulation* simulation) {
+  return static_cast<std::size_t>(simulation->simulation.num_facets());
+}
+const double* itr_positions(const itr_simulation* simulation) { return simulation->simulation.positions().data(); }
+const double* itr_velocities(const itr_simulation* simulation) { return simulation->simulation.velocities().data(); }
+
+itr_status itr_get_rest_positions(itr_simulation* simulation, double* X) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.rest_positions(), "X", X); });
+}
+itr_status itr_get_cells(itr_simulation* simulation, int* cells) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.cells(), "cells", cells); });
+}
+itr_status itr_get_bodies(itr_simulation* simulation, int* bodies) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.bodies(), "bodies", bodies); });
+}
+itr_status itr_get_facets(itr_simulation* simulation, int* facets) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facets(), "facets", facets); });
+}
+itr_status itr_get_facet_boundaries(itr_simulation* simulation, int* ids) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facet_boundaries(), "ids", ids); });
+}
+
+itr_status itr_watch_forces(itr_simulation* simulation, int watched) {
+  return with(simulation, [&](itr::AnySimulation& s) { s.watch_forces(watched != 0); });
+}
+const double* itr_forces(const itr_simulation* simulation, itr_force kind) {
+  const itr::NodalForces& forces = simulation->simulation.forces();
+  const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
+  if (kind < ITR_CONTACT || kind > ITR_APPLIED || kinds[kind]->size() == 0) return nullptr;
+  return kinds[kind]->data();
+}
+itr_status itr_resultant(itr_simulation* simulation, const char* boundary, const double* about, double* force,
+                         double* moment) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(boundary, "boundary");
+    const std::string name = boundary;
+    const auto sum = s.resultant(std::span(&name, 1), array("about", about, dimension_of(simulation)));
+    copy(sum.force, "force", force);
+    copy(sum.moment, "moment", moment);
+  });
+}
+
+void itr_get_energies(const itr_simulation* simulation, itr_energies* energies) {
+  const itr::EnergyReport& e = simulation->simulation.report().energy;
+  *energies = {e.inertia, e.elastic, e.body, e.contact, e.friction, e.damping, e.host, e.total};
+}
+void itr_get_statistics(const itr_simulation* simulation, itr_statistics* statistics) {
+  const itr::StepReport& r = simulation->simulation.report();
+  *statistics = {r.newton_iterations,  r.linear_solves,  r.factorizations,   r.splits.accepted,
+                 r.collapses.accepted, r.swaps.accepted, r.smooths.accepted, r.cut_steps,
+                 r.history_loss,       r.min_distance,   r.min_volume_ratio, r.seconds.total};
+}
+
+itr_snapshot* itr_save(const itr_simulation* simulation) {
+  try {
+    return new itr_snapshot{simulation->simulation.save()};
+  } catch (...) {
+    return nullptr;
+  }
+}
+itr_status itr_restore(itr_simulation* simulation, const itr_snapshot* snapshot) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(snapshot, "snapshot");
+    s.restore(snapshot->saved);
+  });
+}
+void itr_snapshot_destroy(itr_snapshot* snapshot) { delete snapshot; }
+
+itr_status itr_on_iteration(itr_simulation* simulation, itr_iteration_function listener, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    if (!listener) return s.on_iteration(nullptr);
+    s.on_iteration([=](const itr::NewtonProgress& p) {
+      return listener(p.iteration, p.energy, p.gradient_norm, p.step_norm, user) != 0;
+    });
+  });
+}
+
+itr_status itr_on_mesh_change(itr_simulation* simulation, itr_mesh_function listener, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    if (!listener) return s.on_mesh_change(nullptr);
+    s.on_mesh_change([=](const itr::AnyMeshChange& change) {
+      const auto& P = change.interpolation;
+      const itr_mesh_change view{change.vertex.size(),
+                                 change.cell.size(),
+                                 change.facet.size(),
+                                 static_cast<std::size_t>(P.rows()),
+                                 change.facet_parent.size(),
+                                 change.vertex.data(),
+                                 change.cell.data(),
+                                 change.facet.data(),
+                                 change.facet_parent.data(),
+                                 P.outerIndexPtr(),
+                                 P.innerIndexPtr(),
+                                 P.valuePtr(),
+                                 &change};
+      listener(&view, user);
+    });
+  });
+}
+
+itr_status itr_project(const itr_mesh_change* change, size_t components, const double* old_field, double* new_field) {
+  if (!change || !old_field || !new_field || components == 0) return ITR_BAD_INPUT;
+  std::string ignored;
+  return guarded(ignored, [&] {
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const auto n = static_cast<Eigen::Index>(change->old_vertices), k = static_cast<Eigen::Index>(components);
+    const itr::MatrixX fields = Eigen::Map<const Rows>(old_field, n, k);
+    const itr::MatrixX result = static_cast<const itr::AnyMeshChange*>(change->projection)->project(fields);
+    Eigen::Map<Rows>(new_field, result.rows(), k) = result;
+  });
+}

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: MIT
+#include "itr/embed/model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "itr/core/error.hpp"
+
+namespace itr {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& place, const std::string& found, const std::string& expected) {
+  throw InputError({"", place, found, expected});
+}
+
+void check_length(const std::string& name, std::size_t length, int multiple) {
+  if (length % multiple != 0) refuse(name, fmt::format("{} numbers", length), fmt::format("a multiple of {}", multiple));
+}
+
+void check_finite(const std::string& name, std::span<const double> values) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i])) refuse(fmt::format("{}[{}]", name, i), fmt::format("{}", values[i]), "a finite number");
+}
+
+void check_ids(const std::string& name, std::span<const int> ids, std::size_t count) {
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if (ids[i] < 0 || static_cast<std::size_t>(ids[i]) >= count)
+      refuse(fmt::format("{}[{}]", name, i), std::to_string(ids[i]), fmt::format("a vertex, 0 to {} - 1", count));
+}
+
+template <int N>
+std::vector<Vec<N>> as_points(std::span<const double> values) {
+  std::vector<Vec<N>> points(values.size() / N);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Vec<N>>(values.data() + N * i);
+  return points;
+}
+
+template <std::size_t N>
+std::vector<std::array<int, N>> as_rows(std::span<const int> ids) {
+  std::vector<std::array<int, N>> rows(ids.size() / N);
+  for (std::size_t i = 0; i < ids.size(); ++i) rows[i / N][i % N] = ids[i];
+  return rows;
+}
+
+}  // namespace
+
+Model::Model(int dimension) : dimension_(dimension) {
+  if (dimension != 2 && dimension != 3) refuse("dimension", std::to_string(dimension), "2 or 3");
+}
+
+Model Model::from_scene(const std::string& file, const std::vector<scene::Override>& overrides) {
+  scene::Scene scene = scene::read(file, overrides);
+  Model model(scene.setup.index() == 0 ? 2 : 3);
+  model.scene_ = std::move(scene);
+  model.scene_file_ = file;
+  model.overrides_ = overrides;
+  return model;
+}
+
+void Model::set_options(const std::string& json) {
+  if (scene_) refuse("options", "a model that was read from a scene", "its file, with overrides");
+  auto options = nlohmann::json::parse(json, nullptr, false);
+  if (!options.is_object())
+    refuse("options", options.is_discarded() ? "text that is no JSON" : "no object", "a JSON object");
+  auto merged = nlohmann::json::parse(options_);
+  merged.merge_patch(options);
+  options_ = merged.dump();
+}
+
+void Model::set_option(const std::string& pointer, const std::string& value) {
+  if (!scene_) {
+    overrides_.push_back({pointer, value});
+    return;
+  }
+  auto overrides = overrides_;
+  overrides.push_back({pointer, value});
+  *this = from_scene(scene_file_, overrides);
+}
+
+void Model::set_mesh(std::span<const double> vertices, std::span<const int> cells, std::span<const int> bodies) {
+  if (scene_) refuse("mesh", "a model that was read from a scene", "one mesh");
+  check_length("vertices", vertices.size(), dimension_);
+  check_finite("vertices", vertices);
+  check_length("cells", cells.size(), dimension_ + 1);
+  check_ids("cells", cells, vertices.size() / dimension_);
+  if (!bodies.empty() && bodies.size() != cells.size() / (dimension_ + 1))
+    refuse("bodies", fmt::format("{} numbers", bodies.size()),
+           fmt::format("{}, one a cell", cells.size() / (dimension_ + 1)));
+  vertices_.assign(vertices.begin(), vertices.end());
+  cells_.assign(cells.begin(), cells.end());
+  bodies_.assign(bodies.begin(), bodies.end());
+  if (bodies_.empty()) bodies_.assign(cells.size() / (dimension_ + 1), 0);
+  boundaries_.clear();
+}
+
+int Model::next_id(const std::string& name) const {
+  for (const auto* parts : {&boundaries_, &obstacles_})
+    for (const Part& part : *parts)
+      if (part.name == name) refuse("name", "'" + name + "' twice", "another name");
+  return 1 + static_cast<int>(boundaries_.size() + obstacles_.size());
+}
+
+int Model::add_boundary(const std::string& name, std::span<const int> facets) {
+  check_length("boundary '" + name + "'", facets.size(), dimension_);
+  check_ids("boundary '" + name + "'", facets, vertices_.size() / dimension_);
+  Part part{name, next_id(name), {}, {}, {}, {facets.begin(), facets.end()}};
+  boundaries_.push_back(std::move(part));
+  return boundaries_.back().id;
+}
+
+/// Facets of the mesh that stand in one cell only.
+int Model::add_facets(const std::string& name, const std::function<bool(const std::vector<int>& facet)>& takes) {
+  std::map<std::vector<int>, int> count;
+  const int corners = dimension_ + 1;
+  for (std::size_t c = 0; c < cells_.size(); c += corners)
+    for (int k = 0; k < corners; ++k) {
+      std::vector<int> facet;
+      for (int i = 0; i < corners; ++i)
+        if (i != k) facet.push_back(cells_[c + i]);
+      std::sort(facet.begin(), facet.end());
+      ++count[facet];
+    }
+  std::vector<int> facets;
+  for (const auto& [facet, cells] : count)
+    if (cells == 1 && takes(facet)) facets.insert(facets.end(), facet.begin(), facet.end());
+  if (facets.empty()) refuse("boundary '" + name + "'", "no facets", "some of the mesh's boundary");
+  return add_boundary(name, facets);
+}
+
+int Model::add_boundary(const std::string& name, std::span<const double> box_min, std::span<const double> box_max) {
+  for (const auto box : {box_min, box_max})
+    if (box.size() != static_cast<std::size_t>(dimension_))
+      refuse("box of boundary '" + name + "'", fmt::format("{} numbers", box.size()), std::to_string(dimension_));
+  return add_facets(name, [&](const std::vector<int>& facet) {
+    return std::all_of(facet.begin(), facet.end(), [&](int v) {
+      for (int c = 0; c < dimension_; ++c)
+        if (const double X = vertices_[dimension_ * v + c]; X < box_min[c] || X > box_max[c]) return false;
+      return true;
+    });
+  });
+}
+
+int Model::add_boundary(const std::string& name, const std::function<bool(const double* X)>& rule) {
+  return add_facets(name, [&](const std::vector<int>& facet) {
+    std::array<double, 3> middle{};
+    for (const int v : facet)
+      for (int c = 0; c < dimension_; ++c) middle[c] += vertices_[dimension_ * v + c] / dimension_;
+    return rule(middle.data());
+  });
+}
+
+int Model::add_obstacle(const std::string& name, std::span<const double> vertices, std::span<const int> edges,
+                        std::span<const int> triangles) {
+  if (scene_) refuse("obstacle '" + name + "'", "a model that was read from a scene", "obstacles of its file");
+  const std::string place = "obstacle '" + name + "'";
+  check_length(place + ".vertices", vertices.size(), dimension_);
+  check_finite(place + ".vertices", vertices);
+  const std::size_t count = vertices.size() / dimension_;
+  check_length(place + ".edges", edges.size(), 2);
+  check_ids(place + ".edges", edges, count);
+  check_length(place + ".triangles", triangles.size(), 3);
+  check_ids(place + ".triangles", triangles, count);
+  if (dimension_ == 2 && !triangles.empty())
+    refuse(place + ".triangles", fmt::format("{} numbers", triangles.size()), "none in 2D");
+  obstacles_.push_back({name,
+                        next_id(name),
+                        {vertices.begin(), vertices.end()},
+                        {edges.begin(), edges.end()},
+                        {triangles.begin(), triangles.end()},
+                        {}});
+  return obstacles_.back().id;
+}
+
+template <int Dim>
+scene::Geometry<Dim> Model::geometry() const {
+  if (cells_.empty()) refuse("mesh", "no cells", "set_mesh before");
+  scene::Geometry<Dim> geometry;
+  geometry.mesh = Mesh<Dim>(as_points<Dim>(vertices_), as_rows<Dim + 1>(cells_), bodies_);
+  for (const Part& part : boundaries_) {
+    const auto facets = as_rows<Dim>(part.facets);
+    for (std::size_t i = 0; i < facets.size(); ++i) {
+      const FacetId f = geometry.mesh.find_facet(facets[i]);
+      const auto fail = [&](const std::string& expected) {
+        refuse(fmt::format("boundary '{}', facet {}", part.name, i), fmt::format("vertices {}", fmt::join(facets[i], " ")),
+               expected);
+      };
+      if (f == kNone) fail("a facet of the mesh's boundary");
+      if (const int tag = geometry.mesh.facet_tag(f); tag != kNoTag && tag != part.id)
+        fail(fmt::format("one that is not in the boundary of id {} already", tag));
+      geometry.mesh.set_facet_tag(f, part.id);
+    }
+  }
+  Obstacles<Dim>& obstacles = geometry.obstacles;
+  for (const Part& part : obstacles_) {
+    const int first = static_cast<int>(obstacles.rest.size());
+    for (const auto& X : as_points<Dim>(part.vertices)) obstacles.rest.push_back(X);
+    for (const auto& [a, b] : as_rows<2>(part.edges)) obstacles.edges.push_back({first + a, first + b});
+    for (const auto& [a, b, c] : as_rows<3>(part.triangles))
+      obstacles.triangles.push_back({first + a, first + b, first + c});
+    geometry.id.resize(obstacles.rest.size(), part.id);
+  }
+  return geometry;
+}
+
+template <int Dim>
+Setup<Dim> Model::setup(std::vector<std::string>& warnings) const {
+  if (scene_) {
+    warnings = scene_->warnings;
+    return std::get<Setup<Dim>>(scene_->setup);
+  }
+  return scene::make_setup<Dim>(geometry<Dim>(), options_, overrides_, warnings);
+}
+
+int Model::max_threads() const { return scene_ ? scene_->max_threads : scene::read_max_threads(options_, overrides_); }
+
+template Setup<2> Model::setup<2>(std::vector<std::string>&) const;
+template Setup<3> Model::setup<3>(std::vector<std::string>&) const;
+
+}  // namespace itr

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+// The compiled half of the Python package: AnySimulation with arrays in NumPy's hands. itr/__init__.py is what users see.
+#include <dlfcn.h>
+#include <pybind11/eigen.h>
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <filesystem>
+
+#include "itr/itr.hpp"
+
+namespace py = pybind11;
+
+/// Of solver modules: in the prefix that the package is installed in (lib/pythonX.Y/site-packages/itr/_itr.so).
+extern "C" const char* itr_installed_backends() {
+  static const std::string folder = [] {
+    Dl_info info{};
+    dladdr(reinterpret_cast<void*>(&itr_installed_backends), &info);
+    std::filesystem::path prefix = std::filesystem::absolute(info.dli_fname ? info.dli_fname : "");
+    for (int level = 0; level < 5; ++level) prefix = prefix.parent_path();
+    return (prefix / ITR_BACKEND_DIR).string();
+  }();
+  return folder.c_str();
+}
+
+namespace {
+
+using itr::AnySimulation;
+using itr::Model;
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Ints = py::array_t<int, py::array::c_style | py::array::forcecast>;
+
+template <typename T>
+std::span<const T> view(const py::array_t<T, py::array::c_style | py::array::forcecast>& array) {
+  return {array.data(), static_cast<std::size_t>(array.size())};
+}
+
+template <typename T>
+py::array_t<T> copied(const std::vector<T>& values, int columns) {
+  const auto rows = static_cast<py::ssize_t>(values.size()) / columns;
+  py::array_t<T> result = columns == 1 ? py::array_t<T>(rows) : py::array_t<T>({rows, py::ssize_t{columns}});
+  std::copy(values.begin(), values.end(), result.mutable_data());
+  return result;
+}
+
+/// Of values that live as long as `owner` does: no copy, not to be written to.
+template <typename Owner>
+py::array_t<double> shared(std::span<const double> values, int columns, Owner owner) {
+  const py::capsule base(new Owner(std::move(owner)), [](void* p) { delete static_cast<Owner*>(p); });
+  py::array_t<double> result({static_cast<py::ssize_t>(values.size()) / columns, py::ssize_t{columns}}, values.data(), base);
+  result.attr("setflags")(py::arg("write") = false);
+  return result;
+}
+
+std::string json(const py::handle& value) { return py::module_::import("json").attr("dumps")(value).cast<std::string>(); }
+
+py::dict energies(const itr::EnergyReport& e) {
+  using namespace py::literals;
+  return py::dict("inertia"_a = e.inertia, "elastic"_a = e.elastic, "body"_a = e.body, "contact"_a = e.contact,
+                  "friction"_a = e.friction, "damping"_a = e.damping, "host"_a = e.host, "total"_a = e.total);
+}
+
+py::dict describe(const itr::StepReport& r) {
+  using namespace py::literals;
+  return py::dict("step"_a = r.step, "t"_a = r.t, "vertices"_a = r.vertices, "elements"_a = r.elements,
+                  "unknowns"_a = r.unknowns, "newton_iterations"_a = r.newton_iterations,
+                  "linear_solves"_a = r.linear_solves, "factorizations"_a = r.factorizations, "splits"_a = r.splits.accepted,
+                  "collapses"_a = r.collapses.accepted, "swaps"_a = r.swaps.accepted, "smooths"_a = r.smooths.accepted,
+                  "cut_steps"_a = r.cut_steps, "history_loss"_a = r.history_loss, "min_distance"_a = r.min_distance,
+                  "min_volume_ratio"_a = r.min_volume_ratio, "seconds"_a = r.seconds.total, "energy"_a = energies(r.energy));
+}
+
+/// Listeners of Python's are called under its lock, which a step does not hold.
+itr::Logger logger_of(const std::function<void(int, std::string)>& log) {
+  if (!log) return {};
+  return itr::Logger([log](itr::LogLevel level, std::string_view text) {
+    const py::gil_scoped_acquire lock;
+    log(static_cast<int>(level), std::string(text));
+  });
+}
+
+void add_model(py::module_& m) {
+  py::class_<Model>(m, "Model")
+      .def(py::init<int>())
+      .def_static("from_scene",
+                  [](const std::string& file, const py::dict& overrides) {
+                    std::vector<itr::scene::Override> list;
+                    for (const auto& [pointer, value] : overrides)
+                      list.push_back({pointer.cast<std::string>(), json(value)});
+                    return Model::from_scene(file, list);
+                  })
+      .def_property_readonly("dimension", &Model::dimension)
+      .def("set_options", [](Model& model, const py::dict& options) { model.set_options(json(options)); })
+      .def("set_option",
+           [](Model& model, const std::string& pointer, const py::object& value) { model.set_option(pointer, json(value)); })
+      .def("set_mesh", [](Model& model, const Doubles& vertices, const Ints& cells,
+                          const Ints& bodies) { model.set_mesh(view(vertices), view(cells), view(bodies)); })
+      .def("add_boundary_facets",
+           [](Model& model, const std::string& name, const Ints& facets) { return model.add_boundary(name, view(facets)); })
+      .def("add_boundary_box", [](Model& model, const std::string& name, const Doubles& low,
+                                  const Doubles& high) { return model.add_boundary(name, view(low), view(high)); })
+      .def("add_boundary_rule",
+           [](Model& model, const std::string& name, const py::function& rule) {
+             const int d = model.dimension();
+             return model.add_boundary(name, [&](const double* X) { return rule(py::array_t<double>(d, X)).cast<bool>(); });
+           })
+      .def("add_obstacle",
+           [](Model& model, const std::string& name, const Doubles& vertices, const Ints& edges, const Ints& triangles) {
+             return model.add_obstacle(name, view(vertices), view(edges), view(triangles));
+           });
+}
+
+struct Saved {
+  AnySimulation::Saved state;
+};
+
+py::object positions(const AnySimulation& s, bool velocities) {
+  return std::visit(
+      [&](const auto& snapshot) -> py::object {
+        return shared(velocities ? s.velocities() : s.positions(), s.dimension(), snapshot.state);
+      },
+      s.save());
+}
+
+/// Of a step, taken without Python's lock.
+template <typename Step>
+py::tuple outcome(const Step& step) {
+  itr::StepResult result;
+  {
+    const py::gil_scoped_release unlock;
+    result = step();
+  }
+  return py::make_tuple(result.ok, result.cancelled, result.reason);
+}
+
+void add_simulation(py::module_& m) {
+  py::class_<Saved>(m, "Saved");
+  py::class_<AnySimulation>(m, "Simulation")
+      .def(py::init([](const Model& model, const std::function<void(int, std::string)>& log) {
+        return std::make_unique<AnySimulation>(model, logger_of(log));
+      }))
+      .def("step", [](AnySimulation& s, double dt) { return outcome([&] { return s.step(dt); }); })
+      .def("adapt", [](AnySimulation& s, double dt) { return outcome([&] { return s.adapt(dt); }); })
+      .def_property_readonly("dimension", &AnySimulation::dimension)
+      .def_property_readonly("time", &AnySimulation::time)
+      .def_property_readonly("step_length", &AnySimulation::step_length)
+      .def_property_readonly("steps", &AnySimulation::steps)
+      .def_property_readonly("finished", &AnySimulation::finished)
+      .def_property_readonly("warnings", &AnySimulation::warnings)
+      .def_property_readonly("report", [](const AnySimulation& s) { return describe(s.report()); })
+      .def("fix", [](AnySimulation& s, const std::string& boundary, const Ints& mask,
+                     const Doubles& values) { s.fix(boundary, view(mask), view(values)); })
+      .def("set_traction", [](AnySimulation& s, const std::string& boundary,
+                              const Doubles& values) { s.set_traction(boundary, view(values)); })
+      .def("set_pressure",
+           [](AnySimulation& s, const std::string& boundary, double pressure) {
+             s.set_pressure(boundary, [pressure](const double*, double, double* value) { *value = pressure; });
+           })
+      .def("set_acceleration",
+           [](AnySimulation& s, const std::vector<double>& value) {
+             if (value.size() != static_cast<std::size_t>(s.dimension()))
+               throw itr::InputError(
+                   {"", "acceleration", std::to_string(value.size()) + " numbers", std::to_string(s.dimension())});
+             s.set_acceleration([value](const double*, double, double* a) { std::copy(value.begin(), value.end(), a); });
+           })
+      .def("move_obstacle", [](AnySimulation& s, const std::string& obstacle,
+                               const Doubles& values) { s.move_obstacle(obstacle, view(values)); })
+      .def("set_forces", [](AnySimulation& s, const Doubles& forces) { s.set_forces(view(forces)); })
+      .def("set_velocities", [](AnySimulation& s, const Doubles& values) { s.set_velocities(view(values)); })
+      .def("freeze_mesh", &AnySimulation::freeze_mesh)
+      .def_property_readonly("num_vertices", &AnySimulation::num_vertices)
+      .def_property_readonly("positions", [](const AnySimulation& s) { return positions(s, false); })
+      .def_property_readonly("velocities", [](const AnySimulation& s) { return positions(s, true); })
+      .def_property_readonly("rest_positions",
+                             [](const AnySimulation& s) { return copied(s.rest_positions(), s.dimension()); })
+      .def_property_readonly("cells", [](const AnySimulation& s) { return copied(s.cells(), s.dimension() + 1); })
+      .def_property_readonly("bodies", [](const AnySimulation& s) { return copied(s.bodies(), 1); })
+      .def_property_readonly("facets", [](const AnySimulation& s) { return copied(s.facets(), s.dimension()); })
+      .def_property_readonly("facet_boundaries", [](const AnySimulation& s) { return copied(s.facet_boundaries(), 1); })
+      .def_property_readonly("obstacle_positions",
+                             [](const AnySimulation& s) { return copied(s.obstacle_positions(), s.dimension()); })
+      .def_property_readonly("elastic_density", [](const AnySimulation& s) { return copied(s.elastic_density(), 1); })
+      .def("watch_forces", &AnySimulation::watch_forces)
+      .def("forces",
+           [](const AnySimulation& s, int kind) -> py::object {
+             const itr::NodalForces& forces = s.forces();
+             const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
+             const itr::VectorX& values = *kinds[kind];
+             if (values.size() == 0) return py::none();
+             return copied(std::vector<double>(values.begin(), values.end()), s.dimension());
+           })
+      .def("resultant",
+           [](const AnySimulation& s, const std::vector<std::string>& boundaries, const Doubles& about) {
+             const auto sum = s.resultant(boundaries, view(about));
+             return py::make_tuple(copied(sum.force, 1), copied(sum.moment, 1));
+           })
+      .def("save", [](const AnySimulation& s) { return Saved{s.save()}; })
+      .def("restore", [](AnySimulation& s, const Saved& saved) { s.restore(saved.state); })
+      .def("on_iteration",
+           [](AnySimulation& s, const std::function<bool(int, double, double, double)>& listener) {
+             if (!listener) return s.on_iteration(nullptr);
+             s.on_iteration([listener](const itr::NewtonProgress& p) {
+               const py::gil_scoped_acquire lock;
+               return listener(p.iteration, p.energy, p.gradient_norm, p.step_norm);
+             });
+           })
+      .def("on_mesh_change", [](AnySimulation& s, const py::object& listener) {
+        if (listener.is_none()) return s.on_mesh_change(nullptr);
+        s.on_mesh_change([listener = listener.cast<std::function<void(py::object)>>()](const itr::AnyMeshChange& change) {
+          using namespace py::literals;
+          const py::gil_scoped_acquire lock;
+          const auto& P = change.interpolation;
+          const auto ints = [](const int* p, Eigen::Index n) { return py::array_t<int>(n, p); };
+          const auto project = py::cpp_function([&change](const itr::MatrixX& fields) { return change.project(fields); });
+          listener(py::dict(
+              "vertex"_a = copied(change.vertex, 1), "cell"_a = copied(change.cell, 1), "facet"_a = copied(change.facet, 1),
+              "facet_parent"_a = copied(change.facet_parent, 1), "shape"_a = py::make_tuple(P.rows(), P.cols()),
+              "indptr"_a = ints(P.outerIndexPtr(), P.rows() + 1), "indices"_a = ints(P.innerIndexPtr(), P.nonZeros()),
+              "data"_a = py::array_t<double>(P.nonZeros(), P.valuePtr()), "project"_a = project));
+        });
+      });
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_itr, m) {
+  m.doc() = "compiled half of the package itr";
+  m.attr("__version__") = ITR_VERSION;
+  py::register_exception<itr::InputError>(m, "InputError", PyExc_ValueError);
+  add_model(m);
+  add_simulation(m);
+}

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: MIT
+// The facade over both dimensions, and the C interface over it: arrays in, steps, arrays out, errors that name a place.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "block.hpp"
+#include "itr/itr.h"
+#include "itr/itr.hpp"
+
+namespace itr {
+namespace {
+
+constexpr const char* kOptions = R"({"materials": {"type": "NeoHookean", "E": 1e5, "nu": 0.3, "rho": 1000},
+  "time": {"dt": 0.01, "time_steps": 10, "integrator": "ImplicitEuler"},
+  "solver": {"nonlinear": {"grad_norm": 1e-10}}})";
+
+/// The block of block.hpp in arrays.
+template <int Dim>
+struct Arrays {
+  std::vector<double> vertices;
+  std::vector<int> cells, bodies;
+  Arrays() {
+    const Mesh<Dim> mesh = make_block<Dim>();
+    for (int v = 0; v < mesh.vertex_slots(); ++v)
+      vertices.insert(vertices.end(), mesh.rest(v).data(), mesh.rest(v).data() + Dim);
+    for (int c = 0; c < mesh.cell_slots(); ++c) cells.insert(cells.end(), mesh.cell(c).begin(), mesh.cell(c).end());
+    bodies.assign(static_cast<std::size_t>(mesh.cell_slots()), 1);
+  }
+};
+
+template <int Dim>
+Model block_model() {
+  const Arrays<Dim> arrays;
+  Model model(Dim);
+  model.set_mesh(arrays.vertices, arrays.cells, arrays.bodies);
+  model.add_boundary("left", [](const double* X) { return X[0] < 1e-9; });
+  model.add_boundary("top", [](const double* X) { return X[1] > kSize - 1e-9; });
+  model.set_options(kOptions);
+  return model;
+}
+
+/// What an InputError says.
+template <typename F>
+std::string message_of(F&& f) {
+  try {
+    f();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Facade, ErrorsNameArrayIndexFoundAndExpected) {
+  const Arrays<2> arrays;
+  const auto with = [&](auto&& change) {
+    return message_of([&] {
+      Arrays<2> changed = arrays;
+      Model model(2);
+      change(changed);
+      model.set_mesh(changed.vertices, changed.cells, changed.bodies);
+      model.set_options(kOptions);
+      AnySimulation simulation(model);
+    });
+  };
+  EXPECT_EQ(with([](auto& a) { a.vertices[5] = NAN; }), "vertices[5]: found nan; expected a finite number");
+  EXPECT_EQ(with([](auto& a) { a.vertices.pop_back(); }), "vertices: found 31 numbers; expected a multiple of 2");
+  EXPECT_EQ(with([](auto& a) { a.cells[4] = 16; }), "cells[4]: found 16; expected a vertex, 0 to 16 - 1");
+  EXPECT_EQ(with([](auto& a) { a.bodies.pop_back(); }), "bodies: found 17 numbers; expected 18, one a cell");
+  EXPECT_NE(with([](auto& a) { std::swap(a.cells[0], a.cells[1]); }).find("cell 0"), std::string::npos);
+  EXPECT_EQ(message_of([] { Model(4); }), "dimension: found 4; expected 2 or 3");
+
+  Model model = block_model<2>();
+  EXPECT_NE(message_of([&] { model.add_boundary("top", std::array{0, 1}); }).find("'top' twice"), std::string::npos);
+  model.set_option("/time/dt", "-1");
+  EXPECT_NE(message_of([&] { AnySimulation s(model); }).find("/time/dt: found -1"), std::string::npos);
+  Model unknown = block_model<2>();
+  unknown.set_options(R"({"contact": {"dhatt": 1}})");
+  EXPECT_NE(message_of([&] { AnySimulation s(unknown); }).find("/contact/dhatt"), std::string::npos);
+  Model inner = block_model<2>();
+  inner.add_boundary("inside", std::array{0, 5});
+  EXPECT_EQ(message_of([&] { AnySimulation s(inner); }),
+            "boundary 'inside', facet 0: found vertices 0 5; expected a facet of the mesh's boundary");
+  Model twice = block_model<2>();
+  twice.add_boundary("again", std::array{12, 13});
+  EXPECT_NE(message_of([&] { AnySimulation s(twice); }).find("boundary of id 2 already"), std::string::npos);
+
+  AnySimulation simulation(block_model<2>());
+  const std::array mask{1, 1};
+  EXPECT_EQ(message_of([&] { simulation.fix("lefd", mask, std::vector<double>(32)); }),
+            "boundary: found 'lefd'; expected 'left', 'top'");
+  EXPECT_EQ(message_of([&] { simulation.fix("left", mask, std::vector<double>(31)); }),
+            "displacements: found 31 numbers; expected 32");
+  std::vector<double> forces(32);
+  forces[7] = std::numeric_limits<double>::infinity();
+  EXPECT_NE(message_of([&] { simulation.set_forces(forces); }).find("forces[3]"), std::string::npos);
+  EXPECT_EQ(message_of([&] { simulation.step(-1); }), "dt: found -1.000000; expected a number > 0");
+  AnySimulation other(block_model<3>());
+  EXPECT_NE(message_of([&] { simulation.restore(other.save()); }).find("another dimension"), std::string::npos);
+}
+
+template <int Dim>
+void expect_same_as_template() {
+  Setup<Dim> setup = block<Dim>();
+  setup.newton = {};
+  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 1e-10 * setup.time.dt;
+  DirichletCondition<Dim> left{1, {}, [](const Vec<Dim>& X, double t) { return Vec<Dim>(t * X); }};
+  left.components.fill(true);
+  setup.dirichlet.push_back(left);
+  setup.neumann.push_back({2, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Unit(1) * 50); }});
+  linear::Registry registry;
+  Simulation<Dim> below(setup, registry);
+
+  AnySimulation simulation(block_model<Dim>());
+  EXPECT_EQ(simulation.dimension(), Dim);
+  const std::vector<int> mask(Dim, 1);
+  simulation.set_acceleration([](const double*, double, double* a) { a[1] = -kGravity; });
+  simulation.set_traction("top", [](const double*, double, double* f) { f[1] = 50; });
+  for (int i = 1; i <= 3; ++i) {
+    std::vector<double> u = simulation.rest_positions();
+    for (double& component : u) component *= 0.01 * i;
+    simulation.fix("left", mask, u);
+    ASSERT_TRUE(below.advance().ok);
+    ASSERT_TRUE(simulation.step().ok);
+  }
+  const Eigen::Map<const VectorX> x(simulation.positions().data(), Dim * simulation.num_vertices());
+  EXPECT_LT((x - below.state().history.x[0]).norm(), 1e-12);
+  EXPECT_EQ(simulation.time(), below.state().t);
+  EXPECT_EQ(simulation.cells(), Arrays<Dim>().cells);
+  EXPECT_EQ(simulation.bodies(), Arrays<Dim>().bodies);
+  EXPECT_EQ(simulation.facets().size(), std::size_t(Dim * simulation.num_facets()));
+  EXPECT_THROW(simulation.as<5 - Dim>(), std::bad_variant_access);
+}
+
+TEST(Facade, DoesWhatTheTemplatesDo) {
+  expect_same_as_template<2>();
+  expect_same_as_template<3>();
+}
+
+TEST(Facade, MovesObstaclesByArraysAndFunctions) {
+  Model model = block_model<2>();
+  model.add_obstacle("wall", std::array{0.21, -1.0, 0.21, 1.0}, std::array{0, 1});
+  model.add_obstacle("far", std::array{9.0, 0.0, 9.0, 1.0}, std::array{0, 1});
+  model.set_options(R"({"contact": {"enabled": true, "dhat": 1e-3}, "solver": {"contact": {"barrier_stiffness": 1e6}}})");
+  AnySimulation simulation(model);
+  simulation.fix("left", std::array{1, 1}, [](const double*, double, double* u) { u[0] = u[1] = 0; });
+  simulation.watch_forces(true);
+  for (int i = 1; i <= 5; ++i) {
+    const double x = 0.21 - 0.005 * i;
+    if (i % 2)
+      simulation.move_obstacle("wall", std::array{x, -1.0, x, 1.0});
+    else
+      simulation.move_obstacle("wall", [=](const double*, double, double* u) { u[0] = x - 0.21; });
+    ASSERT_TRUE(simulation.step().ok);
+    EXPECT_NEAR(simulation.obstacle_positions()[0], x, 1e-15);
+    EXPECT_NEAR(simulation.obstacle_positions()[3], 1, 1e-15);
+    EXPECT_EQ(simulation.obstacle_positions()[4], 9);
+  }
+  EXPECT_GT(simulation.resultant("left").force[0], 1);                 // it is squeezed
+  EXPECT_LE(simulation.as<2>().setup().obstacles.motions.size(), 3u);  // places are used again
+}
+
+TEST(Facade, ReadsScenes) {
+  Model model = Model::from_scene(std::string(ITR_SOURCE_DIR) + "/examples/masticator.json", {{"/time/tend", "0.1"}});
+  AnySimulation simulation(model);
+  ASSERT_TRUE(simulation.step().ok);
+  EXPECT_GT(simulation.num_vertices(), 100);
+  model.set_option("/time/dt", "0.01");
+  EXPECT_EQ(AnySimulation(model).step_length(), 0.01);
+  EXPECT_THROW(model.set_option("/time/dtt", "0.01"), InputError);
+  EXPECT_EQ(AnySimulation(model).step_length(), 0.01);
+  EXPECT_THROW(model.set_options("{}"), InputError);
+  EXPECT_NE(message_of([&] {
+              simulation.watch_forces(true), simulation.step(), simulation.resultant("left");
+            }).find("the id of a surface"),
+            std::string::npos);
+}
+
+TEST(Facade, MeshChangesReachTheHost) {
+  Model model = block_model<2>();
+  model.set_options(R"({"space": {"remesh": {"enabled": true, "split": {"acceptance_tolerance": 1e-4}}}})");
+  AnySimulation simulation(model);
+  simulation.fix("left", std::array{1, 1}, [](const double*, double, double* u) { u[0] = u[1] = 0; });
+  simulation.set_traction("top", [](const double*, double, double* f) { f[0] = 1000, f[1] = 0; });
+  VectorX own = VectorX::Ones(simulation.num_vertices());
+  std::vector<double> forces(static_cast<std::size_t>(2 * simulation.num_vertices()), 0.01);
+  simulation.set_forces(forces);
+  int changes = 0;
+  simulation.on_mesh_change([&](const AnyMeshChange& change) {
+    ++changes;
+    EXPECT_LT((change.project(own) - VectorX::Ones(simulation.num_vertices())).norm(), 1e-12);
+    own = change.interpolation * own;
+  });
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(simulation.step().ok);
+  EXPECT_GT(changes, 0);
+  ASSERT_EQ(own.size(), simulation.num_vertices());
+  EXPECT_LT((own - VectorX::Ones(own.size())).norm(), 1e-14);
+  simulation.freeze_mesh(true);
+  const int vertices = simulation.num_vertices();
+  ASSERT_TRUE(simulation.step().ok);
+  EXPECT_EQ(simulation.num_vertices(), vertices);
+}
+
+// --- in C ---
+
+struct CBlock {
+  itr_model* model = itr_model_create(2);
+  itr_simulation* simulation = nullptr;
+  CBlock() {
+    const Arrays<2> arrays;
+    EXPECT_EQ(itr_model_set_mesh(model, arrays.vertices.size() / 2, arrays.vertices.data(), arrays.cells.size() / 3,
+                                 arrays.cells.data(), nullptr),
+              ITR_SUCCESS);
+    const double low[] = {0, 0}, high[] = {0, 1};
+    EXPECT_EQ(itr_model_add_boundary_box(model, "left", low, high, nullptr), ITR_SUCCESS);
+    EXPECT_EQ(itr_model_set_options(model, kOptions), ITR_SUCCESS);
+    EXPECT_EQ(itr_simulation_create(model, nullptr, nullptr, &simulation), ITR_SUCCESS) << itr_model_message(model);
+  }
+  ~CBlock() {
+    itr_simulation_destroy(simulation);
+    itr_model_destroy(model);
+  }
+};
+
+TEST(CInterface, SaysWhatIsWrongAndGoesOn) {
+  EXPECT_EQ(itr_model_create(5), nullptr);
+  CBlock block;
+  EXPECT_EQ(itr_model_set_mesh(block.model, 3, nullptr, 1, nullptr, nullptr), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_model_message(block.model), "vertices: found NULL; expected an argument");
+  EXPECT_EQ(itr_model_set_options(block.model, "{"), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_model_message(block.model), "options: found text that is no JSON; expected a JSON object");
+  EXPECT_EQ(itr_model_read_scene(block.model, "nowhere.json"), ITR_BAD_INPUT);
+  EXPECT_NE(std::string(itr_model_message(block.model)).find("nowhere.json"), std::string::npos);
+  EXPECT_EQ(itr_step(nullptr, 1), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_step(block.simulation, -1), ITR_BAD_INPUT);
+  const int mask[] = {1, 1};
+  EXPECT_EQ(itr_fix(block.simulation, "right", mask, nullptr, nullptr), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(block.simulation), "boundary: found 'right'; expected 'left'");
+  EXPECT_EQ(itr_fix(block.simulation, "left", mask, nullptr, nullptr), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+}
+
+TEST(CInterface, CancelsSavesAndRestores) {
+  CBlock block;
+  const auto gravity = [](const double*, double, double* a, void*) { a[0] = 0, a[1] = -10; };
+  itr_set_acceleration(block.simulation, gravity, nullptr);
+  int calls = 0;
+  itr_on_iteration(
+      block.simulation, [](int, double, double, double, void* user) { return ++*static_cast<int*>(user) < 1 ? 1 : 0; },
+      &calls);
+  EXPECT_EQ(itr_step(block.simulation, 0.01), ITR_CANCELLED);
+  EXPECT_EQ(calls, 1);
+  EXPECT_EQ(itr_steps(block.simulation), 0);
+  itr_on_iteration(block.simulation, nullptr, nullptr);
+  itr_snapshot* saved = itr_save(block.simulation);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+  EXPECT_NEAR(itr_velocities(block.simulation)[1], -0.1, 1e-9);
+  EXPECT_EQ(itr_forces(block.simulation, ITR_CONTACT), nullptr);
+  const double y = itr_positions(block.simulation)[1];
+  itr_energies energies;
+  itr_get_energies(block.simulation, &energies);
+  itr_statistics statistics;
+  itr_get_statistics(block.simulation, &statistics);
+  EXPECT_GT(statistics.newton_iterations, 0);
+  EXPECT_NEAR(energies.total, energies.inertia + energies.elastic + energies.body, 1e-12);
+  itr_restore(block.simulation, saved);
+  EXPECT_EQ(itr_time(block.simulation), 0);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+  EXPECT_EQ(itr_positions(block.simulation)[1], y);
+  itr_snapshot_destroy(saved);
+}
+
+TEST(CInterface, TakesForcesOfPositions) {
+  CBlock block;
+  itr_set_follower_forces(
+      block.simulation,
+      [](size_t n, const double*, const double* x, double, double* f, void*) {
+        for (size_t i = 0; i < 2 * n; ++i) f[i] -= 100 * x[i];
+      },
+      nullptr);
+  for (int i = 0; i < 3; ++i)
+    ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS) << itr_simulation_message(block.simulation);
+  double sum = 0;  // drawn towards the origin
+  for (size_t i = 0; i < 2 * itr_num_vertices(block.simulation); ++i) sum += itr_velocities(block.simulation)[i];
+  EXPECT_LT(sum, -0.1);
+}
+
+}  // namespace
+}  // namespace itr
