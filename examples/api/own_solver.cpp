@@ -51,7 +51,6 @@ class IncompleteCholesky final : public itr::linear::Engine {
 void add_own_solver(itr::linear::Registry& registry) {
   itr::linear::BackendInfo info;
   info.name = "mine:iccg";
-  info.library_version = "1.0";
   info.license = "MIT";
   info.capabilities.iterative = true;
   info.available = true;
@@ -77,8 +76,7 @@ int run(itr::Setup<Dim> setup, int steps) {
       std::printf("step %d: %s\n", result.report.step, result.reason.c_str());
       return 1;
     }
-    std::printf("t = %g s: %d vertices, %d Newton iterations, %g J\n", result.report.t, result.report.vertices,
-                result.report.newton_iterations, result.report.energy.total);
+    std::printf("t = %g s: %d vertices, %g J\n", result.report.t, result.report.vertices, result.report.energy.total);
   }
   return 0;
 }

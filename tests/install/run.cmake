@@ -8,7 +8,8 @@ endfunction()
 
 function(build source name)
   run(${CMAKE_COMMAND} -S ${SOURCE_DIR}/${source} -B ${WORK_DIR}/${name} -G ${GENERATOR}
-      -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix -D CMAKE_BUILD_TYPE=${BUILD_TYPE} -D "CMAKE_CXX_FLAGS=${CXX_FLAGS}")
+      -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix -D CMAKE_BUILD_TYPE=${BUILD_TYPE} -D "CMAKE_CXX_FLAGS=${CXX_FLAGS}"
+      -D "CMAKE_C_FLAGS=${CXX_FLAGS}" -D "CMAKE_Fortran_FLAGS=${CXX_FLAGS}")
   run(${CMAKE_COMMAND} --build ${WORK_DIR}/${name})
 endfunction()
 
@@ -58,7 +59,40 @@ endif()
 
 set(scene ${shared}/itr/examples/masticator.json)
 build(examples/api api)
-run(${WORK_DIR}/api/own_solver ${scene} 30)
+run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK_DIR}/api --output-on-failure --no-tests=error)
+
+# The guide, as a new user goes through it.
+run(${PYTHON} ${SOURCE_DIR}/tests/install/guide.py ${SOURCE_DIR} ${WORK_DIR}/guide)
+run(${CMAKE_COMMAND} -S ${WORK_DIR}/guide -B ${WORK_DIR}/guide/build -G ${GENERATOR}
+    -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix -D "CMAKE_CXX_FLAGS=${CXX_FLAGS}")
+run(${CMAKE_COMMAND} --build ${WORK_DIR}/guide/build)
+run(${WORK_DIR}/guide/build/host)
+
+# The C example by pkg-config, and the Python package, which pip packs from the same build.
+find_program(PKG_CONFIG pkg-config)
+file(GLOB_RECURSE pc ${WORK_DIR}/prefix/*/itr.pc)
+if(PKG_CONFIG AND pc)
+  cmake_path(GET pc PARENT_PATH folder)
+  set(ENV{PKG_CONFIG_PATH} ${folder})
+  execute_process(COMMAND ${PKG_CONFIG} --cflags --libs itr OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE
+    COMMAND_ERROR_IS_FATAL ANY)
+  separate_arguments(flags)
+  separate_arguments(more NATIVE_COMMAND "${CXX_FLAGS}")
+  cmake_path(GET folder PARENT_PATH libraries)
+  run(cc ${more} ${SOURCE_DIR}/examples/api/bounce.c ${flags} -lm -Wl,-rpath,${libraries} -o ${WORK_DIR}/bounce)
+  run(${WORK_DIR}/bounce)
+endif()
+file(GLOB package ${WORK_DIR}/prefix/lib/python*/site-packages)
+if(package)
+  run(${CMAKE_COMMAND} -E env PYTHONPATH=${package} ${PYTHON} ${SOURCE_DIR}/tests/python_test.py ${SOURCE_DIR} Arrays)
+  run(${CMAKE_COMMAND} -E env PYTHONPATH=${package} ${PYTHON} ${WORK_DIR}/guide/host.py)
+  execute_process(COMMAND ${PYTHON} -m pip --version RESULT_VARIABLE no_pip OUTPUT_QUIET ERROR_QUIET)
+  if(NOT no_pip)
+    run(${CMAKE_COMMAND} -E env ITR_PYTHON_BUILD=${BUILD_DIR} ${PYTHON} -m pip install --quiet --no-index
+        --no-build-isolation --no-deps --target ${WORK_DIR}/pip ${SOURCE_DIR})
+    run(${CMAKE_COMMAND} -E env PYTHONPATH=${WORK_DIR}/pip ${PYTHON} ${SOURCE_DIR}/tests/python_test.py ${SOURCE_DIR} Arrays)
+  endif()
+endif()
 
 build(examples/custom_backend custom_backend)
 set(itr ${WORK_DIR}/prefix/bin/itr)
