@@ -32,7 +32,6 @@ class ContactCandidates {
   const Pairs& vertex_edges() const { return vertex_edges_; }          ///< (vertex, edge); 2D
   const Pairs& vertex_triangles() const { return vertex_triangles_; }  ///< (vertex, triangle); 3D
   const Pairs& edge_edges() const { return edge_edges_; }              ///< smaller index first where both count; 3D
-  bool empty() const { return vertex_edges_.empty() && vertex_triangles_.empty() && edge_edges_.empty(); }
 
  private:
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].

@@ -185,13 +185,6 @@ const std::vector<ContactStencil>& ContactEnergy<Dim>::active(ConstVectorView x,
 }
 
 template <int Dim>
-bool ContactEnergy<Dim>::has_candidates(ConstVectorView x, Workspace& workspace) const {
-  auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(surface_, x, nullptr, dhat_);
-  return !candidates.empty();
-}
-
-template <int Dim>
 double ContactEnergy<Dim>::min_distance(ConstVectorView x, Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
   candidates.update(surface_, x, nullptr, dhat_);

@@ -48,8 +48,6 @@ class ContactEnergy final : public Energy {
   const std::vector<ContactStencil>& active(ConstVectorView x, Workspace& workspace) const;
   /// Smallest distance [m] over counted pairs nearer than dhat; infinity where there are none.
   double min_distance(ConstVectorView x, Workspace& workspace) const;
-  /// Whether any counted pair is near enough to x to be looked at.
-  bool has_candidates(ConstVectorView x, Workspace& workspace) const;
   /// What a pair adds to the energy of `scale` 1 [J].
   double pair_energy(const ContactStencil& stencil, ConstVectorView x) const;
   /// Distance of the pair's closest features.
