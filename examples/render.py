@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: MIT
 """Draws what `itr run` left in a folder: the deformed mesh, cells coloured by a field, obstacles in grey.
 
-usage: render.py RESULTS [-o out.png] [--frames i,j,k] [--animation out.gif] [--field NAME]
+usage: render.py RESULTS [-o out.png] [--frames i,j,k] [--animation out.gif] [--field NAME] [--view x,y,z] [--zoom S]
+                 [--cut x,y,z,d]
 
 Without --frames: the first stored step, the one with the largest elastic energy, and the last. NAME is any dataset of the
 frames' /fields: of vectors and tensors the magnitude counts, of fields on vertices the mean of a cell's. Default:
-elastic_density, on a logarithmic scale.
+elastic_density, on a logarithmic scale. Solid bodies are drawn by VTK (solid_images.py).
 """
 
 import argparse
@@ -21,13 +22,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from matplotlib.cm import ScalarMappable
 from PIL import Image
+
+from solid_images import SolidImages, ensure_display
 
 DECADES = 5  # of energy density that the colours span below its maximum
 MAX_ANIMATION_FRAMES = 150
 ANIMATION_DPI = 90
-UP = [2, 0, 1]  # order of the axes in 3D, where matplotlib draws the last one upwards: y is
+PANEL_PIXELS = 900
+COLOURS = "YlOrRd"
 
 
 class Frame:
@@ -39,7 +43,7 @@ class Frame:
                 raise SystemExit(f"{path}: no field {field}; there are {', '.join(file['/fields'])} (SCENES.md, "
                                  "/output/paraview/options, says how to ask for others)")
             self.step, self.t = int(file.attrs["step"]), float(file.attrs["t"])
-            self.x = file["/fields/x"][:]
+            self.x, self.rest = file["/fields/x"][:], file["/mesh/rest"][:]
             self.cells = file["/mesh/simplices"][:]
             values = file["/fields"][field][:]
             self.unit = file["/fields"][field].attrs.get("unit", "")
@@ -50,15 +54,12 @@ class Frame:
         values = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
         self.values = values if len(values) == len(self.cells) else values[self.cells].mean(axis=1)
 
-    def polygons(self):
-        """Corner positions of what is drawn, and its values: triangles of a plane mesh, boundary faces of a solid one."""
-        if self.dim == 2:
-            return self.x[self.cells], self.values
-        faces = np.concatenate([np.delete(self.cells, k, axis=1) for k in range(4)])
-        owner = np.tile(np.arange(len(self.cells)), 4)
+    def outer_faces(self, kept):
+        """Of the tetrahedra `kept`: the vertices of the faces that only one of them has, and whose they are."""
+        faces = np.concatenate([np.delete(self.cells[kept], k, axis=1) for k in range(4)])
         _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
         outer = first[count == 1]
-        return self.x[faces[outer]], self.values[owner[outer]]
+        return faces[outer], np.tile(kept, 4)[outer]
 
 
 def frame_paths(folder):
@@ -106,54 +107,61 @@ def common_box(frames):
     return low - margin, high + margin
 
 
-def draw_plane(axes, frame, norm):
-    # An obstacle from triangles comes as its boundary edges: grey lines, heavier than the mesh.
-    axes.add_collection(LineCollection(frame.obstacle_x[frame.obstacle_edges], colors="0.35", linewidths=1.8))
-    polygons, values = frame.polygons()
-    cells = PolyCollection(polygons, array=values, cmap="YlOrRd", norm=norm, edgecolors="0.1", linewidths=0.25)
-    axes.add_collection(cells)
-    axes.set_aspect("equal")
-    return cells
+class PlaneDrawing:
+    """Bodies in the plane, by matplotlib."""
+
+    def __init__(self, box, norm):
+        self.box, self.norm = box, norm
+        size = box[1] - box[0]
+        self.is_wide = size[0] > 1.5 * size[1]
+        self.width = 9 if self.is_wide else 4.2
+        self.height = 0.87 * self.width * size[1] / size[0] + 0.4
+
+    def draw(self, axes, frame):
+        # An obstacle from triangles comes as its boundary edges: grey lines, heavier than the mesh.
+        axes.add_collection(LineCollection(frame.obstacle_x[frame.obstacle_edges], colors="0.35", linewidths=1.8))
+        axes.add_collection(PolyCollection(frame.x[frame.cells], array=frame.values, cmap=COLOURS, norm=self.norm,
+                                           edgecolors="0.1", linewidths=0.25))
+        axes.set_aspect("equal")
+        axes.set_xlim(self.box[0][0], self.box[1][0])
+        axes.set_ylim(self.box[0][1], self.box[1][1])
+        axes.tick_params(labelsize=7)
 
 
-def draw_solid(axes, frame, norm):
-    if len(frame.obstacle_faces):
-        axes.add_collection3d(
-            Poly3DCollection(frame.obstacle_x[frame.obstacle_faces][..., UP], facecolors=(0.6, 0.6, 0.6, 0.25)))
-    polygons, values = frame.polygons()
-    cells = Poly3DCollection(polygons[..., UP], cmap="YlOrRd", norm=norm, edgecolors="0.1", linewidths=0.2)
-    cells.set_array(values)
-    axes.add_collection3d(cells)
-    return cells
+class SolidDrawing:
+    """Solid bodies, by VTK."""
+
+    is_wide, width, height = False, 5, 5.2
+
+    def __init__(self, box, norm, options):
+        self.norm = norm
+        self.cut = (np.array(options.cut[:3]), options.cut[3]) if options.cut else None
+        self.images = SolidImages(box, (PANEL_PIXELS, PANEL_PIXELS), options.view, options.zoom)
+
+    def draw(self, axes, frame):
+        colours = plt.get_cmap(COLOURS)(self.norm(frame.values))[:, :3]
+        axes.imshow(self.images.image(frame, colours, self.cut))
+        axes.set_axis_off()
 
 
-def draw(axes, frame, norm, box):
-    low, high = box
-    cells = draw_plane(axes, frame, norm) if frame.dim == 2 else draw_solid(axes, frame, norm)
-    if frame.dim == 3:
-        low, high = low[UP], high[UP]
-        axes.set_zlim(low[2], high[2])
-        axes.set_box_aspect(high - low)
-        axes.view_init(elev=20, azim=-30)
-        for name, index in zip("xyz", UP):
-            axes.set(**{f"{name}label": "xyz"[index]})
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
+def make_drawing(frames, options):
+    box, norm = common_box(frames), common_norm(frames, is_logarithmic(options.field))
+    return PlaneDrawing(box, norm) if frames[0].dim == 2 else SolidDrawing(box, norm, options)
+
+
+def draw(drawing, axes, frame):
+    for artist in [*axes.collections, *axes.images]:
+        artist.remove()
+    drawing.draw(axes, frame)
     axes.set_title(f"step {frame.step}, t = {frame.t:.4g} s: {len(frame.x)} vertices, {len(frame.cells)} cells", fontsize=9)
-    axes.tick_params(labelsize=7)
-    return cells
 
 
-def make_axes(frames, box, count):
+def make_figure(drawing, frames, options, count):
     """A figure with one row or one column of panels, whichever is nearer to a page."""
-    size = box[1] - box[0]
-    is_wide = frames[0].dim == 2 and size[0] > 1.5 * size[1]
-    rows, columns = (count, 1) if is_wide else (1, count)
-    panel_width = 9 if is_wide else 4.2
-    panel_height = 0.87 * panel_width * size[1] / size[0] + 0.4 if frames[0].dim == 2 else panel_width
-    keywords = {"projection": "3d"} if frames[0].dim == 3 else {}
-    figure, axes = plt.subplots(rows, columns, figsize=(panel_width * columns + 1, panel_height * rows), squeeze=False,
-                                subplot_kw=keywords, constrained_layout=True)
+    rows, columns = (count, 1) if drawing.is_wide else (1, count)
+    figure, axes = plt.subplots(rows, columns, figsize=(drawing.width * columns + 1, drawing.height * rows), squeeze=False,
+                                constrained_layout=True)
+    figure.colorbar(ScalarMappable(drawing.norm, COLOURS), ax=list(axes.ravel()), label=label(frames, options.field), shrink=0.8)
     return figure, axes.ravel()
 
 
@@ -166,36 +174,43 @@ def is_logarithmic(field):
     return field == "elastic_density"
 
 
-def render_picture(frames, path, field):
-    norm, box = common_norm(frames, is_logarithmic(field)), common_box(frames)
-    figure, axes = make_axes(frames, box, len(frames))
+def render_picture(frames, path, options):
+    drawing = make_drawing(frames, options)
+    figure, axes = make_figure(drawing, frames, options, len(frames))
     for panel, frame in zip(axes, frames):
-        cells = draw(panel, frame, norm, box)
-    figure.colorbar(cells, ax=list(axes), label=label(frames, field), shrink=0.8)
+        draw(drawing, panel, frame)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=150)
     plt.close(figure)
 
 
-def render_animation(frames, path, frames_per_second, field):
-    """The layout is found once: frame after frame only what moves is drawn, and taken off the canvas."""
-    norm, box = common_norm(frames, is_logarithmic(field)), common_box(frames)
-    figure, (axes,) = make_axes(frames, box, 1)
+def render_animation(frames, path, options):
+    """The layout is found once: frame after frame only what moves is drawn."""
+    drawing = make_drawing(frames, options)
+    figure, (axes,) = make_figure(drawing, frames, options, 1)
     figure.set_dpi(ANIMATION_DPI)
-    figure.colorbar(draw(axes, frames[0], norm, box), ax=axes, label=label(frames, field))
+    draw(drawing, axes, frames[0])
     figure.canvas.draw()
     figure.set_layout_engine("none")
     pictures = []
     for frame in frames:
-        for artist in list(axes.collections):
-            artist.remove()
-        draw(axes, frame, norm, box)
+        draw(drawing, axes, frame)
         figure.canvas.draw()
         picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
         pictures.append(picture.quantize(64, dither=Image.Dither.NONE))
     path.parent.mkdir(parents=True, exist_ok=True)
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / frames_per_second), loop=0)
+    pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=round(1000 / options.fps), loop=0)
     plt.close(figure)
+
+
+def numbers(count):
+    def parse(text):
+        values = [float(part) for part in text.split(",")]
+        if len(values) != count:
+            raise argparse.ArgumentTypeError(f"'{text}': expected {count} numbers")
+        return values
+
+    return parse
 
 
 def main():
@@ -206,18 +221,24 @@ def main():
     parser.add_argument("--animation", type=pathlib.Path, help="a .gif of all stored steps")
     parser.add_argument("--field", default="elastic_density", help="dataset of /fields that colours cells")
     parser.add_argument("--fps", type=int, default=15, help="of the animation")
-    arguments = parser.parse_args()
+    parser.add_argument("--view", type=numbers(3), default=[0.55, 0.35, 1], metavar="X,Y,Z",
+                        help="3D: from the bodies to the camera")
+    parser.add_argument("--zoom", type=float, default=1, help="3D: above 1 nearer")
+    parser.add_argument("--cut", type=numbers(4), metavar="X,Y,Z,D",
+                        help="3D: leaves out cells whose middle at rest, p, has (X,Y,Z).p > D")
+    options = parser.parse_args()
 
-    paths = frame_paths(arguments.results)
-    if arguments.animation:
+    paths = frame_paths(options.results)
+    if Frame(next(iter(paths.values())), options.field).dim == 3:
+        ensure_display()
+    if options.animation:
         stride = -(-len(paths) // MAX_ANIMATION_FRAMES)
-        frames = [Frame(paths[step], arguments.field) for step in sorted(paths)[::stride]]
-        render_animation(frames, arguments.animation, arguments.fps, arguments.field)
-        print(arguments.animation)
-    if arguments.output or not arguments.animation:
-        output = arguments.output or arguments.results / "picture.png"
-        chosen = choose_frames(arguments.results, paths, arguments.frames)
-        render_picture([Frame(paths[step], arguments.field) for step in chosen], output, arguments.field)
+        render_animation([Frame(paths[step], options.field) for step in sorted(paths)[::stride]], options.animation, options)
+        print(options.animation)
+    if options.output or not options.animation:
+        output = options.output or options.results / "picture.png"
+        chosen = choose_frames(options.results, paths, options.frames)
+        render_picture([Frame(paths[step], options.field) for step in chosen], output, options)
         print(output)
 
 
