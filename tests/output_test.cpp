@@ -72,6 +72,7 @@ StepReport report_of(int step) {
   report.energy_before_remesh = 4.0 / 3;
   report.min_distance = 0.5 / (step + 1);
   report.seconds.total = 0.25;
+  report.processor_seconds = 0.5;
   return report;
 }
 
@@ -180,6 +181,7 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
                                                      "indefinite",
                                                      "damped_steps",
                                                      "seconds",
+                                                     "processor_seconds",
                                                      "peak_rss_mb",
                                                      "trial_seconds"}));
   EXPECT_EQ(keys_of(line["energy"]),
@@ -219,6 +221,7 @@ TEST_F(OutputTest, SummaryHasTotalsAndNorms) {
   EXPECT_EQ(summary["linear_iterations"], 44);
   EXPECT_EQ(summary["splits"]["tried"], 40);
   EXPECT_EQ(summary["seconds"]["total"], 1.0);
+  EXPECT_EQ(summary["processor_seconds"], 2.0);
   EXPECT_EQ(summary["min_distance"], 0.125);
   EXPECT_DOUBLE_EQ(summary["energy_decrease_by_remeshing"].get<double>(), 3);
   EXPECT_EQ(keys_of(summary["norms"]), (std::vector<std::string>{"l2", "h1", "h1_semi", "linf", "linf_grad", "lp"}));

@@ -130,6 +130,7 @@ std::vector<Json> results_of(const fs::path& directory) {
   for (std::string line; std::getline(text, line);) {
     lines.push_back(Json::parse(line));
     lines.back().erase("seconds");
+    lines.back().erase("processor_seconds");
     lines.back().erase("peak_rss_mb");
     lines.back().erase("trial_seconds");
   }
@@ -159,6 +160,7 @@ void expect_same_results(const fs::path& a, const fs::path& b) {
 Json summary_of(const fs::path& directory) {
   Json summary = Json::parse(text_of(directory / "summary.json"));
   summary.erase("seconds");
+  summary.erase("processor_seconds");
   summary.erase("peak_rss_mb");
   return summary;
 }

@@ -13,9 +13,17 @@ SOURCE = pathlib.Path(sys.argv.pop())
 sys.path.insert(0, str(SOURCE / "verification"))
 from harness import report, stored  # noqa: E402
 
-SPEC = importlib.util.spec_from_file_location("paper", SOURCE / "verification/paper/run.py")
-paper = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(paper)
+
+
+def load(path):
+    spec = importlib.util.spec_from_file_location(path.replace("/", "_").removesuffix(".py"), SOURCE / "verification" / path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+paper, studies, stability = (load(path) for path in ("paper/run.py", "paper/studies.py", "stability/table.py"))
 
 
 class Stored(unittest.TestCase):
@@ -39,6 +47,11 @@ class Stored(unittest.TestCase):
         entries = json.loads((folder / "report/results.json").read_text())["cases"]
         self.assertEqual((folder / "report/report.md").read_text(), report.markdown(report.blocks(entries)))
         self.assertEqual((folder / "report/report.html").read_text(), report.html_page(report.blocks(entries)))
+
+    def test_pages_of_studies_and_hard_cases(self):
+        folder = SOURCE / "verification"
+        self.assertEqual((folder / "paper/studies.md").read_text(), studies.page())
+        self.assertEqual((folder / "stability/table.md").read_text(), stability.table(stability.read(folder / "stability/results.csv")))
 
     def test_counts_what_changed_since(self):
         if stored.git("rev-parse", "HEAD~5") is None:

@@ -14,10 +14,12 @@
 #include "ranks.hpp"
 #include "run.hpp"
 #include "scene/node.hpp"
+#include "study/study.hpp"
 
 namespace {
 
 using namespace itr;
+namespace study = cli::study;
 
 scene::Override parse_override(const std::string& text) {
   const auto equals = text.find('=');
@@ -92,6 +94,33 @@ void check_command(const CLI::App& app, int argc, char** argv) {
                     fmt::format("{}one of {}", near.empty() ? "" : near + " perhaps; ", fmt::join(names, ", "))});
 }
 
+void add_study_options(CLI::App& app, study::Options& options, std::vector<std::string>& sets) {
+  std::string series;
+  for (const auto& row : study::all_series())
+    series += fmt::format("\n  {}{}: {}", row.name, row.is_default ? "" : " (not by default)", row.what);
+  app.add_option("scene", options.scene, "scene file (JSON)")->required();
+  app.add_option("-o,--output", options.directory, "folder (default: study/<scene>); what is done in it is not done again");
+  app.add_option("--series", options.series, "some of these, or `all`:" + series)->delimiter(',');
+  app.add_option("--levels", options.levels, "uniform refinements of the scene's mesh (default: 3 in 2D, 2 in 3D)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--tolerances", options.tolerances, "of splits [J] (default: 4, 1, 1/4 and 1/16 times the scene's)")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber);
+  app.add_option("--starts", options.starts, "uniform refinements of the mesh that remeshing begins with (default: 0)")
+      ->delimiter(',')
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--reference", options.reference,
+                 "folder of a run to compare with (default: the finest level, split on and never coarsened)");
+  app.add_option("--reference-tolerance", options.reference_tolerance,
+                 "of its splits [J] (default: a quarter of the smallest tolerance)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--frames", options.frames, "times at which runs are compared (default: 10)")->check(CLI::PositiveNumber);
+  app.add_option("--time-limit", options.time_limit, "of a run [s]")->check(CLI::NonNegativeNumber);
+  app.add_option("--solver", options.solver, "linear solver, see `itr solvers`");
+  app.add_option("--threads", options.threads, "of each run (default: 1)")->check(CLI::PositiveNumber);
+  app.add_option("--set", sets, "/json/pointer=VALUE, for all runs")->allow_extra_args(false);
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App app("In-Timestep Remeshing for contacting elastodynamics");
   app.require_subcommand(1);
@@ -109,6 +138,9 @@ int dispatch(int argc, char** argv) {
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
+  auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
+  study::Options study_options;
+  add_study_options(*study, study_options, sets);
   check_command(app, argc, argv);
   try {
     app.parse(argc, argv);
@@ -127,7 +159,12 @@ int dispatch(int argc, char** argv) {
     return cli::done;
   }
   for (const auto& text : sets) options.overrides.push_back(parse_override(text));
+  if (*study) {
+    options.scene = study_options.scene;
+    study_options.overrides = options.overrides;
+  }
   try {
+    if (*study) return cli::run_study(study_options);
     return *explain ? cli::explain(options) : cli::run(options);
   } catch (const InputError& error) {  // what the library finds wrong with a setup is wrong with its scene
     if (!error.parts().file.empty()) throw;

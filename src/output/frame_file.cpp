@@ -159,6 +159,16 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
   return sizes;
 }
 
+FrameTotals read_frame_totals(const std::filesystem::path& path) {
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(path);
+  FrameTotals totals{step_of_frame(path), file.read_double_attribute("t"), {}, {}};
+  if (const char* name = "/totals/kinetic_energy"; file.contains(name))
+    totals.kinetic_energy = file.read_doubles(name).values.at(0);
+  if (const char* name = "/totals/momentum"; file.contains(name)) totals.momentum = file.read_doubles(name).values;
+  return totals;
+}
+
 StoredFrame read_frame(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
@@ -167,6 +177,10 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
   frame.dim = x.columns;
   frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
+  frame.body = file.read_integers("/mesh/body").values;
+  if (const std::size_t cells = frame.simplices.size() / (frame.dim + 1); frame.body.size() != cells)
+    throw InputError({path.string(), "/mesh/body", std::to_string(frame.body.size()) + " ids", std::to_string(cells)});
+  frame.surface = read_indices(path, file, "/mesh/surface", frame.dim, x.rows());
   hdf5::Table<double> rest = file.read_doubles("/mesh/rest");
   require_shape(path, "/mesh/rest", rest.columns, frame.dim);
   if (rest.rows() != x.rows())

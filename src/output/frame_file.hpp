@@ -10,6 +10,7 @@
 
 #include "core/hdf5.hpp"
 #include "files.hpp"
+#include "itr/output/distance.hpp"
 #include "itr/simulation/frame.hpp"
 
 namespace itr::output {
@@ -36,6 +37,8 @@ struct FrameSizes {
 };
 FrameSizes read_frame_sizes(const std::filesystem::path& path);
 
+FrameTotals read_frame_totals(const std::filesystem::path& path);
+
 /// A surface of a stored frame.
 struct StoredSurface {
   std::vector<double> x;            ///< k x dim, row-major [m]
@@ -43,12 +46,14 @@ struct StoredSurface {
   std::vector<std::int64_t> faces;  ///< f x 3
 };
 
-/// What a certificate needs of a stored frame. Indices are checked: all within range.
+/// What a certificate or a comparison needs of a stored frame. Indices are checked: all within range.
 struct StoredFrame {
   int dim = 0;
   std::vector<double> rest;             ///< n x dim, row-major [m]
   std::vector<double> x;                ///< n x dim, row-major [m]
   std::vector<std::int64_t> simplices;  ///< m x (dim + 1)
+  std::vector<std::int64_t> body;       ///< m, ids
+  std::vector<std::int64_t> surface;    ///< k x dim, facets of the boundary
   StoredSurface obstacles;
   bool has_proxy = false;
   StoredSurface proxy;  ///< what touches in place of the boundary

@@ -31,6 +31,7 @@ void StepReport::add_effort(const StepReport& before) {
   cut_steps += before.cut_steps;
   damped_steps += before.damped_steps;
   seconds += before.seconds;
+  processor_seconds += before.processor_seconds;
 }
 
 void StepReport::forget_operations() {

@@ -7,6 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <string>
 
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
@@ -17,12 +21,18 @@
 namespace itr {
 
 double peak_rss_mb() {
+  // What getrusage knows has the memory of the program that started this one in it.
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return std::strtod(line.c_str() + 6, nullptr) / 1024;
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
 namespace {
+
+double processor_seconds_now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 constexpr double kPoorResidual = 1e-6;  ///< of a linear solve, relative: a hundred times what Newton asks for
 
@@ -61,7 +71,11 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
                         State<Dim>* start_of_step) {
   StepResult result;
   StepReport& report = result.report;
-  const double start = seconds_now();
+  const double start = seconds_now(), processor_start = processor_seconds_now();
+  const auto stop_clocks = [&] {
+    report.seconds.total = seconds_now() - start;
+    report.processor_seconds = processor_seconds_now() - processor_start;
+  };
   EnergyGuard<Dim> guard(setup, state);
   State<Dim> next = state;
   next.step = state.step + 1;
@@ -80,7 +94,7 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
     add_solves(solves_before, solver.counts(), report);
     result.ok = false;
     result.reason = std::move(reason);
-    report.seconds.total = seconds_now() - start;
+    stop_clocks();
     return result;
   };
   const auto forbid = [&] {
@@ -173,7 +187,7 @@ StepResult attempt_step(const Setup<Dim>& setup, double shortest_edge, SparseSys
   TimeIntegrator(setup.time).push(std::move(x), next.history);
   state = std::move(next);
   report.peak_rss_mb = peak_rss_mb();
-  report.seconds.total = seconds_now() - start;
+  stop_clocks();
   return result;
 }
 

@@ -47,9 +47,11 @@ struct StepReport {
   double min_distance = 0;      ///< over contact pairs nearer than dhat; infinity where there are none [m]
   double min_volume_ratio = 1;  ///< smallest J = det F over the cells
   StepSeconds seconds;
+  double processor_seconds = 0;  ///< of the whole process, all threads, from begin to end of the step, without output
   double peak_rss_mb = 0;
 
-  /// Adds the effort of what came before: iterations, operations, forgotten history, damped and cut steps, seconds.
+  /// Adds the effort of what came before: iterations, operations, forgotten history, damped and cut steps, seconds,
+  /// processor seconds.
   void add_effort(const StepReport& before);
   /// Of a mesh that was dropped: none was accepted.
   void forget_operations();

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: MIT
+#include "plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "itr/core/error.hpp"
+#include "itr/linear/registry.hpp"
+
+namespace itr::cli::study {
+
+namespace {
+
+using Json = nlohmann::json;
+using Kind = Series::Kind;
+using Overrides = std::vector<scene::Override>;
+
+constexpr double kFactors[] = {4, 1, 1.0 / 4, 1.0 / 16};  ///< of the scene's tolerance
+constexpr double kReferenceShare = 0.25;                  ///< its tolerance by the smallest of the study
+
+Overrides operator+(Overrides a, const Overrides& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+/// Splits and collapses by energy as this library decides them; rows below change that.
+Overrides remeshed(const Overrides& changes = {}) {
+  Overrides all = {{"/space/remesh/enabled", "true"},
+                   {"/space/remesh/type", "\"physics\""},
+                   {"/space/remesh/screening", "\"bounds\""},
+                   {"/space/remesh/swap/enabled", "false"},
+                   {"/space/remesh/smooth/enabled", "false"}};
+  for (const auto& change : changes) {
+    const auto same = [&](const scene::Override& o) { return o.pointer == change.pointer; };
+    const auto found = std::find_if(all.begin(), all.end(), same);
+    if (found == all.end())
+      all.push_back(change);
+    else
+      *found = change;
+  }
+  return all;
+}
+
+const scene::Override kFixed = {"/space/remesh/enabled", "false"};
+const scene::Override kSwap = {"/space/remesh/swap/enabled", "true"}, kSmooth = {"/space/remesh/smooth/enabled", "true"};
+
+/// The scene as its options ask for, merged.
+class Source {
+ public:
+  explicit Source(const Options& options) : scene_(scene::read(options.scene, options.overrides)) {
+    json_ = Json::parse(scene_.identity);
+    const auto look = [&](auto setup) {
+      dim = static_cast<int>(setup.mesh.rest(0).size());
+      time = setup.time;
+      const bool is_open = setup.contact.enabled && !has("/solver/contact/barrier_stiffness");
+      if (is_open) setup.contact.adaptive_stiffness = false, setup.contact.barrier_stiffness = 0;
+      setup.remesh.enabled = true;
+      setup.choose_defaults();
+      remesh = setup.remesh;
+      // What remeshing would choose holds for all runs: they are to have one limit.
+      if (is_open) pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness)}};
+    };
+    std::visit(look, scene_.setup);
+    if (json_["geometry"].is_array()) {
+      for (std::size_t i = 0; i < json_["geometry"].size(); ++i)
+        find_body(json_["geometry"][i], fmt::format("/geometry/{}", i));
+    } else {
+      find_body(json_["geometry"], "/geometry");
+    }
+  }
+
+  int dim = 0;
+  TimeOptions time;
+  RemeshOptions remesh;  ///< with its defaults chosen
+  Overrides pinned;      ///< what the scene leaves open and all runs have to agree on
+
+  bool has(const std::string& pointer) const { return json_.contains(Json::json_pointer(pointer)); }
+  /// Every body refined so many times more than the scene has it.
+  Overrides refined(int more) const {
+    Overrides all;
+    for (const auto& [pointer, own] : bodies_) all.push_back({pointer + "/n_refs", std::to_string(own + more)});
+    return all;
+  }
+  /// As messages name a level.
+  std::string level_label(int more) const { return fmt::format("n_refs {}", bodies_.front().second + more); }
+
+ private:
+  void find_body(const Json& geometry, const std::string& pointer) {
+    if (geometry.value("is_obstacle", false) || !geometry.value("enabled", true)) return;
+    bodies_.emplace_back(pointer, geometry.value("n_refs", 0));
+  }
+
+  scene::Scene scene_;
+  Json json_;
+  std::vector<std::pair<std::string, int>> bodies_;  ///< pointer and own n_refs
+};
+
+bool contains(const Overrides& all, const scene::Override& one) {
+  return std::any_of(all.begin(), all.end(),
+                     [&](const scene::Override& o) { return o.pointer == one.pointer && o.value == one.value; });
+}
+
+/// The tolerances of the operations of a series, in the ratio of the split's to the scene's own.
+Overrides with_tolerance(const Source& source, const Series& series, double tolerance) {
+  const double own = source.remesh.split.acceptance_tolerance;
+  Overrides all = {{"/space/remesh/split/acceptance_tolerance", fmt::format("{}", tolerance)}};
+  const auto scale = [&](const char* operation, double value) {
+    all.push_back(
+        {fmt::format("/space/remesh/{}/acceptance_tolerance", operation), fmt::format("{}", value * tolerance / own)});
+  };
+  scale("collapse", source.remesh.collapse.acceptance_tolerance);
+  if (contains(series.overrides, kSwap)) scale("swap", source.remesh.swap.acceptance_tolerance);
+  if (contains(series.overrides, kSmooth)) scale("smooth", source.remesh.smooth.acceptance_tolerance);
+  return all;
+}
+
+/// The same end in steps of dt / parts.
+Overrides with_time_step(const Source& source, int parts, int skip) {
+  Overrides all = {{"/output/paraview/skip_frame", std::to_string(skip * parts)}};
+  if (source.has("/time/dt")) all.push_back({"/time/dt", fmt::format("{}", source.time.dt / parts)});
+  if (source.has("/time/time_steps")) all.push_back({"/time/time_steps", std::to_string(source.time.steps * parts)});
+  return all;
+}
+
+std::vector<std::string> solvers_there() {
+  linear::Registry registry;
+  std::vector<std::string> names;
+  for (const auto& row : registry.list())
+    if (row.available && row.name != "dense" && row.name != "auto") names.push_back(row.name);
+  return names;
+}
+
+std::string folder_name(std::string text) {
+  std::replace(text.begin(), text.end(), ':', '-');
+  return text;
+}
+
+class Planner {
+ public:
+  explicit Planner(const Options& options) : options_(options), source_(options) {
+    levels_ = options.levels > 0 ? options.levels : source_.dim == 2 ? 3 : 2;
+    skip_ = std::max(1, source_.time.steps / std::max(1, options.frames));
+    tolerances_ = options.tolerances;
+    const double own = source_.remesh.split.acceptance_tolerance;
+    if (tolerances_.empty())
+      for (const double factor : kFactors) tolerances_.push_back(own * factor);
+    std::sort(tolerances_.begin(), tolerances_.end(), std::greater<>());
+    starts_ = options.starts.empty() ? std::vector<int>{0} : options.starts;
+    plan_.dim = source_.dim;
+    plan_.is_dynamic = !source_.time.is_static && !source_.time.quasistatic;
+  }
+
+  Plan make() {
+    if (options_.reference.empty()) add_reference();
+    for (const auto& series : all_series()) {
+      const auto& asked = options_.series;
+      const bool is_asked = asked.empty() ? series.is_default
+                                          : std::find(asked.begin(), asked.end(), series.name) != asked.end() ||
+                                                std::find(asked.begin(), asked.end(), "all") != asked.end();
+      if (is_asked) add(series);
+    }
+    return std::move(plan_);
+  }
+
+ private:
+  void add(PlannedRun run) {
+    run.overrides.insert(run.overrides.begin(), {{"/output/paraview/skip_frame", std::to_string(skip_)},
+                                                 {"/output/paraview/options/kinetic_energy", "true"},
+                                                 {"/output/paraview/options/momentum", "true"}});
+    run.overrides.insert(run.overrides.begin(), source_.pinned.begin(), source_.pinned.end());
+    run.overrides.insert(run.overrides.begin(), options_.overrides.begin(), options_.overrides.end());
+    if (run.solver.empty()) run.solver = options_.solver;
+    plan_.runs.push_back(std::move(run));
+  }
+
+  /// The finest level, split on where that gains least of all, and never coarsened: its space has all of the uniform ones.
+  void add_reference() {
+    static const Series series = {"reference", Kind::levels, true, "what the others are compared with",
+                                  remeshed({{"/space/remesh/collapse/enabled", "false"}})};
+    const double asked = options_.reference_tolerance;
+    const double tolerance = asked > 0 ? asked : kReferenceShare * tolerances_.back();
+    plan_.reference = "reference";
+    plan_.fallback = fmt::format("uniform-{}", levels_);
+    add({plan_.reference, &series, fmt::format("{}, split on to {:g} J", source_.level_label(levels_), tolerance),
+         series.overrides + source_.refined(levels_) + with_tolerance(source_, series, tolerance), "", ""});
+  }
+
+  void add(const Series& series) {
+    switch (series.kind) {
+      case Kind::levels:
+        for (int level = 0; level <= levels_; ++level)
+          add({fmt::format("{}-{}", series.name, level), &series, source_.level_label(level),
+               series.overrides + source_.refined(level), "", plan_.reference});
+        return;
+      case Kind::tolerances:
+        for (const int start : starts_)
+          for (const double tolerance : tolerances_) add_remeshed(series, start, tolerance);
+        return;
+      case Kind::solvers:
+        for (const auto& solver : solvers_there())
+          add({fmt::format("{}-{}", series.name, folder_name(solver)), &series, solver,
+               series.overrides + source_.refined(levels_ - 1), solver, plan_.reference});
+        return;
+      case Kind::time_steps:
+        for (const int parts : {1, 2, 4})
+          add({fmt::format("{}-{}", series.name, parts), &series, fmt::format("dt {:g} s", source_.time.dt / parts),
+               series.overrides + source_.refined(levels_ - 1) + with_time_step(source_, parts, skip_), "",
+               fmt::format("{}-4", series.name)});
+        return;
+    }
+  }
+
+  void add_remeshed(const Series& series, int start, double tolerance) {
+    std::string name = fmt::format("{}-{:g}", series.name, tolerance), label = fmt::format("tolerance {:g} J", tolerance);
+    if (start > 0) name += fmt::format("-from-{}", start), label += ", from " + source_.level_label(start);
+    add({name, &series, label, series.overrides + source_.refined(start) + with_tolerance(source_, series, tolerance), "",
+         plan_.reference});
+  }
+
+  const Options& options_;
+  Source source_;
+  int levels_, skip_;
+  std::vector<double> tolerances_;
+  std::vector<int> starts_;
+  Plan plan_;
+};
+
+}  // namespace
+
+const std::vector<Series>& all_series() {
+  static const std::vector<Series> table = {
+      {"uniform", Kind::levels, true, "uniform refinement", {kFixed}},
+      {"itr", Kind::tolerances, true, "splits and collapses", remeshed()},
+      {"swaps", Kind::tolerances, true, "splits, collapses and swaps", remeshed({kSwap})},
+      {"smoothing", Kind::tolerances, true, "splits, collapses, swaps and smoothing", remeshed({kSwap, kSmooth})},
+      {"no-screening", Kind::tolerances, false, "`smoothing`, a patch relaxed for every edge",
+       remeshed({kSwap, kSmooth, {"/space/remesh/screening", "\"none\""}})},
+      {"culling", Kind::tolerances, false, "`smoothing`, the paper's culling by energy",
+       remeshed({kSwap, kSmooth, {"/space/remesh/screening", "\"energy-percentile\""}})},
+      {"sizing-field", Kind::levels, false, "the sizing-field baseline, from each uniform level",
+       remeshed({{"/space/remesh/type", "\"sizing_field\""}})},
+      {"solvers", Kind::solvers, false, "the linear solvers that are there, without remeshing", {kFixed}},
+      {"time", Kind::time_steps, false, "dt, dt/2 and dt/4 without remeshing, against dt/4", {kFixed}},
+  };
+  return table;
+}
+
+Plan make_plan(const Options& options) {
+  std::string names = "all";
+  for (const auto& series : all_series()) names += fmt::format(", {}", series.name);
+  for (const auto& name : options.series) {
+    const auto is_it = [&](const Series& series) { return name == series.name; };
+    if (name != "all" && std::none_of(all_series().begin(), all_series().end(), is_it))
+      throw InputError({"", "--series", "\"" + name + "\"", "some of " + names});
+  }
+  return Planner(options).make();
+}
+
+}  // namespace itr::cli::study

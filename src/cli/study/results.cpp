@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "results.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "itr/core/error.hpp"
+#include "itr/output/certify.hpp"
+#include "itr/output/distance.hpp"
+
+namespace itr::cli::study {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr double kSameShape = 1e-6;  ///< share of the volume that two meshes of one shape may leave uncovered
+constexpr double kSameTime = 1e-9;   ///< relative
+
+std::vector<Json> read_steps(const fs::path& folder) {
+  std::vector<Json> steps;
+  std::ifstream file(folder / "steps.jsonl");
+  for (std::string line; std::getline(file, line);) {
+    steps.push_back(Json::parse(line, nullptr, false));
+    if (steps.back().is_discarded())
+      throw InputError(
+          {(folder / "steps.jsonl").string(), fmt::format("line {}", steps.size()), line.substr(0, 40), "JSON"});
+  }
+  if (steps.size() < 2) throw InputError({(folder / "steps.jsonl").string(), "", "no step", "a run that finished"});
+  return steps;
+}
+
+/// A stored time of a run.
+struct Moment {
+  fs::path file;
+  output::FrameTotals totals;
+  double energy = 0;  ///< kinetic, elastic, body and contact [J]
+};
+
+std::vector<Moment> read_moments(const fs::path& folder, bool is_dynamic) {
+  const std::vector<Json> steps = read_steps(folder);
+  std::vector<Moment> moments;
+  for (auto& [file, totals] : output::list_frames(folder)) {
+    if (totals.step >= static_cast<int>(steps.size())) continue;
+    const Json& energy = steps[totals.step]["energy"];
+    double sum = is_dynamic ? totals.kinetic_energy.value_or(0) : 0;
+    for (const char* term : {"elastic", "body", "contact"}) sum += energy[term].get<double>();
+    moments.push_back({file, totals, sum});
+  }
+  return moments;
+}
+
+/// What identifies the frames of a folder, for as long as nobody writes there.
+std::string stamp(const std::vector<Moment>& moments) {
+  std::string text;
+  for (const auto& moment : moments)
+    text += fmt::format("{} {} ", moment.totals.step, fs::last_write_time(moment.file).time_since_epoch().count());
+  return text;
+}
+
+Json to_json(const Errors& e) {
+  return {{"l2", e.l2},      {"h1", e.h1}, {"surface", e.surface}, {"energy", e.energy}, {"momentum", e.momentum},
+          {"times", e.times}};
+}
+
+std::optional<Errors> read_kept(const fs::path& file, const std::string& key) {
+  std::ifstream stream(file);
+  const Json kept = stream ? Json::parse(stream, nullptr, false) : Json();
+  if (!kept.is_object() || kept.value("of", "") != key) return std::nullopt;
+  const Json& e = kept["errors"];
+  return Errors{e["l2"], e["h1"], e["surface"], e["energy"], e["momentum"], e["times"]};
+}
+
+double distance(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+  return std::sqrt(sum);
+}
+
+Errors compare(const std::vector<Moment>& moments, const std::vector<Moment>& references, bool is_dynamic) {
+  struct Squares {
+    double l2 = 0, h1 = 0, reference_l2 = 0, reference_h1 = 0, energy = 0, momentum = 0;
+  } sum;
+  Errors errors;
+  for (const auto& moment : moments) {
+    if (moment.totals.step == 0) continue;
+    const double t = moment.totals.t;
+    const auto is_same_time = [&](const Moment& m) { return std::abs(m.totals.t - t) <= kSameTime * std::abs(t); };
+    const auto found = std::find_if(references.begin(), references.end(), is_same_time);
+    if (found == references.end()) continue;
+    const output::FrameDistance at = output::frame_distance(moment.file, found->file);
+    if (at.uncovered > kSameShape)
+      throw InputError({moment.file.string(), "/mesh/rest",
+                        fmt::format("bodies of which {:.2g} is not in those of the reference, or the reverse", at.uncovered),
+                        "the same shapes at rest as in " + found->file.string()});
+    sum.l2 += at.l2 * at.l2;
+    sum.h1 += at.h1_semi * at.h1_semi;
+    sum.reference_l2 += at.reference_l2 * at.reference_l2;
+    sum.reference_h1 += at.reference_h1_semi * at.reference_h1_semi;
+    sum.energy += std::pow(moment.energy - found->energy, 2);
+    if (is_dynamic) sum.momentum += std::pow(distance(moment.totals.momentum, found->totals.momentum), 2);
+    errors.surface = std::max(errors.surface, at.surface);
+    ++errors.times;
+  }
+  if (errors.times == 0) return errors;
+  const auto ratio = [](double part, double whole) { return whole > 0 ? std::sqrt(part / whole) : std::sqrt(part); };
+  errors.l2 = ratio(sum.l2, sum.reference_l2);
+  errors.h1 = ratio(sum.h1, sum.reference_h1);
+  errors.energy = std::sqrt(sum.energy / errors.times);
+  errors.momentum = std::sqrt(sum.momentum / errors.times);
+  return errors;
+}
+
+}  // namespace
+
+Row read_row(const PlannedRun& run, const fs::path& folder) {
+  Row row;
+  row.run = run;
+  const std::vector<Json> steps = read_steps(folder);
+  for (std::size_t i = 1; i < steps.size(); ++i) {
+    const Json& step = steps[i];
+    row.unknowns += step["unknowns"].get<double>() / static_cast<double>(steps.size() - 1);
+    row.seconds += step["seconds"]["total"].get<double>() - step["seconds"]["output"].get<double>();
+    row.processor_seconds += step["processor_seconds"].get<double>();
+    row.newton_iterations += step["newton_iterations"].get<int>();
+    row.memory_mb = std::max(row.memory_mb, step["peak_rss_mb"].get<double>());
+  }
+  row.steps = static_cast<int>(steps.size()) - 1;
+  row.vertices = steps.back()["vertices"];
+  row.potential = steps.back()["energy"]["total"];
+  row.finished = true;
+  row.certified = output::certify(folder).passed();
+  return row;
+}
+
+Errors measure_errors(const fs::path& folder, const fs::path& reference, bool is_dynamic) {
+  const std::vector<Moment> moments = read_moments(folder, is_dynamic), references = read_moments(reference, is_dynamic);
+  const std::string key = stamp(moments) + "/ " + stamp(references);
+  const fs::path file = folder / "errors.json";
+  if (const auto kept = read_kept(file, key)) return *kept;
+  const Errors errors = compare(moments, references, is_dynamic);
+  if (errors.times == 0)
+    throw InputError({reference.string(), "frames", "no frame at a time of " + folder.string(), "frames at the same times"});
+  std::ofstream(file) << Json{{"of", key}, {"errors", to_json(errors)}}.dump(1) << '\n';
+  return errors;
+}
+
+}  // namespace itr::cli::study

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// What the runs of a study left in their folders, and how far each is from its reference.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "plan.hpp"
+
+namespace itr::cli::study {
+
+/// Over the times at which both runs have stored frames, but the first.
+struct Errors {
+  double l2 = 0, h1 = 0;  ///< of the displacement and its gradient: root mean square over time, by that of the reference
+  double surface = 0;     ///< largest Hausdorff distance of the bodies' boundaries [m]
+  double energy = 0;      ///< root mean square over time: kinetic, elastic, of loads and of contact together [J]
+  double momentum = 0;    ///< the same [kg m/s]
+  int times = 0;
+};
+
+/// One run: what it cost, and what its error is where it finished.
+struct Row {
+  PlannedRun run;
+  bool finished = false;
+  std::string reason;      ///< why it did not finish
+  bool certified = false;  ///< no frame with an intersection or an inversion
+  int steps = 0;
+  double unknowns = 0;           ///< mean over the steps
+  int vertices = 0;              ///< at the end
+  double seconds = 0;            ///< of the steps, without output
+  double processor_seconds = 0;  ///< the same, of all threads
+  double memory_mb = 0;
+  int newton_iterations = 0;
+  double potential = 0;  ///< incremental potential of the last step [J]: in statics, less is nearer to the limit
+  std::optional<Errors> errors;
+};
+
+/// Reads steps.jsonl and certifies all frames. Throws InputError where the folder cannot be read.
+Row read_row(const PlannedRun& run, const std::filesystem::path& folder);
+
+/// Distances are kept in the folder until a frame of it or of the reference changes. Throws InputError where the two have no
+/// stored time in common, or bodies of other shapes.
+Errors measure_errors(const std::filesystem::path& folder, const std::filesystem::path& reference, bool is_dynamic);
+
+}  // namespace itr::cli::study

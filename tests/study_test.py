@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""`itr study` on Cook's membrane, small. Arguments: the command, the folder of examples."""
+import csv
+import json
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import xml.etree.ElementTree as ElementTree
+
+EXAMPLES = pathlib.Path(sys.argv.pop())
+ITR = sys.argv.pop()
+SMALL = ["--set", "/geometry/0/n_refs=1", "--set", "/time/dt=0.25", "--levels", "2", "--tolerances", "4000,500", "--frames", "4"]
+
+
+def command(folder, *more):
+    return [ITR, "study", EXAMPLES / "cantilever.json", "-o", folder, *SMALL, *more]
+
+
+def study(folder, *more, status=0):
+    done = subprocess.run(command(folder, *more), capture_output=True, text=True)
+    assert done.returncode == status, done.stderr
+    return done
+
+
+def rows(folder):
+    with open(folder / "study.csv", newline="") as file:
+        return {row["run"]: row for row in csv.DictReader(file)}
+
+
+class Study(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self.temporary.name)
+
+    def tearDown(self):
+        self.temporary.cleanup()
+
+    def test_measures_ranks_and_does_nothing_twice(self):
+        first = study(self.folder, "--series", "uniform,itr,solvers,time")
+        found = rows(self.folder)
+        for name in ("reference", "uniform-0", "uniform-2", "itr-4000", "itr-500", "solvers-eigen-ldlt", "time-1", "time-4"):
+            self.assertEqual(found[name]["status"], "finished", name)
+        value = lambda run, column: float(found[run][column])
+        for k in range(2):  # P1: orders 2 and 1, less by the singular corners
+            self.assertGreater(value(f"uniform-{k}", "l2"), 2 * value(f"uniform-{k + 1}", "l2"))
+            self.assertGreater(value(f"uniform-{k}", "h1"), 1.5 * value(f"uniform-{k + 1}", "h1"))
+            self.assertGreater(value(f"uniform-{k}", "energy"), 2 * value(f"uniform-{k + 1}", "energy"))
+        self.assertLess(value("itr-500", "h1"), value("itr-4000", "h1"))
+        self.assertLess(value("itr-4000", "h1"), value("uniform-0", "h1"))
+        self.assertGreater(value("itr-500", "unknowns"), value("itr-4000", "unknowns"))
+        self.assertEqual(found["reference"]["l2"], "")
+        self.assertEqual(found["time-4"]["l2"], "")  # what the others of its series are compared with
+        # Quasistatic and elastic: another path to the same end.
+        self.assertLess(value("time-1", "h1"), 1e-2 * value("uniform-1", "h1"))
+        self.assertAlmostEqual(value("solvers-eigen-ldlt", "l2"), value("uniform-1", "l2"), delta=1e-5 * value("uniform-1", "l2"))
+        self.assertGreater(value("uniform-2", "processor_seconds"), 0)
+
+        content = json.loads((self.folder / "study.json").read_text())
+        verdict = next(v for v in content["verdicts"] if (v["series"], v["measure"]) == ("itr", "l2"))
+        self.assertAlmostEqual(verdict["finest_uniform"]["error"], value("uniform-2", "l2"), delta=1e-5 * value("uniform-2", "l2"))
+        for point, run in zip(verdict["points"], ("itr-4000", "itr-500")):
+            self.assertAlmostEqual(point["error"], value(run, "l2"), delta=1e-5 * point["error"])
+            self.assertTrue(point["unknowns_ratio"] is None or point["unknowns_ratio"] < 1)  # None: no uniform level has that error
+        orders = {(order["series"], order["measure"]): order for order in content["orders"]}
+        self.assertGreater(orders["uniform", "l2"]["in_size"], 1.3)
+        self.assertTrue(any("`itr`" in sentence and "pay" in sentence for sentence in content["answers"]))
+        self.assertTrue(any(sentence.startswith("Linear solvers") and "eigen:ldlt" in sentence for sentence in content["answers"]))
+        self.assertTrue(any("the mesh rules" in sentence for sentence in content["answers"]), content["answers"])
+        page = (self.folder / "study.md").read_text()
+        self.assertIn("For this error, run this", page)
+        self.assertIn(page, first.stdout)
+        svg = ElementTree.parse(self.folder / "study.svg").getroot()
+        lines = svg.findall("{http://www.w3.org/2000/svg}polyline")
+        self.assertEqual(len(lines), 2 * 3 * 4)  # series, costs, measures (no momentum: quasistatic)
+
+        frames = {path: path.stat().st_mtime_ns for path in self.folder.rglob("frames/*.h5")}
+        before = (self.folder / "study.csv").read_text()
+        study(self.folder, "--series", "uniform,itr,solvers,time")
+        self.assertEqual(frames, {path: path.stat().st_mtime_ns for path in self.folder.rglob("frames/*.h5")})
+        self.assertEqual(before, (self.folder / "study.csv").read_text())
+
+    def test_goes_on_where_it_was_killed(self):
+        whole, killed = self.folder / "whole", self.folder / "killed"
+        study(whole, "--series", "uniform")
+        running = subprocess.Popen(command(killed, "--series", "uniform"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        log = killed / "runs/uniform-1/steps.jsonl"
+        until = time.monotonic() + 60
+        while not log.exists() and time.monotonic() < until and running.poll() is None:
+            time.sleep(0.002)
+        running.send_signal(signal.SIGKILL)
+        running.wait()
+        self.assertTrue(log.exists())
+        self.assertFalse((killed / "study.csv").exists())
+        study(killed, "--series", "uniform")
+        for name, row in rows(whole).items():
+            self.assertEqual([row[c] for c in ("l2", "h1", "surface", "energy", "vertices", "potential")],
+                             [rows(killed)[name][c] for c in ("l2", "h1", "surface", "energy", "vertices", "potential")])
+
+    def test_told_to_stop_it_saves_and_goes_on_later(self):
+        running = subprocess.Popen(command(self.folder, "--series", "uniform"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        log = self.folder / "runs/reference/steps.jsonl"
+        until = time.monotonic() + 60
+        while not log.exists() and time.monotonic() < until and running.poll() is None:
+            time.sleep(0.002)
+        running.send_signal(signal.SIGTERM)
+        _, said = running.communicate(timeout=60)
+        self.assertEqual(running.returncode, 3)
+        self.assertIn(b"the same command goes on from there", said)
+        study(self.folder, "--series", "uniform")
+        self.assertEqual(rows(self.folder)["uniform-2"]["status"], "finished")
+
+    def test_says_what_failed_and_goes_on_without_it(self):
+        # Not with remeshing: the reference cannot run, and the finest uniform level takes its place.
+        point = '/geometry/0/point_selection=[{"id": 7, "box": [[-1, -1], [1, 1]], "relative": false}]'
+        study(self.folder, "--series", "uniform,itr", "--set", point)
+        found = rows(self.folder)
+        for name in ("reference", "itr-500"):
+            self.assertEqual(found[name]["status"], "failed")
+            self.assertIn("point_selection", found[name]["reason"])
+        self.assertEqual(found["uniform-2"]["l2"], "")
+        self.assertGreater(float(found["uniform-0"]["l2"]), float(found["uniform-1"]["l2"]))
+        page = (self.folder / "study.md").read_text()
+        self.assertIn("Errors against `uniform-2`", page)
+        self.assertIn("Failed: reference:", page)
+
+    def test_a_run_that_takes_too_long_is_ended(self):
+        subprocess.run(command(self.folder, "--series", "uniform", "--time-limit", "0.05", "--set", "/geometry/0/n_refs=4"),
+                       capture_output=True)  # whatever else finishes in time, the reference does not
+        self.assertEqual(rows(self.folder)["reference"]["reason"], "took longer than 0.05 s")
+
+    def test_a_given_reference(self):
+        reference = self.folder / "given"
+        subprocess.run([ITR, "run", EXAMPLES / "cantilever.json", "-o", reference, "--set", "/geometry/0/n_refs=2", "--set",
+                        "/time/dt=0.25", "--set", "/space/remesh/enabled=false"], check=True, capture_output=True)
+        study(self.folder / "study", "--series", "uniform", "--reference", reference)
+        found = rows(self.folder / "study")
+        self.assertNotIn("reference", found)
+        self.assertEqual(float(found["uniform-1"]["l2"]), 0)
+        self.assertGreater(float(found["uniform-2"]["l2"]), 1e-3)
+
+    def test_names_of_series_are_checked(self):
+        done = study(self.folder, "--series", "uniform,nothing", status=2)
+        self.assertIn('--series: found "nothing"', done.stderr)
+        self.assertIn("sizing-field", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
