@@ -17,6 +17,8 @@ STORED = {
     "verification/scaling/results.csv": LINEAR,
     "verification/solvers/results.csv": LINEAR,
     "verification/solvers/end_to_end.csv": LINEAR,
+    "verification/stability/results.csv": CODE,
+    **{str(path.relative_to(ROOT)): CODE for path in sorted((ROOT / "verification/paper").glob("*/study.json"))},
 }
 
 
@@ -37,7 +39,10 @@ def commit():
 def commits_of(path):
     """Pairs of what a stored file has and the commit that it was made at."""
     if path.endswith(".json"):
-        cases = json.loads((ROOT / path).read_text())["cases"]
+        content = json.loads((ROOT / path).read_text())
+        if "cases" not in content:
+            return [(path, content.get("commit", ""))]
+        cases = content["cases"]
         return [(f"{path}: {name}", case.get("versions", {}).get("itr", "")) for name, case in cases.items()]
     with open(ROOT / path, newline="") as file:
         rows = list(csv.DictReader(file))
@@ -56,5 +61,5 @@ def ages():
     """(what, commit, changes since or None) of all that is stored."""
     for path, depends in STORED.items():
         for what, made in commits_of(path):
-            case = [f"verification/cases/{what.rpartition(' ')[2]}.py"] if path.endswith(".json") else []
+            case = [f"verification/cases/{what.rpartition(' ')[2]}.py"] if what != path and path.endswith(".json") else []
             yield what, made, changes_since(made, [*depends, *case]) if made else None

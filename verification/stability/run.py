@@ -1,0 +1,232 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""Runs the hard cases, judges each, and writes results.csv and table.md.
+
+python3 verification/stability/run.py [--case PART-OF-NAME]... [--build build/release] [--runs DIR] [--results DIR]
+
+A case passes where its run finishes, is certified, its energy is bounded, forces and momentum balance, another solver comes to the
+same end, and two threads to the same bits. The exit status is 1 if any fails that is not among the known ones.
+"""
+import argparse
+import math
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path[:0] = [str(HERE.parent), str(HERE)]
+import hard_cases as cases  # noqa: E402
+import numpy as np  # noqa: E402
+from harness import stored  # noqa: E402
+from harness.scenes import Run  # noqa: E402
+from table import Verdict, number, read, write  # noqa: E402
+
+TIME_LIMIT = 300  # of a run [s]; a limit on processor time would make the kernel count it by ticks
+OTHER_SOLVER = "cholmod:supernodal"
+ENERGY_BAR = 1e-6    # growth in a step, by the largest energy of motion, strain and contact so far
+BALANCE_BAR = 1e-3   # of momentum and forces, by the sum of the forces' sizes
+AGREEMENT_BAR = 1e-6  # of positions by the scene's extent; where meshes differ, of energies AGREEMENT_OF_ENERGY
+AGREEMENT_OF_ENERGY = 1e-2
+SCALE_BAR = 1e-6     # of positions by the scene's extent, between scales
+
+
+def call(build, *arguments):
+    """Exit status and the last words of a command; a status of None where it took too long."""
+    try:
+        done = subprocess.run([str(build / "bin/itr"), *map(str, arguments)], capture_output=True, text=True, timeout=TIME_LIMIT)
+    except subprocess.TimeoutExpired:
+        return None, f"took more than {TIME_LIMIT} s"
+    said = [line for line in done.stderr.splitlines() if line.startswith("itr: ")] or done.stdout.splitlines()[:1] or [""]
+    return done.returncode, said[-1].removeprefix("itr: ")
+
+
+def violations(build, scene, folder):
+    """What `itr certify` finds; where nothing touches, bodies may pass through themselves."""
+    done = subprocess.run([str(build / "bin/itr"), "certify", str(folder)], capture_output=True, text=True)
+    found = done.stdout.splitlines()[:-1]
+    return found if scene.contact else [line for line in found if "inverted" in line or "degenerate" in line]
+
+
+def simulate(build, scene, folder, *more):
+    shutil.rmtree(folder, ignore_errors=True)
+    status, words = call(build, "run", scene.folder / "scene.json", "-o", folder, *more)
+    return "" if status == 0 else words or f"exit status {status}"
+
+
+def totals(path):
+    """Of a frame: kinetic energy, momentum, sum of all forces, sum of their sizes."""
+    import h5py
+    with h5py.File(path) as file:
+        forces = [file["fields/" + name][()] for name in ("contact_force", "friction_force", "reaction_force")
+                  if "fields/" + name in file]
+        return (float(file["totals/kinetic_energy"][()][0]), file["totals/momentum"][()].ravel(),
+                sum(f.sum(axis=0) for f in forces) if forces else 0.0, sum(np.abs(f).sum() for f in forces))
+
+
+def frame_paths(folder):
+    return sorted((folder / "frames").glob("*.h5"))
+
+
+def energy_growth(scene, run, states):
+    """Largest growth in a step by what is stored so far; of driven scenes nothing but that it is finite."""
+    rows = [(0.0 if scene.quasistatic else state[0], s["energy"]) for s, state in zip(run.steps, states)]
+    stored_energy = [kinetic + e["elastic"] + e["contact"] for kinetic, e in rows]
+    whole = [own + e["body"] for own, (_, e) in zip(stored_energy, rows)]
+    if not np.isfinite(whole).all():
+        return math.nan
+    if scene.driven or scene.quasistatic:
+        return 0.0
+    return max((b - a) / max(max(np.abs(stored_energy[:k + 2])), 1e-300) for k, (a, b) in enumerate(zip(whole, whole[1:])))
+
+
+def balance(scene, states):
+    """Largest imbalance of a step: change of momentum, contact, friction, what holds, and weight; by the largest so far."""
+    weight = np.zeros(scene.dim)
+    weight[1] = -scene.gravity * scene.mass
+    worst = size = 0.0
+    for before, now in zip(states, states[1:]):
+        inertia = 0 if scene.quasistatic else (now[1] - before[1]) / scene.dt
+        size = max(size, now[3] + np.abs(weight).sum() + np.abs(inertia).sum())
+        if size > 0:
+            worst = max(worst, float(np.abs(inertia - now[2] - weight).max() / size))
+    return worst
+
+
+def quality(frame):
+    """The worst of its cells, deformed."""
+    corners = frame.x[frame.cells]
+    dim = corners.shape[2]
+    volume = np.linalg.det(corners[:, 1:] - corners[:, :1]) / (2 if dim == 2 else 6)
+    pairs = [(i, j) for i in range(dim + 1) for j in range(i)]
+    edge = np.sqrt(np.mean([((corners[:, i] - corners[:, j])**2).sum(axis=1) for i, j in pairs], axis=0))
+    return float((volume / ((math.sqrt(3) / 4 if dim == 2 else math.sqrt(2) / 12) * edge**dim)).min())
+
+
+def extent(frame):
+    return float(np.ptp(frame.x, axis=0).max())
+
+
+def disagreement(a, b):
+    """Of two ends of one scene: positions by the extent, or infinity and the difference of energies where meshes differ."""
+    x, y = a.last(), b.last()
+    if x.x.shape == y.x.shape and np.array_equal(x.cells, y.cells):
+        return float(np.abs(x.x - y.x).max() / extent(x)), None
+    e, f = (run.steps[-1]["energy"]["elastic"] + run.steps[-1]["energy"]["contact"] for run in (a, b))
+    return math.inf, abs(e - f) / max(abs(e), abs(f), 1e-300)
+
+
+def same_bits(a, b):
+    import h5py
+    first, second = frame_paths(a), frame_paths(b)
+    if [p.name for p in first] != [p.name for p in second]:
+        return False
+    for p, q in zip(first, second):
+        with h5py.File(p) as f, h5py.File(q) as g:
+            if any(f[name][()].tobytes() != g[name][()].tobytes() for name in ("fields/x", "fields/v", "mesh/simplices")):
+                return False
+    return True
+
+
+def judge(name, build, runs):
+    """(verdict, run or None, scene)."""
+    folder = runs / name
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    scene = cases.build(name, folder)
+    verdict = Verdict(name, dim=scene.dim, remeshed=scene.remesh is not None, commit=stored.commit())
+    failures = []
+    if reason := simulate(build, scene, folder / "one", "--threads", 1):
+        failures.append("does not finish: " + reason.split("; `itr run`")[0])
+    run = None
+    if frame_paths(folder / "one"):
+        failures += [f"not certified: {words}" for words in violations(build, scene, folder / "one")[:1]]
+    if not failures:
+        run = Run(folder / "one")
+        states = [totals(path) for path in frame_paths(folder / "one")]
+        steps = run.steps[1:]
+        verdict.steps = len(steps)
+        verdict.processor_seconds = sum(s["processor_seconds"] for s in steps)
+        distances = [s["min_distance"] for s in steps if s["min_distance"] is not None]
+        verdict.min_distance = min(distances) / scene.size if distances else math.nan
+        verdict.worst_volume = min(s["min_volume_ratio"] for s in steps)
+        verdict.worst_quality = quality(run.last())
+        verdict.vertices = steps[-1]["vertices"]
+        verdict.energy_growth = energy_growth(scene, run, states)
+        if not verdict.energy_growth <= ENERGY_BAR:
+            failures.append(f"energy grows by {verdict.energy_growth:.2g} in a step")
+        if not verdict.remeshed:
+            verdict.balance = balance(scene, states)
+            if not verdict.balance <= BALANCE_BAR:
+                failures.append(f"forces are off balance by {verdict.balance:.2g}")
+        failures += compare_runs(build, scene, folder, run, verdict)
+    verdict.failures = "; ".join(failures)
+    verdict.passed = not failures
+    return verdict, run, scene
+
+
+def compare_runs(build, scene, folder, run, verdict):
+    """Another solver, another number of threads."""
+    if reason := simulate(build, scene, folder / "two", "--threads", 2):
+        yield "does not finish on two threads: " + reason
+    elif not same_bits(folder / "one", folder / "two"):
+        yield "two threads give other bits"
+    shutil.rmtree(folder / "two", ignore_errors=True)
+    if reason := simulate(build, scene, folder / "other", "--threads", 1, "--solver", OTHER_SOLVER):
+        yield f"does not finish with {OTHER_SOLVER}: {reason}"
+        return
+    verdict.agreement, of_energy = disagreement(run, Run(folder / "other"))
+    shutil.rmtree(folder / "other", ignore_errors=True)
+    if scene.chaotic:
+        return
+    if of_energy is None and not verdict.agreement <= AGREEMENT_BAR:
+        yield f"{OTHER_SOLVER} ends {verdict.agreement:.2g} of the extent away"
+    if of_energy is not None and not of_energy <= AGREEMENT_OF_ENERGY:
+        yield f"{OTHER_SOLVER} makes another mesh, with an energy {of_energy:.2g} off"
+
+
+def judge_scales(found):
+    """Runs that differ by their unit only, against that in metres."""
+    for name, (verdict, run, scene) in found.items():
+        unit = name.split("_")[1] if name.startswith("scale_") else "m"
+        if unit == "m" or run is None:
+            continue
+        _, other, other_scene = found.get(name.replace(f"scale_{unit}", "scale_m"), (None, None, None))
+        if other is None:
+            continue
+        x, y = run.last(), other.last()
+        if x.x.shape != y.x.shape:
+            off = math.inf
+        else:
+            off = float(np.abs(x.x / scene.size - y.x / other_scene.size).max() / (extent(y) / other_scene.size))
+        if not off <= SCALE_BAR:
+            verdict.passed = False
+            words = "has another mesh than" if math.isinf(off) else f"ends {off:.2g} of the extent away from"
+            verdict.failures = "; ".join(filter(None, [verdict.failures, f"{words} the scene in metres"]))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--case", action="append", help="only those whose names have this in them")
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser.add_argument("--runs", type=pathlib.Path, default=ROOT / "results/stability")
+    parser.add_argument("--results", type=pathlib.Path, default=HERE)
+    options = parser.parse_args()
+    names = [name for name in cases.CASES if not options.case or any(part in name for part in options.case)]
+    found = {}
+    for name in names:
+        found[name] = judge(name, options.build.resolve(), options.runs.resolve())
+        verdict = found[name][0]
+        print(f"{'ok  ' if verdict.passed else 'FAIL'} {name:28} {number(verdict.processor_seconds):>8} s  {verdict.failures}", flush=True)
+    judge_scales(found)
+    rows = {row.case: row for row in read(options.results / "results.csv")} if (options.results / "results.csv").exists() else {}
+    rows |= {name: verdict for name, (verdict, _, _) in found.items()}
+    write(options.results, [rows[name] for name in cases.CASES if name in rows])
+    return 0 if all(verdict.passed for verdict, _, _ in found.values()) else 1
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    sys.exit(main())
