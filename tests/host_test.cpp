@@ -90,7 +90,9 @@ TEST(HostLoop, ConditionsChangeBetweenSteps) {
   simulation.conditions().body_acceleration = nullptr;
   ASSERT_TRUE(simulation.advance().ok);
   for (int v = 0; v < simulation.state().mesh.vertex_slots(); ++v)
-    if (simulation.state().mesh.rest(v)[0] == 0) EXPECT_NEAR(simulation.state().history.x[0][2 * v], 0.01, 1e-15);
+    if (simulation.state().mesh.rest(v)[0] == 0) {
+      EXPECT_NEAR(simulation.state().history.x[0][2 * v], 0.01, 1e-15);
+    }
 }
 
 TEST(HostLoop, ReplaysWithTheSameBits) {

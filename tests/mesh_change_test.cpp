@@ -80,8 +80,9 @@ void check(const Mesh<Dim>& before, const Mesh<Dim>& mesh, const MeshChange<Dim>
       ASSERT_GT(it.value(), 0);
   EXPECT_LT((change.interpolation * linear_fields(before) - linear_fields(mesh)).cwiseAbs().maxCoeff(), 1e-12);
   for (int v = 0; v < before.vertex_slots(); ++v)
-    if (const int now = change.vertex[v]; now != kNone && mesh.rest(now) == before.rest(v))
+    if (const int now = change.vertex[v]; now != kNone && mesh.rest(now) == before.rest(v)) {
       ASSERT_EQ(change.interpolation.coeff(now, v), 1);
+    }
   // Projection: keeps integrals of any field.
   const MatrixX field = MatrixX::Random(before.vertex_slots(), 2);
   const MatrixX projected = project_fields(before, mesh, change, field);

@@ -8,7 +8,6 @@ import pathlib
 import subprocess
 import sys
 import tempfile
-import types
 
 import h5py
 import numpy
@@ -30,22 +29,34 @@ def check_colours(examples, frame):
     assert (Frame(frame, "v").unit, Frame(frame, "von_mises").unit) == ("m/s", "Pa")
 
 
-def check_lengths_in_space(examples):
-    """A unit has one length along all three axes (Gauss: the squares of its projections, as complex numbers, sum to 0)."""
-    from matplotlib.colors import LogNorm
-    from mpl_toolkits.mplot3d import proj3d
-    from render import draw, make_axes
+SCALE_CHECK = """
+import sys, types
+import numpy
+sys.path.insert(0, sys.argv[1])
+from solid_images import SolidImages, ensure_display
+ensure_display()
+corners = numpy.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 1], [4, 4, 1]], float)
+faces = numpy.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+frame = types.SimpleNamespace(x=corners, rest=corners, cells=numpy.array([[0, 1, 2, 3]]), obstacle_faces=[],
+                              outer_faces=lambda kept: (faces, numpy.zeros(4, int)))
+box = corners.min(axis=0), corners.max(axis=0)
+image = SolidImages(box, (400, 400), [0, 0, 1], 1).image(frame, numpy.array([[1.0, 0, 0]]))
+rows, columns = numpy.nonzero(image.min(axis=2) < 250)
+print(numpy.ptp(rows), numpy.ptp(columns))
+"""
 
-    corners = numpy.array([[0, 0, 0], [4, 0, 0], [0, 2, 0], [0, 0, 1]], float)
-    frame = types.SimpleNamespace(dim=3, step=0, t=0, x=corners, cells=[[0, 1, 2, 3]], obstacle_faces=[],
-                                  polygons=lambda: (corners[None, :3], numpy.ones(1)))
-    box = corners.min(axis=0), corners.max(axis=0)
-    axes = make_axes([frame], box, 1)[1][0]
-    draw(axes, frame, LogNorm(0.1, 1), box)
-    axes.set_proj_type("ortho")
-    x, y, _ = proj3d.proj_transform(*numpy.vstack([numpy.zeros(3), numpy.eye(3)]).T, axes.get_proj())
-    units = (x[1:] - x[0]) + 1j * (y[1:] - y[0])
-    assert abs((units**2).sum()) < 1e-9 * (abs(units)**2).sum(), units
+
+def check_lengths_in_space(examples, scratch):
+    """Seen from the front, a body that is as wide as high is drawn so."""
+    program = scratch / "scale.py"
+    program.write_text(SCALE_CHECK)
+    done = subprocess.run([sys.executable, program, str(examples)], capture_output=True, text=True)
+    if "packages" in done.stderr:
+        print("skipped the pictures of solids:", done.stderr.strip())
+        return
+    assert done.returncode == 0, done.stderr
+    high, wide = (int(word) for word in done.stdout.split())
+    assert wide > 100 and abs(high - wide) <= 2, (high, wide)
 
 
 def main():
@@ -60,7 +71,7 @@ def main():
         frames = len(stored)
         assert frames > 3, frames
         check_colours(examples, stored[-1])
-        check_lengths_in_space(examples)
+        check_lengths_in_space(examples, folder)
 
         def render(*arguments, status=0):
             done = subprocess.run([sys.executable, examples / "render.py", folder / "run", *arguments], capture_output=True,

@@ -98,7 +98,8 @@ PotentialTerms<Dim> potential_terms(const Setup<Dim>& setup, const History& hist
           .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
           .velocity_rate = integrator.velocity_rate(history),
           .host = setup.terms,
-          .t = t};
+          .t = t,
+          .follower = {}};
 }
 
 template <int Dim>
