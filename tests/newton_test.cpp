@@ -12,14 +12,14 @@
 namespace itr {
 namespace {
 
-/// sum over the dofs of x^4 / 4 - c x^2 / 2: a saddle at 0, minima at +-sqrt(c). Its "projected" Hessian is much stiffer
-/// than the true one near the saddle, as the sum of projected element Hessians is near a buckling load.
+/// A constant and the sum over the dofs of x^4 / 4 - c x^2 / 2: a saddle at 0, minima at +-sqrt(c). Its "projected" Hessian
+/// is much stiffer than the true one near the saddle, as the sum of projected element Hessians is near a buckling load.
 class DoubleWell final : public Energy {
  public:
-  explicit DoubleWell(double c) : c_(c) {}
+  explicit DoubleWell(double c, double constant = 0) : c_(c), constant_(constant) {}
   std::string_view name() const override { return "double well"; }
   double value(ConstVectorView x, Workspace&) const override {
-    return (x.array().pow(4) / 4 - c_ * x.array().square() / 2).sum();
+    return constant_ + (x.array().pow(4) / 4 - c_ * x.array().square() / 2).sum();
   }
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
     gradient.array() += x.array().cube() - c_ * x.array();
@@ -36,7 +36,7 @@ class DoubleWell final : public Energy {
   }
 
  private:
-  double c_;
+  double c_, constant_;
 };
 
 TEST(Newton, LeavesASaddleInFewSteps) {
@@ -116,6 +116,29 @@ TEST(Newton, CallsNoSaddleConverged) {
       EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
       EXPECT_GT(summary.indefinite, 0) << name;
       EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-4 / (2 * c)) << name;  // by the curvature there
+    }
+}
+
+/// A saddle so flat that steps from it promise less than the energy resolves: not a place to end, and which of the equal
+/// minima follows must not hang on round-off in the gradient.
+TEST(Newton, LeavesASaddleWithinRoundOffToOneSide) {
+  const double c = 1e-2;
+  linear::Registry registry;
+  for (const char* name : {"eigen:llt", "eigen:ldlt"})
+    for (const double noise : {1e-12, -1e-12}) {
+      const auto solver = registry.create(name);
+      SparseSystem system(*solver);
+      const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
+      system.reset(dofs, 2, {}, 3);
+      VectorX x = VectorX::Constant(2, noise);
+      NewtonOptions options;
+      options.gradient_tolerance = options.first_gradient_tolerance = 0;
+      options.step_tolerance = 1e-16;
+      options.extend_steps = false;  // they would leave the saddle without asking what it is
+      Workspace workspace;
+      const NewtonSummary summary = minimize(DoubleWell(c, 1), x, dofs, VectorX(), system, options, workspace);
+      EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
+      EXPECT_LE((x.array() - std::sqrt(c)).abs().maxCoeff(), 1e-6) << name << " from " << noise;
     }
 }
 

@@ -81,18 +81,19 @@ class Minimizer {
       compute_gradient();
       if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
       if (!moving_ && has_small_gradient()) {
-        if (!is_at_saddle()) return stop(Termination::gradient);
-        if (!leave_saddle()) return stop(Termination::round_off, kFlatSaddle);
-        continue;
+        if (can_leave_saddle()) continue;
+        return finish(Termination::gradient);
       }
       if (!compute_direction())
         return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
       if (const bool by_step = has_small_step(); by_step || (!moving_ && decrement() < options_.decrement_tolerance)) {
-        if (!is_at_saddle()) return stop(by_step ? Termination::step : Termination::decrement);
-        if (!leave_saddle()) return stop(Termination::round_off, kFlatSaddle);
-        continue;
+        if (can_leave_saddle()) continue;
+        return finish(by_step ? Termination::step : Termination::decrement);
       }
-      if (is_lost_in_round_off()) return stop(Termination::round_off, kAtRoundOff);
+      if (is_lost_in_round_off()) {
+        if (can_leave_saddle()) continue;
+        return finish(Termination::round_off, kAtRoundOff);
+      }
       const double before = value_;
       if (!line_search() && !retry_projected()) {
         const bool relaxed = is_unresolved();
@@ -101,8 +102,9 @@ class Minimizer {
           if (++blocked_ > kMaxBlocked) return stop(Termination::no_descent, describe_way_left());
           continue;
         }
-        if (relaxed) return stop(Termination::round_off, kAtRoundOff);
-        return stop(Termination::no_descent, "the line search found no step");
+        if (!relaxed) return stop(Termination::no_descent, "the line search found no step");
+        if (can_leave_saddle()) continue;
+        return finish(Termination::round_off, kAtRoundOff);
       }
       const bool stalled = has_stalled(before);
       if (extras_.after_step && extras_.after_step(x_)) value_ = timed_value(x_);
@@ -135,6 +137,14 @@ class Minimizer {
     std::ostringstream text;
     text << "held vertices cannot reach their targets, up to " << longest << " m are left";
     return text.str();
+  }
+
+  /// Where a solve would end: whether that is a saddle, and x is lower now.
+  bool can_leave_saddle() { return is_at_saddle() && leave_saddle(); }
+
+  NewtonSummary finish(Termination termination, std::string message = {}) {
+    if (is_at_saddle()) return stop(Termination::round_off, kFlatSaddle);
+    return stop(termination, std::move(message));
   }
 
   NewtonSummary stop(Termination termination, std::string message = {}) {
@@ -335,9 +345,10 @@ class Minimizer {
     step_.setZero(x_.size());
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = direction[dofs_.unknown[i]];
-    if (step_.dot(gradient_) > 0) step_ = -step_;
-    // From the shortest way that the energy resolves on.
+    // From the shortest way that the energy resolves on. Down the slope, or where that is round-off, to the side that the
+    // eigenvector has with any linear solver: the other branch may be as low.
     step_ *= std::max(options_.step_tolerance, std::sqrt(2 * kRoundOff * std::abs(value_) / -curvature));
+    if (step_.dot(gradient_) > kRoundOff * std::abs(value_)) step_ = -step_;
     for (int k = 0; k < kMostDoublings; ++k, step_ *= 2) {
       {
         const ScopedTimer timer(summary_.ccd_seconds);
