@@ -173,6 +173,33 @@ TEST(Newton, EndsAtRoundOffAndSaysSo) {
   EXPECT_LT(summary.iterations, 100);
 }
 
+/// A quadratic whose minimum lies between coordinates that doubles have.
+class FarBowl final : public Energy {
+ public:
+  std::string_view name() const override { return "far bowl"; }
+  double value(ConstVectorView x, Workspace&) const override { return away(x).squaredNorm() / 2; }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override { gradient += away(x); }
+  void add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const override {
+    for (int v = 0; v < x.size() / 2; ++v) sink.add<2>(std::array{v}, Mat<2>(Mat<2>::Identity()).data());
+  }
+
+ private:
+  static VectorX away(ConstVectorView x) { return (x.array() - 1e6 - 4e-11).matrix(); }
+};
+
+TEST(Newton, EndsAtTheRoundOffOfPositions) {
+  VectorX x = VectorX::Constant(4, 1e6 + 1);
+  const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+  DenseSystem system;
+  NewtonOptions options;
+  options.step_tolerance = options.gradient_tolerance = options.first_gradient_tolerance = 1e-12;  // the spacing is 1e-10
+  Workspace workspace;
+  const NewtonSummary summary = minimize(FarBowl(), x, dofs, VectorX(), system, options, workspace);
+  EXPECT_EQ(summary.termination, Termination::round_off) << to_string(summary.termination);
+  EXPECT_LT(summary.iterations, 100);
+  EXPECT_LE((x.array() - 1e6).abs().maxCoeff(), 2e-10);
+}
+
 TEST(Newton, CallsBackAfterEachStepAndTakesInAChangedEnergy) {
   VectorX x = VectorX::Constant(4, 2.0);
   const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));

@@ -193,6 +193,19 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
   EXPECT_EQ(line["energy"]["total"].get<double>(), 1.0 / 3);  // the same bits
 }
 
+TEST(PeakMemory, GrowsByWhatIsTouchedAndStays) {
+  constexpr double kMegabytes = 64;
+  const double before = peak_rss_mb();
+  EXPECT_GT(before, 1);
+  {
+    std::vector<char> touched(static_cast<std::size_t>(kMegabytes * 1024 * 1024), 1);
+    EXPECT_EQ(touched.back(), 1);
+  }
+  const double after = peak_rss_mb();
+  EXPECT_GT(after, before + 0.5 * kMegabytes);  // some of it may have been there before, freed
+  EXPECT_LT(after, before + 1.5 * kMegabytes);
+}
+
 TEST_F(OutputTest, EachLineIsThereAsSoonAsItsStep) {
   Writer writer = make_writer();
   for (int step = 0; step < 5; ++step) {

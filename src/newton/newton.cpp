@@ -51,7 +51,8 @@ namespace {
 constexpr double kArmijo = 1e-4;
 constexpr double kRoundOff = 1e-9;     ///< relative change of energy below which slopes tell more
 constexpr double kUnresolved = 1e-14;  ///< relative change of energy that a sum of many terms does not resolve
-constexpr const char* kAtRoundOff = "converged to the round-off of the energy, above the tolerances asked for";
+constexpr double kSpacing = 8 * std::numeric_limits<double>::epsilon();  ///< of the largest coordinate
+constexpr const char* kAtRoundOff = "converged to the round-off of energy and positions, above the tolerances asked for";
 constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
 constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less than that
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
@@ -230,9 +231,12 @@ class Minimizer {
   /// What the full step promises.
   double decrement() const { return -0.5 * free_dot(step_, gradient_); }
 
-  bool is_unresolved() const { return decrement() < kUnresolved * std::abs(value_); }
+  bool is_unresolved() const { return decrement() < kUnresolved * std::abs(value_) || is_below_spacing(); }
 
-  /// Whether many steps in a row promised less than the energy resolves: the gradient is round-off, and stays.
+  /// Whether the step is one of the last bits of positions, which far from the origin are long.
+  bool is_below_spacing() const { return step_.lpNorm<Eigen::Infinity>() <= kSpacing * x_.lpNorm<Eigen::Infinity>(); }
+
+  /// Whether many steps in a row promised less than energy or positions resolve: the gradient is round-off, and stays.
   bool is_lost_in_round_off() {
     unresolved_ = !moving_ && is_unresolved() ? unresolved_ + 1 : 0;
     return unresolved_ >= kMostUnresolved;

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <limits>
 
+#include "check_keys.hpp"
 #include "collision_mesh.hpp"
 #include "conditions.hpp"
 #include "geometry.hpp"
-#include "known_keys.hpp"
 #include "materials.hpp"
 #include "merge.hpp"
 #include "options.hpp"

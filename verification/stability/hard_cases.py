@@ -10,6 +10,15 @@ import numpy as np
 from harness.scenes import box_mesh, write_mesh
 
 CASES = {}
+# Cases that are to end as another one does, up to their size: (that one, whether to the last bit).
+LIKE = {}
+# Cases that fail, and why; one that passes is to be taken off.
+KNOWN = {
+    "impact_1e3_two_bodies":
+        "its steps take up to 2 068 iterations (with 20 000 allowed it ends, certified): rho v^2 is a thousand times the barrier's "
+        "stiffness, gaps are 1e-6 of dhat, and a vertex that slides along an edge that turns goes sqrt(gap * length) an iteration; "
+        "impact_1e3_two_bodies_stiff has a barrier for this speed",
+}
 
 
 @dataclasses.dataclass
@@ -30,7 +39,8 @@ class Scene:
     remesh: float | None = None  # split tolerance [J]
     operations: dict = dataclasses.field(default_factory=dict)  # further keys of /space/remesh
     driven: bool = False         # held vertices or obstacles move: they do work, so energy need not fall
-    chaotic: bool = False        # round-off decides: solvers need not agree
+    chaotic: bool = False        # round-off grows: only means over the run are compared between solvers
+    fully_decided: bool = True   # by tolerances: else round-off decides from the first operation on, and nothing is compared
     bodies: list = dataclasses.field(default_factory=list)
     obstacles: list = dataclasses.field(default_factory=list)
     held: list = dataclasses.field(default_factory=list)
@@ -49,7 +59,7 @@ class Scene:
         edges = points[cells[:, 1:]] - points[cells[:, :1]]
         self.mass += rho * np.abs(np.linalg.det(edges)).sum() / (2 if self.dim == 2 else 6)
         self.bodies.append(({"mesh": str(path), "volume_selection": number,
-                             "surface_selection": {"threshold": 1e-6 * self.size + 1e-9 * self.origin, "id_offset": 10 * number}},
+                             "surface_selection": {"threshold": 1e-6 * self.size, "id_offset": 10 * number}},
                             {"id": number, "type": "NeoHookean", "E": E, "nu": nu, "rho": rho, **material}))
         if velocity is not None:
             self.velocity.append({"id": number, "value": list(velocity)})
@@ -101,8 +111,9 @@ class Scene:
             "time": {"dt": self.dt, "time_steps": self.steps, "quasistatic": self.quasistatic},
             "contact": {"enabled": self.contact, "dhat": self.dhat * self.size, "use_convergent_formulation": True,
                         "friction_coefficient": self.friction},
-            "solver": {"contact": {"barrier_stiffness": self.kappa, "friction_iterations": 20},
-                       "nonlinear": {"x_delta": (1e-9 * self.size + 1e-13 * self.origin) / (self.dt * self.steps), "grad_norm": 1e-300,
+            "solver": {"contact": {"barrier_stiffness": self.kappa, "friction_iterations": 20,
+                                   "friction_convergence_tol": 1e-2 * self.size**self.dim},
+                       "nonlinear": {"x_delta": 1e-9 * self.size / (self.dt * self.steps), "grad_norm": 1e-300,
                                      "max_iterations": 1000, "advanced": {"first_grad_norm_tol": 1e-300}}},
             "output": {"paraview": {"options": {name: True for name in (
                 "contact_forces", "friction_forces", "reaction_forces", "kinetic_energy", "momentum")}}},
@@ -278,11 +289,12 @@ def edges(scene, crossed=False):
 
 # --- speed, steps, strain --------------------------------------------------------------------------------------------
 
-@case(impact_1e3=(2, None), impact_1e3_remeshed=(2, 1e3), impact_1e3_3d=(3, None), impact_1e3_two_bodies=(2, None, True))
+@case(impact_1e3=(2, None), impact_1e3_remeshed=(2, 1e3), impact_1e3_3d=(3, None), impact_1e3_two_bodies=(2, None, 1e6),
+      impact_1e3_two_bodies_stiff=(2, None, 1e9))
 def impact(scene, value):
-    """A thousand metres a second, ten times the speed of sound in the body."""
+    """A thousand metres a second, ten times the speed of sound in the body: a pressure of 1e9 Pa."""
     scene.dim, scene.remesh, *two = value
-    scene.dt, scene.steps, scene.gravity, scene.kappa = 2e-5, 40, 0.0, 1e6
+    scene.dt, scene.steps, scene.gravity, scene.kappa = 2e-5, 40, 0.0, two[0] if two else 1e6
     counts, velocity = ([4, 4] if scene.dim == 2 else [2, 2, 2]), [0, -1000.0, 0][:scene.dim]
     scene.box(counts, [0, 0.01, 0][:scene.dim], [1, 1.01, 1][:scene.dim], E=1e7, velocity=velocity)
     if two:
@@ -328,8 +340,10 @@ def twist(scene, value):
 @case(sharp_corners=(2, 0.0, None), sharp_corners_friction=(2, 0.5, None), sharp_corners_remeshed=(2, 0.3, 0.05),
       sharp_ridges_3d=(3, 0.3, None))
 def corners(scene, value):
-    """A block dragged over teeth."""
+    """A block dragged over teeth. It sticks and slips: where it is remeshed, a share of 10^-9 of the barrier's stiffness decides
+    in which step it lets go, and moves the energy at the end by 11 %, with one solver."""
     scene.dim, scene.friction, scene.remesh = value
+    scene.chaotic = scene.remesh is not None
     scene.gravity, scene.dt, scene.steps = 0.0, 0.02, 50
     teeth = [[0.1 * k, -0.05 * (k % 2)] for k in range(-5, 40)]
     if scene.dim == 2:
@@ -359,6 +373,28 @@ def scaled(scene, value):
     scene.dt, scene.gravity = 0.01 * scene.size, 9.81 / scene.size
     scene.floor()
     scene.box([4, 2, 2][:scene.dim], [0, 0.002, 0][:scene.dim], [1, 0.5, 1][:scene.dim], velocity=[0.3, -1, 0][:scene.dim])
+
+
+LIKE |= {f"scale_{unit}{kind}": (f"scale_m{kind}", False) for unit in SCALES if unit != "m" for kind in ("", "_remeshed", "_3d")}
+
+POWERS = {"one": 1.0, "small": 2.0**-24, "large": 2.0**24}
+
+
+@case(**{f"exact_{name}": (2, s, None) for name, s in POWERS.items()},
+      **{f"exact_{name}_remeshed": (2, s, 0.02) for name, s in POWERS.items()},
+      **{f"exact_{name}_3d": (3, s, None) for name, s in POWERS.items()},
+      **{f"exact_{name}_3d_remeshed": (3, s, 0.2) for name, s in POWERS.items()})
+def exactly_scaled(scene, value):
+    """The same with friction and swaps, by powers of two: without rounding all numbers scale, and a length, force or time that the
+    program takes for granted would change bits."""
+    scaled(scene, value)
+    scene.friction, scene.steps = 0.3, 10
+    if scene.remesh:
+        scene.operations["swap"] = {"enabled": True, "acceptance_tolerance": 0.1 * scene.remesh}
+
+
+LIKE |= {f"exact_{name}{kind}": (f"exact_one{kind}", True) for name in ("small", "large")
+         for kind in ("", "_remeshed", "_3d", "_3d_remeshed")}
 
 
 @case(far_1e6=(2, None), far_1e6_remeshed=(2, 0.05), far_1e6_3d=(3, None))
@@ -397,7 +433,7 @@ def codimensional(scene, value):
 @case(storm_2d=2, storm_3d=3)
 def storm(scene, dim):
     """Every split that gains anything and every other operation that is possible is accepted; two bodies in contact."""
-    scene.dim, scene.steps, scene.chaotic = dim, 4 if dim == 2 else 2, True
+    scene.dim, scene.steps, scene.fully_decided = dim, 4 if dim == 2 else 2, False
     scene.remesh = 1e-300
     scene.operations = {"split": {"acceptance_tolerance": 1e-300, "min_edge_length": 0.2, "max_depth": 1},
                         "collapse": {"acceptance_tolerance": -1e9, "rel_max_edge_length": 1e9},

@@ -90,7 +90,7 @@ enum class Termination {
   step,        ///< full Newton step below tolerance
   decrement,   ///< Newton decrement below tolerance
   energy,      ///< energy does not change any more
-  round_off,   ///< what a full step would gain is below the round-off of the energy
+  round_off,   ///< what a full step would gain or move is below round-off
   iterations,  ///< out of iterations
   no_descent,  ///< no direction or no step that lowers the energy, and the gradient is not small
   infeasible,  ///< the start is not feasible or a number is not finite

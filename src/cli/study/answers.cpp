@@ -217,9 +217,10 @@ std::vector<std::string> answers(const Results& results) {
   const auto add = [&](std::string sentence) {
     if (!sentence.empty()) sentences.push_back(std::move(sentence));
   };
+  const auto all = verdicts(results);
   for (const auto& measure : measures()) {
     if (!is_judged(measure)) continue;
-    for (const auto& verdict : verdicts(results))
+    for (const auto& verdict : all)
       if (verdict.measure == &measure) add(in_words(verdict));
     add(time_step_answer(results, measure));
   }

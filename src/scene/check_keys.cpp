@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "known_keys.hpp"
+#include "check_keys.hpp"
 
 #include "key_table.hpp"
 
