@@ -15,6 +15,7 @@
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
 #include "itr/output/writer.hpp"
+#include "itr/simulation/step.hpp"
 
 namespace itr::output {
 namespace {
