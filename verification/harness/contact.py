@@ -34,10 +34,27 @@ def vertex_lengths(rest, cells):
     return lengths
 
 
+def vertex_areas(rest, cells, chosen):
+    """A third of the areas of the boundary triangles at each vertex, of those triangles whose vertices are all chosen."""
+    faces = np.concatenate([np.delete(cells, k, axis=1) for k in range(4)])
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    faces = faces[first[count == 1]]
+    faces = faces[chosen[faces].all(axis=1)]
+    sides = rest[faces[:, 1:]] - rest[faces[:, :1]]
+    areas = np.zeros(len(rest))
+    np.add.at(areas, faces, np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)[:, None] / 6)
+    return areas
+
+
 def write_line(path, *points):
     """A polyline as an obstacle's mesh."""
     path.write_text("".join(f"v {x:.17g} {y:.17g} 0\n" for x, y in points)
                     + "l " + " ".join(str(k + 1) for k in range(len(points))) + "\n")
+
+
+def write_plane(path, height, size=40.0):
+    """A level triangle as an obstacle's mesh, with its edges far from the origin."""
+    path.write_text(f"v {-size} {-size} {height:.17g}\nv {3 * size} {-size} {height:.17g}\nv {-size} {3 * size} {height:.17g}\nf 1 2 3\n")
 
 
 def with_obstacle(content, path, dhat, kappa, **contact):
