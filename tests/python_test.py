@@ -4,9 +4,14 @@
 usage: PYTHONPATH=BUILD_DIR/python python_test.py SOURCE_DIR
 """
 
+import ctypes
 import gc
+import inspect
 import pathlib
+import shutil
+import subprocess
 import sys
+import tempfile
 import threading
 import unittest
 
@@ -122,6 +127,44 @@ class Conditions(unittest.TestCase):
         simulation.step()
         np.testing.assert_allclose(simulation.forces("applied"), 0)
 
+    def test_pressures_and_accelerations_are_constants_arrays_or_functions(self):
+        for method, constant, shape in (("set_pressure", 50.0, (16,)), ("set_acceleration", [1.0, -10.0], (16, 2))):
+            results = []
+            for value in (constant, np.broadcast_to(constant, shape), lambda X, t: np.broadcast_to(constant, shape)):
+                simulation = make_simulation()
+                simulation.fix("left", [0, 0])
+                getattr(simulation, method)(*(["right"] if method == "set_pressure" else []), value)
+                simulation.step()
+                results.append(simulation.positions)
+            self.assertGreater(np.abs(results[0] - simulation.rest_positions).max(), 1e-6)
+            np.testing.assert_allclose(results[1], results[0], atol=1e-12)
+            np.testing.assert_allclose(results[2], results[0], atol=1e-12)
+
+    def test_forces_of_present_positions(self):
+        k, iterations, results = 300, [], []
+        calls = []
+
+        def springs(X, x, t):
+            calls.append((X.shape, x.shape, t))
+            return -k * x
+
+        def stiffness(X, x, t):
+            return np.arange(len(X))[:, None], np.tile(k * np.eye(2), (len(X), 1, 1))
+
+        for more in ((), (stiffness,)):
+            simulation = make_simulation()
+            simulation.set_follower_forces(springs, *more)
+            iterations.append(simulation.step()["newton_iterations"])
+            results.append(simulation.positions)
+        self.assertEqual(set(calls), {((16, 2), (16, 2), 0.01)})
+        self.assertLess(iterations[1], iterations[0])
+        np.testing.assert_allclose(results[1], results[0], atol=1e-9)
+        # A free body: velocity times mass is the impulse of the forces at the end of the step.
+        momentum = simulation.velocities[simulation.cells].mean(1).sum(0) * 1000 * 0.2**2 / 18
+        np.testing.assert_allclose(momentum, 0.01 * (-k * results[1]).sum(0), rtol=1e-9)
+        simulation.set_follower_forces(None)
+        simulation.step()
+
     def test_obstacles_move(self):
         model = make_model(contact={"enabled": True, "dhat": 1e-3})
         model.set_option("/solver/contact", {"barrier_stiffness": 1e6})
@@ -131,8 +174,90 @@ class Conditions(unittest.TestCase):
         for x in (0.205, 0.2, 0.195):
             simulation.move_obstacle("wall", [[x, -1], [x, 1]])
             simulation.step()
+        simulation.move_obstacle("wall", lambda t: np.array([[0.235 - t, -1], [0.235 - t, 1]]))
+        simulation.step()
+        self.assertAlmostEqual(simulation.obstacle_positions[0, 0], 0.195)
         self.assertLess(simulation.positions[:, 0].max(), 0.195)
         self.assertGreater(simulation.report["energy"]["contact"], 0)
+
+
+COMPILED = """
+#include <itr/itr.h>
+#include <math.h>
+/* user: mu and lambda of W = mu/2 (|F|^2 - 2 - 2 ln J) + lambda/2 (ln J)^2 */
+double density(int d, const double* F, void* user) {
+  const double *l = user, log_j = log(F[0] * F[3] - F[1] * F[2]);
+  return l[0] / 2 * (F[0] * F[0] + F[1] * F[1] + F[2] * F[2] + F[3] * F[3] - d - 2 * log_j) + l[1] / 2 * log_j * log_j;
+}
+void stress(int d, const double* F, double* P, void* user) {
+  const double *l = user, J = F[0] * F[3] - F[1] * F[2], T[] = {F[3] / J, -F[2] / J, -F[1] / J, F[0] / J};
+  for (int i = 0; i < d * d; ++i) P[i] = l[0] * (F[i] - T[i]) + l[1] * log(J) * T[i];
+}
+void hessian(int d, const double* F, double* H, void* user) {
+  const double *l = user, J = F[0] * F[3] - F[1] * F[2], T[] = {F[3] / J, -F[2] / J, -F[1] / J, F[0] / J};
+  const double c = l[0] - l[1] * log(J), C[4][4] = {{0, 0, 0, 1}, {0, 0, -1, 0}, {0, -1, 0, 0}, {1, 0, 0, 0}};
+  for (int i = 0; i < d * d; ++i)
+    for (int j = 0; j < d * d; ++j) H[4 * j + i] = (i == j ? l[0] : 0) + (c + l[1]) * T[i] * T[j] - c * C[i][j] / J;
+}
+/* springs of stiffness *user at the vertices: not for a mesh that changes */
+double energy(const itr_part* part, const double* x, void* user) {
+  double sum = 0;
+  for (size_t i = 0; i < 2 * part->num_vertices; ++i) sum += *(double*)user / 2 * x[i] * x[i];
+  return sum;
+}
+void add_gradient(const itr_part* part, const double* x, double* g, void* user) {
+  for (size_t i = 0; i < 2 * part->num_vertices; ++i) g[i] += *(double*)user * x[i];
+}
+void add_hessian(const itr_part* part, const double* x, itr_block_receiver add, void* to, void* user) {
+  const double k = *(double*)user, block[] = {k, 0, 0, k};
+  for (int v = 0; v < (int)part->num_vertices; ++v) add(to, 1, &v, block);
+}
+"""
+
+
+@unittest.skipUnless(shutil.which("cc"), "no C compiler")
+class CompiledFunctions(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        source = pathlib.Path(cls.folder.name, "own.c")
+        source.write_text(COMPILED)
+        library = source.with_suffix(".so")
+        subprocess.run(["cc", "-O2", "-shared", "-fPIC", f"-I{ROOT}/include", source, "-o", library, "-lm"], check=True)
+        cls.own = ctypes.CDLL(str(library))
+
+    def test_are_laws(self):
+        lame = (ctypes.c_double * 2)(1e5 / 2.6, 0.3 * 1e5 / (1 - 0.3**2))
+        energies = []
+        for own in (False, True):
+            model = make_model()
+            if own:
+                model.set_law(0, self.own.density, self.own.stress, self.own.hessian, ctypes.addressof(lame))
+            simulation = itr.Simulation(model)
+            simulation.fix("left", [0, 0])
+            simulation.set_acceleration([0, -100])
+            for _ in range(3):
+                energies.append(simulation.step()["energy"]["elastic"])
+        np.testing.assert_allclose(energies[3:], energies[:3], rtol=1e-8)
+
+    def test_are_terms(self):
+        k = ctypes.c_double(300)
+        simulation, other = make_simulation(), make_simulation()
+        simulation.set_term("springs", self.own.energy, self.own.add_gradient, self.own.add_hessian, ctypes.addressof(k))
+        other.set_follower_forces(lambda X, x, t: -300 * x)
+        for s in (simulation, other):
+            s.step()
+        np.testing.assert_allclose(simulation.positions, other.positions, atol=1e-9)
+        self.assertGreater(simulation.report["energy"]["host"], 0)
+        simulation.remove_term("springs")
+        self.assertEqual(simulation.step()["energy"]["host"], 0)
+        with self.assertRaises(itr.InputError) as caught:
+            simulation.set_term("springs", self.own.energy, None, self.own.add_hessian)
+        self.assertIn("term.add_gradient: found NULL; expected a function", str(caught.exception))
+        with self.assertRaises(itr.InputError) as caught:
+            simulation.set_term("springs", lambda part, x: 0, self.own.add_gradient, self.own.add_hessian)
+        self.assertIn("found a function; expected a compiled one", str(caught.exception))
 
 
 class Remeshing(unittest.TestCase):
@@ -246,7 +371,94 @@ class Errors(unittest.TestCase):
         self.expect("displacements: found 6 numbers; expected 32", lambda: simulation.fix("left", np.zeros((3, 2))))
         self.expect("dt: found 0", lambda: simulation.step(0))
         self.expect("kind: found 'x'", lambda: simulation.forces("x"))
-        self.expect("not all kinds of forces", lambda: simulation.resultant("left"))
+        self.expect("forces: found none", lambda: simulation.resultant("left"))
+
+    def test_they_are_those_of_the_other_interfaces(self):
+        """tests/bad_input.txt, as bad_input_test.cpp."""
+        nan, inf = float("nan"), float("inf")
+        wall = [[1, 0], [1, 1]]
+
+        def model(vertices=None, cells=None):
+            points, triangles = block()
+            made = itr.Model(points if vertices is None else vertices, triangles if cells is None else cells)
+            made.add_boundary("left", box=([0, 0], [0, 1]))
+            made.add_obstacle("wall", wall, edges=[[0, 1]])
+            made.set_options({"materials": OPTIONS["materials"], "time": {"dt": 0.01, "time_steps": 10}})
+            made.set_options({"contact": {"enabled": True, "dhat": 1e-3}})
+            return made
+
+        def made(change):
+            changed = model()
+            change(changed)
+            itr.Simulation(changed)
+
+        def changed(array, place, value):
+            array = array.copy()
+            array.flat[place] = value
+            return array
+
+        points, triangles = block()
+        with_nan = changed(np.full((16, 2), 0.1), 3, nan)
+        swapped = triangles.copy()
+        swapped[0, :2] = triangles[0, 1::-1]
+        law = [ctypes.CFUNCTYPE(ctypes.c_double)(lambda: 0.0)] * 3
+        s = itr.Simulation(model())
+
+        def follow(*functions):
+            simulation = itr.Simulation(model())
+            simulation.set_follower_forces(*functions)
+            simulation.step()
+
+        cases = {
+            "vertex": lambda: model(vertices=changed(points, 5, nan)),
+            "cell": lambda: model(cells=changed(triangles, 4, 16)),
+            "inverted cell": lambda: itr.Simulation(model(cells=swapped)),
+            "facet": lambda: made(lambda m: m.add_boundary("top", [[0, 16]])),
+            "inner facet": lambda: made(lambda m: m.add_boundary("top", [[0, 5]])),
+            "empty box": lambda: made(lambda m: m.add_boundary("top", box=([5, 5], [6, 6]))),
+            "name": lambda: made(lambda m: m.add_boundary("left", [[0, 1]])),
+            "obstacle vertex": lambda: made(lambda m: m.add_obstacle("floor", [[0, 0], [1, inf]], [[0, 1]])),
+            "obstacle edge": lambda: made(lambda m: m.add_obstacle("floor", wall, [[0, 2]])),
+            "unknown key": lambda: made(lambda m: m.set_option("/contact/dhatt", 1)),
+            "time step": lambda: made(lambda m: m.set_option("/time/dt", -1)),
+            "law": lambda: made(lambda m: m.set_law(3, *law)),
+            "step": lambda: s.step(-1),
+            "boundary": lambda: s.fix("lefd", with_nan),
+            "displacement": lambda: s.fix("left", with_nan),
+            "traction": lambda: s.set_traction("left", with_nan),
+            "pressure": lambda: s.set_pressure("left", changed(np.zeros(16), 3, nan)),
+            "acceleration": lambda: s.set_acceleration(with_nan),
+            "force": lambda: s.set_forces(with_nan),
+            "velocity": lambda: s.set_velocities(with_nan),
+            "obstacle": lambda: s.move_obstacle("door", wall),
+            "obstacle position": lambda: s.move_obstacle("wall", [[0, nan], [0, 0]]),
+            "obstacle positions": lambda: s.move_obstacle("wall", [[0, 0]]),
+            "follower force": lambda: follow(lambda X, x, t: changed(0 * x, 3, nan)),
+            "follower vertex": lambda: follow(lambda X, x, t: 0 * x, lambda X, x, t: ([[16]], np.zeros((1, 2, 2)))),
+            "resultant": lambda: s.resultant("lefd"),
+            "not watched": lambda: s.resultant("left"),
+        }
+        for line in (ROOT / "tests/bad_input.txt").read_text().splitlines():
+            if line.startswith("#"):
+                continue
+            key, expected = line.split(": ", 1)
+            with self.subTest(key), self.assertRaises(itr.InputError) as caught:
+                cases[key]()
+            self.assertEqual(str(caught.exception), expected)
+            del cases[key]
+        self.assertFalse(cases)
+
+    def test_they_are_of_values_and_functions_too(self):
+        simulation = make_simulation()
+        self.expect("traction: found nan; expected a finite number", lambda: simulation.set_traction("left", [np.nan, 0]))
+        self.expect("acceleration: found 3 numbers; expected 2", lambda: simulation.set_acceleration([0, 0, -1]))
+        simulation.set_follower_forces(lambda X, x, t: np.zeros(3))
+        self.expect("follower forces: found 3 numbers; expected 32", simulation.step)
+        simulation.set_follower_forces(lambda X, x, t: "none")
+        self.expect("follower forces: found no array of numbers; expected 32", simulation.step)
+        simulation.set_follower_forces(lambda X, x, t: 0 * x, lambda X, x, t: ([[0, 1]], np.zeros((1, 2, 2))))
+        self.expect("follower stiffness.block: found 4 numbers; expected 16", simulation.step)
+        self.assertEqual(simulation.time, 0)
 
     def test_a_step_that_cannot_be_done_raises_and_leaves_the_state(self):
         simulation = make_simulation(solver={"nonlinear": {"max_iterations": 1, "grad_norm": 1e-14}})
@@ -279,8 +491,102 @@ class Files(unittest.TestCase):
         simulation.set_velocities([1, 0])
         simulation.step()
         mesh = simulation.to_meshio()
+        self.assertEqual(mesh.cell_data["body"][0].tolist(), [0] * 18)
         np.testing.assert_allclose(mesh.point_data["displacement"][:, 0], 0.01, atol=1e-9)
         self.assertEqual(mesh.cells[0].type, "triangle")
+
+    def test_meshio_with_groups(self):
+        try:
+            import meshio
+        except ImportError:
+            self.skipTest("no meshio")
+        vertices, cells = block()
+        points = np.vstack([[[9.0, 9.0]], vertices])  # one that no cell has, as Gmsh leaves them
+        turned = cells[9:, ::-1]  # clockwise
+        blocks = [("line", [[1, 5], [5, 9]]), ("triangle", cells[:9] + 1), ("line", [[4, 8]]), ("triangle", turned + 1)]
+        groups = [np.array([7, 7]), np.full(9, 1), np.array([8]), np.full(9, 2)]
+        mesh = meshio.Mesh(points, blocks, cell_data={"gmsh:physical": groups}, field_data={"left": np.array([7, 1])})
+        model = itr.Model.from_meshio(mesh)
+        model.set_options(OPTIONS)
+        materials = [{**OPTIONS["materials"], "id": body} for body in (1, 2)]
+        model.set_options({"materials": materials})
+        simulation = itr.Simulation(model)
+        np.testing.assert_array_equal(simulation.rest_positions, vertices)
+        np.testing.assert_array_equal(np.sort(simulation.cells, 1), np.sort(cells, 1))
+        self.assertEqual(simulation.bodies.tolist(), [1] * 9 + [2] * 9)
+        self.assertEqual(sorted(simulation.facet_boundaries)[-3:], [1, 1, 2])
+        simulation.fix("left", [0, 0])
+        simulation.fix("8", [0, 0])
+        quads = meshio.Mesh(points, [("triangle", cells + 1), ("quad", [[1, 2, 6, 5]])])
+        with self.assertRaises(itr.InputError) as caught:
+            itr.Model.from_meshio(quads)
+        self.assertEqual(str(caught.exception), "mesh: found cells quad; expected tetra or triangle only")
+
+    def test_dolfinx(self):
+        try:
+            import dolfinx.fem
+            import ufl
+        except ImportError:
+            self.skipTest("no dolfinx")
+        simulation = make_simulation(**REMESH)
+        simulation.fix("left", [0, 0])
+        simulation.set_traction("right", [0, 2000])
+        for _ in range(3):
+            simulation.step()
+        mesh, functions = simulation.to_dolfinx()
+        self.assertGreater(len(simulation.cells), 18)
+        self.assertEqual(mesh.topology.index_map(2).size_local, len(simulation.cells))
+        integrate = lambda form: dolfinx.fem.assemble_scalar(dolfinx.fem.form(form))
+        # What they integrate is what the simulation has: volumes by cell, energy, and F = I + grad u of det F > 0.
+        X, cells = simulation.rest_positions, simulation.cells
+        areas = np.abs(np.linalg.det(X[cells[:, 1:]] - X[cells[:, :1]])) / 2
+        u, density = functions["displacement"], functions["elastic_density"]
+        mean = (simulation.positions - X)[cells].mean(1)
+        for k in range(2):
+            self.assertAlmostEqual(integrate(u[k] * ufl.dx(mesh)), areas @ mean[:, k], delta=1e-14)
+            self.assertAlmostEqual(
+                integrate(functions["velocity"][k] * ufl.dx(mesh)), areas @ simulation.velocities[cells].mean(1)[:, k], delta=1e-12
+            )
+        F = ufl.Identity(2) + ufl.grad(u)
+        mu, lame = 1e5 / 2.6, 0.3 * 1e5 / (1 - 0.3**2)
+        W = mu / 2 * (ufl.tr(F.T * F) - 2 - 2 * ufl.ln(ufl.det(F))) + lame / 2 * ufl.ln(ufl.det(F)) ** 2
+        self.assertAlmostEqual(integrate(density * ufl.dx(mesh)) / integrate(W * ufl.dx(mesh)), 1, delta=1e-10)
+
+    def test_studies(self):
+        try:
+            from itr._study import _find_command
+
+            _find_command()
+        except itr.InputError as error:
+            self.skipTest(str(error))
+        scene = ROOT / "examples/cantilever.json"
+        small = {"/geometry/0/n_refs": 1, "/time/dt": 0.5}
+        with tempfile.TemporaryDirectory() as folder:
+            found = itr.study(scene, folder, small, series=["uniform"], levels=1, frames=2)
+            self.assertIn("uniform-1", [run["run"] for run in found["runs"]])
+            with self.assertRaises(itr.InputError) as caught:
+                itr.study(scene, folder + "/other", {"/time/dtt": 1}, levels=1)
+            self.assertIn("/time/dtt", str(caught.exception))
+
+
+class Package(unittest.TestCase):
+    def test_everything_public_has_hints_and_says_what_it_is(self):
+        self.assertTrue((pathlib.Path(itr.__file__).parent / "py.typed").exists())
+        for name in itr.__all__:
+            thing = getattr(itr, name)
+            members = {name: thing} if inspect.isfunction(thing) else {}
+            if inspect.isclass(thing) and thing.__module__ == "itr":
+                self.assertTrue(thing.__doc__, name)
+                members = {f"{name}.{key}": value for key, value in vars(thing).items() if key[0] != "_" or key == "__init__"}
+            for key, value in members.items():
+                function = value.fget if isinstance(value, property) else getattr(value, "__func__", value)
+                if not inspect.isfunction(function):
+                    continue
+                hints = function.__annotations__
+                parameters = [p for p in inspect.signature(function).parameters if p not in ("self", "cls")]
+                self.assertEqual([p for p in parameters if p not in hints], [], key)
+                if not key.endswith("__init__"):
+                    self.assertIn("return", hints, key)
 
 
 if __name__ == "__main__":

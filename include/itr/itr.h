@@ -24,7 +24,7 @@ typedef enum itr_status {
   ITR_BAD_INPUT = 2, /* a mistake in what was handed in */
   ITR_STOPPED = 3,   /* a step could not be done: the state is that before it */
   ITR_CANCELLED = 4, /* a callback ended the step: the state is that before it */
-  ITR_ERROR = 5     /* out of memory, or an error of the library's own */
+  ITR_ERROR = 5      /* out of memory, or an error of the library's own */
 } itr_status;
 
 typedef struct itr_model itr_model;           /* what is simulated */
@@ -35,6 +35,11 @@ typedef struct itr_snapshot itr_snapshot;     /* a saved state */
 typedef void (*itr_function)(const double* X, double t, double* value, void* user);
 /* Adds to the forces f [N] of n vertices at rest positions X and positions x; n may be that of a new mesh. */
 typedef void (*itr_force_function)(size_t n, const double* X, const double* x, double t, double* f, void* user);
+/* Takes a symmetric block (dimension * num_vertices squared numbers) of some vertices; `to` is what came with it. */
+typedef void (*itr_block_receiver)(void* to, size_t num_vertices, const int* vertices, const double* block);
+/* Gives blocks of -df/dx [N/m] of such forces. */
+typedef void (*itr_stiffness_function)(size_t n, const double* X, const double* x, double t, itr_block_receiver add,
+                                       void* to, void* user);
 /* After a Newton iteration; 0 ends the step. */
 typedef int (*itr_iteration_function)(int iteration, double energy, double gradient_norm, double step_norm, void* user);
 
@@ -86,6 +91,15 @@ ITR_C_API itr_status itr_model_add_boundary(itr_model* model, const char* name, 
 /* The facets of the boundary that are in the box. */
 ITR_C_API itr_status itr_model_add_boundary_box(itr_model* model, const char* name, const double* box_min,
                                                 const double* box_max, int* id);
+/* A stored-energy density W(F) of the program's own, which has to be frame-indifferent, for F of det F > 0, by columns: W
+ * [J/m^d], the stress P = dW/dF (d x d [Pa]) and H = d2W/dF2 (d^2 x d^2, symmetric [Pa]), d the dimension. Several threads
+ * may call the functions. For a body that the options give a material, of which E, nu (a scale) and density stay. */
+typedef struct itr_law {
+  double (*density)(int d, const double* F, void* user);
+  void (*stress)(int d, const double* F, double* P, void* user);
+  void (*hessian)(int d, const double* F, double* H, void* user);
+} itr_law;
+ITR_C_API itr_status itr_model_set_law(itr_model* model, int body, const itr_law* law, void* user);
 ITR_C_API itr_status itr_model_add_obstacle(itr_model* model, const char* name, size_t num_vertices, const double* vertices,
                                             size_t num_edges, const int* edges, size_t num_triangles, const int* triangles,
                                             int* id);
@@ -114,13 +128,34 @@ ITR_C_API itr_status itr_fix_values(itr_simulation* simulation, const char* boun
 ITR_C_API itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, itr_function traction, void* user);
 ITR_C_API itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, const double* tractions);
 ITR_C_API itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, itr_function pressure, void* user);
+ITR_C_API itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, const double* pressures);
 ITR_C_API itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user);
+ITR_C_API itr_status itr_set_acceleration_values(itr_simulation* simulation, const double* accelerations);
 ITR_C_API itr_status itr_move_obstacle(itr_simulation* simulation, const char* obstacle, itr_function displacement,
                                        void* user);
 ITR_C_API itr_status itr_move_obstacle_to(itr_simulation* simulation, const char* obstacle, size_t num_vertices,
                                           const double* positions);
 ITR_C_API itr_status itr_set_forces(itr_simulation* simulation, const double* forces); /* [N]; NULL: none */
-ITR_C_API itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces, void* user);
+/* Forces of present positions; NULL: none. With their stiffness (NULL: none) a step takes fewer rounds. */
+ITR_C_API itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces,
+                                             itr_stiffness_function stiffness, void* user);
+/* What a term of the program's own is a sum over: the whole mesh, or the patch around an edit, which numbers its vertices
+ * itself; valid during a call. Obstacles' vertices come last. boundaries: an id a facet, -1: none. */
+typedef struct itr_part {
+  size_t num_vertices, num_cells, num_facets;
+  const double* X;
+  const int *cells, *bodies, *facets, *boundaries;
+  double t; /* end of the step [s] */
+} itr_part;
+/* An energy [J], its gradient [N] and symmetric blocks of its Hessian [N/m] at positions x: a sum over cells, facets or
+ * points at rest positions, not over vertex numbers. Several threads may call the functions. */
+typedef struct itr_term {
+  double (*energy)(const itr_part* part, const double* x, void* user);
+  void (*add_gradient)(const itr_part* part, const double* x, double* gradient, void* user);
+  void (*add_hessian)(const itr_part* part, const double* x, itr_block_receiver add, void* to, void* user);
+} itr_term;
+/* Adds a term to the incremental potential, or puts it in the place of the one of this name; NULL: it goes. */
+ITR_C_API itr_status itr_set_term(itr_simulation* simulation, const char* name, const itr_term* term, void* user);
 ITR_C_API itr_status itr_set_velocities(itr_simulation* simulation, const double* velocities);
 ITR_C_API itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen);
 

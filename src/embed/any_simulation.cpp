@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <map>
 
-#include "itr/core/error.hpp"
+#include "arrays.hpp"
+#include "host_term.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/energy/point_forces.hpp"
 #include "itr/fem/locator.hpp"
@@ -18,24 +18,38 @@ namespace itr {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& place, const std::string& found, const std::string& expected) {
-  throw InputError({"", place, found, expected});
-}
-
-void check_array(const std::string& name, std::span<const double> values, std::size_t length) {
-  if (values.size() != length) refuse(name, fmt::format("{} numbers", values.size()), std::to_string(length));
-  for (std::size_t i = 0; i < length; ++i)
-    if (!std::isfinite(values[i])) refuse(fmt::format("{}[{}]", name, i), fmt::format("{}", values[i]), "a finite number");
-}
-
-template <int Dim>
-SpaceTimeFunction<Dim> as_vector(HostFunction f) {
+/// `place` is for its errors.
+template <int Dim, int Components>
+std::function<Vec<Components>(const Vec<Dim>& X, double t)> as_function(std::string place, HostFunction f) {
   if (!f) return nullptr;
-  return [f = std::move(f)](const Vec<Dim>& X, double t) {
-    Vec<Dim> value = Vec<Dim>::Zero();
+  return [place = std::move(place), f = std::move(f)](const Vec<Dim>& X, double t) {
+    Vec<Components> value = Vec<Components>::Zero();
     f(X.data(), t, value.data());
+    if (!value.allFinite())
+      refuse(fmt::format("{} at X = ({}), t = {}", place, fmt::join(X, ", "), t), fmt::format("{}", fmt::join(value, ", ")),
+             "finite numbers");
     return value;
   };
+}
+template <int Dim>
+SpaceTimeFunction<Dim> as_vector(std::string place, HostFunction f) {
+  return as_function<Dim, Dim>(std::move(place), std::move(f));
+}
+
+std::string of(const std::string& quantity, const std::string& part) { return quantity + " of '" + part + "'"; }
+
+/// What row(0), row(1), ... hold, one after the other.
+template <typename Row>
+std::vector<int> joined(int count, const Row& row) {
+  std::vector<int> ids;
+  for (int i = 0; i < count; ++i) ids.insert(ids.end(), row(i).begin(), row(i).end());
+  return ids;
+}
+template <typename Value>
+std::vector<int> listed(int count, const Value& value) {
+  std::vector<int> values;
+  for (int i = 0; i < count; ++i) values.push_back(value(i));
+  return values;
 }
 
 VectorX as_field(std::span<const double> values) {
@@ -65,12 +79,28 @@ struct AnySimulation::Impl {
     Simulation<Dim> simulation;
     std::shared_ptr<const Locator<Dim>> locator;  ///< of the present mesh, once needed
     std::map<std::string, std::vector<int>> obstacle_vertices;
+    std::map<std::string, std::size_t> term_places;  ///< in Setup::terms
 
     const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
-    SpaceTimeFunction<Dim> nodal(const std::string& name, std::span<const double> values) {
-      check_array(name, values, static_cast<std::size_t>(Dim * mesh().vertex_slots()));
+    /// Linear on the cells of the present mesh.
+    template <int Components = Dim>
+    std::function<Vec<Components>(const Vec<Dim>& X, double t)> nodal(const std::string& name,
+                                                                      std::span<const double> values) {
+      check_array(name, values, static_cast<std::size_t>(Components * mesh().vertex_slots()));
       if (!locator) locator = std::make_shared<Locator<Dim>>(mesh());
-      return [f = nodal_function<Dim>(locator, as_field(values))](const Vec<Dim>& X, double) { return Vec<Dim>(f(X)); };
+      return
+          [f = nodal_function<Dim>(locator, as_field(values))](const Vec<Dim>& X, double) { return Vec<Components>(f(X)); };
+    }
+    /// Puts a term in the place of the one of its name, which stays that of a null one.
+    void set_term(const std::string& name, TermFactory<Dim> term) {
+      auto& terms = simulation.conditions().terms;
+      if (!term && !term_places.contains(name)) return;
+      if (!term) term = [](const CellSet<Dim>&, double, double) { return nullptr; };
+      const auto [place, is_new] = term_places.try_emplace(name, terms.size());
+      if (is_new)
+        terms.push_back(std::move(term));
+      else
+        terms.at(place->second) = std::move(term);
     }
   };
 
@@ -80,7 +110,6 @@ struct AnySimulation::Impl {
   bool any_id = false;  ///< boundaries are named by their ids
   std::variant<Of<2>, Of<3>> of;
   bool remeshes = false;
-  int forces_index = kNone;  ///< of the term of set_forces
   int max_threads = 0;
   StepReport report;
 
@@ -88,7 +117,7 @@ struct AnySimulation::Impl {
   static Of<Dim> make(const Model& model, linear::Registry& registry, const Logger& logger,
                       std::vector<std::string>& warnings) {
     Setup<Dim> setup = model.setup<Dim>(warnings);
-    return {Simulation<Dim>(std::move(setup), registry, logger), nullptr, {}};
+    return {Simulation<Dim>(std::move(setup), registry, logger), nullptr, {}, {}};
   }
   using Either = std::variant<Of<2>, Of<3>>;
 
@@ -214,7 +243,7 @@ void hold(Setup<Dim>& setup, int tag, std::span<const int> mask, SpaceTimeFuncti
 void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement) {
   const int tag = impl_->tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    hold<Dim>(d.simulation.conditions(), tag, mask, as_vector<Dim>(std::move(displacement)));
+    hold<Dim>(d.simulation.conditions(), tag, mask, as_vector<Dim>(of("displacement", boundary), std::move(displacement)));
   });
 }
 
@@ -228,7 +257,7 @@ void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, 
 void AnySimulation::set_traction(const std::string& boundary, HostFunction traction) {
   const int tag = impl_->tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    NeumannCondition<Dim> condition{tag, as_vector<Dim>(std::move(traction))};
+    NeumannCondition<Dim> condition{tag, as_vector<Dim>(of("traction", boundary), std::move(traction))};
     const bool is_null = !condition.traction;
     replace(d.simulation.conditions().neumann, std::move(condition), is_null);
   });
@@ -245,18 +274,28 @@ void AnySimulation::set_pressure(const std::string& boundary, HostFunction press
   const int tag = impl_->tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const bool is_null = !pressure;
-    const auto scalar = [f = std::move(pressure)](const Vec<Dim>& X, double t) {
-      double value = 0;
-      f(X.data(), t, &value);
-      return value;
-    };
-    replace(d.simulation.conditions().pressure, {tag, scalar}, is_null);
+    const auto value = as_function<Dim, 1>(of("pressure", boundary), std::move(pressure));
+    replace(d.simulation.conditions().pressure, {tag, [=](const Vec<Dim>& X, double t) { return value(X, t)[0]; }}, is_null);
+  });
+}
+
+void AnySimulation::set_pressure(const std::string& boundary, std::span<const double> pressures) {
+  const int tag = impl_->tag(boundary);
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    const auto value = d.template nodal<1>("pressures", pressures);
+    replace(d.simulation.conditions().pressure, {tag, [=](const Vec<Dim>& X, double t) { return value(X, t)[0]; }}, false);
   });
 }
 
 void AnySimulation::set_acceleration(HostFunction acceleration) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    d.simulation.conditions().body_acceleration = as_vector<Dim>(std::move(acceleration));
+    d.simulation.conditions().body_acceleration = as_vector<Dim>("acceleration", std::move(acceleration));
+  });
+}
+
+void AnySimulation::set_acceleration(std::span<const double> accelerations) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    d.simulation.conditions().body_acceleration = d.nodal("accelerations", accelerations);
   });
 }
 
@@ -286,7 +325,7 @@ void AnySimulation::move_obstacle(const std::string& obstacle, HostFunction disp
     const std::vector<int>& vertices = Impl::obstacle(d, obstacle);
     auto& obstacles = d.simulation.conditions().obstacles;
     for (const int v : vertices) obstacles.motion[v] = static_cast<int>(obstacles.motions.size());
-    obstacles.motions.push_back(as_vector<Dim>(std::move(displacement)));
+    obstacles.motions.push_back(as_vector<Dim>(of("displacement", obstacle), std::move(displacement)));
     tidy(obstacles);
   });
 }
@@ -307,15 +346,18 @@ void AnySimulation::move_obstacle(const std::string& obstacle, std::span<const d
 
 void AnySimulation::set_forces(std::span<const double> forces) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    auto& terms = d.simulation.conditions().terms;
-    if (impl_->forces_index == kNone) {
-      if (forces.empty()) return;
-      impl_->forces_index = static_cast<int>(terms.size());
-      terms.emplace_back();
-    }
-    terms[impl_->forces_index] = forces.empty()
-                                     ? TermFactory<Dim>([](const CellSet<Dim>&, double, double) { return nullptr; })
-                                     : point_forces<Dim>(d.mesh(), as_field(forces));
+    if (!forces.empty()) check_array("forces", forces, static_cast<std::size_t>(Dim * num_vertices()));
+    d.set_term("", forces.empty() ? nullptr : point_forces<Dim>(d.mesh(), as_field(forces)));
+  });
+}
+
+void AnySimulation::set_term(const std::string& name, HostTerm term) {
+  if (name.empty()) refuse("name", "an empty one", "the name of a term");
+  const bool is_null = !term.energy && !term.add_gradient && !term.add_hessian;
+  if (!is_null && !(term.energy && term.add_gradient && term.add_hessian))
+    refuse("term '" + name + "'", "only some of its functions", "energy, gradient and Hessian");
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    d.set_term(name, is_null ? nullptr : as_factory<Dim>(std::make_shared<const HostTerm>(std::move(term)), name));
   });
 }
 
@@ -326,10 +368,17 @@ void AnySimulation::set_follower_forces(ForceFunction forces, StiffnessFunction 
     if (forces)
       follower.forces = [f = std::move(forces)](const Mesh<Dim>& mesh, ConstVectorView x, double t, VectorView result) {
         f(rest_of(mesh), x, t, result);
+        check_finite("follower forces", {result.data(), static_cast<std::size_t>(result.size())});
       };
     if (stiffness)
       follower.stiffness = [f = std::move(stiffness)](const Mesh<Dim>& mesh, ConstVectorView x, double t,
-                                                      const StiffnessReceiver& add) { f(rest_of(mesh), x, t, add); };
+                                                      const StiffnessReceiver& add) {
+        f(rest_of(mesh), x, t, [&](std::span<const int> vertices, const double* block) {
+          const std::size_t side = Dim * vertices.size();
+          check_block("follower stiffness", vertices, {block, side * side}, mesh.vertex_slots());
+          add(vertices, block);
+        });
+      };
   });
 }
 
@@ -373,35 +422,28 @@ std::vector<double> AnySimulation::rest_positions() const {
 }
 
 std::vector<int> AnySimulation::cells() const {
-  std::vector<int> ids;
-  impl_->visit([&](const auto& d) {
-    for (CellId c = 0; c < d.mesh().cell_slots(); ++c)
-      ids.insert(ids.end(), d.mesh().cell(c).begin(), d.mesh().cell(c).end());
+  return impl_->visit([](const auto& d) {
+    return joined(
+        d.mesh().cell_slots(), [&](CellId c) -> auto& { return d.mesh().cell(c); });
   });
-  return ids;
 }
 std::vector<int> AnySimulation::bodies() const {
-  std::vector<int> ids;
-  impl_->visit([&](const auto& d) {
-    for (CellId c = 0; c < d.mesh().cell_slots(); ++c) ids.push_back(d.mesh().body(c));
-  });
-  return ids;
+  return impl_->visit(
+      [](const auto& d) { return listed(d.mesh().cell_slots(), [&](CellId c) { return d.mesh().body(c); }); });
 }
 std::vector<int> AnySimulation::facets() const {
-  std::vector<int> ids;
-  impl_->visit([&](const auto& d) {
-    for (FacetId f = 0; f < d.mesh().facet_slots(); ++f)
-      ids.insert(ids.end(), d.mesh().facet(f).begin(), d.mesh().facet(f).end());
+  return impl_->visit([](const auto& d) {
+    return joined(
+        d.mesh().facet_slots(), [&](FacetId f) -> auto& { return d.mesh().facet(f); });
   });
-  return ids;
 }
 std::vector<int> AnySimulation::facet_boundaries() const {
-  std::vector<int> ids;
-  impl_->visit([&](const auto& d) {
-    for (FacetId f = 0; f < d.mesh().facet_slots(); ++f)
-      ids.push_back(d.mesh().facet_tag(f) == kNoTag ? -1 : d.mesh().facet_tag(f));
+  return impl_->visit([](const auto& d) {
+    return listed(d.mesh().facet_slots(), [&](FacetId f) {
+      const int tag = d.mesh().facet_tag(f);
+      return tag == kNoTag ? -1 : tag;
+    });
   });
-  return ids;
 }
 std::vector<double> AnySimulation::obstacle_positions() const {
   return impl_->visit([&](const auto& d) {
@@ -426,6 +468,7 @@ AnySimulation::Resultants AnySimulation::resultant(std::span<const std::string> 
   for (const std::string& name : boundaries) tags.push_back(impl_->tag(name));
   return impl_->visit([&]<int Dim>(const Impl::Of<Dim>& d) {
     check_array("about", about, Dim);
+    if (forces().contact.size() == 0) refuse("forces", "none", "forces that are watched, and a step since");
     const auto sum = itr::resultant<Dim>(d.simulation, tags, Vec<Dim>(about.data()));
     return Resultants{{sum.force.begin(), sum.force.end()}, {sum.moment.begin(), sum.moment.end()}};
   });

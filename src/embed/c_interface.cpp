@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "c_callbacks.hpp"
 #include "itr/core/error.hpp"
 #include "itr/embed/any_simulation.hpp"
 #include "itr/itr.h"
@@ -162,6 +163,12 @@ itr_status itr_model_add_boundary_box(itr_model* model, const char* name, const 
     if (id) *id = given;
   });
 }
+itr_status itr_model_set_law(itr_model* model, int body, const itr_law* law, void* user) {
+  return with(model, [&](itr::Model& m) {
+    require(law, "law");
+    m.set_law(body, itr::law_of(*law, user));
+  });
+}
 itr_status itr_model_add_obstacle(itr_model* model, const char* name, size_t num_vertices, const double* vertices,
                                   size_t num_edges, const int* edges, size_t num_triangles, const int* triangles, int* id) {
   return with(model, [&](itr::Model& m) {
@@ -233,8 +240,19 @@ itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, it
     s.set_pressure(boundary, as_function(pressure, user));
   });
 }
+itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, const double* pressures) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(boundary, "boundary");
+    s.set_pressure(boundary, array("pressures", pressures, static_cast<std::size_t>(s.num_vertices())));
+  });
+}
 itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user) {
   return with(simulation, [&](itr::AnySimulation& s) { s.set_acceleration(as_function(acceleration, user)); });
+}
+itr_status itr_set_acceleration_values(itr_simulation* simulation, const double* accelerations) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    s.set_acceleration(array("accelerations", accelerations, nodal_size(simulation)));
+  });
 }
 itr_status itr_move_obstacle(itr_simulation* simulation, const char* obstacle, itr_function displacement, void* user) {
   return with(simulation, [&](itr::AnySimulation& s) {
@@ -254,13 +272,16 @@ itr_status itr_set_forces(itr_simulation* simulation, const double* forces) {
     s.set_forces(forces ? std::span(forces, nodal_size(simulation)) : std::span<const double>());
   });
 }
-itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces, void* user) {
+itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces, itr_stiffness_function stiffness,
+                                   void* user) {
   return with(simulation, [&](itr::AnySimulation& s) {
-    if (!forces) return s.set_follower_forces(nullptr);
-    const auto d = dimension_of(simulation);
-    s.set_follower_forces([=](itr::ConstVectorView X, itr::ConstVectorView x, double t, itr::VectorView f) {
-      forces(static_cast<std::size_t>(x.size()) / d, X.data(), x.data(), t, f.data(), user);
-    });
+    s.set_follower_forces(itr::forces_of(forces, s.dimension(), user), itr::stiffness_of(stiffness, s.dimension(), user));
+  });
+}
+itr_status itr_set_term(itr_simulation* simulation, const char* name, const itr_term* term, void* user) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(name, "name");
+    s.set_term(name, term ? itr::term_of(*term, user) : itr::HostTerm());
   });
 }
 itr_status itr_set_velocities(itr_simulation* simulation, const double* velocities) {

@@ -4,34 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <ranges>
 
-#include "itr/core/error.hpp"
+#include "arrays.hpp"
 
 namespace itr {
 
 namespace {
-
-[[noreturn]] void refuse(const std::string& place, const std::string& found, const std::string& expected) {
-  throw InputError({"", place, found, expected});
-}
-
-void check_length(const std::string& name, std::size_t length, int multiple) {
-  if (length % multiple != 0) refuse(name, fmt::format("{} numbers", length), fmt::format("a multiple of {}", multiple));
-}
-
-void check_finite(const std::string& name, std::span<const double> values) {
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (!std::isfinite(values[i])) refuse(fmt::format("{}[{}]", name, i), fmt::format("{}", values[i]), "a finite number");
-}
-
-void check_ids(const std::string& name, std::span<const int> ids, std::size_t count) {
-  for (std::size_t i = 0; i < ids.size(); ++i)
-    if (ids[i] < 0 || static_cast<std::size_t>(ids[i]) >= count)
-      refuse(fmt::format("{}[{}]", name, i), std::to_string(ids[i]), fmt::format("a vertex, 0 to {} - 1", count));
-}
 
 template <int N>
 std::vector<Vec<N>> as_points(std::span<const double> values) {
@@ -84,9 +65,9 @@ void Model::set_option(const std::string& pointer, const std::string& value) {
 
 void Model::set_mesh(std::span<const double> vertices, std::span<const int> cells, std::span<const int> bodies) {
   if (scene_) refuse("mesh", "a model that was read from a scene", "one mesh");
-  check_length("vertices", vertices.size(), dimension_);
+  check_multiple("vertices", vertices.size(), dimension_);
   check_finite("vertices", vertices);
-  check_length("cells", cells.size(), dimension_ + 1);
+  check_multiple("cells", cells.size(), dimension_ + 1);
   check_ids("cells", cells, vertices.size() / dimension_);
   if (!bodies.empty() && bodies.size() != cells.size() / (dimension_ + 1))
     refuse("bodies", fmt::format("{} numbers", bodies.size()),
@@ -106,7 +87,7 @@ int Model::next_id(const std::string& name) const {
 }
 
 int Model::add_boundary(const std::string& name, std::span<const int> facets) {
-  check_length("boundary '" + name + "'", facets.size(), dimension_);
+  check_multiple("boundary '" + name + "'", facets.size(), dimension_);
   check_ids("boundary '" + name + "'", facets, vertices_.size() / dimension_);
   Part part{name, next_id(name), {}, {}, {}, {facets.begin(), facets.end()}};
   boundaries_.push_back(std::move(part));
@@ -158,12 +139,12 @@ int Model::add_obstacle(const std::string& name, std::span<const double> vertice
                         std::span<const int> triangles) {
   if (scene_) refuse("obstacle '" + name + "'", "a model that was read from a scene", "obstacles of its file");
   const std::string place = "obstacle '" + name + "'";
-  check_length(place + ".vertices", vertices.size(), dimension_);
+  check_multiple(place + ".vertices", vertices.size(), dimension_);
   check_finite(place + ".vertices", vertices);
   const std::size_t count = vertices.size() / dimension_;
-  check_length(place + ".edges", edges.size(), 2);
+  check_multiple(place + ".edges", edges.size(), 2);
   check_ids(place + ".edges", edges, count);
-  check_length(place + ".triangles", triangles.size(), 3);
+  check_multiple(place + ".triangles", triangles.size(), 3);
   check_ids(place + ".triangles", triangles, count);
   if (dimension_ == 2 && !triangles.empty())
     refuse(place + ".triangles", fmt::format("{} numbers", triangles.size()), "none in 2D");
@@ -207,13 +188,29 @@ scene::Geometry<Dim> Model::geometry() const {
   return geometry;
 }
 
+void Model::set_law(int body, std::shared_ptr<const OwnLaw> law) {
+  if (!law) refuse(fmt::format("law of body {}", body), "none", "a law");
+  laws_[body] = std::move(law);
+}
+
 template <int Dim>
 Setup<Dim> Model::setup(std::vector<std::string>& warnings) const {
+  Setup<Dim> setup;
   if (scene_) {
     warnings = scene_->warnings;
-    return std::get<Setup<Dim>>(scene_->setup);
+    setup = std::get<Setup<Dim>>(scene_->setup);
+  } else {
+    setup = scene::make_setup<Dim>(geometry<Dim>(), options_, overrides_, warnings);
   }
-  return scene::make_setup<Dim>(geometry<Dim>(), options_, overrides_, warnings);
+  for (const auto& [body, law] : laws_) {
+    const auto material = setup.materials.find(body);
+    if (material == setup.materials.end())
+      refuse(fmt::format("law of body {}", body), "no such body",
+             fmt::format("one of {}", fmt::join(std::views::keys(setup.materials), ", ")));
+    material->second.law = MaterialLaw::own;
+    material->second.own = law;
+  }
+  return setup;
 }
 
 int Model::max_threads() const { return scene_ ? scene_->max_threads : scene::read_max_threads(options_, overrides_); }

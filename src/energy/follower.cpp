@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/follower.hpp"
 
-#include <Eigen/Eigenvalues>
+#include "project_block.hpp"
 
 namespace itr {
 
@@ -54,11 +54,7 @@ template <int Dim>
 void LinearizedForces<Dim>::add_hessian(ConstVectorView, PsdProjection psd, HessianSink& sink, Workspace&) const {
   for (const Block& block : blocks_) {
     MatrixX H = scale_ * block.stiffness;
-    if (psd != PsdProjection::none) {
-      const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(H);
-      const VectorX values = eigen.eigenvalues().unaryExpr([&](double value) { return projected(value, psd); });
-      H = eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
-    }
+    project_block(H, psd);
     sink.add<Dim>(block.vertices, H.data());
   }
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/pressure.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+
+#include "project_block.hpp"
 
 namespace itr {
 
@@ -116,11 +117,7 @@ template <int Dim>
 void PressureEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
   for (const LoadedFacet& facet : facets_) {
     Mat<Dim* Dim> block = scale_ * facet.pressure * cone_hessian(corners(facet, x));
-    if (psd != PsdProjection::none) {
-      const Eigen::SelfAdjointEigenSolver<Mat<Dim * Dim>> eigen(block);
-      const auto values = eigen.eigenvalues().unaryExpr([psd](double value) { return projected(value, psd); });
-      block = eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
-    }
+    project_block(block, psd);
     sink.add<Dim>(facet.vertices, block.data());
   }
 }

@@ -7,8 +7,10 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
 #include <filesystem>
 
+#include "embed/c_callbacks.hpp"
 #include "itr/itr.hpp"
 
 namespace py = pybind11;
@@ -54,6 +56,35 @@ py::array_t<double> shared(std::span<const double> values, int columns, Owner ow
   return result;
 }
 
+/// A compiled function by its address; 0: none.
+template <typename Function>
+void set_function(Function*& function, std::uintptr_t address) {
+  function = reinterpret_cast<Function*>(address);
+}
+
+/// f's result, an array of as many numbers as `size`.
+Doubles asked_array(const py::object& result, const char* name, Eigen::Index size) {
+  Doubles values = Doubles::ensure(result);
+  if (!values || values.size() != size)
+    throw itr::InputError(
+        {"", name, values ? std::to_string(values.size()) + " numbers" : "no array of numbers", std::to_string(size)});
+  return values;
+}
+
+/// f of nodal values, or where `values` has less than `nodal_axes` axes, of the constant function of them.
+template <typename F>
+void with_values(const Doubles& values, int nodal_axes, const char* name, int components, F&& f) {
+  if (values.ndim() >= nodal_axes) return f(view(values));
+  const auto fail = [&](const std::string& found, const std::string& expected) {
+    throw itr::InputError({"", name, found, expected});
+  };
+  if (values.size() != components) fail(std::to_string(values.size()) + " numbers", std::to_string(components));
+  const std::vector<double> constant(values.data(), values.data() + values.size());
+  for (const double value : constant)
+    if (!std::isfinite(value)) fail(std::to_string(value), "a finite number");
+  f(itr::HostFunction([=](const double*, double, double* result) { std::copy(constant.begin(), constant.end(), result); }));
+}
+
 std::string json(const py::handle& value) { return py::module_::import("json").attr("dumps")(value).cast<std::string>(); }
 
 py::dict energies(const itr::EnergyReport& e) {
@@ -95,6 +126,15 @@ void add_model(py::module_& m) {
       .def("set_options", [](Model& model, const py::dict& options) { model.set_options(json(options)); })
       .def("set_option",
            [](Model& model, const std::string& pointer, const py::object& value) { model.set_option(pointer, json(value)); })
+      .def("set_law",
+           [](Model& model, int body, std::uintptr_t density, std::uintptr_t stress, std::uintptr_t hessian,
+              std::uintptr_t user) {
+             itr_law law{};
+             set_function(law.density, density);
+             set_function(law.stress, stress);
+             set_function(law.hessian, hessian);
+             model.set_law(body, itr::law_of(law, reinterpret_cast<void*>(user)));
+           })
       .def("set_mesh", [](Model& model, const Doubles& vertices, const Ints& cells,
                           const Ints& bodies) { model.set_mesh(view(vertices), view(cells), view(bodies)); })
       .def("add_boundary_facets",
@@ -135,6 +175,35 @@ py::tuple outcome(const Step& step) {
   return py::make_tuple(result.ok, result.cancelled, result.reason);
 }
 
+/// They are asked for once a round, not within trials: forces(X, x, t) gives an array as x, stiffness(X, x, t) vertices
+/// (m x k) and as many blocks (m x kd x kd). Either may be None.
+void set_follower_forces(AnySimulation& s, const py::object& forces, const py::object& stiffness) {
+  const int d = s.dimension();
+  if (forces.is_none()) return s.set_follower_forces(nullptr);
+  const auto rows = [d](itr::ConstVectorView v) {
+    return py::array_t<double>({static_cast<py::ssize_t>(v.size()) / d, py::ssize_t{d}}, v.data());
+  };
+  AnySimulation::StiffnessFunction blocks;
+  if (!stiffness.is_none())
+    blocks = [=, f = stiffness.cast<std::function<py::object(py::object, py::object, double)>>()](
+                 itr::ConstVectorView X, itr::ConstVectorView x, double t, const itr::StiffnessReceiver& add) {
+      const py::gil_scoped_acquire lock;
+      const auto [vertices, values] = f(rows(X), rows(x), t).cast<std::pair<Ints, Doubles>>();
+      const py::ssize_t k = vertices.ndim() == 2 ? vertices.shape(1) : 1, side = k * d;
+      asked_array(values, "follower stiffness.block", vertices.size() / std::max<py::ssize_t>(k, 1) * side * side);
+      for (py::ssize_t i = 0; i * k < vertices.size(); ++i)
+        add({vertices.data() + i * k, static_cast<std::size_t>(k)}, values.data() + i * side * side);
+    };
+  s.set_follower_forces(
+      [=, f = forces.cast<std::function<py::object(py::object, py::object, double)>>()](
+          itr::ConstVectorView X, itr::ConstVectorView x, double t, itr::VectorView result) {
+        const py::gil_scoped_acquire lock;
+        const Doubles values = asked_array(f(rows(X), rows(x), t), "follower forces", x.size());
+        result += Eigen::Map<const itr::VectorX>(values.data(), x.size());
+      },
+      std::move(blocks));
+}
+
 void add_simulation(py::module_& m) {
   py::class_<Saved>(m, "Saved");
   py::class_<AnySimulation>(m, "Simulation")
@@ -150,24 +219,36 @@ void add_simulation(py::module_& m) {
       .def_property_readonly("finished", &AnySimulation::finished)
       .def_property_readonly("warnings", &AnySimulation::warnings)
       .def_property_readonly("report", [](const AnySimulation& s) { return describe(s.report()); })
-      .def("fix", [](AnySimulation& s, const std::string& boundary, const Ints& mask,
-                     const Doubles& values) { s.fix(boundary, view(mask), view(values)); })
-      .def("set_traction", [](AnySimulation& s, const std::string& boundary,
-                              const Doubles& values) { s.set_traction(boundary, view(values)); })
+      .def("fix",
+           [](AnySimulation& s, const std::string& boundary, const Ints& mask, const Doubles& values) {
+             with_values(values, 2, "displacement", s.dimension(), [&](auto&& f) { s.fix(boundary, view(mask), f); });
+           })
+      .def("set_traction",
+           [](AnySimulation& s, const std::string& boundary, const Doubles& values) {
+             with_values(values, 2, "traction", s.dimension(), [&](auto&& f) { s.set_traction(boundary, f); });
+           })
       .def("set_pressure",
-           [](AnySimulation& s, const std::string& boundary, double pressure) {
-             s.set_pressure(boundary, [pressure](const double*, double, double* value) { *value = pressure; });
+           [](AnySimulation& s, const std::string& boundary, const Doubles& values) {
+             with_values(values, 1, "pressure", 1, [&](auto&& f) { s.set_pressure(boundary, f); });
            })
       .def("set_acceleration",
-           [](AnySimulation& s, const std::vector<double>& value) {
-             if (value.size() != static_cast<std::size_t>(s.dimension()))
-               throw itr::InputError(
-                   {"", "acceleration", std::to_string(value.size()) + " numbers", std::to_string(s.dimension())});
-             s.set_acceleration([value](const double*, double, double* a) { std::copy(value.begin(), value.end(), a); });
+           [](AnySimulation& s, const Doubles& values) {
+             with_values(values, 2, "acceleration", s.dimension(), [&](auto&& f) { s.set_acceleration(f); });
            })
       .def("move_obstacle", [](AnySimulation& s, const std::string& obstacle,
                                const Doubles& values) { s.move_obstacle(obstacle, view(values)); })
       .def("set_forces", [](AnySimulation& s, const Doubles& forces) { s.set_forces(view(forces)); })
+      .def("set_follower_forces", &set_follower_forces)
+      .def("set_term",
+           [](AnySimulation& s, const std::string& name, std::uintptr_t energy, std::uintptr_t gradient,
+              std::uintptr_t hessian, std::uintptr_t user) {
+             itr_term term{};
+             set_function(term.energy, energy);
+             set_function(term.add_gradient, gradient);
+             set_function(term.add_hessian, hessian);
+             s.set_term(name, itr::term_of(term, reinterpret_cast<void*>(user)));
+           })
+      .def("remove_term", [](AnySimulation& s, const std::string& name) { s.set_term(name, {}); })
       .def("set_velocities", [](AnySimulation& s, const Doubles& values) { s.set_velocities(view(values)); })
       .def("freeze_mesh", &AnySimulation::freeze_mesh)
       .def_property_readonly("num_vertices", &AnySimulation::num_vertices)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "itr/simulation/simulation.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -125,7 +127,7 @@ struct Simulation<Dim>::Impl {
   /// Steps from now on have this length.
   void set_step(double dt) {
     TimeOptions& time = setup.time;
-    if (!(dt > 0) || !std::isfinite(dt)) throw InputError({"", "dt", std::to_string(dt), "a number > 0"});
+    if (!(dt > 0) || !std::isfinite(dt)) throw InputError({"", "dt", fmt::format("{}", dt), "a number > 0"});
     if (dt == time.dt) return;
     time.t0 = state->t;
     time.first_step = state->step;

@@ -18,6 +18,25 @@ namespace itr {
 /// Writes `dimension` numbers (a scalar: one) for the rest position X [m] and the time t [s].
 using HostFunction = std::function<void(const double* X, double t, double* value)>;
 
+/// What a term of the program's own is a sum over: the whole mesh, or the patch around an edit, which numbers its vertices
+/// itself. Valid during a call.
+struct HostPart {
+  int dimension;
+  std::span<const double> X;                ///< rest positions [m]; obstacles' vertices come last
+  std::span<const int> cells, bodies;       ///< dimension + 1 vertices each, and their body
+  std::span<const int> facets, boundaries;  ///< of the bodies' boundary, dimension vertices each; ids, -1: none
+  double t;                                 ///< end of the step [s]
+};
+
+/// An energy E(x) of the program's own, its gradient and Hessian, at positions x [m] as long as part.X: a sum over cells,
+/// facets or points at rest positions, not over vertex numbers. All three are needed; several threads may call them.
+struct HostTerm {
+  std::function<double(const HostPart& part, ConstVectorView x)> energy;  ///< [J]; not a number: not defined there
+  std::function<void(const HostPart& part, ConstVectorView x, VectorView gradient)> add_gradient;  ///< [N]
+  /// Symmetric blocks [N/m]; the library projects them where it needs to.
+  std::function<void(const HostPart& part, ConstVectorView x, const StiffnessReceiver& add)> add_hessian;
+};
+
 /// What MeshChange says, for a program that does not know the dimension at compile time.
 struct AnyMeshChange {
   std::vector<int> vertex, cell, facet, facet_parent;
@@ -65,7 +84,9 @@ class AnySimulation {
   void set_traction(const std::string& boundary, std::span<const double> tractions);
   /// Along inward normals as they are then, the same unit. Null: none.
   void set_pressure(const std::string& boundary, HostFunction pressure);
+  void set_pressure(const std::string& boundary, std::span<const double> pressures);  ///< a number a vertex
   void set_acceleration(HostFunction acceleration);  ///< body force by mass [m/s^2]; null: none
+  void set_acceleration(std::span<const double> accelerations);
   /// Displacement of an obstacle from rest [m], or its vertices' positions at the end of the next steps [m].
   void move_obstacle(const std::string& obstacle, HostFunction displacement);
   void move_obstacle(const std::string& obstacle, std::span<const double> positions);
@@ -77,6 +98,8 @@ class AnySimulation {
   using StiffnessFunction =
       std::function<void(ConstVectorView X, ConstVectorView x, double t, const StiffnessReceiver& add)>;
   void set_follower_forces(ForceFunction forces, StiffnessFunction stiffness = nullptr);
+  /// Adds a term to the incremental potential, or puts it in the place of the one of this name. All null: it goes.
+  void set_term(const std::string& name, HostTerm term);
   /// Of the bodies' vertices [m/s]; for a start, or a state that the program has from elsewhere.
   void set_velocities(std::span<const double> velocities);
   void freeze_mesh(bool frozen);  ///< no remeshing while it is; no effect where the options do not ask for it

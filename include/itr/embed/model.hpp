@@ -3,6 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -46,6 +48,9 @@ class Model {
   int add_obstacle(const std::string& name, std::span<const double> vertices, std::span<const int> edges,
                    std::span<const int> triangles = {});
 
+  /// A law of the program's own for a body that the options give a material: its E, nu (a scale) and density stay.
+  void set_law(int body, std::shared_ptr<const OwnLaw> law);
+
   int dimension() const { return dimension_; }
 
  private:
@@ -72,6 +77,7 @@ class Model {
   std::vector<double> vertices_;
   std::vector<int> cells_, bodies_;
   std::vector<Part> boundaries_, obstacles_;
+  std::map<int, std::shared_ptr<const OwnLaw>> laws_;  ///< by body
   std::optional<scene::Scene> scene_;
 };
 

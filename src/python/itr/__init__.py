@@ -14,19 +14,29 @@ array, which index, what was found and what was expected.
 
 from __future__ import annotations
 
-from typing import Any, Callable, Iterable, Mapping, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
 from . import _itr
 from ._itr import InputError, Saved, __version__
+from ._study import study
 
-__all__ = ["Cancelled", "InputError", "MeshChange", "Model", "Saved", "Simulation", "StepFailed", "__version__"]
+if TYPE_CHECKING:
+    import dolfinx.fem
+    import dolfinx.mesh
+    import meshio
+    import scipy.sparse
+
+__all__ = ["Cancelled", "InputError", "MeshChange", "Model", "Saved", "Simulation", "StepFailed", "__version__", "study"]
 
 Array = np.ndarray
-Value = Union[Sequence[float], Array, Callable[[Array, float], Array]]
-"""A constant (d numbers), values by vertex of the present mesh (n x d), or a function of the rest positions (n x d) and the
-time at the end of a step, which is called once before each step."""
+Value = Union[float, Sequence[float], Array, Callable[[Array, float], Array]]
+"""A constant (d numbers; a pressure: one), values by vertex of the present mesh (n x d; n), or a function of the rest positions
+(n x d) and the time at the end of a step, which is called once before each step."""
+Compiled = Any
+"""A function of C's calling convention: of a ctypes library, of numba.cfunc, or an address. A step calls it without Python's
+lock, from several threads."""
 
 FORCES = ("contact", "friction", "reaction", "applied")
 
@@ -48,6 +58,7 @@ class Model:
         if vertices.ndim != 2:
             raise InputError(f"vertices: found an array of shape {vertices.shape}; expected (n, 2) or (n, 3)")
         self._model = _itr.Model(vertices.shape[1])
+        self._kept: list = []  # what compiled functions live in
         self._model.set_mesh(vertices, _ints("cells", cells), _ints("bodies", [] if bodies is None else bodies))
 
     @classmethod
@@ -55,16 +66,20 @@ class Model:
         """All of a scene file; `overrides`: values by JSON pointer. Its surfaces are boundaries "1", "2", ...: their ids."""
         model = cls.__new__(cls)
         model._model = _itr.Model.from_scene(str(file), dict(overrides or {}))
+        model._kept = []
         return model
 
     @classmethod
-    def from_meshio(cls, mesh: Any) -> "Model":
-        """The tetrahedra of a meshio.Mesh, or else its triangles in the plane z = 0."""
-        cells = {block.type: block.data for block in mesh.cells}
-        kind, dimension = ("tetra", 3) if "tetra" in cells else ("triangle", 2)
-        if kind not in cells:
-            raise InputError(f"mesh: found cells {sorted(cells)}; expected tetra or triangle")
-        return cls(mesh.points[:, :dimension], cells[kind])
+    def from_meshio(cls, mesh: meshio.Mesh) -> Model:
+        """The tetrahedra of a meshio.Mesh, or else its triangles, in the plane z = 0. Gmsh's physical groups are bodies (their
+        numbers) and, of facets, boundaries (their names, or else numbers)."""
+        from ._convert import from_meshio
+
+        vertices, cells, bodies, boundaries = from_meshio(mesh)
+        model = cls(vertices, cells, bodies)
+        for name, facets in boundaries.items():
+            model.add_boundary(name, facets)
+        return model
 
     @property
     def dimension(self) -> int:
@@ -99,6 +114,12 @@ class Model:
         """Geometry that only collides. Returns the id that options know it by."""
         return self._model.add_obstacle(name, vertices, _ints("edges", edges), _ints("triangles", triangles))
 
+    def set_law(self, body: int, density: Compiled, stress: Compiled, hessian: Compiled, user: int = 0) -> None:
+        """A stored-energy density of the program's own, of the functions of `itr_law` in itr.h, for a body that the options
+        give a material: its E, nu (a scale) and density stay. `user` is the address that the functions get."""
+        self._kept += [density, stress, hessian]
+        self._model.set_law(body, _address(density), _address(stress), _address(hessian), user)
+
 
 class MeshChange:
     """The change of a mesh within a step; projection only during the call that is told of it.
@@ -114,7 +135,7 @@ class MeshChange:
         self.facet_parent: Array = data["facet_parent"]
         self._data = data
 
-    def interpolation(self):
+    def interpolation(self) -> scipy.sparse.csr_matrix:
         """The transfer operator, a scipy.sparse.csr_matrix (new vertices x old ones): `P @ field`."""
         from scipy.sparse import csr_matrix
 
@@ -142,6 +163,7 @@ class Simulation:
         """`log` gets messages with their level: 0 debug, 1 information, 2 warning."""
         self._simulation = _itr.Simulation(model._model, log)
         self._functions: dict[tuple, Callable[[float], None]] = {}
+        self._kept = {"laws": list(model._kept)}  # what compiled functions live in
 
     # Steps.
 
@@ -156,7 +178,7 @@ class Simulation:
 
     def _do(self, step: Callable[[float], tuple], dt: Optional[float]) -> None:
         if dt is not None and not dt > 0:
-            raise InputError(f"dt: found {dt}; expected a number > 0")
+            raise InputError(f"dt: found {dt:g}; expected a number > 0")
         t = self.time + (self._simulation.step_length if dt is None else dt)
         for sample in self._functions.values():
             sample(t)
@@ -198,24 +220,28 @@ class Simulation:
 
     def release(self, boundary: str) -> None:
         self._functions.pop(("fix", boundary), None)
-        n = len(self.rest_positions)
-        self._simulation.fix(boundary, np.zeros(self.dimension, int), np.zeros((n, self.dimension)))
+        self._simulation.fix(boundary, np.zeros(self.dimension, int), np.zeros(self.dimension))
 
     def set_traction(self, boundary: str, traction: Value) -> None:
         """Force by rest area [N/m^2] (2D: length [N/m])."""
         self._set(("traction", boundary), traction, lambda values: self._simulation.set_traction(boundary, values))
 
-    def set_pressure(self, boundary: str, pressure: float) -> None:
-        """Along inward normals as they are then, the same unit."""
-        self._simulation.set_pressure(boundary, pressure)
+    def set_pressure(self, boundary: str, pressure: Value) -> None:
+        """Along inward normals as they are then, the same unit; a number, or one a vertex."""
+        self._set(("pressure", boundary), pressure, lambda p: self._simulation.set_pressure(boundary, p))
 
-    def set_acceleration(self, acceleration: Sequence[float]) -> None:
+    def set_acceleration(self, acceleration: Value) -> None:
         """Body force by mass [m/s^2]."""
-        self._simulation.set_acceleration(list(acceleration))
+        self._set(("acceleration",), acceleration, self._simulation.set_acceleration)
 
-    def move_obstacle(self, obstacle: str, positions: Array) -> None:
-        """Where its vertices are at the end of the next steps [m]."""
-        self._simulation.move_obstacle(obstacle, positions)
+    def move_obstacle(self, obstacle: str, positions: Union[Array, Callable[[float], Array]]) -> None:
+        """Where its vertices are at the end of the next steps [m], or a function that says so of a time."""
+        if callable(positions):
+            move = self._functions[("obstacle", obstacle)] = lambda t: self._simulation.move_obstacle(obstacle, positions(t))
+            move(self.time)
+        else:
+            self._functions.pop(("obstacle", obstacle), None)
+            self._simulation.move_obstacle(obstacle, positions)
 
     def set_forces(self, forces: Optional[Value]) -> None:
         """Dead forces [N] on the vertices; they stay where they act however the mesh changes. None: no forces."""
@@ -223,26 +249,48 @@ class Simulation:
             self._functions.pop(("forces",), None)
             self._simulation.set_forces([])
         else:
-            self._set(("forces",), forces, self._simulation.set_forces)
+            self._set(("forces",), forces, lambda f: self._simulation.set_forces(self._nodal(f)))
+
+    def set_follower_forces(
+        self,
+        forces: Optional[Callable[[Array, Array, float], Array]],
+        stiffness: Optional[Callable[[Array, Array, float], tuple[Array, Array]]] = None,
+    ) -> None:
+        """Forces [N] of present positions: forces(X, x, t) gives an array as x (n x d). A step is solved with them, linearised,
+        at the solution before, until they balance; with blocks of -df/dx that takes fewer rounds: stiffness(X, x, t) gives
+        their vertices (m x k) and the blocks (m x kd x kd) [N/m]. Both are called once a round; n may be that of a new mesh.
+        None: no such forces."""
+        self._simulation.set_follower_forces(forces, stiffness)
+
+    def set_term(self, name: str, energy: Compiled, gradient: Compiled, hessian: Compiled, user: int = 0) -> None:
+        """Adds a term to the incremental potential, of the functions of `itr_term` in itr.h, or puts it in the place of the
+        one of this name. `user` is the address that the functions get."""
+        self._simulation.set_term(name, _address(energy), _address(gradient), _address(hessian), user)
+        self._kept[name] = [energy, gradient, hessian]
+
+    def remove_term(self, name: str) -> None:
+        self._simulation.remove_term(name)
+        self._kept.pop(name, None)
 
     def set_velocities(self, velocities: Value) -> None:
         """[m/s]"""
-        self._simulation.set_velocities(self._nodal(velocities, self.time))
+        self._simulation.set_velocities(self._nodal(self._sample(velocities, self.time)))
 
     def freeze_mesh(self, frozen: bool = True) -> None:
         """No remeshing while it is."""
         self._simulation.freeze_mesh(frozen)
 
-    def _nodal(self, value: Value, t: float) -> Array:
-        X = self.rest_positions
-        values = np.asarray(value(X, t) if callable(value) else value, dtype=float)
-        return np.broadcast_to(values, X.shape) if values.shape == (self.dimension,) else values
+    def _sample(self, value: Value, t: float) -> Array:
+        return np.asarray(value(self.rest_positions, t) if callable(value) else value, dtype=float)
+
+    def _nodal(self, values: Array) -> Array:
+        return np.broadcast_to(values, self.positions.shape) if values.shape == (self.dimension,) else values
 
     def _set(self, key: tuple, value: Value, set_values: Callable[[Array], None]) -> None:
         """Values now, and of a function before each step again."""
-        set_values(self._nodal(value, self.time))
+        set_values(self._sample(value, self.time))
         if callable(value):
-            self._functions[key] = lambda t: set_values(self._nodal(value, t))
+            self._functions[key] = lambda t: set_values(self._sample(value, t))
         else:
             self._functions.pop(key, None)
 
@@ -333,18 +381,18 @@ class Simulation:
 
     # To other libraries.
 
-    def to_meshio(self):
-        """A meshio.Mesh of the present positions with `displacement`, `velocity` and `elastic_density`."""
-        import meshio
+    def to_meshio(self) -> meshio.Mesh:
+        """A meshio.Mesh of the present positions with `displacement`, `velocity`, `body` and `elastic_density`."""
+        from ._convert import to_meshio
 
-        pad = [(0, 0), (0, 3 - self.dimension)]
-        x = np.pad(self.positions, pad)
-        return meshio.Mesh(
-            x,
-            [("tetra" if self.dimension == 3 else "triangle", self.cells)],
-            point_data={"displacement": x - np.pad(self.rest_positions, pad), "velocity": np.pad(self.velocities, pad)},
-            cell_data={"elastic_density": [self.elastic_density]},
-        )
+        return to_meshio(self)
+
+    def to_dolfinx(self, comm: Any = None) -> tuple[dolfinx.mesh.Mesh, dict[str, dolfinx.fem.Function]]:
+        """The mesh at rest in dolfinx, on one rank, and functions on it: `displacement` and `velocity`, linear, and
+        `elastic_density`, constant on cells. `comm`: an MPI communicator of one rank, else MPI.COMM_SELF."""
+        from ._convert import to_dolfinx
+
+        return to_dolfinx(self, comm)
 
 
 def _ints(name: str, values: Any) -> Array:
@@ -352,3 +400,17 @@ def _ints(name: str, values: Any) -> Array:
     if array.size > 0 and not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"{name}: found numbers of type {array.dtype}; expected integers")
     return np.ascontiguousarray(array, dtype=np.intc) if array.size else np.empty(0, np.intc)
+
+
+def _address(function: Compiled) -> int:
+    """0, which is refused, for None."""
+    if function is None or isinstance(function, int):
+        return function or 0
+    if hasattr(function, "address"):  # numba
+        return function.address
+    import ctypes
+
+    try:
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
+    except ctypes.ArgumentError:
+        raise InputError(f"function: found a {type(function).__name__}; expected a compiled one or its address") from None
