@@ -262,7 +262,7 @@ TEST(CInterface, CancelsSavesAndRestores) {
   const double y = itr_positions(block.simulation)[1];
   itr_energies energies;
   itr_get_energies(block.simulation, &energies);
-  itr_statistics statistics;
+  itr_step_statistics statistics;
   itr_get_statistics(block.simulation, &statistics);
   EXPECT_GT(statistics.newton_iterations, 0);
   EXPECT_NEAR(energies.total, energies.inertia + energies.elastic + energies.body, 1e-12);
@@ -302,7 +302,7 @@ TEST(CInterface, TakesTheirStiffness) {
     CBlock block;
     itr_set_follower_forces(block.simulation, springs, with_stiffness ? +stiffness : nullptr, nullptr);
     ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
-    itr_statistics statistics;
+    itr_step_statistics statistics;
     itr_get_statistics(block.simulation, &statistics);
     iterations.push_back(statistics.newton_iterations);
     heights.push_back(itr_positions(block.simulation)[31]);

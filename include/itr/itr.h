@@ -184,12 +184,12 @@ ITR_C_API itr_status itr_resultant(itr_simulation* simulation, const char* bound
 typedef struct itr_energies {
   double inertia, elastic, body, contact, friction, damping, host, total;
 } itr_energies;
-typedef struct itr_statistics {
+typedef struct itr_step_statistics {
   int newton_iterations, linear_solves, factorizations, splits, collapses, swaps, smooths, cut_steps;
   double history_loss, min_distance, min_volume_ratio, seconds;
-} itr_statistics;
+} itr_step_statistics;
 ITR_C_API void itr_get_energies(const itr_simulation* simulation, itr_energies* energies);
-ITR_C_API void itr_get_statistics(const itr_simulation* simulation, itr_statistics* statistics);
+ITR_C_API void itr_get_statistics(const itr_simulation* simulation, itr_step_statistics* statistics);
 
 /* Saved states: cheap; the same steps from one have the same bits. NULL where there is no memory. */
 ITR_C_API itr_snapshot* itr_save(const itr_simulation* simulation);

@@ -344,7 +344,7 @@ void itr_get_energies(const itr_simulation* simulation, itr_energies* energies) 
   const itr::EnergyReport& e = simulation->simulation.report().energy;
   *energies = {e.inertia, e.elastic, e.body, e.contact, e.friction, e.damping, e.host, e.total};
 }
-void itr_get_statistics(const itr_simulation* simulation, itr_statistics* statistics) {
+void itr_get_statistics(const itr_simulation* simulation, itr_step_statistics* statistics) {
   const itr::StepReport& r = simulation->simulation.report();
   *statistics = {r.newton_iterations,  r.linear_solves,  r.factorizations,   r.splits.accepted,
                  r.collapses.accepted, r.swaps.accepted, r.smooths.accepted, r.cut_steps,

@@ -26,6 +26,15 @@ foreach(file itr/examples/masticator.json itr/examples/render.py itr/examples/ta
   endif()
 endforeach()
 
+foreach(header simulation/step_problem.hpp remesh/edits.hpp core/timer.hpp)
+  if(EXISTS ${WORK_DIR}/prefix/include/itr/${header})
+    message(FATAL_ERROR "${header} is installed, which no public header includes")
+  endif()
+endforeach()
+if(EXISTS ${WORK_DIR}/consumer/shared_consumer)
+  run(${WORK_DIR}/consumer/shared_consumer)
+endif()
+
 # Where program and command look for modules: in their prefix, wherever the build tree was.
 file(GLOB modules ${WORK_DIR}/prefix/lib*/itr/backends/itr_backend_cholmod.so
      ${WORK_DIR}/prefix/lib/*/itr/backends/itr_backend_cholmod.so)
