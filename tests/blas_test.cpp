@@ -52,9 +52,12 @@ std::string solvers_as_listed(const std::string& environment) {
 class KernelsTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fitting_blas_kernels()) GTEST_SKIP() << "no AVX2";
-    if (std::getenv(kVariable)) GTEST_SKIP() << kVariable << " is set";
-    if (Registry().find("cholmod").library_version.find("OpenBLAS") == std::string::npos) GTEST_SKIP() << "no OpenBLAS";
+    if (!fitting_blas_kernels()) GTEST_SKIP() << "a machine without AVX2 does without: old kernels are the fitting ones";
+    if (std::getenv(kVariable)) GTEST_SKIP() << "where " << kVariable << " is set the kernels are the user's choice";
+    const BackendInfo info = Registry().find("cholmod");
+    if (!info.available) GTEST_SKIP() << "a machine without CHOLMOD does without: " << info.reason;
+    if (info.library_version.find("OpenBLAS") == std::string::npos)
+      GTEST_SKIP() << "a machine without OpenBLAS does without: CHOLMOD has " << info.library_version;
   }
 };
 
@@ -83,7 +86,8 @@ TEST(Kernels, OfOldCpusComeWithAdvice) {
 /// Dense blocks pay from some flops an entry of the factor: not in a small 2D system.
 TEST(Cholmod, ChoosesByFlops) {
   Registry registry = full_registry();
-  if (!registry.is_ready("cholmod")) GTEST_SKIP() << "no CHOLMOD";
+  if (!registry.is_ready("cholmod"))
+    GTEST_SKIP() << "a machine without CHOLMOD does without: " << registry.find("cholmod").reason;
   const auto bytes = [&](const char* name, const Elastic& system) {
     const auto solver = registry.create(name);
     EXPECT_EQ(solver->analyze(system.pattern, system.hints()), Outcome::ok);

@@ -276,7 +276,7 @@ TEST(Refine, TetrahedronIntoEightOfEqualVolume) {
 
 TEST(MeshReaders, EveryMeshOfThePaper) {
   const fs::path folder = fs::path(ITR_SHARED_DIR) / "paper-scenes" / "meshes";
-  if (!fs::exists(folder)) GTEST_SKIP() << "no scenes of the paper at " << folder;
+  if (!fs::exists(folder)) GTEST_SKIP() << "a machine without the data of the paper does without: no " << folder;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     const fs::path& file = entry.path();
     if ((file.extension() != ".msh" && file.extension() != ".obj") || file.filename() == "cantilever-quad.obj") continue;

@@ -39,15 +39,30 @@ class DoubleWell final : public Energy {
   double c_, constant_;
 };
 
+/// Until a step is below this, whatever the gradient.
+NewtonOptions until_steps_below(double tolerance) {
+  NewtonOptions options;
+  options.step_tolerance = tolerance;
+  options.gradient_tolerance = options.first_gradient_tolerance = 0;
+  return options;
+}
+
+/// Over all dofs of `x`, with a solver's own system.
+NewtonSummary minimize_by(linear::Solver& solver, const Energy& energy, VectorX& x, const NewtonOptions& options) {
+  SparseSystem system(solver);
+  const DofMap dofs = DofMap::from_held(std::vector<char>(x.size(), 0));
+  system.reset(dofs, 2, {}, 3);
+  Workspace workspace;
+  return minimize(energy, x, dofs, VectorX(), system, options, workspace);
+}
+
 TEST(Newton, LeavesASaddleInFewSteps) {
   const double c = 1e-2;
   VectorX x = VectorX::Constant(4, 1e-6);
   const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
   DenseSystem system;
-  NewtonOptions options;
+  NewtonOptions options = until_steps_below(1e-10);
   options.max_iterations = 500;
-  options.step_tolerance = 1e-10;
-  options.gradient_tolerance = options.first_gradient_tolerance = 0;
   Workspace workspace;
   const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
   EXPECT_TRUE(summary.converged()) << summary.message;
@@ -61,15 +76,8 @@ TEST(Newton, IsNotDrawnToASaddleByASolverThatAllowsIt) {
   linear::Registry registry;
   for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "eigen:cg"}) {
     const auto solver = registry.create(name);
-    SparseSystem system(*solver);
-    const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
-    system.reset(dofs, 2, {}, 3);
     VectorX x = Vec<2>(1e-6, 0.3);
-    NewtonOptions options;
-    options.step_tolerance = 1e-10;
-    options.gradient_tolerance = options.first_gradient_tolerance = 0;
-    Workspace workspace;
-    const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
+    const NewtonSummary summary = minimize_by(*solver, DoubleWell(c), x, until_steps_below(1e-10));
     EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
     EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-6) << name;  // the saddle is at 0
   }
@@ -80,16 +88,10 @@ TEST(Newton, TakesIndefiniteDirectionsWithAnySolverWhereAskedTo) {
   linear::Registry registry;
   for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "dense"}) {
     const auto solver = linear::choose_solver({.solvers = {name}}, true, registry, {});
-    SparseSystem system(*solver);
-    const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
-    system.reset(dofs, 2, {}, 3);
     VectorX x = Vec<2>(1e-6, 0.3);
-    NewtonOptions options;
+    NewtonOptions options = until_steps_below(1e-10);
     options.indefinite = IndefiniteHessian::accept;
-    options.step_tolerance = 1e-10;
-    options.gradient_tolerance = options.first_gradient_tolerance = 0;
-    Workspace workspace;
-    const NewtonSummary summary = minimize(DoubleWell(1e-2), x, dofs, VectorX(), system, options, workspace);
+    const NewtonSummary summary = minimize_by(*solver, DoubleWell(1e-2), x, options);
     EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
     EXPECT_LE(std::abs(x[0]), 1e-9) << name;
     EXPECT_LE(std::abs(x[1] - 0.1), 1e-9) << name;
@@ -104,15 +106,10 @@ TEST(Newton, CallsNoSaddleConverged) {
   for (const char* name : {"eigen:llt", "eigen:ldlt"})
     for (const double tolerance : {1e-4, 0.0}) {
       const auto solver = registry.create(name);
-      SparseSystem system(*solver);
-      const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
-      system.reset(dofs, 2, {}, 3);
       VectorX x = Vec<2>(1e-12, 0.3);
-      NewtonOptions options;
+      NewtonOptions options = until_steps_below(1e-4);
       options.gradient_tolerance = options.first_gradient_tolerance = tolerance;
-      options.step_tolerance = 1e-4;
-      Workspace workspace;
-      const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
+      const NewtonSummary summary = minimize_by(*solver, DoubleWell(c), x, options);
       EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
       EXPECT_GT(summary.indefinite, 0) << name;
       EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-4 / (2 * c)) << name;  // by the curvature there
@@ -204,9 +201,7 @@ TEST(Newton, CallsBackAfterEachStepAndTakesInAChangedEnergy) {
   VectorX x = VectorX::Constant(4, 2.0);
   const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
   DenseSystem system;
-  NewtonOptions options;
-  options.step_tolerance = 1e-10;
-  options.gradient_tolerance = options.first_gradient_tolerance = 0;
+  NewtonOptions options = until_steps_below(1e-10);
   Workspace workspace;
   int calls = 0;
   const NewtonExtras extras{.after_step = [&](const VectorX&) {
@@ -223,9 +218,7 @@ TEST(Newton, EndsBeforeTheNextIterationWhereItIsCancelled) {
   const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
   DenseSystem system;
   std::atomic<bool> cancel = false;
-  NewtonOptions options;
-  options.step_tolerance = 1e-10;
-  options.gradient_tolerance = options.first_gradient_tolerance = 0;
+  NewtonOptions options = until_steps_below(1e-10);
   options.cancel = &cancel;
   Workspace workspace;
   int calls = 0;

@@ -19,7 +19,7 @@ const fs::path kScripts = fs::path(ITR_SHARED_DIR) / "paper-scenes" / "scripts";
 class PaperScenes : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fs::exists(kScripts)) GTEST_SKIP() << "no scenes of the paper at " << kScripts;
+    if (!fs::exists(kScripts)) GTEST_SKIP() << "a machine without the data of the paper does without: no " << kScripts;
   }
 };
 

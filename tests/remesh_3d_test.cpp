@@ -94,67 +94,69 @@ std::optional<Edit<3>> random_edit(const TetScene& scene, const Strata<3>& strat
   }
 }
 
-TEST(LocalProblem3d, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
-  int compared = 0, in_contact = 0;
-  for (unsigned seed = 0; compared < 150; ++seed) {
+/// What a patch's test compares: the scene, the patch around a random edit that passes the gate, and both meshes.
+struct EditedScene {
+  const TetScene& scene;
+  const LocalProblem<3>& before;
+  LocalProblem<3>& after;
+  double energy;  ///< of the whole mesh before
+  const Mesh<3>& changed;
+  RemeshFields<3>& fields;  ///< after
+  VertexId created;
+};
+
+/// Gives `compare` random edits of random scenes until it has taken `count` of them.
+template <typename Compare>
+void for_random_edits(int count, int edits_a_scene, double friction, const Compare& compare) {
+  int compared = 0;
+  for (unsigned seed = 0; compared < count && !::testing::Test::HasFailure(); ++seed) {
+    SCOPED_TRACE(::testing::Message() << "seed " << seed);
     TetScene scene(seed);
+    scene.context.contact.friction_coefficient = friction;
     if (find_inverted<3>(scene.mesh, scene.fields.x) != kNone) continue;
-    const double global_before = whole_energy(scene.mesh, scene.fields, scene.context);
-    if (!std::isfinite(global_before)) continue;
+    const double energy = whole_energy(scene.mesh, scene.fields, scene.context);
+    if (!std::isfinite(energy)) continue;
     const Strata<3> strata(scene.mesh);
     const Gate<3> gate(scene.mesh, scene.fields, scene.context);
     const RemeshState<3> state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::interpolated};
     LocalScratch<3> scratch;
     Marks marks;
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < edits_a_scene; ++i) {
       const auto edit = random_edit(scene, strata, scene.random);
       if (!edit || !gate.passes(*edit, scratch.hits)) continue;
       const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
       LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
-      const double local = after.value() - before.value();
-      Mesh<3> changed = scene.mesh;
-      RemeshFields<3> fields = scene.fields;
-      fields.follow(*edit, changed.apply(*edit));
-      const double global = whole_energy(changed, fields, scene.context) - global_before;
-      ASSERT_NEAR(local, global, 1e-11 * global_before) << "seed " << seed << ", edit " << i;
-      ++compared;
-      in_contact += before.touches_contact();
-    }
-  }
-  EXPECT_GT(in_contact, 10);
-}
-
-TEST(LocalProblem3d, RelaxationLowersTheGlobalEnergyByWhatItReports) {
-  int compared = 0, in_contact = 0, clear = 0;
-  for (unsigned seed = 0; compared < 60; ++seed) {
-    TetScene scene(seed);
-    scene.context.contact.friction_coefficient = 0;  // lagged where a relaxation starts
-    if (find_inverted<3>(scene.mesh, scene.fields.x) != kNone) continue;
-    if (!std::isfinite(whole_energy(scene.mesh, scene.fields, scene.context))) continue;
-    const Strata<3> strata(scene.mesh);
-    const Gate<3> gate(scene.mesh, scene.fields, scene.context);
-    const RemeshState<3> state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::interpolated};
-    LocalScratch<3> scratch;
-    Marks marks;
-    for (int i = 0; i < 5; ++i) {
-      const auto edit = random_edit(scene, strata, scene.random);
-      if (!edit || !gate.passes(*edit, scratch.hits)) continue;
-      const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
-      LocalProblem<3> after(state, patch, *edit, true, scratch);
-      if (!after.has_unknowns()) continue;
       Mesh<3> changed = scene.mesh;
       RemeshFields<3> fields = scene.fields;
       const VertexId created = changed.apply(*edit);
       fields.follow(*edit, created);
-      const double local_before = after.value(), global_before = whole_energy(changed, fields, scene.context);
-      const double fall = local_before - after.relax(20).energy;
-      for (const auto& [v, x] : after.positions()) fields.x.segment<3>(3 * (v == kNewVertex ? created : v)) = x;
-      ASSERT_NEAR(fall, global_before - whole_energy(changed, fields, scene.context), 1e-10 * global_before)
-          << "seed " << seed << ", edit " << i;
-      ++compared;
-      ++(after.touches_contact() ? in_contact : clear);
+      compared += compare(EditedScene{scene, before, after, energy, changed, fields, created});
     }
   }
+}
+
+TEST(LocalProblem3d, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
+  int in_contact = 0;
+  for_random_edits(150, 10, 0.2, [&](const EditedScene& s) {
+    const double global = whole_energy(s.changed, s.fields, s.scene.context) - s.energy;
+    EXPECT_NEAR(s.after.value() - s.before.value(), global, 1e-11 * s.energy);
+    in_contact += s.before.touches_contact();
+    return true;
+  });
+  EXPECT_GT(in_contact, 10);
+}
+
+TEST(LocalProblem3d, RelaxationLowersTheGlobalEnergyByWhatItReports) {
+  int in_contact = 0, clear = 0;
+  for_random_edits(60, 5, 0, [&](const EditedScene& s) {  // friction is lagged where a relaxation starts
+    if (!s.after.has_unknowns()) return false;
+    const double unrelaxed = whole_energy(s.changed, s.fields, s.scene.context), local = s.after.value();
+    const double fall = local - s.after.relax(20).energy;
+    for (const auto& [v, x] : s.after.positions()) s.fields.x.segment<3>(3 * (v == kNewVertex ? s.created : v)) = x;
+    EXPECT_NEAR(fall, unrelaxed - whole_energy(s.changed, s.fields, s.scene.context), 1e-10 * s.energy);
+    ++(s.after.touches_contact() ? in_contact : clear);
+    return true;
+  });
   EXPECT_GT(in_contact, 10);
   EXPECT_GT(clear, 10);
 }

@@ -17,46 +17,28 @@ template <int Dim>
 void LinearizedForces<Dim>::add_stiffness(std::span<const int> vertices, const double* block) {
   const auto size = Dim * static_cast<Eigen::Index>(vertices.size());
   const Eigen::Map<const MatrixX> K(block, size, size);
-  blocks_.push_back({{vertices.begin(), vertices.end()}, 0.5 * (K + K.transpose())});
-}
-
-template <int Dim>
-template <typename F>
-void LinearizedForces<Dim>::for_each(ConstVectorView x, F&& f) const {
-  VectorX d;
-  for (const Block& block : blocks_) {
-    d.resize(block.stiffness.rows());
-    for (std::size_t k = 0; k < block.vertices.size(); ++k)
-      d.segment<Dim>(Dim * static_cast<int>(k)) =
-          x.segment<Dim>(Dim * block.vertices[k]) - lagged_x_.segment<Dim>(Dim * block.vertices[k]);
-    f(block, d);
-  }
+  const MatrixX symmetric = 0.5 * (K + K.transpose());
+  stiffness_.add(vertices, symmetric.data());
 }
 
 template <int Dim>
 double LinearizedForces<Dim>::value(ConstVectorView x, Workspace&) const {
-  double value = -forces_.dot(x - lagged_x_);
-  for_each(x, [&](const Block& block, const VectorX& d) { value += 0.5 * d.dot(block.stiffness * d); });
-  return scale_ * value;
+  return scale_ * (stiffness_.value(x, lagged_x_) - forces_.dot(x - lagged_x_));
 }
 
 template <int Dim>
 void LinearizedForces<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
   gradient -= scale_ * forces_;
-  for_each(x, [&](const Block& block, const VectorX& d) {
-    const VectorX g = scale_ * (block.stiffness * d);
-    for (std::size_t k = 0; k < block.vertices.size(); ++k)
-      gradient.segment<Dim>(Dim * block.vertices[k]) += g.segment<Dim>(Dim * static_cast<int>(k));
-  });
+  stiffness_.add_gradient(x, lagged_x_, scale_, gradient);
 }
 
 template <int Dim>
 void LinearizedForces<Dim>::add_hessian(ConstVectorView, PsdProjection psd, HessianSink& sink, Workspace&) const {
-  for (const Block& block : blocks_) {
-    MatrixX H = scale_ * block.stiffness;
+  stiffness_.for_each([&](std::span<const int> vertices, const auto& K) {
+    MatrixX H = scale_ * K;
     project_block(H, psd);
-    sink.add<Dim>(block.vertices, H.data());
-  }
+    sink.add<Dim>(vertices, H.data());
+  });
 }
 
 template <int Dim>

@@ -26,7 +26,7 @@ void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stenci
     pattern_ = base_;
     return;
   }
-  kept_key_.clear();
+  kept_factors_.clear();
   pattern_ = {};
   gathers_.clear();
   unknown_ = dofs.unknown;
@@ -105,8 +105,9 @@ void SparseAssembler::add_batch(std::size_t first, const double* blocks) {
   });
 }
 
-bool SparseAssembler::add_kept(const std::vector<double>& key) {
-  if (kept_key_.empty() || kept_key_ != key) return false;
+bool SparseAssembler::add_kept(std::span<const double> factors, std::span<const double> block) {
+  if (kept_factors_.empty() || !std::ranges::equal(kept_factors_, factors) || !std::ranges::equal(kept_block_, block))
+    return false;
   for (std::size_t k = 0; k < kept_.size(); ++k) values_[place(static_cast<int>(k))] += kept_[k];
   return true;
 }
@@ -116,12 +117,13 @@ void SparseAssembler::begin_keeping() {
   std::fill(values_.begin(), values_.end(), 0.0);
 }
 
-void SparseAssembler::end_keeping(std::vector<double> key) {
-  kept_key_ = std::move(key);
+void SparseAssembler::end_keeping(std::span<const double> factors, std::span<const double> block) {
+  kept_factors_.assign(factors.begin(), factors.end());
+  kept_block_.assign(block.begin(), block.end());
   kept_.resize(base_.row_indices.size());
   for (std::size_t k = 0; k < kept_.size(); ++k) kept_[k] = values_[place(static_cast<int>(k))];
   values_ = others_;
-  add_kept(kept_key_);
+  add_kept(factors, block);
 }
 
 void SparseAssembler::begin() {

@@ -3,6 +3,7 @@
 
 #include "itr/energy/damping_options.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/quadratic_blocks.hpp"
 #include "itr/energy/velocity_rule.hpp"
 
 namespace itr {
@@ -21,21 +22,7 @@ class DampingEnergy final : public Energy {
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
 
  private:
-  /// Of a stencil of `damped`.
-  struct Block {
-    std::array<int, 4> vertices;
-    int size;           ///< number of vertices
-    std::size_t first;  ///< of its values
-  };
-  std::span<const int> vertices(const Block& block) const {
-    return {block.vertices.data(), static_cast<std::size_t>(block.size)};
-  }
-  /// f(block, its matrix, velocities of its vertices) for each block.
-  template <typename F>
-  void for_each(ConstVectorView x, F&& f) const;
-
-  std::vector<Block> blocks_;
-  std::vector<double> values_;  ///< of the blocks, column-major
+  QuadraticBlocks<Dim> damped_;
   double coefficient_;
   VelocityRule velocity_;
 };

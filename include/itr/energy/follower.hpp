@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <vector>
+#include <span>
 
 #include "itr/energy/energy.hpp"
 #include "itr/energy/host_terms.hpp"
+#include "itr/energy/quadratic_blocks.hpp"
 
 namespace itr {
 
@@ -23,16 +24,8 @@ class LinearizedForces final : public Energy {
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
 
  private:
-  struct Block {
-    std::vector<int> vertices;
-    MatrixX stiffness;
-  };
-  /// f(block, d of its vertices) for each block.
-  template <typename F>
-  void for_each(ConstVectorView x, F&& f) const;
-
   VectorX forces_, lagged_x_;
-  std::vector<Block> blocks_;
+  QuadraticBlocks<Dim> stiffness_;
   double scale_;
 };
 

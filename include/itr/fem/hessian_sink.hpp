@@ -43,12 +43,12 @@ class SparseAssembler {
   /// of its batch.
   void add_batch(std::size_t first, const double* blocks);
 
-  /// A part of the matrix that is the same each time: adds what was kept for `key`, by whose values it is determined, if
-  /// the stencils are still those that it was kept with.
-  bool add_kept(const std::vector<double>& key);
-  /// What is added between the two (to entries of the base pattern only) is kept for `key`.
+  /// A part of the matrix that is the same each time, `block` times a factor for each base stencil: adds the sum that was
+  /// kept, if it is of these and the stencils are still those that it was kept with.
+  bool add_kept(std::span<const double> factors, std::span<const double> block);
+  /// What is added between the two (to entries of the base pattern only) is kept as the sum of these.
   void begin_keeping();
-  void end_keeping(std::vector<double> key);
+  void end_keeping(std::span<const double> factors, std::span<const double> block);
 
   /// Takes in entries that the pattern did not have. Returns whether the pattern changed since the last call.
   bool finish();
@@ -79,8 +79,8 @@ class SparseAssembler {
   linear::SparsityPattern base_;
   std::vector<int> place_;  ///< of the base's entries in the present pattern; empty: the same
   std::vector<Gather> gathers_;
-  std::vector<double> kept_, others_;  ///< by the base's entries; what was there before begin_keeping
-  std::vector<double> kept_key_;       ///< empty: nothing is kept
+  std::vector<double> kept_, others_;              ///< by the base's entries; what was there before begin_keeping
+  std::vector<double> kept_factors_, kept_block_;  ///< empty: nothing is kept
 };
 
 /// A step that held dofs are made to take, and what it does to the Newton system of the unknowns.
@@ -136,12 +136,11 @@ class HessianSink {
   void add_multiples(const CellSet<Dim>& cells, const std::vector<double>& factors, const Mat<Dim*(Dim + 1)>& block) {
     const auto fill = [&](std::size_t e, Mat<Dim*(Dim + 1)>& multiple) { multiple = factors[e] * block; };
     if (!sparse_ || motion_) return add_elements<Dim>(cells, fill);
-    std::vector<double> key(factors);
-    key.insert(key.end(), block.data(), block.data() + block.size());
-    if (sparse_->add_kept(key)) return;
+    const std::span values(block.data(), static_cast<std::size_t>(block.size()));
+    if (sparse_->add_kept(factors, values)) return;
     sparse_->begin_keeping();
     add_elements<Dim>(cells, fill);
-    sparse_->end_keeping(std::move(key));
+    sparse_->end_keeping(factors, values);
   }
 
  private:
