@@ -17,11 +17,11 @@
 #include <sstream>
 
 #include "itr/core/error.hpp"
+#include "itr/core/process.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/readers.hpp"
 #include "itr/scene/scene.hpp"
 #include "itr/simulation/simulation.hpp"
-#include "itr/simulation/step.hpp"
 
 namespace itr {
 namespace {

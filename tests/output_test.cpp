@@ -13,9 +13,9 @@
 
 #include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
+#include "itr/core/process.hpp"
 #include "itr/output/certify.hpp"
 #include "itr/output/writer.hpp"
-#include "itr/simulation/step.hpp"
 
 namespace itr::output {
 namespace {

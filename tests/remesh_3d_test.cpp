@@ -97,7 +97,7 @@ std::optional<Edit<3>> random_edit(const TetScene& scene, const Strata<3>& strat
 /// What a patch's test compares: the scene, the patch around a random edit that passes the gate, and both meshes.
 struct EditedScene {
   const TetScene& scene;
-  const LocalProblem<3>& before;
+  LocalProblem<3>& before;
   LocalProblem<3>& after;
   double energy;  ///< of the whole mesh before
   const Mesh<3>& changed;

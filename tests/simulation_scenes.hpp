@@ -7,6 +7,7 @@
 #include <ostream>
 
 #include "itr/mesh/validate.hpp"
+#include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "square_mesh.hpp"
 

@@ -6,6 +6,7 @@
 
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
+#include "itr/energy/inertia.hpp"
 #include "itr/linear/registry.hpp"
 #include "simulation_scenes.hpp"
 

@@ -9,6 +9,7 @@
 #include "itr/core/error.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/fem/cell_set.hpp"
+#include "itr/fem/locator.hpp"
 #include "itr/geometry/bvh.hpp"
 
 namespace itr {
@@ -40,15 +41,6 @@ struct Points {
   Bvh<Dim> tree;
 };
 
-template <int Dim>
-std::array<double, Dim + 1> weights_in(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element,
-                                       const Vec<Dim>& X) {
-  const Vec<Dim> local = element.inverse_edges * (X - cells.rest[element.vertices[0]]);
-  std::array<double, Dim + 1> weights{1 - local.sum()};
-  for (int k = 0; k < Dim; ++k) weights[k + 1] = local[k];
-  return weights;
-}
-
 constexpr double kInside = -1e-9;  ///< least weight of a point in a cell
 
 /// Adds the forces of the points that are in some cell of the set: each to the cell that it is deepest in.
@@ -69,7 +61,7 @@ void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& 
     points.tree.query(box.inflated(1e-9 * (box.max - box.min).norm()), hits);
     for (const int i : hits) {
       if (points.body[i] != element.body) continue;
-      const auto weights = weights_in(cells, element, points.X[i]);
+      const auto weights = barycentric_weights<Dim>(cells.rest[element.vertices[0]], element.inverse_edges, points.X[i]);
       const double depth = *std::min_element(weights.begin(), weights.end());
       if (depth < kInside) continue;
       const auto [it, is_new] = best.try_emplace(i, Best{depth, e, weights});

@@ -40,13 +40,6 @@ struct Locator<Dim>::Impl {
     if (!ids.empty()) extent = (all.max - all.min).norm();
     tree.build(boxes);
   }
-
-  std::array<double, Dim + 1> weights(const Cell& cell, const Vec<Dim>& X) const {
-    const Vec<Dim> local = cell.inverse_edges * (X - cell.origin);
-    std::array<double, Dim + 1> result{1 - local.sum()};
-    for (int k = 0; k < Dim; ++k) result[k + 1] = local[k];
-    return result;
-  }
 };
 
 namespace {
@@ -89,7 +82,7 @@ typename Locator<Dim>::Place Locator<Dim>::find(const Vec<Dim>& X, int body) con
   const auto look = [&](int i) {
     const auto& cell = impl_->cells[i];
     if (body != kNone && cell.body != body) return;
-    const auto weights = impl_->weights(cell, X);
+    const auto weights = barycentric_weights<Dim>(cell.origin, cell.inverse_edges, X);
     const double least = *std::min_element(weights.begin(), weights.end());
     if (least <= depth && best.cell != kNone) return;
     depth = least;

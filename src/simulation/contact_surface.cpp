@@ -46,7 +46,7 @@ CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& 
 
 /// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
 template <int Dim>
-std::shared_ptr<const VertexMap<Dim>> proxy_map(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
+std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   const int vertices = mesh.vertex_slots(), own = static_cast<int>(proxy.rest.size());
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
@@ -65,7 +65,7 @@ std::shared_ptr<const VertexMap<Dim>> proxy_map(const Setup<Dim>& setup, const M
 }
 
 template <int Dim>
-ContactSurface<Dim> contact_surface(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
   if (!setup.proxy) return {collision_surface(mesh, setup.obstacles), nullptr};
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   std::vector<int> points(proxy.rest.size());
@@ -77,10 +77,10 @@ ContactSurface<Dim> contact_surface(const Setup<Dim>& setup, const Mesh<Dim>& me
 }
 
 template CollisionSurface collision_surface(const Mesh<2>&, const Obstacles<2>&);
-template std::shared_ptr<const VertexMap<2>> proxy_map(const Setup<2>&, const Mesh<2>&);
-template ContactSurface<2> contact_surface(const Setup<2>&, const Mesh<2>&);
+template std::shared_ptr<const VertexMap<2>> proxy_map(const StepSetup<2>&, const Mesh<2>&);
+template ContactSurface<2> contact_surface(const StepSetup<2>&, const Mesh<2>&);
 template CollisionSurface collision_surface(const Mesh<3>&, const Obstacles<3>&);
-template std::shared_ptr<const VertexMap<3>> proxy_map(const Setup<3>&, const Mesh<3>&);
-template ContactSurface<3> contact_surface(const Setup<3>&, const Mesh<3>&);
+template std::shared_ptr<const VertexMap<3>> proxy_map(const StepSetup<3>&, const Mesh<3>&);
+template ContactSurface<3> contact_surface(const StepSetup<3>&, const Mesh<3>&);
 
 }  // namespace itr

@@ -109,6 +109,8 @@ std::string choose_tolerances(const Setup<Dim>& setup, RemeshOptions& remesh) {
 template <int Dim>
 std::vector<std::string> Setup<Dim>::choose_defaults() {
   std::vector<std::string> words;
+  ContactOptions& contact = this->contact;
+  RemeshOptions& remesh = this->remesh;
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));

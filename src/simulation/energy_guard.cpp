@@ -7,7 +7,7 @@
 namespace itr {
 
 template <int Dim>
-EnergyGuard<Dim>::EnergyGuard(const Setup<Dim>& setup, const State<Dim>& start)
+EnergyGuard<Dim>::EnergyGuard(const StepSetup<Dim>& setup, const State<Dim>& start)
     : setup_(setup),
       is_on_(std::isfinite(setup.time.energy_growth_limit) && setup.time.integrator == Integrator::newmark),
       start_(start.created_energy),

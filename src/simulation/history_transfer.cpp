@@ -23,7 +23,7 @@ VectorX interleaved(const MatrixX& rows) {
 template <int Dim>
 class HistoryTransfer {
  public:
-  HistoryTransfer(const Setup<Dim>& setup, const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched)
+  HistoryTransfer(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched)
       : setup_(setup), mesh_(mesh), patch_(make_transfer_patch(old_mesh, mesh, touched, setup.materials, kRings)) {
     const auto n = patch_.new_cells.vertices.size();
     prescribed_.assign(Dim * n, 0);
@@ -116,7 +116,7 @@ class HistoryTransfer {
     return x;
   }
 
-  const Setup<Dim>& setup_;
+  const StepSetup<Dim>& setup_;
   const Mesh<Dim>& mesh_;
   TransferPatch<Dim> patch_;
   std::vector<char> prescribed_;  ///< by dof of the patch
@@ -127,7 +127,7 @@ class HistoryTransfer {
 }  // namespace
 
 template <int Dim>
-HistoryTransferReport transfer_history(const Setup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
+HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
                                        const Mesh<Dim>& mesh, const TouchedCells& touched, linear::Solver& solver,
                                        History& history) {
   HistoryTransfer<Dim> transfer(setup, old_mesh, mesh, touched);
@@ -149,8 +149,8 @@ HistoryTransferReport transfer_history(const Setup<Dim>& setup, const Mesh<Dim>&
   return report;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                \
-  template HistoryTransferReport transfer_history<Dim>(const Setup<Dim>&, const Mesh<Dim>&, const History&, \
+#define ITR_INSTANTIATE(Dim)                                                                                    \
+  template HistoryTransferReport transfer_history<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const History&, \
                                                        const Mesh<Dim>&, const TouchedCells&, linear::Solver&, History&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -7,7 +7,7 @@
 namespace itr {
 
 template <int Dim>
-std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
+std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
   if (const CellId c = find_inverted<Dim>(mesh, x); c != kNone) return "cell " + std::to_string(c) + " is inverted";
   if (!setup.contact.enabled) return {};
   const ContactSurface<Dim> contact = contact_surface(setup, mesh);
@@ -21,7 +21,7 @@ std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const
   return {};
 }
 
-template std::string find_violation(const Setup<2>&, const Mesh<2>&, const VectorX&);
-template std::string find_violation(const Setup<3>&, const Mesh<3>&, const VectorX&);
+template std::string find_violation(const StepSetup<2>&, const Mesh<2>&, const VectorX&);
+template std::string find_violation(const StepSetup<3>&, const Mesh<3>&, const VectorX&);
 
 }  // namespace itr

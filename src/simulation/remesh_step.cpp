@@ -28,24 +28,23 @@ std::vector<Vec<Dim>> as_points(const VectorX& field, int first) {
 }
 
 template <int Dim>
-StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, const StepProblem<Dim>& problem,
-                              const VectorX& x, double t, double shortest_edge) {
+StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& state, const StepProblem<Dim>& problem,
+                              const VectorX& x) {
+  const StepSetup<Dim>& setup = tools.setup;
   const TimeIntegrator integrator(setup.time);
   StepContext<Dim> context;
-  static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, t);
+  static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, state.t);
   if (setup.follower.forces) {
     const int dofs = Dim * state.mesh.vertex_slots();
     VectorX forces = VectorX::Zero(dofs);
-    setup.follower.forces(state.mesh, x.head(dofs), t, forces);
+    setup.follower.forces(state.mesh, x.head(dofs), state.t, forces);
     context.host.push_back(point_forces<Dim>(state.mesh, forces));
   }
   context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
   for (const auto& condition : setup.dirichlet) context.held_components.try_emplace(condition.tag, condition.components);
   context.newton = setup.newton;
-  context.shortest_edge = shortest_edge;
-  if (setup.remesh.sizing_field.enabled)
-    for (const auto& [a, b] : setup.mesh.edges())
-      context.longest_edge = std::max(context.longest_edge, (setup.mesh.rest(a) - setup.mesh.rest(b)).norm());
+  context.shortest_edge = tools.initial_edges.shortest;
+  context.longest_edge = tools.initial_edges.longest;
   const int bodies = state.mesh.vertex_slots();
   auto& obstacles = context.obstacles;
   obstacles.rest = setup.obstacles.rest;
@@ -58,7 +57,7 @@ StepContext<Dim> make_context(const Setup<Dim>& setup, const State<Dim>& state, 
 }
 
 template <int Dim>
-RemeshFields<Dim> make_fields(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
+RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
   const int dofs = Dim * state.mesh.vertex_slots();
   const TimeIntegrator integrator(setup.time);
   RemeshFields<Dim> fields;
@@ -75,7 +74,7 @@ RemeshFields<Dim> make_fields(const Setup<Dim>& setup, const State<Dim>& state, 
 
 /// Mass of the bodies times the diameter of where they are [kg m].
 template <int Dim>
-double mass_moment(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
+double mass_moment(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
   double mass = 0;
   for (int c = 0; c < mesh.cell_slots(); ++c) mass += setup.materials.at(mesh.body(c)).density * mesh.volume(c);
   Box<Dim> box;
@@ -100,11 +99,11 @@ void tell(const HistoryTransferReport& transfer, double extent, int step, const 
 }  // namespace
 
 template <int Dim>
-std::optional<MeshRenumbering> remesh_and_project(const Setup<Dim>& setup, double shortest_edge,
-                                                  const StepProblem<Dim>& problem, double t, const State<Dim>& before,
-                                                  State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
-                                                  const Logger& logger) {
-  const StepContext<Dim> context = make_context(setup, before, problem, x, t, shortest_edge);
+std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+                                                  const State<Dim>& before, State<Dim>& state, VectorX& x,
+                                                  StepReport& report) {
+  const StepSetup<Dim>& setup = tools.setup;
+  const StepContext<Dim> context = make_context(tools, before, problem, x);
   RemeshFields<Dim> fields = make_fields(setup, before, x);
   RemeshReport remeshed;
   {
@@ -145,16 +144,15 @@ std::optional<MeshRenumbering> remesh_and_project(const Setup<Dim>& setup, doubl
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
   if (!remeshed.coarsened()) return renumbering;  // refinement alone: interpolation is exact
   const HistoryTransferReport transfer =
-      transfer_history(setup, before.mesh, before.history, state.mesh, touched, solver, state.history);
+      transfer_history(setup, before.mesh, before.history, state.mesh, touched, tools.system.solver(), state.history);
   report.history_loss = transfer.loss / problem.scaling();
-  tell(transfer, mass_moment(setup, state.mesh, x), state.step, logger);
+  tell(transfer, mass_moment(setup, state.mesh, x), state.step, tools.logger);
   return renumbering;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                          \
-  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const Setup<Dim>&, double, const StepProblem<Dim>&, \
-                                                                  double, const State<Dim>&, State<Dim>&, VectorX&,   \
-                                                                  StepReport&, linear::Solver&, const Logger&);
+#define ITR_INSTANTIATE(Dim)                                                                                      \
+  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&, \
+                                                                  const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -152,31 +152,38 @@ void check_proxy(const Setup<Dim>& setup) {
 }  // namespace
 
 template <int Dim>
-void Setup<Dim>::validate() const {
-  if (mesh.num_cells() == 0) refuse("mesh", "no cells", "at least one");
+void StepSetup<Dim>::validate() const {
   check_time(time);
   check_contact(contact);
   check_newton(newton);
   check_remeshing(remesh);
-  check_materials(*this);
   check_obstacles(obstacles);
-  check_proxy(*this);
-  linear.validate();
-  if (!point_tags.empty() && point_tags.size() != static_cast<std::size_t>(mesh.vertex_slots()))
-    refuse("point_tags", fmt::format("{} entries", point_tags.size()), fmt::format("{}, one a vertex", mesh.vertex_slots()));
   check_functions("dirichlet", dirichlet, &DirichletCondition<Dim>::displacement);
   check_functions("neumann", neumann, &NeumannCondition<Dim>::traction);
   check_functions("pressure", pressure, &PressureCondition<Dim>::pressure);
-  for (const auto& [name, list] :
-       {std::pair{"initial_displacement", &initial_displacement}, std::pair{"initial_velocity", &initial_velocity},
-        std::pair{"initial_acceleration", &initial_acceleration}})
-    check_functions(name, *list, &InitialCondition<Dim>::value);
   for (std::size_t i = 0; i < damping.size(); ++i) {
     require_not_negative(element("damping", i) + ".coefficient", damping[i].coefficient);
     require_at_least(element("damping", i) + ".lagging_rounds", damping[i].lagging_rounds, 1);
   }
 }
 
+template <int Dim>
+void Setup<Dim>::validate() const {
+  if (mesh.num_cells() == 0) refuse("mesh", "no cells", "at least one");
+  StepSetup<Dim>::validate();
+  check_materials(*this);
+  check_proxy(*this);
+  linear.validate();
+  if (const auto tags = this->point_tags.size(); tags != 0 && tags != static_cast<std::size_t>(mesh.vertex_slots()))
+    refuse("point_tags", fmt::format("{} entries", tags), fmt::format("{}, one a vertex", mesh.vertex_slots()));
+  for (const auto& [name, list] :
+       {std::pair{"initial_displacement", &initial_displacement}, std::pair{"initial_velocity", &initial_velocity},
+        std::pair{"initial_acceleration", &initial_acceleration}})
+    check_functions(name, *list, &InitialCondition<Dim>::value);
+}
+
+template void StepSetup<2>::validate() const;
+template void StepSetup<3>::validate() const;
 template void Setup<2>::validate() const;
 template void Setup<3>::validate() const;
 

@@ -9,7 +9,7 @@
 
 #include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/timer.hpp"
+#include "itr/core/process.hpp"
 #include "itr/linear/choice.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/simulation/step.hpp"
@@ -118,11 +118,13 @@ struct Simulation<Dim>::Impl {
   std::unique_ptr<linear::ReusingSolver> solver;
   std::unique_ptr<SparseSystem> system;                                ///< keeps what it knows of the mesh from step to step
   std::shared_ptr<State<Dim>> state = std::make_shared<State<Dim>>();  ///< snapshots may share it
-  double shortest_edge = 0;                                            ///< of the initial mesh [m]
-  NodalForces forces;                                                  ///< of the last step
-  double first_dt = 1;                                                 ///< what the setup's tolerances are for [s]
+  EdgeLengths initial_edges;
+  NodalForces forces;   ///< of the last step
+  double first_dt = 1;  ///< what the setup's tolerances are for [s]
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
+
+  StepTools<Dim> tools() const { return {setup, initial_edges, *system, *solver, logger}; }
 
   /// Steps from now on have this length.
   void set_step(double dt) {
@@ -178,14 +180,11 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   impl_->first_dt = impl_->setup.time.dt;
   impl_->first_newton = impl_->setup.newton;
   *impl_->state = initial_state(impl_->setup);
+  impl_->initial_edges = edge_lengths(impl_->state->mesh);
   refuse_intersections(impl_->setup, *impl_->state);
   if (impl_->setup.consistent_initial_acceleration && !impl_->state->history.a.empty())
     set_consistent_acceleration(impl_->setup, *impl_->state, *impl_->system);
   impl_->set_forces_at_rest();
-  impl_->shortest_edge = std::numeric_limits<double>::infinity();
-  const auto& mesh = impl_->state->mesh;
-  for (const auto& [a, b] : mesh.edges())
-    impl_->shortest_edge = std::min(impl_->shortest_edge, (mesh.rest(a) - mesh.rest(b)).norm());
 }
 
 template <int Dim>
@@ -216,8 +215,7 @@ StepResult Simulation<Dim>::adapt(double dt) {
   impl_->set_step(dt);
   State<Dim> end = *impl_->state;
   const auto start = std::make_shared<State<Dim>>();
-  StepResult result =
-      take_step(impl_->setup, impl_->shortest_edge, *impl_->system, *impl_->solver, impl_->logger, end, false, start.get());
+  StepResult result = take_step(impl_->tools(), end, false, start.get());
   if (!result.ok || result.renumbering.empty()) return result;
   const std::shared_ptr<const State<Dim>> before = std::exchange(impl_->state, start);
   impl_->set_forces_at_rest();
@@ -231,8 +229,7 @@ StepResult Simulation<Dim>::advance() {
   const std::shared_ptr<const State<Dim>> before =
       impl_->on_mesh_change && impl_->setup.remesh.enabled ? impl_->state : nullptr;
   impl_->own_state();
-  StepResult result =
-      take_step_in_parts(impl_->setup, impl_->shortest_edge, *impl_->system, *impl_->solver, impl_->logger, *impl_->state);
+  StepResult result = take_step_in_parts(impl_->tools(), *impl_->state);
   if (!result.ok) return result;
   impl_->forces = result.forces;
   if (before && !result.renumbering.empty())

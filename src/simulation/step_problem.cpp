@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
-#include <sstream>
 #include <utility>
 
+#include "diagnosis.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/energy/follower.hpp"
 
@@ -34,7 +33,7 @@ bool has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double
 }  // namespace
 
 template <int Dim>
-Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
+Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
   Loads<Dim> loads;
   if (setup.body_acceleration) loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) { return f(X, t); };
   for (const auto& condition : setup.neumann)
@@ -45,7 +44,7 @@ Loads<Dim> loads_at(const Setup<Dim>& setup, double t) {
 }
 
 template <int Dim>
-HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t) {
+HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t) {
   const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(setup.obstacles.rest.size());
   HeldDofs<Dim> result{std::vector<char>(Dim * total, 0), VectorX::Zero(Dim * total)};
   std::vector<const DirichletCondition<Dim>*> by_tag;
@@ -87,7 +86,7 @@ double rest_diagonal(const Mesh<Dim>& mesh) {
 }
 
 template <int Dim>
-PotentialTerms<Dim> potential_terms(const Setup<Dim>& setup, const History& history, double t) {
+PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t) {
   const TimeIntegrator integrator(setup.time);
   return {.materials = setup.materials,
           .loads = loads_at(setup, t),
@@ -103,7 +102,7 @@ PotentialTerms<Dim> potential_terms(const Setup<Dim>& setup, const History& hist
 }
 
 template <int Dim>
-StepProblem<Dim>::StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
+StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
                               SparseSystem& system, const BarrierStiffness& stiffness)
     : setup_(setup),
       terms_(potential_terms(setup, history, t)),
@@ -168,121 +167,13 @@ VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
   return free ? start : x;
 }
 
-namespace {
-
-template <int Dim>
-Vec<Dim> middle_of(std::span<const int> vertices, const VectorX& x) {
-  Vec<Dim> middle = Vec<Dim>::Zero();
-  for (const int v : vertices) middle += x.template segment<Dim>(Dim * v) / static_cast<double>(vertices.size());
-  return middle;
-}
-
-/// Between the closest points of a pair.
-template <int Dim>
-Vec<Dim> place_of_pair(PairKind kind, std::span<const int> vertices, const VectorX& x) {
-  std::array<Vec<Dim>, 4> positions, closest;
-  for (std::size_t i = 0; i < vertices.size(); ++i) positions[i] = x.template segment<Dim>(Dim * vertices[i]);
-  const ClosestFeatures features = closest_features<Dim>(kind, positions.data());
-  for (int i = 0; i < pair_size(features.kind); ++i) closest[i] = positions[features.local[i]];
-  const PairDistance<Dim> distance = pair_distance<Dim>(features.kind, closest.data());
-  Vec<Dim> sum = Vec<Dim>::Zero();
-  for (int i = 0; i < pair_size(features.kind); ++i) sum += std::abs(distance.coefficients[i]) * closest[i];
-  return sum / distance.coefficients.template lpNorm<1>();
-}
-
-PairKind kind_of_pair(const StepLimit& limit) {
-  if (limit.vertices.size() == 3) return PairKind::edge_vertex;
-  if (limit.vertices.size() == 2) return PairKind::vertex_vertex;
-  return limit.kind == "edge-edge pair" ? PairKind::edge_edge : PairKind::face_vertex;
-}
-
-}  // namespace
-
-/// "12 13 obstacle 4 near (0.1, 0.2)": vertices at x, the problem's, or the surface's (those of a proxy: "proxy 12").
-template <int Dim>
-std::string StepProblem<Dim>::name_vertices(std::span<const int> vertices, const VectorX& x, const Vec<Dim>& place,
-                                            const char* own) const {
-  const int bodies = static_cast<int>(x.size() / Dim) - static_cast<int>(setup_.obstacles.rest.size());
-  std::ostringstream text;
-  for (const int v : vertices) text << (v < bodies ? own : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
-  text << "near (";
-  for (int c = 0; c < Dim; ++c) text << (c > 0 ? ", " : "") << place[c];
-  text << ')';
-  return text.str();
-}
-
-/// Adds to the message of a solve that did not converge what stopped it: the cell or pair that limits the last step, and the
-/// cell and the pair at the largest residual.
+/// `summary` with the reason of a failure.
 template <int Dim>
 NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
   if (summary.converged()) return summary;
-  std::ostringstream text;
-  const VectorX on_surface = surface_.positions(x);
-  const auto name_pair = [&](PairKind kind, std::span<const int> vertices) {
-    return name_vertices(vertices, on_surface, place_of_pair<Dim>(kind, vertices, on_surface), surface_.map ? "proxy " : "");
-  };
-  const auto name_middle = [&](std::span<const int> vertices) {
-    return name_vertices(vertices, x, middle_of<Dim>(vertices, x));
-  };
-  const VectorX& step = summary.failed_step;
-  if (step.size() == x.size() && step.allFinite()) {
-    const StepLimit cell = potential_.elastic()->step_limit(x, step);
-    StepLimit pair;
-    if (potential_.contact()) pair = potential_.contact()->step_limit(on_surface, surface_.motion(step), workspace_);
-    const bool is_pair = pair.step < cell.step;
-    const StepLimit& limit = is_pair ? pair : cell;
-    if (limit.step < 1)
-      text << "; " << limit.step << " of the last Newton step is free, limited by the " << limit.kind << ' '
-           << (is_pair ? name_pair(kind_of_pair(limit), limit.vertices) : name_middle(limit.vertices));
-  }
-  if (summary.worst_dof != kNone) {
-    const int v = summary.worst_dof / Dim;
-    Vec<Dim> total = Vec<Dim>::Zero();
-    double largest = -1;
-    std::string_view name;
-    for (const auto& term : sum.terms()) {
-      VectorX gradient = VectorX::Zero(x.size());
-      term->add_gradient(x, gradient, workspace_);
-      const Vec<Dim> force = gradient.template segment<Dim>(Dim * v) / terms_.scaling;
-      total += force;
-      if (force.norm() > largest) {
-        largest = force.norm();
-        name = term->name();
-      }
-    }
-    text << "; the largest residual, " << total.norm() << " N, is at vertex " << name_middle(std::array{v})
-         << ", where the largest force, " << largest << " N, is that of the term '" << name << '\'';
-    const auto has = [v](const auto& vertices) { return std::find(vertices.begin(), vertices.end(), v) != vertices.end(); };
-    const auto acts_on_it = [&](std::span<const int> pair) {
-      if (!surface_.map) return has(pair);
-      return std::any_of(pair.begin(), pair.end(), [&](int w) { return has(surface_.map->sources(w)); });
-    };
-    double least = std::numeric_limits<double>::infinity();
-    std::span<const int> stencil;
-    for (const auto& element : cells_.elements) {
-      if (!has(element.vertices)) continue;
-      const double ratio = deformation_gradient<Dim>(element, x).determinant();
-      if (ratio >= least) continue;
-      least = ratio;
-      stencil = element.vertices;
-    }
-    if (!stencil.empty()) text << "; its cell " << name_middle(stencil) << " has the volume ratio " << least;
-    least = std::numeric_limits<double>::infinity();
-    stencil = {};
-    PairKind kind{};
-    if (potential_.contact())
-      for (const ContactStencil& s : potential_.contact()->active(on_surface, workspace_)) {
-        const std::span<const int> pair(s.vertices.data(), s.size());
-        if (!acts_on_it(pair)) continue;
-        const double distance = std::sqrt(potential_.contact()->distance(s, on_surface).squared);
-        if (distance >= least) continue;
-        least = distance;
-        stencil = pair;
-        kind = s.kind;
-      }
-    if (!stencil.empty()) text << "; its contact pair " << name_pair(kind, stencil) << " has the distance " << least << " m";
-  }
-  summary.message += text.str();
+  const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
+  summary.message +=
+      diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling}, summary, sum, x, workspace_);
   return summary;
 }
 
@@ -503,12 +394,12 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   return least;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                    \
-  template class StepProblem<Dim>;                                                              \
-  template Loads<Dim> loads_at<Dim>(const Setup<Dim>&, double);                                 \
-  template PotentialTerms<Dim> potential_terms<Dim>(const Setup<Dim>&, const History&, double); \
-  template HeldDofs<Dim> held_dofs<Dim>(const Setup<Dim>&, const Mesh<Dim>&, double);           \
-  template double rest_diagonal<Dim>(const Mesh<Dim>&);                                         \
+#define ITR_INSTANTIATE(Dim)                                                                        \
+  template class StepProblem<Dim>;                                                                  \
+  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                 \
+  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double); \
+  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);           \
+  template double rest_diagonal<Dim>(const Mesh<Dim>&);                                             \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -11,6 +11,15 @@
 
 namespace itr {
 
+/// Weights of a rest position in a simplex, from its first vertex and the inverse of its edges; below 0 outside.
+template <int Dim>
+std::array<double, Dim + 1> barycentric_weights(const Vec<Dim>& origin, const Mat<Dim>& inverse_edges, const Vec<Dim>& X) {
+  const Vec<Dim> local = inverse_edges * (X - origin);
+  std::array<double, Dim + 1> weights{1 - local.sum()};
+  for (int k = 0; k < Dim; ++k) weights[k + 1] = local[k];
+  return weights;
+}
+
 /// Finds cells by rest positions. It copies what it needs: the mesh may change afterwards.
 template <int Dim>
 class Locator {

@@ -27,10 +27,10 @@ struct ContactSurface {
 
 /// From the vertices of mesh and obstacles to those of the setup's proxy and obstacles.
 template <int Dim>
-std::shared_ptr<const VertexMap<Dim>> proxy_map(const Setup<Dim>& setup, const Mesh<Dim>& mesh);
+std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 
 /// The proxy's surface where the setup has one, else the boundary of the compact mesh; with the obstacles.
 template <int Dim>
-ContactSurface<Dim> contact_surface(const Setup<Dim>& setup, const Mesh<Dim>& mesh);
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 
 }  // namespace itr

@@ -13,14 +13,14 @@ template <int Dim>
 class EnergyGuard {
  public:
   /// Of a step that starts from `start`. `setup` must outlive this.
-  EnergyGuard(const Setup<Dim>& setup, const State<Dim>& start);
+  EnergyGuard(const StepSetup<Dim>& setup, const State<Dim>& start);
   /// Whether the step from `history`, which `problem` describes, may end at x. Always, where implicit Euler takes it.
   bool allows(StepProblem<Dim>& problem, const History& history, const VectorX& x);
   /// The balance at the end of the step that was last asked about [J].
   double created_energy() const { return balance_; }
 
  private:
-  const Setup<Dim>& setup_;
+  const StepSetup<Dim>& setup_;
   bool is_on_;
   double start_;    ///< the balance before the step [J]
   double balance_;  ///< and at its end [J]

@@ -21,7 +21,7 @@ struct HistoryTransferReport {
 /// values change on these and some rings around them only. The integrals of rho x, rho v and rho a over each connected part
 /// of that are kept to round-off. Prescribed components of positions stay what they are.
 template <int Dim>
-HistoryTransferReport transfer_history(const Setup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
+HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
                                        const Mesh<Dim>& mesh, const TouchedCells& touched, linear::Solver& solver,
                                        History& history);
 

@@ -11,6 +11,6 @@ namespace itr {
 /// oriented; with contact, surfaces do not cross, and no body or obstacle is inside of a body. Linear in the size of the
 /// mesh but for a tree of its surface.
 template <int Dim>
-std::string find_violation(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x);
+std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x);
 
 }  // namespace itr

@@ -2,20 +2,16 @@
 // The middle of a time step: remesh where that lowers the step's energy, carry the state over to the new mesh.
 #pragma once
 
-#include "itr/core/log.hpp"
-#include "itr/linear/solver.hpp"
-#include "itr/simulation/simulation.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "itr/simulation/step.hpp"
 
 namespace itr {
 
-/// Remeshes state.mesh, around the solution x of `problem` at time t, and carries state.history and x over to the new mesh;
-/// `before` is the state as it is. Returns what became of its ids; nothing where nothing changed. `report` gets operations,
-/// forgotten history and seconds. `shortest_edge` is that of the initial mesh [m].
+/// Remeshes state.mesh, around the solution x of `problem`, and carries state.history and x over to the new mesh; `before`
+/// is the state as it is, at the end of the step but for x. Returns what became of its ids; nothing where nothing changed.
+/// `report` gets operations, forgotten history and seconds.
 template <int Dim>
-std::optional<MeshRenumbering> remesh_and_project(const Setup<Dim>& setup, double shortest_edge,
-                                                  const StepProblem<Dim>& problem, double t, const State<Dim>& before,
-                                                  State<Dim>& state, VectorX& x, StepReport& report, linear::Solver& solver,
-                                                  const Logger& logger);
+std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+                                                  const State<Dim>& before, State<Dim>& state, VectorX& x,
+                                                  StepReport& report);
 
 }  // namespace itr

@@ -84,27 +84,24 @@ struct FieldOptions {
   bool any_forces() const { return contact_forces || friction_forces || reaction_forces || applied_forces; }
 };
 
+/// What acts in a step, whatever mesh it begins on.
 template <int Dim>
-struct Setup {
-  Mesh<Dim> mesh;  ///< with body ids and facet tags
+struct StepSetup {
   Obstacles<Dim> obstacles;
   std::optional<CollisionProxy<Dim>> proxy;  ///< not with remeshing
   std::map<int, Material> materials;         ///< by body id; every body of the mesh has one
   std::vector<DirichletCondition<Dim>> dirichlet;
-  /// By vertex of `mesh`: Dirichlet conditions with this tag hold it, whatever its facets say; kNoTag or empty: none. Not
+  /// By vertex of the mesh: Dirichlet conditions with this tag hold it, whatever its facets say; kNoTag or empty: none. Not
   /// with remeshing.
   std::vector<int> point_tags;
   std::vector<NeumannCondition<Dim>> neumann;
   std::vector<PressureCondition<Dim>> pressure;
   SpaceTimeFunction<Dim> body_acceleration;  ///< acts along +: gravity is (0, -9.81) [m/s^2]; empty: none
-  std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
-  bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
 
   TimeOptions time;
   ContactOptions contact;
   NewtonOptions newton;
   RemeshOptions remesh;
-  LinearOptions linear;
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   FieldOptions fields;
   bool lump_mass = false;
@@ -115,19 +112,33 @@ struct Setup {
   /// Called after each Newton iteration of a whole mesh; false ends the step, which is then not done. Empty: nobody asks.
   std::function<bool(const NewtonProgress&)> on_iteration;
 
+  /// Throws InputError for the first thing that is out of range, missing, or not finite. Places are those of a scene file
+  /// where it has them.
+  void validate() const;
+};
+
+/// A simulation from its start.
+template <int Dim>
+struct Setup : StepSetup<Dim> {
+  Mesh<Dim> mesh;  ///< with body ids and facet tags
+  std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
+  bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
+  LinearOptions linear;
+
   /// Fills in what is left open, and says what with, a sentence each. Barrier stiffness 0: adaptive; with remeshing a tenth
   /// of the stiffest body's modulus [Pa], or what that is in the other form. Split tolerance 0: relative_tolerance times an
   /// energy of the scene, the lesser of 1 % of sum(E V), which bodies have at strains of a tenth, and, where nothing
   /// prescribed feeds it, of what it has at the start and gravity gives; collapses then may cost a hundredth of that. Least
   /// edge to split below 0: 1e-6 of the bodies' diagonal. A Simulation calls it.
   std::vector<std::string> choose_defaults();
-  /// Throws InputError for the first thing that cannot be simulated: what is out of range, missing, or not finite. Places
-  /// are those of a scene file where it has them. A Simulation calls it.
+  /// That of all, what belongs to the mesh included. A Simulation calls it.
   void validate() const;
 };
 
 extern template std::vector<std::string> Setup<2>::choose_defaults();
 extern template std::vector<std::string> Setup<3>::choose_defaults();
+extern template void StepSetup<2>::validate() const;
+extern template void StepSetup<3>::validate() const;
 extern template void Setup<2>::validate() const;
 extern template void Setup<3>::validate() const;
 

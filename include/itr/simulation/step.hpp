@@ -7,20 +7,31 @@
 
 namespace itr {
 
+/// Of the mesh that a simulation begins with [m].
+struct EdgeLengths {
+  double shortest = 0, longest = 0;
+};
+template <int Dim>
+EdgeLengths edge_lengths(const Mesh<Dim>& mesh);
+
+/// What all steps of a simulation share.
+template <int Dim>
+struct StepTools {
+  const StepSetup<Dim>& setup;
+  EdgeLengths initial_edges;
+  SparseSystem& system;
+  linear::ReusingSolver& solver;  ///< that of `system`
+  const Logger& logger;
+};
+
 /// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again.
-/// `shortest_edge` is that of the initial mesh [m], `solver` that of `system`. `damped`: Newmark leaves the step
-/// to implicit Euler. On failure `state` is left as it was. `start`, if there is one, gets the state before the step as it
-/// is on the mesh at the end of it.
+/// `damped`: Newmark leaves the step to implicit Euler. On failure `state` is left as it was. `start`, if there is one, gets
+/// the state before the step as it is on the mesh at the end of it.
 template <int Dim>
-StepResult take_step(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system, linear::ReusingSolver& solver,
-                     const Logger& logger, State<Dim>& state, bool damped = false, State<Dim>* start = nullptr);
+StepResult take_step(const StepTools<Dim>& tools, State<Dim>& state, bool damped = false, State<Dim>* start = nullptr);
 
-/// That, with a step whose solve fails cut into smaller ones, as TimeOptions::step_cuts allows and `logger` is told.
+/// That, with a step whose solve fails cut into smaller ones, as TimeOptions::step_cuts allows and the logger is told.
 template <int Dim>
-StepResult take_step_in_parts(const Setup<Dim>& setup, double shortest_edge, SparseSystem& system,
-                              linear::ReusingSolver& solver, const Logger& logger, State<Dim>& state, bool damped = false);
-
-/// Most memory that this process has held [MB].
-double peak_rss_mb();
+StepResult take_step_in_parts(const StepTools<Dim>& tools, State<Dim>& state, bool damped = false);
 
 }  // namespace itr

@@ -2,9 +2,6 @@
 // The incremental potential of one time step on one mesh, and its solution: terms that the scene needs and no others.
 #pragma once
 
-#include <span>
-#include <string>
-
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
@@ -17,11 +14,11 @@ namespace itr {
 
 /// Loads of a setup at time t.
 template <int Dim>
-Loads<Dim> loads_at(const Setup<Dim>& setup, double t);
+Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
 
 /// What acts in the step that ends at time t, as every scope of it sees it.
 template <int Dim>
-PotentialTerms<Dim> potential_terms(const Setup<Dim>& setup, const History& history, double t);
+PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t);
 
 /// Which dofs are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two conditions
 /// the one with the larger tag wins.
@@ -31,7 +28,7 @@ struct HeldDofs {
   VectorX target;  ///< only entries of held dofs mean anything
 };
 template <int Dim>
-HeldDofs<Dim> held_dofs(const Setup<Dim>& setup, const Mesh<Dim>& mesh, double t);
+HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t);
 
 /// Of the bounding box of the bodies at rest [m].
 template <int Dim>
@@ -42,7 +39,7 @@ class StepProblem {
  public:
   /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
   /// `stiffness`, which the barrier starts from where it is adaptive. `system` serves the newest problem only.
-  StepProblem(const Setup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, SparseSystem& system,
+  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, SparseSystem& system,
               const BarrierStiffness& stiffness = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
@@ -73,8 +70,6 @@ class StepProblem {
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   NewtonSummary minimize_lagged(VectorX& x);
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
-  std::string name_vertices(std::span<const int> vertices, const VectorX& x, const Vec<Dim>& place,
-                            const char* own = "") const;
   void initialize_stiffness(const VectorX& x);
   void foresee_contact(const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
@@ -82,7 +77,7 @@ class StepProblem {
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;
 
-  const Setup<Dim>& setup_;
+  const StepSetup<Dim>& setup_;
   PotentialTerms<Dim> terms_;
   CellSet<Dim> cells_;
   ContactSurface<Dim> surface_;

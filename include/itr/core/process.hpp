@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: MIT
+// What this process has used.
+#pragma once
+
+namespace itr {
+
+/// Most memory that this process has held [MB].
+double peak_rss_mb();
+/// Of all its threads [s].
+double processor_seconds_now();
+
+}  // namespace itr

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+#include "diagnosis.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <sstream>
+#include <string_view>
+
+namespace itr {
+
+namespace {
+
+template <int Dim>
+Vec<Dim> middle_of(std::span<const int> vertices, const VectorX& x) {
+  Vec<Dim> middle = Vec<Dim>::Zero();
+  for (const int v : vertices) middle += x.template segment<Dim>(Dim * v) / static_cast<double>(vertices.size());
+  return middle;
+}
+
+/// Between the closest points of a pair.
+template <int Dim>
+Vec<Dim> place_of_pair(PairKind kind, std::span<const int> vertices, const VectorX& x) {
+  std::array<Vec<Dim>, 4> positions, closest;
+  for (std::size_t i = 0; i < vertices.size(); ++i) positions[i] = x.template segment<Dim>(Dim * vertices[i]);
+  const ClosestFeatures features = closest_features<Dim>(kind, positions.data());
+  for (int i = 0; i < pair_size(features.kind); ++i) closest[i] = positions[features.local[i]];
+  const PairDistance<Dim> distance = pair_distance<Dim>(features.kind, closest.data());
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (int i = 0; i < pair_size(features.kind); ++i) sum += std::abs(distance.coefficients[i]) * closest[i];
+  return sum / distance.coefficients.template lpNorm<1>();
+}
+
+PairKind kind_of_pair(const StepLimit& limit) {
+  if (limit.vertices.size() == 3) return PairKind::edge_vertex;
+  if (limit.vertices.size() == 2) return PairKind::vertex_vertex;
+  return limit.kind == "edge-edge pair" ? PairKind::edge_edge : PairKind::face_vertex;
+}
+
+template <int Dim>
+class Diagnosis {
+ public:
+  Diagnosis(const SolveScope<Dim>& scope, const VectorX& x, Workspace& workspace)
+      : scope_(scope), x_(x), on_surface_(scope.surface.positions(x)), workspace_(workspace) {}
+
+  void name_limit_of(const VectorX& step);
+  void name_residual_at(int vertex, const EnergySum& sum);
+  void name_worst_cell_at(int vertex);
+  void name_nearest_pair_at(int vertex);
+  std::string text() const { return text_.str(); }
+
+ private:
+  /// "12 13 obstacle 4 near (0.1, 0.2)": vertices at `positions`, the cells' (or, of a proxy's surface, "proxy 12").
+  std::string named(std::span<const int> vertices, const VectorX& positions, const Vec<Dim>& place, const char* own) const {
+    const int bodies = static_cast<int>(positions.size() / Dim) - scope_.num_obstacles;
+    std::ostringstream text;
+    for (const int v : vertices) text << (v < bodies ? own : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
+    text << "near (";
+    for (int c = 0; c < Dim; ++c) text << (c > 0 ? ", " : "") << place[c];
+    text << ')';
+    return text.str();
+  }
+  std::string named_cell(std::span<const int> vertices) const {
+    return named(vertices, x_, middle_of<Dim>(vertices, x_), "");
+  }
+  std::string named_pair(PairKind kind, std::span<const int> vertices) const {
+    return named(vertices, on_surface_, place_of_pair<Dim>(kind, vertices, on_surface_), scope_.surface.map ? "proxy " : "");
+  }
+  const ContactEnergy<Dim>* contact() const { return scope_.potential.contact().get(); }
+
+  const SolveScope<Dim>& scope_;
+  const VectorX& x_;
+  VectorX on_surface_;
+  Workspace& workspace_;
+  std::ostringstream text_;
+};
+
+template <int Dim>
+void Diagnosis<Dim>::name_limit_of(const VectorX& step) {
+  const StepLimit cell = scope_.potential.elastic()->step_limit(x_, step);
+  StepLimit pair;
+  if (contact()) pair = contact()->step_limit(on_surface_, scope_.surface.motion(step), workspace_);
+  const bool is_pair = pair.step < cell.step;
+  const StepLimit& limit = is_pair ? pair : cell;
+  if (limit.step >= 1) return;
+  text_ << "; " << limit.step << " of the last Newton step is free, limited by the " << limit.kind << ' '
+        << (is_pair ? named_pair(kind_of_pair(limit), limit.vertices) : named_cell(limit.vertices));
+}
+
+template <int Dim>
+void Diagnosis<Dim>::name_residual_at(int vertex, const EnergySum& sum) {
+  Vec<Dim> total = Vec<Dim>::Zero();
+  double largest = -1;
+  std::string_view name;
+  for (const auto& term : sum.terms()) {
+    VectorX gradient = VectorX::Zero(x_.size());
+    term->add_gradient(x_, gradient, workspace_);
+    const Vec<Dim> force = gradient.template segment<Dim>(Dim * vertex) / scope_.scaling;
+    total += force;
+    if (force.norm() <= largest) continue;
+    largest = force.norm();
+    name = term->name();
+  }
+  text_ << "; the largest residual, " << total.norm() << " N, is at vertex " << named_cell(std::array{vertex})
+        << ", where the largest force, " << largest << " N, is that of the term '" << name << '\'';
+}
+
+std::span<const int> vertices_of(const ContactStencil& stencil) {
+  return {stencil.vertices.data(), static_cast<std::size_t>(stencil.size())};
+}
+
+bool has(std::span<const int> vertices, int vertex) {
+  return std::find(vertices.begin(), vertices.end(), vertex) != vertices.end();
+}
+
+template <int Dim>
+void Diagnosis<Dim>::name_worst_cell_at(int vertex) {
+  double least = std::numeric_limits<double>::infinity();
+  std::span<const int> worst;
+  for (const auto& element : scope_.cells.elements) {
+    if (!has(element.vertices, vertex)) continue;
+    const double ratio = deformation_gradient<Dim>(element, x_).determinant();
+    if (ratio >= least) continue;
+    least = ratio;
+    worst = element.vertices;
+  }
+  if (!worst.empty()) text_ << "; its cell " << named_cell(worst) << " has the volume ratio " << least;
+}
+
+template <int Dim>
+void Diagnosis<Dim>::name_nearest_pair_at(int vertex) {
+  if (!contact()) return;
+  const auto acts_on_it = [&](std::span<const int> pair) {
+    const auto* map = scope_.surface.map.get();
+    if (!map) return has(pair, vertex);
+    return std::any_of(pair.begin(), pair.end(), [&](int w) { return has(map->sources(w), vertex); });
+  };
+  double least = std::numeric_limits<double>::infinity();
+  ContactStencil nearest{};
+  for (const ContactStencil& stencil : contact()->active(on_surface_, workspace_)) {
+    if (!acts_on_it(vertices_of(stencil))) continue;
+    const double distance = std::sqrt(contact()->distance(stencil, on_surface_).squared);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = stencil;
+  }
+  if (std::isfinite(least))
+    text_ << "; its contact pair " << named_pair(nearest.kind, vertices_of(nearest)) << " has the distance " << least
+          << " m";
+}
+
+}  // namespace
+
+template <int Dim>
+std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary, const EnergySum& sum, const VectorX& x,
+                      Workspace& workspace) {
+  Diagnosis<Dim> result(scope, x, workspace);
+  const VectorX& step = summary.failed_step;
+  if (step.size() == x.size() && step.allFinite()) result.name_limit_of(step);
+  if (summary.worst_dof != kNone) {
+    const int vertex = summary.worst_dof / Dim;
+    result.name_residual_at(vertex, sum);
+    result.name_worst_cell_at(vertex);
+    result.name_nearest_pair_at(vertex);
+  }
+  return result.text();
+}
+
+template std::string diagnosis<2>(const SolveScope<2>&, const NewtonSummary&, const EnergySum&, const VectorX&, Workspace&);
+template std::string diagnosis<3>(const SolveScope<3>&, const NewtonSummary&, const EnergySum&, const VectorX&, Workspace&);
+
+}  // namespace itr

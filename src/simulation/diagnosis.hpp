@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// In words, what stopped a solve.
+#pragma once
+
+#include <string>
+
+#include "itr/energy/incremental_potential.hpp"
+#include "itr/newton/newton.hpp"
+#include "itr/simulation/contact_surface.hpp"
+
+namespace itr {
+
+/// What a solve was of.
+template <int Dim>
+struct SolveScope {
+  const CellSet<Dim>& cells;
+  const IncrementalPotential<Dim>& potential;
+  const ContactSurface<Dim>& surface;
+  int num_obstacles;  ///< vertices of obstacles, the last ones
+  double scaling;     ///< of energies (alpha h^2) [s^2]
+};
+
+/// Of a solve that ended at x: the cell or pair that limits its last step, and the cell, the pair and the term at the
+/// largest residual. `sum`: the terms that were minimised.
+template <int Dim>
+std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary, const EnergySum& sum, const VectorX& x,
+                      Workspace& workspace);
+
+}  // namespace itr
