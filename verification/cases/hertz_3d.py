@@ -67,7 +67,7 @@ class State:
 
     def shares(self):
         """Radii by Hertz's for this force, the share of the force within, and Hertz's share."""
-        a = (3 * self.force * R * (1 - NU**2) / (8 * YOUNG))**(1 / 3)
+        a = (3 * self.force * R * (1 - NU**2) / (4 * YOUNG))**(1 / 3)
         order = np.argsort(self.r)
         within = np.cumsum((self.area * self.pressure)[order]) * 4 / self.force
         # Half of a vertex's own force lies outside of its radius.
