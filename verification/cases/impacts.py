@@ -139,6 +139,7 @@ def results(context):
         for integrator, (cells, courant) in INTEGRATORS.items():
             if context.quick and (integrator == "ImplicitEuler" or bar is FallingBar and integrator == "BDF2"):
                 continue
+            cells = cells if bar is Bar or context.quick else cells // 2  # the falling one takes 2.4 times the steps
             runs.append(run(context, bar, integrator, cells, courant))
             yield from judge(f"{bar.name}, {integrator}", runs[-1])
             if not context.quick:
@@ -169,11 +170,11 @@ def by_one(context):
     for integrator, (_, courant) in INTEGRATORS.items():
         motion_of = lambda cells=50, share=1, dhat=2e-3: run(context, Bar, integrator, cells, courant * share, dhat=dhat, periods=1)
         common = motion_of()
-        for cells in (25, 50, 100) if integrator == "ImplicitEuler" else (25, 50, 100, 200):
+        for cells in (25, 50, 100):
             yield f"{integrator}, cells", common if cells == 50 else motion_of(cells=cells)
         for share in (4, 2, 1):
             yield f"{integrator}, dt", common if share == 1 else motion_of(share=share)
-        for dhat in (8e-2, 4e-2, 2e-2, 2e-3):
+        for dhat in (8e-2, 2e-2, 2e-3):
             yield f"{integrator}, dhat", common if dhat == 2e-3 else motion_of(dhat=dhat)
 
 

@@ -79,7 +79,7 @@ class State:
 
 
 def results(context):
-    series = {"uniform": [press(context, f"uniform-{h:g}", h, h) for h in ((8, 4) if context.quick else (8, 5.6, 4, 2.8, 2, 1.4))],
+    series = {"uniform": [press(context, f"uniform-{h:g}", h, h) for h in ((8, 4) if context.quick else (8, 5.6, 4, 2.8, 2))],
               "remeshed": [press(context, f"remeshed-{tolerance:g}", 16, 1, tolerance=tolerance)
                            for tolerance in ((0.3,) if context.quick else (10, 3, 1, 0.3, 0.1))]}
     for name, states in series.items():

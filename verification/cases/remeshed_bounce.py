@@ -35,15 +35,16 @@ def bounce(context, dim, integrator, steps, size, remesh=True):
     else:
         write_plane(floor, 0)
     turn = ["0.5 - y", "x"] if dim == 2 else ["0.5 - z", "0.2", "x"]
+    share = {2: 1e-3, 3: 1e-2}[dim]
     energy = RHO * G * DROP * volumes(points, cells).sum()
     content = scene(mesh, {"type": "NeoHookean", "E": YOUNG, "nu": NU, "rho": RHO},
                     boundary_conditions={"rhs": [0] * (dim - 1) + [G]}, initial_conditions={"velocity": [{"id": 1, "value": turn}]},
                     time={"dt": H, "time_steps": steps, "integrator": integrator},
                     output={"checkpoint_period": 3600, "paraview": {"options": {"kinetic_energy": True, "momentum": True}}})
     if remesh:
-        content["space"] = {"remesh": {"enabled": True, "split": {"acceptance_tolerance": 1e-3 * energy}, "swap": {"enabled": True},
+        content["space"] = {"remesh": {"enabled": True, "split": {"acceptance_tolerance": share * energy}, "swap": {"enabled": True},
                                        "smooth": {"enabled": True},
-                                       "collapse": {"acceptance_tolerance": -1e-5 * energy, "rel_max_edge_length": 3}}}
+                                       "collapse": {"acceptance_tolerance": -0.01 * share * energy, "rel_max_edge_length": 3}}}
     content["solver"]["nonlinear"]["x_delta"] = 1e-9
     run = run_scene(context, name, with_obstacle(content, floor, DHAT, YOUNG))
     totals, momentum = [], []
@@ -89,8 +90,7 @@ def judge(label, totals, momentum, steps, mass, tolerance):
 def results(context):
     runs = {}
     # Implicit Euler loses energy in every step; BDF2 much less, so that what remeshing does shows, beside the same on a fixed mesh.
-    plan = [(2, "ImplicitEuler", True, 10000), (3, "ImplicitEuler", True, 10000), (2, "BDF2", True, 10000), (2, "BDF2", False, 10000),
-            (3, "BDF2", True, 2000), (3, "BDF2", False, 2000)]
+    plan = [(2, "ImplicitEuler", True, 10000), (3, "ImplicitEuler", True, 10000), (2, "BDF2", True, 2000), (2, "BDF2", False, 2000)]
     if context.quick:
         plan = [(2, "ImplicitEuler", True, 150), (3, "ImplicitEuler", True, 80)]
     for dim, integrator, remesh, steps in plan:

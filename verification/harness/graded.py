@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cook's membrane by FEniCSx with elements of any degree on meshes graded towards the singular corners."""
+"""Clamped bodies, Cook's membrane among them, by FEniCSx with elements of any degree on meshes graded towards what is singular."""
 import time
 
 import numpy as np
@@ -26,28 +26,38 @@ def mapped_mesh(n, grading):
     return points, oriented(points, cells)
 
 
-class Membrane:
-    """The static solution: unknowns, energy [J], tip displacement [m], seconds of the solve, and its gradient anywhere."""
+def graded_bar(counts, size, grading):
+    """A box of tetrahedra that shrink towards the side x = 0 and its edges."""
+    points, cells = box_mesh(counts, [1.0] * len(counts))
+    towards_both = np.where(points < 0.5, (2 * points)**grading, 2 - (2 - 2 * points)**grading) / 2
+    points = np.column_stack([points[:, 0]**grading, towards_both[:, 1:]]) * size
+    return points, oriented(points, cells)
 
-    def __init__(self, points, cells, degree, E, nu, traction, steps=5):
+
+class Clamped:
+    """The static solution of a body held where x = 0 and pulled where x is largest: unknowns, energy [J], displacement of the tip (the
+    point of largest sum of coordinates) [m], seconds of the solve, and its gradient anywhere."""
+
+    def __init__(self, points, cells, degree, E, nu, traction, density=neo_hookean, steps=5):
+        dim, end = points.shape[1], points[:, 0].max()
         self.domain, _ = create_domain(points, cells)
         V = fem.VectorFunctionSpace(self.domain, ("Lagrange", degree))
         self.u = fem.Function(V)
         v = ufl.TestFunction(V)
-        right = mesh.locate_entities_boundary(self.domain, 1, lambda x: np.isclose(x[0], 48))
+        right = mesh.locate_entities_boundary(self.domain, dim - 1, lambda x: np.isclose(x[0], end))
         ds = ufl.Measure("ds", domain=self.domain,
-                         subdomain_data=mesh.meshtags(self.domain, 1, np.sort(right), np.ones(len(right), dtype=np.int32)))
+                         subdomain_data=mesh.meshtags(self.domain, dim - 1, np.sort(right), np.ones(len(right), dtype=np.int32)))
         share = fem.Constant(self.domain, PETSc.ScalarType(0))
-        F = ufl.Identity(2) + ufl.grad(self.u)
+        F = ufl.Identity(dim) + ufl.grad(self.u)
         dx = ufl.dx(metadata={"quadrature_degree": max(1, 4 * (degree - 1))})
         pull = ufl.as_vector(traction)
-        energy = neo_hookean(F, *lame(E, nu, 2), 2, ufl) * dx - share * ufl.inner(pull, self.u) * ds(1)
+        energy = density(F, *lame(E, nu, dim), dim, ufl) * dx - share * ufl.inner(pull, self.u) * ds(1)
         residual = ufl.derivative(energy, self.u, v)
         tangent = fem.form(ufl.derivative(residual, self.u))
         residual, energy = fem.form(residual), fem.form(energy)
-        left = fem.locate_dofs_topological(V, 1, mesh.locate_entities_boundary(self.domain, 1, lambda x: np.isclose(x[0], 0)))
-        held = fem.dirichletbc(np.zeros(2), left, V)
-        self.unknowns = V.dofmap.index_map.size_global * 2 - 2 * len(left)
+        left = fem.locate_dofs_topological(V, dim - 1, mesh.locate_entities_boundary(self.domain, dim - 1, lambda x: np.isclose(x[0], 0)))
+        held = fem.dirichletbc(np.zeros(dim), left, V)
+        self.unknowns = V.dofmap.index_map.size_global * dim - dim * len(left)
         solver = PETSc.KSP().create(MPI.COMM_SELF)
         solver.setType("preonly")
         solver.getPC().setType("lu")
@@ -73,22 +83,23 @@ class Membrane:
                 if size < 1e-9:
                     break
             else:
-                raise RuntimeError(f"no convergence of the membrane's Newton: last step {size:.3g}")
+                raise RuntimeError(f"no convergence of the reference's Newton: last step {size:.3g}")
         self.seconds = time.perf_counter() - start
         self.energy = fem.assemble_scalar(energy)
-        self.tip = self.values_at(self.u, np.array([[48.0, 60.0]]))[0]
+        self.tip = self.values_at(self.u, points[[points.sum(axis=1).argmax()]])[0]
         slope = fem.TensorFunctionSpace(self.domain, ("DG", degree - 1))
         self.slope = fem.Function(slope)
         self.slope.interpolate(fem.Expression(ufl.grad(self.u), slope.element.interpolation_points()))
 
     def values_at(self, function, places):
-        """Values of a function at places (n x 2) of the membrane."""
+        """Values of a function at places (a row each) of the body."""
+        dim = places.shape[1]
         flat = np.zeros((len(places), 3))
-        flat[:, :2] = places
-        tree = geometry.BoundingBoxTree(self.domain, 2, padding=1e-9)
+        flat[:, :dim] = places
+        tree = geometry.BoundingBoxTree(self.domain, dim, padding=1e-9)
         cells = geometry.compute_colliding_cells(self.domain, geometry.compute_collisions(tree, flat), flat)
         return function.eval(flat, [cells.links(i)[0] for i in range(len(flat))]).reshape(len(flat), -1)
 
     def gradient_at(self, places):
-        """du_i/dX_j, n x 2 x 2."""
-        return self.values_at(self.slope, places).reshape(-1, 2, 2)
+        """du_i/dX_j, n x dim x dim."""
+        return self.values_at(self.slope, places).reshape(len(places), places.shape[1], -1)
