@@ -110,7 +110,7 @@ TEST(Explain, SaysWhatIsModelledAndWhy) {
   const std::string text = explain("cantilever.json");
   for (const char* line :
        {"inertia    no   /time/quasistatic", "elastic    yes  always", "contact    no   /contact/enabled is false",
-        "body       yes  1 tractions", "144 of 162 (18 held)", "warnings\n  none"})
+        "body       yes  1 tractions", "pressure   no ", "damping    no ", "144 of 162 (18 held)", "warnings\n  none"})
     EXPECT_NE(text.find(line), std::string::npos) << line << "\n" << text;
 }
 

@@ -213,6 +213,23 @@ TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
   EXPECT_GT(tried[Screening::none], tried[Screening::bounds]);
 }
 
+/// Where no prediction knows what a split depends on, a refusal of one step says nothing of the next.
+TEST(Remesh, AsksAgainWhatWasRefusedWhereNoPredictionTells) {
+  for (const bool pressure : {false, true}) {
+    TrialScene scene(1, 6, {.pressure = pressure, .damping = !pressure});
+    scene.context.contact.enabled = false;
+    RemeshOptions options;
+    options.collapse.enabled = false;
+    options.split.acceptance_tolerance = 1e6;  // none gains that
+    RemeshMemory memory;
+    const auto first = remesh(scene.mesh, scene.fields, scene.context, options, memory).splits;
+    ASSERT_GT(first.tried, 0);
+    ASSERT_EQ(first.accepted, 0);
+    options.split.acceptance_tolerance = 1e-6;  // as if forces had grown
+    EXPECT_GT(remesh(scene.mesh, scene.fields, scene.context, options, memory).splits.accepted, 0);
+  }
+}
+
 TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {
   const auto run = [](unsigned seed) {
     TrialScene scene(seed);

@@ -151,6 +151,13 @@ class Explanation {
     if (setup_.body_acceleration) loads = "/boundary_conditions/rhs";
     if (!setup_.neumann.empty()) loads += (loads.empty() ? "" : ", ") + std::to_string(setup_.neumann.size()) + " tractions";
     term("body", !loads.empty(), loads.empty() ? "no body force, no tractions" : loads);
+    term("pressure", !setup_.pressure.empty(),
+         setup_.pressure.empty() ? "no pressure on a boundary" : std::to_string(setup_.pressure.size()) + " boundaries");
+    const bool is_damped = !setup_.damping.empty() && !setup_.time.is_static;
+    term("damping", is_damped,
+         is_damped                ? "/solver/rayleigh_damping"
+         : setup_.damping.empty() ? "no /solver/rayleigh_damping"
+                                  : "no /time: static");
     term("contact", setup_.contact.enabled,
          !setup_.contact.enabled     ? "/contact/enabled is false"
          : setup_.contact.convergent ? "convergent form"

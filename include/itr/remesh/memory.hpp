@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -13,11 +14,12 @@ namespace itr {
 /// Refusals, each with what it depended on. Part of a simulation's state: which edges are asked again depends on it.
 struct RemeshMemory {
   /// A signal is a number that stands for what a verdict depended on: as long as it stays in the range, so does the verdict.
+  /// It is infinite where nobody can tell (pressure, damping, forces of programs); then no verdict stays.
   struct Refusal {
     double least_signal, most_signal;
     bool in_contact;
     bool holds(double signal, bool contact) const {
-      return contact == in_contact && signal >= least_signal && signal <= most_signal;
+      return contact == in_contact && std::isfinite(signal) && signal >= least_signal && signal <= most_signal;
     }
   };
   struct Entry {
