@@ -23,7 +23,7 @@ def load(path):
     return module
 
 
-paper, studies, stability = (load(path) for path in ("paper/run.py", "paper/studies.py", "stability/table.py"))
+paper, studies, stability, needs = (load(path) for path in ("paper/run.py", "paper/studies.py", "stability/table.py", "needs/run.py"))
 
 
 class Stored(unittest.TestCase):
@@ -44,14 +44,16 @@ class Stored(unittest.TestCase):
         page = (folder / "paper/README.md").read_text()
         for line in paper.table(rows).splitlines():
             self.assertIn(line, page)
-        entries = json.loads((folder / "report/results.json").read_text())["cases"]
-        self.assertEqual((folder / "report/report.md").read_text(), report.markdown(report.blocks(entries)))
-        self.assertEqual((folder / "report/report.html").read_text(), report.html_page(report.blocks(entries)))
+        content = json.loads((folder / "report/results.json").read_text())
+        blocks = list(report.blocks(content["cases"], content["overview"]))
+        self.assertEqual((folder / "report/report.md").read_text(), report.markdown(blocks))
+        self.assertEqual((folder / "report/report.html").read_text(), report.html_page(blocks, folder / "report"))
 
     def test_pages_of_studies_and_hard_cases(self):
         folder = SOURCE / "verification"
         self.assertEqual((folder / "paper/studies.md").read_text(), studies.page())
         self.assertEqual((folder / "stability/table.md").read_text(), stability.table(stability.read(folder / "stability/results.csv")))
+        self.assertEqual((folder / "needs/table.md").read_text(), needs.table(needs.read(folder / "needs/results.csv")))
 
     def test_counts_what_changed_since(self):
         if stored.git("rev-parse", "HEAD~5") is None:

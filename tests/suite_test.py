@@ -84,14 +84,38 @@ class Bars(unittest.TestCase):
 
 
 class Report(unittest.TestCase):
-    def test_each_case_shows_the_commit_of_its_own_run(self):
+    OVERVIEW = {"commit": "cccc333", "date": "2026-01-01", "never_run": ["waves"], "ages": [["verification/report/results.json: old", "aaaa111", 7],
+                                                                    ["verification/hard.csv", "dddd444", 3]],
+                "tables": [{"what": "hard", "title": "Hard cases", "page": "hard.md", "files": ["verification/hard.csv"], "judged": 2,
+                            "passed": 1, "failures": [["sliver", "does not finish"]]}]}
+
+    def page(self, **entries):
+        return report.markdown(report.blocks(entries, self.OVERVIEW))
+
+    def test_each_case_shows_the_commit_of_its_own_run_and_its_age(self):
         old, new = run(Result("x", 0.0, 1.0)), run(Result("x", 0.0, 1.0))
         old["versions"], new["versions"] = {"itr": "aaaa111"}, {"itr": "bbbb222", "numpy": "1.24"}
-        text = report.markdown(report.blocks({"old": old, "new": new, "older": run(Result("x", 0.0, 1.0))}))
+        text = self.page(old=old, new=new, older=run(Result("x", 0.0, 1.0)))
         old_row, new_row, _ = (line for line in text.splitlines() if "| passed |" in line)
-        self.assertIn("aaaa111", old_row)
-        self.assertIn("bbbb222", new_row)
+        self.assertIn("aaaa111 | 7 |", old_row)
+        self.assertIn("bbbb222 | unknown |", new_row)
         self.assertIn("Run with itr bbbb222, numpy 1.24.", text)
+
+    def test_the_first_page_names_all_that_failed(self):
+        text = self.page(fine=run(Result("x", 0.0, 1.0)), bad=run(Result("y", 2.0, 1.0), Result("z", 0.0, 1.0)))
+        first = text[:text.index("What was verified")]
+        self.assertIn("2 cases hold 3 results", first)
+        self.assertIn("2 are within", first)
+        self.assertIn("Never run in full: waves.", first)
+        self.assertIn("| bad | y | 2, at most 1 |", first)
+        self.assertIn("| hard | sliver | does not finish |", first)
+        self.assertNotIn("fine", first)
+        self.assertIn("| hard | Hard cases | hard.md | **FAILED** | 1/2 | dddd444 | 3 |", text)
+
+    def test_the_page_has_its_pictures_in_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / "x.svg").write_text("<svg/>")
+            self.assertIn("base64,PHN2Zy8+", report.html_page([("image", "x.svg")], pathlib.Path(folder)))
 
 
 if __name__ == "__main__":

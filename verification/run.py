@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: MIT
 """Runs the verification suite: every file of verification/cases is a case with a quantity, a reference and a tolerance.
 
-python3 verification/run.py [--quick] [--case NAME]... [--build build/release] [--report DIR]
+python3 verification/run.py [--quick] [--page] [--case NAME]... [--build build/release] [--report DIR]
 
 A full run, or one of some cases, brings verification/report up to date; --quick writes into BUILD/verification, so that it
-never replaces figures of a full run. Exit status: 0 passed, 1 a case failed.
+never replaces figures of a full run. --page runs nothing and writes the pages anew: how old results are. Exit status: 0 passed, 1 a case failed.
 """
 import argparse
 import importlib
@@ -24,6 +24,7 @@ if importlib.util.find_spec("dolfinx") is None and os.path.exists(SYSTEM_PYTHON)
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 from harness import stored as provenance  # noqa: E402
+from harness.overview import overview  # noqa: E402
 from harness.report import write_report  # noqa: E402
 from harness.suite import Context, load_cases, run_case, save_json  # noqa: E402
 
@@ -43,6 +44,7 @@ def versions(build):
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="smaller and fewer cases: minutes instead of hours")
+    parser.add_argument("--page", action="store_true", help="run nothing")
     parser.add_argument("--case", action="append", metavar="NAME", help="only this one; may be given again")
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
     parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared", help="folder of the paper's scenes")
@@ -56,7 +58,7 @@ def main():
     report = (options.report or (build / "verification" if options.quick else HERE / "report")).resolve()
     report.mkdir(parents=True, exist_ok=True)
     cases = load_cases()
-    chosen = options.case or list(cases)
+    chosen = [] if options.page else options.case or list(cases)
     if unknown := [name for name in chosen if name not in cases]:
         sys.exit(f"no such case: {', '.join(unknown)}; there are: {', '.join(cases)}")
 
@@ -77,8 +79,10 @@ def main():
     # A case that could not run keeps the figures of when it could.
     entries.update({name: entry for name, entry in ran.items() if entry["status"] != "skipped" or name not in entries})
     entries = {name: entries[name] for name in cases if name in entries}
-    save_json(stored, {"cases": entries})
-    write_report(report, json.loads(stored.read_text())["cases"])
+    save_json(stored, {"cases": entries})  # ages are of what is stored
+    save_json(stored, {"cases": entries, "overview": overview([name for name in cases if name not in entries])})
+    content = json.loads(stored.read_text())
+    write_report(report, content["cases"], content["overview"])
 
     by_status = {status: [n for n, e in ran.items() if e["status"] == status] for status in ("passed", "failed", "skipped")}
     print("; ".join(f"{len(names)} {status}" + (f" ({', '.join(names)})" if names and status != "passed" else "")

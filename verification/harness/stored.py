@@ -18,6 +18,7 @@ STORED = {
     "verification/solvers/results.csv": LINEAR,
     "verification/solvers/end_to_end.csv": LINEAR,
     "verification/stability/results.csv": CODE,
+    "verification/needs/results.csv": CODE,
     **{str(path.relative_to(ROOT)): CODE for path in sorted((ROOT / "verification/paper").glob("*/study.json"))},
 }
 
