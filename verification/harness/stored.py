@@ -33,8 +33,12 @@ def git(*arguments):
 
 
 def commit():
-    """Of the sources as they are, with `-dirty` where they are changed; empty outside of a repository."""
-    return git("describe", "--always", "--dirty") or ""
+    """Of the sources as they are, with `-dirty` where they are changed; empty outside of a repository. Results are no sources:
+    one that is written while others still run does not mark theirs."""
+    made = git("describe", "--always")
+    if not made:
+        return ""
+    return made if git("diff", "--quiet", "HEAD", "--", *CODE, "verification/*.py") is not None else made + "-dirty"
 
 
 def commits_of(path):
