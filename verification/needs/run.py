@@ -21,7 +21,6 @@ import sys
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path.insert(0, str(HERE.parent))
-import numpy as np  # noqa: E402
 from harness import stored  # noqa: E402
 
 REPEATS = 2
@@ -114,6 +113,7 @@ def last_frame(folder):
 
 
 def measure(name, options):
+    import numpy as np
     scene, sets = SCENES[name]
     scene = options.shared / "paper-scenes/scripts" / scene
     own = [word for one in sets for word in ("--set", one)]
