@@ -243,6 +243,7 @@ void LocalProblem<Dim>::add_surface() {
   find_contacts();
   has_surface_ = true;
   const ContactReach<Dim>& reach = scratch_.reach;
+  surface_read_ = reach.read();
   touches_contact_ = !reach.touching().empty();
   if (!touches_contact_) return;
 
@@ -277,7 +278,10 @@ void LocalProblem<Dim>::add_surface() {
       if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
   }
   std::sort(facets.begin(), facets.end());
-  for (const FacetId f : facets) add_facet(mesh_.facet(f));
+  for (const FacetId f : facets) {
+    add_facet(mesh_.facet(f));
+    for (const VertexId v : mesh_.facet(f)) surface_read_.include(state_.surface.at(v));
+  }
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets)
       if (std::any_of(facet.vertices.begin(), facet.vertices.end(), [&](int v) { return reach.touches(v); }))

@@ -64,6 +64,8 @@ class LocalProblem {
   int num_unknowns() const { return dofs_.num_unknowns; }
   /// Whether anything that the patch changes could touch something.
   bool touches_contact() const { return touches_contact_; }
+  /// Holds all vertices of the surface, beside the patch's own, that could have made a difference; empty without contact.
+  const Box<Dim>& surface_read() const { return surface_read_; }
 
   struct Position {
     VertexId vertex;  ///< kNewVertex for the one that the edit creates
@@ -103,6 +105,7 @@ class LocalProblem {
   DofMap dofs_;
   CollisionSurface surface_;
   bool has_surface_ = false, touches_contact_ = false;
+  Box<Dim> surface_read_;
   EnergySum energy_;
   std::unique_ptr<IncrementalPotential<Dim>> potential_;
   std::vector<char> changes_;  ///< by local vertex: whether its contacts can change
