@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "itr/remesh/edits.hpp"
-#include "session.hpp"
+#include "wave.hpp"
 
 namespace itr {
 
@@ -25,29 +25,49 @@ class Collapser {
   Collapser(RemeshSession<Dim>& session, const EdgeRanks& ranks)
       : session_(session), options_(session.options().collapse), ranks_(ranks) {}
 
-  void run() {
-    for (const EdgeKey& edge : session_.mesh().edges()) push(edge);
-    while (const auto edge = queue_.pop()) {
-      if (session_.is_cancelled()) return;
-      if (!session_.may_be_collapsed(*edge) || session_.depth(*edge) >= options_.max_depth) continue;
-      const double signal = session_.roughness(*edge);
-      const bool in_contact = session_.is_in_contact(*edge);
-      if (session_.was_refused(RemeshMemory::collapse, *edge, signal, in_contact)) continue;
-      const Decision decision = collapse(*edge);
-      if (decision != Decision::by_bound && decision != Decision::by_energy) continue;
-      constexpr double kNever = std::numeric_limits<double>::infinity();  // a rougher field loses more
-      session_.remember(RemeshMemory::collapse, *edge,
-                        {signal / kSameSignal, in_contact ? signal * kSameSignal : kNever, in_contact});
+  /// Shortest first.
+  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
+    if (!is_candidate(edge) || !session_.may_be_collapsed(edge)) return std::nullopt;
+    return EdgeQueue::Entry{.edge = edge, .priority = -session_.rest_length(edge)};
+  }
+
+  void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
+    const EdgeKey& edge = trial.edge();
+    if (!session_.may_be_collapsed(edge) || session_.depth(edge) >= options_.max_depth) return;
+    trial.signal = session_.roughness(edge);
+    session_.find_contact(trial, scratch);
+    if (session_.was_refused(RemeshMemory::collapse, edge, trial.signal, trial.in_contact)) return;
+    trial.is_asked = true;
+    trial.edit = collapse_of(session_, edge);
+    if (!trial.edit) return;
+    if (!trial.in_contact &&
+        session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), options_.acceptance_tolerance)) {
+      trial.verdict.decision = Decision::by_bound;
+      return;
     }
-    session_.forget_depths();
+    session_.judge(trial, trial.edit->value->rest, options_.acceptance_tolerance, session_.options().local, scratch);
+  }
+
+  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+    if (!trial.is_asked) return;
+    const int generation = session_.depth(trial.edge()) + 1;
+    if (session_.commit(trial, session_.report().collapses)) {
+      const VertexId kept = trial.edit->value->vertex;
+      for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(kept))) {
+        if (near[0] == kept || near[1] == kept) session_.set_depth(near, generation);
+        fresh.push_back(near);
+      }
+      return;
+    }
+    const Decision decision = trial.verdict.decision;
+    if (decision != Decision::by_bound && decision != Decision::by_energy) return;
+    constexpr double kNever = std::numeric_limits<double>::infinity();  // a rougher field loses more
+    session_.remember(
+        RemeshMemory::collapse, trial.edge(),
+        {trial.signal / kSameSignal, trial.in_contact ? trial.signal * kSameSignal : kNever, trial.in_contact});
   }
 
  private:
-  /// Shortest first.
-  void push(const EdgeKey& edge) {
-    if (is_candidate(edge)) queue_.push(edge, -session_.rest_length(edge));
-  }
-
   bool is_candidate(const EdgeKey& edge) const {
     if (session_.options().screening != Screening::energy_percentile) return true;
     const auto it = ranks_.find(edge);
@@ -55,36 +75,18 @@ class Collapser {
            session_.rest_length(edge) < kTinyEdge * session_.context().shortest_edge;
   }
 
-  Decision collapse(const EdgeKey& edge) {
-    ++session_.report().collapses.tried;
-    const auto edit = collapse_of(session_, edge);
-    if (!edit) return Decision::by_gate;
-    if (!session_.is_in_contact(edge) && session_.is_hopeless(*edit, session_.predict(*edit), options_.acceptance_tolerance))
-      return Decision::by_bound;
-    const int generation = session_.depth(edge) + 1;
-    const auto verdict = session_.attempt(*edit, edit->value->rest, options_.acceptance_tolerance);
-    session_.report().collapses.relaxed += verdict.was_relaxed;
-    if (!verdict.accepted()) return verdict.decision;
-    ++session_.report().collapses.accepted;
-    const VertexId kept = edit->value->vertex;
-    for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(kept))) {
-      if (near[0] == kept || near[1] == kept) session_.set_depth(near, generation);
-      push(near);
-    }
-    return Decision::accepted;
-  }
-
   RemeshSession<Dim>& session_;
   const CollapseOptions& options_;
   const EdgeRanks& ranks_;
-  EdgeQueue queue_;
 };
 
 }  // namespace
 
 template <int Dim>
 void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks) {
-  Collapser<Dim>(session, ranks).run();
+  Collapser<Dim> collapser(session, ranks);
+  run_waves(session, collapser, session.mesh().edges());
+  session.forget_depths();
 }
 
 template void collapse_edges(RemeshSession<2>&, const EdgeRanks&);

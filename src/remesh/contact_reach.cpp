@@ -66,6 +66,7 @@ template <int Dim>
 void ContactReach<Dim>::clear(int facet_slots) {
   own_.clear();
   touching_.clear();
+  read_ = {};
   known_.clear(facet_slots);
   own_of_.resize(facet_slots);
 }

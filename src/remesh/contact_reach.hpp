@@ -56,6 +56,7 @@ class ContactReach {
   void find(const SurfaceIndex<Dim>& surface, Neighbourhoods<Dim>& neighbourhoods, double dhat, Hits& hits,
             const IsGone& is_gone) {
     choose_room(dhat, surface.span());
+    for (const Own& own : own_) read_.include(own.piece.box.inflated(dhat_ + 2 * room_));
     for (std::size_t i = 0; i < own_.size(); ++i) {
       if (own_[i].facet == kNone) {
         look_around(surface, static_cast<int>(i), hits, is_gone);
@@ -72,6 +73,8 @@ class ContactReach {
   }
   /// How far vertices may move [m].
   double room() const { return room_; }
+  /// Holds all of the surface that could have made a difference.
+  const Box<Dim>& read() const { return read_; }
   /// Vertices of what can touch, ascending by their ids in pieces.
   const std::vector<int>& touching() const { return touching_; }
   bool touches(int id) const { return std::binary_search(touching_.begin(), touching_.end(), id); }
@@ -110,6 +113,7 @@ class ContactReach {
   std::vector<int> own_of_;  ///< by facet, where it is known
   std::vector<int> touching_;
   double dhat_ = 0, room_ = 0;
+  Box<Dim> read_;
 };
 
 extern template class Neighbourhoods<2>;

@@ -46,6 +46,10 @@ template <int Dim>
 LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit,
                                 bool is_after, LocalScratch<Dim>& scratch)
     : state_(state), mesh_(state.mesh), edit_(edit), is_after_(is_after), scratch_(scratch) {
+  if (!scratch_.spare.empty()) {
+    storage_ = std::move(scratch_.spare.back());
+    scratch_.spare.pop_back();
+  }
   scratch_.known.clear(mesh_.vertex_slots());
   scratch_.known_obstacles.clear(static_cast<int>(state.context.obstacles.x.size()));
   if (static_cast<int>(scratch_.local_of.size()) < mesh_.vertex_slots()) scratch_.local_of.resize(2 * mesh_.vertex_slots());
@@ -56,6 +60,16 @@ LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const C
   hold_vertices();
   if (state.context.contact.enabled) add_surface();
   add_terms();
+}
+
+template <int Dim>
+LocalProblem<Dim>::~LocalProblem() {
+  cells_.rest.clear();
+  cells_.elements.clear();
+  cells_.facets.clear();
+  vertices_.clear();
+  changes_.clear();
+  scratch_.spare.push_back(std::move(storage_));
 }
 
 /// Whether the edit sets this vertex, after it.
@@ -193,20 +207,19 @@ void LocalProblem<Dim>::hold_vertices() {
 
 /// Free vertices of the surface, and those whose facets the edit replaces (on both sides of the comparison).
 template <int Dim>
-std::vector<char> LocalProblem<Dim>::vertices_whose_contacts_change() {
-  std::vector<char> changes(vertices_.size(), 0);
+void LocalProblem<Dim>::find_what_changes() {
+  changes_.assign(vertices_.size(), 0);
   for (std::size_t i = 0; i < vertices_.size(); ++i)
-    if (vertices_[i].kind == Kind::of_mesh && mesh_.is_boundary(vertices_[i].id)) changes[i] = is_free(static_cast<int>(i));
+    if (vertices_[i].kind == Kind::of_mesh && mesh_.is_boundary(vertices_[i].id)) changes_[i] = is_free(static_cast<int>(i));
   const auto mark = [&](VertexId v) {
     if (v == kNewVertex && !is_after_) return;
     if (is_after_ && v == edit_.removed_vertex) return;
-    changes[local(v)] = 1;
+    changes_[local(v)] = 1;
   };
   for (const FacetId f : edit_.removed_facets)
     for (const int v : mesh_.facet(f)) mark(v);
   for (const auto& facet : edit_.inserted_facets)
     for (const int v : facet.vertices) mark(v);
-  return changes;
 }
 
 /// Hands over the facets at what changes, and looks for what they could touch.
@@ -238,11 +251,12 @@ void LocalProblem<Dim>::find_contacts() {
 /// The part of the surface that can touch what changes, with the stars of its vertices: contact is weighted by them.
 template <int Dim>
 void LocalProblem<Dim>::add_surface() {
-  changes_ = vertices_whose_contacts_change();
+  find_what_changes();
   if (std::find(changes_.begin(), changes_.end(), 1) == changes_.end()) return;
   find_contacts();
   has_surface_ = true;
   const ContactReach<Dim>& reach = scratch_.reach;
+  surface_read_ = reach.read();
   touches_contact_ = !reach.touching().empty();
   if (!touches_contact_) return;
 
@@ -277,7 +291,10 @@ void LocalProblem<Dim>::add_surface() {
       if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
   }
   std::sort(facets.begin(), facets.end());
-  for (const FacetId f : facets) add_facet(mesh_.facet(f));
+  for (const FacetId f : facets) {
+    add_facet(mesh_.facet(f));
+    for (const VertexId v : mesh_.facet(f)) surface_read_.include(state_.surface.at(v));
+  }
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets)
       if (std::any_of(facet.vertices.begin(), facet.vertices.end(), [&](int v) { return reach.touches(v); }))

@@ -35,6 +35,14 @@ struct LocalVertex {
   bool operator==(const LocalVertex&) const = default;
 };
 
+/// What one local problem is kept in.
+template <int Dim>
+struct LocalStorage {
+  CellSet<Dim> cells;
+  std::vector<LocalVertex> vertices;
+  std::vector<char> changes;  ///< by local vertex: whether its contacts can change
+};
+
 /// Buffers of local problems that are worth keeping between them: one for each thread.
 template <int Dim>
 struct LocalScratch {
@@ -45,6 +53,7 @@ struct LocalScratch {
   Neighbourhoods<Dim> neighbourhoods;
   ContactReach<Dim> reach;
   DenseSystem system;
+  std::vector<LocalStorage<Dim>> spare;
 };
 
 template <int Dim>
@@ -54,6 +63,7 @@ class LocalProblem {
   /// free. The problem is that before the edit, or after it. What is handed in must outlive this.
   LocalProblem(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, bool is_after,
                LocalScratch<Dim>& scratch);
+  ~LocalProblem();
   LocalProblem(const LocalProblem&) = delete;
   LocalProblem& operator=(const LocalProblem&) = delete;
 
@@ -64,6 +74,8 @@ class LocalProblem {
   int num_unknowns() const { return dofs_.num_unknowns; }
   /// Whether anything that the patch changes could touch something.
   bool touches_contact() const { return touches_contact_; }
+  /// Holds all vertices of the surface, beside the patch's own, that could have made a difference; empty without contact.
+  const Box<Dim>& surface_read() const { return surface_read_; }
 
   struct Position {
     VertexId vertex;  ///< kNewVertex for the one that the edit creates
@@ -81,7 +93,7 @@ class LocalProblem {
   void hold_vertices();
   void find_contacts();
   void add_surface();
-  std::vector<char> vertices_whose_contacts_change();
+  void find_what_changes();
   VectorX gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values) const;
   void add_terms();
   void add_unrepresented_history(InertiaEnergy<Dim>& inertia) const;
@@ -97,15 +109,17 @@ class LocalProblem {
   bool is_after_;
   LocalScratch<Dim>& scratch_;
 
-  CellSet<Dim> cells_;
-  std::vector<LocalVertex> vertices_;
+  LocalStorage<Dim> storage_;
+  CellSet<Dim>& cells_ = storage_.cells;
+  std::vector<LocalVertex>& vertices_ = storage_.vertices;
+  std::vector<char>& changes_ = storage_.changes;
   VectorX x_;
   DofMap dofs_;
   CollisionSurface surface_;
   bool has_surface_ = false, touches_contact_ = false;
+  Box<Dim> surface_read_;
   EnergySum energy_;
   std::unique_ptr<IncrementalPotential<Dim>> potential_;
-  std::vector<char> changes_;  ///< by local vertex: whether its contacts can change
   Workspace workspace_;
 };
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <optional>
-#include <set>
 #include <unordered_map>
-#include <utility>
+#include <vector>
 
 #include "itr/core/types.hpp"
 
@@ -16,25 +17,52 @@ struct EdgeKeyHash {
   }
 };
 
-/// Edges (a vertex v is {v, kNone}) in order of descending priority, ties by key; each is there once.
+/// Edges (a vertex v is {v, kNone}) in order of descending priority, ties by key. One that is pushed again moves.
 class EdgeQueue {
  public:
-  void push(const EdgeKey& edge, double priority) {
-    if (const auto it = priority_.find(edge); it != priority_.end()) entries_.erase({-it->second, edge});
-    priority_[edge] = priority;
-    entries_.insert({-priority, edge});
+  struct Entry {
+    EdgeKey edge;
+    double priority;
+    unsigned since = 0;        ///< commit after which that was found
+    bool is_hopeless = false;  ///< nothing to gain, then
+  };
+
+  /// Several at once, each edge once.
+  void push(std::vector<Entry> entries) {
+    if (!heap_.empty() || !last_.empty()) {
+      for (const Entry& entry : entries) push(entry);
+      return;
+    }
+    heap_ = std::move(entries);
+    std::make_heap(heap_.begin(), heap_.end(), is_after);
   }
-  std::optional<EdgeKey> pop() {
-    if (entries_.empty()) return std::nullopt;
-    const EdgeKey edge = entries_.begin()->second;
-    entries_.erase(entries_.begin());
-    priority_.erase(edge);
-    return edge;
+  void push(const Entry& entry) {
+    last_[entry.edge] = entry.priority;
+    heap_.push_back(entry);
+    std::push_heap(heap_.begin(), heap_.end(), is_after);
+  }
+
+  std::optional<Entry> pop() {
+    while (!heap_.empty()) {
+      std::pop_heap(heap_.begin(), heap_.end(), is_after);
+      const Entry entry = heap_.back();
+      heap_.pop_back();
+      if (last_.empty()) return entry;
+      const auto it = last_.find(entry.edge);
+      if (it == last_.end()) return entry;
+      if (it->second != entry.priority) continue;  // moved, or popped since
+      it->second = std::numeric_limits<double>::quiet_NaN();
+      return entry;
+    }
+    return std::nullopt;
   }
 
  private:
-  std::set<std::pair<double, EdgeKey>> entries_;
-  std::unordered_map<EdgeKey, double, EdgeKeyHash> priority_;
+  static bool is_after(const Entry& a, const Entry& b) {
+    return a.priority != b.priority ? a.priority < b.priority : a.edge > b.edge;
+  }
+  std::vector<Entry> heap_;
+  std::unordered_map<EdgeKey, double, EdgeKeyHash> last_;  ///< priorities of edges that did not come first; NaN: popped
 };
 
 }  // namespace itr

@@ -29,7 +29,9 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
       options_(options),
       total_volume_(mesh.total_volume()),
       gate_(mesh, fields, context),
-      refusals_(memory) {
+      lanes_(context.host.empty() ? num_threads() : 1),  // terms of the program may not be for several threads
+      refusals_(memory),
+      changed_at_(mesh.vertex_slots(), 0) {
   if constexpr (Dim == 3) strata_ = Strata<Dim>(mesh);
 }
 
@@ -42,13 +44,12 @@ bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
 }
 
 template <int Dim>
-bool RemeshSession<Dim>::may_be_split(const EdgeKey& e) {
+bool RemeshSession<Dim>::may_be_split(const EdgeKey& e, bool& is_bound_by_dhat) const {
   if (!exists(e) || rest_length(e) < options_.split.min_edge_length) return false;
   if (!has_contact() || !is_surface(e)) return true;
   const double dhat = context_.contact.activation_distance;
-  if (rest_length(e) >= 2 * dhat && length(e) >= 2 * dhat) return true;
-  ++report_.bound_by_activation_distance;
-  return false;
+  is_bound_by_dhat = rest_length(e) < 2 * dhat || length(e) < 2 * dhat;
+  return !is_bound_by_dhat;
 }
 
 template <int Dim>
@@ -61,14 +62,24 @@ bool RemeshSession<Dim>::may_be_collapsed(const EdgeKey& e) const {
 }
 
 template <int Dim>
-bool RemeshSession<Dim>::is_in_contact(const EdgeKey& e) {
+bool RemeshSession<Dim>::is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
   if (!has_contact()) return false;
   const double dhat = context_.contact.activation_distance;
   const auto facets = mesh_.facets_of(e[0]);
   return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
     return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() &&
-           scratch_.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch_.hits);
+           scratch.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch.hits);
   });
+}
+
+template <int Dim>
+void RemeshSession<Dim>::find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
+  trial.in_contact = is_in_contact(trial.edge(), scratch);
+  if (!has_contact() || !is_surface(trial.edge())) return;
+  Box<Dim> edge;
+  for (const FacetId f : mesh_.facets_of(trial.edge()[0]))
+    for (const VertexId v : mesh_.facet(f)) edge.include(gate_.present().at(v));
+  trial.surface_read.include(edge.inflated(context_.contact.activation_distance));
 }
 
 template <int Dim>
@@ -79,11 +90,12 @@ typename RemeshSession<Dim>::PieceInContact RemeshSession<Dim>::piece(FacetId f)
 }
 
 template <int Dim>
-std::vector<typename RemeshSession<Dim>::PieceInContact> RemeshSession<Dim>::pieces_in_contact(FacetId f) {
+std::vector<typename RemeshSession<Dim>::PieceInContact> RemeshSession<Dim>::pieces_in_contact(
+    FacetId f, LocalScratch<Dim>& scratch) const {
   const SurfaceIndex<Dim>& surface = gate_.present();
   const double dhat = context_.contact.activation_distance;
   std::vector<PieceInContact> pieces;
-  for (const auto& [other, distance] : scratch_.neighbourhoods.near(surface, f, dhat, scratch_.hits)) {
+  for (const auto& [other, distance] : scratch.neighbourhoods.near(surface, f, dhat, scratch.hits)) {
     if (distance >= dhat) continue;
     if (other >= 0) {
       pieces.push_back(piece(other));
@@ -100,7 +112,7 @@ std::vector<typename RemeshSession<Dim>::PieceInContact> RemeshSession<Dim>::pie
 template <int Dim>
 bool RemeshSession<Dim>::apply_if_valid(const Edit<Dim>& edit) {
   Verdict<Dim> verdict;
-  if (!gate_.passes(edit, scratch_.hits)) return false;
+  if (!gate_.passes(edit, scratch().hits)) return false;
   commit(edit, verdict);
   return true;
 }
@@ -120,15 +132,15 @@ std::vector<EdgeKey> RemeshSession<Dim>::edges_of(std::span<const CellId> cells)
 }
 
 template <int Dim>
-double RemeshSession<Dim>::roughness(const EdgeKey& edge) {
-  around_.assign(mesh_.cells_of(edge[0]).begin(), mesh_.cells_of(edge[0]).end());
+double RemeshSession<Dim>::roughness(const EdgeKey& edge) const {
+  std::vector<CellId> around(mesh_.cells_of(edge[0]).begin(), mesh_.cells_of(edge[0]).end());
   if (edge[1] != kNone)
     for (const CellId c : mesh_.cells_of(edge[1]))
-      if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around_.push_back(c);
+      if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around.push_back(c);
   const auto variation = [&](const VectorX& field, auto&& weight) {
     Mat<Dim> sum = Mat<Dim>::Zero();
     double total = 0, squares = 0;
-    for (const CellId c : around_) {
+    for (const CellId c : around) {
       const typename CellSet<Dim>::Element element{mesh_.cell(c), mesh_.body(c), mesh_.volume(c),
                                                    mesh_.inverse_rest_edges(c)};
       const Mat<Dim> gradient = deformation_gradient<Dim>(element, field);
@@ -143,7 +155,7 @@ double RemeshSession<Dim>::roughness(const EdgeKey& edge) {
   double result = context_.scaling * variation(fields_.x, stiffness);
   if (context_.has_inertia) {
     const double size =
-        edge[1] == kNone ? mesh_.volume(around_[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
+        edge[1] == kNone ? mesh_.volume(around[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
     const auto mass = [&](CellId c) { return size * mesh_.volume(c) * context_.materials.at(mesh_.body(c)).density; };
     result += variation(fields_.predictor, mass);
   }
@@ -158,35 +170,100 @@ double RemeshSession<Dim>::largest_poisson_ratio(const Edit<Dim>& edit) const {
 }
 
 template <int Dim>
-Verdict<Dim> RemeshSession<Dim>::attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance,
-                                         const LocalRelaxationOptions& local) {
-  const ScopedTimer timer(trial_seconds_.emplace_back(0));
+void RemeshSession<Dim>::judge(Trial<Dim>& trial, const Vec<Dim>& center, double tolerance,
+                               const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const {
+  const ScopedTimer timer(trial.seconds);
   const RemeshState<Dim> state = this->state();
-  TrialOptions trial{.required = context_.scaling * tolerance, .local = local};
+  const Edit<Dim>& edit = *trial.edit;
+  TrialOptions options{.required = context_.scaling * tolerance, .local = local};
   if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth && edit.value)
-    trial.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit));
-  Verdict<Dim> verdict = preview<Dim>(state, gate_, edit, center, total_volume_, trial, scratch_);
-  if (verdict.accepted()) commit(edit, verdict);
-  return verdict;
+    options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit));
+  trial.is_asked = trial.was_previewed = true;
+  trial.verdict = preview<Dim>(state, gate_, edit, center, total_volume_, options, scratch);
+  trial.surface_read.include(trial.verdict.surface_read);
+}
+
+template <int Dim>
+void RemeshSession<Dim>::begin_wave() {
+  commits_before_wave_ = commits_;
+  written_.clear(mesh_.vertex_slots());
+  surface_written_.clear();
+}
+
+template <int Dim>
+bool RemeshSession<Dim>::was_overtaken(const Trial<Dim>& trial) const {
+  if (commits_ == commits_before_wave_) return false;
+  const bool reads_past_surface = has_contact() && trial.edit && trial.edit->kind != Edit<Dim>::Kind::split &&
+                                  !trial.edit->inserted_facets.empty();  // see Gate
+  if (reads_past_surface && !surface_written_.empty()) return true;
+  if (std::any_of(surface_written_.begin(), surface_written_.end(),
+                  [&](const Box<Dim>& box) { return box.overlaps(trial.surface_read); }))
+    return true;
+  return std::any_of(trial.verdict.patch.begin(), trial.verdict.patch.end(), [&](CellId c) {
+    const auto& cell = mesh_.cell(c);
+    return !mesh_.is_cell_alive(c) || std::any_of(cell.begin(), cell.end(), [&](VertexId v) { return written_[v]; });
+  });
+}
+
+template <int Dim>
+bool RemeshSession<Dim>::commit(Trial<Dim>& trial, OperationCount& count) {
+  if (trial.was_previewed) trial_seconds_.push_back(trial.seconds);
+  ++count.tried;
+  count.relaxed += trial.verdict.was_relaxed;
+  count.accepted += trial.verdict.accepted();
+  if (trial.verdict.accepted()) commit(*trial.edit, trial.verdict);
+  return trial.verdict.accepted();
 }
 
 template <int Dim>
 void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
+  ++commits_;
+  for (const CellId c : edit.removed_cells)
+    for (const VertexId v : mesh_.cell(c)) mark_written(v);
+  Box<Dim> surface;
+  const auto include_facets_at = [&](VertexId v) {
+    for (const FacetId f : mesh_.facets_of(v))
+      for (const VertexId w : mesh_.facet(f)) surface.include(gate_.present().at(w));
+  };
+  if (has_contact()) {
+    for (const FacetId f : edit.removed_facets) include_facets_at(mesh_.facet(f)[0]);
+    for (const auto& [v, x] : verdict.positions)
+      if (v != kNewVertex) include_facets_at(v);
+  }
+
   const int first_cell = mesh_.cell_slots(), first_facet = mesh_.facet_slots();
   const VertexId created = mesh_.apply(edit);
   fields_.follow(edit, created);
   gate_.follow(edit, first_facet);
   if constexpr (Dim == 3) strata_.follow(edit, created);
+  changed_at_.resize(mesh_.vertex_slots(), 0);
   for (const auto& [v, x] : verdict.positions) {
     const VertexId vertex = v == kNewVertex ? created : v;
     fields_.x.template segment<Dim>(Dim * vertex) = x;
     if (has_contact()) gate_.move(vertex);
+    mark_written(vertex);
   }
   const std::size_t first = verdict.patch.size();
-  for (int c = first_cell; c < mesh_.cell_slots(); ++c) verdict.patch.push_back(c);
+  for (int c = first_cell; c < mesh_.cell_slots(); ++c) {
+    verdict.patch.push_back(c);
+    for (const VertexId v : mesh_.cell(c)) mark_written(v);
+  }
+  if (has_contact()) {
+    for (const auto& [v, x] : verdict.positions) include_facets_at(v == kNewVertex ? created : v);
+    for (FacetId f = first_facet; f < mesh_.facet_slots(); ++f) include_facets_at(mesh_.facet(f)[0]);
+    if (surface.min[0] <= surface.max[0]) surface_written_.push_back(surface);
+  }
   for (const EdgeKey& edge : edges_of(std::span(verdict.patch).subspan(first))) refusals_.forget(edge);
   ITR_AUDIT(mesh_.find_defect().empty(), mesh_.find_defect());
   ITR_AUDIT(find_inverted<Dim>(mesh_, fields_.x) == kNone);
+}
+
+template <int Dim>
+void RemeshSession<Dim>::mark_written(VertexId v) {
+  written_.mark(v);
+  changed_at_[v] = commits_;
+  for (const CellId c : mesh_.cells_of(v))
+    for (const VertexId w : mesh_.cell(c)) changed_at_[w] = commits_;
 }
 
 template <int Dim>

@@ -3,9 +3,12 @@
 // which an edit is tried and committed.
 #pragma once
 
+#include <atomic>
+#include <deque>
 #include <unordered_map>
 #include <vector>
 
+#include "itr/core/parallel.hpp"
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "prediction.hpp"
@@ -16,6 +19,24 @@
 
 namespace itr {
 
+/// What was found about a candidate on the mesh as it was when its wave began.
+template <int Dim>
+struct Trial {
+  EdgeQueue::Entry candidate;
+  std::optional<Edit<Dim>> edit{};
+  double signal = 0;  ///< see RemeshMemory
+  bool in_contact = false;
+  bool is_asked = false;  ///< a refusal is to be remembered
+  bool was_previewed = false;
+  bool is_bound_by_dhat = false;  ///< see RemeshReport
+  Box<Dim> surface_read{};        ///< of the present one
+  double seconds = 0;             ///< of the preview
+  Verdict<Dim> verdict{};
+
+  const EdgeKey& edge() const { return candidate.edge; }
+};
+
+/// All operations of one call share it. What is const may be called by several threads, each with a scratch of its own.
 template <int Dim>
 class RemeshSession {
  public:
@@ -35,16 +56,19 @@ class RemeshSession {
   double length(const EdgeKey& e) const {
     return (fields_.x.template segment<Dim>(Dim * e[0]) - fields_.x.template segment<Dim>(Dim * e[1])).norm();
   }
-  bool exists(const EdgeKey& e) const {
+  bool exists(const EdgeKey& e) const {  ///< also of a vertex {v, kNone}
+    if (e[1] == kNone) return mesh_.is_vertex_alive(e[0]);
     return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty();
   }
   bool is_surface(const EdgeKey& e) const;
-  /// Whether an edge is there and as long as it has to be for a split; counts those that are too short on the surface.
-  bool may_be_split(const EdgeKey& e);
+  /// Whether an edge is there and as long as it has to be for a split; if not, whether because of the activation distance.
+  bool may_be_split(const EdgeKey& e, bool& is_bound_by_dhat) const;
   /// Whether an edge is there and short enough for a collapse.
   bool may_be_collapsed(const EdgeKey& e) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
-  bool is_in_contact(const EdgeKey& e);
+  bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
+  /// The same of a trial's edge.
+  void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;
 
   /// Generations of an edge in this pass.
   int depth(const EdgeKey& edge) const {
@@ -56,7 +80,7 @@ class RemeshSession {
 
   /// How much the deformation and the history vary over the cells around an edge (a vertex {v, kNone}): a field that is
   /// linear there gives and takes nothing, whatever is done to the mesh. [J, times the scaling, up to a factor]
-  double roughness(const EdgeKey& edge);
+  double roughness(const EdgeKey& edge) const;
   /// Whether the same was refused before and what it depended on is as it was. Only where bounds decide.
   bool was_refused(RemeshMemory::Kind kind, const EdgeKey& edge, double signal, bool in_contact) const {
     return options_.screening == Screening::bounds && refusals_.holds(kind, edge, signal, in_contact);
@@ -78,12 +102,36 @@ class RemeshSession {
            at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(edit))) < context_.scaling * tolerance;
   }
 
-  /// Tries an edit that has to gain `tolerance` [J], and commits it where it does. Returns the verdict; the patch of an
-  /// accepted one has the new cells too.
-  Verdict<Dim> attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance, const LocalRelaxationOptions& local);
-  Verdict<Dim> attempt(const Edit<Dim>& edit, const Vec<Dim>& center, double tolerance) {
-    return attempt(edit, center, tolerance, options_.local);
+  /// Threads that look at candidates at the same time.
+  int num_lanes() const { return static_cast<int>(lanes_.size()); }
+  /// Calls f(i, scratch) for all i below n, on all of them.
+  template <typename F>
+  void for_each(std::size_t n, const F& f) {
+    std::atomic<std::size_t> next = 0;
+    parallel_blocks(std::min(n, lanes_.size()), 1, [&](std::size_t lane, std::size_t) {
+      for (std::size_t i = next++; i < n; i = next++) f(i, lanes_[lane]);
+    });
   }
+
+  /// Whether bulk terms at an entry's edge are as they were when it was stamped.
+  bool is_unchanged(const EdgeQueue::Entry& entry) const { return !changed_after(entry.edge, entry.since); }
+  EdgeQueue::Entry stamped(EdgeQueue::Entry entry) const {
+    entry.since = commits_;
+    return entry;
+  }
+
+  /// Decides about the edit of a trial that has to gain `tolerance` [J].
+  void judge(Trial<Dim>& trial, const Vec<Dim>& center, double tolerance, const LocalRelaxationOptions& local,
+             LocalScratch<Dim>& scratch) const;
+  /// From here on the next two tell what commits change.
+  void begin_wave();
+  /// Whether cells at an edge (a vertex {v, kNone}) are others, or their vertices elsewhere: all of its trials look there.
+  bool has_changed_around(const EdgeKey& e) const { return changed_after(e, commits_before_wave_); }
+  /// Whether something else that a trial of the wave read has changed.
+  bool was_overtaken(const Trial<Dim>& trial) const;
+  /// Counts a judged trial, and commits it where it was accepted; the verdict's patch then has the new cells too. Returns
+  /// whether it did.
+  bool commit(Trial<Dim>& trial, OperationCount& count);
 
   /// Commits an edit as it is, nothing relaxed, where the gate lets it pass. Returns whether it did.
   bool apply_if_valid(const Edit<Dim>& edit);
@@ -92,17 +140,23 @@ class RemeshSession {
   struct PieceInContact {
     SurfacePiece<Dim> now, rest;
   };
-  std::vector<PieceInContact> pieces_in_contact(FacetId f);
+  std::vector<PieceInContact> pieces_in_contact(FacetId f, LocalScratch<Dim>& scratch) const;
   /// A facet, now and at rest.
   PieceInContact piece(FacetId f) const;
 
   /// Edges of those cells that are alive, ascending.
   std::vector<EdgeKey> edges_of(std::span<const CellId> cells) const;
   double median_trial_seconds();
+  /// For calls from the thread that owns this.
+  LocalScratch<Dim>& scratch() { return lanes_.front(); }
 
  private:
   RemeshState<Dim> state() const { return {mesh_, fields_, context_, gate_.present(), options_.history}; }
   void commit(const Edit<Dim>& edit, Verdict<Dim>& verdict);
+  void mark_written(VertexId v);
+  bool changed_after(const EdgeKey& e, unsigned commit) const {
+    return changed_at_[e[0]] > commit || (e[1] != kNone && changed_at_[e[1]] > commit);
+  }
   double largest_poisson_ratio(const Edit<Dim>& edit) const;
 
   Mesh<Dim>& mesh_;
@@ -112,12 +166,15 @@ class RemeshSession {
   double total_volume_;
   Gate<Dim> gate_;
   Strata<Dim> strata_;
-  LocalScratch<Dim> scratch_;
+  std::deque<LocalScratch<Dim>> lanes_;
   Refusals refusals_;
-  std::vector<CellId> around_;
   std::unordered_map<EdgeKey, int, EdgeKeyHash> depth_;
   RemeshReport report_;
   std::vector<double> trial_seconds_;
+  unsigned commits_ = 0, commits_before_wave_ = 0;
+  std::vector<unsigned> changed_at_;       ///< by vertex: the last commit that changed a cell around it or a vertex of one
+  Marks written_;                          ///< vertices that commits of the wave moved or gave other cells
+  std::vector<Box<Dim>> surface_written_;  ///< by the same, in the present configuration
 };
 
 /// Change of a signal by which a refusal no longer holds.

@@ -27,11 +27,15 @@ class SizingField {
   void split() {
     const double least = least_length();
     for (const EdgeKey& edge : session_.mesh().edges()) push_split(edge);
-    while (const auto edge = queue_.pop()) {
+    while (const auto entry = queue_.pop()) {
+      const EdgeKey& edge = entry->edge;
       if (session_.is_cancelled()) return;
-      if (!session_.may_be_split(*edge) || session_.rest_length(*edge) < least) continue;
+      bool is_bound_by_dhat = false;
+      const bool may_be_split = session_.may_be_split(edge, is_bound_by_dhat);
+      session_.report().bound_by_activation_distance += is_bound_by_dhat;
+      if (!may_be_split || session_.rest_length(edge) < least) continue;
       ++session_.report().splits.tried;
-      const auto edit = make_split(session_.mesh(), *edge);
+      const auto edit = make_split(session_.mesh(), edge);
       const VertexId created = session_.mesh().vertex_slots();
       if (!session_.apply_if_valid(edit)) continue;
       ++session_.report().splits.accepted;
@@ -41,11 +45,12 @@ class SizingField {
 
   void collapse() {
     for (const EdgeKey& edge : session_.mesh().edges()) push_collapse(edge);
-    while (const auto edge = queue_.pop()) {
+    while (const auto entry = queue_.pop()) {
+      const EdgeKey& edge = entry->edge;
       if (session_.is_cancelled()) return;
-      if (!session_.may_be_collapsed(*edge)) continue;
+      if (!session_.may_be_collapsed(edge)) continue;
       ++session_.report().collapses.tried;
-      const auto edit = collapse_of(session_, *edge);
+      const auto edit = collapse_of(session_, edge);
       if (!edit || makes_large_edges(*edit) || !session_.apply_if_valid(*edit)) continue;
       ++session_.report().collapses.accepted;
       for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(edit->value->vertex))) push_collapse(near);
@@ -55,10 +60,10 @@ class SizingField {
  private:
   void push_split(const EdgeKey& edge) {
     const double size = size_of(edge);
-    if (size > kSplitAbove) queue_.push(edge, size);
+    if (size > kSplitAbove) queue_.push({edge, size});
   }
   void push_collapse(const EdgeKey& edge) {
-    if (size_of(edge) <= kCollapseBelow) queue_.push(edge, -session_.rest_length(edge));
+    if (size_of(edge) <= kCollapseBelow) queue_.push({edge, -session_.rest_length(edge)});
   }
 
   /// No edge is split that is shorter [m].
@@ -122,7 +127,7 @@ class SizingField {
     for (const FacetId f : session_.mesh().facets_of(vertex)) {
       const auto own = session_.piece(f);
       const auto at = static_cast<int>(std::find(own.now.id.begin(), own.now.id.end(), vertex) - own.now.id.begin());
-      for (const auto& other : session_.pieces_in_contact(f)) {
+      for (const auto& other : session_.pieces_in_contact(f, session_.scratch())) {
         look_at(own, at, other);
         for (int k = 0; k < other.now.size; ++k) look_at(other, k, own);
       }

@@ -9,7 +9,7 @@
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
-#include "session.hpp"
+#include "wave.hpp"
 
 namespace itr {
 
@@ -80,85 +80,109 @@ Vec<Dim> configurational_gradient(const RemeshSession<Dim>& session, VertexId ve
   return sum;
 }
 
+/// What both ways of moving vertices share.
 template <int Dim>
-class Smoother {
+class Mover {
  public:
-  explicit Smoother(RemeshSession<Dim>& session)
-      : session_(session),
-        mesh_(session.mesh()),
-        options_(session.options().smooth),
-        worthwhile_(std::max(options_.acceptance_tolerance, session.least_worthwhile())),
-        one_ring_(session.options().local) {
+  explicit Mover(RemeshSession<Dim>& session)
+      : session_(session), mesh_(session.mesh()), options_(session.options().smooth), one_ring_(session.options().local) {
     one_ring_.rings = 1;
     one_ring_.relative_volume = 0;
   }
 
-  void run() {
-    for (int round = 0; round < options_.max_iterations; ++round) {
-      follow_forces();
-      better_shapes();
-    }
-  }
-
- private:
-  /// Where a move by kStep along the force promises enough, most first.
-  void follow_forces() {
-    const double least = session_.screens() ? session_.context().scaling * worthwhile_ : 0;
-    std::vector<std::pair<double, VertexId>> order;
-    for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {
-      if (!may_move(v)) continue;
-      const double promise = configurational_gradient(session_, v).norm() * kStep * shortest_edge(mesh_, v);
-      if (promise > least) order.emplace_back(-promise, v);
-    }
-    std::sort(order.begin(), order.end());
-    for (const auto& [promise, v] : order) {
-      if (session_.is_cancelled()) return;
-      const Vec<Dim> gradient = configurational_gradient(session_, v);
-      const double force = gradient.norm(), length = kStep * shortest_edge(mesh_, v);
-      if (force * length <= least || session_.was_refused(RemeshMemory::smooth, {v, kNone}, force, false)) continue;
-      if (!move(v, mesh_.rest(v) - length / force * gradient, worthwhile_))
-        session_.remember(RemeshMemory::smooth, {v, kNone}, {force / kSameForce, force * kSameForce, false});
-    }
-  }
-
-  void better_shapes() {
-    for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {
-      if (session_.is_cancelled()) return;
-      if (!may_move(v)) continue;
-      const double shape = worst_shape(mesh_, v);
-      if (shape < kBadShape || session_.was_refused(RemeshMemory::reshape, {v, kNone}, shape, false)) continue;
-      const Vec<Dim> target = best_shape(session_, v);
-      const bool is_far = (target - mesh_.rest(v)).norm() > kLeastMove * shortest_edge(mesh_, v);
-      if (!is_far || !move(v, target, options_.acceptance_tolerance))
-        session_.remember(RemeshMemory::reshape, {v, kNone}, {shape / kSameShape, shape * kSameShape, false});
-    }
-  }
-
+ protected:
   bool may_move(VertexId v) const { return mesh_.is_vertex_alive(v) && !mesh_.is_boundary(v); }
-
-  bool move(VertexId v, const Vec<Dim>& target, double tolerance) {
-    const auto edit = move_of(session_, v, target);
-    if (!edit || session_.is_hopeless(*edit, session_.predict(*edit), tolerance)) return false;
-    OperationCount& count = session_.report().smooths;
-    ++count.tried;
-    const auto verdict = session_.attempt(*edit, target, tolerance, one_ring_);
-    count.relaxed += verdict.was_relaxed;
-    count.accepted += verdict.accepted();
-    return verdict.accepted();
+  void judge(Trial<Dim>& trial, const Vec<Dim>& target, double tolerance, LocalScratch<Dim>& scratch) const {
+    trial.edit = move_of(session_, trial.edge()[0], target);
+    if (trial.edit && !session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), tolerance))
+      session_.judge(trial, target, tolerance, one_ring_, scratch);
+  }
+  /// `same`: the change of the signal by which it is asked again.
+  void settle(Trial<Dim>& trial, RemeshMemory::Kind kind, double same) {
+    if (!trial.is_asked) return;
+    if (trial.was_previewed && session_.commit(trial, session_.report().smooths)) return;
+    session_.remember(kind, trial.edge(), {trial.signal / same, trial.signal * same, false});
   }
 
   RemeshSession<Dim>& session_;
   const Mesh<Dim>& mesh_;
   const SmoothOptions& options_;
-  double worthwhile_;  ///< [J]
   LocalRelaxationOptions one_ring_;
+};
+
+/// Moves vertices by kStep along the force, where that promises enough, most first.
+template <int Dim>
+class ForceFollower : Mover<Dim> {
+ public:
+  explicit ForceFollower(RemeshSession<Dim>& session)
+      : Mover<Dim>(session),
+        worthwhile_(std::max(this->options_.acceptance_tolerance, session.least_worthwhile())),
+        least_promise_(session.screens() ? session.context().scaling * worthwhile_ : 0) {}
+
+  std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
+    const VertexId v = vertex[0];
+    if (!this->may_move(v)) return std::nullopt;
+    const double promise = configurational_gradient(this->session_, v).norm() * length(v);
+    return promise > least_promise_ ? std::optional(EdgeQueue::Entry{.edge = vertex, .priority = promise}) : std::nullopt;
+  }
+
+  void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
+    const VertexId v = trial.edge()[0];
+    const Vec<Dim> gradient = configurational_gradient(this->session_, v);
+    const double force = gradient.norm();
+    if (force * length(v) <= least_promise_ || this->session_.was_refused(RemeshMemory::smooth, trial.edge(), force, false))
+      return;
+    trial.signal = force;
+    trial.is_asked = true;
+    this->judge(trial, this->mesh_.rest(v) - length(v) / force * gradient, worthwhile_, scratch);
+  }
+
+  void settle(Trial<Dim>& trial, std::vector<EdgeKey>&) { Mover<Dim>::settle(trial, RemeshMemory::smooth, kSameForce); }
+
+ private:
+  double length(VertexId v) const { return kStep * shortest_edge(this->mesh_, v); }
+
+  double worthwhile_;     ///< [J]
+  double least_promise_;  ///< [J, times the scaling]
+};
+
+/// Moves vertices to where the cells around are best shaped, where one of them is badly shaped.
+template <int Dim>
+class ShapeBetterer : Mover<Dim> {
+ public:
+  explicit ShapeBetterer(RemeshSession<Dim>& session) : Mover<Dim>(session) {}
+
+  std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
+    if (!this->may_move(vertex[0]) || worst_shape(this->mesh_, vertex[0]) < kBadShape) return std::nullopt;
+    return EdgeQueue::Entry{.edge = vertex, .priority = -static_cast<double>(vertex[0])};
+  }
+
+  void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
+    const VertexId v = trial.edge()[0];
+    trial.signal = worst_shape(this->mesh_, v);
+    if (trial.signal < kBadShape || this->session_.was_refused(RemeshMemory::reshape, trial.edge(), trial.signal, false))
+      return;
+    trial.is_asked = true;
+    const Vec<Dim> target = best_shape(this->session_, v);
+    if ((target - this->mesh_.rest(v)).norm() > kLeastMove * shortest_edge(this->mesh_, v))
+      this->judge(trial, target, this->options_.acceptance_tolerance, scratch);
+  }
+
+  void settle(Trial<Dim>& trial, std::vector<EdgeKey>&) { Mover<Dim>::settle(trial, RemeshMemory::reshape, kSameShape); }
 };
 
 }  // namespace
 
 template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session) {
-  Smoother<Dim>(session).run();
+  std::vector<EdgeKey> vertices;
+  for (VertexId v = 0; v < session.mesh().vertex_slots(); ++v) vertices.push_back({v, kNone});
+  for (int round = 0; round < session.options().smooth.max_iterations; ++round) {
+    ForceFollower<Dim> follower(session);
+    run_waves(session, follower, vertices);
+    ShapeBetterer<Dim> betterer(session);
+    run_waves(session, betterer, vertices);
+  }
 }
 
 template void smooth_vertices(RemeshSession<2>&);

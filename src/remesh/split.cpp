@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "itr/remesh/edits.hpp"
-#include "session.hpp"
+#include "wave.hpp"
 
 namespace itr {
 
@@ -17,66 +17,68 @@ class Splitter {
         tolerance_(session.context().scaling * options_.acceptance_tolerance),
         ranks_(ranks) {}
 
-  void run() {
-    for (const EdgeKey& edge : session_.mesh().edges()) push(edge);
-    while (const auto edge = queue_.pop()) {
-      if (session_.is_cancelled()) return;
-      if (may_be_split(*edge)) split(*edge);
-    }
-    session_.forget_depths();
+  // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the same
+  // with fewer vertices: verification/paper.)
+  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+    if (session_.depth(edge) >= options_.max_depth) return std::nullopt;
+    if (is_culled() && inherited(edge) != Rank::top) return std::nullopt;
+    const auto edit = make_split(session_.mesh(), edge);
+    const double gain = session_.predict(edit);
+    const bool in_contact = session_.is_in_contact(edge, scratch);
+    if (session_.was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
+    return EdgeQueue::Entry{.edge = edge, .priority = gain, .is_hopeless = !in_contact && is_hopeless(edit, gain)};
+  }
+
+  void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
+    const EdgeKey& edge = trial.edge();
+    if (!session_.exists(edge) || session_.depth(edge) >= options_.max_depth ||
+        !session_.may_be_split(edge, trial.is_bound_by_dhat))
+      return;
+    session_.find_contact(trial, scratch);
+    const bool is_known = session_.is_unchanged(trial.candidate);
+    if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return;
+    trial.edit = make_split(session_.mesh(), edge);
+    trial.signal = is_known ? trial.candidate.priority : session_.predict(*trial.edit);
+    if (!trial.in_contact && is_hopeless(*trial.edit, trial.signal)) return;  // there trials tell
+    session_.judge(trial, trial.edit->value->rest, options_.acceptance_tolerance, session_.options().local, scratch);
+  }
+
+  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+    session_.report().bound_by_activation_distance += trial.is_bound_by_dhat;
+    if (!trial.is_asked) return;
+    if (!session_.commit(trial, session_.report().splits)) return remember(trial);
+    const VertexId created = session_.mesh().vertex_slots() - 1;
+    inherit(trial.edge(), created);
+    const auto near = session_.edges_of(session_.mesh().cells_of(created));
+    fresh.insert(fresh.end(), near.begin(), near.end());
   }
 
  private:
-  double predict(const EdgeKey& edge) const { return session_.predict(make_split(session_.mesh(), edge)); }
   bool is_culled() const { return session_.options().screening == Screening::energy_percentile; }
-
-  // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the same
-  // with fewer vertices: verification/paper.)
-  void push(const EdgeKey& edge) {
-    if (session_.depth(edge) >= options_.max_depth) return;
-    if (is_culled() && rank(edge) != Rank::top) return;
-    const double gain = predict(edge);
-    if (!session_.was_refused(RemeshMemory::split, edge, gain, session_.is_in_contact(edge))) queue_.push(edge, gain);
+  bool is_hopeless(const Edit<Dim>& edit, double gain) const {
+    return session_.is_hopeless(edit, gain, options_.acceptance_tolerance);
   }
 
-  Rank rank(const EdgeKey& edge) const {
+  Rank inherited(const EdgeKey& edge) const {
     const auto it = ranks_.find(edge);
     return it == ranks_.end() ? Rank::middle : it->second;
   }
 
-  bool may_be_split(const EdgeKey& edge) {
-    return session_.exists(edge) && session_.depth(edge) < options_.max_depth && session_.may_be_split(edge);
-  }
-
-  void split(const EdgeKey& edge) {
-    const auto edit = make_split(session_.mesh(), edge);
-    const double signal = session_.predict(edit);
-    const bool in_contact = session_.is_in_contact(edge);  // there trials tell
-    if (!in_contact && session_.is_hopeless(edit, signal, options_.acceptance_tolerance)) return;
-    ++session_.report().splits.tried;
-    const auto verdict = session_.attempt(edit, edit.value->rest, options_.acceptance_tolerance);
-    session_.report().splits.relaxed += verdict.was_relaxed;
-    if (!verdict.accepted()) return remember(edge, signal, in_contact, verdict.gain);
-    ++session_.report().splits.accepted;
-    const VertexId created = session_.mesh().vertex_slots() - 1;
-    inherit(edge, created);
-    for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(created))) push(near);
-  }
-
   /// Bulk terms alone tell when a refused split can have become worthwhile; in contact any change may have done it.
-  void remember(const EdgeKey& edge, double signal, bool in_contact, double gain) {
-    RemeshMemory::Refusal refusal{signal / kSameSignal, signal * kSameSignal, in_contact};
-    if (!in_contact) {
+  void remember(const Trial<Dim>& trial) {
+    const double signal = trial.signal, gain = trial.verdict.gain;
+    RemeshMemory::Refusal refusal{signal / kSameSignal, signal * kSameSignal, trial.in_contact};
+    if (!trial.in_contact) {
       constexpr double kMargin = 1.3;
       refusal.least_signal = 0;
       if (gain > 0) refusal.most_signal = signal * std::max(kSameSignal, tolerance_ / (kMargin * gain));
     }
-    session_.remember(RemeshMemory::split, edge, refusal);
+    session_.remember(RemeshMemory::split, trial.edge(), refusal);
   }
 
   /// Rank and depth of the edges at the new vertex.
   void inherit(const EdgeKey& edge, VertexId created) {
-    const Rank from = rank(edge);
+    const Rank from = inherited(edge);
     const int generation = session_.depth(edge) + 1;
     const auto ring = session_.mesh().cells_of(created);
     for (const EdgeKey& near : session_.edges_of(ring)) {
@@ -90,14 +92,15 @@ class Splitter {
   const SplitOptions& options_;
   double tolerance_;
   EdgeRanks& ranks_;
-  EdgeQueue queue_;
 };
 
 }  // namespace
 
 template <int Dim>
 void split_edges(RemeshSession<Dim>& session, EdgeRanks& ranks) {
-  Splitter<Dim>(session, ranks).run();
+  Splitter<Dim> splitter(session, ranks);
+  run_waves(session, splitter, session.mesh().edges());
+  session.forget_depths();
 }
 
 template void split_edges(RemeshSession<2>&, EdgeRanks&);

@@ -22,6 +22,7 @@ struct Comparison {
   double gain = -std::numeric_limits<double>::infinity();
   bool touches_contact = false;
   bool has_unknowns = false;
+  Box<Dim> surface_read{};
 };
 
 /// `settle`, called with the side after the edit where it gains `required`, may go on with it.
@@ -33,6 +34,8 @@ Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> p
   Comparison<Dim> result;
   result.touches_contact = before.touches_contact() || after.touches_contact();
   result.has_unknowns = after.has_unknowns();
+  result.surface_read = before.surface_read();
+  result.surface_read.include(after.surface_read());
   const int effort = result.touches_contact ? contact_iterations : iterations;
   const double energy_before = before.value();
   const double energy_after = after.has_unknowns() ? after.relax(effort).energy : after.value();
@@ -86,6 +89,7 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
       verdict.decision = Decision::by_bound;
       verdict.gain = bound.gain;
       verdict.touches_contact = bound.touches_contact;
+      verdict.surface_read.include(bound.surface_read);
       return at_most(bound.gain, surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex) <
              options.required;
     };
@@ -101,6 +105,7 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
   if (is_enough) {
     LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
     verdict.touches_contact = after.touches_contact();
+    verdict.surface_read.include(after.surface_read());
     finish(after);
     return verdict;
   }
@@ -108,6 +113,7 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
                                   options.local.max_contact_iterations, scratch, finish);
   verdict.gain = found.gain;
   verdict.touches_contact = found.touches_contact;
+  verdict.surface_read.include(found.surface_read);
   verdict.was_relaxed = true;
   if (!verdict.accepted()) verdict.decision = found.has_unknowns ? Decision::by_energy : Decision::no_unknowns;
   return verdict;

@@ -24,7 +24,8 @@ struct Verdict {
   bool was_relaxed = false;  ///< whether it took the relaxation of a patch to decide
   double gain = 0;           ///< decrease of the energy that was found [J, times the scaling]; negative: increase
   bool touches_contact = false;
-  std::vector<CellId> patch{};                                    ///< that was read
+  Box<Dim> surface_read{};      ///< holds what was read of the surface as it is now, beside the patch's own vertices
+  std::vector<CellId> patch{};  ///< that was read, where the star of the edit did not do
   std::vector<typename LocalProblem<Dim>::Position> positions{};  ///< where accepted
   bool accepted() const { return decision == Decision::accepted; }
 };

@@ -289,9 +289,8 @@ constexpr Key kKeys[] = {
     {"/space/remesh/split/min_edge_length", read, "non_negative", "(1e-6 of the bodies' diagonal)", "m",
      "shorter edges are not split"},
     {"/space/remesh/collapse/enabled", read, "boolean", "true", "", ""},
-    {"/space/remesh/collapse/acceptance_tolerance", read, "number", "-1e-8", "J",
-     "negative: increase of energy that a collapse may cost; -1/100 of the split tolerance coarsens what contact has left "
-     "behind, and is the default where that is chosen"},
+    {"/space/remesh/collapse/acceptance_tolerance", read, "number", "(-1/100 of the split tolerance)", "J",
+     "negative: increase of energy that a collapse may cost; nearer to 0, what contact has left behind stays fine"},
     {"/space/remesh/collapse/culling_threshold", read, "share", "0.01", "",
      "with energy-percentile: edges above this share are not collapsed"},
     {"/space/remesh/collapse/max_depth", read, "natural", "3", "", "generations a step"},

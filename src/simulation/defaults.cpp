@@ -97,7 +97,7 @@ std::string choose_tolerances(const Setup<Dim>& setup, RemeshOptions& remesh) {
   if (const double available = available_energy(setup); available > 0) energy = std::min(energy, available);
   remesh.split.acceptance_tolerance = remesh.relative_tolerance * energy;
   if (remesh.collapse.acceptance_tolerance == CollapseOptions{}.acceptance_tolerance)
-    remesh.collapse.acceptance_tolerance = -0.01 * remesh.split.acceptance_tolerance;
+    remesh.collapse.acceptance_tolerance = kCollapseShare * remesh.split.acceptance_tolerance;
   return fmt::format(
       "split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J; collapses may cost {:.2g} J; "
       "/space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",

@@ -25,6 +25,10 @@ struct SplitOptions {
   double min_edge_length = -1;  ///< shorter rest edges are not split [m]; below 0: 1e-6 of the bodies' diagonal at rest
 };
 
+/// What a collapse may cost, in split tolerances, where nothing else is asked for: less, and what contact has left behind
+/// stays fine.
+inline constexpr double kCollapseShare = -0.01;
+
 struct CollapseOptions {
   bool enabled = true;
   double acceptance_tolerance = -1e-8;  ///< [J]; negative: allowed increase

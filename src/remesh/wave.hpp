@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// Candidates are looked at in waves: so many from the head of the queue, all on the mesh as it is, on all threads; then
+// settled one after another in the queue's order. What rests on something that an earlier one of its wave has changed goes
+// back. How many make a wave depends on what the one before found, never on threads, so neither do results.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "session.hpp"
+
+namespace itr {
+
+/// Candidates of a wave: twice as many as in the one before where nothing of that was wasted, half as many where more than
+/// this share was. (verification/paper/README.md, "Waves")
+inline constexpr int kSmallestWave = 8, kLargestWave = 256;
+inline constexpr double kTolerableWaste = 0.1;
+
+/// Settles candidates of an operation until there are none. The operation has
+///   std::optional<EdgeQueue::Entry> rank(const EdgeKey&, LocalScratch<Dim>&) const;  // empty: no candidate
+///   void look(Trial<Dim>&, LocalScratch<Dim>&) const;                                // may preview
+///   void settle(Trial<Dim>&, std::vector<EdgeKey>& fresh);                           // may commit
+/// `fresh` are edges (a vertex v is {v, kNone}) to be ranked: at first these, each once.
+template <int Dim, typename Operation>
+void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<EdgeKey> fresh) {
+  EdgeQueue queue;
+  std::vector<std::optional<EdgeQueue::Entry>> ranked;
+  std::vector<Trial<Dim>> wave(kLargestWave);
+  int size = kSmallestWave;
+  // One thread alone looks at each when it is its turn, and not at what is lost by then: that finds the same.
+  const bool is_alone = session.num_lanes() == 1;
+  const auto look = [&](Trial<Dim>& trial, LocalScratch<Dim>& scratch) {
+    trial = {.candidate = trial.candidate};
+    operation.look(trial, scratch);
+  };
+  while (!session.is_cancelled()) {
+    int count = 0;
+    for (; count < size; ++count) {
+      const auto entry = queue.pop();
+      if (!entry) break;
+      wave[count].candidate = *entry;
+    }
+    if (count == 0 && fresh.empty()) return;
+
+    constexpr std::size_t kChunk = 16;
+    const std::size_t looks = is_alone ? 0 : count, chunks = (fresh.size() + kChunk - 1) / kChunk;
+    ranked.assign(fresh.size(), std::nullopt);
+    session.for_each(looks + chunks, [&](std::size_t task, LocalScratch<Dim>& scratch) {
+      if (task < looks) return look(wave[task], scratch);
+      const std::size_t first = kChunk * (task - looks);
+      for (std::size_t i = first; i < std::min(fresh.size(), first + kChunk); ++i)
+        if (session.exists(fresh[i])) ranked[i] = operation.rank(fresh[i], scratch);
+    });
+    std::vector<EdgeQueue::Entry> entries;
+    for (const auto& entry : ranked)
+      if (entry) entries.push_back(session.stamped(*entry));
+    queue.push(std::move(entries));
+    fresh.clear();
+
+    session.begin_wave();
+    int wasted = 0;
+    for (Trial<Dim>& trial : std::span(wave).first(count)) {
+      bool is_lost = session.has_changed_around(trial.edge());
+      if (is_alone && !is_lost) look(trial, session.scratch());
+      is_lost = is_lost || session.was_overtaken(trial);
+      if (is_lost)
+        queue.push(trial.candidate);
+      else
+        operation.settle(trial, fresh);
+      wasted += is_lost;
+    }
+    std::sort(fresh.begin(), fresh.end());
+    fresh.erase(std::unique(fresh.begin(), fresh.end()), fresh.end());
+    if (wasted == 0)
+      size = std::min(2 * size, kLargestWave);
+    else if (wasted > kTolerableWaste * count)
+      size = std::max(size / 2, kSmallestWave);
+  }
+}
+
+}  // namespace itr
