@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From what a scene asks for to a solver: names, options, fallbacks, `auto`, and simulations side by side.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -324,6 +325,29 @@ TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
   EXPECT_EQ(pick_solver(huge, none).name, "eigen:cg");
   for (const auto& traits : {tiny, small, large, large_3d, indefinite, huge})
     EXPECT_FALSE(pick_solver(traits, all).reason.empty());
+}
+
+/// A long thin body: many unknowns whose factors are far smaller than those of a cube.
+TEST(Auto, AsksAnAnalysisWhereACubeWouldNotFit) {
+  Registry registry;
+  if (!registry.is_ready("cholmod")) GTEST_SKIP() << "cholmod: " << registry.find("cholmod").reason;
+  SparsityPattern chain;
+  chain.order = 1 << 16;
+  while (estimate_factor_bytes({chain.order, 0, 3, false, 0}) <
+         static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE)))
+    chain.order += chain.order / 4;
+  chain.column_starts.push_back(0);
+  for (int j = 0; j < chain.order; ++j) {
+    for (const int i : {j, j + 1})
+      if (i < chain.order) chain.row_indices.push_back(i);
+    chain.column_starts.push_back(static_cast<int>(chain.row_indices.size()));
+  }
+  ASSERT_NE(pick_solver({chain.order, chain.nonzeros(), 3, false, 0}, registry).name, "cholmod");
+  const auto solver = make_auto_solver(registry, false, {});
+  EXPECT_EQ(solver->analyze(chain, {.block_size = 3}), Outcome::ok);
+  EXPECT_EQ(solver->name_in_use(), "cholmod");
+  EXPECT_EQ(pick_solver({chain.order, chain.nonzeros(), 3, false, 1e9, 2e9}, there({"cholmod", "belos:muelu"})).name,
+            "belos:muelu");
 }
 
 TEST(Auto, AsksOnlyAboutSolversInQuestion) {  // an answer may load a module of 40 MB and start MPI

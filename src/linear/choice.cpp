@@ -31,6 +31,11 @@ double half_of_memory() {
   return 0.5 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
+bool outgrows_memory(const MatrixTraits& traits) {
+  const double memory = traits.memory_bytes > 0 ? traits.memory_bytes : half_of_memory();
+  return !traits.may_be_indefinite && (traits.factor_bytes > 0 ? traits.factor_bytes : estimate_factor_bytes(traits)) > memory;
+}
+
 /// Stands for a solver that could not be created in the middle of a run.
 class Absent final : public Solver {
  public:
@@ -70,7 +75,15 @@ class AutoSolver final : public Forwarding {
   std::string_view name() const override { return "auto"; }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
-    pick({pattern.order, pattern.nonzeros(), hints.block_size, may_be_indefinite_});
+    MatrixTraits traits{pattern.order, pattern.nonzeros(), hints.block_size, may_be_indefinite_};
+    if (!hints.may_keep_order) factor_bytes_ = 0;
+    if (factor_bytes_ == 0 && outgrows_memory(traits) && registry_.is_ready("cholmod")) {
+      solver_ = registry_.create("cholmod", options_["cholmod"]);  // where it is picked, the next analysis is for nothing
+      const bool is_possible = solver_->analyze(pattern, hints) == Outcome::ok;
+      factor_bytes_ = is_possible ? solver_->statistics().factor_bytes : std::numeric_limits<double>::infinity();
+    }
+    traits.factor_bytes = factor_bytes_;
+    pick(traits);
     return solver_->analyze(pattern, hints);
   }
   Outcome factorize(std::span<const double> values) override { return solver_->factorize(values); }
@@ -96,7 +109,8 @@ class AutoSolver final : public Forwarding {
   Logger logger_;
   std::map<std::string, SolverOptions> options_;
   std::unique_ptr<Solver> solver_;
-  std::string told_;  ///< the last pick that the logger knows
+  std::string told_;         ///< the last pick that the logger knows
+  double factor_bytes_ = 0;  ///< of this step's first pattern, where it was analysed for them
 };
 
 /// Does the failure say something about the solver, so that another one may succeed?
@@ -210,8 +224,7 @@ double estimate_factor_bytes(const MatrixTraits& traits) {
 
 Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char* name)>& is_there) {
   const bool is_3d = traits.block_size == 3;
-  const double memory = traits.memory_bytes > 0 ? traits.memory_bytes : half_of_memory();
-  if (!traits.may_be_indefinite && estimate_factor_bytes(traits) > memory) {
+  if (outgrows_memory(traits)) {
     const char* why = "its factors would not fit into the memory";
     if (is_there("belos:muelu")) return {"belos:muelu", why};
     return {"eigen:cg", why + std::string(", and belos:muelu is not there")};

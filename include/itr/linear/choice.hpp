@@ -18,6 +18,7 @@ struct MatrixTraits {
   int block_size = 1;        ///< 2: a 2D mesh, 3: a 3D mesh, 1: unknown
   bool may_be_indefinite = false;
   double memory_bytes = 0;  ///< that factors may take; 0: half of this machine's
+  double factor_bytes = 0;  ///< that they take, from an analysis; 0: as estimate_factor_bytes says
 };
 
 struct Pick {
@@ -34,7 +35,8 @@ Pick pick_solver(const MatrixTraits& traits, Registry& registry);
 /// Bytes that the factors of such a matrix take with a nested-dissection ordering, fitted to verification/scaling.
 double estimate_factor_bytes(const MatrixTraits& traits);
 
-/// Picks at each analysis, and tells the logger when the pick changes. `options` by canonical name. A pick that cannot be
+/// Picks at each analysis, and tells the logger when the pick changes. Where factors are estimated not to fit, CHOLMOD's
+/// analysis has the last word, once a time step: the estimate is that of a cube. `options` by canonical name. A pick that cannot be
 /// created is an analysis that failed. `registry` must outlive it.
 std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger,
                                          std::map<std::string, SolverOptions> options = {});
