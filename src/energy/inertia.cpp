@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/inertia.hpp"
 
+#include "itr/core/parallel.hpp"
 #include "itr/energy/elastic/laws.hpp"
 
 namespace itr {
+
+namespace {
+constexpr std::size_t kBlock = 256;
+}  // namespace
 
 template <int Dim>
 std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
@@ -29,18 +34,21 @@ void InertiaEnergy<Dim>::set_unrepresented_history(VectorX residual, double loss
 
 template <int Dim>
 double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
-  double sum = 0;
-  for (std::size_t e = 0; e < mass_.size(); ++e) {
-    Vec<Dim> total = Vec<Dim>::Zero();
-    double squares = 0;
-    for (const int v : cells_.elements[e].vertices) {
-      const Vec<Dim> d = x.segment<Dim>(Dim * v) - predictor_.segment<Dim>(Dim * v);
-      total += d;
-      squares += d.squaredNorm();
+  double sum = parallel_sum(mass_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    double part = 0;
+    for (std::size_t e = begin; e < end; ++e) {
+      Vec<Dim> total = Vec<Dim>::Zero();
+      double squares = 0;
+      for (const int v : cells_.elements[e].vertices) {
+        const Vec<Dim> d = x.segment<Dim>(Dim * v) - predictor_.segment<Dim>(Dim * v);
+        total += d;
+        squares += d.squaredNorm();
+      }
+      const ElementMass<Dim> mass(kind_, mass_[e]);
+      part += 0.5 * (mass.off * total.squaredNorm() + mass.extra * squares);
     }
-    const ElementMass<Dim> mass(kind_, mass_[e]);
-    sum += 0.5 * (mass.off * total.squaredNorm() + mass.extra * squares);
-  }
+    return part;
+  });
   if (residual_.size() > 0) sum += residual_.dot(x - predictor_) + loss_;
   return sum;
 }

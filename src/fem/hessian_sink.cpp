@@ -10,6 +10,7 @@ namespace itr {
 
 namespace {
 constexpr const char* kNonzeros = "nonzeros of the Newton system";
+constexpr std::size_t kEntriesPerTask = 2048;
 }  // namespace
 
 DofMap DofMap::from_held(const std::vector<char>& held) {
@@ -94,7 +95,6 @@ const SparseAssembler::Gather& SparseAssembler::gather(std::size_t batch) {
 }
 
 void SparseAssembler::add_batch(std::size_t first, const double* blocks) {
-  constexpr std::size_t kEntriesPerTask = 2048;
   const Gather& list = gather(first / kBatch);
   parallel_blocks(list.nonzero.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
@@ -108,7 +108,9 @@ void SparseAssembler::add_batch(std::size_t first, const double* blocks) {
 bool SparseAssembler::add_kept(std::span<const double> factors, std::span<const double> block) {
   if (kept_factors_.empty() || !std::ranges::equal(kept_factors_, factors) || !std::ranges::equal(kept_block_, block))
     return false;
-  for (std::size_t k = 0; k < kept_.size(); ++k) values_[place(static_cast<int>(k))] += kept_[k];
+  parallel_blocks(kept_.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) values_[place(static_cast<int>(k))] += kept_[k];
+  });
   return true;
 }
 

@@ -86,11 +86,13 @@ void exact_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const 
   const double J = F.determinant();
   const ShapeGradients<Dim> h = F.inverse().transpose() * gradients;
   const double c = weight * (lame.mu - lame.lambda * std::log(J)), mu = weight * lame.mu, lambda = weight * lame.lambda;
-  for (int i = 0; i <= Dim; ++i)
-    for (int j = 0; j <= Dim; ++j) {
-      Mat<Dim> pair = c * h.col(j) * h.col(i).transpose() + lambda * h.col(i) * h.col(j).transpose();
-      pair.diagonal().array() += mu * gradients.col(i).dot(gradients.col(j));
-      block.template block<Dim, Dim>(Dim * i, Dim * j) = pair;
+  for (int j = 0; j <= Dim; ++j)
+    for (int i = j; i <= Dim; ++i) {
+      const double diagonal = mu * gradients.col(i).dot(gradients.col(j));
+      for (int b = 0; b < Dim; ++b)
+        for (int a = 0; a < Dim; ++a)
+          block(Dim * i + a, Dim * j + b) = block(Dim * j + b, Dim * i + a) =
+              c * h(a, j) * h(b, i) + lambda * h(a, i) * h(b, j) + (a == b ? diagonal : 0);
     }
 }
 
@@ -159,15 +161,18 @@ double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
 
 template <int Dim>
 void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
-  for (std::size_t e = 0; e < cells_.elements.size(); ++e) {
+  const auto forces_of = [&](std::size_t e) -> Mat<Dim> {  // on all vertices but the first
     const auto& element = cells_.elements[e];
     const Mat<Dim> P = elastic_stress<Dim>(deformation_gradient<Dim>(element, x), moduli(e));
-    const Mat<Dim> forces = scale_ * element.volume * P * element.inverse_edges.transpose();
+    return scale_ * element.volume * P * element.inverse_edges.transpose();
+  };
+  parallel_then_ordered<Mat<Dim>>(cells_.elements.size(), kBlock, forces_of, [&](std::size_t e, const Mat<Dim>& forces) {
+    const auto& vertices = cells_.elements[e].vertices;
     for (int k = 0; k < Dim; ++k) {
-      gradient.segment<Dim>(Dim * element.vertices[k + 1]) += forces.col(k);
-      gradient.segment<Dim>(Dim * element.vertices[0]) -= forces.col(k);
+      gradient.segment<Dim>(Dim * vertices[k + 1]) += forces.col(k);
+      gradient.segment<Dim>(Dim * vertices[0]) -= forces.col(k);
     }
-  }
+  });
 }
 
 template <int Dim>
@@ -190,12 +195,15 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
 
 template <int Dim>
 double ElasticEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const {
-  double step = 1;
-  for (const auto& element : cells_.elements) {
-    const double t = first_inversion(edges_of<Dim>(element, x), edges_of<Dim>(element, dx));
-    if (t <= 1) step = std::min(step, kInversionMargin * t);
-  }
-  return step;
+  return parallel_min(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    double step = 1;
+    for (std::size_t e = begin; e < end; ++e) {
+      const auto& element = cells_.elements[e];
+      const double t = first_inversion(edges_of<Dim>(element, x), edges_of<Dim>(element, dx));
+      if (t <= 1) step = std::min(step, kInversionMargin * t);
+    }
+    return step;
+  });
 }
 
 template <int Dim>
