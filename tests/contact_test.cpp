@@ -102,13 +102,13 @@ struct ContactScene3 {
   CollisionSurface surface;
   VectorX x;
   ContactOptions options;
-  ContactScene3(unsigned seed, bool convergent, double angle, double roughness) {
+  /// Sheets of n x n vertices: from 8 on pairs are found by trees, and in several blocks.
+  ContactScene3(unsigned seed, bool convergent, double angle, double roughness, int n = 4) {
     options.enabled = true;
     options.activation_distance = 0.2;
     options.convergent = convergent;
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> noise(-roughness, roughness);
-    const int n = 4;
     std::vector<Vec<3>> rest;
     std::vector<std::array<int, 3>> triangles;
     for (int sheet = 0; sheet < 2; ++sheet)
@@ -343,8 +343,30 @@ TEST(AdaptiveStiffness, BalancesTheBarrierAsTheDofsFeelIt) {
   EXPECT_NEAR(stiffness.value, 7 * least, 1e-10 * least);
 }
 
+/// Search trees are kept: they must not show.
+TEST(Contact3, HasTheBitsOfAFreshWorkspaceInAnUsedOne) {
+  std::srand(1);
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const ContactScene3 scene(seed, true, 0.1, 0.02, 8);
+    const ContactEnergy<3> contact(scene.surface, scene.options, 3, 0.5);
+    const VectorX elsewhere = VectorX::Random(scene.x.size()), dx = 0.3 * VectorX::Random(scene.x.size());
+    const auto run = [&](Workspace& workspace) {
+      contact.foresee(scene.x, dx, workspace);
+      VectorX result(scene.x.size() + 3);
+      VectorX gradient = VectorX::Zero(scene.x.size());
+      contact.add_gradient(scene.x, gradient, workspace);
+      result << gradient, contact.value(scene.x, workspace), contact.max_step(scene.x, dx, workspace),
+          contact.min_distance(scene.x, workspace);
+      return result;
+    };
+    Workspace fresh, used;
+    contact.foresee(elsewhere, dx, used);
+    EXPECT_TRUE((run(fresh).array() == run(used).array()).all()) << "seed " << seed;
+  }
+}
+
 TEST(Contact3, HasTheSameBitsForOneAndTwoThreads) {
-  const ContactScene3 scene(3, true, 0.3, 0.02);
+  const ContactScene3 scene(3, true, 0.3, 0.02, 8);
   const VectorX dx = 0.3 * VectorX::Random(scene.x.size());
   const auto run = [&](int threads) {
     const ThreadLimit limit(threads);

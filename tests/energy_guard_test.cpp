@@ -56,8 +56,8 @@ Energies simulate(const Setup<2>& setup) {
   const auto solver = registry.create("eigen");
   const auto energy = [&] {
     const State<2>& state = simulation.state();
-    SparseSystem system(*solver);
-    StepProblem<2> problem(setup, state.mesh, state.history, state.t, system);
+    ProblemCache<2> cache(*solver);
+    StepProblem<2> problem(setup, state.mesh, state.history, state.t, cache);
     return problem.mechanical_energy(state.history.x[0], state.history.v[0]);
   };
   const double start = energy();

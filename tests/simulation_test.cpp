@@ -120,19 +120,64 @@ INSTANTIATE_TEST_SUITE_P(All, Laws,
                                            MaterialLaw::mooney_rivlin),
                          ::testing::PrintToStringParamName());
 
+/// Cells, surface edges and contacts are in more than one block of their loops, and pairs are found by trees.
+Setup<2> large_impact() {
+  auto setup = impact();
+  setup.mesh = make_square(18, 0.2);
+  setup.obstacles = {};
+  for (int i = 0; i <= 300; ++i) {
+    setup.obstacles.rest.emplace_back(-0.1 + 0.4 * i / 300, -0.01);
+    setup.obstacles.motion.push_back(kNone);
+    if (i > 0) setup.obstacles.edges.push_back({i - 1, i});
+  }
+  setup.time.steps = 3;
+  return setup;
+}
+
+TEST(MeshScope, IsSharedWhileTheMeshStays) {
+  auto setup = impact();
+  linear::Registry registry;
+  const auto solver = registry.create("eigen");
+  const Mesh<2> mesh = Simulation<2>(setup, registry).state().mesh;
+  ProblemCache<2> cache(*solver);
+  const auto first = cache.scope_of(setup, mesh);
+  EXPECT_EQ(cache.scope_of(setup, Mesh<2>(mesh)), first);
+  Mesh<2> tagged = mesh;
+  tagged.set_facet_tag(0, tagged.facet_tag(0) + 1);
+  EXPECT_NE(cache.scope_of(setup, tagged), first);
+  std::vector<Vec<2>> rest;
+  std::vector<Mesh<2>::Cell> cells;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) cells.push_back(mesh.cell(c));
+  rest[0].x() -= 1e-9;
+  EXPECT_NE(cache.scope_of(setup, Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1))), first);
+  const auto before = cache.scope_of(setup, mesh);
+  setup.obstacles.rest[0].y() -= 1e-9;
+  EXPECT_NE(cache.scope_of(setup, mesh), before);
+}
+
+/// What is kept from step to step does not show: a simulation that begins at the step has the same bits.
+TEST(Simulation, OnAMeshThatStaysHasTheBitsOfAFreshOne) {
+  const auto setup = large_impact();
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  double nearest = 1;
+  while (!simulation.finished()) {
+    Simulation<2> fresh(setup, registry);
+    fresh.restore(State<2>(simulation.state()));
+    const auto one = simulation.advance(), two = fresh.advance();
+    ASSERT_TRUE(one.ok && two.ok) << one.reason << two.reason;
+    EXPECT_EQ(simulation.state().history.x[0], fresh.state().history.x[0]) << "step " << simulation.state().step;
+    EXPECT_EQ(one.report.min_distance, two.report.min_distance);
+    nearest = std::min(nearest, one.report.min_distance);
+  }
+  EXPECT_LT(nearest, setup.contact.activation_distance) << "nothing touched";
+}
+
 TEST(Simulation, HasTheSameBitsForOneAndTwoThreads) {
   const auto run = [](int threads) {
     const ThreadLimit limit(threads);
-    auto setup = impact();
-    // Cells, surface edges and contacts in more than one block of their loops, else nothing runs in parallel.
-    setup.mesh = make_square(18, 0.2);
-    setup.obstacles = {};
-    for (int i = 0; i <= 300; ++i) {
-      setup.obstacles.rest.emplace_back(-0.1 + 0.4 * i / 300, -0.01);
-      setup.obstacles.motion.push_back(kNone);
-      if (i > 0) setup.obstacles.edges.push_back({i - 1, i});
-    }
-    setup.time.steps = 3;
+    auto setup = large_impact();
     enable_remeshing(setup);
     linear::Registry registry;
     Simulation<2> simulation(setup, registry);

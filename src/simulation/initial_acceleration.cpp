@@ -4,13 +4,13 @@
 #include <memory>
 
 #include "itr/core/error.hpp"
-#include "itr/simulation/step_problem.hpp"
 
 namespace itr {
 
 template <int Dim>
-void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, SparseSystem& system) {
-  StepProblem<Dim> problem(setup, state.mesh, state.history, state.t, system, state.stiffness);
+void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, ProblemCache<Dim>& cache) {
+  SparseSystem& system = cache.system;
+  StepProblem<Dim> problem(setup, state.mesh, state.history, state.t, cache, state.stiffness);
   VectorX force = problem.total_force(state.history.x[0], state.history.v[0]);
   const DofMap& dofs = problem.dofs();
   VectorX& a = state.history.a[0];
@@ -42,7 +42,7 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, Spa
     if (dofs.unknown[i] != kNone) a[i] = solution[dofs.unknown[i]];
 }
 
-template void set_consistent_acceleration<2>(const Setup<2>&, State<2>&, SparseSystem&);
-template void set_consistent_acceleration<3>(const Setup<3>&, State<3>&, SparseSystem&);
+template void set_consistent_acceleration<2>(const Setup<2>&, State<2>&, ProblemCache<2>&);
+template void set_consistent_acceleration<3>(const Setup<3>&, State<3>&, ProblemCache<3>&);
 
 }  // namespace itr

@@ -144,7 +144,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
   if (!remeshed.coarsened()) return renumbering;  // refinement alone: interpolation is exact
   const HistoryTransferReport transfer =
-      transfer_history(setup, before.mesh, before.history, state.mesh, touched, tools.system.solver(), state.history);
+      transfer_history(setup, before.mesh, before.history, state.mesh, touched, tools.cache.system.solver(), state.history);
   report.history_loss = transfer.loss / problem.scaling();
   tell(transfer, mass_moment(setup, state.mesh, x), state.step, tools.logger);
   return renumbering;

@@ -116,7 +116,7 @@ struct Simulation<Dim>::Impl {
   Logger logger;
   std::unique_ptr<linear::Solver> direct;  ///< or iterative
   std::unique_ptr<linear::ReusingSolver> solver;
-  std::unique_ptr<SparseSystem> system;                                ///< keeps what it knows of the mesh from step to step
+  std::unique_ptr<ProblemCache<Dim>> cache;
   std::shared_ptr<State<Dim>> state = std::make_shared<State<Dim>>();  ///< snapshots may share it
   EdgeLengths initial_edges;
   NodalForces forces;   ///< of the last step
@@ -124,7 +124,7 @@ struct Simulation<Dim>::Impl {
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
 
-  StepTools<Dim> tools() const { return {setup, initial_edges, *system, *solver, logger}; }
+  StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger}; }
 
   /// Steps from now on have this length.
   void set_step(double dt) {
@@ -157,7 +157,7 @@ struct Simulation<Dim>::Impl {
   /// Those of a state that no step of this simulation led to.
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
-    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *system, state->stiffness);
+    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *cache, state->stiffness);
     forces = problem.forces(state->history.x[0]);
     forces.reaction.setZero();
   }
@@ -176,14 +176,14 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
       linear::choose_solver(linear, impl_->setup.newton.indefinite == IndefiniteHessian::accept, registry, impl_->logger);
   impl_->solver =
       std::make_unique<linear::ReusingSolver>(*impl_->direct, linear.reuse_factors && linear.dump_folder.empty());
-  impl_->system = std::make_unique<SparseSystem>(*impl_->solver);
+  impl_->cache = std::make_unique<ProblemCache<Dim>>(*impl_->solver);
   impl_->first_dt = impl_->setup.time.dt;
   impl_->first_newton = impl_->setup.newton;
   *impl_->state = initial_state(impl_->setup);
   impl_->initial_edges = edge_lengths(impl_->state->mesh);
   refuse_intersections(impl_->setup, *impl_->state);
   if (impl_->setup.consistent_initial_acceleration && !impl_->state->history.a.empty())
-    set_consistent_acceleration(impl_->setup, *impl_->state, *impl_->system);
+    set_consistent_acceleration(impl_->setup, *impl_->state, *impl_->cache);
   impl_->set_forces_at_rest();
 }
 
@@ -200,7 +200,7 @@ StepReport Simulation<Dim>::initial_report() const {
   report.t = state.t;
   report.vertices = state.mesh.num_vertices();
   report.elements = state.mesh.num_cells();
-  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->system, state.stiffness);
+  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->cache, state.stiffness);
   report.unknowns = problem.dofs().num_unknowns;
   report.energy = problem.report(state.history.x[0]);
   report.energy_before_remesh = report.energy.total;

@@ -101,8 +101,7 @@ class StepAttempt {
  private:
   void make_problem() {
     const ScopedTimer timer(report_.seconds.assembly);
-    problem_ =
-        std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.history, next_.t, tools_.system, next_.stiffness);
+    problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.history, next_.t, tools_.cache, next_.stiffness);
   }
 
   /// From x, where what is lagged is lagged first.
@@ -115,7 +114,7 @@ class StepAttempt {
     if (summary.linear_residual > kPoorResidual)
       warn(fmt::format(
           "linear solves by {} reached a relative residual of {:.1e} only; another solver, or a `fallback`, may do better",
-          tools_.system.solver().name(), summary.linear_residual));
+          tools_.cache.system.solver().name(), summary.linear_residual));
     return summary;
   }
 

@@ -35,7 +35,7 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, State<Dim>& state, bo
   StepResult whole = take_step(tools, state, damped);
   if (whole.ok || whole.cancelled || setup.time.step_cuts == 0) return whole;
   const StepSetup<Dim> half = halved(setup, state);
-  const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.system, tools.solver, tools.logger};
+  const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.cache, tools.solver, tools.logger};
   tools.logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
                        "), cutting it into two of " + std::to_string(half.time.dt) + " s");
   State<Dim> part = state;

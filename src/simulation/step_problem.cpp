@@ -103,24 +103,25 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
 
 template <int Dim>
 StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
-                              SparseSystem& system, const BarrierStiffness& stiffness)
+                              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness)
     : setup_(setup),
       terms_(potential_terms(setup, history, t)),
-      cells_(whole_mesh(mesh, setup.obstacles.rest)),
+      scope_(cache.scope_of(setup, mesh)),
+      cells_(scope_->cells),
+      surface_(scope_->surface),
+      workspace_(scope_->workspace),
       held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
       potential_(terms_, cells_,
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
                   .velocity_reference = TimeIntegrator(setup.time).velocity_reference(history)}),
-      diagonal_(rest_diagonal(mesh)),
       stiffness_(stiffness),
-      system_(system) {
+      system_(cache.system) {
   if (setup.follower.forces)
     terms_.follower = [this, &mesh, t](const VectorX& x) {
       return lag_follower(setup_.follower, mesh, x, t, terms_.scaling);
     };
   if (setup.contact.enabled) {
-    surface_ = contact_surface(setup, mesh);
     if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
     potential_.add_contact(surface_.surface, stiffness_.value, surface_.map);
     if (setup.contact.adaptive_stiffness)
@@ -266,7 +267,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
                         std::to_string(round) + " rounds, asked " + std::to_string(tolerance);
       break;
     }
-    if (has_recurred(x, previous, setup_.newton.step_tolerance, diagonal_)) break;
+    if (has_recurred(x, previous, setup_.newton.step_tolerance, scope_->diagonal)) break;
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
     previous.push_back(x);
     lagged_ = std::move(next_lagged);

@@ -19,8 +19,8 @@ template <int Dim>
 struct StepTools {
   const StepSetup<Dim>& setup;
   EdgeLengths initial_edges;
-  SparseSystem& system;
-  linear::ReusingSolver& solver;  ///< that of `system`
+  ProblemCache<Dim>& cache;
+  linear::ReusingSolver& solver;  ///< that of `cache`
   const Logger& logger;
 };
 

@@ -5,8 +5,8 @@
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
-#include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/frame.hpp"
+#include "itr/simulation/problem_cache.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/time/integrator.hpp"
 
@@ -38,8 +38,8 @@ template <int Dim>
 class StepProblem {
  public:
   /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
-  /// `stiffness`, which the barrier starts from where it is adaptive. `system` serves the newest problem only.
-  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, SparseSystem& system,
+  /// `stiffness`, which the barrier starts from where it is adaptive. The cache's system serves the newest problem only.
+  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, ProblemCache<Dim>& cache,
               const BarrierStiffness& stiffness = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
@@ -79,14 +79,14 @@ class StepProblem {
 
   const StepSetup<Dim>& setup_;
   PotentialTerms<Dim> terms_;
-  CellSet<Dim> cells_;
-  ContactSurface<Dim> surface_;
+  std::shared_ptr<MeshScope<Dim>> scope_;
+  const CellSet<Dim>& cells_;
+  const ContactSurface<Dim>& surface_;
+  Workspace& workspace_;
   HeldDofs<Dim> held_;
   DofMap dofs_;
   IncrementalPotential<Dim> potential_;
-  Workspace workspace_;
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
-  double diagonal_;                                   ///< of the bodies at rest [m]
   BarrierStiffness stiffness_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
   Lagged lagged_;         ///< of the last solve

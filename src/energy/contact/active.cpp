@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <tuple>
 
 #include "candidates.hpp"
@@ -80,6 +81,8 @@ class ActiveSet {
     merge(stencils_);
     return std::move(stencils_);
   }
+  /// Distance over all pairs found; infinity where there are none.
+  double least_squared() const { return least_squared_; }
 
  private:
   /// What the pairs of one block add: stencils, and features whose overlaps are to be corrected.
@@ -87,6 +90,7 @@ class ActiveSet {
     std::vector<ContactStencil> stencils;
     std::vector<Ids> corners;       ///< (vertex, vertex), smaller first
     std::vector<Ids> vertex_edges;  ///< (edge, vertex)
+    double least_squared = std::numeric_limits<double>::infinity();
   };
 
   bool counts(int v) const { return surface_.counts[v]; }
@@ -97,9 +101,13 @@ class ActiveSet {
     const auto [a, b] = surface_.edges[edge];
     return point_edge_distance_squared<Dim>(at<Dim>(x_, v), at<Dim>(x_, a), at<Dim>(x_, b)) < reach_squared_;
   }
-  bool is_near(PairKind kind, const std::array<Vec<Dim>, 4>& p) const {
-    return box_distance_squared<Dim>(kind, p.data()) < reach_squared_ &&
-           pair_distance_squared<Dim>(kind, p.data()) < reach_squared_;
+  /// Of a candidate, which counts for the least distance then.
+  bool is_near(PairKind kind, const std::array<Vec<Dim>, 4>& p, Part& part) const {
+    if (!(box_distance_squared<Dim>(kind, p.data()) < reach_squared_)) return false;
+    const double squared = pair_distance_squared<Dim>(kind, p.data());
+    if (!(squared < reach_squared_)) return false;
+    part.least_squared = std::min(part.least_squared, squared);
+    return true;
   }
   bool are_near(int p, int q) const { return (at<Dim>(x_, p) - at<Dim>(x_, q)).squaredNorm() < reach_squared_; }
   bool are_adjacent(int p, int q) const {
@@ -131,6 +139,7 @@ class ActiveSet {
     stencils_.insert(stencils_.end(), part.stencils.begin(), part.stencils.end());
     corners_.insert(corners_.end(), part.corners.begin(), part.corners.end());
     vertex_edges_.insert(vertex_edges_.end(), part.vertex_edges.begin(), part.vertex_edges.end());
+    least_squared_ = std::min(least_squared_, part.least_squared);
   }
 
   void add_corner(int v, int corner, Part& part) const {
@@ -141,7 +150,8 @@ class ActiveSet {
   void add_vertex_edges(const std::vector<Ids>& pairs) {
     const auto visit = [&](std::size_t i, Part& part) {
       const auto [v, e] = pairs[i];
-      if (!is_near(e, v)) return;
+      const auto [a, b] = surface_.edges[e];
+      if (!is_near(PairKind::edge_vertex, {at<Dim>(x_, v), at<Dim>(x_, a), at<Dim>(x_, b)}, part)) return;
       part.stencils.push_back(edge_vertex(e, v, convergent_ ? surface_.area[v] / 2 : 1));
       if (convergent_)
         for (const int q : surface_.edges[e]) add_corner(v, q, part);
@@ -169,7 +179,7 @@ class ActiveSet {
       const auto [v, f] = pairs[i];
       const auto& t = surface_.triangles[f];
       const std::array<Vec<Dim>, 4> p{at<Dim>(x_, v), at<Dim>(x_, t[0]), at<Dim>(x_, t[1]), at<Dim>(x_, t[2])};
-      if (!is_near(PairKind::face_vertex, p)) return;
+      if (!is_near(PairKind::face_vertex, p, part)) return;
       const auto closest = closest_features<Dim>(PairKind::face_vertex, p.data());
       part.stencils.push_back(reduced({v, t[0], t[1], t[2]}, closest, convergent_ ? surface_.area[v] / 4 : 1));
       if (!convergent_) return;
@@ -219,7 +229,7 @@ class ActiveSet {
     const auto visit = [&](std::size_t i, Part& part) {
       const auto [a, b] = pairs[i];
       const EdgePair pair = edge_pair(a, b);
-      if (!is_near(PairKind::edge_edge, pair.p)) return;
+      if (!is_near(PairKind::edge_edge, pair.p, part)) return;
       const auto closest = closest_features<3>(PairKind::edge_edge, pair.p.data());
       const double threshold = mollifier_threshold(a, b);
       const double weight = convergent_ ? (surface_.edge_area[a] + surface_.edge_area[b]) / 4 : 1;
@@ -275,18 +285,23 @@ class ActiveSet {
   double unit_;
   std::vector<ContactStencil> stencils_;
   std::vector<Ids> corners_, vertex_edges_;
+  double least_squared_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace
 
 template <int Dim>
-std::vector<ContactStencil> ContactEnergy<Dim>::find_active(ConstVectorView x, Workspace& workspace) const {
+typename ContactEnergy<Dim>::Active ContactEnergy<Dim>::find_active(ConstVectorView x, Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
   candidates.update(surface_, x, nullptr, dhat_);
-  return ActiveSet<Dim>(surface_, x, dhat_, convergent_).find(candidates);
+  ActiveSet<Dim> set(surface_, x, dhat_, convergent_);
+  Active active;
+  active.stencils = set.find(candidates);
+  active.least_squared = set.least_squared();
+  return active;
 }
 
-template std::vector<ContactStencil> ContactEnergy<2>::find_active(ConstVectorView, Workspace&) const;
-template std::vector<ContactStencil> ContactEnergy<3>::find_active(ConstVectorView, Workspace&) const;
+template ContactEnergy<2>::Active ContactEnergy<2>::find_active(ConstVectorView, Workspace&) const;
+template ContactEnergy<3>::Active ContactEnergy<3>::find_active(ConstVectorView, Workspace&) const;
 
 }  // namespace itr

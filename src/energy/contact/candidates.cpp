@@ -28,16 +28,25 @@ std::vector<Box<Dim>> boxes_of(const std::vector<std::array<int, N>>& primitives
   return boxes;
 }
 
-/// Calls find(i, pairs) for i < n, which appends to `pairs`; the pairs come in the order of i.
+/// Calls find(i, hits, pairs) for i < n, which appends to `pairs`; the pairs come in the order of i. `hits` is scratch.
 template <typename Find>
 std::vector<std::array<int, 2>> collect(std::size_t n, const Find& find) {
   std::vector<std::vector<std::array<int, 2>>> found((n + kBlock - 1) / kBlock);
   parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) find(static_cast<int>(i), found[begin / kBlock]);
+    std::vector<int> hits;
+    for (std::size_t i = begin; i < end; ++i) find(static_cast<int>(i), hits, found[begin / kBlock]);
   });
   std::vector<std::array<int, 2>> all;
   for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
   return all;
+}
+
+/// What overlaps the box, ascending: pairs, and with them the bits of CCD, do not depend on how a tree came about.
+template <int Dim>
+void find_overlaps(const Bvh<Dim>& tree, const Box<Dim>& box, std::vector<int>& hits) {
+  hits.clear();
+  tree.query(box, hits);
+  std::sort(hits.begin(), hits.end());
 }
 
 bool counts(const CollisionSurface& surface, int v) { return surface.counts[v]; }
@@ -93,11 +102,10 @@ std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
   Box<Dim> counting;  // what does not count only meets what does
   for (std::size_t i = 0; i < primitives.size(); ++i)
     if (counts(surface, primitives[i])) counting.include(boxes[i]);
-  return collect(surface.vertices.size(), [&](int k, std::vector<std::array<int, 2>>& found) {
+  return collect(surface.vertices.size(), [&](int k, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     const int v = surface.vertices[k];
     if (!counts(surface, v) && !vertex_boxes[v].overlaps(counting)) return;
-    std::vector<int> hits;
-    tree.query(vertex_boxes[v], hits);
+    find_overlaps(tree, vertex_boxes[v], hits);
     for (const int i : hits)
       if (matters(v, i)) found.push_back({v, i});
   });
@@ -108,7 +116,7 @@ std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, cons
                                            const Bvh<Dim>& tree) {
   const auto& edges = surface.edges;
   const bool few = are_few_edge_pairs(surface);
-  return collect(edges.size(), [&](int e, std::vector<std::array<int, 2>>& found) {
+  return collect(edges.size(), [&](int e, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
     const auto consider = [&](int f) {
       const bool both = counts(surface, edges[f]);
@@ -121,8 +129,7 @@ std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, cons
         if (boxes[e].overlaps(boxes[f])) consider(static_cast<int>(f));
       return;
     }
-    std::vector<int> hits;
-    tree.query(boxes[e], hits);
+    find_overlaps(tree, boxes[e], hits);
     for (const int f : hits) consider(f);
   });
 }
@@ -151,26 +158,29 @@ bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorV
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach,
-                                         double room) {
-  room_ = room;
+void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx,
+                                         double reach) {
+  room_ = room_for(surface, dx, reach);
   boxes_.assign(surface.vertices.size(), {});
   reach_.resize(surface.area.size());
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
     const int v = surface.vertices[i];
     boxes_[i].include(at<Dim>(x, v));
     if (dx) boxes_[i].include(at<Dim>(x, v) + at<Dim>(*dx, v));
-    boxes_[i] = boxes_[i].inflated(room);
+    boxes_[i] = boxes_[i].inflated(room_);
     reach_[v] = boxes_[i].inflated(reach / 2);
   }
 }
 
 template <int Dim>
 void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach) {
-  const double room = room_for(surface, dx, reach);
-  if (holds(surface, x, dx, room)) return;
+  if (!holds(surface, x, dx, room_for(surface, dx, reach))) search(surface, x, dx, reach);
+}
+
+template <int Dim>
+void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach) {
   const bool keep_trees = surface_ == &surface;
-  build_boxes(surface, x, dx, reach, room);
+  build_boxes(surface, x, dx, reach);
   surface_ = &surface;
   const auto edge_boxes = boxes_of<Dim>(surface.edges, reach_);
   const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);

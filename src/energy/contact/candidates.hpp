@@ -21,6 +21,8 @@ class ContactCandidates {
   /// Makes the pairs hold for x and, where it is given, for the motion by dx. `reach`: pairs that come nearer than this
   /// count.
   void update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
+  /// That, whatever was found before. Search trees of the surface are used again.
+  void search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
 
   /// The lists that there are in this dimension, each with the kind of its pairs.
   std::array<std::pair<PairKind, const Pairs*>, Dim - 1> all() const {
@@ -37,7 +39,7 @@ class ContactCandidates {
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
   double room_for(const CollisionSurface& surface, const VectorX* dx, double reach) const;
   bool holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double room) const;
-  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach, double room);
+  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
 
   const CollisionSurface* surface_ = nullptr;
   double room_ = 0;              ///< around the motion of the last search [m]

@@ -19,15 +19,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = 64;
 constexpr std::size_t kBatch = 1024;  ///< local Hessians that are held at a time
 
-/// The active pairs of the positions that were asked for last, with what else they depend on.
-struct ActiveCache {
-  const CollisionSurface* surface = nullptr;
-  double dhat = 0;
-  bool convergent = false;
-  VectorX x;
-  std::vector<ContactStencil> stencils;
-};
-
 template <int Dim>
 using Positions = std::array<Vec<Dim>, 4>;
 
@@ -170,32 +161,38 @@ double ContactEnergy<Dim>::barrier_second(double D) const {
   return D >= Dhat ? 0 : (r + 2) * r - 2 * std::log(D / Dhat) - 3;
 }
 
+/// The active pairs of the positions that were asked for last, with what else they depend on.
 template <int Dim>
-const std::vector<ContactStencil>& ContactEnergy<Dim>::active(ConstVectorView x, Workspace& workspace) const {
+struct ContactEnergy<Dim>::ActiveCache {
+  const CollisionSurface* surface = nullptr;
+  double dhat = 0;
+  bool convergent = false;
+  VectorX x;
+  Active active;
+};
+
+template <int Dim>
+const typename ContactEnergy<Dim>::Active& ContactEnergy<Dim>::active_set(ConstVectorView x, Workspace& workspace) const {
   auto& cache = workspace.get<ActiveCache>();
   if (cache.surface == &surface_ && cache.dhat == dhat_ && cache.convergent == convergent_ && cache.x.size() == x.size() &&
       std::memcmp(cache.x.data(), x.data(), sizeof(double) * x.size()) == 0)
-    return cache.stencils;
-  cache.stencils = find_active(x, workspace);
+    return cache.active;
+  cache.active = find_active(x, workspace);
   cache.x = x;
   cache.surface = &surface_;
   cache.dhat = dhat_;
   cache.convergent = convergent_;
-  return cache.stencils;
+  return cache.active;
+}
+
+template <int Dim>
+const std::vector<ContactStencil>& ContactEnergy<Dim>::active(ConstVectorView x, Workspace& workspace) const {
+  return active_set(x, workspace).stencils;
 }
 
 template <int Dim>
 double ContactEnergy<Dim>::min_distance(ConstVectorView x, Workspace& workspace) const {
-  auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(surface_, x, nullptr, dhat_);
-  double smallest = dhat_ * dhat_;
-  for (const auto& [kind, pairs] : candidates.all())
-    for (const auto& pair : *pairs) {
-      const auto p = gather<Dim>(vertices_of(surface_, kind, pair), pair_size(kind), x);
-      if (box_distance_squared<Dim>(kind, p.data()) < smallest)
-        smallest = std::min(smallest, pair_distance_squared<Dim>(kind, p.data()));
-    }
-  return smallest < dhat_ * dhat_ ? std::sqrt(smallest) : kInfinity;
+  return std::sqrt(active_set(x, workspace).least_squared);
 }
 
 template <int Dim>
@@ -231,23 +228,26 @@ double ContactEnergy<Dim>::value(ConstVectorView x, Workspace& workspace) const 
 
 template <int Dim>
 void ContactEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
-  for (const auto& s : active(x, workspace)) {
+  const auto& stencils = active(x, workspace);
+  const auto gradient_of = [&](std::size_t i) -> Vec<4 * Dim> {
+    const ContactStencil& s = stencils[i];
     const auto p = gather<Dim>(s.vertices, s.size(), x);
     const double factor = scale_ * stiffness_ * s.weight;
-    Vec<4 * Dim> local;
-    if (s.is_mollified()) {
-      if constexpr (Dim == 3) {
+    if constexpr (Dim == 3) {
+      if (s.is_mollified()) {
         const SpreadDistance q(s, p, false);
         const CrossSquared cross = edge_cross_squared_with_gradient(p.data());
         const Mollifier m(cross.value, s.mollifier_threshold);
-        local = factor * (m.first * barrier(q.D) * cross.gradient + m.value * barrier_first(q.D) * q.gradient);
+        return factor * (m.first * barrier(q.D) * cross.gradient + m.value * barrier_first(q.D) * q.gradient);
       }
-    } else {
-      const auto pair = pair_distance<Dim>(s.kind, p.data());
-      local = factor * barrier_first(pair.squared) * squared_distance_gradient<Dim>(pair);
     }
+    const auto pair = pair_distance<Dim>(s.kind, p.data());
+    return factor * barrier_first(pair.squared) * squared_distance_gradient<Dim>(pair);
+  };
+  parallel_then_ordered<Vec<4 * Dim>>(stencils.size(), kBlock, gradient_of, [&](std::size_t i, const auto& local) {
+    const ContactStencil& s = stencils[i];
     for (int k = 0; k < s.size(); ++k) gradient.segment<Dim>(Dim * s.vertices[k]) += local.template segment<Dim>(Dim * k);
-  }
+  });
 }
 
 template <int Dim>
@@ -312,8 +312,7 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
     // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
     // the number of threads.
     const auto& pairs = *list;
-    std::vector<double> steps((pairs.size() + kBatch - 1) / kBatch, 1.0);
-    parallel_blocks(pairs.size(), kBatch, [&, kind = kind](std::size_t begin, std::size_t end) {
+    const auto step_of = [&, kind = kind](std::size_t begin, std::size_t end) {
       double step = 1;
       for (std::size_t i = begin; i < end; ++i) {
         const auto vertices = vertices_of(surface_, kind, pairs[i]);
@@ -322,16 +321,16 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
         for (int k = 0; k < pair_size(kind); ++k) q[k] = p[k] + step * q[k];
         step *= free_share<Dim>(kind, p, q);
       }
-      steps[begin / kBatch] = step;
-    });
-    for (const double step : steps) least = std::min(least, step);
+      return step;
+    };
+    least = std::min(least, parallel_min(pairs.size(), kBatch, step_of));
   }
   return least;
 }
 
 template <int Dim>
 void ContactEnergy<Dim>::foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const {
-  workspace.get<ContactCandidates<Dim>>().update(surface_, x, &dx, dhat_);
+  workspace.get<ContactCandidates<Dim>>().search(surface_, x, &dx, dhat_);
 }
 
 template <int Dim>

@@ -39,7 +39,7 @@ class ContactEnergy final : public Energy {
   /// Time of impact by conservative CCD; feasible: no pair touches.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Looks for pairs where a solve that begins at x is expected to go by dx, so that one search serves its start and its
-  /// first step.
+  /// first step. It always looks: what is found then does not depend on earlier solves.
   void foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;
   /// The pair with the earliest time of impact.
   StepLimit step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
@@ -60,7 +60,13 @@ class ContactEnergy final : public Energy {
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
 
  private:
-  std::vector<ContactStencil> find_active(ConstVectorView x, Workspace& workspace) const;
+  struct Active {
+    std::vector<ContactStencil> stencils;
+    double least_squared;  ///< distance over counted pairs nearer than dhat; infinity where there are none
+  };
+  struct ActiveCache;
+  const Active& active_set(ConstVectorView x, Workspace& workspace) const;
+  Active find_active(ConstVectorView x, Workspace& workspace) const;
 
   const CollisionSurface& surface_;
   double dhat_;

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+
+#include "itr/newton/newton.hpp"
+#include "itr/simulation/contact_surface.hpp"
+
+namespace itr {
+
+/// What depends on the mesh and on nothing else: problems share it while the mesh stays.
+template <int Dim>
+struct MeshScope {
+  /// The mesh must be compact.
+  MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
+  /// Whether this is of such a mesh, obstacles included: the same vertices, cells, facets and tags.
+  bool is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) const;
+
+  CellSet<Dim> cells;
+  ContactSurface<Dim> surface;  ///< empty without contact
+  double diagonal;              ///< of the bodies at rest [m]
+  Workspace workspace;          ///< search trees of the surface
+};
+
+/// What a simulation keeps from step to step, so that it is not made again: it changes no result, only the time.
+template <int Dim>
+struct ProblemCache {
+  /// `solver`, a linear::Solver or linear::ReusingSolver, must outlive this.
+  template <typename Solver>
+  explicit ProblemCache(Solver& solver) : system(solver) {}
+  /// The newest scope, where it is of that mesh; else a new one.
+  std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
+
+  SparseSystem system;  ///< with its pattern, analysis and factors
+  std::shared_ptr<MeshScope<Dim>> scope;
+};
+
+}  // namespace itr
