@@ -1,13 +1,15 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """What the choice of a linear solver costs: dumps Newton systems of scenes at several sizes, solves each with every solver
-that is there (a process each, with a limit of time and memory), then runs scenes from end to end with each, and writes
+that is there (a process each, with a limit of time and memory), then runs scenes from end to end with each, factors used
+again and not, and writes
 results.csv, end_to_end.csv, the tables of README.md and a plot.
 
 python3 verification/solvers/run.py [--build build/release] [--work DIR] [--seconds 1200] [--gib 16] [--scene NAME]...
 """
 import argparse
 import csv
+import itertools
 import json
 import math
 import os
@@ -22,6 +24,8 @@ import numpy
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 SHARED = ROOT.parent / "shared" / "paper-scenes" / "scripts"
+sys.path.insert(0, str(HERE.parent))
+from harness import stored  # noqa: E402
 
 
 # Starts close above the spikes or rollers with the speed of the fall, to be in contact after a few steps.
@@ -45,7 +49,9 @@ SCENES = [
 ENDS = {"masticator 2D": ["/time/tend=3"], "bar-twist 3D": [FIXED, "/time/dt=0.05", "/time/tend=0.5", "/geometry/0/n_refs=1"],
         "ball on spikes 3D": [*BALL, "/time/tend=0.02"], "monkey on rollers 3D": MONKEY}
 DENSE_MOST = 10_000  # unknowns: `dense` is for patches
-END_KEYS = ["scene", "solver", "outcome", "steps", "newton_iterations", "total_s", "linear_s", "energy"]
+ITERATIVE = ("belos:muelu", "eigen:cg")  # have no factors to use again
+END_KEYS = ["scene", "solver", "reuse", "outcome", "steps", "newton_iterations", "linear_solves", "factorizations",
+            "linear_iterations", "total_s", "linear_s", "energy", "commit"]
 KEYS = ["scene", "solver", "ranks", "unknowns", "nonzeros", "outcome", "analyze_s", "factorize_s", "solve_s",
         "bare_factorize_s", "bare_solve_s", "overhead", "factor_nonzeros", "factor_mb", "largest_rank_mb", "flops", "iterations",
         "residual"]
@@ -165,7 +171,7 @@ def ratios(rows, least):
 def read(file):
     """Rows of an earlier run, numbers as numbers."""
     with open(file, newline="", encoding="utf-8") as text:
-        return [{key: value if key in ("scene", "solver", "outcome") or not value else json.loads(value)
+        return [{key: value if key in ("scene", "solver", "reuse", "outcome", "commit") or not value else json.loads(value)
                  for key, value in row.items()} for row in csv.DictReader(text)]
 
 
@@ -194,7 +200,7 @@ def plot(rows, file):
 
 
 def run_scene(itr, scene, sets, solver, folder, seconds, gib):
-    """Seconds of all steps of a run on one thread, and of their linear solves."""
+    """Processor seconds of all steps of a run on one thread, and those of their linear solves by their share of the time."""
     command = [itr, "run", scene, "-o", folder, "--overwrite", "--threads", "1", "--solver", solver]
     for value in sets:
         command += ["--set", value]
@@ -202,25 +208,27 @@ def run_scene(itr, scene, sets, solver, folder, seconds, gib):
     if outcome != "ok":
         return {"outcome": outcome}
     steps = [json.loads(line) for line in (folder / "steps.jsonl").read_text(encoding="utf-8").splitlines()]
-    return {"outcome": outcome, "steps": len(steps) - 1, "newton_iterations": sum(s["newton_iterations"] for s in steps),
-            "total_s": round(sum(s["seconds"]["total"] for s in steps), 2),
-            "linear_s": round(sum(s["seconds"]["linear_solve"] for s in steps), 2), "energy": steps[-1]["energy"]["total"]}
+    total = lambda key: sum(step[key] for step in steps)
+    share = [step["seconds"]["linear_solve"] / max(1e-9, step["seconds"]["total"] - step["seconds"]["output"]) for step in steps]
+    return {"outcome": outcome, "steps": len(steps) - 1,
+            **{key: total(key) for key in ("newton_iterations", "linear_solves", "factorizations", "linear_iterations")},
+            "total_s": round(total("processor_seconds"), 2),
+            "linear_s": round(sum(step["processor_seconds"] * part for step, part in zip(steps, share)), 2),
+            "energy": steps[-1]["energy"]["total"]}
 
 
 def table_of_ends(rows):
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    of = {(row["scene"], row["solver"]): row for row in rows}
-    lines = ["Scenes from end to end, one thread: seconds of all steps (of them linear solves; over `cholmod:supernodal`'s)", "",
+    of = {(row["scene"], row["solver"], row["reuse"]): row for row in rows}
+    lines = ["Scenes from end to end, one thread: processor seconds of all steps (of them linear solves; factorisations of so many "
+             "systems), factors used again / each matrix factorised", "",
              "| solver | " + " | ".join(scenes) + " |", "|---|" + "---|" * len(scenes)]
     for solver in sorted({row["solver"] for row in rows}):
         cells = []
         for scene in scenes:
-            row, best = of.get((scene, solver)), of.get((scene, "cholmod:supernodal"))
-            if row is None or row["outcome"] != "ok":
-                cells.append(row["outcome"] if row else "")
-                continue
-            ratio = f"; {row['total_s'] / best['total_s']:.2g}" if best and best["outcome"] == "ok" else ""
-            cells.append(f"{row['total_s']:.3g} ({row['linear_s']:.3g}{ratio})")
+            both = [of[key] for key in ((scene, solver, "on"), (scene, solver, "off")) if key in of]
+            cells.append(" / ".join(row["outcome"] if row["outcome"] != "ok" else f"{row['total_s']:.3g} ({row['linear_s']:.3g}; "
+                                    f"{row['factorizations']} of {row['linear_solves']})" for row in both))
         lines.append(f"| {solver} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
@@ -264,6 +272,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=1200, help="a solver has for a system")
     parser.add_argument("--end-seconds", type=float, default=600, help="a solver has for a scene from end to end")
     parser.add_argument("--dump-seconds", type=float, default=1200, help="a run has to reach its end; else its last system counts")
+    parser.add_argument("--ends", action="store_true", help="only run the scenes from end to end")
     parser.add_argument("--once-from", type=int, default=30_000, help="larger systems are factorised once")
     parser.add_argument("--gib", type=float, default=16, help="a solver has for a system, of address space")
     parser.add_argument("--ranks", type=int, nargs="*", default=[1, 2], help="for mumps")
@@ -275,7 +284,8 @@ def main():
         file = arguments.output / name
         return [row for row in read(file) if row["scene"] not in arguments.scene] if arguments.scene and file.exists() else []
 
-    rows, ends = earlier("results.csv"), earlier("end_to_end.csv")
+    rows = read(arguments.output / "results.csv") if arguments.ends else earlier("results.csv")
+    ends = earlier("end_to_end.csv")
     solvers = solvers_there(itr)
     for name, scene, sets, sizes in SCENES:
         if arguments.scene and name not in arguments.scene:
@@ -284,7 +294,7 @@ def main():
             print("left out:", scene, "is not there")
             continue
         beaten = set()
-        for number, size in enumerate(sizes):
+        for number, size in enumerate(() if arguments.ends else sizes):
             folder = arguments.work / f"{name.replace(' ', '-')}-{number}"
             system = dump(itr, scene, [*sets, *size], folder, arguments.dump_seconds)
             if system is None:
@@ -313,12 +323,15 @@ def main():
                     rows.append(row)
                     print(json.dumps(row), flush=True)
         smallest = min((row["unknowns"] for row in rows if row["scene"] == name), default=0)
-        for solver in solvers:
-            folder = arguments.work / f"{name.replace(' ', '-')}-{solver.replace(':', '-')}"
+        for solver, reuse in itertools.product(solvers, (True, False)):
+            if solver in ITERATIVE and not reuse:
+                continue
+            folder = arguments.work / f"{name.replace(' ', '-')}-{solver.replace(':', '-')}{'' if reuse else '-anew'}"
+            sets = [*ENDS[name], f"/solver/linear/reuse_factors={json.dumps(reuse)}"]
             end = {"outcome": "left out"} if solver == "dense" and smallest > DENSE_MOST else kept(
                 folder.with_suffix(".json"),
-                lambda: run_scene(itr, scene, ENDS[name], solver, folder, arguments.end_seconds, arguments.gib))
-            ends.append({"scene": name, "solver": solver, **end})
+                lambda: run_scene(itr, scene, sets, solver, folder, arguments.end_seconds, arguments.gib))
+            ends.append({"scene": name, "solver": solver, "reuse": "on" if reuse else "off", "commit": stored.commit(), **end})
             print(json.dumps(ends[-1]), flush=True)
         write(rows, ends, arguments.output)
     print(write(rows, ends, arguments.output))
