@@ -7,8 +7,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <limits>
-#include <numeric>
 #include <vector>
 
 #ifdef __SANITIZE_THREAD__
@@ -76,13 +74,6 @@ double parallel_sum(std::size_t n, std::size_t block, const std::function<double
   double sum = 0;
   for (const double p : partial) sum += p;
   return sum;
-}
-
-double parallel_min(std::size_t n, std::size_t block, const std::function<double(std::size_t, std::size_t)>& body) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  std::vector<double> partial((n + block - 1) / block, kInfinity);
-  parallel_blocks(n, block, [&](std::size_t begin, std::size_t end) { partial[begin / block] = body(begin, end); });
-  return std::accumulate(partial.begin(), partial.end(), kInfinity, [](double a, double b) { return std::min(a, b); });
 }
 
 }  // namespace itr

@@ -33,7 +33,8 @@ double half_of_memory() {
 
 bool outgrows_memory(const MatrixTraits& traits) {
   const double memory = traits.memory_bytes > 0 ? traits.memory_bytes : half_of_memory();
-  return !traits.may_be_indefinite && (traits.factor_bytes > 0 ? traits.factor_bytes : estimate_factor_bytes(traits)) > memory;
+  return !traits.may_be_indefinite &&
+         (traits.factor_bytes > 0 ? traits.factor_bytes : estimate_factor_bytes(traits)) > memory;
 }
 
 /// Stands for a solver that could not be created in the middle of a run.
@@ -80,7 +81,8 @@ class AutoSolver final : public Forwarding {
     if (factor_bytes_ == 0 && outgrows_memory(traits) && registry_.is_ready("cholmod")) {
       solver_ = registry_.create("cholmod", options_["cholmod"]);  // where it is picked, the next analysis is for nothing
       const bool is_possible = solver_->analyze(pattern, hints) == Outcome::ok;
-      factor_bytes_ = is_possible ? solver_->statistics().factor_bytes : std::numeric_limits<double>::infinity();
+      factor_bytes_ =
+          is_possible ? sizeof(double) * solver_->statistics().factor_nonzeros : std::numeric_limits<double>::infinity();
     }
     traits.factor_bytes = factor_bytes_;
     pick(traits);

@@ -23,7 +23,7 @@ from harness import stored  # noqa: E402
 from harness.scenes import box_mesh  # noqa: E402
 
 CELL = 0.01  # edge of a cell, thickness of the plate [m]
-RADIUS, GAP, SPEED = 0.3, 0.002, 2.0
+RADIUS, GAP, SPEED, STEP = 0.3, 0.0012, 0.25, 0.001
 KEYS = ["cells", "solver", "taken", "threads", "unknowns", "vertices", "tetrahedra", "steps", "newton_iterations", "linear_solves",
         "factorizations", "linear_iterations", "steps_in_contact", "seconds", "linear_s", "assembly_s", "line_search_s", "ccd_s",
         "processor_s", "peak_mb", "certified", "commit"]
@@ -66,7 +66,7 @@ def scene(work):
         "materials": {"type": "NeoHookean", "E": 1e6, "nu": 0.45, "rho": 1000},
         "boundary_conditions": {"rhs": [0, 0, 9.81]},
         "initial_conditions": {"velocity": [{"id": 1, "value": [0, 0, -SPEED]}]},
-        "time": {"dt": 0.002, "time_steps": 20},
+        "time": {"dt": STEP, "time_steps": 20},
         "contact": {"enabled": True, "dhat": 1e-3, "use_convergent_formulation": True},
         "solver": {"nonlinear": {"solver": "Newton", "x_delta": 1e-4, "grad_norm": 1e-8, "line_search": {"method": "RobustArmijo"}},
                    "contact": {"barrier_stiffness": 1e6}},

@@ -34,28 +34,6 @@ void parallel_blocks(std::size_t n, std::size_t block, const std::function<void(
 /// Sum of body(begin, end) over the same blocks, added in block order.
 double parallel_sum(std::size_t n, std::size_t block, const std::function<double(std::size_t, std::size_t)>& body);
 
-/// Least of body(begin, end) over the same blocks; infinity where n is 0.
-double parallel_min(std::size_t n, std::size_t block, const std::function<double(std::size_t, std::size_t)>& body);
-
-/// Computes make(i) for i < n on all threads, and calls use(i, value) with each in ascending order on this one: for sums
-/// whose terms meet in one place.
-template <typename T, typename Make, typename Use>
-void parallel_then_ordered(std::size_t n, std::size_t block, const Make& make, const Use& use) {
-  if (num_threads() == 1 || n <= block) {
-    for (std::size_t i = 0; i < n; ++i) use(i, make(i));
-    return;
-  }
-  const std::size_t batch = 16 * block;
-  std::vector<T> values(std::min(n, batch));
-  for (std::size_t first = 0; first < n; first += batch) {
-    const std::size_t count = std::min(batch, n - first);
-    parallel_blocks(count, block, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) values[i] = make(first + i);
-    });
-    for (std::size_t i = 0; i < count; ++i) use(first + i, values[i]);
-  }
-}
-
 /// Stable sort; blocks that do not depend on the number of threads are sorted and merged.
 template <typename T, typename Less>
 void parallel_sort(std::vector<T>& items, const Less& less) {

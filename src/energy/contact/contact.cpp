@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "candidates.hpp"
-#include "itr/core/parallel.hpp"
+#include "itr/core/parallel_reduce.hpp"
 #include "itr/geometry/ccd.hpp"
 
 namespace itr {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "itr/core/check.hpp"
-#include "itr/core/parallel.hpp"
+#include "itr/core/parallel_reduce.hpp"
 #include "itr/geometry/measures.hpp"
 
 namespace itr {
