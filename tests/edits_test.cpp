@@ -172,6 +172,65 @@ TEST(Edits3D, KeepBodiesTagsPatchesFeaturesAndTopology) {
     EXPECT_GT(refused[operation][Refusal::shape], 0) << static_cast<int>(operation);
 }
 
+/// The part of the boundary that conditions at vertices hold: facets and edges whose ends all have the same tag.
+struct HeldPart {
+  double area = 0, length = 0;  ///< length: of edges that are not at a facet that is held
+  explicit HeldPart(const Mesh<3>& mesh) {
+    const auto joined = [&](VertexId a, VertexId b) {
+      return mesh.vertex_tag(a) != kNoTag && mesh.vertex_tag(a) == mesh.vertex_tag(b);
+    };
+    const auto is_held = [&](FacetId f) {
+      const auto& [a, b, c] = mesh.facet(f);
+      return joined(a, b) && joined(b, c);
+    };
+    for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+      if (!mesh.is_facet_alive(f)) continue;
+      const auto& facet = mesh.facet(f);
+      const Vec<3> u = mesh.rest(facet[1]) - mesh.rest(facet[0]), v = mesh.rest(facet[2]) - mesh.rest(facet[0]);
+      if (is_held(f)) area += u.cross(v).norm() / 2;
+      for (int k = 0; k < 3; ++k) {
+        const EdgeKey edge{facet[k], facet[(k + 1) % 3]};
+        const auto around = mesh.facets_of_edge(edge);
+        if (joined(edge[0], edge[1]) && std::ranges::none_of(around, is_held))
+          length += (mesh.rest(edge[0]) - mesh.rest(edge[1])).norm() / static_cast<double>(around.size());
+      }
+    }
+  }
+};
+
+TEST(Edits3D, KeepVerticesWithTagsAndWhatTheyHold) {
+  double areas = 0, lengths = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    Mesh<3> mesh = random_tets(2 + static_cast<int>(seed) % 3, random, false);
+    const Vec<3> middle = mesh.rest(mesh.facet(0)[0]);
+    std::map<VertexId, Vec<3>> held;
+    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+      if (!mesh.is_boundary(v) || ((mesh.rest(v) - middle).norm() > 0.5 && random() % 3)) continue;
+      mesh.set_vertex_tag(v, 7 + static_cast<int>(random() % 8 == 0));
+      held[v] = mesh.rest(v);
+    }
+    Strata<3> strata(mesh);
+    const HeldPart before(mesh);
+    areas += before.area;
+    lengths += before.length;
+    for (int i = 0; i < 1000; ++i) {
+      const auto proposal = propose_at_random(mesh, strata, static_cast<Operation>(random() % 5), random);
+      if (proposal) apply(mesh, strata, *proposal.edit);
+    }
+    for (const auto& [v, place] : held) {
+      ASSERT_TRUE(mesh.is_vertex_alive(v)) << seed;
+      ASSERT_EQ(mesh.rest(v), place) << seed;
+    }
+    mesh.compact();
+    const HeldPart after(mesh);
+    EXPECT_NEAR(after.area, before.area, 1e-12) << seed;
+    EXPECT_NEAR(after.length, before.length, 1e-12) << seed;
+  }
+  EXPECT_GT(areas, 5);
+  EXPECT_GT(lengths, 10);
+}
+
 /// The same proposals on triangles.
 TEST(Edits3D, HaveTheSameRulesInTwoDimensions) {
   std::map<Edit<2>::Kind, int> done;

@@ -39,6 +39,40 @@ TEST(Edits, KeepAreasTagsInterfacesAndOrientation) {
   for (const auto& [kind, count] : done) EXPECT_GT(count, 20);
 }
 
+TEST(Edits, KeepVerticesWithTagsAndWhatTheyHold) {
+  double lengths = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    Mesh<2> mesh = random_mesh(4, random);
+    std::map<VertexId, Vec<2>> held;
+    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+      if (!mesh.is_boundary(v) || random() % 2) continue;
+      mesh.set_vertex_tag(v, 7);
+      held[v] = mesh.rest(v);
+    }
+    const auto length = [&] {
+      double sum = 0;
+      for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+        if (!mesh.is_facet_alive(f)) continue;
+        const auto [a, b] = mesh.facet(f);
+        if (mesh.vertex_tag(a) == 7 && mesh.vertex_tag(b) == 7) sum += (mesh.rest(a) - mesh.rest(b)).norm();
+      }
+      return sum;
+    };
+    const double before = length();
+    lengths += before;
+    for (int i = 0; i < 300; ++i)
+      if (const auto edit = random_edit(mesh, random)) mesh.apply(*edit);
+    for (const auto& [v, place] : held) {
+      ASSERT_TRUE(mesh.is_vertex_alive(v)) << seed;
+      ASSERT_EQ(mesh.rest(v), place) << seed;
+    }
+    mesh.compact();
+    EXPECT_NEAR(length(), before, 1e-13) << seed;
+  }
+  EXPECT_GT(lengths, 10);
+}
+
 TEST(LocalProblem, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
   int compared = 0, in_contact = 0;
   for (unsigned seed = 0; seed < 30; ++seed) {

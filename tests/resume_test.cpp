@@ -397,6 +397,12 @@ INSTANTIATE_TEST_SUITE_P(
              R"("dt":0.01)",
              {R"(/solver/linear/solver=["cholmod", "eigen"])", "/space/remesh/enabled=false"}},
         Case{"old_factor", "cantilever.json", 30, R"("dt":0.01)", {"/space/remesh/enabled=false", "/geometry/0/n_refs=4"}},
+        Case{"held_points",
+             "cantilever.json",
+             12,
+             R"("dt":0.05,"quasistatic":true)",
+             {R"(/geometry/0/point_selection=[{"id":9,"box":[[-1,-1],[0.1,45]],"relative":false}])",
+              R"(/boundary_conditions/dirichlet_boundary=[{"id":9,"value":[0,0]}])"}},
         Case{"masticator", "masticator.json", 30, R"("dt":0.05)", {}},
         Case{"quasistatic", "cantilever.json", 12, R"("dt":0.05,"quasistatic":true)", {}}),
     [](const auto& info) { return info.param.name; });

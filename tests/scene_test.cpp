@@ -516,7 +516,7 @@ TEST_F(SceneTest, SelectedPointsAreHeld) {
                   "point_selection": [{"id": 9, "box": [[0.5, 0.5], [2, 2]]}]}],
     "boundary_conditions": {"dirichlet_boundary": [{"id": 9, "value": ["t", 0]}, {"id": 3, "value": [5, 5]}]}})json"));
   const auto setup = read2(scene);
-  EXPECT_EQ(setup.point_tags, (std::vector<int>{kNoTag, kNoTag, 9, kNoTag}));
+  for (VertexId v = 0; v < 4; ++v) EXPECT_EQ(setup.mesh.vertex_tag(v), v == 2 ? 9 : kNoTag);
   const HeldDofs<2> held = held_dofs(setup, setup.mesh, 2);
   EXPECT_EQ(held.held, (std::vector<char>{0, 0, 1, 1, 1, 1, 0, 0}));
   EXPECT_EQ(held.target.segment<2>(2), Vec<2>(6, 5));  // its facet is of the right side

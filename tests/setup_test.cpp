@@ -60,7 +60,6 @@ const std::vector<Mistake> kMistakes = {
        s.dirichlet.push_back({1, {true, true}, {}});
      },
      "dirichlet[0]", "no function", "time"},
-    {"tags of others", [](auto& s) { s.point_tags = {1}; }, "point_tags", "1 entries", "one a vertex"},
     {"no iterations", [](auto& s) { s.newton.max_iterations = 0; }, "/solver/nonlinear/max_iterations", "0", ">= 1"},
     {"negative split tolerance", [](auto& s) { s.remesh.enabled = true, s.remesh.split.acceptance_tolerance = -1; },
      "/space/remesh/split/acceptance_tolerance", "-1", ">= 0"},

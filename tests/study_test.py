@@ -116,12 +116,11 @@ class Study(unittest.TestCase):
 
     def test_says_what_failed_and_goes_on_without_it(self):
         # Not with remeshing: the reference cannot run, and the finest uniform level takes its place.
-        point = '/geometry/0/point_selection=[{"id": 7, "box": [[-1, -1], [1, 1]], "relative": false}]'
-        study(self.folder, "--series", "uniform,itr", "--set", point)
+        study(self.folder, "--series", "uniform,itr", "--set", '/materials/0/rho="1 + x"')
         found = rows(self.folder)
         for name in ("reference", "itr-500"):
             self.assertEqual(found[name]["status"], "failed")
-            self.assertIn("point_selection", found[name]["reason"])
+            self.assertIn("a density that varies in space", found[name]["reason"])
         self.assertEqual(found["uniform-2"]["l2"], "")
         self.assertGreater(float(found["uniform-0"]["l2"]), float(found["uniform-1"]["l2"]))
         page = (self.folder / "study.md").read_text()

@@ -44,6 +44,7 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
     : num_vertices_(static_cast<int>(rest.size())), rest_(std::move(rest)) {
   ITR_CHECK(cells.size() == body.size(), cells.size(), body.size());
   vertex_alive_.assign(rest_.size(), 1);
+  vertex_tag_.assign(rest_.size(), kNoTag);
   cells_of_.resize(rest_.size());
   facets_of_.resize(rest_.size());
   std::map<Facet, std::pair<int, Facet>> facets;  // sorted vertices -> number of cells, outward facet of the first
@@ -152,6 +153,12 @@ std::vector<CellId> Mesh<Dim>::cells_of_edge(const EdgeKey& edge) const {
 }
 
 template <int Dim>
+bool Mesh<Dim>::are_joined(VertexId a, VertexId b) const {
+  return std::any_of(cells_of_[a].begin(), cells_of_[a].end(),
+                     [&](CellId c) { return std::find(cells_[c].begin(), cells_[c].end(), b) != cells_[c].end(); });
+}
+
+template <int Dim>
 std::vector<FacetId> Mesh<Dim>::facets_of_edge(const EdgeKey& edge) const {
   std::vector<FacetId> found;
   for (const FacetId f : facets_of_[edge[0]])
@@ -200,6 +207,7 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
     created = vertex_slots();
     rest_.push_back(edit.value->rest);
     vertex_alive_.push_back(1);
+    vertex_tag_.push_back(edit.value->tag);
     cells_of_.emplace_back();
     facets_of_.emplace_back();
     ++num_vertices_;
@@ -235,6 +243,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
   for (int v = 0; v < vertex_slots(); ++v) {
     if (!vertex_alive_[v]) continue;
     map.vertex[v] = vertices;
+    vertex_tag_[vertices] = vertex_tag_[v];
     rest_[vertices++] = rest_[v];
   }
   const auto renumber = [&](auto ids) {
@@ -262,6 +271,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
   }
   rest_.resize(vertices);
   vertex_alive_.assign(vertices, 1);
+  vertex_tag_.resize(vertices);
   cells_.resize(cells);
   body_.resize(cells);
   volume_.resize(cells);

@@ -190,7 +190,7 @@ Strata<Dim>::Strata(const Mesh<Dim>& mesh, double flatness) {
 
 template <int Dim>
 Stratum Strata<Dim>::classify(const Mesh<Dim>& mesh, VertexId v) const {
-  if (mesh.cells_of(v).empty()) return Stratum::corner;
+  if (mesh.cells_of(v).empty() || mesh.vertex_tag(v) != kNoTag) return Stratum::corner;
   const auto sheets = sheets_of(mesh, v);
   if (sheets.empty()) return Stratum::volume;
   const int n = static_cast<int>(sheets.size());
@@ -371,6 +371,7 @@ void Strata<Dim>::follow(const Edit<Dim>& edit, VertexId created) {
       };
       if (patch_at(0) == patch_at(1)) stratum = Stratum::surface;
     }
+    if (edit.value->tag != kNoTag && stratum != Stratum::non_manifold) stratum = Stratum::corner;
     vertices_.push_back(stratum);
   }
   for (const auto& facet : edit.inserted_facets) {

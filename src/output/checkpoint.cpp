@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 4;
+constexpr std::int64_t kFormat = 5;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -55,6 +55,14 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
     throw InputError({path.string(), "/mesh", "lists of different lengths", "one entry for every cell and facet"});
   Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
   mesh.set_facets(facets, tags);
+  if (!file.contains("/checkpoint/vertex_tag")) return mesh;
+  const auto vertex_tags = read_rows<2>(path, file, "/checkpoint/vertex_tag");
+  for (const auto& [v, tag] : vertex_tags) {
+    if (v < 0 || v >= mesh.vertex_slots())
+      throw InputError({path.string(), "/checkpoint/vertex_tag", "vertex " + std::to_string(v),
+                        "numbers below " + std::to_string(mesh.vertex_slots())});
+    mesh.set_vertex_tag(v, tag);
+  }
   return mesh;
 }
 
@@ -150,6 +158,10 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   tags.reserve(state.mesh.facet_slots());
   for (FacetId f = 0; f < state.mesh.facet_slots(); ++f) tags.push_back(state.mesh.facet_tag(f));
   file.write("/checkpoint/facet_tag", tags, 0);
+  std::vector<std::int64_t> points;  // rows of a vertex and its tag
+  for (VertexId v = 0; v < state.mesh.vertex_slots(); ++v)
+    if (state.mesh.vertex_tag(v) != kNoTag) points.insert(points.end(), {v, state.mesh.vertex_tag(v)});
+  if (!points.empty()) file.write("/checkpoint/vertex_tag", points, 2);
   const auto write_fields = [&](const char* kind, const std::vector<VectorX>& fields) {
     for (std::size_t age = 0; age < fields.size(); ++age)
       file.write(field_name(kind, age), std::span(fields[age].data(), static_cast<std::size_t>(fields[age].size())), 0);

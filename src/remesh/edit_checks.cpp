@@ -26,6 +26,20 @@ bool has_valid_rest_shape(const Mesh<2>& mesh, const Edit<2>& edit) {
 }
 
 template <int Dim>
+bool extends_tags(const Mesh<Dim>& mesh, const Edit<Dim>& edit) {
+  return std::any_of(edit.inserted_facets.begin(), edit.inserted_facets.end(), [&](const auto& facet) {
+    int tagged = 0;
+    for (int i = 0; i < Dim; ++i) {
+      const EdgeKey side{facet.vertices[i], facet.vertices[(i + 1) % Dim]};
+      if (!has_tag(mesh, side)) continue;
+      ++tagged;
+      if (mesh.facets_of_edge(side).empty()) return true;
+    }
+    return tagged == Dim;
+  });
+}
+
+template <int Dim>
 std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, std::span<const CellId> cells) {
   std::vector<typename Mesh<Dim>::Facet> found;
   if (std::all_of(cells.begin(), cells.end(), [&](CellId c) { return mesh.body(c) == mesh.body(cells[0]); })) return found;
@@ -43,6 +57,8 @@ bool is_on_interface(const Mesh<Dim>& mesh, VertexId vertex) {
   return mesh.is_on_interface(vertex);
 }
 
+template bool extends_tags(const Mesh<2>&, const Edit<2>&);
+template bool extends_tags(const Mesh<3>&, const Edit<3>&);
 template std::vector<Mesh<2>::Facet> interfaces_among(const Mesh<2>&, std::span<const CellId>);
 template std::vector<Mesh<3>::Facet> interfaces_among(const Mesh<3>&, std::span<const CellId>);
 template bool is_on_interface<2>(const Mesh<2>&, VertexId);

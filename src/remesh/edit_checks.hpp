@@ -22,6 +22,16 @@ bool holds(const std::array<int, N>& ids, int v) {
   return std::find(ids.begin(), ids.end(), v) != ids.end();
 }
 
+/// Whether both ends have the same tag: where the edge is on the boundary, all of it is held by conditions with that tag.
+template <int Dim>
+bool has_tag(const Mesh<Dim>& mesh, const EdgeKey& edge) {
+  return mesh.vertex_tag(edge[0]) != kNoTag && mesh.vertex_tag(edge[0]) == mesh.vertex_tag(edge[1]);
+}
+
+/// Whether a collapse makes an edge or a facet of the boundary that is held by its vertices' tags and was not.
+template <int Dim>
+bool extends_tags(const Mesh<Dim>& mesh, const Edit<Dim>& edit);
+
 /// Whether every inserted triangle keeps a positive rest area that is not vanishing beside the removed ones.
 bool has_valid_rest_shape(const Mesh<2>& mesh, const Edit<2>& edit);
 

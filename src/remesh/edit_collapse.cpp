@@ -27,7 +27,7 @@ std::vector<VertexId> common_neighbours(const Mesh<2>& mesh, VertexId a, VertexI
 /// Whether boundary vertex v can slide along the boundary edge v-w: its other boundary edge goes straight on with one tag.
 bool can_slide(const Mesh<2>& mesh, VertexId v, VertexId w, FacetId edge) {
   const auto facets = mesh.facets_of(v);
-  if (facets.size() != 2 || is_on_interface(mesh, v)) return false;
+  if (facets.size() != 2 || is_on_interface(mesh, v) || mesh.vertex_tag(v) != kNoTag) return false;
   const FacetId other = facets[0] == edge ? facets[1] : facets[0];
   if (mesh.facet_tag(other) != mesh.facet_tag(edge)) return false;
   const auto& f = mesh.facet(other);
@@ -220,8 +220,12 @@ Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata,
   if (at_a == along && at_b == along) merges.push_back({b, a, 0.5 * (mesh.rest(a) + mesh.rest(b)), true});
   if (at_b == along) merges.push_back({b, a, mesh.rest(a), false});
   if (at_a == along) merges.push_back({a, b, mesh.rest(b), false});
-  for (const Merge<Dim>& merge : merges)
-    if (keeps_shape(mesh, merge, rule)) return {.edit = make_edit(mesh, edge, merge)};
+  for (const Merge<Dim>& merge : merges) {
+    if (!keeps_shape(mesh, merge, rule)) continue;
+    Edit<Dim> edit = make_edit(mesh, edge, merge);
+    if (extends_tags(mesh, edit)) return refused<Dim>(Refusal::held);
+    return {.edit = std::move(edit)};
+  }
   return refused<Dim>(Refusal::shape);
 }
 
@@ -264,7 +268,7 @@ std::optional<Edit<2>> make_collapse(const Mesh<2>& mesh, const EdgeKey& edge) {
       edit.removed_facets.push_back(f);
       edit.inserted_facets.push_back({mesh.facet(f), mesh.facet_tag(f), f});
     }
-  if (edit.inserted_cells.empty() || !has_valid_rest_shape(mesh, edit)) return std::nullopt;
+  if (edit.inserted_cells.empty() || extends_tags(mesh, edit) || !has_valid_rest_shape(mesh, edit)) return std::nullopt;
   return edit;
 }
 

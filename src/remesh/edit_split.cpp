@@ -26,6 +26,7 @@ Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   value.parents[0] = a;
   value.parents[1] = b;
   value.weights[0] = value.weights[1] = 0.5;
+  if (!edit.removed_facets.empty() && has_tag(mesh, edge)) value.tag = mesh.vertex_tag(a);
   edit.value = value;
   return edit;
 }

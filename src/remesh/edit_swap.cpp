@@ -8,11 +8,6 @@ namespace itr {
 
 namespace {
 
-bool are_joined(const Mesh<3>& mesh, VertexId u, VertexId v) {
-  const auto around = mesh.cells_of(u);
-  return std::any_of(around.begin(), around.end(), [&](CellId c) { return holds(mesh.cell(c), v); });
-}
-
 /// A planar polygon of ring vertices around an edge a-b, counterclockwise seen from b, to be cut into triangles, each of
 /// which is the base of a cell to a and of one to b.
 struct Polygon {
@@ -161,13 +156,14 @@ Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, c
     const LeastCut cut(mesh, edge, polygon, least, cost);
     if (!(cut.cost() < HUGE_VAL)) return refused<3>(cut.cost_forbids() ? Refusal::cost : Refusal::shape);
     for (const auto& [u, v] : cut.diagonals())
-      if (are_joined(mesh, u, v)) return refused<3>(Refusal::exists);
+      if (mesh.are_joined(u, v)) return refused<3>(Refusal::exists);
     cut.append_cells(edit.inserted_cells);
     proposal.cost += cut.cost();
   }
   if (along == Stratum::surface) {
     const auto& closing = polygons[0].vertices;
-    if (are_joined(mesh, closing.front(), closing.back())) return refused<3>(Refusal::exists);
+    if (mesh.are_joined(closing.front(), closing.back())) return refused<3>(Refusal::exists);
+    if (has_tag(mesh, edge) || has_tag<3>(mesh, {closing.front(), closing.back()})) return refused<3>(Refusal::held);
     swap_facets(mesh, strata, *ring, edit);
   }
   proposal.edit = std::move(edit);
@@ -185,7 +181,7 @@ Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet
     return *std::find_if(cell.begin(), cell.end(), [&](int v) { return !holds(facet, v); });
   };
   const VertexId d = opposite(cells[0]), e = opposite(cells[1]);
-  if (are_joined(mesh, d, e)) return refused<3>(Refusal::exists);
+  if (mesh.are_joined(d, e)) return refused<3>(Refusal::exists);
   Edit<3> edit{.kind = Edit<3>::Kind::swap, .edge = {std::min(d, e), std::max(d, e)}, .removed_cells = cells};
   const double least = rule.least(worst_quality<3>(mesh, cells));
   for (const VertexId v : facet) {  // one vertex of the facet after the other gives way to the far end
@@ -204,8 +200,7 @@ std::optional<Edit<2>> make_swap(const Mesh<2>& mesh, const EdgeKey& edge) {
   for (int i = 0; i < 2; ++i)
     for (const int v : mesh.cell(cells[i]))
       if (v != edge[0] && v != edge[1]) opposite[i] = v;
-  for (const CellId c : mesh.cells_of(opposite[0]))
-    if (holds(mesh.cell(c), opposite[1])) return std::nullopt;  // that diagonal is there already
+  if (mesh.are_joined(opposite[0], opposite[1])) return std::nullopt;
   Edit<2> edit{.kind = Edit<2>::Kind::swap, .edge = edge};
   edit.removed_cells = cells;
   constexpr double kLeastSwapShare = 0.1;  // of the pair's area, for each triangle

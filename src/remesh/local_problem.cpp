@@ -194,6 +194,7 @@ void LocalProblem<Dim>::hold_vertices() {
       for (const auto& facet : edit_.inserted_facets)
         if (std::find(facet.vertices.begin(), facet.vertices.end(), v.id) != facet.vertices.end())
           hold_components(i, facet.tag);
+      if (edit_.value->tag != kNoTag) hold_components(i, edit_.value->tag);
       continue;
     }
     const auto around = mesh_.cells_of(v.id);
@@ -201,6 +202,7 @@ void LocalProblem<Dim>::hold_vertices() {
       std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
     else
       for (const FacetId f : mesh_.facets_of(v.id)) hold_components(i, mesh_.facet_tag(f));
+    if (mesh_.vertex_tag(v.id) != kNoTag) hold_components(i, mesh_.vertex_tag(v.id));
   }
   dofs_ = DofMap::from_held(held);
 }

@@ -58,7 +58,7 @@ class RemeshSession {
   }
   bool exists(const EdgeKey& e) const {  ///< also of a vertex {v, kNone}
     if (e[1] == kNone) return mesh_.is_vertex_alive(e[0]);
-    return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && !mesh_.cells_of_edge(e).empty();
+    return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && mesh_.are_joined(e[0], e[1]);
   }
   bool is_surface(const EdgeKey& e) const;
   /// Whether an edge is there and as long as it has to be for a split; if not, whether because of the activation distance.

@@ -17,7 +17,7 @@ class ConditionReader {
   ConditionReader(const Node& root, Setup<Dim>& setup, std::vector<std::string>& warnings)
       : boundary_(root["boundary_conditions"]), initial_(root["initial_conditions"]), setup_(setup), warnings_(warnings) {
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
-    facet_tags_.insert(setup_.point_tags.begin(), setup_.point_tags.end());
+    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) facet_tags_.insert(setup_.mesh.vertex_tag(v));
     for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c) bodies_.insert(setup_.mesh.body(c));
   }
 
@@ -199,8 +199,8 @@ class ConditionReader {
     std::set<int> vertices;
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f)
       if (setup_.mesh.facet_tag(f) == tag) vertices.insert(setup_.mesh.facet(f).begin(), setup_.mesh.facet(f).end());
-    for (std::size_t v = 0; v < setup_.point_tags.size(); ++v)
-      if (setup_.point_tags[v] == tag) vertices.insert(static_cast<int>(v));
+    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v)
+      if (setup_.mesh.vertex_tag(v) == tag) vertices.insert(v);
     return points(vertices);
   }
 

@@ -260,20 +260,14 @@ int find_dimension(const Geometries& geometries, MeshFiles& files) {
 }
 
 template <int Dim>
-BodyGeometry<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
+Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
   Collected<Dim> all;
   for (const Node& geometry : geometries.bodies) read_body<Dim>(geometry, files.get(geometry), all, warnings);
-  BodyGeometry<Dim> bodies;
-  Mesh<Dim>& mesh = bodies.mesh;
-  mesh = make_mesh<Dim>(geometries.bodies.front(), std::move(all.rest), std::move(all.cells), std::move(all.body));
+  Mesh<Dim> mesh = make_mesh<Dim>(geometries.bodies.front(), std::move(all.rest), std::move(all.cells), std::move(all.body));
   for (const auto& [facet, tag] : all.tagged) mesh.set_facet_tag(mesh.find_facet(facet), tag);
-  bool is_selected = false;
-  for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
-    if (!mesh.is_boundary(v)) all.point_tags[v] = kNoTag;
-    is_selected = is_selected || all.point_tags[v] != kNoTag;
-  }
-  if (is_selected) bodies.point_tags = std::move(all.point_tags);
-  return bodies;
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v)
+    if (mesh.is_boundary(v)) mesh.set_vertex_tag(v, all.point_tags[v]);
+  return mesh;
 }
 
 template <int Dim>
@@ -303,8 +297,8 @@ std::vector<Vec<Dim>> points_of(const MeshFile& file) {
   return points;
 }
 
-template BodyGeometry<2> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
-template BodyGeometry<3> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template Mesh<2> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template Mesh<3> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
 template std::vector<Vec<2>> read_copies(const Node&, const Vec<2>&);
 template std::vector<Vec<3>> read_copies(const Node&, const Vec<3>&);
 template std::vector<Vec<2>> points_of(const MeshFile&);

@@ -39,14 +39,9 @@ bool is_flat(const MeshFile& file);
 /// 2 or 3: what all bodies' meshes agree on.
 int find_dimension(const Geometries& geometries, MeshFiles& files);
 
-/// All bodies in one mesh, transformed, refined, with body ids and facet tags.
+/// All bodies in one mesh, transformed, refined, with body ids and tags of facets and vertices.
 template <int Dim>
-struct BodyGeometry {
-  Mesh<Dim> mesh;
-  std::vector<int> point_tags;  ///< see Setup
-};
-template <int Dim>
-BodyGeometry<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings);
+Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings);
 
 template <int Dim>
 struct ObstacleGeometry {

@@ -61,7 +61,7 @@ constexpr Key kKeys[] = {
     {"/geometry/*/advanced/min_component", only, "", "-1", "", "all components are kept"},
     {"/geometry/*/{volume,surface,point}_selection", read, "list", "", "",
      "ids of cells (which material), of boundary facets (which condition; for an obstacle one id), of boundary vertices "
-     "(held by conditions; not with remeshing): a number for all, or rules, of which the first that matches wins"},
+     "(held by conditions): a number for all, or rules, of which the first that matches wins"},
     {"/geometry/*/{volume,surface,point}_selection/*", read, "id", "", "", "id of all, or a rule with an id and a region"},
     {SELECTION "/id", read, "id", "", "",
      "given to what the region contains: barycentres of cells and facets, positions of vertices; no condition acts on id 0"},

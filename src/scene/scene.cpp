@@ -63,13 +63,11 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
 template <int Dim>
 Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
   Setup<Dim> setup;
-  BodyGeometry<Dim> bodies = read_bodies<Dim>(geometries, files, warnings);
-  setup.mesh = std::move(bodies.mesh);
+  setup.mesh = read_bodies<Dim>(geometries, files, warnings);
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
     for (const Node& geometry : *list)
       for (const char* key : {"translation", "dimensions", "scale"})
         warn_of_components(geometry["transformation"][key], Dim, warnings);
-  setup.point_tags = std::move(bodies.point_tags);
   read_model<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);

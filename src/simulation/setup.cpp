@@ -174,8 +174,6 @@ void Setup<Dim>::validate() const {
   check_materials(*this);
   check_proxy(*this);
   linear.validate();
-  if (const auto tags = this->point_tags.size(); tags != 0 && tags != static_cast<std::size_t>(mesh.vertex_slots()))
-    refuse("point_tags", fmt::format("{} entries", tags), fmt::format("{}, one a vertex", mesh.vertex_slots()));
   for (const auto& [name, list] :
        {std::pair{"initial_displacement", &initial_displacement}, std::pair{"initial_velocity", &initial_velocity},
         std::pair{"initial_acceleration", &initial_acceleration}})

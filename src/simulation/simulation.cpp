@@ -32,8 +32,6 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   };
   if (setup.remesh.enabled && setup.proxy)
     refuse("/contact/collision_mesh", "a collision mesh where the bodies' mesh changes");
-  if (setup.remesh.enabled && !setup.point_tags.empty())
-    refuse("/geometry", "a point_selection where the mesh changes (select surfaces)");
   for (const auto& [body, material] : setup.materials)
     if (setup.remesh.enabled && material.density_at)
       refuse("/materials", "a density that varies in space (id " + std::to_string(body) + ") where the mesh changes");

@@ -65,8 +65,8 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
       if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
         for (const int v : mesh.facet(f)) hold(v, *condition);
   for (const auto* condition : by_tag)
-    for (std::size_t v = 0; v < setup.point_tags.size(); ++v)
-      if (setup.point_tags[v] != kNoTag && setup.point_tags[v] == condition->tag) hold(static_cast<int>(v), *condition);
+    for (VertexId v = 0; v < bodies; ++v)
+      if (mesh.vertex_tag(v) != kNoTag && mesh.vertex_tag(v) == condition->tag) hold(v, *condition);
   for (int o = 0; o < total - bodies; ++o) {
     const Vec<Dim>& X = setup.obstacles.rest[o];
     const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];

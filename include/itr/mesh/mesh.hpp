@@ -2,8 +2,8 @@
 // The simplicial mesh of the bodies' rest shape: triangles in 2D, tetrahedra in 3D.
 //
 // Cells, boundary facets and vertices live in slots; an edit kills some and adds some, ids of the others stay. compact()
-// removes dead slots. Boundary facets are the facets with one incident cell; each carries the surface tag that boundary
-// conditions refer to.
+// removes dead slots. Boundary facets are the facets with one incident cell; they, and single vertices, carry the tags that
+// boundary conditions refer to.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 
 namespace itr {
 
-/// Tag of a boundary facet that no selection named: carries no boundary condition.
+/// Tag of a boundary facet or vertex that no selection named: carries no boundary condition.
 inline constexpr int kNoTag = std::numeric_limits<int>::max();
 
 /// Stands in an Edit for the vertex that the edit creates.
@@ -57,6 +57,7 @@ struct Edit {
     std::array<VertexId, Dim + 1> parents{};  ///< its fields are the weighted sums over parents of the old mesh
     std::array<double, Dim + 1> weights{};
     int num_parents = 0;
+    int tag = kNoTag;  ///< of a new vertex
   };
 
   Kind kind;
@@ -119,12 +120,18 @@ class Mesh {
   const Facet& facet(FacetId f) const { return facets_[f]; }
   int facet_tag(FacetId f) const { return facet_tag_[f]; }
   void set_facet_tag(FacetId f, int tag) { facet_tag_[f] = tag; }
+  /// Of a vertex of the boundary by itself, whatever its facets' tags are. Edits never move nor remove one that has a tag,
+  /// and tag what they put on a boundary edge between two of one tag.
+  int vertex_tag(VertexId v) const { return vertex_tag_[v]; }
+  void set_vertex_tag(VertexId v, int tag) { vertex_tag_[v] = tag; }
   std::span<const CellId> cells_of(VertexId v) const { return cells_of_[v]; }
   std::span<const FacetId> facets_of(VertexId v) const { return facets_of_[v]; }
   bool is_boundary(VertexId v) const { return !facets_of_[v].empty(); }
 
   /// Cells that hold both ends of the edge, ascending.
   std::vector<CellId> cells_of_edge(const EdgeKey& edge) const;
+  /// Whether some cell holds both vertices.
+  bool are_joined(VertexId a, VertexId b) const;
   /// Boundary facets that hold both ends of the edge.
   std::vector<FacetId> facets_of_edge(const EdgeKey& edge) const;
   /// Whether cells of more than one body meet at the vertex.
@@ -161,6 +168,7 @@ class Mesh {
   int num_vertices_ = 0, num_cells_ = 0, num_facets_ = 0;
   std::vector<Vec<Dim>> rest_;
   std::vector<char> vertex_alive_;
+  std::vector<int> vertex_tag_;
   std::vector<Cell> cells_;
   std::vector<int> body_;
   std::vector<double> volume_, quality_;

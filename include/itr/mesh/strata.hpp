@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What of a mesh's shape each vertex, edge and facet belongs to: the inside, a flat patch of the surface or of an interface
-// between bodies, a straight feature, a corner. Found once from the input and carried by edits from then on, so that what an
-// edit may do never hangs on the round-off of earlier ones.
+// between bodies, a straight feature, a corner. Found once a step and carried by its edits from then on, so that what an
+// edit may do does not hang on the round-off of earlier ones.
 #pragma once
 
 #include <span>
@@ -19,7 +19,7 @@ enum class Stratum : unsigned char {
   volume,   ///< inside one body
   surface,  ///< inside a patch: facets of one plane with one body and tag, or between the same two bodies (2D: of a line)
   feature,  ///< on a straight stretch where the same patches meet (in 3D only)
-  corner,   ///< none of the others: cannot move without changing the shape
+  corner,   ///< none of the others, or with a tag of its own: cannot move without changing the shape or what is held
   non_manifold  ///< the cells around are no ball, no half ball: bodies that hang together by this vertex or edge
 };
 std::string_view name(Stratum stratum);

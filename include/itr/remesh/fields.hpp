@@ -42,7 +42,7 @@ struct RemeshFields {
 /// The terms of the step, as every local problem needs them, and what else the remesher asks of a scene.
 template <int Dim>
 struct StepContext : PotentialTerms<Dim> {
-  std::map<int, std::array<bool, Dim>> held_components;  ///< by facet tag
+  std::map<int, std::array<bool, Dim>> held_components;  ///< by tag of facets and vertices
   NewtonOptions newton;
   double shortest_edge = 0, longest_edge = 0;  ///< of the initial mesh [m]
 

@@ -47,7 +47,8 @@ struct CollisionProxy {
   Eigen::SparseMatrix<double, Eigen::RowMajor> weights;  ///< a row for each of its vertices, a column for each of the mesh's
 };
 
-/// Displacement prescribed at the vertices of the boundary facets with a tag.
+/// Displacement prescribed at the vertices of the boundary facets with a tag, and at the vertices that have it themselves,
+/// whatever their facets say.
 template <int Dim>
 struct DirichletCondition {
   int tag = 0;
@@ -91,9 +92,6 @@ struct StepSetup {
   std::optional<CollisionProxy<Dim>> proxy;  ///< not with remeshing
   std::map<int, Material> materials;         ///< by body id; every body of the mesh has one
   std::vector<DirichletCondition<Dim>> dirichlet;
-  /// By vertex of the mesh: Dirichlet conditions with this tag hold it, whatever its facets say; kNoTag or empty: none. Not
-  /// with remeshing.
-  std::vector<int> point_tags;
   std::vector<NeumannCondition<Dim>> neumann;
   std::vector<PressureCondition<Dim>> pressure;
   SpaceTimeFunction<Dim> body_acceleration;  ///< acts along +: gravity is (0, -9.81) [m/s^2]; empty: none
@@ -120,7 +118,7 @@ struct StepSetup {
 /// A simulation from its start.
 template <int Dim>
 struct Setup : StepSetup<Dim> {
-  Mesh<Dim> mesh;  ///< with body ids and facet tags
+  Mesh<Dim> mesh;  ///< with body ids and tags of facets and vertices
   std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
   bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
   LinearOptions linear;
