@@ -231,6 +231,22 @@ TEST(Prediction, OfTheNewVertexIsWhatRelaxingItAloneGains) {
   EXPECT_GT(compared, 5);
 }
 
+TEST(Prediction, OfASplitAloneIsThatOfItsEdit) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    TrialScene scene(seed);
+    scene.context.has_inertia = seed % 3 != 0;
+    for (auto& [body, material] : scene.context.materials)
+      if (seed % 4 == 0) material.law = MaterialLaw::fixed_corotated;
+    if (seed % 5 == 0)
+      scene.context.loads.acceleration = [](const Vec<2>& X) { return Vec<2>(3 * X[1] * X[1], -9.81 + X[0] * X[1]); };
+    const LocalView view(scene);
+    for (const EdgeKey& edge : scene.mesh.edges()) {
+      const double gain = predict_gain<2>(view.state, make_split(scene.mesh, edge));
+      EXPECT_NEAR(predict_split<2>(view.state, edge), gain, 1e-9 * std::abs(gain) + 1e-13) << "seed " << seed;
+    }
+  }
+}
+
 TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
   std::map<Screening, int> tried;
   for (unsigned seed = 0; seed < 5; ++seed)

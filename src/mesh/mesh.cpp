@@ -182,13 +182,14 @@ FacetId Mesh<Dim>::find_facet(const Facet& vertices) const {
 template <int Dim>
 std::vector<EdgeKey> Mesh<Dim>::edges() const {
   std::vector<EdgeKey> all;
-  for (const Cell& cell : cells_) {
-    if (cell[0] == kNone) continue;
-    for (int i = 0; i <= Dim; ++i)
-      for (int j = i + 1; j <= Dim; ++j) all.push_back({std::min(cell[i], cell[j]), std::max(cell[i], cell[j])});
+  for (VertexId v = 0; v < vertex_slots(); ++v) {
+    const auto first = static_cast<std::ptrdiff_t>(all.size());
+    for (const CellId c : cells_of_[v])
+      for (const VertexId w : cells_[c])
+        if (w > v) all.push_back({v, w});
+    std::sort(all.begin() + first, all.end());
+    all.erase(std::unique(all.begin() + first, all.end()), all.end());
   }
-  std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;
 }
 

@@ -12,37 +12,68 @@
 
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/geometry/measures.hpp"
+#include "itr/remesh/edits.hpp"
 
 namespace itr {
 
 namespace {
 
-/// W, and its derivatives by the position of one vertex, whose shape function has this gradient.
+/// W at F, and its derivatives by the position of a vertex whose shape function has a gradient.
 template <int Dim>
-struct ElasticResponse {
-  double density;
-  Vec<Dim> force;      ///< P gradient
-  Mat<Dim> stiffness;  ///< of v -> v . d2W/dF2 : (v x gradient)
-  ElasticResponse(const Mat<Dim>& F, const ElasticModuli& moduli, const Vec<Dim>& gradient) {
-    if (moduli.law == MaterialLaw::neo_hookean) {  // with one inverse and one logarithm
-      const double mu = moduli.lame.mu, lambda = moduli.lame.lambda, J = F.determinant(), log_J = std::log(J);
-      const Vec<Dim> h = F.inverse().transpose() * gradient;
-      density = J > 0 ? mu / 2 * (F.squaredNorm() - Dim - 2 * log_J) + lambda / 2 * log_J * log_J
-                      : std::numeric_limits<double>::infinity();
-      force = mu * F * gradient + (lambda * log_J - mu) * h;
-      stiffness = mu * gradient.squaredNorm() * Mat<Dim>::Identity() + (mu - lambda * log_J + lambda) * h * h.transpose();
-      return;
-    }
-    density = elastic_density<Dim>(F, moduli);
-    force = elastic_stress<Dim>(F, moduli) * gradient;
-    stiffness.setZero();
-    const EigenSystem<Dim> system = elastic_eigensystem<Dim>(F, moduli);
-    for (std::size_t k = 0; k < system.values.size(); ++k) {
-      const Vec<Dim> w = system.modes[k] * gradient;
-      stiffness += system.values[k] * w * w.transpose();
+class ElasticResponse {
+ public:
+  ElasticResponse(const Mat<Dim>& F, const ElasticModuli& moduli) : F_(F), moduli_(moduli) {
+    if (is_neo_hookean()) {  // with one inverse and one logarithm
+      J_ = F.determinant();
+      log_J_ = std::log(J_);
+      inverse_ = F.inverse();
+    } else {
+      stress_ = elastic_stress<Dim>(F, moduli);
+      system_ = elastic_eigensystem<Dim>(F, moduli);
     }
   }
+  double density() const {
+    if (!is_neo_hookean()) return elastic_density<Dim>(F_, moduli_);
+    const double mu = moduli_.lame.mu, lambda = moduli_.lame.lambda;
+    return J_ > 0 ? mu / 2 * (F_.squaredNorm() - Dim - 2 * log_J_) + lambda / 2 * log_J_ * log_J_
+                  : std::numeric_limits<double>::infinity();
+  }
+  /// P gradient
+  Vec<Dim> force(const Vec<Dim>& gradient) const {
+    if (!is_neo_hookean()) return stress_ * gradient;
+    const double mu = moduli_.lame.mu, lambda = moduli_.lame.lambda;
+    return mu * F_ * gradient + (lambda * log_J_ - mu) * (inverse_.transpose() * gradient);
+  }
+  /// Of v -> v . d2W/dF2 : (v x gradient)
+  Mat<Dim> stiffness(const Vec<Dim>& gradient) const {
+    Mat<Dim> sum = Mat<Dim>::Zero();
+    if (is_neo_hookean()) {
+      const double mu = moduli_.lame.mu, lambda = moduli_.lame.lambda;
+      const Vec<Dim> h = inverse_.transpose() * gradient;
+      return mu * gradient.squaredNorm() * Mat<Dim>::Identity() + (mu - lambda * log_J_ + lambda) * h * h.transpose();
+    }
+    for (std::size_t k = 0; k < system_.values.size(); ++k) {
+      const Vec<Dim> w = system_.modes[k] * gradient;
+      sum += system_.values[k] * w * w.transpose();
+    }
+    return sum;
+  }
+
+ private:
+  bool is_neo_hookean() const { return moduli_.law == MaterialLaw::neo_hookean; }
+  const Mat<Dim>& F_;
+  const ElasticModuli& moduli_;
+  double J_ = 0, log_J_ = 0;
+  Mat<Dim> inverse_, stress_;
+  EigenSystem<Dim> system_{};
 };
+
+/// Gradient of the shape function of a cell's vertex, from the inverse of its edges.
+template <int Dim>
+Vec<Dim> shape_gradient(const Mat<Dim>& inverse_edges, int k) {
+  if (k == 0) return -inverse_edges.colwise().sum().transpose();
+  return inverse_edges.row(k - 1).transpose();
+}
 
 /// Energy of cells, and what it does when one of their vertices moves.
 template <int Dim>
@@ -65,16 +96,44 @@ class QuadraticModel {
     if (moving == kNone) {
       energy_ += s * V * elastic_density<Dim>(F, moduli);
     } else {
-      const Vec<Dim> gradient =
-          moving == 0 ? Vec<Dim>(-inverse.colwise().sum().transpose()) : Vec<Dim>(inverse.row(moving - 1).transpose());
-      const ElasticResponse<Dim> response(F, moduli, gradient);
-      energy_ += s * V * response.density;
-      gradient_ += s * V * response.force;
-      hessian_ += s * V * response.stiffness;
+      const Vec<Dim> gradient = shape_gradient<Dim>(inverse, moving);
+      const ElasticResponse<Dim> response(F, moduli);
+      energy_ += s * V * response.density();
+      gradient_ += s * V * response.force(gradient);
+      hessian_ += s * V * response.stiffness(gradient);
     }
     const double mass = mass_density<Dim>(material, center) * V;
     if (context_.has_inertia) add_inertia(at, mass, moving);
     if (context_.loads.acceleration) add_load(at.rest, at.x, s * mass, context_.loads.acceleration, moving);
+  }
+
+  /// What splitting a cell of constant moduli at the middle of its edge from corner `a` to `b` changes: both halves deform
+  /// and move as the whole did, so that without loads the energy stays, and the new vertex feels them at once.
+  void add_split_cell(const Mesh<Dim>& mesh, CellId c, const Corners& at, int a, int b) {
+    const Material& material = context_.materials.at(mesh.body(c));
+    const ElasticModuli moduli = elastic_moduli<Dim>(material, at.rest[0]);
+    const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
+    const Mat<Dim> F = edge_matrix<Dim>(at.x) * inverse;
+    const ElasticResponse<Dim> response(F, moduli);
+    const Vec<Dim> ga = shape_gradient<Dim>(inverse, a), gb = shape_gradient<Dim>(inverse, b);
+    const double sV = context_.scaling * mesh.volume(c), mass = material.density * mesh.volume(c);
+    gradient_ += sV * response.force(ga + gb);
+    hessian_ += 2 * sV * (response.stiffness(ga) + response.stiffness(gb));
+    if (context_.has_inertia) {
+      Vec<Dim> total = (at.x[a] - at.predictor[a] + at.x[b] - at.predictor[b]) / 2;
+      for (int k = 0; k <= Dim; ++k) total += at.x[k] - at.predictor[k];
+      const double share = mass / ((Dim + 1) * (Dim + 2));
+      gradient_ += share * total;
+      hessian_.diagonal().array() += 2 * share;
+    }
+    if (!context_.loads.acceleration) return;
+    add_load(at.rest, at.x, -context_.scaling * mass, context_.loads.acceleration, kNone);
+    for (const int end : {a, b}) {
+      auto rest = at.rest, x = at.x;
+      rest[end] = (at.rest[a] + at.rest[b]) / 2;
+      x[end] = (at.x[a] + at.x[b]) / 2;
+      add_load(rest, x, context_.scaling * mass / 2, context_.loads.acceleration, end);
+    }
   }
 
   void add_facet(const std::array<Vec<Dim>, Dim>& rest, const std::array<Vec<Dim>, Dim>& x, int tag, int moving) {
@@ -138,13 +197,31 @@ class QuadraticModel {
   Mat<Dim> hessian_ = Mat<Dim>::Zero();
 };
 
+/// Of a cell on vertices of the mesh.
+template <int Dim>
+typename QuadraticModel<Dim>::Corners corners_of(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell) {
+  typename QuadraticModel<Dim>::Corners corners;
+  for (int k = 0; k <= Dim; ++k) {
+    corners.rest[k] = state.mesh.rest(cell[k]);
+    corners.x[k] = state.fields.x.template segment<Dim>(Dim * cell[k]);
+    if (state.context.has_inertia) corners.predictor[k] = state.fields.predictor.template segment<Dim>(Dim * cell[k]);
+  }
+  return corners;
+}
+
+template <int Dim>
+bool knows_all_terms(const StepContext<Dim>& context) {
+  return context.loads.pressures.empty() && context.damping.empty() && context.host.empty();
+}
+
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
 }  // namespace
 
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
-  constexpr double kUnknown = std::numeric_limits<double>::infinity();
   const StepContext<Dim>& context = state.context;
-  if (!context.loads.pressures.empty() || !context.damping.empty() || !context.host.empty()) return kUnknown;
+  if (!knows_all_terms(context)) return kUnknown;
   const VertexId set = edit.value ? edit.value->vertex : kNone;
   const auto at = [&](const VectorX& field, VertexId v, bool after) {
     return after && v == set ? RemeshFields<Dim>::interpolate(field, *edit.value) : Vec<Dim>(field.segment<Dim>(Dim * v));
@@ -161,53 +238,83 @@ double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
     }
     model.add_cell(corners, body, moving);
   };
-  const auto cells_before = [&](VertexId mover) {
+  const auto add_facet = [&](const auto& facet, int tag, bool is_after, QuadraticModel<Dim>& model, VertexId mover) {
+    std::array<Vec<Dim>, Dim> X, x;
+    int moving = kNone;
+    for (int k = 0; k < Dim; ++k) {
+      if (facet[k] == mover) moving = k;
+      X[k] = rest(facet[k], is_after);
+      x[k] = at(state.fields.x, facet[k], is_after);
+    }
+    model.add_facet(X, x, tag, moving);
+  };
+  const bool has_tractions = !context.loads.tractions.empty();
+  const auto before = [&](VertexId mover) {
     QuadraticModel<Dim> model(context);
     for (const CellId c : edit.removed_cells) add_cell(state.mesh.cell(c), state.mesh.body(c), false, model, mover);
+    if (has_tractions)
+      for (const FacetId f : edit.removed_facets)
+        add_facet(state.mesh.facet(f), state.mesh.facet_tag(f), false, model, mover);
     return model;
   };
-  const auto cells_after = [&](VertexId mover) {
+  const auto after = [&](VertexId mover) {
     QuadraticModel<Dim> model(context);
     for (const auto& cell : edit.inserted_cells) add_cell(cell.vertices, cell.body, true, model, mover);
+    if (has_tractions)
+      for (const auto& facet : edit.inserted_facets) add_facet(facet.vertices, facet.tag, true, model, mover);
     return model;
   };
-  if (!edit.value) {
-    // Nothing is set: each vertex gives way, by itself, to what the edit adds to its forces. Here the cells of the edit
-    // alone resist, in the mesh those around them too.
-    constexpr double kShareOfRelaxation = 0.25;
-    std::vector<VertexId> vertices;
-    for (const auto& cell : edit.inserted_cells) vertices.insert(vertices.end(), cell.vertices.begin(), cell.vertices.end());
-    std::sort(vertices.begin(), vertices.end());
-    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-    double gain = cells_before(kNone).energy() - cells_after(kNone).energy();
-    for (const VertexId v : vertices) {
-      const QuadraticModel<Dim> old = cells_before(v), now = cells_after(v);
-      const Vec<Dim> force = now.gradient() - old.gradient();
-      const Eigen::LLT<Mat<Dim>> llt(now.hessian());
-      if (llt.info() != Eigen::Success) return kUnknown;
-      gain += kShareOfRelaxation * 0.5 * force.dot(llt.solve(force));
-    }
-    return gain;
+  if (edit.value) return before(kNone).energy() - after(set).relaxed();
+  // Nothing is set: each vertex gives way, by itself, to what the edit adds to its forces. Here the cells of the edit
+  // alone resist, in the mesh those around them too.
+  constexpr double kShareOfRelaxation = 0.25;
+  std::vector<VertexId> vertices;
+  for (const auto& cell : edit.inserted_cells) vertices.insert(vertices.end(), cell.vertices.begin(), cell.vertices.end());
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  double gain = before(kNone).energy() - after(kNone).energy();
+  for (const VertexId v : vertices) {
+    const QuadraticModel<Dim> old = before(v), now = after(v);
+    const Vec<Dim> force = now.gradient() - old.gradient();
+    const Eigen::LLT<Mat<Dim>> llt(now.hessian());
+    if (llt.info() != Eigen::Success) return kUnknown;
+    gain += kShareOfRelaxation * 0.5 * force.dot(llt.solve(force));
   }
-  QuadraticModel<Dim> before = cells_before(kNone), after = cells_after(set);
-  if (!context.loads.tractions.empty()) {
-    const auto add_facet = [&](const auto& facet, int tag, bool is_after, QuadraticModel<Dim>& model) {
-      std::array<Vec<Dim>, Dim> X, x;
-      int moving = kNone;
-      for (int k = 0; k < Dim; ++k) {
-        if (is_after && facet[k] == set) moving = k;
-        X[k] = rest(facet[k], is_after);
-        x[k] = at(state.fields.x, facet[k], is_after);
-      }
-      model.add_facet(X, x, tag, moving);
-    };
-    for (const FacetId f : edit.removed_facets) add_facet(state.mesh.facet(f), state.mesh.facet_tag(f), false, before);
-    for (const auto& facet : edit.inserted_facets) add_facet(facet.vertices, facet.tag, true, after);
+  return gain;
+}
+
+template <int Dim>
+double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
+  const StepContext<Dim>& context = state.context;
+  const Mesh<Dim>& mesh = state.mesh;
+  const auto around = mesh.cells_of(edge[0]);
+  const auto varies = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
+  if (!knows_all_terms(context) || context.mass == MassKind::lumped || !context.loads.tractions.empty() ||
+      std::any_of(around.begin(), around.end(), varies))
+    return predict_gain<Dim>(state, make_split<Dim>(mesh, edge));
+  QuadraticModel<Dim> model(context);
+  for (const CellId c : around) {
+    const auto& cell = mesh.cell(c);
+    const auto b = static_cast<int>(std::find(cell.begin(), cell.end(), edge[1]) - cell.begin());
+    if (b > Dim) continue;
+    const auto a = static_cast<int>(std::find(cell.begin(), cell.end(), edge[0]) - cell.begin());
+    model.add_split_cell(mesh, c, corners_of(state, cell), a, b);
   }
-  return before.energy() - after.relaxed();
+  return -model.relaxed();
+}
+
+template <int Dim>
+double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body) {
+  QuadraticModel<Dim> model(state.context);
+  model.add_cell(corners_of(state, cell), body, kNone);
+  return model.energy();
 }
 
 template double predict_gain(const RemeshState<2>&, const Edit<2>&);
 template double predict_gain(const RemeshState<3>&, const Edit<3>&);
+template double predict_split(const RemeshState<2>&, const EdgeKey&);
+template double predict_split(const RemeshState<3>&, const EdgeKey&);
+template double cell_energy<2>(const RemeshState<2>&, const MeshTypes<2>::Cell&, int);
+template double cell_energy<3>(const RemeshState<3>&, const MeshTypes<3>::Cell&, int);
 
 }  // namespace itr

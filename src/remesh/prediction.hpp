@@ -25,6 +25,16 @@ inline constexpr double kPatchOverVertexInContact = Dim == 2 ? 30 : 10;
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 
+/// The same of the split of an edge, up to round-off: in one evaluation a cell around it, where moduli are constant in cells
+/// and mass is consistent.
+template <int Dim>
+double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge);
+
+/// Elasticity, inertia and body forces of a cell on vertices of the mesh, whether it is there or not, at present positions.
+/// [J, times the scaling]
+template <int Dim>
+double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body);
+
 /// Upper estimate of what an edit gains that has this lower bound.
 inline double at_most(double gain_of_vertex, double factor) {
   return gain_of_vertex > 0 ? factor * gain_of_vertex : gain_of_vertex / factor;

@@ -16,11 +16,7 @@ template <int Dim>
 RemeshMemory Refusals::remembered(const Mesh<Dim>& mesh) const {
   RemeshMemory memory;
   const auto is_there = [&](const EdgeKey& edge) {
-    if (!mesh.is_vertex_alive(edge[0])) return false;
-    const auto around = mesh.cells_of(edge[0]);
-    return edge[1] == kNone || std::any_of(around.begin(), around.end(), [&](CellId c) {
-             return std::find(mesh.cell(c).begin(), mesh.cell(c).end(), edge[1]) != mesh.cell(c).end();
-           });
+    return mesh.is_vertex_alive(edge[0]) && (edge[1] == kNone || mesh.are_joined(edge[0], edge[1]));
   };
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     auto& list = memory.refusals[kind];

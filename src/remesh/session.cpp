@@ -163,9 +163,9 @@ double RemeshSession<Dim>::roughness(const EdgeKey& edge) const {
 }
 
 template <int Dim>
-double RemeshSession<Dim>::largest_poisson_ratio(const Edit<Dim>& edit) const {
+double RemeshSession<Dim>::largest_poisson_ratio(std::span<const CellId> cells) const {
   double nu = 0;
-  for (const CellId c : edit.removed_cells) nu = std::max(nu, context_.materials.at(mesh_.body(c)).poisson_ratio);
+  for (const CellId c : cells) nu = std::max(nu, context_.materials.at(mesh_.body(c)).poisson_ratio);
   return nu;
 }
 
@@ -177,7 +177,7 @@ void RemeshSession<Dim>::judge(Trial<Dim>& trial, const Vec<Dim>& center, double
   const Edit<Dim>& edit = *trial.edit;
   TrialOptions options{.required = context_.scaling * tolerance, .local = local};
   if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth && edit.value)
-    options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit));
+    options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;
   trial.verdict = preview<Dim>(state, gate_, edit, center, total_volume_, options, scratch);
   trial.surface_read.include(trial.verdict.surface_read);

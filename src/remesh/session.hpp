@@ -96,10 +96,18 @@ class RemeshSession {
   double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance : 0; }
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
-  /// Whether a prediction says that a patch cannot gain the tolerance [J] either.
-  bool is_hopeless(const Edit<Dim>& edit, double predicted, double tolerance) const {
+  double predict_split(const EdgeKey& edge) const { return itr::predict_split<Dim>(state(), edge); }
+  /// Of a cell that may not be there yet, at present positions. [J, times the scaling]
+  double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body) const {
+    return cell_energy<Dim>(state(), cell, body);
+  }
+  /// Whether what is predicted of an edit of these cells says that a patch cannot gain the tolerance [J] either.
+  bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance) const {
     return screens() &&
-           at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(edit))) < context_.scaling * tolerance;
+           at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
+  }
+  bool is_hopeless(const Edit<Dim>& edit, double predicted, double tolerance) const {
+    return is_hopeless(edit.removed_cells, predicted, tolerance);
   }
 
   /// Threads that look at candidates at the same time.
@@ -157,7 +165,7 @@ class RemeshSession {
   bool changed_after(const EdgeKey& e, unsigned commit) const {
     return changed_at_[e[0]] > commit || (e[1] != kNone && changed_at_[e[1]] > commit);
   }
-  double largest_poisson_ratio(const Edit<Dim>& edit) const;
+  double largest_poisson_ratio(std::span<const CellId> cells) const;
 
   Mesh<Dim>& mesh_;
   RemeshFields<Dim>& fields_;
@@ -186,7 +194,7 @@ template <int Dim>
 void split_edges(RemeshSession<Dim>& session, EdgeRanks& ranks);
 template <int Dim>
 void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks);
-/// In 3D: edges are removed such that the elastic energy of the new cells is least.
+/// In 3D: edges are removed such that the energy of the new cells is least, then facets (2-3 swaps).
 void swap_edges(RemeshSession<2>& session);
 void swap_edges(RemeshSession<3>& session);
 template <int Dim>

@@ -22,11 +22,12 @@ class Splitter {
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
     if (session_.depth(edge) >= options_.max_depth) return std::nullopt;
     if (is_culled() && inherited(edge) != Rank::top) return std::nullopt;
-    const auto edit = make_split(session_.mesh(), edge);
-    const double gain = session_.predict(edit);
+    const double gain = session_.predict_split(edge);
     const bool in_contact = session_.is_in_contact(edge, scratch);
     if (session_.was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
-    return EdgeQueue::Entry{.edge = edge, .priority = gain, .is_hopeless = !in_contact && is_hopeless(edit, gain)};
+    return EdgeQueue::Entry{.edge = edge,
+                            .priority = gain,
+                            .is_hopeless = !in_contact && is_hopeless(session_.mesh().cells_of_edge(edge), gain)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
@@ -37,9 +38,9 @@ class Splitter {
     session_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
     if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return;
+    trial.signal = is_known ? trial.candidate.priority : session_.predict_split(edge);
     trial.edit = make_split(session_.mesh(), edge);
-    trial.signal = is_known ? trial.candidate.priority : session_.predict(*trial.edit);
-    if (!trial.in_contact && is_hopeless(*trial.edit, trial.signal)) return;  // there trials tell
+    if (!trial.in_contact && is_hopeless(trial.edit->removed_cells, trial.signal)) return;  // there trials tell
     session_.judge(trial, trial.edit->value->rest, options_.acceptance_tolerance, session_.options().local, scratch);
   }
 
@@ -55,8 +56,8 @@ class Splitter {
 
  private:
   bool is_culled() const { return session_.options().screening == Screening::energy_percentile; }
-  bool is_hopeless(const Edit<Dim>& edit, double gain) const {
-    return session_.is_hopeless(edit, gain, options_.acceptance_tolerance);
+  bool is_hopeless(std::span<const CellId> cells, double gain) const {
+    return session_.is_hopeless(cells, gain, options_.acceptance_tolerance);
   }
 
   Rank inherited(const EdgeKey& edge) const {

@@ -4,7 +4,6 @@
 #include <unordered_map>
 
 #include "edit_checks.hpp"
-#include "itr/energy/elastic/laws.hpp"
 #include "wave.hpp"
 
 namespace itr {
@@ -29,14 +28,33 @@ double valence_gain(const Mesh<2>& mesh, const EdgeKey& edge) {
   return gain;
 }
 
-double quality(const Mesh<3>& mesh, const MeshTypes<3>::Cell& v) {
-  return simplex_quality<3>({mesh.rest(v[0]), mesh.rest(v[1]), mesh.rest(v[2]), mesh.rest(v[3])});
+constexpr double kBetter = 1.2;  ///< of the worst quality: by how much a swap betters a shape
+
+/// Worst quality of the cells that an edit makes over that of those that it removes.
+double shape_gain(const Mesh<3>& mesh, const Edit<3>& edit) {
+  double after = 1;
+  for (const auto& cell : edit.inserted_cells)
+    after = std::min(after, quality_with<3>(mesh, cell.vertices, kNone, Vec<3>::Zero()));
+  return after / worst_quality<3>(mesh, edit.removed_cells);
+}
+
+/// What a swap has to gain that is not for the sake of the shape [J].
+template <int Dim>
+double least_gain(const RemeshSession<Dim>& session) {
+  return std::max(session.least_worthwhile(), session.options().swap.acceptance_tolerance);
+}
+
+/// Whether the bulk terms say that an edit gains that [J].
+template <int Dim>
+bool is_promising(const RemeshSession<Dim>& session, const Edit<Dim>& edit, double least) {
+  return !session.screens() || session.predict(edit) >= session.context().scaling * least;
 }
 
 /// What differs between the dimensions: which edges first, and what takes their place. A swap that betters the shape may
 /// cost a little energy, for the sake of the mesh: without that condition, edges swap to and fro.
 struct DiagonalSwap {
   const RemeshSession<2>& session;
+  bool may_go(const EdgeKey& edge) const { return !session.is_surface(edge); }
   double priority(const EdgeKey& edge) const { return valence_gain(session.mesh(), edge); }
   std::optional<Edit<2>> edit(const EdgeKey& edge) const { return make_swap(session.mesh(), edge); }
   bool betters_shape(const EdgeKey& edge, const Edit<2>&) const { return valence_gain(session.mesh(), edge) > 0; }
@@ -45,39 +63,21 @@ struct DiagonalSwap {
   bool is_worth_asking_again(const EdgeKey& edge) const { return valence_gain(session.mesh(), edge) > 0; }
 };
 
-/// At frozen positions the elastic energy is a sum over tetrahedra: that of the new ones is least.
+/// At frozen positions these energies are sums over tetrahedra: that of the new ones is least.
 struct EdgeRemoval {
   const RemeshSession<3>& session;
+  bool may_go(const EdgeKey&) const { return true; }  // in the volume and within flat patches, as strata say
   double priority(const EdgeKey& edge) const {
     return -worst_quality<3>(session.mesh(), session.mesh().cells_of_edge(edge));
   }
   std::optional<Edit<3>> edit(const EdgeKey& edge) const {
     return propose_edge_removal(session.mesh(), session.strata(), edge,
-                                [&](const auto& cell, int body) { return elastic_energy(cell, body); })
+                                [&](const auto& cell, int body) { return session.energy_of(cell, body); })
         .edit;
   }
-  bool betters_shape(const EdgeKey&, const Edit<3>& edit) const {
-    constexpr double kBetter = 1.2;
-    double after = 1;
-    for (const auto& cell : edit.inserted_cells) after = std::min(after, quality(session.mesh(), cell.vertices));
-    return after > kBetter * worst_quality<3>(session.mesh(), edit.removed_cells);
-  }
+  bool betters_shape(const EdgeKey&, const Edit<3>& edit) const { return shape_gain(session.mesh(), edit) > kBetter; }
   static constexpr bool kAsksAllAround = false;
   bool is_worth_asking_again(const EdgeKey&) const { return true; }
-
- private:
-  double elastic_energy(const MeshTypes<3>::Cell& cell, int body) const {
-    std::array<Vec<3>, 4> X, x;
-    Vec<3> barycenter = Vec<3>::Zero();
-    for (int k = 0; k < 4; ++k) {
-      X[k] = session.mesh().rest(cell[k]);
-      x[k] = session.fields().x.segment<3>(3 * cell[k]);
-      barycenter += X[k] / 4;
-    }
-    const Mat<3> edges = edge_matrix<3>(X), F = edge_matrix<3>(x) * edges.inverse();
-    const ElasticModuli moduli = elastic_moduli<3>(session.context().materials.at(body), barycenter);
-    return simplex_volume<3>(edges) * elastic_density<3>(F, moduli);
-  }
 };
 
 template <int Dim, typename Policy>
@@ -86,7 +86,7 @@ class Swapper {
   explicit Swapper(RemeshSession<Dim>& session) : session_(session), options_(session.options().swap), policy_{session} {}
 
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
-    if (session_.is_surface(edge) || (has_begun_ && !policy_.is_worth_asking_again(edge))) return std::nullopt;
+    if (!policy_.may_go(edge) || (has_begun_ && !policy_.is_worth_asking_again(edge))) return std::nullopt;
     return EdgeQueue::Entry{.edge = edge, .priority = policy_.priority(edge)};
   }
 
@@ -96,15 +96,13 @@ class Swapper {
     if (!session_.exists(edge)) return;
     trial.edit = policy_.edit(edge);
     if (!trial.edit) return;
-    const double tolerance = options_.acceptance_tolerance;
-    const double least =
-        policy_.betters_shape(edge, *trial.edit) ? tolerance : std::max(session_.least_worthwhile(), tolerance);
+    const double least = policy_.betters_shape(edge, *trial.edit) ? options_.acceptance_tolerance : least_gain(session_);
     trial.signal = session_.roughness(edge);
     session_.find_contact(trial, scratch);
     if (session_.was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
     trial.is_asked = true;
     trial.verdict.decision = Decision::by_bound;
-    if (session_.screens() && session_.predict(*trial.edit) < session_.context().scaling * least) return;
+    if (!trial.in_contact && !is_promising(session_, *trial.edit, least)) return;  // there trials tell
     const Vec<Dim> center = 0.5 * (session_.mesh().rest(edge[0]) + session_.mesh().rest(edge[1]));
     session_.judge(trial, center, least, session_.options().local, scratch);
   }
@@ -131,6 +129,29 @@ class Swapper {
   std::unordered_map<EdgeKey, int, EdgeKeyHash> tries_;
 };
 
+/// Facets between the cells that are there now, once each: for the energy alone, and not where an edge removal would come
+/// and undo it for the shape.
+void remove_facets(RemeshSession<3>& session) {
+  const Mesh<3>& mesh = session.mesh();
+  const double least = least_gain(session);
+  const CellId end = mesh.cell_slots();
+  for (CellId c = 0; c < end; ++c)
+    for (int k = 0; k < 4 && mesh.is_cell_alive(c); ++k) {
+      if (session.is_cancelled()) return;
+      const auto facet = opposite_facet<3>(mesh.cell(c), k);
+      auto proposal = propose_facet_removal(mesh, facet);
+      if (!proposal) continue;
+      const auto& cells = proposal.edit->removed_cells;
+      if (std::min(cells[0], cells[1]) != c || shape_gain(mesh, *proposal.edit) < 1 / kBetter) continue;
+      if (!is_promising(session, *proposal.edit, least)) continue;
+      const Vec<3> center = (mesh.rest(facet[0]) + mesh.rest(facet[1]) + mesh.rest(facet[2])) / 3;
+      Trial<3> trial{.candidate = {.edge = proposal.edit->edge, .priority = 0}, .edit = std::move(proposal.edit)};
+      session.begin_wave();
+      session.judge(trial, center, least, session.options().local, session.scratch());
+      session.commit(trial, session.report().swaps);
+    }
+}
+
 }  // namespace
 
 void swap_edges(RemeshSession<2>& session) {
@@ -141,6 +162,7 @@ void swap_edges(RemeshSession<2>& session) {
 void swap_edges(RemeshSession<3>& session) {
   Swapper<3, EdgeRemoval> swapper(session);
   run_waves(session, swapper, session.mesh().edges());
+  remove_facets(session);
 }
 
 }  // namespace itr
