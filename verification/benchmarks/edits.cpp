@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Time of making an edit of a tetrahedral mesh, checks included, and of carrying it out, at 10^4, 10^5 and 10^6 cells. The
-// argument is the number of cubes along a side, six cells each. Proposals are made at random places, so that at a million
-// cells most of what they read comes from memory.
+// Time of making an edit of a tetrahedral mesh, checks included, of deciding about it, and of carrying it out, at 10^4, 10^5
+// and 10^6 cells. The argument is the number of cubes along a side, six cells each. Proposals are made at random places, so
+// that at a million cells most of what they read comes from memory.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
 
 #include "itr/energy/elastic/neo_hookean.hpp"
 #include "random_tets.hpp"
+#include "remesh/prediction.hpp"
+#include "remesh/trial.hpp"
 
 namespace {
 
@@ -127,6 +129,86 @@ void ApplyEdit(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations());
 }
 
+/// A body in the middle of a step, pressed onto a plane where there is contact: what decides about an edit.
+struct Step {
+  Body body;
+  RemeshFields<3> fields;
+  StepContext<3> context;
+  Gate<3> gate;
+  RemeshState<3> state;
+  LocalScratch<3> scratch;
+
+  Step(int n, bool has_contact)
+      : body(n),
+        fields(make_fields(body)),
+        context(make_context(n, has_contact)),
+        gate(body.mesh, fields, context),
+        state{body.mesh, fields, context, gate.present(), HistoryRule::function} {}
+
+  static RemeshFields<3> make_fields(const Body& body) {
+    return {.x = body.x, .predictor = body.x, .velocity_reference = body.x, .past_positions = {body.x}, .past_rates = {}};
+  }
+  static StepContext<3> make_context(int n, bool has_contact) {
+    StepContext<3> context;
+    context.materials[1] = {.youngs_modulus = 1e5, .poisson_ratio = 0.4, .density = 1000};
+    context.scaling = 1e-4;
+    context.newton.step_tolerance = 1e-9;
+    if (!has_contact) return context;
+    const double dhat = 0.1 / n;
+    context.contact = {.enabled = true, .activation_distance = dhat, .convergent = true, .barrier_stiffness = 1e4};
+    auto& obstacles = context.obstacles;
+    obstacles.rest = obstacles.x = obstacles.velocity_reference = {{-9, -9, -dhat}, {9, -9, -dhat}, {0, 9, -dhat}};
+    obstacles.triangles = {{0, 1, 2}};
+    obstacles.edges = {{0, 1}, {1, 2}, {0, 2}};
+    obstacles.past_x = {obstacles.x};
+    return context;
+  }
+  /// In contact those on the plane.
+  std::vector<EdgeKey> edges() {
+    std::vector<EdgeKey> found = body.mesh.edges();
+    const auto is_above = [&](const EdgeKey& e) { return body.mesh.rest(e[0])[2] > 0 || body.mesh.rest(e[1])[2] > 0; };
+    if (context.contact.enabled) std::erase_if(found, is_above);
+    std::shuffle(found.begin(), found.end(), body.random);
+    found.resize(std::min<std::size_t>(found.size(), 4096));
+    return found;
+  }
+};
+
+/// `decide` gets a split, of which nothing is done.
+void decide(benchmark::State& state, bool has_contact, auto&& decide) {
+  Step step(static_cast<int>(state.range(0)), has_contact);
+  const auto edges = step.edges();
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const EdgeKey& edge = edges[i++ % edges.size()];
+    benchmark::DoNotOptimize(decide(step, edge));
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
+void PredictSplit(benchmark::State& state) {
+  decide(state, false, [](Step& step, const EdgeKey& edge) { return predict_split<3>(step.state, edge); });
+}
+
+double bound(Step& step, const EdgeKey& edge) {
+  return gain_of_vertex<3>(step.state, make_split(step.body.mesh, edge), step.scratch);
+}
+void BoundOfSplit(benchmark::State& state) { decide(state, false, bound); }
+void BoundOfSplitInContact(benchmark::State& state) { decide(state, true, bound); }
+
+/// Of a patch of two rings, refused.
+double trial(Step& step, const EdgeKey& edge) {
+  const auto edit = make_split(step.body.mesh, edge);
+  return preview<3>(step.state, step.gate, edit, edit.value->rest, 1, {.required = 1e9, .local = {}}, step.scratch).gain;
+}
+void TrialOfSplit(benchmark::State& state) { decide(state, false, trial); }
+void TrialOfSplitInContact(benchmark::State& state) { decide(state, true, trial); }
+
+BENCHMARK(PredictSplit)->Arg(12)->Arg(26);
+BENCHMARK(BoundOfSplit)->Arg(12)->Arg(26);
+BENCHMARK(BoundOfSplitInContact)->Arg(12)->Arg(26);
+BENCHMARK(TrialOfSplit)->Arg(12)->Arg(26);
+BENCHMARK(TrialOfSplitInContact)->Arg(12)->Arg(26);
 BENCHMARK(ProposeSplit)->Arg(12)->Arg(26)->Arg(55);
 BENCHMARK(ProposeCollapse)->Arg(12)->Arg(26)->Arg(55);
 BENCHMARK(ProposeEdgeRemoval)->Arg(12)->Arg(26)->Arg(55);

@@ -3,9 +3,10 @@
 """Runs the paper's scenes one after another on one thread, writes results.csv and prints the table of README.md.
 
 python3 verification/paper/run.py [--check] [--itr build/release/bin/itr] [--shared ../shared] [--results DIR]
-                                  [--case PART-OF-NAME]...
+                                  [--solids] [--case PART-OF-NAME]...
 
-With --check it runs the scenes that have bars (below) and stores nothing; the exit status is 1 if one is missed. Figures of the reference implementation are those of shared/reference-runs.md (its faster column). Every run is certified.
+With --solids it runs the 3D scenes on uniform levels, with the sizing field and with remeshing, and prints the table that
+compares those; it stores nothing. With --check it runs the scenes that have bars (below) and stores nothing; the exit status is 1 if one is missed. Figures of the reference implementation are those of shared/reference-runs.md (its faster column). Every run is certified.
 """
 import argparse
 import csv
@@ -89,6 +90,17 @@ CASES = [
     ("1-cube fixed mesh", "unit-tests/1-cube-noremesh.json", [], None),
     ("1-cube-stretch fixed mesh", "unit-tests/1-cube-stretch-noremesh.json", [], None),
     ("collapse-3D fixed mesh", "unit-tests/collapse-3D-noremesh.json", [], None),
+]
+
+# 3D scenes, each on a horizon that its finest uniform level reaches, by every way to a mesh.
+SOLIDS = [("ball-wall", "ball-wall/3D.json", ["/time/tend=0.00132"]),
+          ("masticator", "masticator/3D.json", ["/time/tend=1.1"]),
+          ("twisting-beam, tolerance 10", "twisting-beam/twisting-beam.json",
+           ["/time/tend=0.2", "/space/remesh/split/acceptance_tolerance=10"])]
+WAYS = [(f"uniform {k}", ["/space/remesh/enabled=false", f"/geometry/0/n_refs={k}"]) for k in range(3)] + [
+    ("sizing field", ['/space/remesh/type="sizing_field"']),
+    ("remeshed", []),
+    ("remeshed, swaps and smoothing", ["/space/remesh/swap/enabled=true", "/space/remesh/smooth/enabled=true"]),
 ]
 
 # What a case has to reach: least gain [J] (0.8 of the reference's); energy of the last step [J], at most or (value, relative
@@ -186,6 +198,9 @@ def run(case, options):
         "accepted": sum(s[k]["accepted"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
         "microseconds_per_trial": 1e6 * median_trial(steps),
         "peak_rss_mb": last["peak_rss_mb"],
+        "linear_share": sum(s["seconds"]["linear_solve"] for s in steps) / total,
+        "unknowns_mean": sum(s["unknowns"] for s in steps) / len(steps), "unknowns_max": max(s["unknowns"] for s in steps),
+        "tried": sum(s[k]["tried"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
         "reference_seconds": reference[0] if reference else None, "reference_gain": reference[1] if reference else None,
         "reference_mb": reference[2] if reference else None, "commit": stored.commit(),
     }
@@ -221,6 +236,18 @@ def table(rows):
     return "\n".join(lines)
 
 
+def solids_table(rows):
+    lines = ["| scene | end | processor s/step | linear solves | MB | unknowns, mean (most) | Newton iterations | bounds / trials / accepted "
+             "| energy, last step [J] | gained, net [J] |", "|" + "---|" * 10]
+    for r in rows:
+        end = ("finished" if r["finished"] else "stopped") + (", certified" if r["certified"] else ", NOT CERTIFIED")
+        lines.append(
+            f"| {r['case']} | {r['steps']} steps, {end} | {r['processor_seconds_per_step']:.4f} | {100 * r['linear_share']:.0f} % "
+            f"| {r['peak_rss_mb']:.0f} | {r['unknowns_mean']:.0f} ({r['unknowns_max']}) | {r['newton']} "
+            f"| {r['tried']} / {r['trials']} / {r['accepted']} | {r['energy_total']:.6g} | {r['gain']:.4g} |")
+    return "\n".join(lines)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--itr", type=pathlib.Path, default=ROOT / "build/release/bin/itr")
@@ -228,7 +255,12 @@ def main():
     parser.add_argument("--results", type=pathlib.Path, default=ROOT / "results/paper")
     parser.add_argument("--case", action="append")
     parser.add_argument("--check", action="store_true", help="only the scenes that have bars, against them")
+    parser.add_argument("--solids", action="store_true", help="3D scenes: uniform levels, sizing field and remeshing side by side")
     options = parser.parse_args()
+    if options.solids:
+        cases = [(f"{name}, {way}", scene, sets + more, None) for name, scene, sets in SOLIDS for way, more in WAYS]
+        print(solids_table([run(c, options) for c in cases if not options.case or any(part in c[0] for part in options.case)]))
+        return 0
     if options.check:
         missed = 0
         for row, found in check(options.itr, options.shared, options.results):
