@@ -47,6 +47,17 @@ while not simulation.finished:
     force, moment = simulation.resultant("floor")
     print(f"t = {report['t']:.2f} s: {report['vertices']} vertices, the floor carries {force[1]:.2f} N")
 
+# %% Results in other programs: a file by meshio, functions of dolfinx (both where they are there)
+try:
+    simulation.to_meshio().write("host_loop.vtu")
+except ImportError:
+    print("no meshio")
+try:
+    mesh, functions = simulation.to_dolfinx()
+    print(f"in dolfinx: {mesh.topology.index_map(2).size_local} cells, {', '.join(functions)}")
+except ImportError:
+    print("no dolfinx")
+
 # %% What came out
 assert np.allclose(temperature, 20 + 100 * simulation.rest_positions[:, 1])
 assert len(simulation.positions) > len(grid)

@@ -53,9 +53,9 @@ class AnySimulation {
   /// the library finds.
   explicit AnySimulation(const Model& model, Logger logger = {}, std::shared_ptr<linear::Registry> registry = nullptr);
   ~AnySimulation();
-  AnySimulation(AnySimulation&&) noexcept;
+  AnySimulation(AnySimulation&&) noexcept;  ///< what is moved from can only be destroyed
 
-  int dimension() const;
+  int dimension() const;  ///< 2 or 3
   /// The simulation below. Throws std::bad_variant_access for the other dimension.
   template <int Dim>
   Simulation<Dim>& as();
@@ -78,25 +78,28 @@ class AnySimulation {
 
   /// Prescribes displacements [m] of the components for which `mask` (dimension flags) is not 0; all 0: releases.
   void fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement);
-  void fix(const std::string& boundary, std::span<const int> mask, std::span<const double> displacements);
+  void fix(const std::string& boundary, std::span<const int> mask, std::span<const double> displacements);  ///< the same
   /// Force by rest area [N/m^2] (2D: length [N/m]). Null: none.
   void set_traction(const std::string& boundary, HostFunction traction);
-  void set_traction(const std::string& boundary, std::span<const double> tractions);
+  void set_traction(const std::string& boundary, std::span<const double> tractions);  ///< dimension numbers a vertex
   /// Along inward normals as they are then, the same unit. Null: none.
   void set_pressure(const std::string& boundary, HostFunction pressure);
   void set_pressure(const std::string& boundary, std::span<const double> pressures);  ///< a number a vertex
-  void set_acceleration(HostFunction acceleration);  ///< body force by mass [m/s^2]; null: none
-  void set_acceleration(std::span<const double> accelerations);
-  /// Displacement of an obstacle from rest [m], or its vertices' positions at the end of the next steps [m].
+  void set_acceleration(HostFunction acceleration);              ///< body force by mass [m/s^2]; null: none
+  void set_acceleration(std::span<const double> accelerations);  ///< dimension numbers a vertex
+  /// Displacement of an obstacle from rest [m].
   void move_obstacle(const std::string& obstacle, HostFunction displacement);
+  /// Its vertices' positions at the end of the next steps [m]: dimension numbers each, in the order of add_obstacle.
   void move_obstacle(const std::string& obstacle, std::span<const double> positions);
   /// Dead forces [N] on the vertices, `dimension` each; they stay where they act however the mesh changes. Empty: none.
   void set_forces(std::span<const double> forces);
   /// Forces of present positions: adds to f [N] for vertices at rest positions X and positions x [m]; `stiffness`, if it is
   /// there, gives blocks of -df/dx. The mesh may be a new one within a step: lengths say so.
   using ForceFunction = std::function<void(ConstVectorView X, ConstVectorView x, double t, VectorView f)>;
+  /// Gives blocks of -df/dx [N/m].
   using StiffnessFunction =
       std::function<void(ConstVectorView X, ConstVectorView x, double t, const StiffnessReceiver& add)>;
+  /// Null: none.
   void set_follower_forces(ForceFunction forces, StiffnessFunction stiffness = nullptr);
   /// Adds a term to the incremental potential, or puts it in the place of the one of this name. All null: it goes.
   void set_term(const std::string& name, HostTerm term);
@@ -106,39 +109,40 @@ class AnySimulation {
 
   // The state.
 
-  int num_vertices() const;
-  int num_cells() const;
-  int num_facets() const;
-  std::span<const double> positions() const;   ///< [m]
-  std::span<const double> velocities() const;  ///< [m/s]
-  std::vector<double> rest_positions() const;  ///< [m]
-  std::vector<int> cells() const;              ///< dimension + 1 vertices each
-  std::vector<int> bodies() const;             ///< a cell
-  std::vector<int> facets() const;             ///< of the boundary: dimension vertices each, outward
-  std::vector<int> facet_boundaries() const;   ///< ids of Model::add_boundary; -1: none
-  std::vector<double> obstacle_positions() const;
+  int num_vertices() const;                        ///< of the bodies
+  int num_cells() const;                           ///< triangles or tetrahedra
+  int num_facets() const;                          ///< of their boundary
+  std::span<const double> positions() const;       ///< dimension numbers a vertex [m]
+  std::span<const double> velocities() const;      ///< the same [m/s]
+  std::vector<double> rest_positions() const;      ///< the same [m]
+  std::vector<int> cells() const;                  ///< dimension + 1 vertices each
+  std::vector<int> bodies() const;                 ///< a cell
+  std::vector<int> facets() const;                 ///< of the boundary: dimension vertices each, outward
+  std::vector<int> facet_boundaries() const;       ///< ids of Model::add_boundary; -1: none
+  std::vector<double> obstacle_positions() const;  ///< of all obstacles, one after the other [m]
   /// Asks for forces, which then are there after each step: their cost is that of some gradients a step.
   void watch_forces(bool watched);
-  const NodalForces& forces() const;
+  const NodalForces& forces() const;  ///< dimension numbers a vertex [N]; empty where they are not watched
   /// Force [N] and moment about a point [N m] (2D: one number) of all forces on boundaries, see itr::resultant. Forces have
   /// to be watched.
   struct Resultants {
-    std::vector<double> force, moment;
+    std::vector<double> force, moment;  ///< dimension numbers; one in 2D, three in 3D
   };
+  /// On several boundaries together.
   Resultants resultant(std::span<const std::string> boundaries, std::span<const double> about) const;
   Resultants resultant(const std::string& boundary) const;  ///< about the origin
   std::vector<double> elastic_density() const;              ///< by cell, of rest volume [J/m^Dim]
 
   /// See Snapshot.
   using Saved = std::variant<Snapshot<2>, Snapshot<3>>;
-  Saved save() const;
+  Saved save() const;  ///< cheap, see Simulation::save
   /// Throws InputError for one of another dimension.
   void restore(const Saved& saved);
 
   // Events; null: nobody listens. What they throw comes out of step(), which then did nothing or (mesh change) was done.
 
-  void on_iteration(std::function<bool(const NewtonProgress&)> listener);  ///< false cancels the step
-  void on_mesh_change(std::function<void(const AnyMeshChange&)> listener);
+  void on_iteration(std::function<bool(const NewtonProgress&)> listener);   ///< false cancels the step
+  void on_mesh_change(std::function<void(const AnyMeshChange&)> listener);  ///< after a step that changed the mesh
 
  private:
   struct Impl;
@@ -146,8 +150,8 @@ class AnySimulation {
 };
 
 template <>
-Simulation<2>& AnySimulation::as<2>();
+Simulation<2>& AnySimulation::as<2>();  ///< in 2D
 template <>
-Simulation<3>& AnySimulation::as<3>();
+Simulation<3>& AnySimulation::as<3>();  ///< in 3D
 
 }  // namespace itr

@@ -51,7 +51,7 @@ class Model {
   /// A law of the program's own for a body that the options give a material: its E, nu (a scale) and density stay.
   void set_law(int body, std::shared_ptr<const OwnLaw> law);
 
-  int dimension() const { return dimension_; }
+  int dimension() const { return dimension_; }  ///< 2 or 3
 
  private:
   friend class AnySimulation;
