@@ -142,7 +142,7 @@ def results(context):
             cells = cells if bar is Bar or context.quick else cells // 2  # the falling one takes 2.4 times the steps
             runs.append(run(context, bar, integrator, cells, courant))
             yield from judge(f"{bar.name}, {integrator}", runs[-1])
-            if not context.quick:
+            if not context.quick and (bar is Bar or integrator != "ImplicitEuler"):
                 runs.append(run(context, bar, integrator, cells, courant, remesh=1e-4))
                 yield from judge(f"{bar.name}, {integrator}, remeshed", runs[-1])
     if context.quick:
@@ -168,10 +168,10 @@ def results(context):
 def by_one(context):
     """The bar that bounces over a period where one thing changes: pairs of a label and its motion."""
     for integrator, (_, courant) in INTEGRATORS.items():
-        motion_of = lambda cells=50, share=1, dhat=2e-3: run(context, Bar, integrator, cells, courant * share, dhat=dhat, periods=1)
+        motion_of = lambda cells=25, share=1, dhat=2e-3: run(context, Bar, integrator, cells, max(courant, 0.1) * share, dhat=dhat, periods=1)
         common = motion_of()
         for cells in (25, 50, 100):
-            yield f"{integrator}, cells", common if cells == 50 else motion_of(cells=cells)
+            yield f"{integrator}, cells", common if cells == 25 else motion_of(cells=cells)
         for share in (4, 2, 1):
             yield f"{integrator}, dt", common if share == 1 else motion_of(share=share)
         for dhat in (8e-2, 2e-2, 2e-3):
@@ -182,7 +182,7 @@ def over_periods(context):
     """Energy of the bar that bounces."""
     periods, motions = 10, []
     for integrator in INTEGRATORS:
-        motion = run(context, Bar, integrator, 25, 0.2, periods=periods)
+        motion = run(context, Bar, integrator, 25, 0.4, periods=periods)
         motions.append(motion)
         free = np.abs(motion.pressure) == 0  # in contact the barrier has a share
         energy = motion.energy[free] / Bar.energy
