@@ -384,8 +384,8 @@ TEST_F(OutputTest, FindsAnEdgeFoldedOntoItsNeighbour) {
   plane.obstacle_x = {};
   plane.obstacle_edges = {};
   const auto violations = violations_of(plane);
-  ASSERT_FALSE(violations.empty());
-  EXPECT_EQ(violations[0], "frames/000000.h5: edges (0, 1) and (0, 4) intersect");
+  EXPECT_NE(std::find(violations.begin(), violations.end(), "frames/000000.h5: edges (0, 1) and (0, 4) intersect"),
+            violations.end());
   plane.x[9] = -0.1;
   EXPECT_TRUE(violations_of(plane).empty());
 }

@@ -354,7 +354,7 @@ TEST(Remesh3d, SwapsFindFacetsWhoseRemovalGains) {
   int removed = 0;
   std::mt19937 random(1);
   for (int i = 0; i < 100; ++i) {
-    Mesh<3> two({{0, 0, 0}, {1, 0, 0}, {0.5, 0.9, 0}, {0.5, 0.3, 0.8}, {0.5, 0.3, -0.8}}, {{0, 1, 2, 3}, {0, 2, 1, 4}},
+    Mesh<3> two({{0, 0, 0}, {1, 0, 0}, {0.5, 0.9, 0}, {0.5, 0.3, 0.4}, {0.5, 0.3, -0.4}}, {{0, 1, 2, 3}, {0, 2, 1, 4}},
                 {1, 1});
     for (VertexId v = 0; v < 5; ++v) two.set_vertex_tag(v, 9);
     const Swapped swapped(two, 0.2, random);

@@ -15,7 +15,6 @@ STORED = {
     "verification/paper/results.csv": CODE,
     "verification/newton/results.csv": ("src/newton", "include/itr/newton"),
     "verification/scaling/results.csv": LINEAR,
-    "verification/scaling/million.csv": CODE,
     "verification/solvers/results.csv": LINEAR,
     "verification/solvers/end_to_end.csv": LINEAR,
     "verification/stability/results.csv": CODE,

@@ -36,8 +36,8 @@ Pick pick_solver(const MatrixTraits& traits, Registry& registry);
 double estimate_factor_bytes(const MatrixTraits& traits);
 
 /// Picks at each analysis, and tells the logger when the pick changes. Where factors are estimated not to fit, CHOLMOD's
-/// analysis has the last word, once a time step: the estimate is that of a cube. `options` by canonical name. A pick that cannot be
-/// created is an analysis that failed. `registry` must outlive it.
+/// analysis has the last word, once a time step: the estimate is that of a cube. `options` by canonical name. A pick that
+/// cannot be created is an analysis that failed. `registry` must outlive it.
 std::unique_ptr<Solver> make_auto_solver(Registry& registry, bool may_be_indefinite, Logger logger,
                                          std::map<std::string, SolverOptions> options = {});
 
