@@ -43,10 +43,16 @@ STUDIES = {
                  "to t = 0.5: the bar has landed on the spikes"),
     "twisting-beam-3d": ("twisting-beam/twisting-beam.json",
                          ["--set", "/time/tend=0.05", "--tolerances", "40,10", "--levels", "1", "--frames", "5",
-                          "--series", "uniform,itr", "--time-limit", "900"], "to t = 0.05: a twist of 18 degrees"),
+                          "--series", "uniform,itr,smoothing", "--time-limit", "900"], "to t = 0.05: a twist of 18 degrees"),
     "masticator-3d": ("masticator/3D.json",
                       ["--set", "/time/tend=1.1", "--tolerances", "0.016,0.004", "--levels", "1", "--frames", "4",
-                       "--series", "uniform,itr", "--time-limit", "900"], "to t = 1.1: the first contact"),
+                       "--series", "uniform,itr,smoothing", "--time-limit", "900"], "to t = 1.1: the first contact"),
+    "ball-wall-3d": ("ball-wall/3D.json",
+                     ["--set", "/time/tend=0.00132", "--tolerances", "1e-4,2.5e-5", "--levels", "1", "--frames", "6",
+                      "--series", "uniform,itr,smoothing", "--time-limit", "900"], "to t = 1.32 ms: into the impact"),
+    "spikes3d": ("spikes3d/drop-ball.json",
+                 ["--set", "/time/tend=0.35", "--tolerances", "1,0.1", "--levels", "1", "--frames", "5",
+                  "--series", "uniform,itr", "--time-limit", "900"], "to t = 0.35: the ball has reached the spikes"),
 }
 FILES = ("study.md", "study.csv", "study.json", "study.svg")
 MEASURES = {"l2": "L2", "h1": "H1", "energy": "energy"}
