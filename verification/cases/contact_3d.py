@@ -44,7 +44,10 @@ def patches(context):
         errors = [patch(context, below, above, dhat) for dhat in gaps]
         note = "errors " + ", ".join(f"{e:.2e}" for e in errors) + " for dhat of 1e-5 to 1e-8"
         yield Result(f"patch test, {below} cells on {above}: stress at the smallest dhat, L2", errors[-1], 1e-3, note=note)
-        order = float(fitted_order(gaps[1:], errors[1:]))  # where vertices lie over faces it is reached later, the finer the later
+        # Where vertices lie over faces it is reached later, the finer the later; elsewhere it is there at once, and at 1e-8 the
+        # error is that of steps that are ended at 1e-11 m.
+        fitted = slice(0, 3) if below == above else slice(1, 4)
+        order = float(fitted_order(gaps[fitted], errors[fitted]))
         yield Result(f"patch test, {below} cells on {above}: order of the stress's error in dhat", excess(1, order),
                      0.1 if below == above else None, order, 1)
 
