@@ -37,13 +37,17 @@ double chain_error(Solver& solver, int n) {
   return error;
 }
 
+/// Iterations end at a residual of 1e-10, of a matrix whose condition is up to a million.
+double most_error(const Solver& solver) { return solver.capabilities().iterative ? 1e-4 : 1e-9; }
+
 /// Twice in a row: a session can follow another.
 bool solve_in_group(int group, MPI_Comm communicator) {
   int rank = 0;
   MPI_Comm_rank(communicator, &rank);
   bool good = true;
-  for (const char* name : {"mumps", "mumps:spd"}) {
+  for (const char* name : {"mumps", "mumps:spd", "belos:muelu"}) {
     Registry registry;
+    if (!registry.find(name).available) continue;
     if (rank > 0) {
       registry.serve(name, &communicator);
       continue;
@@ -53,13 +57,13 @@ bool solve_in_group(int group, MPI_Comm communicator) {
       const auto first = registry.create(name), second = registry.create(name);
       for (Solver* solver : {first.get(), second.get(), first.get()}) {
         const double error = chain_error(*solver, 1000 + 500 * group);
-        good = good && error >= 0 && error < 1e-9;
+        good = good && error >= 0 && error < most_error(*solver);
       }
     }
     registry.disconnect(name);
     const auto alone = registry.create(name);  // on this rank alone again
     const double error = chain_error(*alone, 100);
-    good = good && error >= 0 && error < 1e-9;
+    good = good && error >= 0 && error < most_error(*alone);
   }
   return good;
 }

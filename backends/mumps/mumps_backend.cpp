@@ -5,19 +5,17 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <mutex>
 #include <string_view>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "../common/blas.hpp"
-#include "../common/mpi_session.hpp"
 #include "../common/ordering.hpp"
+#include "../common/rank_session.hpp"
 #include "itr/linear/module_adapter.hpp"
 
 #ifdef ITR_MUMPS_HAS_SCOTCH
@@ -40,29 +38,12 @@ double count(MUMPS_INT n) { return n >= 0 ? n : -1e6 * n; }
 
 constexpr int kInit = -1, kEnd = -2, kAnalyze = 1, kFactorize = 2, kSolve = 3;
 
-/// What rank 0 sends: a job of MUMPS for one instance.
-struct Command {
-  int job = 0;  ///< 0: the session is over
-  int instance = 0;
-  int symmetry = 0;  ///< with kInit
-};
-constexpr int kCommandTag = 71;
-constexpr int kCommandSize = 3;
+using itr::backends::RankCommand;
 
 /// MUMPS is not re-entrant; everything below and every call of it happens under this lock.
 std::mutex lock;
 
-struct Session {
-  MPI_Comm communicator = MPI_COMM_NULL;  ///< of rank 0 and those who serve; null: not connected
-  int ranks = 1;
-  int number = 0;  ///< grows with each connect: instances of an older one are void
-  int instances = 0;
-} session;
-
-void send(const Command& command) {
-  for (int rank = 1; rank < session.ranks; ++rank)
-    MPI_Send(&command, kCommandSize, MPI_INT, rank, kCommandTag, session.communicator);
-}
+itr::backends::RankSession session;
 
 void run(DMUMPS_STRUC_C& mumps, int job) {
   mumps.job = job;
@@ -188,7 +169,7 @@ class Mumps {
 
   /// An instance on its own rank does not care who connects or leaves.
   bool is_alive() const {
-    return session_ >= 0 && (!is_shared_ || session_ == session.number) && itr::backends::mpi_is_running();
+    return session_ >= 0 && (!is_shared_ || session_ == session.number()) && itr::backends::mpi_is_running();
   }
   int gone() {
     std::snprintf(text_.data(), text_.size(), "the MPI ranks of this solver are gone");
@@ -203,17 +184,17 @@ class Mumps {
       std::snprintf(text_.data(), text_.size(), "MPI does not run");
       return false;
     }
-    session_ = session.number;
-    is_shared_ = session.communicator != MPI_COMM_NULL;
-    instance_ = ++session.instances;
+    session_ = session.number();
+    is_shared_ = session.is_shared();
+    instance_ = session.new_instance();
     is_factorized_ = false;
-    if (is_shared_) send({kInit, instance_, Symmetry});
-    init(mumps_, Symmetry, is_shared_ ? session.communicator : MPI_COMM_SELF);
+    if (is_shared_) session.send({kInit, instance_, Symmetry});
+    init(mumps_, Symmetry, session.communicator());
     return infog(mumps_, 1) >= 0;
   }
   void end() {
     if (is_alive()) {
-      if (is_shared_) send({kEnd, instance_, 0});
+      if (is_shared_) session.send({kEnd, instance_, 0});
       run(mumps_, kEnd);
     }
     session_ = -1;
@@ -229,7 +210,7 @@ class Mumps {
   double foreseen_flops() const { return mumps_.rinfog[0]; }
 
   int job(int number) {
-    if (is_shared_) send({number, instance_, 0});
+    if (is_shared_) session.send({number, instance_, 0});
     run(mumps_, number);
     const int status = infog(mumps_, 1);
     std::snprintf(text_.data(), text_.size(), "MUMPS status %d (%d)", status, infog(mumps_, 2));
@@ -263,67 +244,32 @@ class Mumps {
   std::array<char, 96> text_{};
 };
 
-/// Collective over rank 0 and those who serve.
-bool join(const void* communicator) {
-  if (itr::backends::prepare_mpi(communicator == nullptr) != ITR_OK) return false;
-  if (session.communicator != MPI_COMM_NULL) return false;
-  const MPI_Comm all = communicator ? *static_cast<const MPI_Comm*>(communicator) : MPI_COMM_WORLD;
-  if (MPI_Comm_dup(all, &session.communicator) != MPI_SUCCESS) return false;  // our messages do not meet the caller's
-  MPI_Comm_size(session.communicator, &session.ranks);
-  ++session.number;
-  return true;
-}
-
-void leave() {
-  MPI_Comm_free(&session.communicator);
-  session.communicator = MPI_COMM_NULL;
-  session.ranks = 1;
-  ++session.number;
-}
-
 void disconnect() {
   const std::scoped_lock guard(lock);
-  if (session.communicator == MPI_COMM_NULL || !itr::backends::mpi_is_running()) return;
-  send({});
-  leave();
+  session.end();
 }
 
 int connect(const void* communicator) {
   const std::scoped_lock guard(lock);
-  if (!join(communicator)) return ITR_FAILED;
+  if (!session.join(communicator)) return ITR_FAILED;
   // A program that ends without a word must not leave the others waiting.
   static const int registered = std::atexit(disconnect);
   return registered == 0 ? ITR_OK : ITR_FAILED;
 }
 
-/// Waits without burning the core that rank 0 may be using.
-Command next_command() {
-  using namespace std::chrono_literals;
-  constexpr auto kLongest = 200us;
-  auto pause = 5us;
-  for (int there = 0;; pause = std::min(2 * pause, kLongest)) {
-    MPI_Iprobe(0, kCommandTag, session.communicator, &there, MPI_STATUS_IGNORE);
-    if (there) break;
-    std::this_thread::sleep_for(pause);
-  }
-  Command command;
-  MPI_Recv(&command, kCommandSize, MPI_INT, 0, kCommandTag, session.communicator, MPI_STATUS_IGNORE);
-  return command;
-}
-
 int serve(const void* communicator) {
   const std::scoped_lock guard(lock);
-  if (!join(communicator)) return ITR_FAILED;
+  if (!session.join(communicator)) return ITR_FAILED;
   std::map<int, DMUMPS_STRUC_C> instances;
-  for (Command command = next_command(); command.job != 0; command = next_command()) {
+  for (RankCommand command = session.next_command(); command.job != 0; command = session.next_command()) {
     DMUMPS_STRUC_C& mumps = instances[command.instance];
     if (command.job == kInit)
-      init(mumps, command.symmetry, session.communicator);
+      init(mumps, command.argument, session.communicator());
     else
       run(mumps, command.job);
     if (command.job == kEnd) instances.erase(command.instance);
   }
-  leave();
+  session.leave();
   return ITR_OK;
 }
 

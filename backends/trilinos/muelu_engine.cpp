@@ -2,79 +2,88 @@
 // Belos' conjugate gradients preconditioned by MueLu's smoothed aggregation, for systems too large to factorise. The
 // near-null space is that of the rigid body modes at the positions that the analysis is given (Vanek, Mandel & Brezina
 // 1996); nodes with held components are filled up with unit rows, so that every node has the same number of unknowns.
-#include <BelosPseudoBlockCGSolMgr.hpp>
-#include <BelosTpetraAdapter.hpp>
-#include <MueLu_CreateTpetraPreconditioner.hpp>
-#include <Teuchos_DefaultMpiComm.hpp>
-#include <Tpetra_CrsMatrix.hpp>
-#include <Tpetra_MultiVector.hpp>
-
-#include <algorithm>
+// Rank 0 owns the system; matrix, hierarchy and vectors are spread over it and those who serve.
 #include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "../common/full_matrix.hpp"
-#include "itr/linear/iteration_options.hpp"
+#include "../common/rank_session.hpp"
+#include "muelu_part.hpp"
 #include "trilinos.hpp"
 
 namespace itr::backends {
 
 namespace {
 
-using Map = Tpetra::Map<>;
-using Matrix = Tpetra::CrsMatrix<double>;
-using Vectors = Tpetra::MultiVector<double>;
-using Operator = Tpetra::Operator<double>;
-using Teuchos::RCP;
+constexpr int kBegin = 1, kAnalyze = 2, kFactorize = 3, kSolve = 4, kEnd = 5;
 
-/// Rows 0 .. order-1, all on this rank (MPI_COMM_SELF).
-RCP<const Map> make_map(int order) {
-  const auto self = Teuchos::rcp(new Teuchos::MpiComm<int>(MPI_COMM_SELF));
-  return Teuchos::rcp(new Map(order, 0, self));
+RankSession session;  // under Trilinos' lock
+
+/// What fails on one rank leaves the others waiting for it: all of them end.
+[[noreturn]] void give_up(const std::exception& error) {
+  std::fprintf(stderr, "belos:muelu over %d ranks: %s\n", session.ranks(), error.what());
+  MPI_Abort(session.communicator(), 1);
+  std::abort();
 }
 
-RCP<Matrix> make_matrix(const RCP<const Map>& map, const FullMatrix& full) {
-  const auto entries = static_cast<Teuchos_Ordinal>(full.indices.size());
-  Teuchos::ArrayRCP<size_t> starts(static_cast<Teuchos_Ordinal>(full.starts.size()));
-  Teuchos::ArrayRCP<int> indices(entries);
-  Teuchos::ArrayRCP<double> values(entries);
-  std::copy(full.starts.begin(), full.starts.end(), starts.begin());
-  std::copy(full.indices.begin(), full.indices.end(), indices.begin());
-  std::copy(full.values.begin(), full.values.end(), values.begin());
-  const auto matrix = Teuchos::rcp(new Matrix(map, map, starts, indices, values));
-  matrix->fillComplete(map, map);
-  return matrix;
-}
-
-void set_values(Matrix& matrix, const FullMatrix& full) {
-  matrix.resumeFill();
-  for (int i = 0; i < full.order; ++i) {
-    const int first = full.starts[i], count = full.starts[i + 1] - first;
-    matrix.replaceLocalValues(i, count, &full.values[first], &full.indices[first]);
-  }
-  matrix.fillComplete(matrix.getDomainMap(), matrix.getRangeMap());
-}
-
-RCP<Vectors> make_vectors(const RCP<const Map>& map, int columns) { return Teuchos::rcp(new Vectors(map, columns)); }
-
-/// Positive definite wherever the diagonal is positive, whatever the rest of the matrix.
-class Jacobi final : public Operator {
+/// Rank 0's side of an instance, or of one that works on its own rank alone.
+class SharedPart {
  public:
-  explicit Jacobi(const Matrix& matrix) : inverse_(matrix.getRowMap()) {
-    Tpetra::Vector<double> diagonal(matrix.getRowMap());
-    matrix.getLocalDiagCopy(diagonal);
-    inverse_.reciprocal(diagonal);
+  SharedPart()
+      : number_(session.number()),
+        is_shared_(session.is_shared()),
+        instance_(session.new_instance()),
+        communicator_(session.communicator()) {
+    call(kBegin, [&] { part_ = std::make_unique<MueluPart>(communicator_); });
   }
-  RCP<const Map> getDomainMap() const override { return inverse_.getMap(); }
-  RCP<const Map> getRangeMap() const override { return inverse_.getMap(); }
-  void apply(const Vectors& X, Vectors& Y, Teuchos::ETransp, double, double) const override {
-    Y.elementWiseMultiply(1, inverse_, X, 0);
+  ~SharedPart() {
+    if (is_alive()) call(kEnd, [&] { part_.reset(); });
   }
+  SharedPart(const SharedPart&) = delete;
+  SharedPart& operator=(const SharedPart&) = delete;
+
+  void analyze(const MueluSystem& system) {
+    call(kAnalyze, [&] { part_->analyze(system); });
+  }
+  void factorize(const std::vector<double>& values) {
+    call(kFactorize, [&] { part_->factorize(values); });
+  }
+  int solve(const std::vector<double>& b, std::vector<double>& x, const linear::IterationOptions& options) {
+    int outcome = ITR_FAILED;
+    call(kSolve, [&] { outcome = part_->solve(b, x, options); });
+    return outcome;
+  }
+  int iterations() const { return part_->iterations(); }
+  const std::string& message() const { return part_->message(); }
 
  private:
-  Tpetra::Vector<double> inverse_;
+  /// One on its own rank does not care who connects or leaves.
+  bool is_alive() const { return !is_shared_ || number_ == session.number(); }
+
+  template <typename F>
+  void call(int job, F&& f) {
+    if (!is_alive()) throw std::runtime_error("the MPI ranks of this solver are gone");
+    if (!is_shared_) return f();
+    session.send({job, instance_, 0});
+    try {
+      f();
+    } catch (const std::exception& error) {
+      give_up(error);
+    }
+  }
+
+  int number_;
+  bool is_shared_;
+  int instance_;
+  MPI_Comm communicator_;
+  std::unique_ptr<MueluPart> part_;
 };
 
 class Muelu {
@@ -82,45 +91,31 @@ class Muelu {
   int set_option(std::string_view key, std::string_view value) { return options_.set(key, value) ? ITR_OK : ITR_FAILED; }
 
   int analyze(const itr_pattern& pattern, const itr_hints& hints) {
-    preconditioner_ = Teuchos::null;
-    coordinates_ = null_space_ = Teuchos::null;
-    matrix_ = Teuchos::null;
+    part_.reset();
     fill_up(pattern, hints);
     const itr_pattern padded{static_cast<int32_t>(starts_.size() - 1), starts_.data(), rows_.data()};
     full_.set_pattern(padded);
-    map_ = make_map(full_.order);
-    matrix_ = make_matrix(map_, full_);
-    set_near_null_space(hints);
+    MueluSystem system{block_, full_.starts, full_.indices, {}, {}};
+    set_near_null_space(hints, system);
+    part_ = std::make_unique<SharedPart>();
+    part_->analyze(system);
     return ITR_OK;
   }
 
   int factorize(const double* values, size_t count) {
+    message_.clear();
     double diagonal = 0;
     for (const int p : diagonals_) {
-      if (!(values[p] > 0)) return fail(ITR_NOT_POSITIVE_DEFINITE, "a diagonal entry is not positive");
+      if (!(values[p] > 0)) {
+        message_ = "a diagonal entry is not positive";
+        return ITR_NOT_POSITIVE_DEFINITE;
+      }
       diagonal += values[p] / diagonals_.size();
     }
     lower_.assign(rows_.size(), diagonal);  // also of the unknowns that fill up nodes
     for (size_t k = 0; k < count; ++k) lower_[place_[k]] = values[k];
     full_.set_values(lower_.data(), lower_.size());
-    set_values(*matrix_, full_);
-
-    Teuchos::ParameterList list;
-    list.set("verbosity", "none");
-    list.set("number of equations", block_);
-    list.set("max levels", 10);
-    list.set("coarse: max size", 1000);
-    list.set("smoother: type", "CHEBYSHEV");
-    list.sublist("smoother: params").set("chebyshev: degree", 3);
-    list.sublist("smoother: params").set("chebyshev: ratio eigenvalue", 20.0);
-    // Ten power iterations, Ifpack2's default, fall short of the largest eigenvalue by more than its margin of 10 % where a
-    // few contacts or twisted elements have it; beyond it the polynomial may be negative, and the preconditioner indefinite.
-    list.sublist("smoother: params").set("chebyshev: eigenvalue max iterations", 50);
-    auto& user = list.sublist("user data");
-    user.set("Nullspace", null_space_);
-    if (!coordinates_.is_null()) user.set("Coordinates", coordinates_);
-    preconditioner_ = Teuchos::null;
-    preconditioner_ = MueLu::CreateTpetraPreconditioner(RCP<Operator>(matrix_), list);
+    part_->factorize(full_.values);
     return ITR_OK;
   }
 
@@ -129,8 +124,14 @@ class Muelu {
     int outcome = ITR_OK;
     for (int c = 0; c < columns; ++c) {
       const auto offset = static_cast<size_t>(c) * dofs_.size();
-      const int of_column = solve_one(rhs + offset, solution + offset);
-      if (of_column != ITR_OK && outcome != ITR_NOT_POSITIVE_DEFINITE) outcome = of_column;
+      b_.assign(full_.order, 0.0);
+      for (size_t i = 0; i < dofs_.size(); ++i) b_[dofs_[i]] = rhs[offset + i];
+      const int of_column = part_->solve(b_, x_, options_);
+      iterations_ += part_->iterations();
+      for (size_t i = 0; i < dofs_.size(); ++i) solution[offset + i] = x_[dofs_[i]];
+      if (of_column == ITR_OK || outcome == ITR_NOT_POSITIVE_DEFINITE) continue;
+      outcome = of_column;
+      message_ = part_->message();
     }
     return outcome;
   }
@@ -176,12 +177,10 @@ class Muelu {
   }
 
   /// Translations, and rotations about the mean position where positions are known.
-  void set_near_null_space(const itr_hints& hints) {
+  void set_near_null_space(const itr_hints& hints, MueluSystem& system) const {
     const bool has_positions = hints.coordinates && (block_ == 2 || block_ == 3);
     const int modes = !has_positions ? block_ : block_ == 2 ? 3 : 6;
-    null_space_ = make_vectors(map_, modes);
-    std::vector<Teuchos::ArrayRCP<double>> mode(modes);
-    for (int m = 0; m < modes; ++m) mode[m] = null_space_->getDataNonConst(m);
+    system.modes.assign(modes, std::vector<double>(full_.order));
     const auto order = static_cast<int>(dofs_.size());
     std::array<double, 3> center{};
     if (has_positions)
@@ -189,95 +188,91 @@ class Muelu {
         for (int c = 0; c < block_; ++c) center[c] += hints.coordinates[static_cast<size_t>(i) * block_ + c] / order;
     for (int i = 0; i < order; ++i) {
       const int row = dofs_[i], component = row % block_;
-      mode[component][row] = 1;
+      system.modes[component][row] = 1;
       if (!has_positions) continue;
       std::array<double, 3> r{};
       for (int c = 0; c < block_; ++c) r[c] = hints.coordinates[static_cast<size_t>(i) * block_ + c] - center[c];
       if (block_ == 2) {
-        mode[2][row] = component == 0 ? -r[1] : r[0];
+        system.modes[2][row] = component == 0 ? -r[1] : r[0];
       } else {  // e_k x r
         for (int k = 0; k < 3; ++k) {
           const std::array<double, 3> axis{double(k == 0), double(k == 1), double(k == 2)};
           const int a = (component + 1) % 3, b = (component + 2) % 3;
-          mode[3 + k][row] = axis[a] * r[b] - axis[b] * r[a];
+          system.modes[3 + k][row] = axis[a] * r[b] - axis[b] * r[a];
         }
       }
     }
     if (!has_positions) return;
-    const auto nodes = make_map(full_.order / block_);
-    coordinates_ = make_vectors(nodes, block_);
-    for (int c = 0; c < block_; ++c) {
-      auto column = coordinates_->getDataNonConst(c);
-      for (int i = 0; i < order; ++i) column[dofs_[i] / block_] = hints.coordinates[static_cast<size_t>(i) * block_ + c];
-    }
-  }
-
-  int solve_one(const double* rhs, double* solution) {
-    const auto b = make_vectors(map_, 1), x = make_vectors(map_, 1);
-    {
-      auto column = b->getDataNonConst(0);
-      for (size_t i = 0; i < dofs_.size(); ++i) column[dofs_[i]] = rhs[i];
-    }
-    int outcome = iterate(b, x, preconditioner_);
-    // Belos says the same of an indefinite matrix and of an indefinite preconditioner. Jacobi's cannot be that.
-    if (outcome == ITR_NOT_POSITIVE_DEFINITE) {
-      x->putScalar(0);
-      outcome = iterate(b, x, Teuchos::rcp(new Jacobi(*matrix_)));
-    }
-    const auto column = x->getData(0);
-    for (size_t i = 0; i < dofs_.size(); ++i) solution[i] = column[dofs_[i]];
-    return outcome;
-  }
-
-  /// Conjugate gradients; ITR_NOT_POSITIVE_DEFINITE where the matrix or the preconditioner turns out not to be.
-  int iterate(const RCP<Vectors>& b, const RCP<Vectors>& x, const RCP<Operator>& preconditioner) {
-    const auto problem = Teuchos::rcp(new Belos::LinearProblem<double, Vectors, Operator>(matrix_, x, b));
-    problem->setLeftPrec(preconditioner);
-    problem->setHermitian();
-    problem->setProblem();
-    const auto list = Teuchos::parameterList();
-    list->set("Convergence Tolerance", options_.tolerance);
-    list->set("Maximum Iterations", options_.max_iterations);
-    list->set("Implicit Residual Scaling", "Norm of RHS");
-    list->set("Verbosity", 0);
-    Belos::PseudoBlockCGSolMgr<double, Vectors, Operator> solver(problem, list);
-    try {
-      const bool converged = solver.solve() == Belos::Converged;
-      iterations_ += solver.getNumIters();
-      return converged ? ITR_OK : fail(ITR_NOT_CONVERGED, "the iterations did not converge");
-    } catch (const Belos::StatusTestError& error) {
-      return fail(ITR_NOT_CONVERGED, error.what());
-    } catch (const Belos::CGIterateFailure& error) {
-      return fail(ITR_NOT_POSITIVE_DEFINITE, error.what());
-    }
-  }
-
-  int fail(int outcome, const char* why) {
-    message_ = why;
-    return outcome;
+    system.coordinates.assign(block_, std::vector<double>(full_.order / block_));
+    for (int c = 0; c < block_; ++c)
+      for (int i = 0; i < order; ++i)
+        system.coordinates[c][dofs_[i] / block_] = hints.coordinates[static_cast<size_t>(i) * block_ + c];
   }
 
   linear::IterationOptions options_{1e-10, 1000};
   FullMatrix full_;
-  RCP<const Map> map_;
-  RCP<Matrix> matrix_;
-  RCP<Vectors> null_space_, coordinates_;
-  RCP<Operator> preconditioner_;
+  std::unique_ptr<SharedPart> part_;
   int block_ = 1;
   int iterations_ = 0;
   std::vector<int> dofs_;           ///< row of each unknown in the filled-up system
   std::vector<int> starts_, rows_;  ///< lower triangle of the filled-up system
   std::vector<int> place_;          ///< where each entry of the given triangle goes in it
   std::vector<int> diagonals_;      ///< of the given triangle
-  std::vector<double> lower_;
+  std::vector<double> lower_, b_, x_;
   std::string message_;
 };
+
+void disconnect() {
+  const std::scoped_lock guard(trilinos_lock());
+  session.end();
+}
+
+int connect(const void* communicator) {
+  const std::scoped_lock guard(trilinos_lock());
+  if (!session.join(communicator)) return ITR_FAILED;
+  // A program that ends without a word must not leave the others waiting.
+  static const int registered = std::atexit(disconnect);
+  return registered == 0 ? ITR_OK : ITR_FAILED;
+}
+
+void run(const RankCommand& command, std::map<int, std::unique_ptr<MueluPart>>& parts) {
+  if (command.job == kBegin) {
+    parts[command.instance] = std::make_unique<MueluPart>(session.communicator());
+    return;
+  }
+  MueluPart& part = *parts.at(command.instance);
+  std::vector<double> nothing;
+  if (command.job == kAnalyze) part.analyze({});
+  if (command.job == kFactorize) part.factorize(nothing);
+  if (command.job == kSolve) part.solve(nothing, nothing, {});
+  if (command.job == kEnd) parts.erase(command.instance);
+}
+
+int serve(const void* communicator) {
+  const std::scoped_lock guard(trilinos_lock());
+  if (!session.join(communicator) || !start_kokkos()) return ITR_FAILED;
+  std::map<int, std::unique_ptr<MueluPart>> parts;
+  for (RankCommand command = session.next_command(); command.job != 0; command = session.next_command()) {
+    try {
+      run(command, parts);
+    } catch (const std::exception& error) {
+      give_up(error);
+    }
+  }
+  parts.clear();
+  session.leave();
+  return ITR_OK;
+}
 
 }  // namespace
 
 itr_engine muelu_row(const char* version) {
-  return kokkos_row<Muelu>("belos:muelu", version, "BSD-3-Clause", ITR_ITERATIVE | ITR_TELLS_DEFINITENESS,
-                           linear::IterationOptions::kNames);
+  itr_engine engine = kokkos_row<Muelu>("belos:muelu", version, "BSD-3-Clause",
+                                        ITR_ITERATIVE | ITR_TELLS_DEFINITENESS | ITR_MPI, linear::IterationOptions::kNames);
+  engine.connect = connect;
+  engine.disconnect = disconnect;
+  engine.serve = serve;
+  return engine;
 }
 
 }  // namespace itr::backends
