@@ -68,9 +68,31 @@ TEST(Simulation, FreeFallIsExact) {
   for (int step = 1; step <= 10; ++step) {
     const auto result = simulation.advance();
     ASSERT_TRUE(result.ok) << result.reason;
+    EXPECT_LE(result.report.newton_iterations, step == 1 ? 2 : 0) << "flight is foreseen";
     // Implicit Euler: v_k = -g h k, x_k = x_0 - g h^2 k (k + 1) / 2.
     EXPECT_NEAR(simulation.state().history.x[0][1], -10 * 1e-4 * step * (step + 1) / 2, 1e-12);
   }
+}
+
+/// Newton may begin elsewhere than the step, but the step is the same.
+TEST(Simulation, EndsWhereItEndsWithoutForesight) {
+  auto setup = impact();
+  setup.newton.step_tolerance = 1e-11;
+  setup.time.steps = 20;
+  auto blind = setup;
+  blind.newton.indefinite = IndefiniteHessian::accept;  // begins where the step does
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry), other(blind, registry);
+  int iterations = 0, more = 0;
+  while (!simulation.finished()) {
+    const auto result = simulation.advance(), expected = other.advance();
+    ASSERT_TRUE(result.ok && expected.ok) << result.reason << expected.reason;
+    iterations += result.report.newton_iterations;
+    more += expected.report.newton_iterations;
+  }
+  EXPECT_LT(iterations, more);
+  const VectorX &x = simulation.state().history.x[0], &y = other.state().history.x[0];
+  EXPECT_LE((x - y).lpNorm<Eigen::Infinity>(), 1e-9 * y.lpNorm<Eigen::Infinity>());
 }
 
 class Integrators : public ::testing::TestWithParam<TimeOptions> {};

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 5;
+constexpr std::int64_t kFormat = 6;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -169,6 +169,7 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   write_fields("x", state.history.x);
   write_fields("v", state.history.v);
   write_fields("a", state.history.a);
+  if (state.deviation.size() > 0) write_fields("deviation", {state.deviation});
   const BarrierStiffness& stiffness = state.stiffness;
   file.write("/checkpoint/barrier_stiffness",
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
@@ -216,6 +217,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.x = read_fields(file, "x");
   state.history.v = read_fields(file, "v");
   state.history.a = read_fields(file, "a");
+  if (auto deviation = read_fields(file, "deviation"); !deviation.empty()) state.deviation = std::move(deviation[0]);
   const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;
   if (stiffness.size() != 3)
     throw InputError(

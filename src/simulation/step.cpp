@@ -80,7 +80,7 @@ class StepAttempt {
       tools_.solver.restore(before_.factor);
     }
     make_problem();
-    NewtonSummary summary = solve();
+    NewtonSummary summary = solve(expected());
     if (!summary.converged()) return failed(summary);
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
     if (setup_.remesh.enabled) {
@@ -104,9 +104,19 @@ class StepAttempt {
     problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.history, next_.t, tools_.cache, next_.stiffness);
   }
 
+  bool has_inertia() const { return !setup_.time.quasistatic && !setup_.time.is_static; }
+
+  /// Where forces that act as in the last step lead to; empty without inertia.
+  VectorX expected() const {
+    if (!has_inertia()) return {};
+    VectorX x = TimeIntegrator(setup_.time).predictor(next_.history);
+    if (next_.deviation.size() == x.size()) x += next_.deviation;
+    return x;
+  }
+
   /// From x, where what is lagged is lagged first.
-  NewtonSummary solve() {
-    NewtonSummary summary = problem_->solve(x_, VectorX(x_));
+  NewtonSummary solve(const VectorX& expected = {}) {
+    NewtonSummary summary = problem_->solve(x_, VectorX(x_), expected);
     add_seconds(summary, report_.seconds);
     report_.newton_iterations += summary.iterations;
     report_.indefinite += summary.indefinite;
@@ -169,7 +179,9 @@ class StepAttempt {
       start->stiffness = before_.stiffness;
       start->created_energy = before_.created_energy;
       start->history.damp_next = before_.history.damp_next;
+      if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
+    if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     TimeIntegrator(setup_.time).push(std::move(x_), next_.history);
     state = std::move(next_);
     stop_clocks();

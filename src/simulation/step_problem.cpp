@@ -160,9 +160,7 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
 /// x with held dofs at their targets, where the straight way there is free.
 template <int Dim>
 VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
-  VectorX start = x;
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] == kNone) start[i] = held_.target[i];
+  const VectorX start = with_held_at_targets(x);
   const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
                     potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
   return free ? start : x;
@@ -212,26 +210,36 @@ int StepProblem<Dim>::most_rounds() const {
   return rounds;
 }
 
-/// Bodies go about where inertia leads them, what is held to its target.
+/// x with held dofs at their targets.
 template <int Dim>
-void StepProblem<Dim>::foresee_contact(const VectorX& x) {
-  if (!potential_.contact()) return;
-  VectorX way = VectorX::Zero(x.size());
-  if (potential_.inertia()) way = potential_.inertia()->predictor() - x;
+VectorX StepProblem<Dim>::with_held_at_targets(VectorX x) const {
   for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] == kNone) way[i] = held_.target[i] - x[i];
-  potential_.contact()->foresee(surface_.positions(x), surface_.motion(way), workspace_);
+    if (dofs_.unknown[i] == kNone) x[i] = held_.target[i];
+  return x;
+}
+
+/// Whether a solve from x had better begin at `start`: the way there is free, and the energy lower than where only what is
+/// held moves.
+template <int Dim>
+bool StepProblem<Dim>::is_better_start(const VectorX& start, const VectorX& x) {
+  const EnergySum sum = potential_.sum(lagged_);
+  return sum.max_step(x, start - x, workspace_) == 1 &&
+         sum.value(start, workspace_) < sum.value(with_held_at_targets(x), workspace_);
 }
 
 template <int Dim>
-NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x) {
+NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
   double lagging_seconds = 0;
   {
     const ScopedTimer timer(lagging_seconds);
-    foresee_contact(x);
+    const VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
+    if (potential_.contact()) potential_.contact()->foresee(surface_.positions(x), surface_.motion(start - x), workspace_);
     const bool is_first_step = std::isinf(stiffness_.largest);
     if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
     lagged_ = potential_.lag(lagged_x, workspace_);
+    // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
+    const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
+    if (expected.size() > 0 && may_move && is_better_start(start, x)) x = start;
   }
   NewtonSummary summary = minimize_lagged(x);
   summary.assembly_seconds += lagging_seconds;

@@ -31,6 +31,7 @@ struct State {
   BarrierStiffness stiffness;   ///< where it is adaptive
   RemeshMemory remesh_memory;   ///< what remeshing refused, and need not ask again
   linear::FactorRecord factor;  ///< that may serve the next step
+  VectorX deviation;            ///< x less x-hat of the last step, with which the next one begins; empty: there was none [m]
   double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 

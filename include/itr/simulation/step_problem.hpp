@@ -43,8 +43,9 @@ class StepProblem {
               const BarrierStiffness& stiffness = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
-  /// the first round they are lagged at `lagged_x`.
-  NewtonSummary solve(VectorX& x, const VectorX& lagged_x);
+  /// the first round they are lagged at `lagged_x`. Newton begins where the bodies are `expected` (empty: nowhere), if the
+  /// way there is free and the energy lower.
+  NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected = {});
 
   /// With friction lagged at x, so that numbers compare between meshes and with other codes; else as in the last solve.
   EnergyReport report(const VectorX& x);
@@ -71,7 +72,8 @@ class StepProblem {
   NewtonSummary minimize_lagged(VectorX& x);
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
-  void foresee_contact(const VectorX& x);
+  VectorX with_held_at_targets(VectorX x) const;
+  bool is_better_start(const VectorX& start, const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
   int most_rounds() const;
   VectorX momentum(const VectorX& v) const;

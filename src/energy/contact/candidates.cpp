@@ -137,11 +137,11 @@ std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, cons
 }  // namespace
 
 template <int Dim>
-double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const VectorX* dx, double reach) const {
+double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const VectorX* dx, double reach, double share) {
   double motion = 0;
   if (dx)
     for (const int v : surface.vertices) motion = std::max(motion, at<Dim>(*dx, v).norm());
-  return 0.5 * reach + 0.25 * motion;
+  return 0.5 * reach + share * motion;
 }
 
 template <int Dim>
@@ -158,9 +158,9 @@ bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorV
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx,
-                                         double reach) {
-  room_ = room_for(surface, dx, reach);
+void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach,
+                                         double share) {
+  room_ = room_for(surface, dx, reach, share);
   boxes_.assign(surface.vertices.size(), {});
   reach_.resize(surface.area.size());
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
@@ -174,13 +174,14 @@ void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstV
 
 template <int Dim>
 void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach) {
-  if (!holds(surface, x, dx, room_for(surface, dx, reach))) search(surface, x, dx, reach);
+  if (!holds(surface, x, dx, room_for(surface, dx, reach, kUnforeseen))) search(surface, x, dx, reach, kUnforeseen);
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach) {
+void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach,
+                                    double share) {
   const bool keep_trees = surface_ == &surface;
-  build_boxes(surface, x, dx, reach);
+  build_boxes(surface, x, dx, reach, share);
   surface_ = &surface;
   const auto edge_boxes = boxes_of<Dim>(surface.edges, reach_);
   const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);

@@ -17,12 +17,14 @@ template <int Dim>
 class ContactCandidates {
  public:
   using Pairs = std::vector<std::array<int, 2>>;
+  /// Room around a motion, as a share of the longest: where steps of a solve lead, and where a solve is expected to go.
+  static constexpr double kUnforeseen = 0.25, kForeseen = 0.02;
 
   /// Makes the pairs hold for x and, where it is given, for the motion by dx. `reach`: pairs that come nearer than this
   /// count.
   void update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
-  /// That, whatever was found before. Search trees of the surface are used again.
-  void search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
+  /// That, whatever was found before, with this share of the motion for room. Search trees of the surface are used again.
+  void search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach, double share);
 
   /// The lists that there are in this dimension, each with the kind of its pairs.
   std::array<std::pair<PairKind, const Pairs*>, Dim - 1> all() const {
@@ -37,9 +39,9 @@ class ContactCandidates {
 
  private:
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
-  double room_for(const CollisionSurface& surface, const VectorX* dx, double reach) const;
+  static double room_for(const CollisionSurface& surface, const VectorX* dx, double reach, double share);
   bool holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double room) const;
-  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
+  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach, double share);
 
   const CollisionSurface* surface_ = nullptr;
   double room_ = 0;              ///< around the motion of the last search [m]

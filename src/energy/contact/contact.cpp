@@ -330,7 +330,8 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
 
 template <int Dim>
 void ContactEnergy<Dim>::foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const {
-  workspace.get<ContactCandidates<Dim>>().search(surface_, x, &dx, dhat_);
+  using Candidates = ContactCandidates<Dim>;
+  workspace.get<Candidates>().search(surface_, x, &dx, dhat_, Candidates::kForeseen);
 }
 
 template <int Dim>
