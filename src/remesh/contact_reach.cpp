@@ -40,19 +40,28 @@ std::span<const typename Neighbourhoods<Dim>::Near> Neighbourhoods<Dim>::near(co
                                                                               double radius, Hits& hits) {
   if (static_cast<int>(entries_.size()) <= f) entries_.resize(2 * f + 16);
   Entry& entry = entries_[f];
-  if (entry.stamp == surface.stamp(f) && entry.radius >= radius) return entry.near;
+  const bool is_wide = entry.radius >= radius;
+  if (is_wide && entry.stamp == surface.stamp(f)) return entry.near;
+  // Where the facet is where it was, only what has changed around it is looked at.
+  const bool is_there = is_wide && surface.changed(f) <= entry.stamp;
+  const auto has_changed = [&](int other) { return other >= 0 && surface.changed(other) > entry.stamp; };
+  if (is_there)
+    std::erase_if(entry.near, [&](const Near& known) { return has_changed(known.piece); });
+  else
+    entry.near.clear();
+  entry.radius = std::max(entry.radius, radius);
   const SurfacePiece<Dim> piece = surface.piece(f);
-  entry.near.clear();
-  entry.radius = radius;
-  entry.stamp = surface.stamp(f);
-  surface.query(piece.box.inflated(radius), hits);
+  surface.query(piece.box.inflated(entry.radius), hits);
   const auto look_at = [&](int other, const SurfacePiece<Dim>& there) {
-    const double distance = distance_below(piece, there, radius);
-    if (distance < radius) entry.near.push_back({other, distance});
+    const double distance = distance_below(piece, there, entry.radius);
+    if (distance < entry.radius) entry.near.push_back({other, distance});
   };
   for (const FacetId other : hits.facets)
-    if (other != f) look_at(other, surface.piece(other));
-  for (const int i : hits.obstacles) look_at(of_obstacle(i), surface.obstacle_piece(i));
+    if (other != f && (!is_there || has_changed(other))) look_at(other, surface.piece(other));
+  if (!is_there)
+    for (const int i : hits.obstacles) look_at(of_obstacle(i), surface.obstacle_piece(i));
+  std::sort(entry.near.begin(), entry.near.end(), [](const Near& a, const Near& b) { return a.piece < b.piece; });
+  entry.stamp = surface.stamp(f);
   return entry.near;
 }
 

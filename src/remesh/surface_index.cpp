@@ -2,6 +2,7 @@
 #include "surface_index.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace itr {
 
@@ -37,6 +38,7 @@ SurfaceIndex<Dim>::SurfaceIndex(const Mesh<Dim>& mesh, const VectorX& x, const O
                                 const std::vector<Vec<Dim>>& obstacle_x, double span)
     : mesh_(&mesh), x_(&x), primitives_(&primitives), obstacle_x_(&obstacle_x), span_(span) {
   stamps_.assign(mesh.facet_slots(), now_);
+  changed_ = stamps_;
   std::vector<Box<Dim>> boxes(mesh.facet_slots());
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.is_facet_alive(f)) boxes[f] = box_of(f);
@@ -90,7 +92,9 @@ template <int Dim>
 void SurfaceIndex<Dim>::follow(std::span<const FacetId> removed, FacetId first_new) {
   ++now_;
   stamps_.resize(mesh_->facet_slots(), now_);
+  changed_.resize(mesh_->facet_slots(), now_);
   for (const FacetId f : removed) {
+    changed_[f] = std::numeric_limits<unsigned>::max();
     stamp_near(facets_.box(f));
     facets_.remove(f);
   }
@@ -107,6 +111,7 @@ void SurfaceIndex<Dim>::move(VertexId v) {
   Box<Dim> around;
   for (const FacetId f : mesh_->facets_of(v)) {
     const Box<Dim> box = box_of(f);
+    changed_[f] = now_;
     around.include(facets_.box(f));
     around.include(box);
     facets_.update(f, box);

@@ -52,6 +52,8 @@ class SurfaceIndex {
   const ObstaclePrimitives& primitives() const { return *primitives_; }
   /// Changes (and is never 0) whenever something changes nearer than span() to the facet.
   unsigned stamp(FacetId f) const { return stamps_[f]; }
+  /// The stamp of the last change of the facet itself; later than all others where it is gone.
+  unsigned changed(FacetId f) const { return changed_[f]; }
   double span() const { return span_; }
   SurfacePiece<Dim> piece(FacetId f) const;
   SurfacePiece<Dim> obstacle_piece(int primitive) const;
@@ -65,7 +67,7 @@ class SurfaceIndex {
   const ObstaclePrimitives* primitives_;
   const std::vector<Vec<Dim>>* obstacle_x_;
   double span_;
-  std::vector<unsigned> stamps_;
+  std::vector<unsigned> stamps_, changed_;  ///< by facet
   unsigned now_ = 1;
   std::vector<FacetId> stamped_;
   DynamicTree<Dim> facets_;

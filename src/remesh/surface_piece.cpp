@@ -2,32 +2,20 @@
 #include "surface_piece.hpp"
 
 #include <cmath>
-#include <initializer_list>
 
 namespace itr {
 
 namespace {
 
-/// Whether the boxes around some points of two pieces are further apart than `reach`: most pairs are, and this is cheap.
+/// The largest distance between two boxes along an axis; negative where they overlap. Most pairs are apart, and this is
+/// cheap.
 template <int Dim>
-bool is_apart(const SurfacePiece<Dim>& a, std::initializer_list<int> i, const SurfacePiece<Dim>& b,
-              std::initializer_list<int> j, double reach) {
-  const auto coordinate = [](const SurfacePiece<Dim>& piece, int c) { return [&piece, c](int k) { return piece.p[k][c]; }; };
-  const auto least = [](std::initializer_list<int> ids, const auto& of) {
-    double value = of(*ids.begin());
-    for (const int k : ids) value = std::min(value, of(k));
-    return value;
-  };
-  const auto most = [](std::initializer_list<int> ids, const auto& of) {
-    double value = of(*ids.begin());
-    for (const int k : ids) value = std::max(value, of(k));
-    return value;
-  };
-  for (int c = 0; c < Dim; ++c)
-    if (least(i, coordinate(a, c)) - most(j, coordinate(b, c)) > reach ||
-        least(j, coordinate(b, c)) - most(i, coordinate(a, c)) > reach)
-      return true;
-  return false;
+double gap(const Box<Dim>& a, const Box<Dim>& b) {
+  return std::max((a.min - b.max).maxCoeff(), (b.min - a.max).maxCoeff());
+}
+template <int Dim>
+double gap(const Vec<Dim>& p, const Box<Dim>& box) {
+  return gap<Dim>(Box<Dim>{p, p}, box);
 }
 
 /// Calls visit(squared distance) for pairs of primitives that may be within `reach`, which it gives back as it is then;
@@ -36,7 +24,7 @@ template <typename Visit>
 void visit_vertices(const SurfacePiece<2>& a, const SurfacePiece<2>& b, double& reach, const Visit& visit) {
   if (b.size < 2) return;
   for (int k = 0; k < a.size && reach >= 0; ++k)
-    if (!b.has(a.id[k]) && !is_apart(a, {k}, b, {0, 1}, reach))
+    if (gap<2>(a.p[k], b.box) <= reach && !b.has(a.id[k]))
       reach = visit(point_edge_distance_squared<2>(a.p[k], b.p[0], b.p[1]));
 }
 
@@ -44,20 +32,29 @@ template <typename Visit>
 void visit_vertices(const SurfacePiece<3>& a, const SurfacePiece<3>& b, double& reach, const Visit& visit) {
   if (b.size < 3) return;
   for (int k = 0; k < a.size && reach >= 0; ++k)
-    if (!b.has(a.id[k]) && !is_apart(a, {k}, b, {0, 1, 2}, reach))
+    if (gap<3>(a.p[k], b.box) <= reach && !b.has(a.id[k]))
       reach = visit(point_triangle_distance_squared(a.p[k], b.p[0], b.p[1], b.p[2]));
 }
 
 template <typename Visit>
 void visit_edges(const SurfacePiece<3>& a, const SurfacePiece<3>& b, double& reach, const Visit& visit) {
-  const auto edges = [](const SurfacePiece<3>& piece) { return piece.size == 3 ? 3 : piece.size - 1; };
-  for (int i = 0; i < edges(a); ++i) {
+  const auto number = [](const SurfacePiece<3>& piece) { return piece.size == 3 ? 3 : piece.size - 1; };
+  std::array<Box<3>, 3> boxes;
+  for (int j = 0; j < number(b); ++j) {
+    boxes[j].include(b.p[j]);
+    boxes[j].include(b.p[(j + 1) % b.size]);
+  }
+  for (int i = 0; i < number(a); ++i) {
     const int i1 = (i + 1) % a.size;
-    for (int j = 0; j < edges(b) && reach >= 0; ++j) {
+    Box<3> box;
+    box.include(a.p[i]);
+    box.include(a.p[i1]);
+    if (gap(box, b.box) > reach) continue;
+    for (int j = 0; j < number(b) && reach >= 0; ++j) {
+      if (gap(box, boxes[j]) > reach) continue;
       const int j1 = (j + 1) % b.size;
       const bool meet = a.id[i] == b.id[j] || a.id[i] == b.id[j1] || a.id[i1] == b.id[j] || a.id[i1] == b.id[j1];
-      if (!meet && !is_apart(a, {i, i1}, b, {j, j1}, reach))
-        reach = visit(edge_edge_distance_squared(a.p[i], a.p[i1], b.p[j], b.p[j1]));
+      if (!meet) reach = visit(edge_edge_distance_squared(a.p[i], a.p[i1], b.p[j], b.p[j1]));
     }
   }
 }

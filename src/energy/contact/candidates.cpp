@@ -2,7 +2,8 @@
 #include "candidates.hpp"
 
 #include <algorithm>
-#include <numeric>
+#include <cstdint>
+#include <cstring>
 
 #include "itr/core/parallel.hpp"
 
@@ -79,6 +80,44 @@ bool are_few_edge_pairs(const CollisionSurface& surface) {
   return number_that_counts(surface, surface.edges) * surface.edges.size() < kFewPairs;
 }
 
+/// Boxes side by side, so that one is compared with several at once.
+template <int Dim>
+class BoxTable {
+ public:
+  explicit BoxTable(const std::vector<Box<Dim>>& boxes) : overlaps_((boxes.size() + kStride - 1) / kStride * kStride) {
+    for (int c = 0; c < Dim; ++c) {
+      min_[c].resize(boxes.size());
+      max_[c].resize(boxes.size());
+      for (std::size_t i = 0; i < boxes.size(); ++i) {
+        min_[c][i] = boxes[i].min[c];
+        max_[c][i] = boxes[i].max[c];
+      }
+    }
+  }
+  /// Calls visit(i) for all that overlap, ascending.
+  template <typename Visit>
+  void visit_overlaps(const Box<Dim>& box, const Visit& visit) {
+    for (int c = 0; c < Dim; ++c) {
+      const double *min = min_[c].data(), *max = max_[c].data(), low = box.min[c], high = box.max[c];
+      char* overlaps = overlaps_.data();
+      for (std::size_t i = 0; i < min_[c].size(); ++i)
+        overlaps[i] = static_cast<char>((c == 0 || overlaps[i]) & (min[i] <= high) & (max[i] >= low));
+    }
+    for (std::size_t first = 0; first < overlaps_.size(); first += kStride) {
+      std::uint64_t any = 0;
+      std::memcpy(&any, &overlaps_[first], kStride);
+      if (any == 0) continue;
+      for (std::size_t i = first; i < first + kStride; ++i)
+        if (overlaps_[i]) visit(static_cast<int>(i));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kStride = sizeof(std::uint64_t);
+  std::array<std::vector<double>, Dim> min_, max_;
+  std::vector<char> overlaps_;  ///< 0 behind the last
+};
+
 /// (vertex, primitive) for all that overlap, share no vertex, and of which one counts. `tree` is not needed for few pairs.
 template <int Dim, std::size_t N>
 std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
@@ -88,20 +127,19 @@ std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
   const auto matters = [&](int v, int i) {
     return !contains(primitives[i], v) && (counts(surface, v) || counts(surface, primitives[i]));
   };
-  std::vector<std::array<int, 2>> pairs;
-  if (are_few(surface, primitives)) {
-    std::vector<int> all(primitives.size()), counting;
-    std::iota(all.begin(), all.end(), 0);
-    for (const int i : all)
-      if (counts(surface, primitives[i])) counting.push_back(i);
-    for (const int v : surface.vertices)
-      for (const int i : counts(surface, v) ? all : counting)
-        if (vertex_boxes[v].overlaps(boxes[i]) && matters(v, i)) pairs.push_back({v, i});
-    return pairs;
-  }
   Box<Dim> counting;  // what does not count only meets what does
   for (std::size_t i = 0; i < primitives.size(); ++i)
     if (counts(surface, primitives[i])) counting.include(boxes[i]);
+  if (are_few(surface, primitives)) {
+    std::vector<std::array<int, 2>> pairs;
+    BoxTable<Dim> table(boxes);
+    for (const int v : surface.vertices)
+      if (counts(surface, v) || vertex_boxes[v].overlaps(counting))
+        table.visit_overlaps(vertex_boxes[v], [&](int i) {
+          if (matters(v, i)) pairs.push_back({v, i});
+        });
+    return pairs;
+  }
   return collect(surface.vertices.size(), [&](int k, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     const int v = surface.vertices[k];
     if (!counts(surface, v) && !vertex_boxes[v].overlaps(counting)) return;
@@ -115,22 +153,23 @@ template <int Dim>
 std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes,
                                            const Bvh<Dim>& tree) {
   const auto& edges = surface.edges;
-  const bool few = are_few_edge_pairs(surface);
+  const auto consider = [&](int e, int f, std::vector<std::array<int, 2>>& found) {
+    const bool both = counts(surface, edges[f]);
+    if (both ? f <= e : f == e) return;
+    if (contains(edges[e], edges[f][0]) || contains(edges[e], edges[f][1])) return;
+    found.push_back({std::min(e, f), std::max(e, f)});
+  };
+  if (are_few_edge_pairs(surface)) {
+    std::vector<std::array<int, 2>> pairs;
+    BoxTable<Dim> table(boxes);
+    for (int e = 0; e < static_cast<int>(edges.size()); ++e)
+      if (counts(surface, edges[e])) table.visit_overlaps(boxes[e], [&](int f) { consider(e, f, pairs); });
+    return pairs;
+  }
   return collect(edges.size(), [&](int e, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
-    const auto consider = [&](int f) {
-      const bool both = counts(surface, edges[f]);
-      if (both ? f <= e : f == e) return;
-      if (contains(edges[e], edges[f][0]) || contains(edges[e], edges[f][1])) return;
-      found.push_back({std::min(e, f), std::max(e, f)});
-    };
-    if (few) {
-      for (std::size_t f = 0; f < edges.size(); ++f)
-        if (boxes[e].overlaps(boxes[f])) consider(static_cast<int>(f));
-      return;
-    }
     find_overlaps(tree, boxes[e], hits);
-    for (const int f : hits) consider(f);
+    for (const int f : hits) consider(e, f, found);
   });
 }
 

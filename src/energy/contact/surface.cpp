@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 #include "itr/mesh/validate.hpp"
@@ -23,23 +24,47 @@ Adjacency group(int n, const std::vector<std::array<int, 2>>& pairs) {
   return result;
 }
 
+/// Lists those of the triangles too, each edge once, ascending; says which are a triangle's.
+void sort_edges(CollisionSurface& surface) {
+  struct Side {
+    std::uint64_t edge;  ///< smaller vertex, then the other
+    std::size_t number;  ///< 3 * triangle + k; behind all of these where it is of none
+  };
+  std::vector<Side> sides;
+  sides.reserve(surface.edges.size() + 3 * surface.triangles.size());
+  const auto add = [&](int a, int b, std::size_t number) {
+    sides.push_back({static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint64_t>(std::max(a, b)), number});
+  };
+  const std::size_t of_none = 3 * surface.triangles.size();
+  for (const auto& [a, b] : surface.edges) add(a, b, of_none);
+  for (std::size_t i = 0; i < of_none; ++i) add(surface.triangles[i / 3][i % 3], surface.triangles[i / 3][(i + 1) % 3], i);
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.edge < b.edge; });
+  surface.edges.clear();
+  surface.triangle_edges.resize(surface.triangles.size());
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const auto [edge, number] = sides[i];
+    if (i == 0 || edge != sides[i - 1].edge)
+      surface.edges.push_back({static_cast<int>(edge >> 32), static_cast<int>(edge & 0xffffffff)});
+    if (number < of_none) surface.triangle_edges[number / 3][number % 3] = static_cast<int>(surface.edges.size()) - 1;
+  }
+}
+
 void add_topology_of_triangles(std::span<const Vec<3>> rest, CollisionSurface& surface) {
   const int num_edges = static_cast<int>(surface.edges.size()), num_vertices = static_cast<int>(rest.size());
   std::vector<std::array<int, 2>> opposites, star;
   std::vector<double> triangle_area(num_vertices, 0);
+  opposites.reserve(3 * surface.triangles.size());
+  star.reserve(2 * surface.edges.size());
   surface.edge_area.assign(num_edges, 0);
-  for (const auto& triangle : surface.triangles) {
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    const auto &triangle = surface.triangles[i], &edges = surface.triangle_edges[i];
     const Vec<3>&a = rest[triangle[0]], &b = rest[triangle[1]], &c = rest[triangle[2]];
     const double third = (b - a).cross(c - a).norm() / 6;
-    std::array<int, 3> edges{};
     for (int k = 0; k < 3; ++k) {
-      const std::array key{std::min(triangle[k], triangle[(k + 1) % 3]), std::max(triangle[k], triangle[(k + 1) % 3])};
-      edges[k] = static_cast<int>(std::lower_bound(surface.edges.begin(), surface.edges.end(), key) - surface.edges.begin());
       opposites.push_back({edges[k], triangle[(k + 2) % 3]});
       surface.edge_area[edges[k]] += third;
       triangle_area[triangle[k]] += third;
     }
-    surface.triangle_edges.push_back(edges);
   }
   for (int v = 0; v < num_vertices; ++v)
     if (triangle_area[v] > 0) surface.area[v] = triangle_area[v];
@@ -67,12 +92,7 @@ CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, s
   surface.edges = std::move(edges);
   surface.triangles = std::move(triangles);
   surface.counts = std::move(counts);
-  for (const auto& t : surface.triangles)
-    for (int k = 0; k < 3; ++k) surface.edges.push_back({t[k], t[(k + 1) % 3]});
-  for (auto& [a, b] : surface.edges)
-    if (a > b) std::swap(a, b);
-  std::sort(surface.edges.begin(), surface.edges.end());
-  surface.edges.erase(std::unique(surface.edges.begin(), surface.edges.end()), surface.edges.end());
+  sort_edges(surface);
 
   surface.area.assign(rest.size(), 0);
   surface.degree.assign(rest.size(), 0);
