@@ -11,6 +11,25 @@ namespace itr {
 namespace {
 constexpr const char* kNonzeros = "nonzeros of the Newton system";
 constexpr std::size_t kEntriesPerTask = 2048;
+
+/// An entry of the base pattern, and the number of the blocks that is added to it.
+struct Target {
+  int nonzero, source;
+};
+
+/// Stable, digit by digit: many times faster than by comparisons. Numbers are below `end`.
+void sort_by_nonzero(std::vector<Target>& targets, std::size_t end) {
+  constexpr int kBits = 11;
+  std::vector<Target> sorted(targets.size());
+  for (int shift = 0; end >> shift > 0; shift += kBits) {
+    std::array<std::size_t, (1 << kBits) + 1> first{};
+    const auto digit = [&](const Target& target) { return target.nonzero >> shift & ((1 << kBits) - 1); };
+    for (const Target& target : targets) ++first[digit(target) + 1];
+    for (int d = 0; d < 1 << kBits; ++d) first[d + 1] += first[d];
+    for (const Target& target : targets) sorted[first[digit(target)]++] = target;
+    targets.swap(sorted);
+  }
+}
 }  // namespace
 
 DofMap DofMap::from_held(const std::vector<char>& held) {
@@ -65,7 +84,7 @@ const SparseAssembler::Gather& SparseAssembler::gather(std::size_t batch) {
   if (!result.offset.empty()) return result;
   const std::size_t first = batch * kBatch, count = std::min(kBatch, num_stencils() - first);
   const int side = dim_ * stencil_size_;
-  std::vector<std::pair<int, int>> entries;  // entry of the base, number of the blocks
+  std::vector<Target> entries;
   entries.reserve(count * side * (side + 1) / 2);
   std::vector<int> unknown(side);
   for (std::size_t s = 0; s < count; ++s) {
@@ -75,20 +94,22 @@ const SparseAssembler::Gather& SparseAssembler::gather(std::size_t batch) {
       if (unknown[j] == kNone) continue;
       const auto begin = base_.row_indices.begin() + base_.column_starts[unknown[j]];
       const auto end = base_.row_indices.begin() + base_.column_starts[unknown[j] + 1];
+      auto at = begin;
       for (int i = 0; i < side; ++i) {
         if (unknown[i] < unknown[j]) continue;  // above the diagonal, or held
-        const auto at = std::lower_bound(begin, end, unknown[i]) - base_.row_indices.begin();
-        entries.emplace_back(static_cast<int>(at), static_cast<int>((s * side + j) * side + i));
+        // Rows of one vertex follow each other.
+        if (at == end || ++at == end || *at != unknown[i]) at = std::lower_bound(begin, end, unknown[i]);
+        entries.push_back({static_cast<int>(at - base_.row_indices.begin()), static_cast<int>((s * side + j) * side + i)});
       }
     }
   }
-  std::sort(entries.begin(), entries.end());
+  sort_by_nonzero(entries, base_.row_indices.size());
   for (std::size_t k = 0; k < entries.size(); ++k) {
-    if (k == 0 || entries[k].first != entries[k - 1].first) {
-      result.nonzero.push_back(entries[k].first);
+    if (k == 0 || entries[k].nonzero != entries[k - 1].nonzero) {
+      result.nonzero.push_back(entries[k].nonzero);
       result.offset.push_back(static_cast<int>(k));
     }
-    result.source.push_back(entries[k].second);
+    result.source.push_back(entries[k].source);
   }
   result.offset.push_back(static_cast<int>(entries.size()));
   return result;
