@@ -215,6 +215,46 @@ bool knows_all_terms(const StepContext<Dim>& context) {
 }
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
+/// Share of what is forgotten that no relaxation gets back (ball-wall 2D: all of it refuses a sixth more vertices).
+constexpr double kLeastForgotten = 0.3;
+
+/// About what an edit forgets of the predictor (see add_unrepresented_history) where it takes a vertex away or moves it: the
+/// gap between both functions where that was, times its hat function on the old cells.
+template <int Dim, typename At>
+double predict_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit, const At& at) {
+  double forgotten = 0;
+  for (const VertexId v : {edit.value->vertex, edit.removed_vertex}) {
+    if (v == kNone || v == kNewVertex) continue;
+    const Vec<Dim>& X = state.mesh.rest(v);
+    double mass = 0;
+    for (const CellId c : edit.removed_cells) {
+      const auto& cell = state.mesh.cell(c);
+      if (std::find(cell.begin(), cell.end(), v) != cell.end())
+        mass += state.context.materials.at(state.mesh.body(c)).density * state.mesh.volume(c) / (Dim + 1);
+    }
+    // There in the new mesh.
+    double deepest = -std::numeric_limits<double>::infinity();
+    Vec<Dim> way, predictor;
+    for (const auto& [cell, body] : edit.inserted_cells) {
+      std::array<Vec<Dim>, Dim + 1> rest;
+      for (int k = 0; k <= Dim; ++k) rest[k] = cell[k] == edit.value->vertex ? edit.value->rest : state.mesh.rest(cell[k]);
+      const Vec<Dim> weights = edge_matrix<Dim>(rest).inverse() * (X - rest[0]);
+      const double depth = std::min(weights.minCoeff(), 1 - weights.sum());
+      if (depth <= deepest) continue;
+      deepest = depth;
+      way = predictor = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) {
+        const double weight = k == 0 ? 1 - weights.sum() : weights[k - 1];
+        const Vec<Dim> x_hat = at(state.fields.predictor, cell[k], true);
+        predictor += weight * x_hat;
+        way += weight * (at(state.fields.x, cell[k], true) - x_hat);
+      }
+    }
+    const Vec<Dim> gap = state.fields.predictor.template segment<Dim>(Dim * v) - predictor;
+    forgotten += mass * (gap.squaredNorm() / (Dim + 2) - gap.dot(way));
+  }
+  return forgotten;
+}
 
 }  // namespace
 
@@ -264,7 +304,12 @@ double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
       for (const auto& facet : edit.inserted_facets) add_facet(facet.vertices, facet.tag, true, model, mover);
     return model;
   };
-  if (edit.value) return before(kNone).energy() - after(set).relaxed();
+  if (edit.value) {
+    double gain = before(kNone).energy() - after(set).relaxed();
+    if (context.has_inertia && state.history == HistoryRule::function && edit.kind != Edit<Dim>::Kind::split)
+      gain -= kLeastForgotten * predict_forgotten<Dim>(state, edit, at);
+    return gain;
+  }
   // Nothing is set: each vertex gives way, by itself, to what the edit adds to its forces. Here the cells of the edit
   // alone resist, in the mesh those around them too.
   constexpr double kShareOfRelaxation = 0.25;
