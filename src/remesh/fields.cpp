@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "itr/remesh/fields.hpp"
 
+#include <algorithm>
+
 namespace itr {
 
 template <int Dim>
@@ -9,9 +11,22 @@ void RemeshFields<Dim>::follow(const Edit<Dim>& edit, VertexId created) {
   for_each([&](VectorX& field) {
     const Vec<Dim> value = interpolate(field, *edit.value);
     const VertexId v = created == kNone ? edit.value->vertex : created;
-    if (created != kNone) field.conservativeResize(field.size() + Dim);
+    if (field.size() < Dim * (v + 1)) field.conservativeResize(Dim * (v + 1));
     field.template segment<Dim>(Dim * v) = value;
   });
+}
+
+template <int Dim>
+void RemeshFields<Dim>::make_room(int vertices) {
+  const Eigen::Index least = Dim * static_cast<Eigen::Index>(vertices);
+  for_each([&](VectorX& field) {
+    if (field.size() < least) field.conservativeResize(std::max(least, field.size() + field.size() / 2));
+  });
+}
+
+template <int Dim>
+void RemeshFields<Dim>::trim(int vertices) {
+  for_each([&](VectorX& field) { field.conservativeResize(Dim * static_cast<Eigen::Index>(vertices)); });
 }
 
 template struct RemeshFields<2>;

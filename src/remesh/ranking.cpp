@@ -69,7 +69,7 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   std::vector<Vec<Dim>> rest(total);
   for (int v = 0; v < bodies; ++v) rest[v] = mesh.rest(v);
   VectorX x(Dim * total);
-  x.head(Dim * bodies) = fields.x;
+  x.head(Dim * bodies) = fields.x.head(Dim * bodies);
   for (int o = 0; o < total - bodies; ++o) {
     points.push_back(bodies + o);
     rest[bodies + o] = obstacles.rest[o];

@@ -25,6 +25,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
     if (options.smooth.enabled) smooth_vertices(session);
     if (report.accepted() == before) break;
   }
+  fields.trim(mesh.vertex_slots());
   report.trial_seconds = session.median_trial_seconds();
   memory = session.memory();
   return report;

@@ -233,6 +233,7 @@ void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
 
   const int first_cell = mesh_.cell_slots(), first_facet = mesh_.facet_slots();
   const VertexId created = mesh_.apply(edit);
+  fields_.make_room(mesh_.vertex_slots());
   fields_.follow(edit, created);
   gate_.follow(edit, first_facet);
   if constexpr (Dim == 3) strata_.follow(edit, created);

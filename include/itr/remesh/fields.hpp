@@ -37,6 +37,10 @@ struct RemeshFields {
   }
   /// Extends or updates all fields for an edit that was just applied and created `created` (or kNone).
   void follow(const Edit<Dim>& edit, VertexId created);
+  /// Makes all fields as long as so many vertices need, and longer where they grow: edits then seldom copy them.
+  void make_room(int vertices);
+  /// Ends them behind so many vertices.
+  void trim(int vertices);
 };
 
 /// The terms of the step, as every local problem needs them, and what else the remesher asks of a scene.
