@@ -16,7 +16,11 @@ namespace itr::output {
 
 namespace {
 
-constexpr double kRelative = 1e-3, kOfExtent = 1e-6;
+// In 3D every edge of the other surface that runs below a piece asks for smaller ones, down to the tolerance.
+template <int Dim>
+constexpr double kRelative = Dim == 2 ? 1e-3 : 1e-2;
+template <int Dim>
+constexpr double kOfExtent = Dim == 2 ? 1e-6 : 1e-3;
 
 template <int Dim>
 using Facet = std::array<Vec<Dim>, Dim>;
@@ -50,8 +54,11 @@ class Surface {
     int facet;
     double distance;
   };
-  Nearest nearest(const Vec<Dim>& p) {
-    for (double radius = first_radius_;; radius *= 2) {
+  /// `guess`: a facet that may be near; kNone where none is known.
+  Nearest nearest(const Vec<Dim>& p, int guess) {
+    // Boxes are searched with some room: round-off loses no facet.
+    for (double radius = guess == kNone ? first_radius_ : (1 + 1e-9) * distance_to(p, facets_[guess]) + 1e-9 * first_radius_;
+         ; radius *= 2) {
       Box<Dim> box;
       box.include(p);
       hits_.clear();
@@ -75,6 +82,7 @@ template <int Dim>
 struct Piece {
   double bound;  ///< no point of it is farther from the surface
   Facet<Dim> corners;
+  std::array<int, Dim + 1> near;  ///< facets of the surface that are nearest to its corners and its centre
   bool operator<(const Piece& other) const { return bound < other.bound; }
 };
 
@@ -82,40 +90,45 @@ struct Piece {
 template <int Dim>
 double largest_distance(const std::vector<Facet<Dim>>& from, Surface<Dim>& to, double tolerance) {
   double reached = 0;
-  const auto make_piece = [&](const Facet<Dim>& corners) {
+  const auto nearest = [&](const Vec<Dim>& p, int guess) {
+    const auto found = to.nearest(p, guess);
+    reached = std::max(reached, found.distance);
+    return found.facet;
+  };
+  std::priority_queue<Piece<Dim>> queue;
+  const auto push = [&](const Facet<Dim>& corners, std::array<int, Dim + 1> near) {
     Vec<Dim> centre = Vec<Dim>::Zero();
-    std::array<int, Dim + 1> near{};
-    for (int k = 0; k < Dim; ++k) {
-      const auto nearest = to.nearest(corners[k]);
-      reached = std::max(reached, nearest.distance);
-      near[k] = nearest.facet;
-      centre += corners[k] / Dim;
-    }
-    const auto nearest = to.nearest(centre);
-    reached = std::max(reached, nearest.distance);
-    near[Dim] = nearest.facet;
-    Piece<Dim> piece{std::numeric_limits<double>::infinity(), corners};
+    for (const auto& p : corners) centre += p / Dim;
+    near[Dim] = nearest(centre, near[0]);
+    double bound = std::numeric_limits<double>::infinity();
     for (const int f : near) {
       double largest = 0;
       for (const auto& p : corners) largest = std::max(largest, distance_to(p, to.facet(f)));
-      piece.bound = std::min(piece.bound, largest);
+      bound = std::min(bound, largest);
     }
-    return piece;
+    queue.push({bound, corners, near});
   };
-  std::priority_queue<Piece<Dim>> queue;
-  for (const auto& facet : from) queue.push(make_piece(facet));
-  while (!queue.empty() && queue.top().bound > std::max((1 + kRelative) * reached, reached + tolerance)) {
-    const Facet<Dim> corners = queue.top().corners;
+  for (const auto& facet : from) {
+    std::array<int, Dim + 1> near{};
+    for (int k = 0; k < Dim; ++k) near[k] = nearest(facet[k], k == 0 ? kNone : near[0]);
+    push(facet, near);
+  }
+  while (!queue.empty() && queue.top().bound > std::max((1 + kRelative<Dim>)*reached, reached + tolerance)) {
+    const Piece<Dim> piece = queue.top();
     queue.pop();
+    const auto& corners = piece.corners;
     int a = 0, b = 1;  // the ends of the longest edge
     for (int i = 0; i < Dim; ++i)
       for (int j = i + 1; j < Dim; ++j)
         if ((corners[i] - corners[j]).squaredNorm() > (corners[a] - corners[b]).squaredNorm()) a = i, b = j;
     const Vec<Dim> middle = 0.5 * (corners[a] + corners[b]);
+    const int near_middle = nearest(middle, piece.near[Dim]);
     for (const int replaced : {a, b}) {
       Facet<Dim> half = corners;
+      std::array<int, Dim + 1> near = piece.near;
       half[replaced] = middle;
-      queue.push(make_piece(half));
+      near[replaced] = near_middle;
+      push(half, near);
     }
   }
   return reached;
@@ -128,7 +141,7 @@ double surface_distance(const std::vector<Facet<Dim>>& a, const std::vector<Face
   if (a.empty() || b.empty()) return 0;
   Box<Dim> box = box_of<Dim>(a);
   box.include(box_of<Dim>(b));
-  const double tolerance = kOfExtent * (box.max - box.min).norm();
+  const double tolerance = kOfExtent<Dim> * (box.max - box.min).norm();
   Surface<Dim> surface_a(a), surface_b(b);
   return std::max(largest_distance<Dim>(a, surface_b, tolerance), largest_distance<Dim>(b, surface_a, tolerance));
 }
