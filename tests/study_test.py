@@ -14,15 +14,15 @@ import xml.etree.ElementTree as ElementTree
 
 EXAMPLES = pathlib.Path(sys.argv.pop())
 ITR = sys.argv.pop()
-SMALL = ["--set", "/geometry/0/n_refs=1", "--set", "/time/dt=0.25", "--levels", "2", "--tolerances", "4000,500", "--frames", "4"]
+SMALL = ["--set", "/geometry/0/n_refs=1", "--set", "/time/dt=0.25", "--frames", "4"]
 
 
-def command(folder, *more):
-    return [ITR, "study", EXAMPLES / "cantilever.json", "-o", folder, *SMALL, *more]
+def command(folder, *more, levels=2, tolerances="4000,500"):
+    return [ITR, "study", EXAMPLES / "cantilever.json", "-o", folder, *SMALL, "--levels", str(levels), "--tolerances", tolerances, *more]
 
 
-def study(folder, *more, status=0):
-    done = subprocess.run(command(folder, *more), capture_output=True, text=True)
+def study(folder, *more, status=0, **options):
+    done = subprocess.run(command(folder, *more, **options), capture_output=True, text=True)
     assert done.returncode == status, done.stderr
     return done
 
@@ -83,6 +83,20 @@ class Study(unittest.TestCase):
         study(self.folder, "--series", "uniform,itr,solvers,time")
         self.assertEqual(frames, {path: path.stat().st_mtime_ns for path in self.folder.rglob("frames/*.h5")})
         self.assertEqual(before, (self.folder / "study.csv").read_text())
+
+    def test_says_what_its_levels_do_not_tell(self):
+        # More accurate than the finest uniform level and dearer: who would be ahead there is not known.
+        study(self.folder, "--series", "uniform,itr", levels=1, tolerances="5")
+        content = json.loads((self.folder / "study.json").read_text())
+        verdict = next(v for v in content["verdicts"] if (v["series"], v["measure"]) == ("itr", "energy"))
+        point = verdict["points"][0]
+        self.assertIsNone(point["time_ratio"])
+        self.assertGreater(point["seconds"], verdict["finest_uniform"]["seconds"])
+        self.assertEqual(verdict["untold_from"], point["error"])
+        self.assertIsNone(verdict["pays_from"])
+        sentence = next(s for s in content["answers"] if "`itr`" in s and s.startswith("error of the energy"))
+        self.assertIn("a finer uniform level would tell", sentence)
+        self.assertNotIn("does not pay", sentence)
 
     def test_goes_on_where_it_was_killed(self):
         whole, killed = self.folder / "whole", self.folder / "killed"

@@ -92,11 +92,14 @@ def error(value, measure):
 
 
 def pays(verdict):
+    largest, untold = verdict["points"][0]["error"], verdict.get("untold_from")
+    if untold == largest:
+        return "uniform levels do not tell"
     if verdict["pays_from"] is None:
-        return "no"
-    if verdict["pays_from"] == verdict["points"][0]["error"]:
-        return "yes"
-    return "from " + error(verdict["pays_from"], verdict["measure"])
+        answer = "no"
+    else:
+        answer = "yes" if verdict["pays_from"] == largest else "from " + error(verdict["pays_from"], verdict["measure"])
+    return answer if untold is None else f"{answer}; from {error(untold, verdict['measure'])} not told"
 
 
 def rows(name):

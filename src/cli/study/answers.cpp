@@ -98,7 +98,7 @@ std::optional<Verdict> judge(const Results& results, const Series& series, const
   const auto uniform_unknowns = front(points(results, "uniform", measure, unknowns));
   const auto own = front(points(results, series.name, measure, time));
   if (uniform.empty() || own.empty()) return std::nullopt;
-  Verdict verdict{&series, &measure, {}, {}, own.front().error, {}};
+  Verdict verdict{&series, &measure, {}, {}, {}, own.front().error, {}};
   verdict.finest_uniform = {uniform.back().error, 0, 0, 0};
   for (const auto& point : points(results, "uniform", measure, time))
     verdict.finest_uniform.seconds = std::max(verdict.finest_uniform.seconds, point.cost);
@@ -107,6 +107,10 @@ std::optional<Verdict> judge(const Results& results, const Series& series, const
     verdict.points.push_back(
         {point.error, point.cost, cost ? point.cost / *cost : kNan, size ? point.row->unknowns / *size : kNan});
     const bool pays = point.cost < cost.value_or(verdict.finest_uniform.seconds);
+    if (!pays && !cost) {
+      if (!verdict.untold_from) verdict.untold_from = point.error;
+      continue;
+    }
     if (!pays) verdict.pays_from.reset();
     if (pays && !verdict.pays_from) verdict.pays_from = point.error;
   }
@@ -132,9 +136,16 @@ std::string in_words(const Verdict& verdict) {
     text +=
         fmt::format(" {} takes it {:.3g} s; uniform refinement has come to {} after {:.3g} s.", show(last.error, measure),
                     last.seconds, show(verdict.finest_uniform.error, measure), verdict.finest_uniform.seconds);
-  if (!verdict.pays_from) return text + " It does not pay here.";
-  if (*verdict.pays_from == verdict.largest_error) return text + " It pays at all of these errors.";
-  return text + fmt::format(" It pays from {} on.", show(*verdict.pays_from, measure));
+  if (verdict.untold_from == verdict.largest_error) return text + " Whether it pays, a finer uniform level would tell.";
+  if (!verdict.pays_from)
+    text += " It does not pay here";
+  else if (*verdict.pays_from == verdict.largest_error)
+    text += " It pays at all of these errors";
+  else
+    text += fmt::format(" It pays from {} on", show(*verdict.pays_from, measure));
+  if (verdict.untold_from)
+    text += fmt::format("; from {} on a finer uniform level would tell", show(*verdict.untold_from, measure));
+  return text + ".";
 }
 
 /// Of the runs with dt and dt/2, against what the mesh leaves.

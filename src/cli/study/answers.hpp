@@ -30,6 +30,9 @@ struct Verdict {
   const Measure* measure;
   std::vector<Point> points;        ///< the largest error first; runs that another of the series beats are left out
   std::optional<double> pays_from;  ///< the largest error from which on it takes less time at all errors; none: nowhere
+  /// The largest error at which it takes longer than the finest uniform run, whose error is larger still: what uniform
+  /// refinement would take is not known from there on.
+  std::optional<double> untold_from;
   double largest_error = 0;
   Point finest_uniform;  ///< the least error of the uniform levels, and the seconds of the dearest
 };

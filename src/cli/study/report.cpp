@@ -59,6 +59,7 @@ Json to_json(const Verdict& verdict) {
   const auto number = [](double value) { return std::isnan(value) ? Json() : Json(value); };
   Json object = {{"series", verdict.series->name}, {"measure", verdict.measure->name}, {"points", Json::array()}};
   object["pays_from"] = verdict.pays_from ? Json(*verdict.pays_from) : Json();
+  object["untold_from"] = verdict.untold_from ? Json(*verdict.untold_from) : Json();
   for (const auto& point : verdict.points)
     object["points"].push_back({{"error", point.error},
                                 {"seconds", point.seconds},
