@@ -299,6 +299,31 @@ TEST(Remesh3d, KeepsVolumesAndTheStateValidAndHasTheSameBitsForAnyNumberOfThread
   EXPECT_GT(moved, 0);
 }
 
+/// All facets of a side of a cube are coplanar, and so is what a collapse there sweeps over.
+TEST(Gate3d, LetsCollapsesOnFlatSurfacesPass) {
+  const Mesh<3> mesh = make_cubes(
+      4, [](int i, int j, int k) { return Vec<3>(Vec<3>(i, j, k) / 4); }, [](int, int, int) { return 1; });
+  const Strata<3> strata(mesh);
+  RemeshFields<3> fields;
+  fields.x.resize(3 * mesh.vertex_slots());
+  for (int v = 0; v < mesh.vertex_slots(); ++v) fields.x.segment<3>(3 * v) = mesh.rest(v);
+  fields.past_positions = {fields.x};
+  StepContext<3> context;
+  context.contact = {.enabled = true, .activation_distance = 0.01};
+  context.obstacles.past_x.resize(1);
+  const Gate<3> gate(mesh, fields, context);
+  SurfaceIndex<3>::Hits hits;
+  int asked = 0, passed = 0;
+  for (const EdgeKey& edge : mesh.edges()) {
+    const auto proposal = propose_collapse<3>(mesh, strata, edge);
+    if (!proposal || proposal.edit->inserted_facets.empty()) continue;
+    ++asked;
+    passed += gate.passes(*proposal.edit, hits);
+  }
+  EXPECT_GT(asked, 20);
+  EXPECT_EQ(passed, asked);
+}
+
 TEST(Prediction3d, OfASplitAloneIsThatOfItsEdit) {
   for (unsigned seed = 0; seed < 5; ++seed) {
     const TetScene scene(seed);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "gate.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "contact_reach.hpp"
 #include "itr/geometry/predicates.hpp"
@@ -23,21 +25,56 @@ bool meet(const SurfacePiece<2>& a, const SurfacePiece<2>& b) {
   return a.size == 2 && b.size == 2 && segments_intersect(a.p[0], a.p[1], b.p[0], b.p[1]);
 }
 
+/// Whether p and q lie beyond one side of a triangle, by far more than round-off: then p-q does not cross it. Coplanar ones,
+/// of which flat surfaces are full, cost exact predicates most.
+bool are_beyond_a_side(const Vec<3>& p, const Vec<3>& q, const std::array<Vec<3>, 3>& t) {
+  constexpr double kFarAboveRoundOff = 1e-11;
+  const Vec<3> along = t[1] - t[0], across = t[2] - t[0], normal = along.cross(across);
+  const double scale = kFarAboveRoundOff * std::sqrt(along.squaredNorm() * across.squaredNorm());
+  for (int k = 0; k < 3; ++k) {
+    const Vec<3> side = t[(k + 1) % 3] - t[k], outward = side.cross(normal), to_p = p - t[k], to_q = q - t[k];
+    const double least = scale * side.norm();
+    if (outward.dot(to_p) > least * to_p.norm() && outward.dot(to_q) > least * to_q.norm()) return true;
+  }
+  return false;
+}
+
 /// Whether an edge of `a` that shares no corner with the triangle `b` crosses it.
 bool crosses(const SurfacePiece<3>& a, const SurfacePiece<3>& b) {
   if (b.size < 3 || a.size < 2) return false;
   for (int k = 0; k < (a.size == 3 ? 3 : 1); ++k) {
     const int l = (k + 1) % a.size;
-    if (!b.has(a.id[k]) && !b.has(a.id[l]) && segment_intersects_triangle(a.p[k], a.p[l], b.p[0], b.p[1], b.p[2]))
+    if (!b.has(a.id[k]) && !b.has(a.id[l]) && !are_beyond_a_side(a.p[k], a.p[l], b.p) &&
+        segment_intersects_triangle(a.p[k], a.p[l], b.p[0], b.p[1], b.p[2]))
       return true;
   }
   return false;
 }
 bool meet(const SurfacePiece<3>& a, const SurfacePiece<3>& b) { return crosses(a, b) || crosses(b, a); }
 
+template <int Dim>
+bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex);
+
+/// Of points on one line (in whose box it is) or in one plane.
+bool lies_in_flat(const Vec<2>&, const std::array<Vec<2>, 3>&) { return true; }
+bool lies_in_flat(const Vec<3>& point, const std::array<Vec<3>, 4>& simplex) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto projected = [axis](const Vec<3>& p) { return Vec<2>(p[(axis + 1) % 3], p[(axis + 2) % 3]); };
+    bool inside = false;  // one of the four triangles, which cover it
+    for (int k = 0; k < 4; ++k)
+      inside = inside || lies_in<2>(projected(point), {projected(simplex[k]), projected(simplex[(k + 1) % 4]),
+                                                       projected(simplex[(k + 2) % 4])});
+    if (!inside) return false;
+  }
+  return true;
+}
+
 /// Whether a point lies in a closed simplex of whatever orientation, or flat.
 template <int Dim>
 bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex) {
+  Box<Dim> box;
+  for (const auto& corner : simplex) box.include(corner);
+  if (!box.contains(point)) return false;
   bool positive = false, negative = false;
   for (int k = 0; k <= Dim; ++k) {
     auto corners = simplex;
@@ -46,6 +83,7 @@ bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex
     positive = positive || side > 0;
     negative = negative || side < 0;
   }
+  if (!positive && !negative) return lies_in_flat(point, simplex);
   return !(positive && negative);
 }
 
@@ -130,7 +168,7 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
   }
   const auto is_free_of = [&](const SurfacePiece<Dim>& other) {
     return std::none_of(inserted.begin(), inserted.end(),
-                        [&](const SurfacePiece<Dim>& piece) { return meet(piece, other); });
+                        [&](const SurfacePiece<Dim>& piece) { return piece.box.overlaps(other.box) && meet(piece, other); });
   };
   for (const FacetId f : hits.facets) {
     if (std::find(edit.removed_facets.begin(), edit.removed_facets.end(), f) != edit.removed_facets.end()) continue;
