@@ -116,6 +116,53 @@ TEST(Newton, CallsNoSaddleConverged) {
     }
 }
 
+/// Where not all digits are asked for, like iterations that end before they meet the first dof, and what curvature it has.
+class ShortSighted final : public NewtonSystem {
+ public:
+  explicit ShortSighted(double c) : c_(c) {}
+  void assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs, PrescribedMotion& motion,
+                Workspace& workspace) override {
+    curvature_ = 3 * x[1] * x[1] - c_;
+    exact_.assemble(energy, x, psd, dofs, motion, workspace);
+  }
+  linear::Outcome factorize(double shift) override { return exact_.factorize(shift); }
+  linear::Outcome prepare(double shift, const VectorX&, double asked) override {
+    residual_ = asked > kTightResidual && curvature_ > 0 ? asked : 0;
+    loose += residual_ > 0;
+    return residual_ > 0 ? linear::Outcome::ok : factorize(shift);
+  }
+  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override {
+    if (residual_ == 0) return exact_.solve(rhs, solution);
+    solution = Vec<2>(0, rhs[1] / curvature_);
+    return {linear::Outcome::ok, residual_};
+  }
+  std::string message() const override { return "short-sighted"; }
+  double diagonal_scale() const override { return exact_.diagonal_scale(); }
+  int loose = 0;  ///< solves
+
+ private:
+  DenseSystem exact_;
+  double c_, curvature_ = 0, residual_ = 0;
+};
+
+/// Directions may be loose, but what is said of the end is not.
+TEST(Newton, AsksAtTheEndForAllDigits) {
+  const double c = 1e-2;
+  for (const double tolerance : {1e-9, 0.0}) {
+    ShortSighted system(c);
+    VectorX x = Vec<2>(1e-12, 0.3);
+    NewtonOptions options = until_steps_below(1e-8);
+    options.gradient_tolerance = options.first_gradient_tolerance = tolerance;
+    Workspace workspace;
+    const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
+    const NewtonSummary summary = minimize(DoubleWell(c), x, dofs, VectorX(), system, options, workspace);
+    EXPECT_TRUE(summary.converged()) << summary.message;
+    EXPECT_GT(system.loose, 0);
+    EXPECT_GT(summary.indefinite, 0);
+    EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-6);  // the saddle is at 0
+  }
+}
+
 /// A saddle so flat that steps from it promise less than the energy resolves: not a place to end, and which of the equal
 /// minima follows must not hang on round-off in the gradient.
 TEST(Newton, LeavesASaddleWithinRoundOffToOneSide) {

@@ -22,8 +22,9 @@ constexpr double kWorthTrying = 0.7;  ///< share of a factorisation that iterati
 constexpr int kFewest = 4;            ///< iterations without which none is tried
 constexpr int kTellsRate = 6;         ///< iterations after which their rate is known roughly, to a factor of two
 constexpr int kLongestPause = 8;
-constexpr double kCertain = 1e-12;  ///< negative curvature, relative, that is no round-off
-constexpr double kNoise = 1e-2;     ///< of the right-hand side: what iterations start from in every direction
+constexpr double kCertain = 1e-12;     ///< negative curvature, relative, that is no round-off
+constexpr double kWholeSystem = 1e-8;  ///< residual of a system that counts as one
+constexpr double kNoise = 1e-2;        ///< of the right-hand side: what iterations start from in every direction
 
 double dot(std::span<const double> a, std::span<const double> b) {
   double sum = 0;
@@ -94,7 +95,7 @@ bool ReusingSolver::take_in(std::span<const double> values) {
   values_.assign(values.begin(), values.end());
   b_.clear();
   iterations_ = 0;
-  is_refused_ = false;
+  is_counted_ = is_refused_ = false;
   is_old_ = factor_.matrix && *factor_.matrix->pattern == *pattern_ && factor_.matrix->values == values_;
   return !is_old_;
 }
@@ -106,11 +107,12 @@ Outcome ReusingSolver::factorize(std::span<const double> values) {
 
 Outcome ReusingSolver::prepare(std::span<const double> values, std::span<const double> b, double asked) {
   if (!pattern_) return solver_.factorize(values);
-  if (!take_in(values)) return Outcome::ok;
+  const bool goes_on = !b_.empty() && std::ranges::equal(b, b_) && std::ranges::equal(values, values_);
+  if (!goes_on && !take_in(values)) return Outcome::ok;
   const auto n = static_cast<std::size_t>(pattern_->order);
-  if (values.size() == pattern_->nonzeros() && b.size() == n && is_worth_trying()) {
+  if (values.size() == pattern_->nonzeros() && b.size() == n && (goes_on || is_worth_trying())) {
     b_.assign(b.begin(), b.end());
-    if (iterate(b_, asked)) return Outcome::ok;
+    if (iterate(b_, asked, goes_on)) return Outcome::ok;
     b_.clear();
     if (is_refused_) return Outcome::not_positive_definite;
   }
@@ -134,10 +136,11 @@ Outcome ReusingSolver::factorize_now() {
 SolveReport ReusingSolver::solve(std::span<const double> B, std::span<double> X, int columns, double asked) {
   if (is_refused_) return {Outcome::not_positive_definite, std::numeric_limits<double>::infinity()};
   if (!b_.empty()) {
-    if (columns == 1 && X.size() == x_.size() && std::ranges::equal(B, b_) && report_.relative_residual <= asked) {
+    if (columns == 1 && X.size() == x_.size() && std::ranges::equal(B, b_)) {
       std::ranges::copy(x_, X.begin());
-      ++counts_.solves;
-      ++counts_.reused;
+      const bool is_new = !std::exchange(is_counted_, true);
+      counts_.solves += is_new;
+      counts_.reused += is_new;
       return report_;
     }
     b_.clear();
@@ -203,45 +206,58 @@ bool ReusingSolver::precondition(std::span<const double> residual, std::span<dou
   return solver_.solve(residual, z, 1, std::numeric_limits<double>::infinity()).outcome == Outcome::ok;
 }
 
-/// False where the system is to be factorised.
-bool ReusingSolver::iterate(std::span<const double> b, double asked) {
-  const double scale = norm(b);
+/// False where the system is to be factorised. `goes_on`: from what was reached for the same system.
+bool ReusingSolver::iterate(std::span<const double> b, double asked, bool goes_on) {
+  const double scale = norm(b), from = goes_on ? report_.relative_residual : 1;
   if (!(scale > 0) || !std::isfinite(scale)) return false;
-  const int used = run(asked * scale, most_iterations());
-  if (used > 0) {
-    multiply(*pattern_, values_, x_, q_);
-    for (std::size_t i = 0; i < b.size(); ++i) q_[i] = b[i] - q_[i];
-    report_ = {Outcome::ok, norm(q_) / scale};
+  if (goes_on && from <= asked) return true;
+  const int before = iterations_;
+  const bool is_there = (goes_on || begin()) && run(asked * scale, most_iterations() - before);
+  if (is_there) {
+    compute_residual();
+    report_ = {Outcome::ok, norm(r_) / scale};
   }
   if (is_refused_) return false;
-  if (used == 0 || !(report_.relative_residual <= asked)) {
+  if (!is_there || !(report_.relative_residual <= asked)) {
     factor_.pause = factor_.next_pause;
     factor_.next_pause = std::min(2 * factor_.next_pause, kLongestPause);
     return false;
   }
+  const int used = iterations_ - before;
+  const double part = std::log(asked / from) / std::log(kWholeSystem);
   factor_.spent += used * iteration_cost();
-  ++factor_.served;
-  factor_.iterations = used;
+  factor_.served += part;
+  factor_.iterations = used / part;
   factor_.next_pause = 1;
   return true;
 }
 
-/// Conjugate gradients to a residual of `target`. Returns their number, 0 where they did not get there in `most`, are not
-/// going to, or met what is not positive.
-int ReusingSolver::run(double target, int most) {
+void ReusingSolver::compute_residual() {
+  multiply(*pattern_, values_, x_, q_);
+  for (std::size_t i = 0; i < r_.size(); ++i) r_[i] = b_[i] - q_[i];
+}
+
+/// x from a right-hand side with something of every direction, and its residual.
+bool ReusingSolver::begin() {
   const std::size_t n = b_.size();
   for (auto* vector : {&x_, &r_, &z_, &p_, &q_}) vector->resize(n);
   const double scale = kNoise * norm(b_) / std::sqrt(static_cast<double>(n));
   for (std::size_t i = 0; i < n; ++i) r_[i] = b_[i] + scale * noise(i);
-  if (!precondition(r_, x_)) return 0;
-  multiply(*pattern_, values_, x_, q_);
-  for (std::size_t i = 0; i < n; ++i) r_[i] = b_[i] - q_[i];
+  if (!precondition(r_, x_)) return false;
+  compute_residual();
+  return true;
+}
+
+/// Conjugate gradients from x to a residual of `target`; false where they did not get there in `most`, are not going to, or
+/// met what is not positive.
+bool ReusingSolver::run(double target, int most) {
+  const std::size_t n = b_.size();
   const double first = norm(r_);
   double product = 0;
   for (int k = 1; k <= most; ++k) {
     ++counts_.iterations;
     ++iterations_;
-    if (!precondition(r_, z_)) return 0;
+    if (!precondition(r_, z_)) return false;
     const double before = std::exchange(product, dot(r_, z_));
     const double share = k == 1 ? 0 : product / before;
     for (std::size_t i = 0; i < n; ++i) p_[i] = z_[i] + share * p_[i];
@@ -249,18 +265,18 @@ int ReusingSolver::run(double target, int most) {
     const double curvature = dot(p_, q_);
     // That is what a Cholesky factorisation would find; others are asked for one all the same.
     is_refused_ = product > 0 && curvature < -kCertain * norm(p_) * norm(q_) && !capabilities().indefinite;
-    if (!(product > 0) || !(curvature > 0)) return 0;
+    if (!(product > 0) || !(curvature > 0)) return false;
     const double length = product / curvature;
     for (std::size_t i = 0; i < n; ++i) {
       x_[i] += length * p_[i];
       r_[i] -= length * q_[i];
     }
     const double now = norm(r_);
-    if (now <= target) return k;
+    if (now <= target) return true;
     const double by_rate = k * std::log(target / first) / std::min(-1e-3, std::log(now / first));
-    if (k >= kTellsRate && by_rate > 2.0 * most) return 0;
+    if (k >= kTellsRate && by_rate > 2.0 * most) return false;
   }
-  return 0;
+  return false;
 }
 
 FactorRecord ReusingSolver::record() const {

@@ -54,6 +54,7 @@ constexpr double kUnresolved = 1e-14;  ///< relative change of energy that a sum
 constexpr double kSpacing = 8 * std::numeric_limits<double>::epsilon();  ///< of the largest coordinate
 constexpr const char* kAtRoundOff = "converged to the round-off of energy and positions, above the tolerances asked for";
 constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
+constexpr double kLoosest = 1e-4;       ///< residual of a direction
 constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less than that
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
@@ -87,6 +88,8 @@ class Minimizer {
       }
       if (!compute_direction())
         return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
+      if (is_loose_ && is_near_end() && !tighten())
+        return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
       if (const bool by_step = has_small_step(); by_step || (!moving_ && decrement() < options_.decrement_tolerance)) {
         if (can_leave_saddle()) continue;
         return finish(by_step ? Termination::step : Termination::decrement);
@@ -96,7 +99,7 @@ class Minimizer {
         return finish(Termination::round_off, kAtRoundOff);
       }
       const double before = value_;
-      if (!line_search() && !retry_projected()) {
+      if (!line_search() && !retry_tightly() && !retry_projected()) {
         const bool relaxed = is_unresolved();
         if (moving_ && (!relaxing_ || relaxed)) {  // where held dofs are blocked, let the bodies give way first
           relax_next_ = !relaxing_;
@@ -283,7 +286,39 @@ class Minimizer {
       if (dofs_.unknown[i] == kNone) x[i] = target_[i];
   }
 
+  /// Residual to ask of a direction. A Newton step leaves of the gradient the square of what the last one left, at best:
+  /// more digits than that are wasted (Eisenstat & Walker 1996), but for those that tell whether x is a minimum.
+  double forcing() const {
+    if (is_tight_ || moving_ || options_.indefinite == IndefiniteHessian::accept) return kTightResidual;
+    const double left = previous_gradient_ > 0 ? summary_.gradient_norm / previous_gradient_ : 1;
+    const double asked = std::clamp(0.1 * left * left, kTightResidual, kLoosest);
+    const double tolerance = std::max(options_.gradient_tolerance, options_.relative_gradient_tolerance * first_gradient_);
+    const bool may_be_last = 0.1 * summary_.gradient_norm * std::max(left * left, asked) < tolerance;
+    return may_be_last ? kTightResidual : asked;
+  }
+
+  /// Whether a step solved for loosely may be one to end with.
+  bool is_near_end() const {
+    constexpr double kNear = 10;
+    return summary_.step_norm < kNear * options_.step_tolerance ||
+           summary_.step_norm < kNear * options_.relative_step_tolerance * first_step_ ||
+           decrement() < kNear * options_.decrement_tolerance || is_unresolved();
+  }
+
+  /// Solves for the same step to all digits, from now on too: the end has to be sure.
+  bool tighten() {
+    is_tight_ = true;
+    asked_ = kTightResidual;
+    const bool found = factor_and_solve(shift_);
+    if (!projected_ && shift_ == 0) note_definiteness();
+    return found || compute_direction();
+  }
+
+  bool retry_tightly() { return is_loose_ && tighten() && line_search(); }
+
   bool compute_direction() {
+    asked_ = forcing();
+    previous_gradient_ = summary_.gradient_norm;
     // A direction of the true Hessian is only taken where it is known to lead to a minimum, not to a saddle.
     const bool may_be_true = options_.indefinite == IndefiniteHessian::accept || system_.tells_definiteness();
     projected_ = options_.project_to_psd && (psd_iterations_ > 0 || options_.projected_iterations == 0 || !may_be_true);
@@ -319,16 +354,19 @@ class Minimizer {
     summary_.indefinite += is_indefinite_;
   }
 
-  /// Whether a factorisation says that x is no minimum. Asked only where the last one of a true Hessian said so.
+  /// Whether a factorisation says that x is no minimum. Asked only where the last one of a true Hessian said so, or left
+  /// open.
   bool is_at_saddle() {
-    if (options_.indefinite == IndefiniteHessian::accept || !is_indefinite_ || dofs_.num_unknowns == 0) return false;
-    if (is_known_here_) return true;
+    if (options_.indefinite == IndefiniteHessian::accept || dofs_.num_unknowns == 0) return false;
+    if (!is_indefinite_ && !is_loose_) return false;
+    if (is_indefinite_ && is_known_here_) return true;
     {
       const ScopedTimer timer(summary_.assembly_seconds);
       system_.assemble(energy_, x_, PsdProjection::none, dofs_, motion_, workspace_);
     }
     const ScopedTimer timer(summary_.linear_seconds);
-    outcome_ = system_.factorize(0);
+    outcome_ = is_indefinite_ ? system_.factorize(0) : system_.prepare(0, right_hand_side(), kTightResidual);
+    is_loose_ = false;
     note_definiteness();
     return is_indefinite_;
   }
@@ -368,8 +406,17 @@ class Minimizer {
     return false;
   }
 
+  VectorX right_hand_side() const {
+    VectorX rhs = -motion_.coupling;
+    for (Eigen::Index i = 0; i < x_.size(); ++i)
+      if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
+    return rhs;
+  }
+
   /// Solves for the full step; true where it is one of descent.
   bool factor_and_solve(double shift) {
+    shift_ = shift;
+    is_loose_ = false;
     const ScopedTimer timer(summary_.linear_seconds);
     if (dofs_.num_unknowns == 0) {
       step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
@@ -377,10 +424,9 @@ class Minimizer {
       model_curvature_ = motion_.curvature;
       return true;
     }
-    VectorX rhs = -motion_.coupling, solution;
-    for (Eigen::Index i = 0; i < x_.size(); ++i)
-      if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
-    outcome_ = system_.prepare(shift, rhs);
+    const VectorX rhs = right_hand_side();
+    VectorX solution;
+    outcome_ = system_.prepare(shift, rhs, asked_);
     if (outcome_ != linear::Outcome::ok) return give_reason();
     // Not only Cholesky must see it: along eigenvectors of negative eigenvalues Newton's step goes up to a saddle.
     if (options_.indefinite == IndefiniteHessian::project && system_.negative_pivots() > 0) {
@@ -392,7 +438,8 @@ class Minimizer {
     outcome_ = report.outcome;
     if ((outcome_ != linear::Outcome::ok && outcome_ != linear::Outcome::not_converged) || !solution.allFinite())
       return give_reason();
-    summary_.linear_residual = std::max(summary_.linear_residual, report.relative_residual);
+    is_loose_ = report.relative_residual > kTightResidual && report.relative_residual <= asked_;
+    if (!is_loose_) summary_.linear_residual = std::max(summary_.linear_residual, report.relative_residual);
     const double descent = solution.dot(rhs);  // of no minimiser of a convex model where it is not positive
     if (!(descent > 0) && !rhs.isZero(0)) return false;
     step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
@@ -516,8 +563,12 @@ class Minimizer {
   bool relaxing_ = false;  ///< this iteration leaves them where they are
   bool relax_next_ = false;
   bool projected_ = false;
-  bool is_indefinite_ = false;  ///< the true Hessian that was factorised last
-  bool is_known_here_ = false;  ///< that one was of x
+  bool is_indefinite_ = false;                 ///< the true Hessian that was factorised last
+  bool is_known_here_ = false;                 ///< that one was of x
+  double asked_ = kTightResidual, shift_ = 0;  ///< of the last direction
+  double previous_gradient_ = 0;               ///< norm, when the last direction was asked for
+  bool is_loose_ = false;                      ///< the last direction has not all digits, its Hessian may be indefinite
+  bool is_tight_ = false;                      ///< all directions from now on have them
   int psd_iterations_ = 0;
   int blocked_ = 0;
   double first_gradient_ = -1, first_step_ = -1;  ///< norms with the held dofs in place; below 0: not there yet

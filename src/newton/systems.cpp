@@ -6,13 +6,6 @@
 
 namespace itr {
 
-namespace {
-
-// Far below what a Newton direction needs; stiff contacts cannot reach much less, and refining there costs solves.
-constexpr double kAskedResidual = 1e-8;
-
-}  // namespace
-
 void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                            PrescribedMotion& motion, Workspace& workspace) {
   hessian_.setZero(dofs.num_unknowns, dofs.num_unknowns);
@@ -83,17 +76,17 @@ linear::Outcome SparseSystem::factorize(double shift) {
   return outcome == linear::Outcome::ok ? solver_.factorize(shifted(shift)) : outcome;
 }
 
-linear::Outcome SparseSystem::prepare(double shift, const VectorX& rhs) {
+linear::Outcome SparseSystem::prepare(double shift, const VectorX& rhs, double asked) {
   if (!reusing_) return factorize(shift);
   const auto outcome = analyze();
   if (outcome != linear::Outcome::ok) return outcome;
-  return reusing_->prepare(shifted(shift), {rhs.data(), static_cast<std::size_t>(rhs.size())}, kAskedResidual);
+  return reusing_->prepare(shifted(shift), {rhs.data(), static_cast<std::size_t>(rhs.size())}, asked);
 }
 
 linear::SolveReport SparseSystem::solve(const VectorX& rhs, VectorX& solution) {
   solution.resize(rhs.size());
   return solver_.solve({rhs.data(), static_cast<std::size_t>(rhs.size())},
-                       {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kAskedResidual);
+                       {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kTightResidual);
 }
 
 std::string SparseSystem::message() const { return std::string(solver_.name()) + ": " + solver_.message(); }

@@ -106,9 +106,7 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
 
 void write_factor(hdf5::File& file, const linear::FactorRecord& factor) {
   file.write("/checkpoint/factor_record",
-             std::array{factor.spent, double(factor.served), double(factor.iterations), double(factor.pause),
-                        double(factor.next_pause)},
-             0);
+             std::array{factor.spent, factor.served, factor.iterations, double(factor.pause), double(factor.next_pause)}, 0);
   if (!factor.matrix) return;
   const auto& pattern = *factor.matrix->pattern;
   const auto write = [&](const char* name, const std::vector<int>& numbers) {
@@ -126,8 +124,8 @@ linear::FactorRecord read_factor(const fs::path& path, const hdf5::File& file) {
     throw InputError({path.string(), "/checkpoint/factor_record", std::to_string(numbers.size()) + " numbers", "5"});
   linear::FactorRecord factor;
   factor.spent = numbers[0];
-  factor.served = static_cast<int>(numbers[1]);
-  factor.iterations = static_cast<int>(numbers[2]);
+  factor.served = numbers[1];
+  factor.iterations = numbers[2];
   factor.pause = static_cast<int>(numbers[3]);
   factor.next_pause = static_cast<int>(numbers[4]);
   if (!file.contains("/checkpoint/factor")) return factor;

@@ -87,7 +87,7 @@ class PenalisedSystem final : public NewtonSystem {
     small_.compute(small);
     return linear::Outcome::ok;
   }
-  linear::Outcome prepare(double shift, const VectorX&) override { return factorize(shift); }
+  linear::Outcome prepare(double shift, const VectorX&, double) override { return factorize(shift); }
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override {
     const linear::SolveReport report = system_.solve(rhs, solution);
     solution -= solved_ * small_.solve(columns_.transpose() * solution);

@@ -25,8 +25,8 @@ std::shared_ptr<const FactoredMatrix> make_factored_matrix(SparsityPattern patte
 struct FactorRecord {
   std::shared_ptr<const FactoredMatrix> matrix;  ///< null: there is none
   double spent = 0;                              ///< on it and on the systems that it served [s, by counts]
-  int served = 0;                                ///< systems
-  int iterations = 0;                            ///< of the last of them
+  double served = 0;                             ///< systems; one that is solved to half of the digits is half a one
+  double iterations = 0;                         ///< a system, of the last of them
   int pause = 0, next_pause = 1;                 ///< systems that are not tried, now and after the next failure
 };
 
@@ -43,9 +43,9 @@ struct SolveCounts {
 /// they take too long or meet a direction of no positive curvature, the matrix is factorised.
 ///
 /// What is tried depends on counts (flops of a factorisation, entries of a factor, iterations), never on time. A matrix
-/// that iterations solved is positive definite: they start from an error with a part in every direction, and with positive
-/// curvatures throughout, the part in a direction of negative curvature could not have shrunk. (The residual does not show
-/// one whose curvature is below some 1e-4 of the factor's.)
+/// that iterations solved to 1e-8 is positive definite: they start from an error with a part in every direction, and with
+/// positive curvatures throughout, the part in a direction of negative curvature could not have shrunk. (The residual does
+/// not show one whose curvature is below some 1e-4 of the factor's; after looser solves it shows less.)
 ///
 /// Over an iterative solver it only counts.
 class ReusingSolver final : public Solver {
@@ -59,7 +59,8 @@ class ReusingSolver final : public Solver {
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override;
   Outcome factorize(std::span<const double> values) override;
   /// Factorises, or else solves the system of the right-hand side b to the asked residual by iterations, for solve() to
-  /// return. Either way ok says of the matrix what it says after factorize().
+  /// return, whatever that is asked for. Either way ok says of the matrix what it says after factorize(). The same system
+  /// asked again goes on where it was.
   Outcome prepare(std::span<const double> values, std::span<const double> b, double asked_residual);
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked_residual) override;
   Statistics statistics() const override;
@@ -77,8 +78,10 @@ class ReusingSolver final : public Solver {
   bool is_worth_trying();
   Outcome analyze_now();
   Outcome factorize_now();
-  bool iterate(std::span<const double> b, double asked);
-  int run(double target, int most);
+  bool iterate(std::span<const double> b, double asked, bool goes_on);
+  bool begin();
+  void compute_residual();
+  bool run(double target, int most);
   bool precondition(std::span<const double> residual, std::span<double> z);
   int most_iterations() const;
   double iteration_cost() const;
@@ -98,6 +101,7 @@ class ReusingSolver final : public Solver {
   bool is_old_ = false;         ///< the factor was there before the values were given
   bool is_refused_ = false;     ///< the matrix is known not to be positive definite, and is not factorised
   std::vector<double> b_, x_;   ///< the system that iterations solved
+  bool is_counted_ = false;     ///< and solve() gave out
   SolveReport report_;          ///< of that; b_ is empty where the matrix is factorised
   std::vector<double> r_, z_, p_, q_;
   int iterations_ = 0;  ///< of the last solve

@@ -13,6 +13,10 @@
 
 namespace itr {
 
+/// Residual of a direction, relative, far below what Newton needs; stiff contacts cannot reach much less, and refining there
+/// costs solves.
+constexpr double kTightResidual = 1e-8;
+
 /// Assembles and solves the Newton system of one solve.
 class NewtonSystem {
  public:
@@ -22,8 +26,9 @@ class NewtonSystem {
                         PrescribedMotion& motion, Workspace& workspace) = 0;
   /// Factorises Hessian + shift * I.
   virtual linear::Outcome factorize(double shift) = 0;
-  /// Does that, or else finds by other means what solve(rhs) is to return; its outcome says the same of the matrix.
-  virtual linear::Outcome prepare(double shift, const VectorX& rhs) = 0;
+  /// Does that, or else finds by other means, to the relative residual `asked`, what solve(rhs) is to return; its outcome
+  /// says the same of the matrix, the less surely the more is asked.
+  virtual linear::Outcome prepare(double shift, const VectorX& rhs, double asked) = 0;
   virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
   /// Whether factorize, solve or negative_pivots tells of every matrix that is not positive definite.
   virtual bool tells_definiteness() const { return true; }
@@ -40,7 +45,7 @@ class DenseSystem final : public NewtonSystem {
  public:
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
-  linear::Outcome prepare(double shift, const VectorX&) override { return factorize(shift); }
+  linear::Outcome prepare(double shift, const VectorX&, double) override { return factorize(shift); }
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
   std::string message() const override { return "dense Cholesky"; }
   double diagonal_scale() const override;
@@ -63,7 +68,7 @@ class SparseSystem final : public NewtonSystem {
   linear::Solver& solver() { return solver_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
-  linear::Outcome prepare(double shift, const VectorX& rhs) override;
+  linear::Outcome prepare(double shift, const VectorX& rhs, double asked) override;
   linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
   bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
   int negative_pivots() const override { return solver_.statistics().negative_pivots; }
