@@ -37,7 +37,7 @@ Session::Session() : lock_(library_mutex()) {
 Session::~Session() { H5Eset_auto2(H5E_DEFAULT, print_, print_data_); }
 
 File File::create(const std::filesystem::path& path) {
-  constexpr std::size_t kIncrement = 1 << 20;
+  constexpr std::size_t kIncrement = 1 << 16;
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_fapl_core(access.id(), kIncrement, false);
   Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose);
