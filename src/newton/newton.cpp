@@ -55,6 +55,7 @@ constexpr double kSpacing = 8 * std::numeric_limits<double>::epsilon();  ///< of
 constexpr const char* kAtRoundOff = "converged to the round-off of energy and positions, above the tolerances asked for";
 constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
 constexpr double kLoosest = 1e-4;       ///< residual of a direction
+constexpr int kMostLoose = 8;           ///< iterations of a solve that may be loose
 constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less than that
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
@@ -290,6 +291,8 @@ class Minimizer {
   /// more digits than that are wasted (Eisenstat & Walker 1996), but for those that tell whether x is a minimum.
   double forcing() const {
     if (is_tight_ || moving_ || options_.indefinite == IndefiniteHessian::accept) return kTightResidual;
+    // Loose solves may overlook negative curvature, and then creep.
+    if (summary_.indefinite > 0 || summary_.iterations >= kMostLoose) return kTightResidual;
     const double left = previous_gradient_ > 0 ? summary_.gradient_norm / previous_gradient_ : 1;
     const double asked = std::clamp(0.1 * left * left, kTightResidual, kLoosest);
     const double tolerance = std::max(options_.gradient_tolerance, options_.relative_gradient_tolerance * first_gradient_);
