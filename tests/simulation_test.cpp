@@ -74,6 +74,22 @@ TEST(Simulation, FreeFallIsExact) {
   }
 }
 
+/// What is left of the gradient where flight leads is below any tolerance in so short a step, but it is all that acts.
+TEST(Simulation, ForcesActHoweverShortTheStep) {
+  auto setup = free_square(2);
+  setup.newton = {};
+  setup.time = {.dt = 1e-7, .steps = 3};
+  setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -10); };
+  setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(1, 0); }});
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  while (!simulation.finished()) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+  }
+  EXPECT_NEAR(simulation.state().history.v[0][1], -3e-6, 1e-8);
+}
+
 /// Newton may begin elsewhere than the step, but the step is the same.
 TEST(Simulation, EndsWhereItEndsWithoutForesight) {
   auto setup = impact();

@@ -56,6 +56,7 @@ constexpr const char* kAtRoundOff = "converged to the round-off of energy and po
 constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
 constexpr double kLoosest = 1e-4;       ///< residual of a direction
 constexpr int kMostLoose = 8;           ///< iterations of a solve that may be loose
+constexpr double kNothing = 1e-10;      ///< see NewtonExtras::way_to_start
 constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less than that
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
@@ -76,7 +77,7 @@ class Minimizer {
         extras_(extras) {}
 
   NewtonSummary run() {
-    value_ = timed_value(x_);
+    first_value_ = value_ = timed_value(x_);
     if (!std::isfinite(value_)) return stop(Termination::infeasible, "the energy at the start is not finite");
     for (summary_.iterations = 0; summary_.iterations < options_.max_iterations; ++summary_.iterations) {
       if (options_.is_cancelled()) return stop(Termination::cancelled);
@@ -101,7 +102,8 @@ class Minimizer {
       }
       const double before = value_;
       if (!line_search() && !retry_tightly() && !retry_projected()) {
-        const bool relaxed = is_unresolved();
+        // What cancels, as in a body that has turned back to rest, has the round-off of what it was before.
+        const bool relaxed = is_unresolved() || decrement() < kUnresolved * std::abs(first_value_);
         if (moving_ && (!relaxing_ || relaxed)) {  // where held dofs are blocked, let the bodies give way first
           relax_next_ = !relaxing_;
           if (++blocked_ > kMaxBlocked) return stop(Termination::no_descent, describe_way_left());
@@ -201,26 +203,29 @@ class Minimizer {
 
   double weight(Eigen::Index i) const { return (*extras_.norm_weights)[i]; }
 
-  double gradient_norm() const {
-    return norm(gradient_, [&](double g, Eigen::Index i) {
+  double gradient_norm(const VectorX& gradient) const {
+    return norm(gradient, [&](double g, Eigen::Index i) {
       if (options_.norm == NewtonNorm::euclidean) return g;
       return options_.norm == NewtonNorm::l2 ? g / std::sqrt(weight(i)) : g / weight(i);
     });
   }
 
-  double step_norm() const {
-    return norm(step_,
+  double step_norm(const VectorX& step) const {
+    return norm(step,
                 [&](double p, Eigen::Index i) { return options_.norm == NewtonNorm::l2 ? p * std::sqrt(weight(i)) : p; });
   }
 
   void compute_gradient() {
     gradient_ = gradient_at(x_);
-    summary_.gradient_norm = gradient_norm();
+    summary_.gradient_norm = gradient_norm(gradient_);
   }
+
+  bool has_moved() const { return extras_.way_to_start.size() > 0; }
 
   bool has_small_gradient() {
     if (first_gradient_ < 0) first_gradient_ = summary_.gradient_norm;
     const bool is_first = summary_.iterations == 0;
+    if (is_first && has_moved() && summary_.gradient_norm > kNothing * gradient_norm(extras_.gradient_of_way)) return false;
     return summary_.gradient_norm < (is_first ? options_.first_gradient_tolerance : options_.gradient_tolerance) ||
            (!is_first && summary_.gradient_norm < options_.relative_gradient_tolerance * first_gradient_);
   }
@@ -228,6 +233,8 @@ class Minimizer {
   bool has_small_step() {
     if (moving_) return false;
     if (first_step_ < 0) first_step_ = summary_.step_norm;
+    if (summary_.iterations == 0 && has_moved() && summary_.step_norm > kNothing * step_norm(extras_.way_to_start))
+      return false;
     return summary_.step_norm < options_.step_tolerance ||
            (summary_.iterations > 0 && summary_.step_norm < options_.relative_step_tolerance * first_step_);
   }
@@ -450,7 +457,7 @@ class Minimizer {
     model_curvature_ = descent + 2 * solution.dot(motion_.coupling) + motion_.curvature;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = solution[dofs_.unknown[i]];
-    summary_.step_norm = step_norm();
+    summary_.step_norm = step_norm(step_);
     return true;
   }
 
@@ -555,7 +562,7 @@ class Minimizer {
   NewtonSummary summary_;
   linear::Outcome outcome_ = linear::Outcome::ok;  ///< of the last linear solve
   std::string failure_;                            ///< why the last one failed that did
-  double value_ = 0;
+  double value_ = 0, first_value_ = 0;
   VectorX gradient_, step_, candidate_;
   PrescribedMotion motion_;  ///< asked of the held dofs in this iteration
   double model_curvature_ = 0;

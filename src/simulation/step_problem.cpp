@@ -179,10 +179,15 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
 /// One solve with `lagged_`. Adaptive stiffness balances the terms before held dofs move: so it is in the
 /// regression values of peers' scenes.
 template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x) {
+NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start) {
   const EnergySum sum = potential_.sum(lagged_);
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = &norm_weights_, .on_iteration = setup_.on_iteration};
+  if (way_to_start.size() > 0) {
+    extras.gradient_of_way = VectorX::Zero(x.size());
+    potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
+    extras.way_to_start = std::move(way_to_start);
+  }
   if (!adaptive_)
     return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
   initialize_stiffness(x);
@@ -230,6 +235,7 @@ bool StepProblem<Dim>::is_better_start(const VectorX& start, const VectorX& x) {
 template <int Dim>
 NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
   double lagging_seconds = 0;
+  VectorX way_to_start;
   {
     const ScopedTimer timer(lagging_seconds);
     const VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
@@ -239,9 +245,12 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     lagged_ = potential_.lag(lagged_x, workspace_);
     // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
     const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
-    if (expected.size() > 0 && may_move && is_better_start(start, x)) x = start;
+    if (expected.size() > 0 && may_move && is_better_start(start, x)) {
+      way_to_start = start - x;
+      x = start;
+    }
   }
-  NewtonSummary summary = minimize_lagged(x);
+  NewtonSummary summary = minimize_lagged(x, std::move(way_to_start));
   summary.assembly_seconds += lagging_seconds;
   const int rounds = most_rounds();
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;

@@ -127,6 +127,10 @@ struct NewtonExtras {
   std::function<bool(const VectorX& x)> after_step{};
   /// Called after each iteration; false ends the solve, not converged.
   std::function<bool(const NewtonProgress& progress)> on_iteration{};
+  /// Where the solve begins elsewhere than the state is: the way from there, and what inertia does along it to the gradient.
+  /// The solve has not converged there unless gradient and step are nothing beside these: whatever the tolerances, forces
+  /// that just began to act are not passed over. Empty: it begins where the state is.
+  VectorX way_to_start{}, gradient_of_way{};
 };
 
 /// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as

@@ -69,7 +69,7 @@ class StepProblem {
 
  private:
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
-  NewtonSummary minimize_lagged(VectorX& x);
+  NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {});
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
   VectorX with_held_at_targets(VectorX x) const;
