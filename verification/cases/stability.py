@@ -12,7 +12,7 @@ REFERENCE = "verification/stability"
 TOLERANCE = "all of these"
 NEEDS = ("meshio", "h5py")
 
-NAMES = ("nu_0_4999", "coplanar_faces", "stiff_on_soft_1e8", "heavy_on_light_1e4", "slivers_1e4_remeshed", "gap_1e_10", "collinear_edges",
+NAMES = ("nu_0_4999", "coplanar_faces_remeshed", "stiff_on_soft_1e8", "heavy_on_light_1e4", "slivers_1e4_remeshed", "gap_1e_10", "collinear_edges",
          "dt_1_remeshed", "compressed_95", "far_1e6_remeshed", "points_2d", "storm_2d")
 
 
