@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <unordered_map>
@@ -17,7 +18,9 @@ struct EdgeKeyHash {
   }
 };
 
-/// Edges (a vertex v is {v, kNone}) in order of descending priority, ties by key. One that is pushed again moves.
+/// Edges (a vertex v is {v, kNone}) in order of descending priority, ties by key. One that is pushed again moves. Priorities
+/// count to four digits: those of mirror images differ by the round-off of a solve, which is not to decide what is done
+/// first.
 class EdgeQueue {
  public:
   struct Entry {
@@ -34,9 +37,11 @@ class EdgeQueue {
       return;
     }
     heap_ = std::move(entries);
+    for (Entry& entry : heap_) entry.priority = rounded(entry.priority);
     std::make_heap(heap_.begin(), heap_.end(), is_after);
   }
-  void push(const Entry& entry) {
+  void push(Entry entry) {
+    entry.priority = rounded(entry.priority);
     last_[entry.edge] = entry.priority;
     heap_.push_back(entry);
     std::push_heap(heap_.begin(), heap_.end(), is_after);
@@ -58,6 +63,11 @@ class EdgeQueue {
   }
 
  private:
+  static double rounded(double priority) {
+    int exponent = 0;
+    const double fraction = std::frexp(priority, &exponent);
+    return std::isfinite(priority) ? std::ldexp(std::round(fraction * 16384), exponent - 14) : priority;
+  }
   static bool is_after(const Entry& a, const Entry& b) {
     return a.priority != b.priority ? a.priority < b.priority : a.edge > b.edge;
   }
