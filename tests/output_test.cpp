@@ -251,6 +251,34 @@ TEST_F(OutputTest, StoresEveryNthStepOnly) {
   EXPECT_EQ(count_of(text_of(folder / "steps.jsonl"), "\n"), 7);
 }
 
+TEST_F(OutputTest, FramesOfOneShapeAndOfAnotherHoldTheirOwnNumbers) {
+  Plane plane, single;
+  single.mesh = Mesh<2>({{0, 0}, {1, 0}, {0, 1}}, {{0, 1, 2}}, {5});
+  single.x = single.v = VectorX::LinSpaced(6, 0, 5);
+  single.density = {7};
+  const auto at = [&](int step) -> Plane& { return step == 2 ? single : plane; };
+  Writer writer = make_writer();
+  for (int step = 0; step < 4; ++step) {
+    Plane& frame = at(step);
+    frame.x[0] = 0.25 * step;
+    frame.density[0] = step;
+    frame.obstacle_x[0][0] = -step;
+    writer.write(frame.view(), report_of(step));
+  }
+  for (int step = 0; step < 4; ++step) {
+    const hdf5::Session session;
+    const hdf5::File file = hdf5::File::open(folder / fmt::format("frames/{:06}.h5", step));
+    EXPECT_EQ(file.read_integer_attribute("step"), step);
+    EXPECT_EQ(file.read_double_attribute("t"), report_of(step).t);
+    EXPECT_EQ(file.read_integers("/mesh/body").values.size(), at(step).density.size());
+    EXPECT_EQ(file.read_doubles("/fields/x").values.size(), static_cast<std::size_t>(at(step).x.size()));
+    EXPECT_EQ(file.read_doubles("/fields/x").values[0], 0.25 * step);
+    EXPECT_EQ(file.read_doubles("/fields/elastic_density").values[0], step);
+    EXPECT_EQ(file.read_doubles("/obstacles/x").values[0], -step);
+    EXPECT_EQ(file.read_text_attribute("/fields/v", "unit"), "m/s");
+  }
+}
+
 TEST_F(OutputTest, SeriesIsReadableAtAnyMomentAndCompleteAtTheEnd) {
   constexpr int kSteps = 60;
   Writer writer = make_writer();

@@ -56,13 +56,20 @@ void File::require(bool ok, const std::string& what) const {
 }
 
 void File::write_raw(const std::string& name, hid_t type, const void* values, std::size_t size, int columns) {
+  if (const auto it = written_.find(name); it != written_.end()) {
+    const Written& before = it->second;
+    require(before.size == size && before.columns == columns, name);
+    if (size > 0) require(H5Dwrite(before.set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name);
+    return;
+  }
   const std::array<hsize_t, 2> shape = {columns ? size / columns : size, static_cast<hsize_t>(columns)};
   const Handle space(H5Screate_simple(columns ? 2 : 1, shape.data(), nullptr), H5Sclose);
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(links.id(), 1);
-  const Handle set(H5Dcreate2(file_.id(), name.c_str(), type, space.id(), links.id(), H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+  Handle set(H5Dcreate2(file_.id(), name.c_str(), type, space.id(), links.id(), H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
   require(set.is_valid(), name);
   if (size > 0) require(H5Dwrite(set.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name);
+  written_.emplace(name, Written{std::move(set), size, columns});
 }
 
 void File::write(const std::string& name, std::span<const double> values, int columns) {
@@ -74,9 +81,14 @@ void File::write(const std::string& name, std::span<const std::int64_t> values, 
 }
 
 void File::write_attribute_raw(const char* name, hid_t type, const void* value) {
-  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle attribute(H5Acreate2(file_.id(), name, type, space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  require(attribute.is_valid() && H5Awrite(attribute.id(), type, value) >= 0, name);
+  auto it = attributes_.find(name);
+  if (it == attributes_.end()) {
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    Handle attribute(H5Acreate2(file_.id(), name, type, space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    require(attribute.is_valid(), name);
+    it = attributes_.emplace(name, std::move(attribute)).first;
+  }
+  require(H5Awrite(it->second.id(), type, value) >= 0, name);
 }
 
 void File::write_attribute(const char* name, double value) { write_attribute_raw(name, H5T_NATIVE_DOUBLE, &value); }

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <span>
 #include <string>
@@ -69,8 +70,10 @@ class File {
   static File create(const std::filesystem::path& path);
   static File open(const std::filesystem::path& path);
 
+  /// What was written before under this name, of the same shape, is replaced: much cheaper than in a new file.
   void write(const std::string& name, std::span<const double> values, int columns);
   void write(const std::string& name, std::span<const std::int64_t> values, int columns);
+  /// Of the file; what was written before is replaced.
   void write_attribute(const char* name, double value);
   void write_attribute(const char* name, std::int64_t value);
   /// The numbers of an attribute of a group or dataset that is there.
@@ -81,6 +84,7 @@ class File {
   void link_file(const std::string& name, const std::string& relative_path);
   void unlink(const std::string& name);
   void write_text(const std::string& name, const std::string& text);
+  bool has_written(const std::string& name) const { return written_.contains(name); }
   /// The bytes of the file that was created, as far as it is.
   std::string image() const;
 
@@ -106,8 +110,16 @@ class File {
   template <typename T>
   Table<T> read_raw(const std::string& name, hid_t type) const;
 
+  struct Written {
+    Handle set;
+    std::size_t size;
+    int columns;
+  };
+
   std::filesystem::path path_;
   Handle file_;
+  std::map<std::string, Written> written_;    ///< datasets, by name
+  std::map<std::string, Handle> attributes_;  ///< of the file, written here
 };
 
 }  // namespace itr::hdf5

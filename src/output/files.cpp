@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <system_error>
 
 #include "itr/core/error.hpp"
@@ -32,6 +33,18 @@ bool write_all(int descriptor, std::string_view bytes) {
   return true;
 }
 
+/// Puts a file in the place of another. Where there is one already they change places: ext4 writes what replaces a file to
+/// the disk at once (auto_da_alloc), which takes longer than a small step.
+bool replace(const fs::path& temporary, const fs::path& path) {
+#ifdef RENAME_EXCHANGE
+  if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) == 0) {
+    ::unlink(temporary.c_str());
+    return true;
+  }
+#endif
+  return ::rename(temporary.c_str(), path.c_str()) == 0;
+}
+
 }  // namespace
 
 void write_file(const fs::path& path, std::string_view bytes, Durability durability) {
@@ -41,7 +54,7 @@ void write_file(const fs::path& path, std::string_view bytes, Durability durabil
   const bool is_written = write_all(descriptor, bytes) && (durability == Durability::process || ::fsync(descriptor) == 0);
   const int reason = errno;
   const bool is_closed = ::close(descriptor) == 0;  // some file systems report a full disk only here
-  if (is_written && is_closed && ::rename(temporary.c_str(), path.c_str()) == 0) return;
+  if (is_written && is_closed && replace(temporary, path)) return;
   if (!is_written) errno = reason;
   const int first_reason = errno;
   ::unlink(temporary.c_str());

@@ -23,6 +23,13 @@ VectorX rest_positions(const Mesh<Dim>& mesh) {
   return rest;
 }
 
+/// A dataset with the attribute `unit`.
+void write_values(hdf5::File& file, const std::string& name, std::span<const double> values, int columns, const char* unit) {
+  const bool is_new = !file.has_written(name);
+  file.write(name, values, columns);
+  if (is_new) file.write_attribute(name, "unit", std::string(unit));
+}
+
 template <int Dim>
 void write_mesh(hdf5::File& file, const Mesh<Dim>& mesh, ConstVectorView rest) {
   Integers simplices, body, surface;
@@ -33,17 +40,10 @@ void write_mesh(hdf5::File& file, const Mesh<Dim>& mesh, ConstVectorView rest) {
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (mesh.is_facet_alive(f)) surface.insert(surface.end(), mesh.facet(f).begin(), mesh.facet(f).end());
   }
-  file.write("/mesh/rest", as_span(rest), Dim);
-  file.write_attribute("/mesh/rest", "unit", std::string("m"));
+  write_values(file, "/mesh/rest", as_span(rest), Dim, "m");
   file.write("/mesh/simplices", simplices, Dim + 1);
   file.write("/mesh/body", body, 0);
   file.write("/mesh/surface", surface, Dim);
-}
-
-/// A dataset with the attribute `unit`.
-void write_values(hdf5::File& file, const std::string& name, std::span<const double> values, int columns, const char* unit) {
-  file.write(name, values, columns);
-  file.write_attribute(name, "unit", std::string(unit));
 }
 
 template <std::size_t N>
@@ -107,19 +107,13 @@ StoredSurface read_surface(const std::filesystem::path& path, const hdf5::File& 
   return surface;
 }
 
-}  // namespace
-
 template <int Dim>
-void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, Durability durability,
-                 const FrameExtra& extra) {
+void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t) {
   const Mesh<Dim>& mesh = frame.mesh;
   ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots() && mesh.num_cells() == mesh.cell_slots(), "mesh is not compact");
   ITR_CHECK(frame.x.size() == Dim * mesh.num_vertices(), frame.x.size(), mesh.num_vertices());
   const VectorX rest = rest_positions(mesh);
   const VectorX u = frame.x - rest;
-
-  const hdf5::Session session;
-  hdf5::File file = hdf5::File::create(path);
   file.write_attribute("step", static_cast<std::int64_t>(step));
   file.write_attribute("t", t);
   write_mesh(file, mesh, rest);
@@ -130,8 +124,69 @@ void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame,
   if (frame.asked) write_asked<Dim>(file, *frame.asked);
   write_surface<Dim>(file, "/obstacles", frame.obstacle_x, frame.obstacle_edges, frame.obstacle_triangles);
   if (frame.proxy.x) write_surface<Dim>(file, "/proxy", *frame.proxy.x, *frame.proxy.edges, *frame.proxy.triangles);
+}
+
+/// Lengths of all lists that a frame has: of frames with the same, files differ in numbers alone.
+template <int Dim>
+std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
+  const Mesh<Dim>& mesh = frame.mesh;
+  const auto size = [](const auto& list) { return static_cast<std::size_t>(list.size()); };
+  std::vector<std::size_t> shape = {Dim,
+                                    static_cast<std::size_t>(mesh.num_vertices()),
+                                    static_cast<std::size_t>(mesh.num_cells()),
+                                    static_cast<std::size_t>(mesh.num_facets()),
+                                    size(frame.v),
+                                    size(frame.elastic_density),
+                                    size(frame.obstacle_x),
+                                    size(frame.obstacle_edges),
+                                    size(frame.obstacle_triangles),
+                                    frame.proxy.x != nullptr,
+                                    frame.asked != nullptr};
+  if (frame.proxy.x)
+    shape.insert(shape.end(), {size(*frame.proxy.x), size(*frame.proxy.edges), size(*frame.proxy.triangles)});
+  if (frame.asked) {
+    const AskedFields& asked = *frame.asked;
+    shape.insert(shape.end(), {size(asked.forces.contact), size(asked.forces.friction), size(asked.forces.reaction),
+                               size(asked.von_mises), size(asked.stress), size(asked.kinetic_energy), size(asked.momentum)});
+  }
+  return shape;
+}
+
+}  // namespace
+
+template <int Dim>
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, Durability durability,
+                 const FrameExtra& extra) {
+  const hdf5::Session session;
+  hdf5::File file = hdf5::File::create(path);
+  fill(file, frame, step, t);
   if (extra) extra(file);
   write_file(path, file.image(), durability);
+}
+
+FrameFiles::~FrameFiles() {
+  const hdf5::Session session;
+  file_.reset();
+}
+
+template <int Dim>
+void FrameFiles::write(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t) {
+  constexpr std::size_t kSmall = 1 << 20;  // [bytes]
+  const hdf5::Session session;
+  std::vector<std::size_t> shape = shape_of(frame);
+  if (shape != shape_) file_.reset();
+  if (!file_) file_.emplace(hdf5::File::create(path));
+  shape_ = std::move(shape);
+  std::string image;
+  try {
+    fill(*file_, frame, step, t);
+    image = file_->image();
+  } catch (...) {
+    file_.reset();
+    throw;
+  }
+  if (image.size() > kSmall) file_.reset();
+  write_file(path, image);
 }
 
 std::vector<std::filesystem::path> stored_frames(const std::filesystem::path& directory) {
@@ -193,7 +248,12 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   return frame;
 }
 
-template void write_frame<2>(const std::filesystem::path&, const FrameView<2>&, int, double, Durability, const FrameExtra&);
-template void write_frame<3>(const std::filesystem::path&, const FrameView<3>&, int, double, Durability, const FrameExtra&);
+#define ITR_INSTANTIATE(Dim)                                                                                   \
+  template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, Durability, \
+                                 const FrameExtra&);                                                           \
+  template void FrameFiles::write<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr::output

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,22 @@ using FrameExtra = std::function<void(hdf5::File&)>;
 template <int Dim>
 void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t,
                  Durability durability = Durability::process, const FrameExtra& extra = {});
+
+/// Writes frames one after another. While they are small and of one shape they are made in one file in memory: to make it
+/// anew each time takes longer than a step.
+class FrameFiles {
+ public:
+  FrameFiles() = default;
+  ~FrameFiles();
+  FrameFiles(const FrameFiles&) = delete;
+  FrameFiles& operator=(const FrameFiles&) = delete;
+  template <int Dim>
+  void write(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t);
+
+ private:
+  std::optional<hdf5::File> file_;
+  std::vector<std::size_t> shape_;  ///< lengths of all that is in there
+};
 
 /// DIR/frames/NNNNNN.h5, by step.
 std::vector<std::filesystem::path> stored_frames(const std::filesystem::path& directory);

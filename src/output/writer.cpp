@@ -87,7 +87,7 @@ struct Writer::Impl {
       sync(directory / "frames");
       last_checkpoint = seconds_now();
     } else {
-      write_frame(directory / name, frame, step, t);
+      frames.write(directory / name, frame, step, t);
       unsynced.push_back(name);
     }
   }
@@ -122,6 +122,7 @@ struct Writer::Impl {
   RunInfo info;
   TimeSeries series;
   LineFile steps;
+  FrameFiles frames;
   Totals totals;
   DisplacementNorms norms;
   std::vector<std::string> unsynced;
