@@ -146,6 +146,7 @@ void Mesh<Dim>::remove_facet(FacetId f) {
 template <int Dim>
 std::vector<CellId> Mesh<Dim>::cells_of_edge(const EdgeKey& edge) const {
   std::vector<CellId> found;
+  found.reserve(Dim == 2 ? 2 : 8);
   for (const CellId c : cells_of_[edge[0]])
     if (std::find(cells_[c].begin(), cells_[c].end(), edge[1]) != cells_[c].end()) found.push_back(c);
   std::sort(found.begin(), found.end());

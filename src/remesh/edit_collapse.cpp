@@ -1,27 +1,28 @@
 // SPDX-License-Identifier: MIT
 #include <bit>
 
+#include "core/small_vector.hpp"
 #include "edit_checks.hpp"
 
 namespace itr {
 
 namespace {
 
-/// Neighbours that both vertices have in common.
-std::vector<VertexId> common_neighbours(const Mesh<2>& mesh, VertexId a, VertexId b) {
+/// How many neighbours both vertices have in common.
+std::size_t num_common_neighbours(const Mesh<2>& mesh, VertexId a, VertexId b) {
+  using Ring = SmallVector<VertexId, 32>;
   const auto ring = [&](VertexId v) {
-    std::vector<VertexId> ids;
+    Ring ids;
     for (const CellId c : mesh.cells_of(v))
       for (const int w : mesh.cell(c))
         if (w != v) ids.push_back(w);
     std::sort(ids.begin(), ids.end());
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    ids.shorten(static_cast<std::size_t>(std::unique(ids.begin(), ids.end()) - ids.begin()));
     return ids;
   };
-  const auto ra = ring(a), rb = ring(b);
-  std::vector<VertexId> common;
-  std::set_intersection(ra.begin(), ra.end(), rb.begin(), rb.end(), std::back_inserter(common));
-  return common;
+  const Ring ra = ring(a), rb = ring(b);
+  return static_cast<std::size_t>(
+      std::count_if(ra.begin(), ra.end(), [&](VertexId v) { return std::binary_search(rb.begin(), rb.end(), v); }));
 }
 
 /// Whether boundary vertex v can slide along the boundary edge v-w: its other boundary edge goes straight on with one tag.
@@ -85,7 +86,7 @@ class Neighbourhood {
 
 /// Link condition in the volume: whatever vertices and edges the links of a and b have in common must be in the link of a-b.
 template <int Dim>
-bool keeps_cells_apart(const Mesh<Dim>& mesh, VertexId a, VertexId b, const std::vector<CellId>& around_edge) {
+bool keeps_cells_apart(const Mesh<Dim>& mesh, VertexId a, VertexId b, std::span<const CellId> around_edge) {
   const auto around_a = mesh.cells_of(a);
   Neighbourhood beside_a(Dim * around_a.size());
   for (const CellId c : around_a)
@@ -172,9 +173,6 @@ Edit<Dim> make_edit(const Mesh<Dim>& mesh, const EdgeKey& edge, const Merge<Dim>
   edit.removed_vertex = gone;
 
   const auto around = mesh.cells_of(gone);
-  const std::size_t most = around.size() + (moves ? mesh.cells_of(kept).size() : 0);
-  edit.removed_cells.reserve(most);
-  edit.inserted_cells.reserve(most);
   edit.removed_cells.assign(around.begin(), around.end());
   if (moves)
     for (const CellId c : mesh.cells_of(kept))
@@ -233,7 +231,7 @@ std::optional<Edit<2>> make_collapse(const Mesh<2>& mesh, const EdgeKey& edge) {
   const auto [a, b] = edge;
   Edit<2> edit{.kind = Edit<2>::Kind::collapse, .edge = edge};
   const auto around_edge = mesh.cells_of_edge(edge);
-  if (around_edge.empty() || common_neighbours(mesh, a, b).size() != around_edge.size()) return std::nullopt;
+  if (around_edge.empty() || num_common_neighbours(mesh, a, b) != around_edge.size()) return std::nullopt;
   const FacetId facet = mesh.find_facet({a, b});
   const auto target = collapse_target(mesh, edge, facet);
   if (!target) return std::nullopt;
@@ -246,15 +244,13 @@ std::optional<Edit<2>> make_collapse(const Mesh<2>& mesh, const EdgeKey& edge) {
   edit.value = value;
   edit.removed_vertex = gone;
 
-  std::vector<CellId> around(mesh.cells_of(gone).begin(), mesh.cells_of(gone).end());
+  auto& around = edit.removed_cells;
+  around.assign(mesh.cells_of(gone).begin(), mesh.cells_of(gone).end());
   if (*target == End::middle)
-    around.insert(around.end(), mesh.cells_of(kept).begin(), mesh.cells_of(kept).end());
-  else
-    around.insert(around.end(), around_edge.begin(), around_edge.end());
+    for (const CellId c : mesh.cells_of(kept))
+      if (!contains(around_edge, c)) around.push_back(c);
   std::sort(around.begin(), around.end());
-  around.erase(std::unique(around.begin(), around.end()), around.end());
   for (const CellId c : around) {
-    edit.removed_cells.push_back(c);
     const auto& cell = mesh.cell(c);
     if (!(holds(cell, a) && holds(cell, b))) edit.inserted_cells.push_back({replaced(cell, gone, kept), mesh.body(c)});
   }

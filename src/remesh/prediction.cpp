@@ -10,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/small_vector.hpp"
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
@@ -84,27 +85,44 @@ class QuadraticModel {
   struct Corners {
     std::array<Vec<Dim>, Dim + 1> rest, x, predictor;
   };
+  /// What is the same whichever of a cell's corners moves.
+  struct CellAt {
+    CellAt(const StepContext<Dim>& context, const Corners& corners, int body) : at(corners) {
+      const Mat<Dim> edges = edge_matrix<Dim>(at.rest);
+      inverse = edges.inverse();
+      volume = simplex_volume<Dim>(edges);
+      const Material& material = context.materials.at(body);
+      Vec<Dim> center = Vec<Dim>::Zero();
+      for (const auto& p : at.rest) center += p / (Dim + 1);
+      moduli = elastic_moduli<Dim>(material, center);
+      F = edge_matrix<Dim>(at.x) * inverse;
+      mass = mass_density<Dim>(material, center) * volume;
+    }
+    const Corners& at;
+    Mat<Dim> inverse, F;
+    double volume, mass;
+    ElasticModuli moduli;
+  };
+  void add_cell(const CellAt& cell) {
+    energy_ += context_.scaling * cell.volume * elastic_density<Dim>(cell.F, cell.moduli);
+    add_inertia_and_load(cell, kNone);
+  }
+  /// The same where its corner `moving` moves; the response is the cell's.
+  void add_cell(const CellAt& cell, const ElasticResponse<Dim>& response, int moving) {
+    const double s = context_.scaling, V = cell.volume;
+    const Vec<Dim> gradient = shape_gradient<Dim>(cell.inverse, moving);
+    energy_ += s * V * response.density();
+    gradient_ += s * V * response.force(gradient);
+    hessian_ += s * V * response.stiffness(gradient);
+    add_inertia_and_load(cell, moving);
+  }
   /// `moving`: the corner that moves, or kNone.
   void add_cell(const Corners& at, int body, int moving) {
-    const Mat<Dim> edges = edge_matrix<Dim>(at.rest), inverse = edges.inverse();
-    const double V = simplex_volume<Dim>(edges), s = context_.scaling;
-    const Material& material = context_.materials.at(body);
-    Vec<Dim> center = Vec<Dim>::Zero();
-    for (const auto& p : at.rest) center += p / (Dim + 1);
-    const ElasticModuli moduli = elastic_moduli<Dim>(material, center);
-    const Mat<Dim> F = edge_matrix<Dim>(at.x) * inverse;
-    if (moving == kNone) {
-      energy_ += s * V * elastic_density<Dim>(F, moduli);
-    } else {
-      const Vec<Dim> gradient = shape_gradient<Dim>(inverse, moving);
-      const ElasticResponse<Dim> response(F, moduli);
-      energy_ += s * V * response.density();
-      gradient_ += s * V * response.force(gradient);
-      hessian_ += s * V * response.stiffness(gradient);
-    }
-    const double mass = mass_density<Dim>(material, center) * V;
-    if (context_.has_inertia) add_inertia(at, mass, moving);
-    if (context_.loads.acceleration) add_load(at.rest, at.x, s * mass, context_.loads.acceleration, moving);
+    const CellAt cell(context_, at, body);
+    if (moving == kNone)
+      add_cell(cell);
+    else
+      add_cell(cell, ElasticResponse<Dim>(cell.F, cell.moduli), moving);
   }
 
   /// What splitting a cell of constant moduli at the middle of its edge from corner `a` to `b` changes: both halves deform
@@ -152,6 +170,11 @@ class QuadraticModel {
   }
 
  private:
+  void add_inertia_and_load(const CellAt& cell, int moving) {
+    if (context_.has_inertia) add_inertia(cell.at, cell.mass, moving);
+    if (context_.loads.acceleration)
+      add_load(cell.at.rest, cell.at.x, context_.scaling * cell.mass, context_.loads.acceleration, moving);
+  }
   /// As LoadEnergy does it.
   template <std::size_t N>
   void add_load(const std::array<Vec<Dim>, N>& rest, const std::array<Vec<Dim>, N>& x, double weight,
@@ -234,7 +257,7 @@ double predict_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit, c
     }
     // There in the new mesh.
     double deepest = -std::numeric_limits<double>::infinity();
-    Vec<Dim> way, predictor;
+    Vec<Dim> way = Vec<Dim>::Zero(), predictor = way;
     for (const auto& [cell, body] : edit.inserted_cells) {
       std::array<Vec<Dim>, Dim + 1> rest;
       for (int k = 0; k <= Dim; ++k) rest[k] = cell[k] == edit.value->vertex ? edit.value->rest : state.mesh.rest(cell[k]);
@@ -256,75 +279,111 @@ double predict_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit, c
   return forgotten;
 }
 
+/// One side of an edit that sets no vertex: as it is, and with each of some vertices moving by itself.
+template <int Dim>
+class MovingModels {
+ public:
+  MovingModels(const RemeshState<Dim>& state, std::span<const VertexId> vertices)
+      : state_(state), vertices_(vertices), still_(state.context), moving_(vertices.size(), still_) {}
+  void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body) {
+    const auto corners = corners_of(state_, cell);
+    const typename QuadraticModel<Dim>::CellAt at(state_.context, corners, body);
+    const ElasticResponse<Dim> response(at.F, at.moduli);
+    still_.add_cell(at);
+    for (int k = 0; k <= Dim; ++k) moving_[index(cell[k])].add_cell(at, response, k);
+  }
+  void add_facet(const typename MeshTypes<Dim>::Facet& facet, int tag) {
+    std::array<Vec<Dim>, Dim> X, x;
+    for (int k = 0; k < Dim; ++k) {
+      X[k] = state_.mesh.rest(facet[k]);
+      x[k] = state_.fields.x.template segment<Dim>(Dim * facet[k]);
+    }
+    still_.add_facet(X, x, tag, kNone);
+    for (int k = 0; k < Dim; ++k) moving_[index(facet[k])].add_facet(X, x, tag, k);
+  }
+  double energy() const { return still_.energy(); }
+  const QuadraticModel<Dim>& operator[](std::size_t i) const { return moving_[i]; }
+
+ private:
+  std::size_t index(VertexId v) const {
+    return static_cast<std::size_t>(std::lower_bound(vertices_.begin(), vertices_.end(), v) - vertices_.begin());
+  }
+  const RemeshState<Dim>& state_;
+  std::span<const VertexId> vertices_;
+  QuadraticModel<Dim> still_;
+  std::vector<QuadraticModel<Dim>> moving_;
+};
+
+/// Nothing is set: each vertex gives way, by itself, to what the edit adds to its forces. Here the cells of the edit alone
+/// resist, in the mesh those around them too.
+template <int Dim>
+double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
+  constexpr double kShareOfRelaxation = 0.25;
+  SmallVector<VertexId, 64> vertices;  // ascending
+  for (const auto& cell : edit.inserted_cells) vertices.append(cell.vertices.begin(), cell.vertices.end());
+  std::sort(vertices.begin(), vertices.end());
+  vertices.shorten(static_cast<std::size_t>(std::unique(vertices.begin(), vertices.end()) - vertices.begin()));
+  MovingModels<Dim> before(state, vertices), after(state, vertices);
+  for (const CellId c : edit.removed_cells) before.add_cell(state.mesh.cell(c), state.mesh.body(c));
+  for (const auto& cell : edit.inserted_cells) after.add_cell(cell.vertices, cell.body);
+  if (!state.context.loads.tractions.empty()) {
+    for (const FacetId f : edit.removed_facets) before.add_facet(state.mesh.facet(f), state.mesh.facet_tag(f));
+    for (const auto& facet : edit.inserted_facets) after.add_facet(facet.vertices, facet.tag);
+  }
+  double gain = before.energy() - after.energy();
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const Vec<Dim> force = after[i].gradient() - before[i].gradient();
+    const Eigen::LLT<Mat<Dim>> llt(after[i].hessian());
+    if (llt.info() != Eigen::Success) return kUnknown;
+    gain += kShareOfRelaxation * 0.5 * force.dot(llt.solve(force));
+  }
+  return gain;
+}
+
 }  // namespace
 
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   const StepContext<Dim>& context = state.context;
   if (!knows_all_terms(context)) return kUnknown;
-  const VertexId set = edit.value ? edit.value->vertex : kNone;
+  if (!edit.value) return predict_gain_of_swap(state, edit);
+  const VertexId set = edit.value->vertex;
   const auto at = [&](const VectorX& field, VertexId v, bool after) {
     return after && v == set ? RemeshFields<Dim>::interpolate(field, *edit.value) : Vec<Dim>(field.segment<Dim>(Dim * v));
   };
-  const auto rest = [&](VertexId v, bool after) { return after && v == set ? edit.value->rest : state.mesh.rest(v); };
-  const auto add_cell = [&](const auto& cell, int body, bool is_after, QuadraticModel<Dim>& model, VertexId mover) {
+  const auto rest = [&](VertexId v) { return v == set ? edit.value->rest : state.mesh.rest(v); };
+  QuadraticModel<Dim> before(context), after(context);
+  for (const CellId c : edit.removed_cells)
+    before.add_cell(corners_of(state, state.mesh.cell(c)), state.mesh.body(c), kNone);
+  for (const auto& cell : edit.inserted_cells) {
     typename QuadraticModel<Dim>::Corners corners;
     int moving = kNone;
     for (int k = 0; k <= Dim; ++k) {
-      if (cell[k] == mover) moving = k;
-      corners.rest[k] = rest(cell[k], is_after);
-      corners.x[k] = at(state.fields.x, cell[k], is_after);
-      if (context.has_inertia) corners.predictor[k] = at(state.fields.predictor, cell[k], is_after);
+      const VertexId v = cell.vertices[k];
+      if (v == set) moving = k;
+      corners.rest[k] = rest(v);
+      corners.x[k] = at(state.fields.x, v, true);
+      if (context.has_inertia) corners.predictor[k] = at(state.fields.predictor, v, true);
     }
-    model.add_cell(corners, body, moving);
-  };
-  const auto add_facet = [&](const auto& facet, int tag, bool is_after, QuadraticModel<Dim>& model, VertexId mover) {
-    std::array<Vec<Dim>, Dim> X, x;
-    int moving = kNone;
-    for (int k = 0; k < Dim; ++k) {
-      if (facet[k] == mover) moving = k;
-      X[k] = rest(facet[k], is_after);
-      x[k] = at(state.fields.x, facet[k], is_after);
-    }
-    model.add_facet(X, x, tag, moving);
-  };
-  const bool has_tractions = !context.loads.tractions.empty();
-  const auto before = [&](VertexId mover) {
-    QuadraticModel<Dim> model(context);
-    for (const CellId c : edit.removed_cells) add_cell(state.mesh.cell(c), state.mesh.body(c), false, model, mover);
-    if (has_tractions)
-      for (const FacetId f : edit.removed_facets)
-        add_facet(state.mesh.facet(f), state.mesh.facet_tag(f), false, model, mover);
-    return model;
-  };
-  const auto after = [&](VertexId mover) {
-    QuadraticModel<Dim> model(context);
-    for (const auto& cell : edit.inserted_cells) add_cell(cell.vertices, cell.body, true, model, mover);
-    if (has_tractions)
-      for (const auto& facet : edit.inserted_facets) add_facet(facet.vertices, facet.tag, true, model, mover);
-    return model;
-  };
-  if (edit.value) {
-    double gain = before(kNone).energy() - after(set).relaxed();
-    if (context.has_inertia && state.history == HistoryRule::function && edit.kind != Edit<Dim>::Kind::split)
-      gain -= kLeastForgotten * predict_forgotten<Dim>(state, edit, at);
-    return gain;
+    after.add_cell(corners, cell.body, moving);
   }
-  // Nothing is set: each vertex gives way, by itself, to what the edit adds to its forces. Here the cells of the edit
-  // alone resist, in the mesh those around them too.
-  constexpr double kShareOfRelaxation = 0.25;
-  std::vector<VertexId> vertices;
-  for (const auto& cell : edit.inserted_cells) vertices.insert(vertices.end(), cell.vertices.begin(), cell.vertices.end());
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  double gain = before(kNone).energy() - after(kNone).energy();
-  for (const VertexId v : vertices) {
-    const QuadraticModel<Dim> old = before(v), now = after(v);
-    const Vec<Dim> force = now.gradient() - old.gradient();
-    const Eigen::LLT<Mat<Dim>> llt(now.hessian());
-    if (llt.info() != Eigen::Success) return kUnknown;
-    gain += kShareOfRelaxation * 0.5 * force.dot(llt.solve(force));
+  if (!context.loads.tractions.empty()) {
+    const auto add_facet = [&](const auto& facet, int tag, bool is_after, QuadraticModel<Dim>& model) {
+      std::array<Vec<Dim>, Dim> X, x;
+      int moving = kNone;
+      for (int k = 0; k < Dim; ++k) {
+        if (is_after && facet[k] == set) moving = k;
+        X[k] = is_after ? rest(facet[k]) : state.mesh.rest(facet[k]);
+        x[k] = at(state.fields.x, facet[k], is_after);
+      }
+      model.add_facet(X, x, tag, moving);
+    };
+    for (const FacetId f : edit.removed_facets) add_facet(state.mesh.facet(f), state.mesh.facet_tag(f), false, before);
+    for (const auto& facet : edit.inserted_facets) add_facet(facet.vertices, facet.tag, true, after);
   }
+  double gain = before.energy() - after.relaxed();
+  if (context.has_inertia && state.history == HistoryRule::function && edit.kind != Edit<Dim>::Kind::split)
+    gain -= kLeastForgotten * predict_forgotten<Dim>(state, edit, at);
   return gain;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/small_vector.hpp"
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/validate.hpp"
@@ -133,7 +134,7 @@ std::vector<EdgeKey> RemeshSession<Dim>::edges_of(std::span<const CellId> cells)
 
 template <int Dim>
 double RemeshSession<Dim>::roughness(const EdgeKey& edge) const {
-  std::vector<CellId> around(mesh_.cells_of(edge[0]).begin(), mesh_.cells_of(edge[0]).end());
+  SmallVector<CellId, Dim == 2 ? 16 : 64> around(mesh_.cells_of(edge[0]));
   if (edge[1] != kNone)
     for (const CellId c : mesh_.cells_of(edge[1]))
       if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around.push_back(c);

@@ -94,12 +94,12 @@ class Swapper {
     const EdgeKey& edge = trial.edge();
     if (const auto it = tries_.find(edge); it != tries_.end() && it->second >= options_.max_depth) return;
     if (!session_.exists(edge)) return;
-    trial.edit = policy_.edit(edge);
-    if (!trial.edit) return;
-    const double least = policy_.betters_shape(edge, *trial.edit) ? options_.acceptance_tolerance : least_gain(session_);
     trial.signal = session_.roughness(edge);
     session_.find_contact(trial, scratch);
     if (session_.was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
+    trial.edit = policy_.edit(edge);
+    if (!trial.edit) return;
+    const double least = policy_.betters_shape(edge, *trial.edit) ? options_.acceptance_tolerance : least_gain(session_);
     trial.is_asked = true;
     trial.verdict.decision = Decision::by_bound;
     if (!trial.in_contact && !is_promising(session_, *trial.edit, least)) return;  // there trials tell
