@@ -350,6 +350,7 @@ struct Swapped {
     if (find_inverted<3>(before, fields.x) != kNone) return;
     fields.past_positions = {fields.x};
     StepContext<3> context;
+    context.obstacles.past_x.resize(1);
     context.materials[1] = {.youngs_modulus = 1000, .poisson_ratio = 0.3, .density = 1};
     context.has_inertia = false;
     context.held_components[9] = {true, true, true};
