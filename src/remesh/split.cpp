@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <span>
 
 #include "itr/remesh/edits.hpp"
 #include "wave.hpp"
@@ -52,6 +53,15 @@ class Splitter {
     inherit(trial.edge(), created);
     const auto near = session_.edges_of(session_.mesh().cells_of(created));
     fresh.insert(fresh.end(), near.begin(), near.end());
+  }
+
+  /// Counts what look would have: in free flight all edges are hopeless, and nothing is asked.
+  void pass_over(std::span<const EdgeQueue::Entry> entries) {
+    for (const EdgeQueue::Entry& entry : entries) {
+      bool is_bound_by_dhat = false;
+      session_.may_be_split(entry.edge, is_bound_by_dhat);
+      session_.report().bound_by_activation_distance += is_bound_by_dhat;
+    }
   }
 
  private:

@@ -18,10 +18,11 @@ namespace itr {
 inline constexpr int kSmallestWave = 8, kLargestWave = 256;
 inline constexpr double kTolerableWaste = 0.1;
 
-/// Settles candidates of an operation until there are none. The operation has
+/// Settles candidates of an operation until there are none. The operation has (the last where it calls any hopeless)
 ///   std::optional<EdgeQueue::Entry> rank(const EdgeKey&, LocalScratch<Dim>&) const;  // empty: no candidate
 ///   void look(Trial<Dim>&, LocalScratch<Dim>&) const;                                // may preview
 ///   void settle(Trial<Dim>&, std::vector<EdgeKey>& fresh);                           // may commit
+///   void pass_over(std::span<const EdgeQueue::Entry>);                               // all that there are, hopeless
 /// `fresh` are edges (a vertex v is {v, kNone}) to be ranked: at first these, each once.
 template <int Dim, typename Operation>
 void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<EdgeKey> fresh) {
@@ -56,6 +57,10 @@ void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<Ed
     std::vector<EdgeQueue::Entry> entries;
     for (const auto& entry : ranked)
       if (entry) entries.push_back(session.stamped(*entry));
+    if constexpr (requires { operation.pass_over(entries); }) {
+      const auto is_hopeless = [](const EdgeQueue::Entry& entry) { return entry.is_hopeless; };
+      if (count == 0 && std::all_of(entries.begin(), entries.end(), is_hopeless)) return operation.pass_over(entries);
+    }
     queue.push(std::move(entries));
     fresh.clear();
 
