@@ -12,6 +12,7 @@
 #include "itr/energy/contact/surface.hpp"
 #include "itr/energy/damping.hpp"
 #include "itr/energy/mapped.hpp"
+#include "itr/energy/single_ways.hpp"
 
 namespace itr {
 namespace {
@@ -146,6 +147,46 @@ TEST_P(Contact, DerivativesMatchDifferencesIn3D) {
 TEST_P(Contact, StepIsFreeOfContactIn3D) {
   for (unsigned seed = 0; seed < 6; ++seed)
     EXPECT_LT(expect_free_way<3>(ContactScene3(seed, GetParam(), 0.2 * seed, 0.02), 0.2, seed), 1);
+}
+
+/// Exact predicates on the single ways that max_step leaves beside a step that it cuts short; returns how many vertices go
+/// further than that.
+template <int Dim, typename Scene>
+int expect_free_single_ways(const Scene& scene, unsigned seed) {
+  const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, 0.3);
+  const VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
+  Workspace workspace;
+  const double step = contact.max_step(scene.x, dx, workspace);
+  const auto& single = workspace.get<SingleWays>();
+  EXPECT_EQ(single.dx.size() > 0, step < SingleWays::kWorthIt);
+  if (single.dx.size() == 0) return 0;
+  EXPECT_EQ(single.step, step);
+  for (int i = 1; i <= 20; ++i) {
+    const VectorX x = scene.x + i / 20.0 * single.dx;
+    EXPECT_FALSE(has_intersection<Dim>(scene.surface, x)) << "seed " << seed << " at " << 5 * i << " %";
+    Workspace fresh;
+    EXPECT_GT(contact.min_distance(x, fresh), 0) << "seed " << seed;
+  }
+  int further = 0;
+  for (const int v : scene.surface.vertices) {
+    const double way = dx.segment<Dim>(Dim * v).norm(), share = single.dx.segment<Dim>(Dim * v).norm() / way;
+    EXPECT_LE((single.dx.segment<Dim>(Dim * v) - share * dx.segment<Dim>(Dim * v)).norm(), 1e-14 * way);
+    EXPECT_LE(share, 1 + 1e-14);
+    further += share > step;
+  }
+  return further;
+}
+
+TEST_P(Contact, SingleWaysAreFreeOfContactAndLonger) {
+  int further = 0, further_in_3d = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    further += expect_free_single_ways<2>(ContactScene(seed, GetParam()), seed);
+    further_in_3d += expect_free_single_ways<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed);
+  }
+  EXPECT_GT(further, 100);
+  EXPECT_GT(further_in_3d, 100);
 }
 
 /// The sum by its definition: every pair of primitives, nothing merged, no tree.

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "itr/energy/contact/contact.hpp"
 #include "itr/linear/choice.hpp"
 
 namespace itr {
@@ -340,6 +341,52 @@ TEST(Newton, StopsByEachTestAndNamesIt) {
   NewtonOptions by_energy = with(&NewtonOptions::energy_tolerance, 1e-6);
   by_energy.energy_steps = 1;
   EXPECT_EQ(stop(by_energy), Termination::energy);
+}
+
+/// 1/2 |x - target|^2.
+class Pull final : public Energy {
+ public:
+  explicit Pull(VectorX target) : target_(std::move(target)) {}
+  std::string_view name() const override { return "pull"; }
+  double value(ConstVectorView x, Workspace&) const override { return (x - target_).squaredNorm() / 2; }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override { gradient += x - target_; }
+  void add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const override {
+    const Mat<2> block = Mat<2>::Identity();
+    for (int v = 0; v < x.size() / 2; ++v) sink.add<2>(std::array{v}, block.data());
+  }
+
+ private:
+  VectorX target_;
+};
+
+/// Points fall on a floor from heights that differ by a factor of a thousand: each is stopped on its own.
+TEST(Newton, ContactOfOneVertexStopsNoOther) {
+  constexpr int n = 20;
+  std::vector<Vec<2>> rest;
+  std::vector<int> points;
+  for (int i = 0; i < n; ++i) {
+    rest.emplace_back(i, 0.02 * std::pow(1.4, i));
+    points.push_back(i);
+  }
+  rest.insert(rest.end(), {{-1, 0}, {n, 0}});
+  std::vector<char> counts(n, 1), held(2 * n, 0);
+  counts.resize(n + 2, 0);
+  held.resize(2 * n + 4, 1);
+  const auto surface = make_collision_surface<2>({{n, n + 1}}, {}, points, rest, counts);
+  VectorX x(2 * n + 4);
+  for (int v = 0; v < n + 2; ++v) x.segment<2>(2 * v) = rest[v];
+  VectorX target = x;
+  for (int v = 0; v < n; ++v) target[2 * v + 1] = -0.5;
+  EnergySum energy;
+  energy.add(std::make_shared<Pull>(target));
+  energy.add(
+      std::make_shared<ContactEnergy<2>>(surface, ContactOptions{.enabled = true, .activation_distance = 0.01}, 1e7, 1));
+  DenseSystem system;
+  Workspace workspace;
+  const NewtonSummary summary = minimize(energy, x, DofMap::from_held(held), VectorX(), system, {}, workspace);
+  EXPECT_TRUE(summary.converged()) << summary.message;
+  EXPECT_LT(summary.iterations, 15);
+  for (int v = 0; v < n; ++v) EXPECT_NEAR(x[2 * v + 1], x[1], 1e-8);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "itr/energy/single_ways.hpp"
+
 namespace itr {
 
 template <int Dim>
@@ -43,7 +45,9 @@ void MappedEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessia
 
 template <int Dim>
 double MappedEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  return energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
+  const double step = energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
+  workspace.get<SingleWays>().dx.resize(0);  // of other vertices
+  return step;
 }
 
 template class MappedEnergy<2>;

@@ -9,42 +9,9 @@
 
 #include "curvature.hpp"
 #include "itr/core/timer.hpp"
+#include "itr/energy/single_ways.hpp"
 
 namespace itr {
-
-const char* to_string(Termination termination) {
-  switch (termination) {
-    case Termination::gradient:
-      return "gradient below tolerance";
-    case Termination::step:
-      return "step below tolerance";
-    case Termination::decrement:
-      return "Newton decrement below tolerance";
-    case Termination::energy:
-      return "energy change below tolerance";
-    case Termination::round_off:
-      return "converged to round-off, not to the tolerance";
-    case Termination::iterations:
-      return "out of iterations";
-    case Termination::no_descent:
-      return "no step lowers the energy";
-    case Termination::infeasible:
-      return "not feasible";
-    case Termination::cancelled:
-      return "cancelled";
-  }
-  return "";
-}
-
-void NewtonSummary::add_effort(const NewtonSummary& other) {
-  iterations += other.iterations;
-  indefinite += other.indefinite;
-  assembly_seconds += other.assembly_seconds;
-  linear_seconds += other.linear_seconds;
-  line_search_seconds += other.line_search_seconds;
-  ccd_seconds += other.ccd_seconds;
-  linear_residual = std::max(linear_residual, other.linear_residual);
-}
 
 namespace {
 
@@ -61,6 +28,7 @@ constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less th
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostDoublings = 12;
+constexpr double kMuchMore = 2;      ///< see try_single_ways
 constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 class Minimizer {
@@ -482,11 +450,16 @@ class Minimizer {
 
   bool line_search() {
     double step = 1;
+    auto& single = workspace_.get<SingleWays>();
+    single.dx.resize(0);
     {
       const ScopedTimer timer(summary_.ccd_seconds);
       step = energy_.max_step(x_, step_, workspace_);
     }
     const bool advancing = motion_.step.size() > 0;
+    VectorX single_ways;  // where nothing but contact cuts the step short
+    if (!advancing && single.step == step && options_.indefinite == IndefiniteHessian::project)
+      single_ways = std::move(single.dx);
     if (advancing && step < kRelaxBelow) relax_next_ = true;
     const double slope = gradient_.dot(step_);
     // Large enough for the step to lower the merit function of the quadratic model by half of what the penalty gives up.
@@ -498,7 +471,7 @@ class Minimizer {
     for (int i = 0; i < limit && step > 1e-14; ++i, step /= 2) {
       candidate_ = x_ + step * step_;
       if (advancing && step == 1) move_to_targets(candidate_);  // exactly there, not to round-off
-      const double value = timed_value(candidate_);
+      double value = timed_value(candidate_);
       if (!std::isfinite(value)) continue;
       const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
       if (!acceptable(merit_change, value, step, merit_slope, advancing)) continue;
@@ -506,11 +479,26 @@ class Minimizer {
       const bool straight = options_.extend_steps && !advancing && step == 1 && value - value_ < kStraight * slope &&
                             free_dot(step_, gradient_at(candidate_)) < kStraight / 2 * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
+      if (single_ways.size() > 0) try_single_ways(single_ways, value);
       accept(value);
       if (straight) go_on();
       return true;
     }
     return false;
+  }
+
+  /// Moves the candidate to where each vertex goes as far as it can alone, if the energy falls by much more there. Where
+  /// that inverts cells it leads into squeezed ones, which take more iterations than it saves.
+  void try_single_ways(const VectorX& ways, double& value) {
+    {
+      const ScopedTimer timer(summary_.ccd_seconds);
+      if (energy_.max_step(x_, ways, workspace_) < 1) return;
+    }
+    VectorX candidate = x_ + ways;
+    const double there = timed_value(candidate);
+    if (!(there - value_ < kMuchMore * (value - value_))) return;
+    candidate_ = std::move(candidate);
+    value = there;
   }
 
   void accept(double value) {

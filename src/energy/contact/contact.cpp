@@ -9,7 +9,10 @@
 
 #include "candidates.hpp"
 #include "itr/core/parallel_reduce.hpp"
+#include "itr/energy/single_ways.hpp"
 #include "itr/geometry/ccd.hpp"
+#include "pairs.hpp"
+#include "planar_bounds.hpp"
 
 namespace itr {
 
@@ -19,35 +22,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = 64;
 constexpr std::size_t kBatch = 1024;  ///< local Hessians that are held at a time
 
-template <int Dim>
-using Positions = std::array<Vec<Dim>, 4>;
-
-template <int Dim>
-Positions<Dim> gather(const std::array<int, 4>& vertices, int size, ConstVectorView x) {
-  Positions<Dim> p;
-  for (int k = 0; k < size; ++k) p[k] = x.segment<Dim>(Dim * vertices[k]);
-  return p;
-}
-
-/// Vertices of a candidate: those of its first primitive, then those of the second.
-std::array<int, 4> vertices_of(const CollisionSurface& surface, PairKind kind, const std::array<int, 2>& pair) {
-  const auto [i, j] = pair;
-  if (kind == PairKind::edge_vertex) return {i, surface.edges[j][0], surface.edges[j][1], kNone};
-  if (kind == PairKind::face_vertex) return {i, surface.triangles[j][0], surface.triangles[j][1], surface.triangles[j][2]};
-  return {surface.edges[i][0], surface.edges[i][1], surface.edges[j][0], surface.edges[j][1]};
-}
-
 /// Share of the way from p to q that is free of contact, by conservative CCD.
 template <int Dim>
 double free_share(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q) {
-  const int size_of_first = kind == PairKind::edge_edge ? 2 : 1;
-  Box<Dim> first, second;
-  for (int k = 0; k < pair_size(kind); ++k) {
-    Box<Dim>& box = k < size_of_first ? first : second;
-    box.include(p[k]);
-    box.include(q[k]);
-  }
-  if (!first.overlaps(second)) return 1;
+  if (!ways_overlap<Dim>(kind, p, q)) return 1;
   if constexpr (Dim == 2) return point_edge_ccd<2>(p[0], p[1], p[2], q[0], q[1], q[2]);
   if constexpr (Dim == 3)
     return kind == PairKind::edge_edge ? edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3])
@@ -58,6 +36,29 @@ const char* name_of(PairKind kind) {
   return kind == PairKind::edge_vertex   ? "vertex-edge pair"
          : kind == PairKind::face_vertex ? "vertex-triangle pair"
                                          : "edge-edge pair";
+}
+
+/// The motion with each vertex' way as long as it is free of contact by planar bounds.
+template <int Dim>
+VectorX single_ways(const CollisionSurface& surface, const ContactCandidates<Dim>& candidates, ConstVectorView x,
+                    const VectorX& motion, double dhat) {
+  std::vector<double> share(surface.area.size(), 1);
+  for (const auto& [kind, list] : candidates.all()) {
+    const auto& pairs = *list;
+    const auto shares_of = [&, kind = kind](std::size_t i) {
+      const auto vertices = vertices_of(surface, kind, pairs[i]);
+      const int size = pair_size(kind);
+      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, motion), dhat);
+    };
+    const auto note = [&, kind = kind](std::size_t i, const std::array<double, 4>& shares) {
+      const auto vertices = vertices_of(surface, kind, pairs[i]);
+      for (int k = 0; k < pair_size(kind); ++k) share[vertices[k]] = std::min(share[vertices[k]], shares[k]);
+    };
+    parallel_then_ordered<std::array<double, 4>>(pairs.size(), kBlock, shares_of, note);
+  }
+  VectorX ways = motion;
+  for (const int v : surface.vertices) ways.segment<Dim>(Dim * v) *= share[v];
+  return ways;
 }
 
 /// The features of a mollified pair whose distance counts.
@@ -325,6 +326,8 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
     };
     least = std::min(least, parallel_min(pairs.size(), kBatch, step_of));
   }
+  if (least < SingleWays::kWorthIt)
+    workspace.get<SingleWays>() = {single_ways(surface_, candidates, x, motion, dhat_), least};
   return least;
 }
 

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Candidates with their vertices and positions.
+#pragma once
+
+#include <array>
+
+#include "itr/energy/contact/surface.hpp"
+#include "itr/geometry/bvh.hpp"
+#include "itr/geometry/distance.hpp"
+
+namespace itr {
+
+template <int Dim>
+using Positions = std::array<Vec<Dim>, 4>;
+
+template <int Dim>
+Positions<Dim> gather(const std::array<int, 4>& vertices, int size, ConstVectorView x) {
+  Positions<Dim> p;
+  for (int k = 0; k < size; ++k) p[k] = x.segment<Dim>(Dim * vertices[k]);
+  return p;
+}
+
+/// Of the pair's primitives the first has so many vertices.
+inline int size_of_first(PairKind kind) { return kind == PairKind::edge_edge ? 2 : 1; }
+
+/// Vertices of a candidate: those of its first primitive, then those of the second.
+inline std::array<int, 4> vertices_of(const CollisionSurface& surface, PairKind kind, const std::array<int, 2>& pair) {
+  const auto [i, j] = pair;
+  if (kind == PairKind::edge_vertex) return {i, surface.edges[j][0], surface.edges[j][1], kNone};
+  if (kind == PairKind::face_vertex) return {i, surface.triangles[j][0], surface.triangles[j][1], surface.triangles[j][2]};
+  return {surface.edges[i][0], surface.edges[i][1], surface.edges[j][0], surface.edges[j][1]};
+}
+
+/// Whether the boxes around the ways of both primitives from p to q overlap.
+template <int Dim>
+bool ways_overlap(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q) {
+  Box<Dim> first, second;
+  for (int k = 0; k < pair_size(kind); ++k) {
+    Box<Dim>& box = k < size_of_first(kind) ? first : second;
+    box.include(p[k]);
+    box.include(q[k]);
+  }
+  return first.overlaps(second);
+}
+
+}  // namespace itr

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+
+#include "itr/newton/newton.hpp"
+
+namespace itr {
+
+const char* to_string(Termination termination) {
+  switch (termination) {
+    case Termination::gradient:
+      return "gradient below tolerance";
+    case Termination::step:
+      return "step below tolerance";
+    case Termination::decrement:
+      return "Newton decrement below tolerance";
+    case Termination::energy:
+      return "energy change below tolerance";
+    case Termination::round_off:
+      return "converged to round-off, not to the tolerance";
+    case Termination::iterations:
+      return "out of iterations";
+    case Termination::no_descent:
+      return "no step lowers the energy";
+    case Termination::infeasible:
+      return "not feasible";
+    case Termination::cancelled:
+      return "cancelled";
+  }
+  return "";
+}
+
+void NewtonSummary::add_effort(const NewtonSummary& other) {
+  iterations += other.iterations;
+  indefinite += other.indefinite;
+  assembly_seconds += other.assembly_seconds;
+  linear_seconds += other.linear_seconds;
+  line_search_seconds += other.line_search_seconds;
+  ccd_seconds += other.ccd_seconds;
+  linear_residual = std::max(linear_residual, other.linear_residual);
+}
+
+}  // namespace itr
