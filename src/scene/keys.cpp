@@ -204,7 +204,7 @@ constexpr Key kKeys[] = {
 
     {"/solver/nonlinear/solver", only, "", "\"Newton\"", "", "the only one"},
     {"/solver/nonlinear/allow_out_of_iterations", only, "", "false", "", "a step that does not converge is not taken"},
-    {"/solver/nonlinear/max_iterations", read, "count", "500", "",
+    {"/solver/nonlinear/max_iterations", read, "count", "3000", "",
      "of Newton's method in a solve; more than that: it failed"},
     {"/solver/nonlinear/x_delta", read, "non_negative", "0", "m/s",
      "converged: Newton step shorter than this times dt (norm over all)"},

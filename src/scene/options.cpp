@@ -197,7 +197,7 @@ IndefiniteHessian indefinite_by_solver(const Node& root) {
 NewtonOptions read_newton(const Node& root, double characteristic_length, const SceneScale& scale) {
   const Node nonlinear = root["solver"]["nonlinear"];
   NewtonOptions options;
-  options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, 500);
+  options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, options.max_iterations);
   const Node paper_key = find_any(nonlinear, kPaperKeys, "f_delta");
   const Node main_key = find_any(nonlinear, kMainKeys, "f_delta_tol");
   if (paper_key.exists() && main_key.exists())

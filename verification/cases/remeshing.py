@@ -86,7 +86,7 @@ def results(context):
     mesh = context.folder / "beam.msh"
     write_mesh(mesh, points, cells)
     for rule in RULES:
-        run = run_scene(context, rule, scene_of(mesh, rule, 6 if context.quick else 40))
+        run = run_scene(context, rule, scene_of(mesh, rule, 12 if context.quick else 40))
         done = {kind: sum(step[kind]["accepted"] for step in run.steps) for kind in ("splits", "collapses", "swaps", "smooths")}
         if not all(done.values()):
             raise Failure(f"{rule}: the scene is to use every operation, but accepted {done}")

@@ -14,10 +14,6 @@ CASES = {}
 LIKE = {}
 # Cases that fail, and why; one that passes is to be taken off.
 KNOWN = {
-    "impact_1e3_two_bodies":
-        "its steps take up to 2 068 iterations (with 20 000 allowed it ends, certified): rho v^2 is a thousand times the barrier's "
-        "stiffness, gaps are 1e-6 of dhat, and a vertex that slides along an edge that turns goes sqrt(gap * length) an iteration; "
-        "impact_1e3_two_bodies_stiff has a barrier for this speed",
     "coplanar_faces":
         "the two ends are mirror images of one norm to twelve digits: nothing but round-off says on which side the upper cube turns; with "
         "/solver/linear/reuse_factors false the solvers take the same",

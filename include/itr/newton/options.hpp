@@ -35,7 +35,7 @@ struct NewtonProgress {
 /// When a solve has converged, and how it searches. Tolerances are those of the scene (CONVENTIONS.md, "Tolerances") already
 /// multiplied by what its vocabulary multiplies them with; 0 turns a test off.
 struct NewtonOptions {
-  int max_iterations = 500;
+  int max_iterations = 3000;
   NewtonNorm norm = NewtonNorm::euclidean;
   double step_tolerance = 0;                ///< stop when the full step has a norm below it
   double gradient_tolerance = 1e-8;         ///< stop when the gradient has a norm below it
