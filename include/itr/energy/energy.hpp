@@ -22,7 +22,8 @@ inline double projected(double eigenvalue, PsdProjection psd) {
 }
 
 /// Scratch of one solve, owned by the caller: terms keep no mutable caches, so solves never meet. What is in it never
-/// changes a result, only the time that it takes.
+/// changes a result, only the time that it takes; what max_step says beside its value (`SingleWays`) is an answer, and no
+/// scratch.
 class Workspace {
  public:
   /// The one object of type T of this workspace.
