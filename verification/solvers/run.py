@@ -46,7 +46,7 @@ SCENES = [
 ]
 # the same scenes from end to end, at their first size (the masticator with remeshing): name, --set
 ENDS = {"masticator 2D": ["/time/tend=3"], "bar-twist 3D": [FIXED, "/time/dt=0.05", "/time/tend=0.5", "/geometry/0/n_refs=1"],
-        "ball on spikes 3D": [*BALL, "/time/tend=0.02"], "monkey on rollers 3D": [*MONKEY, "/time/tend=0.05"]}
+        "ball on spikes 3D": [*BALL, "/time/tend=0.01"], "monkey on rollers 3D": [*MONKEY, "/time/tend=0.03"]}
 DENSE_MOST = 10_000  # unknowns: `dense` is for patches
 ITERATIVE = ("belos:muelu", "eigen:cg")  # have no factors to use again
 END_KEYS = ["scene", "solver", "reuse", "outcome", "steps", "newton_iterations", "linear_solves", "factorizations",
