@@ -16,6 +16,11 @@
 
 namespace itr {
 
+/// Places the vertices of n^3 cubes in the unit cube.
+inline auto unit_grid(int n) {
+  return [n](int i, int j, int k) { return Vec<3>(Vec<3>(i, j, k) / n); };
+}
+
 /// n^3 cubes of six tetrahedra each (Kuhn), those for which `body(i, j, k)` is not kNone; boundary facets on the planes x,
 /// y, z = 0 or 1 have tags 2 * axis + side, others 6. Vertices at `place(i, j, k)`; unused ones are left out.
 template <typename Place, typename Body>

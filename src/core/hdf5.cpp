@@ -119,7 +119,10 @@ void File::link_file(const std::string& name, const std::string& relative_path) 
   require(H5Lcreate_external(relative_path.c_str(), "/", file_.id(), name.c_str(), links.id(), H5P_DEFAULT) >= 0, name);
 }
 
-void File::unlink(const std::string& name) { require(H5Ldelete(file_.id(), name.c_str(), H5P_DEFAULT) >= 0, name); }
+void File::unlink(const std::string& name) {
+  written_.erase(name);
+  require(H5Ldelete(file_.id(), name.c_str(), H5P_DEFAULT) >= 0, name);
+}
 
 void File::write_text(const std::string& name, const std::string& text) {
   write_raw(name, H5T_NATIVE_CHAR, text.data(), text.size(), 0);

@@ -29,12 +29,13 @@ class ElasticResponse {
       log_J_ = std::log(J_);
       inverse_ = F.inverse();
     } else {
+      density_ = elastic_density<Dim>(F, moduli);
       stress_ = elastic_stress<Dim>(F, moduli);
       system_ = elastic_eigensystem<Dim>(F, moduli);
     }
   }
   double density() const {
-    if (!is_neo_hookean()) return elastic_density<Dim>(F_, moduli_);
+    if (!is_neo_hookean()) return density_;
     const double mu = moduli_.lame.mu, lambda = moduli_.lame.lambda;
     return J_ > 0 ? mu / 2 * (F_.squaredNorm() - Dim - 2 * log_J_) + lambda / 2 * log_J_ * log_J_
                   : std::numeric_limits<double>::infinity();
@@ -64,7 +65,7 @@ class ElasticResponse {
   bool is_neo_hookean() const { return moduli_.law == MaterialLaw::neo_hookean; }
   const Mat<Dim>& F_;
   const ElasticModuli& moduli_;
-  double J_ = 0, log_J_ = 0;
+  double J_ = 0, log_J_ = 0, density_ = 0;
   Mat<Dim> inverse_, stress_;
   EigenSystem<Dim> system_{};
 };
