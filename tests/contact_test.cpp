@@ -12,7 +12,6 @@
 #include "itr/energy/contact/surface.hpp"
 #include "itr/energy/damping.hpp"
 #include "itr/energy/mapped.hpp"
-#include "itr/energy/single_ways.hpp"
 
 namespace itr {
 namespace {
@@ -149,8 +148,7 @@ TEST_P(Contact, StepIsFreeOfContactIn3D) {
     EXPECT_LT(expect_free_way<3>(ContactScene3(seed, GetParam(), 0.2 * seed, 0.02), 0.2, seed), 1);
 }
 
-/// Exact predicates on the single ways that max_step leaves beside a step that it cuts short; returns how many vertices go
-/// further than that.
+/// Exact predicates on single ways; returns how many vertices go further than by the step of all.
 template <int Dim, typename Scene>
 int expect_free_single_ways(const Scene& scene, unsigned seed) {
   const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
@@ -159,24 +157,53 @@ int expect_free_single_ways(const Scene& scene, unsigned seed) {
   const VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
   Workspace workspace;
   const double step = contact.max_step(scene.x, dx, workspace);
-  const auto& single = workspace.get<SingleWays>();
-  EXPECT_EQ(single.dx.size() > 0, step < SingleWays::kWorthIt);
-  if (single.dx.size() == 0) return 0;
-  EXPECT_EQ(single.step, step);
+  const VectorX ways = contact.single_ways(scene.x, dx, workspace);
+  EXPECT_EQ(ways.size(), dx.size());
   for (int i = 1; i <= 20; ++i) {
-    const VectorX x = scene.x + i / 20.0 * single.dx;
+    const VectorX x = scene.x + i / 20.0 * ways;
     EXPECT_FALSE(has_intersection<Dim>(scene.surface, x)) << "seed " << seed << " at " << 5 * i << " %";
     Workspace fresh;
     EXPECT_GT(contact.min_distance(x, fresh), 0) << "seed " << seed;
   }
   int further = 0;
   for (const int v : scene.surface.vertices) {
-    const double way = dx.segment<Dim>(Dim * v).norm(), share = single.dx.segment<Dim>(Dim * v).norm() / way;
-    EXPECT_LE((single.dx.segment<Dim>(Dim * v) - share * dx.segment<Dim>(Dim * v)).norm(), 1e-14 * way);
+    const double way = dx.segment<Dim>(Dim * v).norm(), share = ways.segment<Dim>(Dim * v).norm() / way;
+    EXPECT_LE((ways.segment<Dim>(Dim * v) - share * dx.segment<Dim>(Dim * v)).norm(), 1e-14 * way);
     EXPECT_LE(share, 1 + 1e-14);
     further += share > step;
   }
   return further;
+}
+
+/// A term of energy 0 that lets a step go so far.
+struct Limit final : Energy {
+  explicit Limit(double step) : step(step) {}
+  std::string_view name() const override { return "limit"; }
+  double value(ConstVectorView, Workspace&) const override { return 0; }
+  void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+  double max_step(ConstVectorView, ConstVectorView, Workspace&) const override { return step; }
+  double step;
+};
+
+TEST_P(Contact, SumTellsSingleWaysWhereContactAloneCutsAStep) {
+  const ContactScene scene(0, GetParam());
+  const auto contact = std::make_shared<ContactEnergy<2>>(scene.surface, scene.options, 3, 0.5);
+  const VectorX dx = VectorX::Constant(scene.x.size(), 0.1);
+  Workspace workspace;
+  const VectorX ways = contact->single_ways(scene.x, dx, workspace);
+  for (const double step : {1.0, 0.5})
+    for (const bool is_first : {false, true}) {
+      EnergySum sum;
+      if (is_first) sum.add(std::make_shared<Limit>(step));
+      sum.add(contact);
+      if (!is_first) sum.add(std::make_shared<Limit>(step));
+      EXPECT_EQ(sum.single_ways(scene.x, dx, workspace), step == 1 ? ways : VectorX());
+    }
+  EnergySum twice;
+  twice.add(contact);
+  twice.add(contact);
+  EXPECT_EQ(twice.single_ways(scene.x, dx, workspace).size(), 0);
 }
 
 TEST_P(Contact, SingleWaysAreFreeOfContactAndLonger) {

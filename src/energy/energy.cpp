@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace itr {
 
 double Energy::max_step(ConstVectorView, ConstVectorView, Workspace&) const { return 1; }
+
+VectorX Energy::single_ways(ConstVectorView, ConstVectorView, Workspace&) const { return {}; }
 
 double EnergySum::value(ConstVectorView x, Workspace& workspace) const {
   double sum = 0;
@@ -35,6 +38,17 @@ double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& wor
     part = step * dx;
   }
   return step;
+}
+
+VectorX EnergySum::single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
+  VectorX ways;
+  for (const auto& term : terms_) {
+    VectorX own = term->single_ways(x, dx, workspace);
+    if (own.size() == 0 && term->max_step(x, dx, workspace) == 1) continue;
+    if (own.size() == 0 || ways.size() > 0) return {};
+    ways = std::move(own);
+  }
+  return ways;
 }
 
 }  // namespace itr

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "itr/energy/single_ways.hpp"
-
 namespace itr {
 
 template <int Dim>
@@ -45,9 +43,7 @@ void MappedEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessia
 
 template <int Dim>
 double MappedEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  const double step = energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
-  workspace.get<SingleWays>().dx.resize(0);  // of other vertices
-  return step;
+  return energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
 }
 
 template class MappedEnergy<2>;

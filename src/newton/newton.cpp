@@ -9,7 +9,6 @@
 
 #include "curvature.hpp"
 #include "itr/core/timer.hpp"
-#include "itr/energy/single_ways.hpp"
 
 namespace itr {
 
@@ -28,7 +27,7 @@ constexpr int kMostUnresolved = 20;     ///< steps in a row that promise less th
 constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: above the round-off of a body at rest
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostDoublings = 12;
-constexpr double kMuchMore = 2;      ///< see try_single_ways
+constexpr double kSingleWaysBelow = 0.25, kMuchMore = 2;  ///< see try_single_ways
 constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 class Minimizer {
@@ -450,16 +449,14 @@ class Minimizer {
 
   bool line_search() {
     double step = 1;
-    auto& single = workspace_.get<SingleWays>();
-    single.dx.resize(0);
+    const bool advancing = motion_.step.size() > 0;
+    VectorX single_ways;
     {
       const ScopedTimer timer(summary_.ccd_seconds);
       step = energy_.max_step(x_, step_, workspace_);
+      if (step < kSingleWaysBelow && !advancing && options_.indefinite == IndefiniteHessian::project)
+        single_ways = energy_.single_ways(x_, step_, workspace_);
     }
-    const bool advancing = motion_.step.size() > 0;
-    VectorX single_ways;  // where nothing but contact cuts the step short
-    if (!advancing && single.step == step && options_.indefinite == IndefiniteHessian::project)
-      single_ways = std::move(single.dx);
     if (advancing && step < kRelaxBelow) relax_next_ = true;
     const double slope = gradient_.dot(step_);
     // Large enough for the step to lower the merit function of the quadratic model by half of what the penalty gives up.
@@ -487,7 +484,8 @@ class Minimizer {
     return false;
   }
 
-  /// Moves the candidate to where each vertex goes as far as it can alone, if the energy falls by much more there. Where
+  /// Moves the candidate to where each vertex goes as far as it can alone (asked where the whole step is cut to less than
+  /// `kSingleWaysBelow`), if the energy falls by much more there. Where
   /// that inverts cells it leads into squeezed ones, which take more iterations than it saves.
   void try_single_ways(const VectorX& ways, double& value) {
     {

@@ -22,8 +22,7 @@ inline double projected(double eigenvalue, PsdProjection psd) {
 }
 
 /// Scratch of one solve, owned by the caller: terms keep no mutable caches, so solves never meet. What is in it never
-/// changes a result, only the time that it takes; what max_step says beside its value (`SingleWays`) is an answer, and no
-/// scratch.
+/// changes a result, only the time that it takes.
 class Workspace {
  public:
   /// The one object of type T of this workspace.
@@ -48,6 +47,9 @@ class Energy {
   virtual void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const = 0;
   /// Largest a in [0, 1] such that x + s dx is feasible for all s in [0, a] (conservative).
   virtual double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
+  /// The motion dx with each vertex' way as long as it is feasible whatever stops others, for where max_step cuts dx short
+  /// as a whole; empty where the term cannot tell.
+  virtual VectorX single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
 };
 
 /// A sum that does not own its terms' data but shares the terms.
@@ -60,6 +62,8 @@ class EnergySum final : public Energy {
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
+  /// Those of the one term that can tell; empty where another cuts dx short.
+  VectorX single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
 
  private:
   std::vector<std::shared_ptr<const Energy>> terms_;

@@ -9,7 +9,6 @@
 
 #include "candidates.hpp"
 #include "itr/core/parallel_reduce.hpp"
-#include "itr/energy/single_ways.hpp"
 #include "itr/geometry/ccd.hpp"
 #include "pairs.hpp"
 #include "planar_bounds.hpp"
@@ -36,29 +35,6 @@ const char* name_of(PairKind kind) {
   return kind == PairKind::edge_vertex   ? "vertex-edge pair"
          : kind == PairKind::face_vertex ? "vertex-triangle pair"
                                          : "edge-edge pair";
-}
-
-/// The motion with each vertex' way as long as it is free of contact by planar bounds.
-template <int Dim>
-VectorX single_ways(const CollisionSurface& surface, const ContactCandidates<Dim>& candidates, ConstVectorView x,
-                    const VectorX& motion, double dhat) {
-  std::vector<double> share(surface.area.size(), 1);
-  for (const auto& [kind, list] : candidates.all()) {
-    const auto& pairs = *list;
-    const auto shares_of = [&, kind = kind](std::size_t i) {
-      const auto vertices = vertices_of(surface, kind, pairs[i]);
-      const int size = pair_size(kind);
-      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, motion), dhat);
-    };
-    const auto note = [&, kind = kind](std::size_t i, const std::array<double, 4>& shares) {
-      const auto vertices = vertices_of(surface, kind, pairs[i]);
-      for (int k = 0; k < pair_size(kind); ++k) share[vertices[k]] = std::min(share[vertices[k]], shares[k]);
-    };
-    parallel_then_ordered<std::array<double, 4>>(pairs.size(), kBlock, shares_of, note);
-  }
-  VectorX ways = motion;
-  for (const int v : surface.vertices) ways.segment<Dim>(Dim * v) *= share[v];
-  return ways;
 }
 
 /// The features of a mollified pair whose distance counts.
@@ -326,9 +302,30 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
     };
     least = std::min(least, parallel_min(pairs.size(), kBatch, step_of));
   }
-  if (least < SingleWays::kWorthIt)
-    workspace.get<SingleWays>() = {single_ways(surface_, candidates, x, motion, dhat_), least};
   return least;
+}
+
+template <int Dim>
+VectorX ContactEnergy<Dim>::single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
+  VectorX motion = dx;
+  auto& candidates = workspace.get<ContactCandidates<Dim>>();
+  candidates.update(surface_, x, &motion, dhat_);
+  std::vector<double> share(surface_.area.size(), 1);
+  for (const auto& [kind, list] : candidates.all()) {
+    const auto& pairs = *list;
+    const auto shares_of = [&, kind = kind](std::size_t i) {
+      const auto vertices = vertices_of(surface_, kind, pairs[i]);
+      const int size = pair_size(kind);
+      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, motion), dhat_);
+    };
+    const auto note = [&, kind = kind](std::size_t i, const std::array<double, 4>& shares) {
+      const auto vertices = vertices_of(surface_, kind, pairs[i]);
+      for (int k = 0; k < pair_size(kind); ++k) share[vertices[k]] = std::min(share[vertices[k]], shares[k]);
+    };
+    parallel_then_ordered<std::array<double, 4>>(pairs.size(), kBlock, shares_of, note);
+  }
+  for (const int v : surface_.vertices) motion.segment<Dim>(Dim * v) *= share[v];
+  return motion;
 }
 
 template <int Dim>

@@ -38,6 +38,8 @@ class ContactEnergy final : public Energy {
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
   /// Time of impact by conservative CCD; feasible: no pair touches.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
+  /// By planar bounds of each pair (`planar_shares`).
+  VectorX single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Looks for pairs where a solve that begins at x is expected to go by dx, so that one search serves its start and its
   /// first step. It always looks: what is found then does not depend on earlier solves.
   void foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;
