@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "itr/remesh/remesher.hpp"
 
+#include "prospect.hpp"
 #include "ranking.hpp"
 #include "session.hpp"
 
@@ -9,6 +10,11 @@ namespace itr {
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory) {
+  const bool may_split = options.split.enabled &&
+                         available_energy(mesh, fields, context) >= context.scaling * options.split.acceptance_tolerance;
+  const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
+  if (!may_split && !may_collapse && !options.swap.enabled && !options.smooth.enabled && !options.sizing_field.enabled)
+    return {};
   RemeshSession<Dim> session(mesh, fields, context, options, memory);
   RemeshReport& report = session.report();
   for (int sweep = 0; sweep < options.sweeps; ++sweep) {
@@ -18,7 +24,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
     if (options.sizing_field.enabled) {
       follow_sizing_field(session);
     } else {
-      if (options.split.enabled) split_edges(session, ranks);
+      if (may_split) split_edges(session, ranks);
       if (options.collapse.enabled) collapse_edges(session, ranks);
     }
     if (options.swap.enabled) swap_edges(session);

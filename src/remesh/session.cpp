@@ -8,18 +8,9 @@
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/validate.hpp"
+#include "prospect.hpp"
 
 namespace itr {
-
-namespace {
-
-/// Of a cell whose edges are this long: isosceles and right-angled in 2D, regular in 3D (CONVENTIONS.md, "Remeshing").
-template <int Dim>
-double volume_of(double length) {
-  return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
-}
-
-}  // namespace
 
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
@@ -55,11 +46,10 @@ bool RemeshSession<Dim>::may_be_split(const EdgeKey& e, bool& is_bound_by_dhat) 
 
 template <int Dim>
 bool RemeshSession<Dim>::may_be_collapsed(const EdgeKey& e) const {
-  const CollapseOptions& collapse = options_.collapse;
-  const double longest = std::min(collapse.abs_max_edge_length, collapse.rel_max_edge_length * context_.shortest_edge);
+  const double longest = longest_collapse(options_.collapse, context_);
   if (!exists(e) || rest_length(e) > longest) return false;
   const auto around = mesh_.cells_of_edge(e);
-  return std::any_of(around.begin(), around.end(), [&](CellId c) { return mesh_.volume(c) <= volume_of<Dim>(longest); });
+  return std::any_of(around.begin(), around.end(), [&](CellId c) { return is_small(mesh_, c, longest); });
 }
 
 template <int Dim>

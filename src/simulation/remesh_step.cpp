@@ -29,7 +29,7 @@ std::vector<Vec<Dim>> as_points(const VectorX& field, int first) {
 
 template <int Dim>
 StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& state, const StepProblem<Dim>& problem,
-                              const VectorX& x) {
+                              const VectorX& x, const EnergyReport& energy) {
   const StepSetup<Dim>& setup = tools.setup;
   const TimeIntegrator integrator(setup.time);
   StepContext<Dim> context;
@@ -45,6 +45,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   context.newton = setup.newton;
   context.shortest_edge = tools.initial_edges.shortest;
   context.longest_edge = tools.initial_edges.longest;
+  context.coupling = context.scaling * (energy.contact + energy.friction);
   const int bodies = state.mesh.vertex_slots();
   auto& obstacles = context.obstacles;
   obstacles.rest = setup.obstacles.rest;
@@ -103,7 +104,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
                                                   StepReport& report) {
   const StepSetup<Dim>& setup = tools.setup;
-  const StepContext<Dim> context = make_context(tools, before, problem, x);
+  const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
   RemeshFields<Dim> fields = make_fields(setup, before, x);
   RemeshReport remeshed;
   {

@@ -133,7 +133,8 @@ class StepAttempt {
   std::optional<NewtonSummary> remesh() {
     {
       const ScopedTimer timer(report_.seconds.assembly);
-      report_.energy_before_remesh = problem_->report(x_).total;
+      report_.energy = problem_->report(x_);
+      report_.energy_before_remesh = report_.energy.total;
     }
     next_.stiffness = problem_->stiffness();
     const State<Dim> unchanged = next_;
@@ -161,7 +162,7 @@ class StepAttempt {
     next_.created_energy = guard_.created_energy();
     {
       const ScopedTimer timer(report_.seconds.assembly);
-      report_.energy = problem_->report(x_);
+      if (!setup_.remesh.enabled || !renumbering_.empty()) report_.energy = problem_->report(x_);
       if (!setup_.remesh.enabled) report_.energy_before_remesh = report_.energy.total;
       report_.vertices = next_.mesh.num_vertices();
       report_.elements = next_.mesh.num_cells();

@@ -8,7 +8,7 @@ namespace itr {
 
 /// Remeshes state.mesh, around the solution x of `problem`, and carries state.history and x over to the new mesh; `before`
 /// is the state as it is, at the end of the step but for x. Returns what became of its ids; nothing where nothing changed.
-/// `report` gets operations, forgotten history and seconds.
+/// `report` has the energies of x; it gets operations, forgotten history and seconds.
 template <int Dim>
 std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
