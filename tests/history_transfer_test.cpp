@@ -5,6 +5,7 @@
 #include <random>
 
 #include "itr/energy/contact/contact.hpp"
+#include "itr/energy/inertia.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/projection/safe_projection.hpp"
@@ -180,6 +181,51 @@ TEST(HistoryTransfer, ForcedBarrierKeepsIntegralsAndValidity) {
     EXPECT_FALSE(has_intersection<2>(collision_surface(scene.mesh, scene.setup.obstacles), scene.history.x[0])) << seed;
   }
   EXPECT_GT(forced, 3);
+}
+
+/// Barriers that act in one place are asked there alone: more rings change next to nothing.
+TEST(SafeProjection, GoesStraightFarFromWhatStopsIt) {
+  std::mt19937 random(5);
+  const Mesh<2> mesh = random_mesh(16, random);
+  const int n = mesh.vertex_slots();
+  CellSet<2> cells = whole_mesh<2>(mesh, {{-1, -1e-4}, {2, -1e-4}});
+  std::map<int, Material> materials;
+  for (const int body : {1, 2}) materials[body].density = 2;
+  std::vector<char> counts(n + 2, 1), held(2 * (n + 2), 0);
+  counts[n] = counts[n + 1] = 0;
+  std::fill(held.end() - 4, held.end(), 1);
+  std::vector<std::array<int, 2>> edges{{n, n + 1}};
+  for (int f = 0; f < mesh.facet_slots(); ++f) edges.push_back(mesh.facet(f));
+  const CollisionSurface surface = make_collision_surface<2>(edges, {}, {}, cells.rest, counts);
+  VectorX interpolant(2 * (n + 2));
+  for (int v = 0; v < n + 2; ++v) interpolant.segment<2>(2 * v) = cells.rest[v];
+  VectorX goal = interpolant;
+  for (int v = 0; v < n; ++v) {  // a bulge through the table, waves elsewhere
+    const Vec<2> X = cells.rest[v];
+    goal.segment<2>(2 * v) += 2e-3 * Vec<2>(std::sin(9 * X[1]), std::cos(7 * X[0]) * X[1]);
+    goal[2 * v + 1] -= 4e-3 * std::exp(-200 * (X - Vec<2>(0.5, 0)).squaredNorm());
+  }
+  linear::Registry registry;
+  const auto solver = registry.create("eigen:llt");
+  const InertiaEnergy<2> distance(cells, materials, MassKind::consistent, goal);
+  const auto project = [&](int rings, int* straight) {
+    SafeProjectionReport<2> report;
+    const VectorX x = project_safely<2>({cells, &surface, materials, 1e-2, held, std::vector<int>(n, 0), rings}, interpolant,
+                                        goal, *solver, report);
+    EXPECT_TRUE(report.used_barriers && report.converged);
+    EXPECT_FALSE(has_intersection<2>(surface, x));
+    EXPECT_EQ(find_inverted<2>(mesh, x.head(2 * n)), kNone);
+    EXPECT_LE(report.lost.norm(), kRoundOff);
+    for (int v = 0; v < n; ++v) *straight += x.segment<2>(2 * v) == goal.segment<2>(2 * v);
+    Workspace workspace;
+    return distance.value(x, workspace);
+  };
+  int straight = 0, none = 0;
+  const double local = project(4, &straight), whole = project(100, &none);
+  EXPECT_GT(straight, n / 3);
+  EXPECT_LT(none, n / 10);
+  EXPECT_GT(whole, 0);
+  EXPECT_NEAR(local, whole, 0.05 * whole);
 }
 
 /// Rollers prescribe one component: the other one is free.

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kVolumeActivation = 1e-2;   ///< most volume ratio below which the barrier acts
 constexpr double kRelativeTolerance = 1e-9;  ///< of the way from the interpolant to the unconstrained minimiser
+constexpr double kNearEnd = 1e-2;            ///< of the same way
 constexpr double kPenalty = 1e8;             ///< of an integral's change by that of the inertia
 
 /// An integral sum_i m_i (x_i - goal_i) over the free dofs of one part and one axis, which is to vanish.
@@ -104,7 +105,7 @@ class PenalisedSystem final : public NewtonSystem {
 };
 
 template <int Dim>
-std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem) {
+std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem, const std::vector<char>& held_dofs) {
   const int patch = static_cast<int>(problem.part.size());
   const int parts = patch == 0 ? 0 : *std::max_element(problem.part.begin(), problem.part.end()) + 1;
   VectorX masses = VectorX::Zero(patch);
@@ -114,7 +115,7 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem) {
   std::vector<Integral> integrals(parts * Dim);
   for (int v = 0; v < patch; ++v)
     for (int c = 0; c < Dim; ++c) {
-      if (problem.held_dofs[Dim * v + c]) continue;
+      if (held_dofs[Dim * v + c]) continue;
       Integral& integral = integrals[Dim * problem.part[v] + c];
       integral.dofs.push_back(Dim * v + c);
       integral.masses.push_back(masses[v]);
@@ -122,6 +123,71 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem) {
     }
   std::erase_if(integrals, [](const Integral& integral) { return integral.dofs.empty(); });
   return integrals;
+}
+
+/// What must not become worse on the way from the interpolant.
+template <int Dim>
+struct Barriers {
+  std::shared_ptr<ElasticEnergy<Dim>> inversion;  ///< asked for steps alone
+  std::shared_ptr<VolumeBarrier<Dim>> volume;
+  std::shared_ptr<ContactEnergy<Dim>> distance;  ///< null: nothing to touch
+  double least_ratio;                            ///< of volumes, below which theirs acts
+
+  bool let_pass(const VectorX& x, const VectorX& way, Workspace& workspace) const {
+    const VectorX end = x + way;
+    return inversion->max_step(x, way, workspace) == 1 && volume->value(end, workspace) == 0 &&
+           (!distance || (distance->max_step(x, way, workspace) == 1 && distance->active(end, workspace).empty()));
+  }
+};
+
+/// They act below half of what the interpolant has.
+template <int Dim>
+Barriers<Dim> barriers_for(const SafeProjectionProblem<Dim>& problem, const VectorX& interpolant, Workspace& workspace) {
+  double least_ratio = kVolumeActivation * 2, mass = 0, volume = 0;
+  for (const auto& element : problem.cells.elements) {
+    least_ratio = std::min(least_ratio, deformation_gradient<Dim>(element, interpolant).determinant());
+    mass += problem.materials.at(element.body).density * element.volume;
+    volume += element.volume;
+  }
+  const double size = std::pow(volume / problem.cells.elements.size(), 1.0 / Dim);
+  Barriers<Dim> barriers{std::make_shared<ElasticEnergy<Dim>>(problem.cells, problem.materials, 1), nullptr, nullptr,
+                         least_ratio / 2};
+  barriers.volume = std::make_shared<VolumeBarrier<Dim>>(problem.cells, barriers.least_ratio, mass / volume * size * size);
+  if (problem.surface) {
+    ContactOptions contact{.enabled = true, .activation_distance = problem.activation_distance};
+    const double nearest = ContactEnergy<Dim>(*problem.surface, contact, 1, 1).min_distance(interpolant, workspace);
+    contact.activation_distance = std::min(nearest, problem.activation_distance) / 2;
+    // At half of that distance the barrier is as stiff as the mass of a vertex.
+    const double stiffness = mass / problem.part.size() / std::pow(contact.activation_distance, 2);
+    barriers.distance = std::make_shared<ContactEnergy<Dim>>(*problem.surface, contact, stiffness, 1);
+  }
+  return barriers;
+}
+
+/// By vertex, whether it is in a cell or a pair that the straight way squeezes or stops, or at most `problem.rings` edges
+/// away.
+template <int Dim>
+std::vector<char> near_barriers(const SafeProjectionProblem<Dim>& problem, const Barriers<Dim>& barriers, const VectorX& x,
+                                const VectorX& way, Workspace& workspace) {
+  std::vector<char> is_near(problem.cells.num_vertices, 0);
+  const VectorX end = x + way;
+  for (const auto& element : problem.cells.elements)
+    if (deformation_gradient<Dim>(element, end).determinant() < barriers.least_ratio)
+      for (const int v : element.vertices) is_near[v] = 1;
+  if (barriers.distance) {
+    const VectorX single = barriers.distance->single_ways(x, way, workspace);
+    for (int v = 0; v < problem.cells.num_vertices; ++v)
+      is_near[v] |= single.segment<Dim>(Dim * v) != way.segment<Dim>(Dim * v);
+    for (const ContactStencil& pair : barriers.distance->active(end, workspace))
+      for (int k = 0; k < pair.size(); ++k) is_near[pair.vertices[k]] = 1;
+  }
+  for (int ring = 0; ring < problem.rings; ++ring) {
+    const std::vector<char> before = is_near;
+    for (const auto& element : problem.cells.elements)
+      if (std::any_of(element.vertices.begin(), element.vertices.end(), [&](int v) { return before[v]; }))
+        for (const int v : element.vertices) is_near[v] = 1;
+  }
+  return is_near;
 }
 
 /// Moves free dofs, all by the same, to where the integrals are; returns whether that is free of contact and inversion.
@@ -144,49 +210,44 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
                        linear::Solver& solver, SafeProjectionReport<Dim>& report) {
   Workspace workspace;
   const VectorX way = projected - interpolant;
-  double least_ratio = kVolumeActivation * 2, mass = 0, volume = 0;
-  for (const auto& element : problem.cells.elements) {
-    least_ratio = std::min(least_ratio, deformation_gradient<Dim>(element, interpolant).determinant());
-    mass += problem.materials.at(element.body).density * element.volume;
-    volume += element.volume;
-  }
-  const double size = std::pow(volume / problem.cells.elements.size(), 1.0 / Dim);
-  const auto inversion = std::make_shared<ElasticEnergy<Dim>>(problem.cells, problem.materials, 1);
-  const auto keep_volume = std::make_shared<VolumeBarrier<Dim>>(problem.cells, least_ratio / 2, mass / volume * size * size);
-  std::shared_ptr<ContactEnergy<Dim>> keep_distance;
-  if (problem.surface) {
-    ContactOptions contact{.enabled = true, .activation_distance = problem.activation_distance};
-    const double nearest = ContactEnergy<Dim>(*problem.surface, contact, 1, 1).min_distance(interpolant, workspace);
-    contact.activation_distance = std::min(nearest, problem.activation_distance) / 2;
-    // At half of that distance the barrier is as stiff as the mass of a vertex.
-    const double stiffness = mass / problem.part.size() / std::pow(contact.activation_distance, 2);
-    keep_distance = std::make_shared<ContactEnergy<Dim>>(*problem.surface, contact, stiffness, 1);
-  }
-  const bool reachable =
-      inversion->max_step(interpolant, way, workspace) == 1 && keep_volume->value(projected, workspace) == 0 &&
-      (!keep_distance ||
-       (keep_distance->max_step(interpolant, way, workspace) == 1 && keep_distance->active(projected, workspace).empty()));
-  if (reachable) return projected;
+  const Barriers<Dim> barriers = barriers_for(problem, interpolant, workspace);
+  if (barriers.let_pass(interpolant, way, workspace)) return projected;
+
+  // Far from what stands in the way all goes straight, if that is free with the rest left behind.
+  VectorX x = interpolant;
+  std::vector<char> held = problem.held_dofs;
+  const std::vector<char> is_near = near_barriers(problem, barriers, interpolant, way, workspace);
+  VectorX straight = way;
+  for (int v = 0; v < problem.cells.num_vertices; ++v)
+    if (is_near[v]) straight.segment<Dim>(Dim * v).setZero();
+  if (barriers.let_pass(interpolant, straight, workspace))
+    for (int v = 0; v < problem.cells.num_vertices; ++v) {
+      if (is_near[v]) continue;
+      x.segment<Dim>(Dim * v) = projected.segment<Dim>(Dim * v);
+      std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(Dim * v), Dim, 1);
+    }
 
   report.used_barriers = true;
-  const std::vector<Integral> integrals = integrals_of(problem);
-  const DofMap dofs = DofMap::from_held(problem.held_dofs);
+  const std::vector<Integral> integrals = integrals_of(problem, held);
+  const DofMap dofs = DofMap::from_held(held);
   EnergySum energy;
   energy.add(std::make_shared<InertiaEnergy<Dim>>(problem.cells, problem.materials, MassKind::consistent, projected));
-  energy.add(keep_volume);
-  if (keep_distance) energy.add(keep_distance);
-  energy.add(std::make_shared<IntegralPenalty>(integrals, projected));
+  energy.add(barriers.volume);
+  if (barriers.distance) energy.add(barriers.distance);
   SparseSystem sparse(solver);
   sparse.reset(dofs, Dim, stencil_vertices(problem.cells), Dim + 1);
-  PenalisedSystem system(sparse, integrals, dofs);
   NewtonOptions options;
   options.max_iterations = 100;
-  options.step_tolerance = kRelativeTolerance * way.norm();
   options.gradient_tolerance = options.first_gradient_tolerance = 0;
-  VectorX x = interpolant;
+  // Integrals bind all vertices together, so that what stops one stops all: first without, near to the end.
+  options.step_tolerance = kNearEnd * way.norm();
+  report.iterations = minimize(energy, x, dofs, VectorX(), sparse, options, workspace).iterations;
+  energy.add(std::make_shared<IntegralPenalty>(integrals, projected));
+  PenalisedSystem system(sparse, integrals, dofs);
+  options.step_tolerance = kRelativeTolerance * way.norm();
   const NewtonSummary summary = minimize(energy, x, dofs, VectorX(), system, options, workspace);
   report.converged = summary.converged();
-  report.iterations = summary.iterations;
+  report.iterations += summary.iterations;
   close_integrals(integrals, projected, energy, x, workspace);
   for (const Integral& integral : integrals) report.lost[integral.dofs[0] % Dim] -= integral.defect(x, projected);
   return x;

@@ -107,10 +107,10 @@ class HistoryTransfer {
       held.resize(interpolant.size(), 1);
     }
     SafeProjectionReport<Dim> safe;
-    VectorX x =
-        project_safely<Dim>({cells, surface.empty() ? nullptr : &surface.surface, setup_.materials,
-                             setup_.contact.activation_distance, std::move(held), connected_parts(patch_.new_cells.view())},
-                            interpolant, goal, solver, safe);
+    VectorX x = project_safely<Dim>(
+        {cells, surface.empty() ? nullptr : &surface.surface, setup_.materials, setup_.contact.activation_distance,
+         std::move(held), connected_parts(patch_.new_cells.view()), kRings<Dim>},
+        interpolant, goal, solver, safe);
     report.with_barriers += safe.used_barriers;
     report.not_converged += !safe.converged;
     lost += safe.lost;

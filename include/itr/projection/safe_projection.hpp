@@ -19,6 +19,7 @@ struct SafeProjectionProblem {
   double activation_distance;   ///< dhat: contact is looked at below it [m]
   std::vector<char> held_dofs;  ///< prescribed ones and those that do not belong to the patch, by dof
   std::vector<int> part;        ///< by vertex of the patch: its connected part; the integral of rho x is kept on each
+  int rings;                    ///< so many edges around what stops the straight way vertices may leave it
 };
 
 template <int Dim>
