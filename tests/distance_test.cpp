@@ -95,6 +95,16 @@ TEST_F(DistanceTest, BodiesAreComparedWithTheirOwn) {
   EXPECT_EQ(distance.uncovered, 1);
 }
 
+TEST_F(DistanceTest, BodiesThatOnlyTogetherHaveTheSameShapeAreComparedTogether) {
+  const Motion<2> rest = [](const Vec<2>&) { return Vec<2>(0, 0); }, shift = [](const Vec<2>&) { return Vec<2>(0.1, 0); };
+  const std::vector<Vec<2>> corners{{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0.5, 0}};
+  const std::vector<Mesh<2>::Cell> cells{{0, 4, 3}, {4, 2, 3}, {4, 1, 2}};
+  const fs::path a = store<2>(1, Mesh<2>(corners, cells, {1, 1, 2}), rest);
+  const FrameDistance distance = frame_distance(a, store<2>(2, Mesh<2>(corners, cells, {1, 2, 2}), shift));
+  EXPECT_NEAR(distance.uncovered, 0, 1e-14);
+  EXPECT_NEAR(distance.l2, 0.1, 1e-14);
+}
+
 TEST_F(DistanceTest, FramesOfOtherDimensionsAreRefused) {
   const fs::path a = store<2>(1, square(false), [](const Vec<2>&) { return Vec<2>(0, 0); });
   const Mesh<3> tetrahedron({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2, 3}}, {1});

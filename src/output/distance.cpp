@@ -15,6 +15,8 @@ namespace itr::output {
 
 namespace {
 
+constexpr double kSameVolume = 1e-9;
+
 template <int Dim>
 Vec<Dim> point(const std::vector<double>& x, std::int64_t v) {
   return Eigen::Map<const Vec<Dim>>(x.data() + Dim * v);
@@ -37,8 +39,12 @@ struct Cells {
 };
 
 template <int Dim>
-std::map<std::int64_t, Cells<Dim>> cells_by_body(const StoredFrame& frame) {
-  std::map<std::int64_t, Cells<Dim>> bodies;
+using Bodies = std::map<std::int64_t, Cells<Dim>>;
+
+/// By body, or all under one id.
+template <int Dim>
+Bodies<Dim> cells_of(const StoredFrame& frame, bool by_body) {
+  Bodies<Dim> bodies;
   for (std::size_t c = 0; c < frame.body.size(); ++c) {
     std::array<Vec<Dim>, Dim + 1> corners;
     Eigen::Matrix<double, Dim, Dim + 1> u;
@@ -49,13 +55,28 @@ std::map<std::int64_t, Cells<Dim>> cells_by_body(const StoredFrame& frame) {
       u.col(k) = point<Dim>(frame.x, v) - corners[k];
       box.include(corners[k]);
     }
-    Cells<Dim>& cells = bodies[frame.body[c]];
+    Cells<Dim>& cells = bodies[by_body ? frame.body[c] : 0];
     cells.simplices.emplace_back(corners);
     cells.u.push_back(u);
     cells.boxes.push_back(box);
     cells.volume += cells.simplices.back().volume;
   }
   return bodies;
+}
+
+/// Whether two meshes have the same bodies together, but not each: a selection by place takes cells by their barycentres,
+/// and finer ones go elsewhere.
+template <int Dim>
+bool are_divided_otherwise(const Bodies<Dim>& a, const Bodies<Dim>& b) {
+  const auto has_same_id = [](const auto& x, const auto& y) { return x.first == y.first; };
+  if (!std::equal(a.begin(), a.end(), b.begin(), b.end(), has_same_id)) return false;
+  double all_a = 0, all_b = 0, moved = 0;
+  for (const auto& [id, cells] : a) {
+    all_a += cells.volume;
+    all_b += b.at(id).volume;
+    moved = std::max(moved, std::abs(cells.volume - b.at(id).volume));
+  }
+  return std::abs(all_a - all_b) < kSameVolume * all_a && moved > kSameVolume * all_a;
 }
 
 struct Integrals {
@@ -111,7 +132,11 @@ std::vector<std::array<Vec<Dim>, Dim>> boundary_now(const StoredFrame& frame) {
 
 template <int Dim>
 FrameDistance distance_of(const StoredFrame& frame, const StoredFrame& reference) {
-  const auto bodies = cells_by_body<Dim>(frame), reference_bodies = cells_by_body<Dim>(reference);
+  Bodies<Dim> bodies = cells_of<Dim>(frame, true), reference_bodies = cells_of<Dim>(reference, true);
+  if (are_divided_otherwise(bodies, reference_bodies)) {
+    bodies = cells_of<Dim>(frame, false);
+    reference_bodies = cells_of<Dim>(reference, false);
+  }
   Integrals difference, of_reference;
   double volume = 0, reference_volume = 0;
   for (const auto& [id, cells] : bodies) {

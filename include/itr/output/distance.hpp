@@ -8,7 +8,8 @@
 
 namespace itr::output {
 
-/// Of a frame from a reference at the same time. Bodies are told apart by their ids.
+/// Of a frame from a reference at the same time. Bodies are told apart by their ids, unless only together they have the
+/// same shape.
 struct FrameDistance {
   double l2 = 0;       ///< (integral of |u - u_ref|^2 over the rest bodies)^(1/2) [m^(1 + Dim/2)]
   double h1_semi = 0;  ///< the same of grad u - grad u_ref [m^(Dim/2)]
