@@ -4,8 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <thread>
 
 #include "explain.hpp"
 #include "itr/core/error.hpp"
@@ -186,7 +188,11 @@ int main(int argc, char** argv) {
   try {
     return dispatch(argc, argv);
   } catch (const itr::InputError& error) {
-    if (speaks) fmt::print(stderr, "itr: {}\n", error.what());
+    // A launcher ends all ranks when one has failed: the others wait until rank 0 has said why.
+    if (speaks)
+      fmt::print(stderr, "itr: {}\n", error.what());
+    else
+      std::this_thread::sleep_for(std::chrono::seconds(5));
     return itr::cli::bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "itr: internal error: {}\n", error.what());
