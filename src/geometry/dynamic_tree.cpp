@@ -80,10 +80,14 @@ int DynamicTree<Dim>::build_node(std::span<const Box<Dim>> boxes, std::span<int>
   return node;
 }
 
+/// As far up as boxes change.
 template <int Dim>
 void DynamicTree<Dim>::refit_from(int node) {
-  for (; node != kNone; node = nodes_[node].parent)
-    nodes_[node].box = united(nodes_[nodes_[node].left].box, nodes_[nodes_[node].right].box);
+  for (; node != kNone; node = nodes_[node].parent) {
+    const Box<Dim> box = united(nodes_[nodes_[node].left].box, nodes_[nodes_[node].right].box);
+    if (box.min == nodes_[node].box.min && box.max == nodes_[node].box.max) return;
+    nodes_[node].box = box;
+  }
 }
 
 /// Gives a leaf the sibling that makes the boxes on the way grow least, found greedily from the root.
