@@ -130,12 +130,12 @@ class ShortSighted final : public NewtonSystem {
     residual_ = 0;
     return exact_.factorize(shift);
   }
-  linear::Outcome prepare(double shift, const VectorX&, double asked) override {
+  linear::Outcome prepare(double shift, ConstVectorView, double asked) override {
     residual_ = asked > kTightResidual && curvature_ > 0 ? asked : 0;
     loose += residual_ > 0;
     return residual_ > 0 ? linear::Outcome::ok : factorize(shift);
   }
-  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override {
+  linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override {
     if (residual_ == 0) return exact_.solve(rhs, solution);
     solution = Vec<2>(0, rhs[1] / curvature_);
     return {linear::Outcome::ok, residual_};
@@ -295,7 +295,7 @@ TEST(Newton, MeasuresGradientsAndStepsInTheNormOfItsOptions) {
   const auto summary_of = [&](NewtonOptions options) {
     VectorX x = start;
     DenseSystem system;
-    return minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace, {.norm_weights = &weights});
+    return minimize(DoubleWell(1), x, dofs, VectorX(), system, options, workspace, {.norm_weights = {weights.data(), 4}});
   };
   const auto gradient_norm = [&](NewtonNorm norm) {
     const NewtonSummary summary = summary_of({.norm = norm, .first_gradient_tolerance = 1e300});

@@ -178,7 +178,9 @@ struct LocalView {
 
 /// Positions of a problem into those of the mesh that its edit made.
 inline void write_back(const LocalProblem<2>& problem, VertexId created, VectorX& x) {
-  for (const auto& [v, position] : problem.positions()) x.segment<2>(2 * (v == kNewVertex ? created : v)) = position;
+  std::vector<LocalProblem<2>::Position> positions;
+  problem.get_positions(positions);
+  for (const auto& [v, position] : positions) x.segment<2>(2 * (v == kNewVertex ? created : v)) = position;
 }
 
 /// All terms on the whole mesh, built without any patch.

@@ -90,7 +90,9 @@ TEST(LocalProblem3d, RelaxationLowersTheGlobalEnergyByWhatItReports) {
     if (!s.after.has_unknowns()) return false;
     const double unrelaxed = whole_energy(s.changed, s.fields, s.scene.context), local = s.after.value();
     const double fall = local - s.after.relax(20).energy;
-    for (const auto& [v, x] : s.after.positions()) s.fields.x.segment<3>(3 * (v == kNewVertex ? s.created : v)) = x;
+    std::vector<LocalProblem<3>::Position> positions;
+    s.after.get_positions(positions);
+    for (const auto& [v, x] : positions) s.fields.x.segment<3>(3 * (v == kNewVertex ? s.created : v)) = x;
     EXPECT_NEAR(fall, unrelaxed - whole_energy(s.changed, s.fields, s.scene.context), 1e-10 * s.energy);
     ++(s.after.touches_contact() ? in_contact : clear);
     return true;

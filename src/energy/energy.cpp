@@ -5,7 +5,15 @@
 #include <cmath>
 #include <utility>
 
+#include "itr/core/kept_vector.hpp"
+
 namespace itr {
+
+namespace {
+struct PartOfWay {
+  KeptVector dx;
+};
+}  // namespace
 
 double Energy::max_step(ConstVectorView, ConstVectorView, Workspace&) const { return 1; }
 
@@ -30,13 +38,15 @@ void EnergySum::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& s
 
 double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
   double step = 1;
-  VectorX part;
-  for (const auto& term : terms_) {  // each is asked only about the part of the way that those before it leave
-    const double fraction = step < 1 ? term->max_step(x, part, workspace) : term->max_step(x, dx, workspace);
+  auto& kept = workspace.get<PartOfWay>().dx;
+  KeptVector part = std::move(kept);  // a term may be a sum itself
+  for (const auto& term : terms_) {   // each is asked only about the part of the way that those before it leave
+    const double fraction = step < 1 ? term->max_step(x, part.view(), workspace) : term->max_step(x, dx, workspace);
     if (fraction == 1) continue;
     step *= fraction;
-    part = step * dx;
+    part.resize(dx.size()) = step * dx;
   }
+  kept = std::move(part);
   return step;
 }
 

@@ -7,24 +7,48 @@
 
 namespace itr {
 
+namespace {
+
+/// Makes a term what a new one would be, in the memory of the one that is there; null where the scene has none.
+template <typename Term, typename... Arguments>
+void renew_term(std::shared_ptr<Term>& term, bool is_needed, const auto& cells, const Arguments&... arguments) {
+  if (!is_needed)
+    term.reset();
+  else if (term)
+    term->renew(arguments...);
+  else
+    term = std::make_shared<Term>(cells, arguments...);
+}
+
+}  // namespace
+
 template <int Dim>
 IncrementalPotential<Dim>::IncrementalPotential(const PotentialTerms<Dim>& terms, const CellSet<Dim>& cells,
-                                                PotentialHistory history)
-    : terms_(terms), cells_(cells), history_(std::move(history)) {
-  if (terms.has_inertia)
-    inertia_ = std::make_shared<InertiaEnergy<Dim>>(cells, terms.materials, terms.mass, std::move(history_.predictor));
-  elastic_ = std::make_shared<ElasticEnergy<Dim>>(cells, terms.materials, terms.scaling);
-  if (terms.loads.has_dead_loads())
-    loads_ = std::make_shared<LoadEnergy<Dim>>(cells, terms.materials, terms.loads, terms.scaling);
+                                                const PotentialHistory& history)
+    : terms_(&terms), cells_(cells) {
+  renew(terms, history);
+}
+
+template <int Dim>
+void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const PotentialHistory& history) {
+  terms_ = &terms;
+  velocity_reference_ = history.velocity_reference;
+  renew_term(inertia_, terms.has_inertia, cells_, terms.materials, terms.mass, history.predictor);
+  renew_term(elastic_, true, cells_, terms.materials, terms.scaling);
+  renew_term(loads_, terms.loads.has_dead_loads(), cells_, terms.materials, terms.loads, terms.scaling);
+  map_.reset();
+  contact_.reset();
+  contact_of_cells_.reset();
+  host_.clear();
   for (const auto& make : terms.host)
-    if (auto term = make(cells, terms.t, terms.scaling)) host_.push_back(std::move(term));
+    if (auto term = make(cells_, terms.t, terms.scaling)) host_.push_back(std::move(term));
 }
 
 template <int Dim>
 void IncrementalPotential<Dim>::add_contact(const CollisionSurface& surface, double stiffness,
                                             std::shared_ptr<const VertexMap<Dim>> map) {
   map_ = std::move(map);
-  contact_ = std::make_shared<ContactEnergy<Dim>>(surface, terms_.contact, stiffness, terms_.scaling);
+  contact_ = std::make_shared<ContactEnergy<Dim>>(surface, terms_->contact, stiffness, terms_->scaling);
   contact_of_cells_ = of_cells(contact_);
 }
 
@@ -37,26 +61,26 @@ std::shared_ptr<const Energy> IncrementalPotential<Dim>::of_cells(std::shared_pt
 
 template <int Dim>
 bool IncrementalPotential<Dim>::has_friction() const {
-  return contact_ && terms_.contact.friction_coefficient > 0 && terms_.contact.friction_iterations != 0;
+  return contact_ && terms_->contact.friction_coefficient > 0 && terms_->contact.friction_iterations != 0;
 }
 
 template <int Dim>
-std::shared_ptr<const Energy> IncrementalPotential<Dim>::lag_friction(const VectorX& x, Workspace& workspace) const {
+std::shared_ptr<const Energy> IncrementalPotential<Dim>::lag_friction(ConstVectorView x, Workspace& workspace) const {
   if (!has_friction()) return nullptr;
-  const auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, on_surface(x), workspace, terms_.contact,
-                                                              velocity_of_surface(), terms_.scaling);
+  const auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, on_surface(x), workspace, terms_->contact,
+                                                              velocity_of_surface(), terms_->scaling);
   return friction->empty() ? nullptr : of_cells(friction);
 }
 
 template <int Dim>
-typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(const VectorX& x, Workspace& workspace) const {
+typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstVectorView x, Workspace& workspace) const {
   Lagged lagged;
   lagged.friction = lag_friction(x, workspace);
-  if (!terms_.loads.pressures.empty()) {
-    lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_.loads, x, terms_.scaling);
+  if (!terms_->loads.pressures.empty()) {
+    lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_->loads, x, terms_->scaling);
     if (lagged.pressure->empty()) lagged.pressure.reset();
   }
-  for (const DampingOptions& options : terms_.damping) {
+  for (const DampingOptions& options : terms_->damping) {
     if (options.term != DampingOptions::Term::contact)
       lagged.damping.push_back(
           std::make_shared<DampingEnergy<Dim>>(*elastic_, x, options.coefficient, velocity(), workspace));
@@ -64,13 +88,19 @@ typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(const 
       lagged.damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(*contact_, on_surface(x), options.coefficient,
                                                                              velocity_of_surface(), workspace)));
   }
-  if (terms_.follower) lagged.follower = terms_.follower(x);
+  if (terms_->follower) lagged.follower = terms_->follower(x);
   return lagged;
 }
 
 template <int Dim>
 EnergySum IncrementalPotential<Dim>::sum(const Lagged& lagged) const {
   EnergySum sum;
+  add_to(sum, lagged);
+  return sum;
+}
+
+template <int Dim>
+void IncrementalPotential<Dim>::add_to(EnergySum& sum, const Lagged& lagged) const {
   const auto add = [&](const auto& term) {
     if (term) sum.add(term);
   };
@@ -83,7 +113,6 @@ EnergySum IncrementalPotential<Dim>::sum(const Lagged& lagged) const {
   add(lagged.friction);
   add(lagged.pressure);
   for (const auto& term : lagged.damping) add(term);
-  return sum;
 }
 
 template class IncrementalPotential<2>;

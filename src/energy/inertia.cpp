@@ -8,6 +8,10 @@ namespace itr {
 
 namespace {
 constexpr std::size_t kBlock = 256;
+
+struct FromPredictor {
+  KeptVector way;
+};
 }  // namespace
 
 template <int Dim>
@@ -21,26 +25,39 @@ std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<
 
 template <int Dim>
 InertiaEnergy<Dim>::InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind,
-                                  VectorX predictor)
-    : cells_(cells), mass_(element_densities(cells, materials)), kind_(kind), predictor_(std::move(predictor)) {
-  for (std::size_t e = 0; e < mass_.size(); ++e) mass_[e] *= cells.elements[e].volume;
+                                  ConstVectorView predictor)
+    : cells_(cells) {
+  renew(materials, kind, predictor);
 }
 
 template <int Dim>
-void InertiaEnergy<Dim>::set_unrepresented_history(VectorX residual, double loss) {
-  residual_ = std::move(residual);
+void InertiaEnergy<Dim>::renew(const std::map<int, Material>& materials, MassKind kind, ConstVectorView predictor) {
+  kind_ = kind;
+  mass_.clear();
+  mass_.reserve(cells_.elements.size());
+  for (const auto& element : cells_.elements)
+    mass_.push_back(mass_density<Dim>(materials.at(element.body), rest_barycenter(cells_, element)) * element.volume);
+  predictor_ = predictor;
+  residual_.resize(0);
+  loss_ = 0;
+}
+
+template <int Dim>
+void InertiaEnergy<Dim>::set_unrepresented_history(ConstVectorView residual, double loss) {
+  residual_ = residual;
   loss_ = loss;
 }
 
 template <int Dim>
 double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
+  const ConstVectorView predictor = predictor_.view();
   double sum = parallel_sum(mass_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     double part = 0;
     for (std::size_t e = begin; e < end; ++e) {
       Vec<Dim> total = Vec<Dim>::Zero();
       double squares = 0;
       for (const int v : cells_.elements[e].vertices) {
-        const Vec<Dim> d = x.segment<Dim>(Dim * v) - predictor_.segment<Dim>(Dim * v);
+        const Vec<Dim> d = x.segment<Dim>(Dim * v) - predictor.segment<Dim>(Dim * v);
         total += d;
         squares += d.squaredNorm();
       }
@@ -49,7 +66,7 @@ double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
     }
     return part;
   });
-  if (residual_.size() > 0) sum += residual_.dot(x - predictor_) + loss_;
+  if (residual_.size() > 0) sum += residual_.view().dot(x - predictor) + loss_;
   return sum;
 }
 
@@ -63,9 +80,11 @@ void InertiaEnergy<Dim>::add_mass_product(ConstVectorView x, VectorView y) const
 }
 
 template <int Dim>
-void InertiaEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
-  add_mass_product(x - predictor_, gradient);
-  if (residual_.size() > 0) gradient += residual_;
+void InertiaEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
+  VectorView way = workspace.get<FromPredictor>().way.resize(x.size());
+  way = x - predictor_.view();
+  add_mass_product(way, gradient);
+  if (residual_.size() > 0) gradient += residual_.view();
 }
 
 template <int Dim>
@@ -80,8 +99,8 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
 }
 
 template <int Dim>
-VectorX unit_mass_diagonal(const CellSet<Dim>& cells) {
-  VectorX diagonal = VectorX::Zero(Dim * cells.num_vertices);
+void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal) {
+  diagonal.setZero();
   for (const auto& element : cells.elements)
     for (const int v : element.vertices)
       diagonal.segment<Dim>(Dim * v).array() += 2 * element.volume / ((Dim + 1) * (Dim + 2));
@@ -89,12 +108,11 @@ VectorX unit_mass_diagonal(const CellSet<Dim>& cells) {
   const double mean = used > 0 ? diagonal.sum() / static_cast<double>(used) : 1;
   for (double& entry : diagonal)
     if (entry == 0) entry = mean;
-  return diagonal;
 }
 
-#define ITR_INSTANTIATE(Dim)                                     \
-  template class InertiaEnergy<Dim>;                             \
-  template VectorX unit_mass_diagonal<Dim>(const CellSet<Dim>&); \
+#define ITR_INSTANTIATE(Dim)                                                  \
+  template class InertiaEnergy<Dim>;                                          \
+  template void get_unit_mass_diagonal<Dim>(const CellSet<Dim>&, VectorView); \
   template std::vector<double> element_densities<Dim>(const CellSet<Dim>&, const std::map<int, Material>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

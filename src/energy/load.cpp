@@ -12,7 +12,7 @@ namespace {
 
 template <int Dim, std::size_t Vertices>
 void add_forces(const std::array<int, Vertices>& vertices, const CellSet<Dim>& cells, double weight,
-                const std::function<Vec<Dim>(const Vec<Dim>&)>& load, VectorX& forces) {
+                const std::function<Vec<Dim>(const Vec<Dim>&)>& load, VectorView forces) {
   constexpr double kNear = near_vertex<Vertices>(), kFar = (1 - kNear) / (Vertices - 1);
   for (std::size_t q = 0; q < Vertices; ++q) {
     Vec<Dim> X = Vec<Dim>::Zero();
@@ -34,16 +34,25 @@ double facet_area(const std::array<int, 3>& f, const CellSet<3>& cells) {
 template <int Dim>
 LoadEnergy<Dim>::LoadEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, const Loads<Dim>& loads,
                             double scale)
-    : forces_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
+    : cells_(cells) {
+  renew(materials, loads, scale);
+}
+
+template <int Dim>
+void LoadEnergy<Dim>::renew(const std::map<int, Material>& materials, const Loads<Dim>& loads, double scale) {
+  scale_ = scale;
+  rest_work_ = 0;
+  VectorView forces = forces_.resize(Dim * cells_.num_vertices);
+  forces.setZero();
   if (loads.acceleration)
-    for (const auto& element : cells.elements) {
-      const double density = mass_density<Dim>(materials.at(element.body), rest_barycenter(cells, element));
-      add_forces<Dim>(element.vertices, cells, density * element.volume, loads.acceleration, forces_);
+    for (const auto& element : cells_.elements) {
+      const double density = mass_density<Dim>(materials.at(element.body), rest_barycenter(cells_, element));
+      add_forces<Dim>(element.vertices, cells_, density * element.volume, loads.acceleration, forces);
     }
-  for (const auto& facet : cells.facets)
+  for (const auto& facet : cells_.facets)
     for (const auto& [tag, traction] : loads.tractions)
-      if (tag == facet.tag) add_forces<Dim>(facet.vertices, cells, facet_area(facet.vertices, cells), traction, forces_);
-  for (int v = 0; v < cells.num_vertices; ++v) rest_work_ += forces_.segment<Dim>(Dim * v).dot(cells.rest[v]);
+      if (tag == facet.tag) add_forces<Dim>(facet.vertices, cells_, facet_area(facet.vertices, cells_), traction, forces);
+  for (int v = 0; v < cells_.num_vertices; ++v) rest_work_ += forces.segment<Dim>(Dim * v).dot(cells_.rest[v]);
 }
 
 template class LoadEnergy<2>;

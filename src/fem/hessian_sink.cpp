@@ -34,9 +34,14 @@ void sort_by_nonzero(std::vector<Target>& targets, std::size_t end) {
 
 DofMap DofMap::from_held(const std::vector<char>& held) {
   DofMap map;
-  map.unknown.resize(held.size());
-  for (std::size_t i = 0; i < held.size(); ++i) map.unknown[i] = held[i] ? kNone : map.num_unknowns++;
+  map.hold(held);
   return map;
+}
+
+void DofMap::hold(const std::vector<char>& held) {
+  num_unknowns = 0;
+  unknown.resize(held.size());
+  for (std::size_t i = 0; i < held.size(); ++i) unknown[i] = held[i] ? kNone : num_unknowns++;
 }
 
 void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
@@ -220,8 +225,10 @@ template <int Dim>
 void HessianSink::add(std::span<const int> vertices, const double* block) {
   const int n = Dim * static_cast<int>(vertices.size());
   if (receiver_) return receiver_(vertices, block);
-  unknown_.resize(n);
-  int* const unknown = unknown_.data();
+  constexpr int kUsual = 24;
+  std::array<int, kUsual> few;
+  std::vector<int> many(n > kUsual ? n : 0);
+  int* const unknown = n > kUsual ? many.data() : few.data();
   for (int i = 0; i < n; ++i) unknown[i] = dofs_->unknown[Dim * vertices[i / Dim] + i % Dim];
   for (int j = 0; j < n; ++j) {
     const int column = unknown[j];
@@ -233,7 +240,7 @@ void HessianSink::add(std::span<const int> vertices, const double* block) {
       if (sparse_)
         sparse_->add(row, column, value);
       else
-        (*dense_)(row, column) += value;
+        dense_[dense_stride_ * column + row] += value;
     }
   }
   if (motion_) add_motion<Dim>(vertices, block);

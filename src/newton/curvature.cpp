@@ -18,7 +18,7 @@ double find_negative_curvature(NewtonSystem& system, int unknowns, VectorX& v) {
   v.resize(unknowns);
   for (int i = 0; i < unknowns; ++i) v[i] = 1 + 0.5 * std::sin(i + 1.0);  // orthogonal to no eigenvector but by accident
   v.normalize();
-  VectorX next;
+  VectorX next(unknowns);
   double curvature = 0;
   for (int k = 0; k < kMostSolves; ++k) {
     const auto outcome = system.solve(v, next).outcome;

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "curvature.hpp"
 #include "itr/core/timer.hpp"
+#include "norms.hpp"
 
 namespace itr {
 
@@ -30,9 +32,14 @@ constexpr int kMostDoublings = 12;
 constexpr double kSingleWaysBelow = 0.25, kMuchMore = 2;  ///< see try_single_ways
 constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
+/// What a solve is kept in.
+struct Buffers {
+  KeptVector gradient, step, candidate, other, rhs, solution;
+};
+
 class Minimizer {
  public:
-  Minimizer(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
+  Minimizer(const Energy& energy, VectorView x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
             const NewtonOptions& options, Workspace& workspace, const NewtonExtras& extras)
       : energy_(energy),
         x_(x),
@@ -41,7 +48,13 @@ class Minimizer {
         system_(system),
         options_(options),
         workspace_(workspace),
-        extras_(extras) {}
+        extras_(extras),
+        norms_(dofs, options.norm, extras.norm_weights),
+        buffers_(workspace.get<Buffers>()),
+        gradient_(buffers_.gradient.resize(x.size())),
+        step_(buffers_.step.resize(x.size())),
+        candidate_(buffers_.candidate.resize(x.size())),
+        other_(buffers_.other.resize(x.size())) {}
 
   NewtonSummary run() {
     first_value_ = value_ = timed_value(x_);
@@ -90,6 +103,7 @@ class Minimizer {
         return stop(Termination::energy);
       }
     }
+    if (extras_.is_brief) return stop(Termination::iterations);
     return stop(Termination::iterations, "no convergence in " + std::to_string(options_.max_iterations) + " iterations" +
                                              (moving_ ? ", " + describe_way_left() : ""));
   }
@@ -116,19 +130,20 @@ class Minimizer {
   /// Where a solve would end: whether that is a saddle, and x is lower now.
   bool can_leave_saddle() { return is_at_saddle() && leave_saddle(); }
 
-  NewtonSummary finish(Termination termination, std::string message = {}) {
+  NewtonSummary finish(Termination termination, std::string_view message = {}) {
     if (is_at_saddle()) return stop(Termination::round_off, kFlatSaddle);
-    return stop(termination, std::move(message));
+    return stop(termination, message);
   }
 
-  NewtonSummary stop(Termination termination, std::string message = {}) {
+  NewtonSummary stop(Termination termination, std::string_view message = {}) {
     summary_.termination = termination;
     summary_.energy = value_;
-    summary_.message = std::move(message);
+    if (extras_.is_brief) return summary_;
+    summary_.message = message;
     if (summary_.converged()) return summary_;
-    summary_.failed_step = step_;
+    if (has_step_) summary_.failed_step = step_;
     double largest = 0;
-    for (Eigen::Index i = 0; i < gradient_.size(); ++i) {
+    for (Eigen::Index i = 0; has_gradient_ && i < gradient_.size(); ++i) {
       if (dofs_.unknown[i] == kNone || !(std::abs(gradient_[i]) > largest)) continue;
       largest = std::abs(gradient_[i]);
       summary_.worst_dof = static_cast<int>(i);
@@ -136,55 +151,34 @@ class Minimizer {
     return summary_;
   }
 
-  double timed_value(const VectorX& x) {
+  double timed_value(ConstVectorView x) {
     const ScopedTimer timer(summary_.line_search_seconds);
     return energy_.value(x, workspace_);
   }
 
-  VectorX gradient_at(const VectorX& x) {
+  void gradient_at(ConstVectorView x, VectorView gradient) {
     const ScopedTimer timer(summary_.assembly_seconds);
-    VectorX gradient = VectorX::Zero(x.size());
+    gradient.setZero();
     energy_.add_gradient(x, gradient, workspace_);
-    return gradient;
   }
 
-  double free_dot(const VectorX& a, const VectorX& b) const {
+  /// Slope of the energy along the step, at the candidate.
+  double slope_at_candidate() {
+    gradient_at(candidate_, other_);
+    return free_dot(step_, other_);
+  }
+
+  double free_dot(ConstVectorView a, ConstVectorView b) const {
     double sum = 0;
     for (Eigen::Index i = 0; i < a.size(); ++i)
       if (dofs_.unknown[i] != kNone) sum += a[i] * b[i];
     return sum;
   }
 
-  /// Over the unknowns, in the options' norm.
-  template <typename Weighted>
-  double norm(const VectorX& field, Weighted&& weighted) const {
-    double sum = 0, largest = 0;
-    for (Eigen::Index i = 0; i < field.size(); ++i) {
-      if (dofs_.unknown[i] == kNone) continue;
-      const double entry = weighted(field[i], i);
-      sum += entry * entry;
-      largest = std::max(largest, std::abs(entry));
-    }
-    return options_.norm == NewtonNorm::linf ? largest : std::sqrt(sum);
-  }
-
-  double weight(Eigen::Index i) const { return (*extras_.norm_weights)[i]; }
-
-  double gradient_norm(const VectorX& gradient) const {
-    return norm(gradient, [&](double g, Eigen::Index i) {
-      if (options_.norm == NewtonNorm::euclidean) return g;
-      return options_.norm == NewtonNorm::l2 ? g / std::sqrt(weight(i)) : g / weight(i);
-    });
-  }
-
-  double step_norm(const VectorX& step) const {
-    return norm(step,
-                [&](double p, Eigen::Index i) { return options_.norm == NewtonNorm::l2 ? p * std::sqrt(weight(i)) : p; });
-  }
-
   void compute_gradient() {
-    gradient_ = gradient_at(x_);
-    summary_.gradient_norm = gradient_norm(gradient_);
+    gradient_at(x_, gradient_);
+    has_gradient_ = true;
+    summary_.gradient_norm = norms_.of_gradient(gradient_);
   }
 
   bool has_moved() const { return extras_.way_to_start.size() > 0; }
@@ -192,7 +186,8 @@ class Minimizer {
   bool has_small_gradient() {
     if (first_gradient_ < 0) first_gradient_ = summary_.gradient_norm;
     const bool is_first = summary_.iterations == 0;
-    if (is_first && has_moved() && summary_.gradient_norm > kNothing * gradient_norm(extras_.gradient_of_way)) return false;
+    if (is_first && has_moved() && summary_.gradient_norm > kNothing * norms_.of_gradient(extras_.gradient_of_way))
+      return false;
     return summary_.gradient_norm < (is_first ? options_.first_gradient_tolerance : options_.gradient_tolerance) ||
            (!is_first && summary_.gradient_norm < options_.relative_gradient_tolerance * first_gradient_);
   }
@@ -200,7 +195,7 @@ class Minimizer {
   bool has_small_step() {
     if (moving_) return false;
     if (first_step_ < 0) first_step_ = summary_.step_norm;
-    if (summary_.iterations == 0 && has_moved() && summary_.step_norm > kNothing * step_norm(extras_.way_to_start))
+    if (summary_.iterations == 0 && has_moved() && summary_.step_norm > kNothing * norms_.of_step(extras_.way_to_start))
       return false;
     return summary_.step_norm < options_.step_tolerance ||
            (summary_.iterations > 0 && summary_.step_norm < options_.relative_step_tolerance * first_step_);
@@ -256,7 +251,7 @@ class Minimizer {
     return true;
   }
 
-  void move_to_targets(VectorX& x) const {
+  void move_to_targets(VectorView x) const {
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] == kNone) x[i] = target_[i];
   }
@@ -361,7 +356,7 @@ class Minimizer {
       curvature = find_negative_curvature(system_, dofs_.num_unknowns, direction);
     }
     if (!(curvature < 0)) return false;
-    step_.setZero(x_.size());
+    step_.setZero();
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = direction[dofs_.unknown[i]];
     // From the shortest way that the energy resolves on. Down the slope, or where that is round-off, to the side that the
@@ -383,8 +378,10 @@ class Minimizer {
     return false;
   }
 
-  VectorX right_hand_side() const {
-    VectorX rhs = -motion_.coupling;
+  ConstVectorView right_hand_side() {
+    VectorView rhs = buffers_.rhs.resize(dofs_.num_unknowns);
+    rhs.setZero();
+    if (motion_.coupling.size() > 0) rhs -= motion_.coupling;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) rhs[dofs_.unknown[i]] -= gradient_[i];
     return rhs;
@@ -396,13 +393,13 @@ class Minimizer {
     is_loose_ = false;
     const ScopedTimer timer(summary_.linear_seconds);
     if (dofs_.num_unknowns == 0) {
-      step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
+      begin_step();
       summary_.step_norm = 0;
       model_curvature_ = motion_.curvature;
       return true;
     }
-    const VectorX rhs = right_hand_side();
-    VectorX solution;
+    const ConstVectorView rhs = right_hand_side();
+    VectorView solution = buffers_.solution.resize(rhs.size());
     outcome_ = system_.prepare(shift, rhs, asked_);
     if (outcome_ != linear::Outcome::ok) return give_reason();
     // Not only Cholesky must see it: along eigenvectors of negative eigenvalues Newton's step goes up to a saddle.
@@ -419,16 +416,28 @@ class Minimizer {
     if (!is_loose_) summary_.linear_residual = std::max(summary_.linear_residual, report.relative_residual);
     const double descent = solution.dot(rhs);  // of no minimiser of a convex model where it is not positive
     if (!(descent > 0) && !rhs.isZero(0)) return false;
-    step_ = motion_.step.size() > 0 ? motion_.step : VectorX::Zero(x_.size());
+    begin_step();
     // step^T H step over all dofs, with H_ff step_f = rhs.
-    model_curvature_ = descent + 2 * solution.dot(motion_.coupling) + motion_.curvature;
+    model_curvature_ = descent;
+    if (motion_.coupling.size() > 0) model_curvature_ += 2 * solution.dot(motion_.coupling);
+    model_curvature_ += motion_.curvature;
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = solution[dofs_.unknown[i]];
-    summary_.step_norm = step_norm(step_);
+    summary_.step_norm = norms_.of_step(step_);
     return true;
   }
 
+  /// That of the held dofs.
+  void begin_step() {
+    has_step_ = true;
+    if (motion_.step.size() > 0)
+      step_ = motion_.step;
+    else
+      step_.setZero();
+  }
+
   bool give_reason() {
+    if (extras_.is_brief) return false;
     failure_ = std::string(" (linear solve: ") + to_string(outcome_) + ", " + system_.message() + ")";
     return false;
   }
@@ -474,7 +483,7 @@ class Minimizer {
       if (!acceptable(merit_change, value, step, merit_slope, advancing)) continue;
       // Also by its slope at the end: near round-off values alone say anything.
       const bool straight = options_.extend_steps && !advancing && step == 1 && value - value_ < kStraight * slope &&
-                            free_dot(step_, gradient_at(candidate_)) < kStraight / 2 * slope;
+                            slope_at_candidate() < kStraight / 2 * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
       if (single_ways.size() > 0) try_single_ways(single_ways, value);
       accept(value);
@@ -500,7 +509,7 @@ class Minimizer {
   }
 
   void accept(double value) {
-    x_.swap(candidate_);
+    x_ = candidate_;
     value_ = value;
     is_known_here_ = false;
   }
@@ -509,14 +518,14 @@ class Minimizer {
   /// near a saddle), steps of twice the length follow as long as they lower it: Newton would leave with hundreds of equal
   /// ones.
   void go_on() {
-    VectorX step = step_;
+    other_ = step_;
     for (int k = 0; k < kMostDoublings; ++k) {
-      step *= 2;
+      other_ *= 2;
       {
         const ScopedTimer timer(summary_.ccd_seconds);
-        if (energy_.max_step(x_, step, workspace_) < 1) return;
+        if (energy_.max_step(x_, other_, workspace_) < 1) return;
       }
-      candidate_ = x_ + step;
+      candidate_ = x_ + other_;
       const double value = timed_value(candidate_);
       if (!(value < value_)) return;
       accept(value);
@@ -532,12 +541,12 @@ class Minimizer {
     // energies say nothing at all, a slope that shrinks to half is enough.
     const double change_of_energy = std::abs(value - value_);
     if (change_of_energy > 0.1 * std::abs(value_)) return false;
-    const double after = free_dot(step_, gradient_at(candidate_));
+    const double after = slope_at_candidate();
     return after <= kArmijo * slope || (change_of_energy <= kRoundOff * std::abs(value_) && after <= -0.5 * slope);
   }
 
   const Energy& energy_;
-  VectorX& x_;
+  VectorView x_;
   const DofMap& dofs_;
   const VectorX& target_;
   NewtonSystem& system_;
@@ -549,8 +558,11 @@ class Minimizer {
   linear::Outcome outcome_ = linear::Outcome::ok;  ///< of the last linear solve
   std::string failure_;                            ///< why the last one failed that did
   double value_ = 0, first_value_ = 0;
-  VectorX gradient_, step_, candidate_;
-  PrescribedMotion motion_;  ///< asked of the held dofs in this iteration
+  const Norms norms_;
+  Buffers& buffers_;
+  VectorView gradient_, step_, candidate_, other_;
+  bool has_gradient_ = false, has_step_ = false;  ///< whether they are set
+  PrescribedMotion motion_;                       ///< asked of the held dofs in this iteration
   double model_curvature_ = 0;
   double remaining_l1_ = 0;
   double remaining_before_ = std::numeric_limits<double>::infinity();  ///< kMaxBlocked iterations ago
@@ -574,7 +586,7 @@ class Minimizer {
 
 }  // namespace
 
-NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
+NewtonSummary minimize(const Energy& energy, VectorView x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
                        const NewtonOptions& options, Workspace& workspace, const NewtonExtras& extras) {
   return Minimizer(energy, x, dofs, target, system, options, workspace, extras).run();
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -8,25 +9,34 @@ namespace itr {
 
 void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                            PrescribedMotion& motion, Workspace& workspace) {
-  hessian_.setZero(dofs.num_unknowns, dofs.num_unknowns);
-  HessianSink sink(dofs, hessian_);
+  order_ = dofs.num_unknowns;
+  hessian_.resize(order_ * order_).setZero();
+  HessianSink sink(dofs, hessian_.matrix(order_));
   sink.set_motion(motion);
   energy.add_hessian(x, psd, sink, workspace);
 }
 
 linear::Outcome DenseSystem::factorize(double shift) {
-  if (shift != 0) hessian_.diagonal().array() += shift;
-  llt_.compute(hessian_);
-  if (shift != 0) hessian_.diagonal().array() -= shift;
-  return llt_.info() == Eigen::Success ? linear::Outcome::ok : linear::Outcome::not_positive_definite;
+  factor_.resize(order_ * order_) = hessian_.view();
+  Eigen::Ref<MatrixX> factor = factor_.matrix(order_);
+  if (shift != 0) factor.diagonal().array() += shift;
+  const Eigen::LLT<Eigen::Ref<MatrixX>, Eigen::Lower> llt(factor);  // in place
+  return llt.info() == Eigen::Success ? linear::Outcome::ok : linear::Outcome::not_positive_definite;
 }
 
-linear::SolveReport DenseSystem::solve(const VectorX& rhs, VectorX& solution) {
-  solution = llt_.solve(rhs);
+linear::SolveReport DenseSystem::solve(ConstVectorView rhs, VectorView solution) {
+  const auto lower = factor_.matrix(order_).triangularView<Eigen::Lower>();
+  solution = rhs;
+  lower.solveInPlace(solution);
+  lower.adjoint().solveInPlace(solution);
   return {solution.allFinite() ? linear::Outcome::ok : linear::Outcome::non_finite, 0};
 }
 
-double DenseSystem::diagonal_scale() const { return hessian_.rows() > 0 ? hessian_.diagonal().cwiseAbs().maxCoeff() : 0; }
+double DenseSystem::diagonal_scale() const {
+  double scale = 0;
+  for (Eigen::Index i = 0; i < order_; ++i) scale = std::max(scale, std::abs(hessian_.view()[(order_ + 1) * i]));
+  return scale;
+}
 
 void SparseSystem::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
   dim_ = dim;
@@ -76,15 +86,14 @@ linear::Outcome SparseSystem::factorize(double shift) {
   return outcome == linear::Outcome::ok ? solver_.factorize(shifted(shift)) : outcome;
 }
 
-linear::Outcome SparseSystem::prepare(double shift, const VectorX& rhs, double asked) {
+linear::Outcome SparseSystem::prepare(double shift, ConstVectorView rhs, double asked) {
   if (!reusing_) return factorize(shift);
   const auto outcome = analyze();
   if (outcome != linear::Outcome::ok) return outcome;
   return reusing_->prepare(shifted(shift), {rhs.data(), static_cast<std::size_t>(rhs.size())}, asked);
 }
 
-linear::SolveReport SparseSystem::solve(const VectorX& rhs, VectorX& solution) {
-  solution.resize(rhs.size());
+linear::SolveReport SparseSystem::solve(ConstVectorView rhs, VectorView solution) {
   return solver_.solve({rhs.data(), static_cast<std::size_t>(rhs.size())},
                        {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kTightResidual);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "itr/projection/safe_projection.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -77,7 +78,7 @@ class PenalisedSystem final : public NewtonSystem {
     const linear::Outcome outcome = system_.factorize(shift);
     if (outcome != linear::Outcome::ok) return outcome;
     solved_.resize(columns_.rows(), columns_.cols());
-    VectorX solution;
+    VectorX solution(columns_.rows());
     for (Eigen::Index q = 0; q < columns_.cols(); ++q) {
       const linear::SolveReport report = system_.solve(columns_.col(q), solution);
       if (report.outcome != linear::Outcome::ok) return report.outcome;
@@ -88,8 +89,8 @@ class PenalisedSystem final : public NewtonSystem {
     small_.compute(small);
     return linear::Outcome::ok;
   }
-  linear::Outcome prepare(double shift, const VectorX&, double) override { return factorize(shift); }
-  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override {
+  linear::Outcome prepare(double shift, ConstVectorView, double) override { return factorize(shift); }
+  linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override {
     const linear::SolveReport report = system_.solve(rhs, solution);
     solution -= solved_ * small_.solve(columns_.transpose() * solution);
     return report;

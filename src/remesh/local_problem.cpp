@@ -9,23 +9,27 @@
 
 namespace itr {
 
-namespace {
-
 /// Keeps vertices of the surface where the patch knows everything that they could touch, no further than `room` from where
 /// they started: an energy of value zero that only limits steps.
 template <int Dim>
 class MotionBound final : public Energy {
  public:
-  MotionBound(std::vector<int> bounded, VectorX start, double room)
-      : bounded_(std::move(bounded)), start_(std::move(start)), room_(room) {}
+  /// From now on of no vertex, and to be told which.
+  void reset(ConstVectorView start, double room) {
+    bounded_.clear();
+    start_ = start;
+    room_ = room;
+  }
+  void add(int vertex) { bounded_.push_back(vertex); }
   std::string_view name() const override { return "motion bound"; }
   double value(ConstVectorView, Workspace&) const override { return 0; }
   void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
   void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override {
     double step = 1;
+    const ConstVectorView start = start_.view();
     for (const int v : bounded_) {
-      const Vec<Dim> move = dx.segment<Dim>(Dim * v), away = x.segment<Dim>(Dim * v) - start_.segment<Dim>(Dim * v);
+      const Vec<Dim> move = dx.segment<Dim>(Dim * v), away = x.segment<Dim>(Dim * v) - start.segment<Dim>(Dim * v);
       if ((away + step * move).norm() <= room_) continue;
       // Where the way leaves the ball: |away + t move| = room.
       const double a = move.squaredNorm(), b = away.dot(move), c = std::max(0.0, room_ * room_ - away.squaredNorm());
@@ -36,20 +40,28 @@ class MotionBound final : public Energy {
 
  private:
   std::vector<int> bounded_;
-  VectorX start_;
-  double room_;
+  KeptVector start_;
+  double room_ = 0;
 };
 
-}  // namespace
+/// Storage that another problem has left, or new one.
+template <int Dim>
+std::unique_ptr<LocalStorage<Dim>> LocalScratch<Dim>::take_storage() {
+  if (spare.empty()) return std::make_unique<LocalStorage<Dim>>();
+  auto storage = std::move(spare.back());
+  spare.pop_back();
+  return storage;
+}
 
 template <int Dim>
 LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit,
                                 bool is_after, LocalScratch<Dim>& scratch)
-    : state_(state), mesh_(state.mesh), edit_(edit), is_after_(is_after), scratch_(scratch) {
-  if (!scratch_.spare.empty()) {
-    storage_ = std::move(scratch_.spare.back());
-    scratch_.spare.pop_back();
-  }
+    : state_(state),
+      mesh_(state.mesh),
+      edit_(edit),
+      is_after_(is_after),
+      scratch_(scratch),
+      storage_(scratch.take_storage()) {
   scratch_.known.clear(mesh_.vertex_slots());
   scratch_.known_obstacles.clear(static_cast<int>(state.context.obstacles.x.size()));
   if (static_cast<int>(scratch_.local_of.size()) < mesh_.vertex_slots()) scratch_.local_of.resize(2 * mesh_.vertex_slots());
@@ -69,6 +81,8 @@ LocalProblem<Dim>::~LocalProblem() {
   cells_.facets.clear();
   vertices_.clear();
   changes_.clear();
+  energy_.clear();
+  if (touches_contact_ || !state_.context.host.empty()) workspace_ = {};  // what they keep in it may be of this one
   scratch_.spare.push_back(std::move(storage_));
 }
 
@@ -93,11 +107,12 @@ Vec<Dim> LocalProblem<Dim>::field_value(const VectorX& field, const std::vector<
 }
 
 template <int Dim>
-VectorX LocalProblem<Dim>::gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values) const {
-  VectorX values(Dim * vertices_.size());
+ConstVectorView LocalProblem<Dim>::gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values,
+                                          KeptVector& values) const {
+  VectorView view = values.resize(static_cast<Eigen::Index>(Dim * vertices_.size()));
   for (std::size_t i = 0; i < vertices_.size(); ++i)
-    values.segment<Dim>(Dim * static_cast<int>(i)) = field_value(field, obstacle_values, vertices_[i]);
-  return values;
+    view.segment<Dim>(Dim * static_cast<int>(i)) = field_value(field, obstacle_values, vertices_[i]);
+  return view;
 }
 
 /// The local id of a vertex, made on first use.
@@ -181,7 +196,8 @@ void LocalProblem<Dim>::add_loaded_facets() {
 
 template <int Dim>
 void LocalProblem<Dim>::hold_vertices() {
-  std::vector<char> held(Dim * vertices_.size(), 0);
+  std::vector<char>& held = storage_->held;
+  held.assign(Dim * vertices_.size(), 0);
   const auto hold_components = [&](std::size_t i, int tag) {
     const auto it = state_.context.held_components.find(tag);
     if (it == state_.context.held_components.end()) return;
@@ -204,7 +220,7 @@ void LocalProblem<Dim>::hold_vertices() {
       for (const FacetId f : mesh_.facets_of(v.id)) hold_components(i, mesh_.facet_tag(f));
     if (mesh_.vertex_tag(v.id) != kNoTag) hold_components(i, mesh_.vertex_tag(v.id));
   }
-  dofs_ = DofMap::from_held(held);
+  dofs_.hold(held);
 }
 
 /// Free vertices of the surface, and those whose facets the edit replaces (on both sides of the comparison).
@@ -316,27 +332,33 @@ template <int Dim>
 void LocalProblem<Dim>::add_terms() {
   const StepContext<Dim>& context = state_.context;
   cells_.num_vertices = static_cast<int>(vertices_.size());
-  x_ = gather(state_.fields.x, context.obstacles.x);
-  PotentialHistory history;
-  if (context.has_inertia) history.predictor = gather(state_.fields.predictor, {});
+  const ConstVectorView x = gather(state_.fields.x, context.obstacles.x, x_);
+  storage_->predictor.resize(0);
+  storage_->velocity_reference.resize(0);
+  if (context.has_inertia) gather(state_.fields.predictor, {}, storage_->predictor);
   const bool has_velocity = touches_contact_ || !context.damping.empty();  // friction or damping can act
   if (has_velocity && state_.fields.velocity_reference.size() > 0)
-    history.velocity_reference = gather(state_.fields.velocity_reference, context.obstacles.velocity_reference);
-  potential_ = std::make_unique<IncrementalPotential<Dim>>(context, cells_, std::move(history));
+    gather(state_.fields.velocity_reference, context.obstacles.velocity_reference, storage_->velocity_reference);
+  const PotentialHistory history{storage_->predictor.view(), storage_->velocity_reference.view()};
+  if (storage_->potential)
+    storage_->potential->renew(context, history);
+  else
+    storage_->potential.emplace(context, cells_, history);
+  IncrementalPotential<Dim>& potential = *storage_->potential;
   // With lumped mass a split changes how inertia is integrated.
   const bool is_nested = !is_after_ || (edit_.kind == Edit<Dim>::Kind::split && context.mass == MassKind::consistent);
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
-    add_unrepresented_history(*potential_->inertia());
+    add_unrepresented_history(*potential.inertia());
   if (has_surface_) {
-    std::vector<int> bounded;
-    for (std::size_t i = 0; i < changes_.size(); ++i)
-      if (changes_[i] && is_free(static_cast<int>(i))) bounded.push_back(static_cast<int>(i));
-    // First: contact then looks no further than that.
-    energy_.add(std::make_shared<MotionBound<Dim>>(std::move(bounded), x_, scratch_.reach.room()));
+    auto& motion_bound = storage_->motion_bound;
+    if (!motion_bound) motion_bound = std::make_shared<MotionBound<Dim>>();
+    motion_bound->reset(x, scratch_.reach.room());
+    for (int i = 0; i < static_cast<int>(changes_.size()); ++i)
+      if (changes_[i] && is_free(i)) motion_bound->add(i);
+    energy_.add(motion_bound);  // first: contact then looks no further than that
   }
-  if (touches_contact_) potential_->add_contact(surface_, context.contact.barrier_stiffness);
-  const EnergySum sum = potential_->sum(potential_->lag(x_, workspace_));
-  for (const auto& term : sum.terms()) energy_.add(term);
+  if (touches_contact_) potential.add_contact(*surface_, context.contact.barrier_stiffness);
+  potential.add_to(energy_, potential.lag(x, workspace_));
 }
 
 /// What of the predictor as a function on the old mesh the new one cannot represent.
@@ -384,25 +406,28 @@ void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) c
     const auto at = std::find(vertices_.begin(), vertices_.end(), of_mesh(new_ids[i])) - vertices_.begin();
     residual.segment<Dim>(Dim * at) = forgotten.residual.row(i).transpose();
   }
-  inertia.set_unrepresented_history(std::move(residual), forgotten.loss);
+  inertia.set_unrepresented_history(residual, forgotten.loss);
 }
 
 template <int Dim>
 NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
   NewtonOptions options = state_.context.newton;
   options.max_iterations = max_iterations;
-  if (options.norm == NewtonNorm::euclidean)
-    return minimize(energy_, x_, dofs_, VectorX(), scratch_.system, options, workspace_);
-  const VectorX weights = unit_mass_diagonal(cells_);
-  return minimize(energy_, x_, dofs_, VectorX(), scratch_.system, options, workspace_, {.norm_weights = &weights});
+  NewtonExtras extras{.is_brief = true};
+  if (options.norm != NewtonNorm::euclidean) {
+    VectorView weights = storage_->norm_weights.resize(Dim * cells_.num_vertices);
+    get_unit_mass_diagonal(cells_, weights);
+    extras.norm_weights = {weights.data(), static_cast<std::size_t>(weights.size())};
+  }
+  return minimize(energy_, x_.view(), dofs_, VectorX(), scratch_.system, options, workspace_, extras);
 }
 
 template <int Dim>
-std::vector<typename LocalProblem<Dim>::Position> LocalProblem<Dim>::positions() const {
-  std::vector<Position> moved;
+void LocalProblem<Dim>::get_positions(std::vector<Position>& positions) const {
+  positions.clear();
+  const ConstVectorView x = x_.view();
   for (int i = 0; i < static_cast<int>(vertices_.size()); ++i)
-    if (is_free(i)) moved.push_back({vertices_[i].id, x_.segment<Dim>(Dim * i)});
-  return moved;
+    if (is_free(i)) positions.push_back({vertices_[i].id, x.segment<Dim>(Dim * i)});
 }
 
 template class LocalProblem<2>;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -35,12 +36,23 @@ struct LocalVertex {
   bool operator==(const LocalVertex&) const = default;
 };
 
-/// What one local problem is kept in.
+template <int Dim>
+class MotionBound;
+
+/// What one local problem is kept in. The next one finds the room that this one took, so that after a few nothing is
+/// allocated but for contact, damping, pressure and terms of the program, and where an edit forgets history.
 template <int Dim>
 struct LocalStorage {
   CellSet<Dim> cells;
   std::vector<LocalVertex> vertices;
   std::vector<char> changes;  ///< by local vertex: whether its contacts can change
+  std::vector<char> held;     ///< by dof
+  DofMap dofs;
+  KeptVector x, predictor, velocity_reference, norm_weights;
+  std::optional<IncrementalPotential<Dim>> potential;  ///< of `cells`
+  std::shared_ptr<MotionBound<Dim>> motion_bound;
+  EnergySum energy;
+  Workspace workspace;
 };
 
 /// Buffers of local problems that are worth keeping between them: one for each thread.
@@ -49,11 +61,13 @@ struct LocalScratch {
   std::vector<int> local_of;           ///< by vertex slot: local id, valid where `known` is marked
   std::vector<int> local_of_obstacle;  ///< the same of the obstacles' vertices
   Marks known, known_obstacles, cells, patch, facets, primitives;
+  std::vector<CellId> star;
   typename SurfaceIndex<Dim>::Hits hits;
   Neighbourhoods<Dim> neighbourhoods;
   ContactReach<Dim> reach;
   DenseSystem system;
-  std::vector<LocalStorage<Dim>> spare;
+  std::vector<std::unique_ptr<LocalStorage<Dim>>> spare;
+  std::unique_ptr<LocalStorage<Dim>> take_storage();
 };
 
 template <int Dim>
@@ -67,7 +81,7 @@ class LocalProblem {
   LocalProblem(const LocalProblem&) = delete;
   LocalProblem& operator=(const LocalProblem&) = delete;
 
-  double value() { return energy_.value(x_, workspace_); }
+  double value() { return energy_.value(x_.view(), workspace_); }
   /// At most so many Newton iterations from where it stands.
   NewtonSummary relax(int max_iterations);
   bool has_unknowns() const { return dofs_.num_unknowns > 0; }
@@ -82,7 +96,7 @@ class LocalProblem {
     Vec<Dim> x;
   };
   /// Where vertices are that have a free component.
-  std::vector<Position> positions() const;
+  void get_positions(std::vector<Position>& positions) const;
 
  private:
   using Kind = LocalVertex::Kind;
@@ -94,7 +108,7 @@ class LocalProblem {
   void find_contacts();
   void add_surface();
   void find_what_changes();
-  VectorX gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values) const;
+  ConstVectorView gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, KeptVector& values) const;
   void add_terms();
   void add_unrepresented_history(InertiaEnergy<Dim>& inertia) const;
   bool is_value_vertex(const LocalVertex& v) const;
@@ -109,18 +123,17 @@ class LocalProblem {
   bool is_after_;
   LocalScratch<Dim>& scratch_;
 
-  LocalStorage<Dim> storage_;
-  CellSet<Dim>& cells_ = storage_.cells;
-  std::vector<LocalVertex>& vertices_ = storage_.vertices;
-  std::vector<char>& changes_ = storage_.changes;
-  VectorX x_;
-  DofMap dofs_;
-  CollisionSurface surface_;
+  std::unique_ptr<LocalStorage<Dim>> storage_;
+  CellSet<Dim>& cells_ = storage_->cells;
+  std::vector<LocalVertex>& vertices_ = storage_->vertices;
+  std::vector<char>& changes_ = storage_->changes;
+  DofMap& dofs_ = storage_->dofs;
+  KeptVector& x_ = storage_->x;
+  EnergySum& energy_ = storage_->energy;
+  Workspace& workspace_ = storage_->workspace;
+  std::optional<CollisionSurface> surface_;  ///< where it touches contact
   bool has_surface_ = false, touches_contact_ = false;
   Box<Dim> surface_read_;
-  EnergySum energy_;
-  std::unique_ptr<IncrementalPotential<Dim>> potential_;
-  Workspace workspace_;
 };
 
 extern template class LocalProblem<2>;

@@ -41,10 +41,10 @@ double radius_squared_of(double volume) {
 }  // namespace
 
 template <int Dim>
-std::vector<CellId> select_patch(const Mesh<Dim>& mesh, std::span<const CellId> seeds, const Vec<Dim>& center,
-                                 double total_volume, const LocalRelaxationOptions& options, Marks& marks) {
+void select_patch(const Mesh<Dim>& mesh, std::span<const CellId> seeds, const Vec<Dim>& center, double total_volume,
+                  const LocalRelaxationOptions& options, Marks& marks, std::vector<CellId>& patch) {
   marks.clear(mesh.cell_slots());
-  std::vector<CellId> patch;
+  patch.clear();
   double volume = 0;
   const auto add = [&](CellId c) {
     if (!marks.mark(c)) return;
@@ -73,12 +73,11 @@ std::vector<CellId> select_patch(const Mesh<Dim>& mesh, std::span<const CellId> 
     }
   }
   std::sort(patch.begin(), patch.end());
-  return patch;
 }
 
-template std::vector<CellId> select_patch(const Mesh<2>&, std::span<const CellId>, const Vec<2>&, double,
-                                          const LocalRelaxationOptions&, Marks&);
-template std::vector<CellId> select_patch(const Mesh<3>&, std::span<const CellId>, const Vec<3>&, double,
-                                          const LocalRelaxationOptions&, Marks&);
+template void select_patch(const Mesh<2>&, std::span<const CellId>, const Vec<2>&, double, const LocalRelaxationOptions&,
+                           Marks&, std::vector<CellId>&);
+template void select_patch(const Mesh<3>&, std::span<const CellId>, const Vec<3>&, double, const LocalRelaxationOptions&,
+                           Marks&, std::vector<CellId>&);
 
 }  // namespace itr

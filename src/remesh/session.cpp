@@ -170,7 +170,7 @@ void RemeshSession<Dim>::judge(Trial<Dim>& trial, const Vec<Dim>& center, double
   if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth && edit.value)
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;
-  trial.verdict = preview<Dim>(state, gate_, edit, center, total_volume_, options, scratch);
+  preview<Dim>(state, gate_, edit, center, total_volume_, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);
 }
 

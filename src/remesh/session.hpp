@@ -6,6 +6,7 @@
 #include <atomic>
 #include <deque>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "itr/core/parallel.hpp"
@@ -34,6 +35,11 @@ struct Trial {
   Verdict<Dim> verdict{};
 
   const EdgeKey& edge() const { return candidate.edge; }
+  /// As before it was looked at; the memory of lists stays.
+  void clear() {
+    verdict.clear();
+    *this = Trial{.candidate = candidate, .verdict = std::move(verdict)};
+  }
 };
 
 /// All operations of one call share it. What is const may be called by several threads, each with a scratch of its own.

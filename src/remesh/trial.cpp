@@ -48,43 +48,43 @@ Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> p
 
 /// The cells of an edit and those around the vertex that it sets.
 template <int Dim>
-std::vector<CellId> star_of(const Mesh<Dim>& mesh, const Edit<Dim>& edit) {
-  std::vector<CellId> cells = edit.removed_cells;
+void find_star(const Mesh<Dim>& mesh, const Edit<Dim>& edit, std::vector<CellId>& cells) {
+  cells.assign(edit.removed_cells.begin(), edit.removed_cells.end());
   if (edit.value && edit.value->vertex != kNewVertex) {
     const auto around = mesh.cells_of(edit.value->vertex);
     cells.insert(cells.end(), around.begin(), around.end());
   }
   std::sort(cells.begin(), cells.end());
   cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
-  return cells;
 }
 
 }  // namespace
 
 template <int Dim>
 double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch) {
-  const auto star = star_of(state.mesh, edit);
+  find_star(state.mesh, edit, scratch.star);
   constexpr double kNever = std::numeric_limits<double>::infinity();
-  return compare<Dim>(state, star, edit, kNever, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {}).gain;
+  return compare<Dim>(state, scratch.star, edit, kNever, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {})
+      .gain;
 }
 
 template <int Dim>
-Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
-                     double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch) {
-  Verdict<Dim> verdict;
-  if (!gate.passes(edit, scratch.hits)) return verdict;
+void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
+             double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
+  verdict.clear();
+  if (!gate.passes(edit, scratch.hits)) return;
   const auto finish = [&](LocalProblem<Dim>& after) {
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
     verdict.decision = Decision::accepted;
-    verdict.positions = after.positions();
+    after.get_positions(verdict.positions);
   };
   bool is_enough = false;
   if (options.patch_over_vertex > 0) {
-    const auto star = star_of(state.mesh, edit);
+    find_star(state.mesh, edit, scratch.star);
     const auto is_refused_on_star = [&](HistoryRule history) {
       const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
-      const auto bound = compare<Dim>(judged, star, edit, options.required, kBoundIterations, kBoundContactIterations,
-                                      scratch, [&](auto&) { is_enough = true; });
+      const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, kBoundIterations,
+                                      kBoundContactIterations, scratch, [&](auto&) { is_enough = true; });
       const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();
       verdict.decision = Decision::by_bound;
       verdict.gain = bound.gain;
@@ -95,19 +95,19 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
     };
     // What the new mesh cannot represent of the history takes the longest to find: first without.
     const bool is_nested = edit.kind == Edit<Dim>::Kind::split || state.history == HistoryRule::interpolated;
-    if (is_refused_on_star(is_nested ? state.history : HistoryRule::interpolated)) return verdict;
+    if (is_refused_on_star(is_nested ? state.history : HistoryRule::interpolated)) return;
     if (!is_nested) {
       is_enough = false;
-      if (is_refused_on_star(state.history)) return verdict;
+      if (is_refused_on_star(state.history)) return;
     }
   }
-  verdict.patch = select_patch<Dim>(state.mesh, edit.removed_cells, center, total_volume, options.local, scratch.patch);
+  select_patch<Dim>(state.mesh, edit.removed_cells, center, total_volume, options.local, scratch.patch, verdict.patch);
   if (is_enough) {
     LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
     verdict.touches_contact = after.touches_contact();
     verdict.surface_read.include(after.surface_read());
     finish(after);
-    return verdict;
+    return;
   }
   const auto found = compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
                                   options.local.max_contact_iterations, scratch, finish);
@@ -116,13 +116,12 @@ Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const
   verdict.surface_read.include(found.surface_read);
   verdict.was_relaxed = true;
   if (!verdict.accepted()) verdict.decision = found.has_unknowns ? Decision::by_energy : Decision::no_unknowns;
-  return verdict;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                               \
-  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);                      \
-  template Verdict<Dim> preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const Vec<Dim>&, double, \
-                                     const TrialOptions&, LocalScratch<Dim>&);
+#define ITR_INSTANTIATE(Dim)                                                                                       \
+  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);              \
+  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const Vec<Dim>&, double, \
+                             const TrialOptions&, LocalScratch<Dim>&, Verdict<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -2,6 +2,7 @@
 // Whether an edit lowers the energy by enough: previewed on a const mesh, so that nothing has to be taken back.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "gate.hpp"
@@ -28,6 +29,12 @@ struct Verdict {
   std::vector<CellId> patch{};  ///< that was read, where the star of the edit did not do
   std::vector<typename LocalProblem<Dim>::Position> positions{};  ///< where accepted
   bool accepted() const { return decision == Decision::accepted; }
+  /// Back to none; the memory of lists stays.
+  void clear() {
+    patch.clear();
+    positions.clear();
+    *this = Verdict{.patch = std::move(patch), .positions = std::move(positions)};
+  }
 };
 
 struct TrialOptions {
@@ -39,10 +46,11 @@ struct TrialOptions {
 /// The decrease of the energy by the edit (CONVENTIONS.md, "Remeshing", rules a-d; paper eq. 11): both sides have one
 /// support and get the same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex
 /// that it sets free: what that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it
-/// refuses. A patch decides what lies between.
+/// refuses. A patch decides what lies between. Once scratch and verdict have served for similar edits, nothing is allocated
+/// but for contact, and for the history that an edit forgets.
 template <int Dim>
-Verdict<Dim> preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
-                     double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch);
+void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
+             double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict);
 
 /// The lower bound alone: what the edit gains when only vertices move whose cells are all the edit's own or around the
 /// vertex that it sets. [J, times the scaling]

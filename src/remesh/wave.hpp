@@ -33,7 +33,7 @@ void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<Ed
   // One thread alone looks at each when it is its turn, and not at what is lost by then: that finds the same.
   const bool is_alone = session.num_lanes() == 1;
   const auto look = [&](Trial<Dim>& trial, LocalScratch<Dim>& scratch) {
-    trial = {.candidate = trial.candidate};
+    trial.clear();
     operation.look(trial, scratch);
   };
   while (!session.is_cancelled()) {

@@ -26,7 +26,7 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, Pro
   inertia->add_mass_product(held, of_held);
   Workspace workspace;
   PrescribedMotion motion;
-  VectorX rhs(dofs.num_unknowns), solution;
+  VectorX rhs(dofs.num_unknowns), solution(dofs.num_unknowns);
   for (Eigen::Index i = 0; i < a.size(); ++i)
     if (dofs.unknown[i] != kNone) rhs[dofs.unknown[i]] = force[i] - of_held[i];
   if (dofs.num_unknowns == 0) return;

@@ -34,6 +34,16 @@ void parallel_blocks(std::size_t n, std::size_t block, const std::function<void(
 /// Sum of body(begin, end) over the same blocks, added in block order.
 double parallel_sum(std::size_t n, std::size_t block, const std::function<double(std::size_t, std::size_t)>& body);
 
+// The same of any callable object, of which std::function would allocate a copy.
+template <typename Body>
+void parallel_blocks(std::size_t n, std::size_t block, const Body& body) {
+  parallel_blocks(n, block, std::function<void(std::size_t, std::size_t)>(std::cref(body)));
+}
+template <typename Body>
+double parallel_sum(std::size_t n, std::size_t block, const Body& body) {
+  return parallel_sum(n, block, std::function<double(std::size_t, std::size_t)>(std::cref(body)));
+}
+
 /// Stable sort; blocks that do not depend on the number of threads are sorted and merged.
 template <typename T, typename Less>
 void parallel_sort(std::vector<T>& items, const Less& less) {

@@ -14,6 +14,8 @@ namespace itr {
 /// Least of body(begin, end) over blocks of [0, n); infinity where n is 0.
 template <typename Body>
 double parallel_min(std::size_t n, std::size_t block, const Body& body) {
+  if (n == 0) return std::numeric_limits<double>::infinity();
+  if (n <= block) return std::min(std::numeric_limits<double>::infinity(), body(0, n));
   std::vector<double> partial((n + block - 1) / block);
   parallel_blocks(n, block, [&](std::size_t begin, std::size_t end) { partial[begin / block] = body(begin, end); });
   double least = std::numeric_limits<double>::infinity();

@@ -56,6 +56,7 @@ class Energy {
 class EnergySum final : public Energy {
  public:
   void add(std::shared_ptr<const Energy> term) { terms_.push_back(std::move(term)); }
+  void clear() { terms_.clear(); }
   const std::vector<std::shared_ptr<const Energy>>& terms() const { return terms_; }
   std::string_view name() const override { return "total"; }
   double value(ConstVectorView x, Workspace& workspace) const override;

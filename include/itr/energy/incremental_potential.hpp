@@ -38,23 +38,25 @@ struct PotentialTerms {
   std::function<std::shared_ptr<const Energy>(const VectorX& x)> follower;
 };
 
-/// Where the vertices of a scope come from: interleaved over its vertices, obstacles included.
+/// Where the vertices of a scope come from: interleaved over its vertices, obstacles included. Refers to what is handed in.
 struct PotentialHistory {
-  VectorX predictor;           ///< x-hat [m]; needed with inertia
-  VectorX velocity_reference;  ///< positions of no velocity [m]; needed with friction or damping
+  ConstVectorView predictor;           ///< x-hat [m]; needed with inertia
+  ConstVectorView velocity_reference;  ///< positions of no velocity [m]; needed with friction or damping
 };
 
 template <int Dim>
 class IncrementalPotential {
  public:
-  /// Terms of the scene on `cells`. What is referred to must outlive this.
-  IncrementalPotential(const PotentialTerms<Dim>& terms, const CellSet<Dim>& cells, PotentialHistory history);
+  /// Terms of the scene on `cells`. These two must outlive this.
+  IncrementalPotential(const PotentialTerms<Dim>& terms, const CellSet<Dim>& cells, const PotentialHistory& history);
+  /// Makes it what a new one on the same `cells`, of which the content may be another, would be. Memory is used again.
+  void renew(const PotentialTerms<Dim>& terms, const PotentialHistory& history);
 
   /// Adds contact among the vertices of `surface`: those of the cells, or (with a `map` from theirs) of its own.
   void add_contact(const CollisionSurface& surface, double stiffness, std::shared_ptr<const VertexMap<Dim>> map = nullptr);
 
   /// Lagged terms from here on are of velocities that vanish at these positions [m].
-  void set_velocity_reference(VectorX x) { history_.velocity_reference = std::move(x); }
+  void set_velocity_reference(VectorX x) { velocity_reference_ = std::move(x); }
 
   /// Terms that depend on an earlier iterate; null or empty where the scene has none.
   struct Lagged {
@@ -64,12 +66,14 @@ class IncrementalPotential {
     std::shared_ptr<const Energy> follower;
   };
   /// Those lagged at x.
-  Lagged lag(const VectorX& x, Workspace& workspace) const;
-  std::shared_ptr<const Energy> lag_friction(const VectorX& x, Workspace& workspace) const;
+  Lagged lag(ConstVectorView x, Workspace& workspace) const;
+  std::shared_ptr<const Energy> lag_friction(ConstVectorView x, Workspace& workspace) const;
   bool has_friction() const;
 
   /// Everything, with these lagged terms.
   EnergySum sum(const Lagged& lagged) const;
+  /// Adds it to a sum.
+  void add_to(EnergySum& sum, const Lagged& lagged) const;
 
   /// Null where the scene has no such term.
   const std::shared_ptr<InertiaEnergy<Dim>>& inertia() const { return inertia_; }
@@ -81,13 +85,13 @@ class IncrementalPotential {
 
  private:
   std::shared_ptr<const Energy> of_cells(std::shared_ptr<const Energy> term) const;
-  VectorX on_surface(const VectorX& x) const { return map_ ? map_->positions(x) : x; }
-  VelocityRule velocity() const { return {terms_.velocity_rate, history_.velocity_reference}; }
-  VelocityRule velocity_of_surface() const { return {terms_.velocity_rate, on_surface(history_.velocity_reference)}; }
+  VectorX on_surface(ConstVectorView x) const { return map_ ? map_->positions(x) : VectorX(x); }
+  VelocityRule velocity() const { return {terms_->velocity_rate, velocity_reference_}; }
+  VelocityRule velocity_of_surface() const { return {terms_->velocity_rate, on_surface(velocity_reference_)}; }
 
-  const PotentialTerms<Dim>& terms_;
+  const PotentialTerms<Dim>* terms_;
   const CellSet<Dim>& cells_;
-  PotentialHistory history_;
+  VectorX velocity_reference_;  ///< as in PotentialHistory
   std::shared_ptr<const VertexMap<Dim>> map_;
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;

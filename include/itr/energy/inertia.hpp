@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "itr/core/kept_vector.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
@@ -15,13 +16,16 @@ template <int Dim>
 class InertiaEnergy final : public Energy {
  public:
   /// `predictor` is xhat at the vertices of `cells`, which must outlive this.
-  InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind, VectorX predictor);
+  InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind,
+                ConstVectorView predictor);
+  /// Makes it what a new one on the same `cells`, of which the content may be another, would be. Memory is used again.
+  void renew(const std::map<int, Material>& materials, MassKind kind, ConstVectorView predictor);
 
   /// Adds residual . (x - xhat) + loss, by which the functional becomes 1/2 ||x - xhat_old||^2 for an xhat_old that the
   /// mesh cannot represent (CONVENTIONS.md, "Remeshing", rule b): see projection/forgotten_history.hpp.
-  void set_unrepresented_history(VectorX residual, double loss);
+  void set_unrepresented_history(ConstVectorView residual, double loss);
 
-  const VectorX& predictor() const { return predictor_; }
+  ConstVectorView predictor() const { return predictor_.view(); }
   std::string_view name() const override { return "inertia"; }
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
@@ -32,9 +36,9 @@ class InertiaEnergy final : public Energy {
  private:
   const CellSet<Dim>& cells_;
   std::vector<double> mass_;  ///< rho |e| by element
-  MassKind kind_;
-  VectorX predictor_;
-  VectorX residual_;  ///< empty: none
+  MassKind kind_ = MassKind::consistent;
+  KeptVector predictor_;
+  KeptVector residual_;  ///< empty: none
   double loss_ = 0;
 };
 
@@ -42,8 +46,15 @@ class InertiaEnergy final : public Energy {
 template <int Dim>
 std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials);
 
-/// Diagonal of the consistent mass matrix of unit density, by dof. Where it is zero, its mean.
+/// Diagonal of the consistent mass matrix of unit density, by dof. Where it is zero, its mean. `diagonal` has Dim *
+/// cells.num_vertices entries.
 template <int Dim>
-VectorX unit_mass_diagonal(const CellSet<Dim>& cells);
+void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal);
+template <int Dim>
+VectorX unit_mass_diagonal(const CellSet<Dim>& cells) {
+  VectorX diagonal(Dim * cells.num_vertices);
+  get_unit_mass_diagonal(cells, diagonal);
+  return diagonal;
+}
 
 }  // namespace itr

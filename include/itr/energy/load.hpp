@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 
+#include "itr/core/kept_vector.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
@@ -33,17 +34,21 @@ struct Loads {
 template <int Dim>
 class LoadEnergy final : public Energy {
  public:
+  /// `cells` must outlive this.
   LoadEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, const Loads<Dim>& loads, double scale);
+  /// Makes it what a new one on the same `cells`, of which the content may be another, would be. Memory is used again.
+  void renew(const std::map<int, Material>& materials, const Loads<Dim>& loads, double scale);
   std::string_view name() const override { return "body"; }
-  double value(ConstVectorView x, Workspace&) const override { return -(scale_ * (forces_.dot(x) - rest_work_)); }
-  void add_gradient(ConstVectorView, VectorView gradient, Workspace&) const override { gradient -= scale_ * forces_; }
+  double value(ConstVectorView x, Workspace&) const override { return -(scale_ * (forces_.view().dot(x) - rest_work_)); }
+  void add_gradient(ConstVectorView, VectorView gradient, Workspace&) const override { gradient -= scale_ * forces_.view(); }
   void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
-  const VectorX& forces() const { return forces_; }  ///< [N]
+  ConstVectorView forces() const { return forces_.view(); }  ///< [N]
 
  private:
-  VectorX forces_;
+  const CellSet<Dim>& cells_;
+  KeptVector forces_;
   double rest_work_ = 0;  ///< f . X
-  double scale_;
+  double scale_ = 1;
 };
 
 }  // namespace itr

@@ -23,6 +23,8 @@ struct DofMap {
 
   /// Numbers the dofs that are not `held` in ascending order.
   static DofMap from_held(const std::vector<char>& held);
+  /// The same in place.
+  void hold(const std::vector<char>& held);
 };
 
 /// Lower triangle of a sparse symmetric matrix whose pattern grows where blocks ask for it: elasticity gives the base,
@@ -86,7 +88,7 @@ class SparseAssembler {
 /// A step that held dofs are made to take, and what it does to the Newton system of the unknowns.
 struct PrescribedMotion {
   VectorX step;          ///< full length, zero at unknowns; empty: held dofs stay
-  VectorX coupling;      ///< out, by unknown: H_fD * step_D
+  VectorX coupling;      ///< out, by unknown: H_fD * step_D; empty where held dofs stay
   double curvature = 0;  ///< out: step_D^T H_DD step_D
 };
 
@@ -95,15 +97,19 @@ using BlockReceiver = std::function<void(std::span<const int> vertices, const do
 
 class HessianSink {
  public:
-  HessianSink(const DofMap& dofs, MatrixX& dense) : dofs_(&dofs), dense_(&dense) {}
+  /// `dense` must outlive this.
+  HessianSink(const DofMap& dofs, Eigen::Ref<MatrixX> dense)
+      : dofs_(&dofs), dense_(dense.data()), dense_stride_(dense.outerStride()) {}
   HessianSink(const DofMap& dofs, SparseAssembler& sparse) : dofs_(&dofs), sparse_(&sparse) {}
   explicit HessianSink(BlockReceiver receiver) : receiver_(std::move(receiver)) {}
 
   /// Collects `motion.coupling` and `motion.curvature` along with the blocks.
   void set_motion(PrescribedMotion& motion) {
-    motion.coupling.setZero(dofs_->num_unknowns);
     motion.curvature = 0;
-    if (motion.step.size() > 0) motion_ = &motion;
+    motion.coupling.resize(0);
+    if (motion.step.size() == 0) return;
+    motion.coupling.setZero(dofs_->num_unknowns);
+    motion_ = &motion;
   }
   /// Adds the symmetric `block` (column-major, Dim * vertices.size() squared) of a stencil.
   template <int Dim>
@@ -152,10 +158,10 @@ class HessianSink {
   void add_motion(std::span<const int> vertices, const double* block);
 
   const DofMap* dofs_ = nullptr;  ///< null where there is a receiver
-  MatrixX* dense_ = nullptr;
+  double* dense_ = nullptr;
+  Eigen::Index dense_stride_ = 0;  ///< from column to column
   SparseAssembler* sparse_ = nullptr;
   BlockReceiver receiver_;
-  std::vector<int> unknown_;  ///< scratch of add
   PrescribedMotion* motion_ = nullptr;
 };
 

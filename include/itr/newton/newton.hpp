@@ -3,10 +3,11 @@
 // only Energy: the global step, a local relaxation and the safe projection are the same code.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <functional>
+#include <span>
 #include <string>
 
+#include "itr/core/kept_vector.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/linear/reuse.hpp"
 #include "itr/newton/options.hpp"
@@ -28,8 +29,9 @@ class NewtonSystem {
   virtual linear::Outcome factorize(double shift) = 0;
   /// Does that, or else finds by other means, to the relative residual `asked`, what solve(rhs) is to return; its outcome
   /// says the same of the matrix, the less surely the more is asked.
-  virtual linear::Outcome prepare(double shift, const VectorX& rhs, double asked) = 0;
-  virtual linear::SolveReport solve(const VectorX& rhs, VectorX& solution) = 0;
+  virtual linear::Outcome prepare(double shift, ConstVectorView rhs, double asked) = 0;
+  /// `solution` has the length of `rhs`.
+  virtual linear::SolveReport solve(ConstVectorView rhs, VectorView solution) = 0;
   /// Whether factorize, solve or negative_pivots tells of every matrix that is not positive definite.
   virtual bool tells_definiteness() const { return true; }
   /// Of the last factorisation: as many as negative eigenvalues of the matrix; 0 where the solver does not count them.
@@ -40,19 +42,19 @@ class NewtonSystem {
   virtual double diagonal_scale() const = 0;
 };
 
-/// For patches of up to some hundred unknowns.
+/// For patches of up to some hundred unknowns. Keeps its memory.
 class DenseSystem final : public NewtonSystem {
  public:
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
-  linear::Outcome prepare(double shift, const VectorX&, double) override { return factorize(shift); }
-  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  linear::Outcome prepare(double shift, ConstVectorView, double) override { return factorize(shift); }
+  linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override;
   std::string message() const override { return "dense Cholesky"; }
   double diagonal_scale() const override;
 
  private:
-  MatrixX hessian_;
-  Eigen::LLT<MatrixX, Eigen::Lower> llt_;
+  Eigen::Index order_ = 0;
+  KeptVector hessian_, factor_;  ///< by columns
 };
 
 /// For whole meshes: fixed base pattern of the elements, contacts added as they appear, analysed when the pattern changes.
@@ -68,8 +70,8 @@ class SparseSystem final : public NewtonSystem {
   linear::Solver& solver() { return solver_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;
-  linear::Outcome prepare(double shift, const VectorX& rhs, double asked) override;
-  linear::SolveReport solve(const VectorX& rhs, VectorX& solution) override;
+  linear::Outcome prepare(double shift, ConstVectorView rhs, double asked) override;
+  linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override;
   bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
   int negative_pivots() const override { return solver_.statistics().negative_pivots; }
   std::string message() const override;
@@ -122,11 +124,13 @@ struct NewtonSummary {
 
 /// What a solve may be given beside its options.
 struct NewtonExtras {
-  const VectorX* norm_weights = nullptr;  ///< D of NewtonNorm by dof; may be null for the Euclidean one
+  std::span<const double> norm_weights{};  ///< D of NewtonNorm by dof; may be empty for the Euclidean one
   /// Called with each accepted iterate; says whether it changed the energy.
   std::function<bool(const VectorX& x)> after_step{};
   /// Called after each iteration; false ends the solve, not converged.
   std::function<bool(const NewtonProgress& progress)> on_iteration{};
+  /// Says nothing of why it ended: neither message nor failed step. For solves that end after so many iterations anyway.
+  bool is_brief = false;
   /// Where the solve begins elsewhere than the state is: the way from there, and what inertia does along it to the gradient.
   /// The solve has not converged there unless gradient and step are nothing beside these: whatever the tolerances, forces
   /// that just began to act are not passed over. Empty: it begins where the state is.
@@ -136,7 +140,7 @@ struct NewtonExtras {
 /// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as
 /// x; empty: they stay), as far in each iteration as feasibility allows, by an exact-penalty merit function (Nocedal &
 /// Wright 2006, §18.3); convergence is tested only once they are there. x stays feasible throughout.
-NewtonSummary minimize(const Energy& energy, VectorX& x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
+NewtonSummary minimize(const Energy& energy, VectorView x, const DofMap& dofs, const VectorX& target, NewtonSystem& system,
                        const NewtonOptions& options, Workspace& workspace, const NewtonExtras& extras = {});
 
 }  // namespace itr

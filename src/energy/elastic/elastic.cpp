@@ -125,16 +125,24 @@ void project_modes(const NegativeModes<Dim>& negative, const ShapeGradients<Dim>
 
 template <int Dim>
 ElasticEnergy<Dim>::ElasticEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale)
-    : cells_(cells), scale_(scale) {
+    : cells_(cells) {
+  renew(materials, scale);
+}
+
+template <int Dim>
+void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double scale) {
+  scale_ = scale;
+  by_body_.clear();
+  by_element_.clear();
   bool varies = false;
   for (const auto& [body, material] : materials) {
     varies = varies || material.has_varying_moduli();
     if (!material.has_varying_moduli()) by_body_.emplace_back(body, elastic_moduli<Dim>(material, Vec<Dim>::Zero()));
   }
   if (!varies) return;
-  by_element_.reserve(cells.elements.size());
-  for (const auto& element : cells.elements)
-    by_element_.push_back(elastic_moduli<Dim>(materials.at(element.body), rest_barycenter(cells, element)));
+  by_element_.reserve(cells_.elements.size());
+  for (const auto& element : cells_.elements)
+    by_element_.push_back(elastic_moduli<Dim>(materials.at(element.body), rest_barycenter(cells_, element)));
 }
 
 template <int Dim>

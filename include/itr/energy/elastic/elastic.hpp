@@ -16,6 +16,8 @@ class ElasticEnergy final : public Energy {
  public:
   /// `scale` is alpha h^2 [s^2]. Elements are referred to, not copied: `cells` must outlive this.
   ElasticEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale);
+  /// Makes it what a new one on the same `cells`, of which the content may be another, would be. Memory is used again.
+  void renew(const std::map<int, Material>& materials, double scale);
   std::string_view name() const override { return "elastic"; }
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
@@ -31,7 +33,7 @@ class ElasticEnergy final : public Energy {
   const CellSet<Dim>& cells_;
   std::vector<std::pair<int, ElasticModuli>> by_body_;  ///< few, searched linearly
   std::vector<ElasticModuli> by_element_;               ///< empty unless moduli vary in space
-  double scale_;
+  double scale_ = 1;
 };
 
 }  // namespace itr

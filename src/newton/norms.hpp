@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "itr/newton/newton.hpp"
+
+namespace itr {
+
+/// Norms over the unknowns. What they refer to must outlive them.
+class Norms {
+ public:
+  /// `weights` are D of `kind` by dof; empty for the Euclidean one.
+  Norms(const DofMap& dofs, NewtonNorm kind, std::span<const double> weights)
+      : dofs_(dofs), kind_(kind), weights_(weights) {}
+
+  double of_gradient(ConstVectorView gradient) const {
+    return norm(gradient, [&](double g, Eigen::Index i) {
+      if (kind_ == NewtonNorm::euclidean) return g;
+      return kind_ == NewtonNorm::l2 ? g / std::sqrt(weights_[i]) : g / weights_[i];
+    });
+  }
+  double of_step(ConstVectorView step) const {
+    return norm(step, [&](double p, Eigen::Index i) { return kind_ == NewtonNorm::l2 ? p * std::sqrt(weights_[i]) : p; });
+  }
+
+ private:
+  template <typename Weighted>
+  double norm(ConstVectorView field, const Weighted& weighted) const {
+    double sum = 0, largest = 0;
+    for (Eigen::Index i = 0; i < field.size(); ++i) {
+      if (dofs_.unknown[i] == kNone) continue;
+      const double entry = weighted(field[i], i);
+      sum += entry * entry;
+      largest = std::max(largest, std::abs(entry));
+    }
+    return kind_ == NewtonNorm::linf ? largest : std::sqrt(sum);
+  }
+
+  const DofMap& dofs_;
+  NewtonNorm kind_;
+  std::span<const double> weights_;
+};
+
+}  // namespace itr
