@@ -42,11 +42,11 @@ STUDIES = {
                   "--frames", "6", "--series", "uniform,itr", "--time-limit", "600"],
                  "to t = 0.5: the bar has landed on the spikes"),
     "twisting-beam-3d": ("twisting-beam/twisting-beam.json",
-                         ["--set", "/time/tend=0.2", "--tolerances", "10,2,0.5", "--levels", "2", "--frames", "5",
+                         ["--set", "/time/tend=0.2", "--tolerances", "10,2,0.5", "--levels", "2", "--starts", "0,1", "--frames", "5",
                           "--reference-tolerance", "2", "--series", "uniform,itr,smoothing", "--time-limit", "1200"],
                          "to t = 0.2: a twist of 72 degrees"),
     "masticator-3d": ("masticator/3D.json",
-                      ["--set", "/time/tend=1.1", "--tolerances", "0.016,0.004,0.001", "--levels", "2", "--frames", "4",
+                      ["--set", "/time/tend=1.1", "--tolerances", "0.016,0.004,0.001", "--levels", "2", "--starts", "0,1", "--frames", "4",
                        "--reference-tolerance", "0.004", "--series", "uniform,itr,smoothing", "--time-limit", "1200"],
                       "to t = 1.1: the first contact"),
     "ball-wall-3d": ("ball-wall/3D.json",
@@ -62,7 +62,7 @@ STUDIES = {
     "ball-obstacle": ("unused/ball-obstacle/2D.json", ["--levels", "3", "--frames", "8", "--series", "uniform,itr,smoothing", "--time-limit", "600"],
                       "the whole scene: 100 steps; kept aside"),
     "rollers": ("rollers/monkey-soft-hard.json",
-                ["--set", "/time/tend=0.1", "--tolerances", "10,1", "--levels", "1", "--frames", "2",
+                ["--set", "/time/tend=0.1", "--tolerances", "0.01,0.001", "--levels", "1", "--frames", "2",
                  "--series", "uniform,itr", "--time-limit", "900"], "to t = 0.1: the rollers turn, first contact"),
 }
 FILES = ("study.md", "study.csv", "study.json", "study.svg")
