@@ -19,6 +19,7 @@ TetScene falling_cube(double pull, double noise) {
   scene.mesh = make_cubes(2, unit_grid(2), [](int, int, int) { return 1; });
   scene.context.contact.enabled = false;
   scene.context.obstacles = {};
+  scene.context.obstacles.past_x.resize(1);  // of the one past position
   scene.context.coupling = 0;
   const Mat<3> turn = (1 + pull) * Eigen::AngleAxisd(0.7, Vec<3>(1, 2, 3).normalized()).toRotationMatrix();
   const Vec<3> fall = scene.context.scaling * scene.context.loads.acceleration(Vec<3>::Zero());
