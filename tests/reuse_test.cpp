@@ -183,32 +183,6 @@ TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
 }
 
 /// Whoever goes on from a record solves what comes with the same bits.
-/// Where a factorisation costs a few iterations, those that would not get there are not begun.
-TEST(FewIterations, AreJudgedByTheirStart) {
-  const Elastic small = elasticity(2, 10, 0.3);
-  Registry registry = full_registry();
-  const auto direct = registry.create("eigen:ldlt");
-  ReusingSolver solver(*direct, true);
-  const auto b = load(small.pattern.order);
-  std::vector<double> x(b.size());
-  const auto solve = [&](double change) {
-    const auto values = changed(small, change);
-    ASSERT_EQ(solver.analyze(small.pattern, small.hints()), Outcome::ok);
-    ASSERT_EQ(solver.prepare(values, b, 1e-4), Outcome::ok);
-    ASSERT_EQ(solver.solve(b, x, 1, 1e-4).outcome, Outcome::ok);
-    EXPECT_LE(residual(small.pattern, values, x, b), 1e-4);
-  };
-  solve(0);
-  solve(0.01);
-  EXPECT_EQ(solver.counts().factorizations, 1);
-  const int good = solver.counts().iterations;
-  EXPECT_GT(good, 0);
-  EXPECT_LE(good, 6);
-  solve(20);
-  EXPECT_EQ(solver.counts().factorizations, 2);
-  EXPECT_EQ(solver.counts().iterations, good);
-}
-
 TEST_P(Engines, ARecordIsAllThatMatters) {
   const auto b = load(block().pattern.order);
   const auto other = registry.create(GetParam());

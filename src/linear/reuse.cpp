@@ -20,8 +20,7 @@ constexpr double kFlops = 3e10, kEntries = 1e8, kBytes = 2.5e10;
 
 constexpr double kWorthTrying = 0.7;  ///< share of a factorisation that iterations may cost
 constexpr int kFewest = 4;            ///< iterations without which none is tried
-constexpr int kTellsRate = 6;         ///< iterations after which their rate is known roughly
-constexpr double kRoughly = 2;        ///< to that factor
+constexpr int kTellsRate = 6;         ///< iterations after which their rate is known roughly, to a factor of two
 constexpr int kLongestPause = 8;
 constexpr double kCertain = 1e-12;     ///< negative curvature, relative, that is no round-off
 constexpr double kWholeSystem = 1e-8;  ///< residual of a system that counts as one
@@ -41,11 +40,6 @@ double noise(std::uint64_t i) {
   bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9;
   bits = (bits ^ (bits >> 27)) * 0x94d049bb133111eb;
   return static_cast<double>(static_cast<std::int64_t>(bits ^ (bits >> 31))) * 0x1p-63;
-}
-
-/// Iterations to a target, both residuals relative to the first, where so many have left so much.
-double at_rate(int iterations, double left, double target) {
-  return iterations * std::log(target) / std::min(-1e-3, std::log(left));
 }
 
 /// y = A x, of a lower triangle.
@@ -217,12 +211,8 @@ bool ReusingSolver::iterate(std::span<const double> b, double asked, bool goes_o
   const double scale = norm(b), from = goes_on ? report_.relative_residual : 1;
   if (!(scale > 0) || !std::isfinite(scale)) return false;
   if (goes_on && from <= asked) return true;
-  const int before = iterations_, most = most_iterations();
-  // Where few are worth it, their rate would show too late: what the solve that they begin with leaves stands for it.
-  const auto begins_well = [&] {
-    return begin() && (most > 2 * kTellsRate || at_rate(1, norm(r_) / scale, asked) <= kRoughly * most);
-  };
-  const bool is_there = (goes_on || begins_well()) && run(asked * scale, most - before);
+  const int before = iterations_;
+  const bool is_there = (goes_on || begin()) && run(asked * scale, most_iterations() - before);
   if (is_there) {
     compute_residual();
     report_ = {Outcome::ok, norm(r_) / scale};
@@ -283,7 +273,8 @@ bool ReusingSolver::run(double target, int most) {
     }
     const double now = norm(r_);
     if (now <= target) return true;
-    if (k >= kTellsRate && at_rate(k, now / first, target / first) > kRoughly * most) return false;
+    const double by_rate = k * std::log(target / first) / std::min(-1e-3, std::log(now / first));
+    if (k >= kTellsRate && by_rate > 2.0 * most) return false;
   }
   return false;
 }
