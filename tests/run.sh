@@ -20,7 +20,7 @@ ctest --test-dir build/release --output-on-failure --no-tests=error -LE long
 cmake --preset audit -D ITR_BUILD_TESTS=OFF
 cmake --build --preset audit --target itr -- -j "${ITR_JOBS:-2}"
 audited=build/audit/runs/ball_wall
-build/audit/bin/itr run examples/ball_wall.json -o "$audited" --set /time/tend=0.0008 \
+build/audit/bin/itr run examples/ball_wall.json -o "$audited" --overwrite --set /time/tend=0.0008 \
   --set '/initial_conditions/velocity/0/value=[67, -20]' --set '/geometry/0/transformation/translation=[0.0629, 0]' \
   --set /contact/friction_coefficient=0.3 --set /space/remesh/split/acceptance_tolerance=1
 build/audit/bin/itr certify "$audited"
