@@ -15,15 +15,6 @@ struct FromPredictor {
 }  // namespace
 
 template <int Dim>
-std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
-  std::vector<double> densities;
-  densities.reserve(cells.elements.size());
-  for (const auto& element : cells.elements)
-    densities.push_back(mass_density<Dim>(materials.at(element.body), rest_barycenter(cells, element)));
-  return densities;
-}
-
-template <int Dim>
 InertiaEnergy<Dim>::InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind,
                                   ConstVectorView predictor)
     : cells_(cells) {
@@ -110,10 +101,9 @@ void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal) {
     if (entry == 0) entry = mean;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                  \
-  template class InertiaEnergy<Dim>;                                          \
-  template void get_unit_mass_diagonal<Dim>(const CellSet<Dim>&, VectorView); \
-  template std::vector<double> element_densities<Dim>(const CellSet<Dim>&, const std::map<int, Material>&);
+#define ITR_INSTANTIATE(Dim)         \
+  template class InertiaEnergy<Dim>; \
+  template void get_unit_mass_diagonal<Dim>(const CellSet<Dim>&, VectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -5,10 +5,10 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "itr/geometry/bvh.hpp"
 #include "itr/geometry/intersection.hpp"
+#include "mesh/connected_parts.hpp"
 
 namespace itr {
 
@@ -42,7 +42,7 @@ template <int Dim>
 class ConstrainedMass {
  public:
   ConstrainedMass(const TransferMesh<Dim>& mesh, std::span<const char> fixed, Eigen::Index columns)
-      : part_(connected_parts(mesh)), columns_(columns) {
+      : part_(connected_parts<Dim + 1>(mesh.rest.size(), mesh.cells)), columns_(columns) {
     const auto n = static_cast<Eigen::Index>(mesh.rest.size());
     VectorX lumped = VectorX::Zero(n);
     std::vector<Eigen::Triplet<double>> entries;
@@ -159,25 +159,6 @@ class ConstrainedMass {
 }  // namespace
 
 template <int Dim>
-std::vector<int> connected_parts(const TransferMesh<Dim>& mesh) {
-  std::vector<int> root(mesh.rest.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
-  for (const auto& cell : mesh.cells)
-    for (int k = 1; k <= Dim; ++k) {
-      const int a = find(cell[0]), b = find(cell[k]);
-      root[std::max(a, b)] = std::min(a, b);
-    }
-  std::vector<int> part(root.size());
-  int parts = 0;
-  for (int v = 0; v < static_cast<int>(root.size()); ++v) part[v] = find(v) == v ? parts++ : part[find(v)];
-  return part;
-}
-
-template <int Dim>
 TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh,
                                      const TouchedCells& touched, const MatrixX& u_old, const MatrixX& u_bar) {
   const Eigen::Index k = u_old.cols();
@@ -281,7 +262,6 @@ MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& n
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                                \
-  template std::vector<int> connected_parts<Dim>(const TransferMesh<Dim>&);                                                 \
   template TouchedDifference touched_difference<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&,                    \
                                                      const TouchedCells&, const MatrixX&, const MatrixX&);                  \
   template MatrixX solve_projection<Dim>(const TransferMesh<Dim>&, const MatrixX&, std::span<const char>, TransferReport&); \

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 
 #include "itr/fem/mass.hpp"
+#include "mesh/connected_parts.hpp"
 
 namespace itr {
 
@@ -27,21 +27,14 @@ std::optional<Vec<Dim>> uniform_acceleration(const Mesh<Dim>& mesh, const Loads<
   return all;
 }
 
-/// By cell, the number of a vertex that stands for its connected part.
+/// By vertex slot, the number of its connected part.
 template <int Dim>
-std::vector<int> parts_of_cells(const Mesh<Dim>& mesh) {
-  std::vector<int> root(mesh.vertex_slots()), part(mesh.cell_slots(), 0);
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
+std::vector<int> parts_of(const Mesh<Dim>& mesh) {
+  std::vector<typename Mesh<Dim>::Cell> cells;
+  cells.reserve(mesh.cell_slots());
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c))
-      for (int k = 1; k <= Dim; ++k) root[find(mesh.cell(c)[k])] = find(mesh.cell(c)[0]);
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c)) part[c] = find(mesh.cell(c)[0]);
-  return part;
+    if (mesh.is_cell_alive(c)) cells.push_back(mesh.cell(c));
+  return connected_parts<Dim + 1>(mesh.vertex_slots(), cells);
 }
 
 /// Of a cell whose edges are so long: isosceles and right-angled in 2D, regular in 3D.
@@ -50,11 +43,11 @@ double volume_of(double length) {
   return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
 }
 
-/// Whether W >= 0 and its moduli are the same everywhere.
+/// Whether W >= 0, with moduli and a density that are the same everywhere.
 template <int Dim>
-bool is_never_negative(const Material& material) {
+bool is_plain(const Material& material) {
   return material.law != MaterialLaw::own && material.law != MaterialLaw::mooney_rivlin && !material.has_varying_moduli() &&
-         material.lame_lambda(Dim) >= 0;
+         !material.density_at && material.lame_lambda(Dim) >= 0;
 }
 
 /// Whether all terms but loads are known to be never negative, and the loads are that of one acceleration.
@@ -64,17 +57,19 @@ bool is_bounded(const StepContext<Dim>& context) {
   return context.damping.empty() && context.host.empty() && !context.follower && loads.tractions.empty() &&
          loads.pressures.empty() && (!loads.acceleration || context.has_inertia) &&
          std::all_of(context.materials.begin(), context.materials.end(),
-                     [](const auto& entry) { return is_never_negative<Dim>(entry.second) && !entry.second.density_at; });
+                     [](const auto& entry) { return is_plain<Dim>(entry.second); });
 }
 
 }  // namespace
 
 template <int Dim>
 double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  if (!is_bounded(context) || !std::isfinite(context.coupling)) return kUnknown;
   const auto acceleration = uniform_acceleration(mesh, context.loads);
-  if (!is_bounded(context) || !acceleration) return std::numeric_limits<double>::infinity();
+  if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;
-  const std::vector<int> parts = parts_of_cells(mesh);
+  const std::vector<int> parts = parts_of(mesh);
   std::vector<double> energy(mesh.vertex_slots(), context.coupling);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
@@ -82,7 +77,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
     const Material& material = context.materials.at(element.body);
     const Mat<Dim> F = deformation_gradient<Dim>(element, fields.x);
     const auto moduli = elastic_moduli<Dim>(material, mesh.rest(element.vertices[0]));
-    energy[parts[c]] += context.scaling * element.volume * elastic_density<Dim>(F, moduli);
+    energy[parts[element.vertices[0]]] += context.scaling * element.volume * elastic_density<Dim>(F, moduli);
     if (!context.has_inertia) continue;
     const ElementMass<Dim> mass(context.mass, material.density * element.volume);
     Vec<Dim> total = Vec<Dim>::Zero();
@@ -92,7 +87,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
       total += d;
       squares += d.squaredNorm();
     }
-    energy[parts[c]] += 0.5 * (mass.off * total.squaredNorm() + mass.extra * squares);
+    energy[parts[element.vertices[0]]] += 0.5 * (mass.off * total.squaredNorm() + mass.extra * squares);
   }
   return *std::max_element(energy.begin(), energy.end());
 }

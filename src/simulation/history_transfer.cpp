@@ -3,6 +3,7 @@
 
 #include "itr/projection/safe_projection.hpp"
 #include "itr/projection/transfer_patch.hpp"
+#include "mesh/connected_parts.hpp"
 #include "simulation/patch_surface.hpp"
 
 namespace itr {
@@ -107,9 +108,10 @@ class HistoryTransfer {
       held.resize(interpolant.size(), 1);
     }
     SafeProjectionReport<Dim> safe;
+    const auto& patch = patch_.new_cells;
     VectorX x = project_safely<Dim>(
         {cells, surface.empty() ? nullptr : &surface.surface, setup_.materials, setup_.contact.activation_distance,
-         std::move(held), connected_parts(patch_.new_cells.view()), kRings<Dim>},
+         std::move(held), connected_parts<Dim + 1>(patch.vertices.size(), patch.cells), kRings<Dim>},
         interpolant, goal, solver, safe);
     report.with_barriers += safe.used_barriers;
     report.not_converged += !safe.converged;

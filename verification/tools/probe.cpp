@@ -110,7 +110,8 @@ struct Body {
     const CellSet<Dim> set = whole_mesh<Dim>(setup.mesh, {});
     rest = set.rest;
     for (const auto& element : set.elements) cells.push_back(element.vertices);
-    density = element_densities<Dim>(set, setup.materials);
+    for (const auto& element : set.elements)
+      density.push_back(mass_density<Dim>(setup.materials.at(element.body), rest_barycenter(set, element)));
   }
   TransferMesh<Dim> view() const { return {rest, cells, density}; }
 };

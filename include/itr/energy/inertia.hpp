@@ -42,10 +42,6 @@ class InertiaEnergy final : public Energy {
   double loss_ = 0;
 };
 
-/// Density of each element [kg/m^Dim].
-template <int Dim>
-std::vector<double> element_densities(const CellSet<Dim>& cells, const std::map<int, Material>& materials);
-
 /// Diagonal of the consistent mass matrix of unit density, by dof. Where it is zero, its mean. `diagonal` has Dim *
 /// cells.num_vertices entries.
 template <int Dim>

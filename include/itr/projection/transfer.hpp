@@ -61,8 +61,4 @@ MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& n
 template <int Dim>
 VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d);
 
-/// By vertex: the number of its connected part, parts in the order of their first vertices.
-template <int Dim>
-std::vector<int> connected_parts(const TransferMesh<Dim>& mesh);
-
 }  // namespace itr
