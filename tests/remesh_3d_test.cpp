@@ -61,7 +61,7 @@ void for_random_edits(int count, int edits_a_scene, double friction, const Compa
     Marks marks;
     for (int i = 0; i < edits_a_scene; ++i) {
       const auto edit = random_edit(scene, strata, scene.random);
-      if (!edit || !gate.passes(*edit, scratch.hits)) continue;
+      if (!edit || !gate.passes(*edit, scratch.gate)) continue;
       const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
       LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
       Mesh<3> changed = scene.mesh;
@@ -138,10 +138,11 @@ TEST(ContactReach3d, NeighbourhoodsAreKeptThroughEditsAndMoves) {
     const SurfaceIndex<3>& surface = gate.present();
     Neighbourhoods<3> kept;
     SurfaceIndex<3>::Hits hits;
+    GateScratch<3> gate_scratch;
     const double radius = 0.7 * surface.span();
     for (int i = 0; i < 60; ++i) {
       const auto edit = random_edit(scene, strata, scene.random);
-      if (!edit || !gate.passes(*edit, hits)) continue;
+      if (!edit || !gate.passes(*edit, gate_scratch)) continue;
       const int first = scene.mesh.facet_slots();
       const VertexId created = scene.mesh.apply(*edit);
       scene.fields.follow(*edit, created);
@@ -183,7 +184,7 @@ TEST(Bounds3d, OfOneVertexNeverExceedWhatAPatchGains) {
     Marks marks;
     for (int i = 0; i < 20; ++i) {
       const auto edit = random_edit(scene, strata, scene.random);
-      if (!edit || !gate.passes(*edit, scratch.hits)) continue;
+      if (!edit || !gate.passes(*edit, scratch.gate)) continue;
       const double bound = gain_of_vertex<3>(state, *edit, scratch);
       const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
       LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
@@ -251,13 +252,13 @@ TEST(Gate3d, LetsCollapsesOnFlatSurfacesPass) {
   context.contact = {.enabled = true, .activation_distance = 0.01};
   context.obstacles.past_x.resize(1);
   const Gate<3> gate(mesh, fields, context);
-  SurfaceIndex<3>::Hits hits;
+  GateScratch<3> scratch;
   int asked = 0, passed = 0;
   for (const EdgeKey& edge : mesh.edges()) {
     const auto proposal = propose_collapse<3>(mesh, strata, edge);
     if (!proposal || proposal.edit->inserted_facets.empty()) continue;
     ++asked;
-    passed += gate.passes(*proposal.edit, hits);
+    passed += gate.passes(*proposal.edit, scratch);
   }
   EXPECT_GT(asked, 20);
   EXPECT_EQ(passed, asked);

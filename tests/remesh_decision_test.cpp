@@ -61,7 +61,7 @@ TEST(Bounds, OfOneVertexNeverExceedWhatAPatchGains) {
     Marks marks;
     for (int i = 0; i < 100; ++i) {
       const auto edit = random_edit(scene.mesh, scene.random);
-      if (!edit || !view.gate.passes(*edit, view.scratch.hits)) continue;
+      if (!edit || !view.gate.passes(*edit, view.scratch.gate)) continue;
       const double bound = gain_of_vertex<2>(view.state, *edit, view.scratch);
       const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
       const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
@@ -136,8 +136,8 @@ TEST(Gate, RefusesCollapsesThatSweepOverAnObstaclePoint) {
     const Gate<2> gate(scene.mesh, scene.fields, scene.context);
     const auto edit = make_collapse(scene.mesh, {1, 2});
     ASSERT_TRUE(edit.has_value());
-    SurfaceIndex<2>::Hits hits;
-    EXPECT_EQ(gate.passes(*edit, hits), !blocked);
+    GateScratch<2> scratch;
+    EXPECT_EQ(gate.passes(*edit, scratch), !blocked);
   }
 }
 

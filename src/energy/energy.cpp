@@ -10,6 +10,9 @@
 namespace itr {
 
 namespace {
+struct SecondWays {  // which say that two terms can tell
+  KeptVector ways;
+};
 struct PartOfWay {
   KeptVector dx;
 };
@@ -17,7 +20,7 @@ struct PartOfWay {
 
 double Energy::max_step(ConstVectorView, ConstVectorView, Workspace&) const { return 1; }
 
-VectorX Energy::single_ways(ConstVectorView, ConstVectorView, Workspace&) const { return {}; }
+bool Energy::get_single_ways(ConstVectorView, ConstVectorView, VectorView, Workspace&) const { return false; }
 
 double EnergySum::value(ConstVectorView x, Workspace& workspace) const {
   double sum = 0;
@@ -50,15 +53,16 @@ double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& wor
   return step;
 }
 
-VectorX EnergySum::single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  VectorX ways;
+bool EnergySum::get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const {
+  bool has_told = false;
   for (const auto& term : terms_) {
-    VectorX own = term->single_ways(x, dx, workspace);
-    if (own.size() == 0 && term->max_step(x, dx, workspace) == 1) continue;
-    if (own.size() == 0 || ways.size() > 0) return {};
-    ways = std::move(own);
+    VectorView own = has_told ? workspace.get<SecondWays>().ways.resize(dx.size()) : ways;
+    const bool tells = term->get_single_ways(x, dx, own, workspace);
+    if (!tells && term->max_step(x, dx, workspace) == 1) continue;
+    if (!tells || has_told) return false;
+    has_told = true;
   }
-  return ways;
+  return has_told;
 }
 
 }  // namespace itr

@@ -20,6 +20,12 @@ void renew_term(std::shared_ptr<Term>& term, bool is_needed, const auto& cells, 
     term = std::make_shared<Term>(cells, arguments...);
 }
 
+/// The friction that was lagged last: made anew where nothing refers to it any more.
+template <int Dim>
+struct KeptFriction {
+  std::shared_ptr<FrictionEnergy<Dim>> last;
+};
+
 }  // namespace
 
 template <int Dim>
@@ -37,8 +43,8 @@ void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const Po
   renew_term(elastic_, true, cells_, terms.materials, terms.scaling);
   renew_term(loads_, terms.loads.has_dead_loads(), cells_, terms.materials, terms.loads, terms.scaling);
   map_.reset();
-  contact_.reset();
   contact_of_cells_.reset();
+  if (contact_) spare_contact_ = std::move(contact_);
   host_.clear();
   for (const auto& make : terms.host)
     if (auto term = make(cells_, terms.t, terms.scaling)) host_.push_back(std::move(term));
@@ -48,7 +54,12 @@ template <int Dim>
 void IncrementalPotential<Dim>::add_contact(const CollisionSurface& surface, double stiffness,
                                             std::shared_ptr<const VertexMap<Dim>> map) {
   map_ = std::move(map);
-  contact_ = std::make_shared<ContactEnergy<Dim>>(surface, terms_->contact, stiffness, terms_->scaling);
+  if (spare_contact_ && spare_contact_.use_count() == 1) {
+    contact_ = std::move(spare_contact_);
+    contact_->renew(surface, terms_->contact, stiffness, terms_->scaling);
+  } else {
+    contact_ = std::make_shared<ContactEnergy<Dim>>(surface, terms_->contact, stiffness, terms_->scaling);
+  }
   contact_of_cells_ = of_cells(contact_);
 }
 
@@ -67,8 +78,15 @@ bool IncrementalPotential<Dim>::has_friction() const {
 template <int Dim>
 std::shared_ptr<const Energy> IncrementalPotential<Dim>::lag_friction(ConstVectorView x, Workspace& workspace) const {
   if (!has_friction()) return nullptr;
-  const auto friction = std::make_shared<FrictionEnergy<Dim>>(*contact_, on_surface(x), workspace, terms_->contact,
-                                                              velocity_of_surface(), terms_->scaling);
+  auto& friction = workspace.get<KeptFriction<Dim>>().last;
+  if (!friction || friction.use_count() > 1) friction = std::make_shared<FrictionEnergy<Dim>>();
+  const auto lag = [&](ConstVectorView at, ConstVectorView reference) {
+    friction->renew(*contact_, at, workspace, terms_->contact, terms_->velocity_rate, reference, terms_->scaling);
+  };
+  if (map_)
+    lag(on_surface(x), on_surface(velocity_reference_.view()));
+  else
+    lag(x, velocity_reference_.view());
   return friction->empty() ? nullptr : of_cells(friction);
 }
 

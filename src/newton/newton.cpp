@@ -34,7 +34,7 @@ constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets 
 
 /// What a solve is kept in.
 struct Buffers {
-  KeptVector gradient, step, candidate, other, rhs, solution;
+  KeptVector gradient, step, candidate, other, rhs, solution, ways;
 };
 
 class Minimizer {
@@ -459,12 +459,12 @@ class Minimizer {
   bool line_search() {
     double step = 1;
     const bool advancing = motion_.step.size() > 0;
-    VectorX single_ways;
+    bool has_single_ways = false;
     {
       const ScopedTimer timer(summary_.ccd_seconds);
       step = energy_.max_step(x_, step_, workspace_);
       if (step < kSingleWaysBelow && !advancing && options_.indefinite == IndefiniteHessian::project)
-        single_ways = energy_.single_ways(x_, step_, workspace_);
+        has_single_ways = energy_.get_single_ways(x_, step_, buffers_.ways.resize(x_.size()), workspace_);
     }
     if (advancing && step < kRelaxBelow) relax_next_ = true;
     const double slope = gradient_.dot(step_);
@@ -485,7 +485,7 @@ class Minimizer {
       const bool straight = options_.extend_steps && !advancing && step == 1 && value - value_ < kStraight * slope &&
                             slope_at_candidate() < kStraight / 2 * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
-      if (single_ways.size() > 0) try_single_ways(single_ways, value);
+      if (has_single_ways) try_single_ways(buffers_.ways.view(), value);
       accept(value);
       if (straight) go_on();
       return true;
@@ -496,15 +496,15 @@ class Minimizer {
   /// Moves the candidate to where each vertex goes as far as it can alone (asked where the whole step is cut to less than
   /// `kSingleWaysBelow`), if the energy falls by much more there. Where
   /// that inverts cells it leads into squeezed ones, which take more iterations than it saves.
-  void try_single_ways(const VectorX& ways, double& value) {
+  void try_single_ways(ConstVectorView ways, double& value) {
     {
       const ScopedTimer timer(summary_.ccd_seconds);
       if (energy_.max_step(x_, ways, workspace_) < 1) return;
     }
-    VectorX candidate = x_ + ways;
-    const double there = timed_value(candidate);
+    other_ = x_ + ways;
+    const double there = timed_value(other_);
     if (!(there - value_ < kMuchMore * (value - value_))) return;
-    candidate_ = std::move(candidate);
+    candidate_ = other_;
     value = there;
   }
 

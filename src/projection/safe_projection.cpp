@@ -176,7 +176,8 @@ std::vector<char> near_barriers(const SafeProjectionProblem<Dim>& problem, const
     if (deformation_gradient<Dim>(element, end).determinant() < barriers.least_ratio)
       for (const int v : element.vertices) is_near[v] = 1;
   if (barriers.distance) {
-    const VectorX single = barriers.distance->single_ways(x, way, workspace);
+    VectorX single(way.size());
+    barriers.distance->get_single_ways(x, way, single, workspace);
     for (int v = 0; v < problem.cells.num_vertices; ++v)
       is_near[v] |= single.segment<Dim>(Dim * v) != way.segment<Dim>(Dim * v);
     for (const ContactStencil& pair : barriers.distance->active(end, workspace))

@@ -101,12 +101,12 @@ Gate<Dim>::Gate(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const St
 }
 
 template <int Dim>
-bool Gate<Dim>::passes(const Edit<Dim>& edit, typename SurfaceIndex<Dim>::Hits& hits) const {
+bool Gate<Dim>::passes(const Edit<Dim>& edit, GateScratch<Dim>& scratch) const {
   for (const auto& configuration : configurations_)
     if (!keeps_orientation(edit, *configuration.x)) return false;
   if (!has_contact_ || edit.kind == Edit<Dim>::Kind::split || edit.inserted_facets.empty()) return true;
   for (const auto& configuration : configurations_)
-    if (!stays_free(edit, configuration, hits)) return false;
+    if (!stays_free(edit, configuration, scratch)) return false;
   return true;
 }
 
@@ -124,8 +124,7 @@ bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const
 }
 
 template <int Dim>
-bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& configuration,
-                           typename SurfaceIndex<Dim>::Hits& hits) const {
+bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& configuration, GateScratch<Dim>& scratch) const {
   const VectorX& x = *configuration.x;
   const SurfaceIndex<Dim>& surface = configuration.surface;
   const VertexId set = edit.value ? edit.value->vertex : kNone;
@@ -136,10 +135,10 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
     for (const VertexId v : facet.vertices) box.include(after(v));
   for (const FacetId f : edit.removed_facets)
     for (const VertexId v : mesh_.facet(f)) box.include(surface.at(v));
-  surface.query(box, hits);
+  surface.query(box, scratch.hits);
 
   // What moves on the way to the new surface: the vertex that is set and the one that goes, both to the target.
-  std::vector<std::array<Vec<Dim>, Dim + 1>> swept;
+  scratch.swept.clear();
   for (const FacetId f : edit.removed_facets) {
     std::array<Vec<Dim>, Dim + 1> simplex;
     int moving = 0;
@@ -149,10 +148,11 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
       moving += v == set || v == edit.removed_vertex;
     }
     simplex[Dim] = target;
-    if (moving > 0) swept.push_back(simplex);
+    if (moving > 0) scratch.swept.push_back(simplex);
   }
   const auto is_swept = [&](const Vec<Dim>& point) {
-    return std::any_of(swept.begin(), swept.end(), [&](const auto& simplex) { return lies_in<Dim>(point, simplex); });
+    return std::any_of(scratch.swept.begin(), scratch.swept.end(),
+                       [&](const auto& simplex) { return lies_in<Dim>(point, simplex); });
   };
   const auto is_part = [&](VertexId v) {
     if (v == set || v == edit.removed_vertex) return true;
@@ -161,16 +161,16 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
     });
   };
 
-  std::vector<SurfacePiece<Dim>> inserted;
+  scratch.inserted.clear();
   for (const auto& facet : edit.inserted_facets) {
-    SurfacePiece<Dim>& piece = inserted.emplace_back();
+    SurfacePiece<Dim>& piece = scratch.inserted.emplace_back();
     for (const VertexId v : facet.vertices) piece.add(after(v), v);
   }
   const auto is_free_of = [&](const SurfacePiece<Dim>& other) {
-    return std::none_of(inserted.begin(), inserted.end(),
+    return std::none_of(scratch.inserted.begin(), scratch.inserted.end(),
                         [&](const SurfacePiece<Dim>& piece) { return piece.box.overlaps(other.box) && meet(piece, other); });
   };
-  for (const FacetId f : hits.facets) {
+  for (const FacetId f : scratch.hits.facets) {
     if (std::find(edit.removed_facets.begin(), edit.removed_facets.end(), f) != edit.removed_facets.end()) continue;
     SurfacePiece<Dim> piece;
     for (const VertexId v : mesh_.facet(f)) {
@@ -179,7 +179,7 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
     }
     if (!is_free_of(piece)) return false;
   }
-  for (const int i : hits.obstacles) {
+  for (const int i : scratch.hits.obstacles) {
     SurfacePiece<Dim> piece;
     for (const int v : primitives_.all[i].ids()) {
       piece.add(surface.obstacle_at(v), SurfacePiece<Dim>::id_of_obstacle(v));

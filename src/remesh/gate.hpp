@@ -3,6 +3,7 @@
 // interpolated values. Energies are not asked.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "surface_index.hpp"
@@ -16,6 +17,14 @@ struct Configuration {
   SurfaceIndex<Dim> surface;
 };
 
+/// Memory of its questions, for the next one.
+template <int Dim>
+struct GateScratch {
+  typename SurfaceIndex<Dim>::Hits hits;
+  std::vector<std::array<Vec<Dim>, Dim + 1>> swept;
+  std::vector<SurfacePiece<Dim>> inserted;
+};
+
 template <int Dim>
 class Gate {
  public:
@@ -24,7 +33,7 @@ class Gate {
 
   /// Cells that the edit inserts keep their orientation; facets that it inserts touch no other ones (they may share
   /// vertices), and on the way there sweep over no vertex of the surface and no obstacle point. Decided exactly.
-  bool passes(const Edit<Dim>& edit, typename SurfaceIndex<Dim>::Hits& hits) const;
+  bool passes(const Edit<Dim>& edit, GateScratch<Dim>& scratch) const;
 
   const SurfaceIndex<Dim>& present() const { return configurations_.front().surface; }
   /// After an edit was applied.
@@ -34,7 +43,7 @@ class Gate {
 
  private:
   bool keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const;
-  bool stays_free(const Edit<Dim>& edit, const Configuration<Dim>& at, typename SurfaceIndex<Dim>::Hits& hits) const;
+  bool stays_free(const Edit<Dim>& edit, const Configuration<Dim>& at, GateScratch<Dim>& scratch) const;
 
   const Mesh<Dim>& mesh_;
   bool has_contact_;

@@ -82,7 +82,7 @@ LocalProblem<Dim>::~LocalProblem() {
   vertices_.clear();
   changes_.clear();
   energy_.clear();
-  if (touches_contact_ || !state_.context.host.empty()) workspace_ = {};  // what they keep in it may be of this one
+  if (!state_.context.host.empty()) workspace_ = {};  // what they keep in it may be of this one
   scratch_.spare.push_back(std::move(storage_));
 }
 
@@ -279,22 +279,26 @@ void LocalProblem<Dim>::add_surface() {
   if (!touches_contact_) return;
 
   using Facet = typename MeshTypes<Dim>::Facet;
-  std::vector<std::array<int, 2>> edges;
-  std::vector<std::array<int, 3>> triangles;
-  std::vector<int> points;
+  CollisionSurface& surface = storage_->surface;
+  surface.edges.clear();
+  surface.triangles.clear();
+  std::vector<int>& points = scratch_.points;
+  points.clear();
   const auto add = [&](const auto& ids, std::size_t size) {  // local ones
     if (size == 1) points.push_back(ids[0]);
-    if (size == 2) edges.push_back({ids[0], ids[1]});
+    if (size == 2) surface.edges.push_back({ids[0], ids[1]});
     if constexpr (Dim == 3)
-      if (size == 3) triangles.push_back({ids[0], ids[1], ids[2]});
+      if (size == 3) surface.triangles.push_back({ids[0], ids[1], ids[2]});
   };
   const auto add_facet = [&](const Facet& facet) {
     Facet ids;
     for (int k = 0; k < Dim; ++k) ids[k] = local(facet[k]);
     add(ids, Dim);
   };
-  std::vector<FacetId> facets;
-  std::vector<int> primitives;
+  std::vector<FacetId>& facets = scratch_.near_facets;
+  std::vector<int>& primitives = scratch_.near_primitives;
+  facets.clear();
+  primitives.clear();
   const ObstaclePrimitives& obstacles = state_.surface.primitives();
   scratch_.facets.clear(mesh_.facet_slots());
   scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
@@ -325,7 +329,8 @@ void LocalProblem<Dim>::add_surface() {
   }
   dofs_.unknown.resize(Dim * vertices_.size(), kNone);
   changes_.resize(vertices_.size(), 0);
-  surface_ = make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, cells_.rest, changes_);
+  surface.counts = changes_;
+  complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 
 template <int Dim>
@@ -357,7 +362,7 @@ void LocalProblem<Dim>::add_terms() {
       if (changes_[i] && is_free(i)) motion_bound->add(i);
     energy_.add(motion_bound);  // first: contact then looks no further than that
   }
-  if (touches_contact_) potential.add_contact(*surface_, context.contact.barrier_stiffness);
+  if (touches_contact_) potential.add_contact(storage_->surface, context.contact.barrier_stiffness);
   potential.add_to(energy_, potential.lag(x, workspace_));
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "contact_reach.hpp"
+#include "gate.hpp"
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/remesh/fields.hpp"
@@ -40,13 +41,14 @@ template <int Dim>
 class MotionBound;
 
 /// What one local problem is kept in. The next one finds the room that this one took, so that after a few nothing is
-/// allocated but for contact, damping, pressure and terms of the program, and where an edit forgets history.
+/// allocated but for damping, pressure and terms of the program, and where an edit forgets history.
 template <int Dim>
 struct LocalStorage {
   CellSet<Dim> cells;
   std::vector<LocalVertex> vertices;
   std::vector<char> changes;  ///< by local vertex: whether its contacts can change
   std::vector<char> held;     ///< by dof
+  CollisionSurface surface;   ///< where it touches contact
   DofMap dofs;
   KeptVector x, predictor, velocity_reference, norm_weights;
   std::optional<IncrementalPotential<Dim>> potential;  ///< of `cells`
@@ -62,7 +64,10 @@ struct LocalScratch {
   std::vector<int> local_of_obstacle;  ///< the same of the obstacles' vertices
   Marks known, known_obstacles, cells, patch, facets, primitives;
   std::vector<CellId> star;
+  std::vector<FacetId> near_facets;
+  std::vector<int> near_primitives, points;
   typename SurfaceIndex<Dim>::Hits hits;
+  GateScratch<Dim> gate;
   Neighbourhoods<Dim> neighbourhoods;
   ContactReach<Dim> reach;
   DenseSystem system;
@@ -131,7 +136,6 @@ class LocalProblem {
   KeptVector& x_ = storage_->x;
   EnergySum& energy_ = storage_->energy;
   Workspace& workspace_ = storage_->workspace;
-  std::optional<CollisionSurface> surface_;  ///< where it touches contact
   bool has_surface_ = false, touches_contact_ = false;
   Box<Dim> surface_read_;
 };

@@ -103,7 +103,7 @@ std::vector<typename RemeshSession<Dim>::PieceInContact> RemeshSession<Dim>::pie
 template <int Dim>
 bool RemeshSession<Dim>::apply_if_valid(const Edit<Dim>& edit) {
   Verdict<Dim> verdict;
-  if (!gate_.passes(edit, scratch().hits)) return false;
+  if (!gate_.passes(edit, scratch().gate)) return false;
   commit(edit, verdict);
   return true;
 }

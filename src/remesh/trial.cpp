@@ -72,7 +72,7 @@ template <int Dim>
 void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
              double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
   verdict.clear();
-  if (!gate.passes(edit, scratch.hits)) return;
+  if (!gate.passes(edit, scratch.gate)) return;
   const auto finish = [&](LocalProblem<Dim>& after) {
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
     verdict.decision = Decision::accepted;

@@ -47,7 +47,7 @@ struct TrialOptions {
 /// support and get the same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex
 /// that it sets free: what that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it
 /// refuses. A patch decides what lies between. Once scratch and verdict have served for similar edits, nothing is allocated
-/// but for contact, and for the history that an edit forgets.
+/// but for the history that an edit forgets, and for damping, pressure and terms of the program.
 template <int Dim>
 void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
              double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict);

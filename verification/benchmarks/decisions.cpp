@@ -107,7 +107,7 @@ void check_collapse(benchmark::State& state, bool has_contact) {
   for (const EdgeKey& edge : step.edges())
     if (auto edit = collapse_of(step.body, edge)) edits.push_back(*edit);
   std::size_t i = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(step.gate.passes(edits[i++ % edits.size()], step.scratch.hits));
+  for (auto _ : state) benchmark::DoNotOptimize(step.gate.passes(edits[i++ % edits.size()], step.scratch.gate));
   state.SetItemsProcessed(state.iterations());
 }
 

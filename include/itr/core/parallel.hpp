@@ -44,13 +44,14 @@ double parallel_sum(std::size_t n, std::size_t block, const Body& body) {
   return parallel_sum(n, block, std::function<double(std::size_t, std::size_t)>(std::cref(body)));
 }
 
-/// Stable sort; blocks that do not depend on the number of threads are sorted and merged.
+/// Sorts by an order that tells all items apart, but for equal ones that are the same; blocks that do not depend on the
+/// number of threads are sorted and merged.
 template <typename T, typename Less>
 void parallel_sort(std::vector<T>& items, const Less& less) {
   constexpr std::size_t kBlock = 2048;
   const std::size_t n = items.size();
   const auto at = [&](std::size_t i) { return items.begin() + static_cast<std::ptrdiff_t>(std::min(i, n)); };
-  parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) { std::stable_sort(at(begin), at(end), less); });
+  parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) { std::sort(at(begin), at(end), less); });
   for (std::size_t width = kBlock; width < n; width *= 2)
     parallel_blocks((n + 2 * width - 1) / (2 * width), 1, [&](std::size_t pair, std::size_t) {
       const std::size_t begin = 2 * width * pair;

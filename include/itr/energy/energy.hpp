@@ -48,8 +48,8 @@ class Energy {
   /// Largest a in [0, 1] such that x + s dx is feasible for all s in [0, a] (conservative).
   virtual double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
   /// The motion dx with each vertex' way as long as it is feasible whatever stops others, for where max_step cuts dx short
-  /// as a whole; empty where the term cannot tell.
-  virtual VectorX single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
+  /// as a whole. False where the term cannot tell; `ways` is as long as dx, and undefined then.
+  virtual bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const;
 };
 
 /// A sum that does not own its terms' data but shares the terms.
@@ -63,8 +63,8 @@ class EnergySum final : public Energy {
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
-  /// Those of the one term that can tell; empty where another cuts dx short.
-  VectorX single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
+  /// Those of the one term that can tell; false where another cuts dx short.
+  bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
 
  private:
   std::vector<std::shared_ptr<const Energy>> terms_;

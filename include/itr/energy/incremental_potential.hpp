@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "itr/core/kept_vector.hpp"
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/damping.hpp"
@@ -56,7 +57,7 @@ class IncrementalPotential {
   void add_contact(const CollisionSurface& surface, double stiffness, std::shared_ptr<const VertexMap<Dim>> map = nullptr);
 
   /// Lagged terms from here on are of velocities that vanish at these positions [m].
-  void set_velocity_reference(VectorX x) { velocity_reference_ = std::move(x); }
+  void set_velocity_reference(ConstVectorView x) { velocity_reference_ = x; }
 
   /// Terms that depend on an earlier iterate; null or empty where the scene has none.
   struct Lagged {
@@ -86,17 +87,17 @@ class IncrementalPotential {
  private:
   std::shared_ptr<const Energy> of_cells(std::shared_ptr<const Energy> term) const;
   VectorX on_surface(ConstVectorView x) const { return map_ ? map_->positions(x) : VectorX(x); }
-  VelocityRule velocity() const { return {terms_->velocity_rate, velocity_reference_}; }
-  VelocityRule velocity_of_surface() const { return {terms_->velocity_rate, on_surface(velocity_reference_)}; }
+  VelocityRule velocity() const { return {terms_->velocity_rate, velocity_reference_.view()}; }
+  VelocityRule velocity_of_surface() const { return {terms_->velocity_rate, on_surface(velocity_reference_.view())}; }
 
   const PotentialTerms<Dim>* terms_;
   const CellSet<Dim>& cells_;
-  VectorX velocity_reference_;  ///< as in PotentialHistory
+  KeptVector velocity_reference_;  ///< as in PotentialHistory
   std::shared_ptr<const VertexMap<Dim>> map_;
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;
   std::shared_ptr<LoadEnergy<Dim>> loads_;
-  std::shared_ptr<ContactEnergy<Dim>> contact_;
+  std::shared_ptr<ContactEnergy<Dim>> contact_, spare_contact_;  ///< the second: to be renewed
   std::shared_ptr<const Energy> contact_of_cells_;
   std::vector<std::shared_ptr<const Energy>> host_;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <tuple>
 
 #include "candidates.hpp"
@@ -29,20 +30,25 @@ auto sort_key(const ContactStencil& s) {
   return std::tie(s.kind, s.vertices, s.mollifier_threshold, s.closest.kind, s.closest.local);
 }
 
-/// Sorts by features and sums the weights of equal ones; drops those that cancel.
-void merge(std::vector<ContactStencil>& stencils) {
-  parallel_sort(stencils, [](const ContactStencil& p, const ContactStencil& q) { return sort_key(p) < sort_key(q); });
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < stencils.size();) {
-    ContactStencil sum = stencils[i];
+/// Sums the weights of stencils of the same features, in the order in which they came; drops those that cancel. What is left
+/// is sorted by features. `order` is scratch.
+void merge(const std::vector<ContactStencil>& stencils, std::vector<int>& order, std::vector<ContactStencil>& merged) {
+  order.resize(stencils.size());
+  std::iota(order.begin(), order.end(), 0);
+  parallel_sort(order, [&](int i, int j) {
+    const auto p = sort_key(stencils[i]), q = sort_key(stencils[j]);
+    return p < q || (p == q && i < j);
+  });
+  merged.clear();
+  for (std::size_t i = 0; i < order.size();) {
+    ContactStencil sum = stencils[order[i]];
     double magnitude = std::abs(sum.weight);
-    for (++i; i < stencils.size() && sort_key(stencils[i]) == sort_key(sum); ++i) {
-      sum.weight += stencils[i].weight;
-      magnitude += std::abs(stencils[i].weight);
+    for (++i; i < order.size() && sort_key(stencils[order[i]]) == sort_key(sum); ++i) {
+      sum.weight += stencils[order[i]].weight;
+      magnitude += std::abs(stencils[order[i]].weight);
     }
-    if (std::abs(sum.weight) > 1e-14 * magnitude) stencils[kept++] = sum;
+    if (std::abs(sum.weight) > 1e-14 * magnitude) merged.push_back(sum);
   }
-  stencils.resize(kept);
 }
 
 void sort_unique(std::vector<Ids>& ids) {
@@ -50,49 +56,67 @@ void sort_unique(std::vector<Ids>& ids) {
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
 
-/// Appends what `visit(i, part)` adds to a part of type T per block, in the order of i.
-template <typename T, typename Visit, typename Take>
-void visit_blocks(std::size_t n, const Visit& visit, const Take& take) {
-  std::vector<T> parts((n + kBlock - 1) / kBlock);
+/// What the pairs of one block add: stencils, and features whose overlaps are to be corrected.
+struct Part {
+  std::vector<ContactStencil> stencils;
+  std::vector<Ids> corners;       ///< (vertex, vertex), smaller first
+  std::vector<Ids> vertex_edges;  ///< (edge, vertex)
+  double least_squared = std::numeric_limits<double>::infinity();
+  void clear() {
+    stencils.clear();
+    corners.clear();
+    vertex_edges.clear();
+    least_squared = std::numeric_limits<double>::infinity();
+  }
+};
+
+/// Memory of a search, for the next one.
+struct ActiveLists {
+  Part all;
+  std::vector<Part> parts;
+  std::vector<int> order;
+};
+
+/// Takes what `visit(i, part)` adds to a part per block, in the order of i. The memory of `parts` is used again.
+template <typename Visit, typename Take>
+void visit_blocks(std::size_t n, std::vector<Part>& parts, const Visit& visit, const Take& take) {
+  const std::size_t blocks = (n + kBlock - 1) / kBlock;
+  if (parts.size() < blocks) parts.resize(blocks);
   parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) visit(i, parts[begin / kBlock]);
+    Part& part = parts[begin / kBlock];
+    part.clear();
+    for (std::size_t i = begin; i < end; ++i) visit(i, part);
   });
-  for (const T& part : parts) take(part);
+  for (std::size_t i = 0; i < blocks; ++i) take(parts[i]);
 }
 
 /// The set of active pairs of one configuration.
 template <int Dim>
 class ActiveSet {
  public:
-  ActiveSet(const CollisionSurface& surface, ConstVectorView x, double dhat, bool convergent)
-      : surface_(surface),
+  ActiveSet(const CollisionSurface& surface, ConstVectorView x, double dhat, bool convergent, ActiveLists& lists)
+      : lists_(lists),
+        surface_(surface),
         x_(x),
         reach_squared_(dhat * dhat),
         convergent_(convergent),
-        unit_(convergent ? 1 / (dhat * dhat * dhat) : 1) {}
+        unit_(convergent ? 1 / (dhat * dhat * dhat) : 1) {
+    lists_.all.clear();
+  }
 
-  std::vector<ContactStencil> find(const ContactCandidates<Dim>& candidates) {
+  void find(const ContactCandidates<Dim>& candidates, std::vector<ContactStencil>& found) {
     if constexpr (Dim == 2) {
       add_vertex_edges(candidates.vertex_edges());
     } else {
       add_vertex_triangles(candidates.vertex_triangles());
       add_edge_edges(candidates.edge_edges());
     }
-    merge(stencils_);
-    return std::move(stencils_);
+    merge(stencils_, lists_.order, found);
   }
   /// Distance over all pairs found; infinity where there are none.
-  double least_squared() const { return least_squared_; }
+  double least_squared() const { return lists_.all.least_squared; }
 
  private:
-  /// What the pairs of one block add: stencils, and features whose overlaps are to be corrected.
-  struct Part {
-    std::vector<ContactStencil> stencils;
-    std::vector<Ids> corners;       ///< (vertex, vertex), smaller first
-    std::vector<Ids> vertex_edges;  ///< (edge, vertex)
-    double least_squared = std::numeric_limits<double>::infinity();
-  };
-
   bool counts(int v) const { return surface_.counts[v]; }
   bool counts(int edge, int v) const {
     return counts(v) || counts(surface_.edges[edge][0]) || counts(surface_.edges[edge][1]);
@@ -139,7 +163,7 @@ class ActiveSet {
     stencils_.insert(stencils_.end(), part.stencils.begin(), part.stencils.end());
     corners_.insert(corners_.end(), part.corners.begin(), part.corners.end());
     vertex_edges_.insert(vertex_edges_.end(), part.vertex_edges.begin(), part.vertex_edges.end());
-    least_squared_ = std::min(least_squared_, part.least_squared);
+    lists_.all.least_squared = std::min(lists_.all.least_squared, part.least_squared);
   }
 
   void add_corner(int v, int corner, Part& part) const {
@@ -156,7 +180,7 @@ class ActiveSet {
       if (convergent_)
         for (const int q : surface_.edges[e]) add_corner(v, q, part);
     };
-    visit_blocks<Part>(pairs.size(), visit, [&](const Part& part) { take(part); });
+    visit_blocks(pairs.size(), lists_.parts, visit, [&](const Part& part) { take(part); });
     sort_unique(corners_);
     for (const Ids& ids : corners_) {
       const int i = ids[0], j = ids[1];  // named by themselves: clang before 16 captures no structured bindings
@@ -189,7 +213,7 @@ class ActiveSet {
         add_corner(v, t[k], part);
       }
     };
-    visit_blocks<Part>(pairs.size(), visit, [&](const Part& part) { take(part); });
+    visit_blocks(pairs.size(), lists_.parts, visit, [&](const Part& part) { take(part); });
     sort_unique(vertex_edges_);
     for (const auto& [e, v] : vertex_edges_) {  // the edge's triangles count the vertex n times
       const auto opposites = surface_.edge_opposites[e];
@@ -240,12 +264,11 @@ class ActiveSet {
         for (const int v : surface_.edges[other])
           if (counts(e, v) && is_near(e, v)) part.vertex_edges.push_back({e, v});
     };
-    visit_blocks<Part>(pairs.size(), visit, [&](const Part& part) { take(part); });
+    visit_blocks(pairs.size(), lists_.parts, visit, [&](const Part& part) { take(part); });
     sort_unique(vertex_edges_);
     const auto remove = [&](std::size_t i, Part& part) { remove_overlap(vertex_edges_[i][0], vertex_edges_[i][1], part); };
-    visit_blocks<Part>(vertex_edges_.size(), remove, [&](const Part& part) {
-      stencils_.insert(stencils_.end(), part.stencils.begin(), part.stencils.end());
-    });
+    visit_blocks(vertex_edges_.size(), lists_.parts, remove,
+                 [&](const Part& part) { stencils_.insert(stencils_.end(), part.stencils.begin(), part.stencils.end()); });
   }
 
   /// The edges at v count the edge e more than once where v is what is closest to it.
@@ -278,30 +301,28 @@ class ActiveSet {
     return closest;
   }
 
+  ActiveLists& lists_;
   const CollisionSurface& surface_;
   ConstVectorView x_;
   double reach_squared_;
   bool convergent_;
   double unit_;
-  std::vector<ContactStencil> stencils_;
-  std::vector<Ids> corners_, vertex_edges_;
-  double least_squared_ = std::numeric_limits<double>::infinity();
+  std::vector<ContactStencil>& stencils_ = lists_.all.stencils;
+  std::vector<Ids>&corners_ = lists_.all.corners, &vertex_edges_ = lists_.all.vertex_edges;
 };
 
 }  // namespace
 
 template <int Dim>
-typename ContactEnergy<Dim>::Active ContactEnergy<Dim>::find_active(ConstVectorView x, Workspace& workspace) const {
+void ContactEnergy<Dim>::find_active(ConstVectorView x, Workspace& workspace, Active& active) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(surface_, x, nullptr, dhat_);
-  ActiveSet<Dim> set(surface_, x, dhat_, convergent_);
-  Active active;
-  active.stencils = set.find(candidates);
+  candidates.update(*surface_, x, nullptr, dhat_);
+  ActiveSet<Dim> set(*surface_, x, dhat_, convergent_, workspace.get<ActiveLists>());
+  set.find(candidates, active.stencils);
   active.least_squared = set.least_squared();
-  return active;
 }
 
-template ContactEnergy<2>::Active ContactEnergy<2>::find_active(ConstVectorView, Workspace&) const;
-template ContactEnergy<3>::Active ContactEnergy<3>::find_active(ConstVectorView, Workspace&) const;
+template void ContactEnergy<2>::find_active(ConstVectorView, Workspace&, Active&) const;
+template void ContactEnergy<3>::find_active(ConstVectorView, Workspace&, Active&) const;
 
 }  // namespace itr

@@ -2,8 +2,6 @@
 #include "candidates.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <cstring>
 
 #include "itr/core/parallel.hpp"
 
@@ -21,25 +19,22 @@ Vec<Dim> at(ConstVectorView x, int v) {
 }
 
 template <int Dim, std::size_t N>
-std::vector<Box<Dim>> boxes_of(const std::vector<std::array<int, N>>& primitives,
-                               const std::vector<Box<Dim>>& vertex_boxes) {
-  std::vector<Box<Dim>> boxes(primitives.size());
+void get_boxes(const std::vector<std::array<int, N>>& primitives, const std::vector<Box<Dim>>& vertex_boxes,
+               std::vector<Box<Dim>>& boxes) {
+  boxes.assign(primitives.size(), {});
   for (std::size_t i = 0; i < primitives.size(); ++i)
     for (const int v : primitives[i]) boxes[i].include(vertex_boxes[v]);
-  return boxes;
 }
 
-/// Calls find(i, hits, pairs) for i < n, which appends to `pairs`; the pairs come in the order of i. `hits` is scratch.
+/// Appends to `all` what find(i, hits, pairs) for i < n appends to `pairs`, in the order of i. `hits` is scratch.
 template <typename Find>
-std::vector<std::array<int, 2>> collect(std::size_t n, const Find& find) {
+void collect(std::size_t n, const Find& find, std::vector<std::array<int, 2>>& all) {
   std::vector<std::vector<std::array<int, 2>>> found((n + kBlock - 1) / kBlock);
   parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) {
     std::vector<int> hits;
     for (std::size_t i = begin; i < end; ++i) find(static_cast<int>(i), hits, found[begin / kBlock]);
   });
-  std::vector<std::array<int, 2>> all;
   for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
-  return all;
 }
 
 /// What overlaps the box, ascending: pairs, and with them the bits of CCD, do not depend on how a tree came about.
@@ -80,50 +75,12 @@ bool are_few_edge_pairs(const CollisionSurface& surface) {
   return number_that_counts(surface, surface.edges) * surface.edges.size() < kFewPairs;
 }
 
-/// Boxes side by side, so that one is compared with several at once.
-template <int Dim>
-class BoxTable {
- public:
-  explicit BoxTable(const std::vector<Box<Dim>>& boxes) : overlaps_((boxes.size() + kStride - 1) / kStride * kStride) {
-    for (int c = 0; c < Dim; ++c) {
-      min_[c].resize(boxes.size());
-      max_[c].resize(boxes.size());
-      for (std::size_t i = 0; i < boxes.size(); ++i) {
-        min_[c][i] = boxes[i].min[c];
-        max_[c][i] = boxes[i].max[c];
-      }
-    }
-  }
-  /// Calls visit(i) for all that overlap, ascending.
-  template <typename Visit>
-  void visit_overlaps(const Box<Dim>& box, const Visit& visit) {
-    for (int c = 0; c < Dim; ++c) {
-      const double *min = min_[c].data(), *max = max_[c].data(), low = box.min[c], high = box.max[c];
-      char* overlaps = overlaps_.data();
-      for (std::size_t i = 0; i < min_[c].size(); ++i)
-        overlaps[i] = static_cast<char>((c == 0 || overlaps[i]) & (min[i] <= high) & (max[i] >= low));
-    }
-    for (std::size_t first = 0; first < overlaps_.size(); first += kStride) {
-      std::uint64_t any = 0;
-      std::memcpy(&any, &overlaps_[first], kStride);
-      if (any == 0) continue;
-      for (std::size_t i = first; i < first + kStride; ++i)
-        if (overlaps_[i]) visit(static_cast<int>(i));
-    }
-  }
-
- private:
-  static constexpr std::size_t kStride = sizeof(std::uint64_t);
-  std::array<std::vector<double>, Dim> min_, max_;
-  std::vector<char> overlaps_;  ///< 0 behind the last
-};
-
 /// (vertex, primitive) for all that overlap, share no vertex, and of which one counts. `tree` is not needed for few pairs.
 template <int Dim, std::size_t N>
-std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
-                                             const std::vector<std::array<int, N>>& primitives,
-                                             const std::vector<Box<Dim>>& vertex_boxes, const std::vector<Box<Dim>>& boxes,
-                                             const Bvh<Dim>& tree) {
+void find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::array<int, N>>& primitives,
+                       const std::vector<Box<Dim>>& vertex_boxes, const std::vector<Box<Dim>>& boxes, const Bvh<Dim>& tree,
+                       BoxTable<Dim>& table, std::vector<std::array<int, 2>>& pairs) {
+  pairs.clear();
   const auto matters = [&](int v, int i) {
     return !contains(primitives[i], v) && (counts(surface, v) || counts(surface, primitives[i]));
   };
@@ -131,27 +88,28 @@ std::vector<std::array<int, 2>> vertex_pairs(const CollisionSurface& surface,
   for (std::size_t i = 0; i < primitives.size(); ++i)
     if (counts(surface, primitives[i])) counting.include(boxes[i]);
   if (are_few(surface, primitives)) {
-    std::vector<std::array<int, 2>> pairs;
-    BoxTable<Dim> table(boxes);
+    table.reset(boxes);
     for (const int v : surface.vertices)
       if (counts(surface, v) || vertex_boxes[v].overlaps(counting))
         table.visit_overlaps(vertex_boxes[v], [&](int i) {
           if (matters(v, i)) pairs.push_back({v, i});
         });
-    return pairs;
+    return;
   }
-  return collect(surface.vertices.size(), [&](int k, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
+  const auto find = [&](int k, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     const int v = surface.vertices[k];
     if (!counts(surface, v) && !vertex_boxes[v].overlaps(counting)) return;
     find_overlaps(tree, vertex_boxes[v], hits);
     for (const int i : hits)
       if (matters(v, i)) found.push_back({v, i});
-  });
+  };
+  collect(surface.vertices.size(), find, pairs);
 }
 
 template <int Dim>
-std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes,
-                                           const Bvh<Dim>& tree) {
+void find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes, const Bvh<Dim>& tree,
+                     BoxTable<Dim>& table, std::vector<std::array<int, 2>>& pairs) {
+  pairs.clear();
   const auto& edges = surface.edges;
   const auto consider = [&](int e, int f, std::vector<std::array<int, 2>>& found) {
     const bool both = counts(surface, edges[f]);
@@ -160,23 +118,24 @@ std::vector<std::array<int, 2>> edge_pairs(const CollisionSurface& surface, cons
     found.push_back({std::min(e, f), std::max(e, f)});
   };
   if (are_few_edge_pairs(surface)) {
-    std::vector<std::array<int, 2>> pairs;
-    BoxTable<Dim> table(boxes);
+    table.reset(boxes);
     for (int e = 0; e < static_cast<int>(edges.size()); ++e)
       if (counts(surface, edges[e])) table.visit_overlaps(boxes[e], [&](int f) { consider(e, f, pairs); });
-    return pairs;
+    return;
   }
-  return collect(edges.size(), [&](int e, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
+  const auto find = [&](int e, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
     find_overlaps(tree, boxes[e], hits);
     for (const int f : hits) consider(e, f, found);
-  });
+  };
+  collect(edges.size(), find, pairs);
 }
 
 }  // namespace
 
 template <int Dim>
-double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const VectorX* dx, double reach, double share) {
+double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach,
+                                        double share) {
   double motion = 0;
   if (dx)
     for (const int v : surface.vertices) motion = std::max(motion, at<Dim>(*dx, v).norm());
@@ -184,9 +143,9 @@ double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const V
 }
 
 template <int Dim>
-bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx,
+bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
                                    double room) const {
-  if (surface_ != &surface || boxes_.size() != surface.vertices.size()) return false;
+  if (surface_ != &surface || revision_ != surface.revision || boxes_.size() != surface.vertices.size()) return false;
   if (dx && room_ > kWasteful * room) return false;
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
     const Vec<Dim> p = at<Dim>(x, surface.vertices[i]);
@@ -197,8 +156,8 @@ bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorV
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach,
-                                         double share) {
+void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
+                                         double reach, double share) {
   room_ = room_for(surface, dx, reach, share);
   boxes_.assign(surface.vertices.size(), {});
   reach_.resize(surface.area.size());
@@ -212,18 +171,20 @@ void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstV
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach) {
+void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
+                                    double reach) {
   if (!holds(surface, x, dx, room_for(surface, dx, reach, kUnforeseen))) search(surface, x, dx, reach, kUnforeseen);
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach,
-                                    double share) {
-  const bool keep_trees = surface_ == &surface;
+void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
+                                    double reach, double share) {
+  const bool keep_trees = surface_ == &surface && revision_ == surface.revision;
   build_boxes(surface, x, dx, reach, share);
   surface_ = &surface;
-  const auto edge_boxes = boxes_of<Dim>(surface.edges, reach_);
-  const auto triangle_boxes = boxes_of<Dim>(surface.triangles, reach_);
+  revision_ = surface.revision;
+  get_boxes<Dim>(surface.edges, reach_, edge_boxes_);
+  get_boxes<Dim>(surface.triangles, reach_, triangle_boxes_);
   const auto update_tree = [&](const std::vector<Box<Dim>>& boxes, bool few, Bvh<Dim>& tree) {
     if (few) return;
     if (keep_trees && tree.size() == static_cast<int>(boxes.size()))
@@ -234,15 +195,15 @@ void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVector
   const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
   parallel_blocks(2, 1, [&](std::size_t task, std::size_t) {
     if (task == 0)
-      update_tree(edge_boxes, few_edges, edge_tree_);
+      update_tree(edge_boxes_, few_edges, edge_tree_);
     else
-      update_tree(triangle_boxes, are_few(surface, surface.triangles), triangle_tree_);
+      update_tree(triangle_boxes_, are_few(surface, surface.triangles), triangle_tree_);
   });
   if constexpr (Dim == 2) {
-    vertex_edges_ = vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes, edge_tree_);
+    find_vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes_, edge_tree_, table_, vertex_edges_);
   } else {
-    vertex_triangles_ = vertex_pairs<Dim>(surface, surface.triangles, reach_, triangle_boxes, triangle_tree_);
-    edge_edges_ = edge_pairs<Dim>(surface, edge_boxes, edge_tree_);
+    find_vertex_pairs<Dim>(surface, surface.triangles, reach_, triangle_boxes_, triangle_tree_, table_, vertex_triangles_);
+    find_edge_pairs<Dim>(surface, edge_boxes_, edge_tree_, table_, edge_edges_);
   }
 }
 

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,46 @@
 #include "itr/geometry/distance.hpp"
 
 namespace itr {
+
+/// Boxes side by side, so that one is compared with several at once.
+template <int Dim>
+class BoxTable {
+ public:
+  void reset(const std::vector<Box<Dim>>& boxes) {
+    overlaps_.assign((boxes.size() + kStride - 1) / kStride * kStride, 0);
+    for (int c = 0; c < Dim; ++c) {
+      min_[c].resize(boxes.size());
+      max_[c].resize(boxes.size());
+      for (std::size_t i = 0; i < boxes.size(); ++i) {
+        min_[c][i] = boxes[i].min[c];
+        max_[c][i] = boxes[i].max[c];
+      }
+    }
+  }
+  /// Calls visit(i) for all that overlap, ascending.
+  template <typename Visit>
+  void visit_overlaps(const Box<Dim>& box, const Visit& visit) {
+    const std::size_t count = min_[0].size(), stored = overlaps_.size();  // named: what is a char may alias anything
+    char* const overlaps = overlaps_.data();
+    for (int c = 0; c < Dim; ++c) {
+      const double *min = min_[c].data(), *max = max_[c].data(), low = box.min[c], high = box.max[c];
+      for (std::size_t i = 0; i < count; ++i)
+        overlaps[i] = static_cast<char>((c == 0 || overlaps[i]) & (min[i] <= high) & (max[i] >= low));
+    }
+    for (std::size_t first = 0; first < stored; first += kStride) {
+      std::uint64_t any = 0;
+      std::memcpy(&any, overlaps + first, kStride);
+      if (any == 0) continue;
+      for (std::size_t i = first; i < first + kStride; ++i)
+        if (overlaps[i]) visit(static_cast<int>(i));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kStride = sizeof(std::uint64_t);
+  std::array<std::vector<double>, Dim> min_, max_;
+  std::vector<char> overlaps_;  ///< 0 behind the last
+};
 
 /// Valid for many evaluations: the boxes hold a motion and some room around it. Kept in a Workspace.
 template <int Dim>
@@ -22,9 +64,9 @@ class ContactCandidates {
 
   /// Makes the pairs hold for x and, where it is given, for the motion by dx. `reach`: pairs that come nearer than this
   /// count.
-  void update(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach);
+  void update(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach);
   /// That, whatever was found before, with this share of the motion for room. Search trees of the surface are used again.
-  void search(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach, double share);
+  void search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double share);
 
   /// The lists that there are in this dimension, each with the kind of its pairs.
   std::array<std::pair<PairKind, const Pairs*>, Dim - 1> all() const {
@@ -39,16 +81,20 @@ class ContactCandidates {
 
  private:
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
-  static double room_for(const CollisionSurface& surface, const VectorX* dx, double reach, double share);
-  bool holds(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double room) const;
-  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const VectorX* dx, double reach, double share);
+  static double room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach, double share);
+  bool holds(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double room) const;
+  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach,
+                   double share);
 
   const CollisionSurface* surface_ = nullptr;
+  int revision_ = 0;             ///< of the surface
   double room_ = 0;              ///< around the motion of the last search [m]
   std::vector<Box<Dim>> boxes_;  ///< one a surface vertex: while it stays in there, the pairs hold
   std::vector<Box<Dim>> reach_;  ///< by problem vertex, half the reach around its box
   Bvh<Dim> edge_tree_, triangle_tree_;
   Pairs vertex_edges_, vertex_triangles_, edge_edges_;
+  std::vector<Box<Dim>> edge_boxes_, triangle_boxes_;
+  BoxTable<Dim> table_;
 };
 
 }  // namespace itr

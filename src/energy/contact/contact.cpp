@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "candidates.hpp"
+#include "itr/core/kept_vector.hpp"
 #include "itr/core/parallel_reduce.hpp"
 #include "itr/geometry/ccd.hpp"
 #include "pairs.hpp"
@@ -107,16 +108,28 @@ struct SpreadDistance {
   }
 };
 
+/// By vertex, the share of its way that is free.
+struct Shares {
+  std::vector<double> of_vertex;
+};
+
 }  // namespace
 
 template <int Dim>
 ContactEnergy<Dim>::ContactEnergy(const CollisionSurface& surface, const ContactOptions& options, double stiffness,
-                                  double scale)
-    : surface_(surface),
-      dhat_(options.activation_distance),
-      convergent_(options.convergent),
-      stiffness_(stiffness),
-      scale_(scale) {}
+                                  double scale) {
+  renew(surface, options, stiffness, scale);
+}
+
+template <int Dim>
+void ContactEnergy<Dim>::renew(const CollisionSurface& surface, const ContactOptions& options, double stiffness,
+                               double scale) {
+  surface_ = &surface;
+  dhat_ = options.activation_distance;
+  convergent_ = options.convergent;
+  stiffness_ = stiffness;
+  scale_ = scale;
+}
 
 template <int Dim>
 double ContactEnergy<Dim>::barrier(double D) const {
@@ -138,25 +151,34 @@ double ContactEnergy<Dim>::barrier_second(double D) const {
   return D >= Dhat ? 0 : (r + 2) * r - 2 * std::log(D / Dhat) - 3;
 }
 
+/// Local Hessians, before they are added.
+template <int Dim>
+struct ContactEnergy<Dim>::HessianBlocks {
+  std::vector<Mat<4 * Dim>> blocks;
+};
+
 /// The active pairs of the positions that were asked for last, with what else they depend on.
 template <int Dim>
 struct ContactEnergy<Dim>::ActiveCache {
   const CollisionSurface* surface = nullptr;
+  int revision = 0;
   double dhat = 0;
   bool convergent = false;
-  VectorX x;
+  KeptVector x;
   Active active;
 };
 
 template <int Dim>
 const typename ContactEnergy<Dim>::Active& ContactEnergy<Dim>::active_set(ConstVectorView x, Workspace& workspace) const {
   auto& cache = workspace.get<ActiveCache>();
-  if (cache.surface == &surface_ && cache.dhat == dhat_ && cache.convergent == convergent_ && cache.x.size() == x.size() &&
-      std::memcmp(cache.x.data(), x.data(), sizeof(double) * x.size()) == 0)
+  if (cache.surface == surface_ && cache.revision == surface_->revision && cache.dhat == dhat_ &&
+      cache.convergent == convergent_ && cache.x.size() == x.size() &&
+      std::memcmp(cache.x.view().data(), x.data(), sizeof(double) * x.size()) == 0)
     return cache.active;
-  cache.active = find_active(x, workspace);
+  find_active(x, workspace, cache.active);
   cache.x = x;
-  cache.surface = &surface_;
+  cache.surface = surface_;
+  cache.revision = surface_->revision;
   cache.dhat = dhat_;
   cache.convergent = convergent_;
   return cache.active;
@@ -262,7 +284,8 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
     const int n = Dim * size;
     for (int j = 1; j < n; ++j) std::copy_n(block.data() + 4 * Dim * j, n, block.data() + n * j);
   };
-  std::vector<Mat<4 * Dim>> blocks(std::min(kBatch, stencils.size()));
+  auto& blocks = workspace.get<HessianBlocks>().blocks;
+  if (blocks.size() < std::min(kBatch, stencils.size())) blocks.resize(std::min(kBatch, stencils.size()));
   for (std::size_t first = 0; first < stencils.size(); first += kBatch) {
     const std::size_t count = std::min(kBatch, stencils.size() - first);
     parallel_blocks(count, kBlock, [&](std::size_t begin, std::size_t end) {
@@ -281,9 +304,8 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
 
 template <int Dim>
 double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  const VectorX motion = dx;
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(surface_, x, &motion, dhat_);
+  candidates.update(*surface_, x, &dx, dhat_);
   double least = 1;
   for (const auto& [kind, list] : candidates.all()) {
     // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
@@ -292,9 +314,9 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
     const auto step_of = [&, kind = kind](std::size_t begin, std::size_t end) {
       double step = 1;
       for (std::size_t i = begin; i < end; ++i) {
-        const auto vertices = vertices_of(surface_, kind, pairs[i]);
+        const auto vertices = vertices_of(*surface_, kind, pairs[i]);
         const auto p = gather<Dim>(vertices, pair_size(kind), x);
-        auto q = gather<Dim>(vertices, pair_size(kind), motion);
+        auto q = gather<Dim>(vertices, pair_size(kind), dx);
         for (int k = 0; k < pair_size(kind); ++k) q[k] = p[k] + step * q[k];
         step *= free_share<Dim>(kind, p, q);
       }
@@ -306,43 +328,46 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
 }
 
 template <int Dim>
-VectorX ContactEnergy<Dim>::single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  VectorX motion = dx;
+bool ContactEnergy<Dim>::get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways,
+                                         Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(surface_, x, &motion, dhat_);
-  std::vector<double> share(surface_.area.size(), 1);
+  candidates.update(*surface_, x, &dx, dhat_);
+  auto& share = workspace.get<Shares>().of_vertex;
+  share.assign(surface_->area.size(), 1);
   for (const auto& [kind, list] : candidates.all()) {
     const auto& pairs = *list;
     const auto shares_of = [&, kind = kind](std::size_t i) {
-      const auto vertices = vertices_of(surface_, kind, pairs[i]);
+      const auto vertices = vertices_of(*surface_, kind, pairs[i]);
       const int size = pair_size(kind);
-      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, motion), dhat_);
+      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, dx), dhat_);
     };
     const auto note = [&, kind = kind](std::size_t i, const std::array<double, 4>& shares) {
-      const auto vertices = vertices_of(surface_, kind, pairs[i]);
+      const auto vertices = vertices_of(*surface_, kind, pairs[i]);
       for (int k = 0; k < pair_size(kind); ++k) share[vertices[k]] = std::min(share[vertices[k]], shares[k]);
     };
     parallel_then_ordered<std::array<double, 4>>(pairs.size(), kBlock, shares_of, note);
   }
-  for (const int v : surface_.vertices) motion.segment<Dim>(Dim * v) *= share[v];
-  return motion;
+  ways = dx;
+  for (const int v : surface_->vertices) ways.segment<Dim>(Dim * v) *= share[v];
+  return true;
 }
 
 template <int Dim>
 void ContactEnergy<Dim>::foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const {
   using Candidates = ContactCandidates<Dim>;
-  workspace.get<Candidates>().search(surface_, x, &dx, dhat_, Candidates::kForeseen);
+  const ConstVectorView motion = dx;
+  workspace.get<Candidates>().search(*surface_, x, &motion, dhat_, Candidates::kForeseen);
 }
 
 template <int Dim>
 StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  const VectorX motion = dx, end = x + dx;
+  const VectorX end = x + dx;
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(surface_, x, &motion, dhat_);
+  candidates.update(*surface_, x, &dx, dhat_);
   StepLimit least;
   for (const auto& [kind, pairs] : candidates.all())
     for (const auto& pair : *pairs) {
-      const auto vertices = vertices_of(surface_, kind, pair);
+      const auto vertices = vertices_of(*surface_, kind, pair);
       const int size = pair_size(kind);
       const double t = free_share<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, end));
       if (t < least.step) least = {t, name_of(kind), {vertices.begin(), vertices.begin() + size}};

@@ -27,8 +27,19 @@ Eigen::Matrix<double, 3, 2> tangent_basis(const Vec<3>& normal) {
 
 template <int Dim>
 FrictionEnergy<Dim>::FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVectorView x, Workspace& workspace,
-                                    const ContactOptions& options, VelocityRule velocity, double scale)
-    : velocity_(std::move(velocity)), epsv_(options.friction_velocity), scale_(scale) {
+                                    const ContactOptions& options, const VelocityRule& velocity, double scale) {
+  renew(contact, x, workspace, options, velocity.rate, velocity.reference, scale);
+}
+
+template <int Dim>
+void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorView x, Workspace& workspace,
+                                const ContactOptions& options, double velocity_rate, ConstVectorView velocity_reference,
+                                double scale) {
+  rate_ = velocity_rate;
+  reference_ = velocity_reference;
+  epsv_ = options.friction_velocity;
+  scale_ = scale;
+  pairs_.clear();
   for (const auto& s : contact.active(x, workspace)) {
     if (s.is_mollified()) continue;
     const PairDistance<Dim> q = contact.distance(s, x);
@@ -43,18 +54,19 @@ FrictionEnergy<Dim>::FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVect
 template <int Dim>
 auto FrictionEnergy<Dim>::slip_velocity(const Pair& pair, ConstVectorView x) const -> Vec<kTangents> {
   Vec<Dim> relative = Vec<Dim>::Zero();
+  const ConstVectorView reference = reference_.view();
   for (int k = 0; k < pair.size; ++k) {
     const int dof = Dim * pair.vertices[k];
-    relative += pair.coefficients[k] * (x.segment<Dim>(dof) - velocity_.reference.segment<Dim>(dof));
+    relative += pair.coefficients[k] * (x.segment<Dim>(dof) - reference.segment<Dim>(dof));
   }
-  return velocity_.rate * (pair.tangents.transpose() * relative);
+  return rate_ * (pair.tangents.transpose() * relative);
 }
 
 template <int Dim>
 double FrictionEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = 0;
   for (const auto& pair : pairs_) sum += pair.force * f0(slip_velocity(pair, x).norm(), epsv_);
-  return scale_ / velocity_.rate * sum;
+  return scale_ / rate_ * sum;
 }
 
 template <int Dim>
@@ -77,7 +89,7 @@ void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
     if (y > 0) inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
     const double force = projected(pair.force, psd);
     if (force == 0) continue;
-    const Mat<Dim> world = scale_ * velocity_.rate * force * pair.tangents * inner * pair.tangents.transpose();
+    const Mat<Dim> world = scale_ * rate_ * force * pair.tangents * inner * pair.tangents.transpose();
     const int dofs = Dim * pair.size;
     block.resize(dofs, dofs);
     for (int i = 0; i < pair.size; ++i)

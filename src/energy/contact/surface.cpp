@@ -12,88 +12,90 @@ namespace itr {
 
 namespace {
 
-/// Lists of `second` by `first` < n, each in the order of the pairs.
-Adjacency group(int n, const std::vector<std::array<int, 2>>& pairs) {
-  Adjacency result;
-  result.offset.assign(n + 1, 0);
-  for (const auto& [first, second] : pairs) ++result.offset[first + 1];
-  for (int i = 0; i < n; ++i) result.offset[i + 1] += result.offset[i];
-  result.id.resize(pairs.size());
-  std::vector<int> next(result.offset.begin(), result.offset.end() - 1);
-  for (const auto& [first, second] : pairs) result.id[next[first]++] = second;
-  return result;
+/// Lists of `second` by `first` < n, each in the order in which `visit` calls what it is given with pairs of them. What is
+/// made here is made in the memory of what was there.
+template <typename Visit>
+void group(int n, const Visit& visit, Adjacency& result) {
+  result.offset.assign(n + 2, 0);
+  visit([&](int first, int) { ++result.offset[first + 2]; });
+  for (int i = 2; i < n + 2; ++i) result.offset[i] += result.offset[i - 1];
+  result.id.resize(result.offset.back());
+  visit([&](int first, int second) { result.id[result.offset[first + 1]++] = second; });
+  result.offset.pop_back();
 }
 
-/// Lists those of the triangles too, each edge once, ascending; says which are a triangle's.
+std::array<int, 2> edge_between(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
+
+/// Lists those of the triangles too, each edge once, ascending.
 void sort_edges(CollisionSurface& surface) {
-  struct Side {
-    std::uint64_t edge;  ///< smaller vertex, then the other
-    std::size_t number;  ///< 3 * triangle + k; behind all of these where it is of none
+  auto& edges = surface.edges;
+  for (auto& [a, b] : edges)
+    if (a > b) std::swap(a, b);
+  for (const auto& [a, b, c] : surface.triangles)
+    edges.insert(edges.end(), {edge_between(a, b), edge_between(b, c), edge_between(c, a)});
+  const auto key = [](const std::array<int, 2>& e) { return static_cast<std::int64_t>(e[0]) << 32 | e[1]; };
+  std::sort(edges.begin(), edges.end(), [&](const auto& e, const auto& f) { return key(e) < key(f); });
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+}
+
+/// The edges of triangles and of vertices.
+void add_neighbours(int num_vertices, CollisionSurface& surface) {
+  const auto& edges = surface.edges;
+  const auto visit_ends = [&](const auto& add) {
+    for (int e = 0; e < static_cast<int>(edges.size()); ++e)
+      for (const int v : edges[e]) add(v, e);
   };
-  std::vector<Side> sides;
-  sides.reserve(surface.edges.size() + 3 * surface.triangles.size());
-  const auto add = [&](int a, int b, std::size_t number) {
-    sides.push_back({static_cast<std::uint64_t>(std::min(a, b)) << 32 | static_cast<std::uint64_t>(std::max(a, b)), number});
-  };
-  const std::size_t of_none = 3 * surface.triangles.size();
-  for (const auto& [a, b] : surface.edges) add(a, b, of_none);
-  for (std::size_t i = 0; i < of_none; ++i) add(surface.triangles[i / 3][i % 3], surface.triangles[i / 3][(i + 1) % 3], i);
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.edge < b.edge; });
-  surface.edges.clear();
+  group(num_vertices, visit_ends, surface.vertex_edges);
   surface.triangle_edges.resize(surface.triangles.size());
-  for (std::size_t i = 0; i < sides.size(); ++i) {
-    const auto [edge, number] = sides[i];
-    if (i == 0 || edge != sides[i - 1].edge)
-      surface.edges.push_back({static_cast<int>(edge >> 32), static_cast<int>(edge & 0xffffffff)});
-    if (number < of_none) surface.triangle_edges[number / 3][number % 3] = static_cast<int>(surface.edges.size()) - 1;
-  }
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i)
+    for (int k = 0; k < 3; ++k) {
+      const auto edge = edge_between(surface.triangles[i][k], surface.triangles[i][(k + 1) % 3]);
+      const auto at_first = surface.vertex_edges[edge[0]];
+      surface.triangle_edges[i][k] =
+          *std::find_if(at_first.begin(), at_first.end(), [&](int e) { return edges[e] == edge; });
+    }
 }
 
 void add_topology_of_triangles(std::span<const Vec<3>> rest, CollisionSurface& surface) {
-  const int num_edges = static_cast<int>(surface.edges.size()), num_vertices = static_cast<int>(rest.size());
-  std::vector<std::array<int, 2>> opposites, star;
-  std::vector<double> triangle_area(num_vertices, 0);
-  opposites.reserve(3 * surface.triangles.size());
-  star.reserve(2 * surface.edges.size());
-  surface.edge_area.assign(num_edges, 0);
+  const auto& edges = surface.edges;
+  const std::size_t num_vertices = rest.size();
+  add_neighbours(static_cast<int>(num_vertices), surface);
+  auto& has_triangles = surface.on_open_boundary;  // until that is known
+  has_triangles.assign(num_vertices, 0);
+  surface.edge_area.assign(edges.size(), 0);
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
-    const auto &triangle = surface.triangles[i], &edges = surface.triangle_edges[i];
+    const auto& triangle = surface.triangles[i];
     const Vec<3>&a = rest[triangle[0]], &b = rest[triangle[1]], &c = rest[triangle[2]];
     const double third = (b - a).cross(c - a).norm() / 6;
     for (int k = 0; k < 3; ++k) {
-      opposites.push_back({edges[k], triangle[(k + 2) % 3]});
-      surface.edge_area[edges[k]] += third;
-      triangle_area[triangle[k]] += third;
+      surface.edge_area[surface.triangle_edges[i][k]] += third;
+      if (third == 0) continue;
+      double& area = surface.area[triangle[k]];
+      area = std::exchange(has_triangles[triangle[k]], 1) ? area + third : third;
     }
   }
-  for (int v = 0; v < num_vertices; ++v)
-    if (triangle_area[v] > 0) surface.area[v] = triangle_area[v];
-  surface.edge_opposites = group(num_edges, opposites);
+  const auto visit_opposites = [&](const auto& add) {
+    for (std::size_t i = 0; i < surface.triangles.size(); ++i)
+      for (int k = 0; k < 3; ++k) add(surface.triangle_edges[i][k], surface.triangles[i][(k + 2) % 3]);
+  };
+  group(static_cast<int>(edges.size()), visit_opposites, surface.edge_opposites);
   surface.on_open_boundary.assign(num_vertices, 0);
-  for (int e = 0; e < num_edges; ++e) {
-    const auto [a, b] = surface.edges[e];
+  surface.edge_length_squared.clear();
+  for (int e = 0; e < static_cast<int>(edges.size()); ++e) {
+    const auto [a, b] = edges[e];
     const double length_squared = (rest[a] - rest[b]).squaredNorm();
     surface.edge_length_squared.push_back(length_squared);
     if (surface.edge_opposites[e].empty()) surface.edge_area[e] = std::sqrt(length_squared);
     if (surface.edge_opposites[e].size() == 1) surface.on_open_boundary[a] = surface.on_open_boundary[b] = 1;
-    star.push_back({a, e});
-    star.push_back({b, e});
   }
-  surface.vertex_edges = group(num_vertices, star);
 }
 
 }  // namespace
 
 template <int Dim>
-CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
-                                        std::span<const int> points, std::span<const Vec<Dim>> rest,
-                                        std::vector<char> counts) {
-  CollisionSurface surface;
-  surface.edges = std::move(edges);
-  surface.triangles = std::move(triangles);
-  surface.counts = std::move(counts);
+void complete_collision_surface(CollisionSurface& surface, std::span<const int> points, std::span<const Vec<Dim>> rest) {
+  ++surface.revision;
   sort_edges(surface);
-
   surface.area.assign(rest.size(), 0);
   surface.degree.assign(rest.size(), 0);
   for (const auto& [a, b] : surface.edges) {
@@ -103,14 +105,23 @@ CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, s
       ++surface.degree[v];
     }
   }
-  std::vector<char> is_point(rest.size(), 0);
-  for (const int v : points) is_point[v] = 1;
-  for (int v = 0; v < static_cast<int>(rest.size()); ++v) {
-    if (surface.degree[v] == 0 && !is_point[v]) continue;
-    surface.vertices.push_back(v);
+  for (const int v : points)
     if (surface.degree[v] == 0) surface.area[v] = 1;
-  }
+  surface.vertices.clear();
+  for (int v = 0; v < static_cast<int>(rest.size()); ++v)
+    if (surface.degree[v] > 0 || surface.area[v] > 0) surface.vertices.push_back(v);
   if constexpr (Dim == 3) add_topology_of_triangles(rest, surface);
+}
+
+template <int Dim>
+CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
+                                        std::span<const int> points, std::span<const Vec<Dim>> rest,
+                                        std::vector<char> counts) {
+  CollisionSurface surface;
+  surface.edges = std::move(edges);
+  surface.triangles = std::move(triangles);
+  surface.counts = std::move(counts);
+  complete_collision_surface(surface, points, rest);
   return surface;
 }
 
@@ -123,9 +134,13 @@ std::vector<std::array<int, 2>> find_intersections<3>(const CollisionSurface& su
   return find_intersections(x, surface.edges, surface.triangles, surface.counts, most);
 }
 
-template CollisionSurface make_collision_surface<2>(std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>,
-                                                    std::span<const int>, std::span<const Vec<2>>, std::vector<char>);
-template CollisionSurface make_collision_surface<3>(std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>,
-                                                    std::span<const int>, std::span<const Vec<3>>, std::vector<char>);
+#define ITR_INSTANTIATE(Dim)                                                                                              \
+  template void complete_collision_surface<Dim>(CollisionSurface&, std::span<const int>, std::span<const Vec<Dim>>);      \
+  template CollisionSurface make_collision_surface<Dim>(std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>, \
+                                                        std::span<const int>, std::span<const Vec<Dim>>,                  \
+                                                        std::vector<char>);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr

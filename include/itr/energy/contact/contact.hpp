@@ -29,9 +29,11 @@ struct ContactStencil {
 template <int Dim>
 class ContactEnergy final : public Energy {
  public:
-  /// `surface` must outlive this. `scale` is alpha h^2. A workspace serves one surface: a new or changed surface needs a new
-  /// workspace.
+  /// `surface` must outlive this. `scale` is alpha h^2. A workspace serves one surface: another one in its place needs a new
+  /// workspace, or another revision.
   ContactEnergy(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale);
+  /// Makes it what a new one would be.
+  void renew(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale);
   std::string_view name() const override { return "contact"; }
   double value(ConstVectorView x, Workspace& workspace) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
@@ -39,7 +41,7 @@ class ContactEnergy final : public Energy {
   /// Time of impact by conservative CCD; feasible: no pair touches.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// By planar bounds of each pair (`planar_shares`).
-  VectorX single_ways(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
+  bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
   /// Looks for pairs where a solve that begins at x is expected to go by dx, so that one search serves its start and its
   /// first step. It always looks: what is found then does not depend on earlier solves.
   void foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;
@@ -64,13 +66,14 @@ class ContactEnergy final : public Energy {
  private:
   struct Active {
     std::vector<ContactStencil> stencils;
-    double least_squared;  ///< distance over counted pairs nearer than dhat; infinity where there are none
+    double least_squared = 0;  ///< distance over counted pairs nearer than dhat; infinity where there are none
   };
   struct ActiveCache;
+  struct HessianBlocks;
   const Active& active_set(ConstVectorView x, Workspace& workspace) const;
-  Active find_active(ConstVectorView x, Workspace& workspace) const;
+  void find_active(ConstVectorView x, Workspace& workspace, Active& active) const;
 
-  const CollisionSurface& surface_;
+  const CollisionSurface* surface_;
   double dhat_;
   bool convergent_;
   double stiffness_;

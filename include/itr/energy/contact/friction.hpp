@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include "itr/core/kept_vector.hpp"
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/velocity_rule.hpp"
 
 namespace itr {
 
 /// Smoothed Coulomb friction with normal forces, tangents and closest points lagged at the positions where it was made
-/// (CONVENTIONS.md, "Friction"). A new lag is a new object.
+/// (CONVENTIONS.md, "Friction").
 template <int Dim>
 class FrictionEnergy final : public Energy {
  public:
+  FrictionEnergy() = default;  ///< of no pair
   FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVectorView lagged_x, Workspace& workspace,
-                 const ContactOptions& options, VelocityRule velocity, double scale);
+                 const ContactOptions& options, const VelocityRule& velocity, double scale);
+  /// Makes it what a new one with this `velocity_rate` and `velocity_reference` (see VelocityRule) would be, where nobody
+  /// else goes on with it.
+  void renew(const ContactEnergy<Dim>& contact, ConstVectorView lagged_x, Workspace& workspace,
+             const ContactOptions& options, double velocity_rate, ConstVectorView velocity_reference, double scale);
   std::string_view name() const override { return "friction"; }
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
@@ -31,9 +37,10 @@ class FrictionEnergy final : public Energy {
   Vec<kTangents> slip_velocity(const Pair& pair, ConstVectorView x) const;
 
   std::vector<Pair> pairs_;
-  VelocityRule velocity_;
-  double epsv_;
-  double scale_;
+  double rate_ = 1;  ///< and the reference of VelocityRule
+  KeptVector reference_;
+  double epsv_ = 0;
+  double scale_ = 1;
 };
 
 }  // namespace itr

@@ -20,6 +20,7 @@ struct Adjacency {
 /// of (the whole scene or a patch), and the per-vertex arrays have one entry for every vertex of that problem. What is said
 /// of a vertex's or an edge's neighbours refers to the *whole* surface, also where only a part of it is here.
 struct CollisionSurface {
+  int revision = 0;                           ///< another one whenever it is made anew in the same place
   std::vector<int> vertices;                  ///< those on the surface, ascending
   std::vector<std::array<int, 2>> edges;      ///< surface edges, smaller id first, ascending
   std::vector<std::array<int, 3>> triangles;  ///< 3D only
@@ -46,6 +47,10 @@ template <int Dim>
 CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
                                         std::span<const int> points, std::span<const Vec<Dim>> rest,
                                         std::vector<char> counts);
+
+/// Makes the rest of a surface of which edges, triangles and `counts` are set, in the memory that is there.
+template <int Dim>
+void complete_collision_surface(CollisionSurface& surface, std::span<const int> points, std::span<const Vec<Dim>> rest);
 
 /// The first `most` pairs of two edges (2D), or of an edge and a triangle (3D), that share a point without sharing a vertex
 /// and of which one counts: indices, decided exactly.
