@@ -89,7 +89,8 @@ TEST(Prospect, NothingIsAskedInFreeFlightUntilThereIsSomethingToGain) {
   const auto tried = [&](const TetScene& scene) {
     TetScene changed = scene;
     RemeshMemory memory;
-    return remesh<3>(changed.mesh, changed.fields, changed.context, options, memory).splits.tried;
+    Strata<3> strata;
+    return remesh<3>(changed.mesh, changed.fields, changed.context, options, memory, strata).splits.tried;
   };
   const TetScene flight = falling_cube(0, 0), noisy = falling_cube(0.2, 0.01);
   EXPECT_LT(available_energy(flight.mesh, flight.fields, flight.context), 1e-20);

@@ -210,10 +210,11 @@ TEST(Remesh3d, KeepsVolumesAndTheStateValidAndHasTheSameBitsForAnyNumberOfThread
       options.collapse.acceptance_tolerance = -1e-3;
       options.collapse.rel_max_edge_length = 100;
       options.swap.enabled = options.smooth.enabled = true;
-      const Strata<3> strata(scene.mesh);
-      const Invariants before(scene.mesh, strata);
+      const Invariants before(scene.mesh, Strata<3>(scene.mesh));
       RemeshMemory memory;
-      const RemeshReport report = remesh(scene.mesh, scene.fields, scene.context, options, memory);
+      Strata<3> strata;
+      const RemeshReport report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
+      EXPECT_EQ(strata.find_defect(scene.mesh), "");
       EXPECT_EQ(scene.mesh.find_defect(), "");
       EXPECT_EQ(find_inverted<3>(scene.mesh, scene.fields.x), kNone);
       EXPECT_TRUE(std::isfinite(whole_energy(scene.mesh, scene.fields, scene.context)));
@@ -309,7 +310,8 @@ struct Swapped {
     };
     const double energy = energy_on(before);
     RemeshMemory memory;
-    remesh(after, fields, context, options, memory);
+    Strata<3> strata;
+    remesh(after, fields, context, options, memory, strata);
     gain = energy - energy_on(after);
     EXPECT_EQ(after.find_defect(), "");
     EXPECT_NEAR(after.total_volume(), before.total_volume(), 1e-12);

@@ -83,15 +83,17 @@ TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
   options.collapse.rel_max_edge_length = 100;
   options.swap.enabled = options.smooth.enabled = true;
   RemeshMemory memory;
-  RemeshReport report = remesh(scene.mesh, scene.fields, scene.context, options, memory);
+  Strata<2> strata;
+  RemeshReport report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
   EXPECT_TRUE(report.changed());
-  for (int i = 0; i < 20 && report.changed(); ++i) report = remesh(scene.mesh, scene.fields, scene.context, options, memory);
+  for (int i = 0; i < 20 && report.changed(); ++i)
+    report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
   ASSERT_FALSE(report.changed());
-  report = remesh(scene.mesh, scene.fields, scene.context, options, memory);
+  report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
   const int relaxed = report.splits.relaxed + report.collapses.relaxed + report.swaps.relaxed + report.smooths.relaxed;
   EXPECT_EQ(relaxed, 0);
   RemeshMemory none;
-  report = remesh(scene.mesh, scene.fields, scene.context, options, none);
+  report = remesh(scene.mesh, scene.fields, scene.context, options, none, strata);
   EXPECT_GT(report.splits.relaxed + report.collapses.relaxed, 0);
 }
 

@@ -248,8 +248,9 @@ RC_GTEST_PROP(TrialProperties, RejectedTrialsLeaveNoTrace, ()) {
   const RemeshFields<2> fields = scene.fields;
   const auto history = *rc::gen::element(HistoryRule::function, HistoryRule::interpolated);
   RemeshMemory memory;
+  Strata<2> strata;
   const OperationCount count =
-      total(remesh(scene.mesh, scene.fields, scene.context, only(draw_kind(), 1e12, history), memory));
+      total(remesh(scene.mesh, scene.fields, scene.context, only(draw_kind(), 1e12, history), memory, strata));
   RC_ASSERT(count.tried > 0);
   RC_ASSERT(count.accepted == 0);
   RC_ASSERT(same_mesh(scene.mesh, mesh));
@@ -299,7 +300,8 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
     mesh = scene.mesh;
     fields = scene.fields;
     RemeshMemory memory;
-    count = total(remesh(mesh, fields, scene.context, options, memory));
+    Strata<2> strata;
+    count = total(remesh(mesh, fields, scene.context, options, memory, strata));
     (count.accepted > 1 ? low : high) = middle;
   }
   RC_PRE(count.accepted == 1);
@@ -357,7 +359,8 @@ RC_GTEST_PROP(TrialProperties, RemeshingHasTheSameBitsForAnyNumberOfThreads, ())
     options.collapse.culling_threshold = 0.1;
     options.swap.enabled = options.smooth.enabled = true;
     RemeshMemory memory;
-    remesh(scene.mesh, scene.fields, scene.context, options, memory);
+    Strata<2> strata;
+    remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
     return std::pair(scene.mesh, scene.fields);
   };
   const auto one = run(1);

@@ -53,7 +53,8 @@ Remeshed remesh_sharply(const TrialScene& scene, RemeshOptions options, double m
     Mesh<2> mesh = scene.mesh;
     RemeshFields<2> fields = scene.fields;
     RemeshMemory memory;
-    const int count = accepted(remesh(mesh, fields, scene.context, options, memory));
+    Strata<2> strata;
+    const int count = accepted(remesh(mesh, fields, scene.context, options, memory, strata));
     (count > 0 ? result.low : result.high) = middle;
     if (count > 0) result.mesh = mesh, result.fields = fields, result.accepted = count;
   }

@@ -282,7 +282,8 @@ TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
       options.collapse.enabled = false;
       options.screening = screening;
       RemeshMemory memory;
-      tried[screening] += remesh(scene.mesh, scene.fields, scene.context, options, memory).splits.tried;
+      Strata<2> strata;
+      tried[screening] += remesh(scene.mesh, scene.fields, scene.context, options, memory, strata).splits.tried;
     }
   EXPECT_GT(tried[Screening::energy_percentile], 0);
   EXPECT_GT(tried[Screening::bounds], 2 * tried[Screening::energy_percentile]);
@@ -298,11 +299,12 @@ TEST(Remesh, AsksAgainWhatWasRefusedWhereNoPredictionTells) {
     options.collapse.enabled = false;
     options.split.acceptance_tolerance = 1e6;  // none gains that
     RemeshMemory memory;
-    const auto first = remesh(scene.mesh, scene.fields, scene.context, options, memory).splits;
+    Strata<2> strata;
+    const auto first = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata).splits;
     ASSERT_GT(first.tried, 0);
     ASSERT_EQ(first.accepted, 0);
     options.split.acceptance_tolerance = 1e-6;  // as if forces had grown
-    EXPECT_GT(remesh(scene.mesh, scene.fields, scene.context, options, memory).splits.accepted, 0);
+    EXPECT_GT(remesh(scene.mesh, scene.fields, scene.context, options, memory, strata).splits.accepted, 0);
   }
 }
 
@@ -318,7 +320,8 @@ TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {
     options.swap.enabled = options.smooth.enabled = true;
     const Totals before(scene.mesh);
     RemeshMemory memory;
-    const auto report = remesh(scene.mesh, scene.fields, scene.context, options, memory);
+    Strata<2> strata;
+    const auto report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
     EXPECT_TRUE(report.changed());
     EXPECT_EQ(scene.mesh.find_defect(), "");
     EXPECT_EQ(find_inverted<2>(scene.mesh, scene.fields.x), kNone);

@@ -203,6 +203,12 @@ TEST_P(ResumeTest, KilledRunGoesOnBitForBit) {
   expect_same_results(whole, killed);
   EXPECT_EQ(summary_of(whole), summary_of(killed));
 
+  if (which.name == std::string("cubes_remeshed")) {
+    const auto saved = find_saved_state(killed);
+    const hdf5::Session session;
+    EXPECT_TRUE(hdf5::File::open(saved->file).contains("/checkpoint/strata"));
+  }
+
   const Command again = start(arguments(which, killed, 0.05, true));
   ASSERT_EQ(again.wait(), 0) << again.said();
   EXPECT_EQ(summary_of(whole), summary_of(killed)) << "of a finished run that was resumed";
@@ -391,6 +397,12 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"damping", "ball_wall.json", 40, R"("dt":2e-5)",
              kImpact + Arguments{R"(/solver/rayleigh_damping=[{"form":"elasticity","stiffness_ratio":0.1}])"}},
         Case{"cubes", "cubes.json", 45, R"("dt":0.01)", {}},  // 3D; they meet in step 14
+        Case{"cubes_remeshed",
+             "cubes.json",
+             28,
+             R"("dt":0.01)",
+             {"/space/remesh/enabled=true", "/space/remesh/split/acceptance_tolerance=2e-4",
+              "/space/remesh/swap/enabled=true", "/space/remesh/smooth/enabled=true"}},
         Case{"kept_order",
              "cubes.json",
              45,

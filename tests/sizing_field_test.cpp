@@ -53,8 +53,9 @@ struct SizedBody {
 
   void remesh_it() {
     RemeshMemory memory;
+    Strata<Dim> strata;
     const double volume = mesh.total_volume();
-    report = remesh(mesh, fields, context, options, memory);
+    report = remesh(mesh, fields, context, options, memory, strata);
     EXPECT_EQ(mesh.find_defect(), "");
     EXPECT_EQ(find_inverted<Dim>(mesh, fields.x), kNone);
     EXPECT_NEAR(mesh.total_volume(), volume, 1e-12);

@@ -189,6 +189,27 @@ Strata<Dim>::Strata(const Mesh<Dim>& mesh, double flatness) {
 }
 
 template <int Dim>
+Strata<Dim>::Strata(const Record& record)
+    : vertices_(record.vertices), patches_(record.patches), planes_(record.planes), tolerance_(record.tolerance) {
+  for (const auto& row : record.interfaces) {
+    Facet facet;
+    std::copy_n(row.begin(), Dim, facet.begin());
+    interfaces_[facet] = row[Dim];
+  }
+}
+
+template <int Dim>
+typename Strata<Dim>::Record Strata<Dim>::record() const {
+  Record record{.vertices = vertices_, .patches = patches_, .interfaces = {}, .planes = planes_, .tolerance = tolerance_};
+  for (const auto& [facet, patch] : interfaces_) {
+    auto& row = record.interfaces.emplace_back();
+    *std::copy(facet.begin(), facet.end(), row.begin()) = patch;
+  }
+  std::sort(record.interfaces.begin(), record.interfaces.end());
+  return record;
+}
+
+template <int Dim>
 Stratum Strata<Dim>::classify(const Mesh<Dim>& mesh, VertexId v) const {
   if (mesh.cells_of(v).empty() || mesh.vertex_tag(v) != kNoTag) return Stratum::corner;
   const auto sheets = sheets_of(mesh, v);
@@ -405,25 +426,34 @@ void Strata<Dim>::compact(const typename Mesh<Dim>::Renumbering& map) {
 }
 
 template <int Dim>
-std::string Strata<Dim>::find_defect(const Mesh<Dim>& mesh) const {
+std::string Strata<Dim>::find_misfit(const Mesh<Dim>& mesh) const {
   if (static_cast<int>(vertices_.size()) != mesh.vertex_slots()) return "wrong number of vertices";
   if (static_cast<int>(patches_.size()) != mesh.facet_slots()) return "wrong number of facets";
   std::size_t interfaces = 0;
   for (const auto& sheet : find_sheets(mesh)) {
     const int patch = sheet.facet == kNone ? interface_patch(sheet.vertices) : patches_[sheet.facet];
     interfaces += sheet.facet == kNone;
-    const std::string place = " at vertex " + std::to_string(sheet.vertices[0]);
-    if (patch == kNone) return "a facet without a patch" + place;
-    for (const int v : sheet.vertices)
-      if (std::abs((mesh.rest(v) - planes_[patch].point).dot(planes_[patch].normal)) > 2 * tolerance_)
-        return "a vertex off the plane of its patch: " + std::to_string(v);
-    if (sheet.normal.dot(planes_[patch].normal) <= 0) return "a facet folded over in its patch" + place;
+    if (patch < 0 || patch >= num_patches()) return "a facet without a patch at vertex " + std::to_string(sheet.vertices[0]);
   }
   if (interfaces != interfaces_.size()) return "interface facets that are not in the mesh";
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
     if (!mesh.is_vertex_alive(v)) continue;
     const bool held = mesh.is_boundary(v) || mesh.is_on_interface(v) || mesh.cells_of(v).empty();
     if (held != (vertices_[v] != Stratum::volume)) return "stratum of vertex " + std::to_string(v);
+  }
+  return {};
+}
+
+template <int Dim>
+std::string Strata<Dim>::find_defect(const Mesh<Dim>& mesh) const {
+  if (std::string misfit = find_misfit(mesh); !misfit.empty()) return misfit;
+  for (const auto& sheet : find_sheets(mesh)) {
+    const Plane& plane = planes_[sheet.facet == kNone ? interface_patch(sheet.vertices) : patches_[sheet.facet]];
+    for (const int v : sheet.vertices)
+      if (!(std::abs((mesh.rest(v) - plane.point).dot(plane.normal)) <= 2 * tolerance_))
+        return "a vertex off the plane of its patch: " + std::to_string(v);
+    if (!(sheet.normal.dot(plane.normal) > 0))
+      return "a facet folded over in its patch at vertex " + std::to_string(sheet.vertices[0]);
   }
   return {};
 }

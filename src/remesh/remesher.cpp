@@ -9,13 +9,13 @@ namespace itr {
 
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
-                    const RemeshOptions& options, RemeshMemory& memory) {
+                    const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
   const bool may_split = options.split.enabled &&
                          available_energy(mesh, fields, context) >= context.scaling * options.split.acceptance_tolerance;
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
   if (!may_split && !may_collapse && !options.swap.enabled && !options.smooth.enabled && !options.sizing_field.enabled)
     return {};
-  RemeshSession<Dim> session(mesh, fields, context, options, memory);
+  RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();
   for (int sweep = 0; sweep < options.sweeps; ++sweep) {
     const int before = report.accepted();
@@ -37,7 +37,9 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   return report;
 }
 
-template RemeshReport remesh(Mesh<2>&, RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&, RemeshMemory&);
-template RemeshReport remesh(Mesh<3>&, RemeshFields<3>&, const StepContext<3>&, const RemeshOptions&, RemeshMemory&);
+template RemeshReport remesh(Mesh<2>&, RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&, RemeshMemory&,
+                             Strata<2>&);
+template RemeshReport remesh(Mesh<3>&, RemeshFields<3>&, const StepContext<3>&, const RemeshOptions&, RemeshMemory&,
+                             Strata<3>&);
 
 }  // namespace itr

@@ -14,17 +14,19 @@ namespace itr {
 
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
-                                  const RemeshOptions& options, const RemeshMemory& memory)
+                                  const RemeshOptions& options, const RemeshMemory& memory, Strata<Dim>& strata)
     : mesh_(mesh),
       fields_(fields),
       context_(context),
       options_(options),
       total_volume_(mesh.total_volume()),
       gate_(mesh, fields, context),
+      strata_(strata),
       lanes_(context.host.empty() ? num_threads() : 1),  // terms of the program may not be for several threads
       refusals_(memory),
       changed_at_(mesh.vertex_slots(), 0) {
-  if constexpr (Dim == 3) strata_ = Strata<Dim>(mesh);
+  if (Dim == 3 && strata.empty()) strata = Strata<Dim>(mesh);
+  ITR_AUDIT(Dim == 2 || strata.find_defect(mesh).empty(), strata.find_defect(mesh));
 }
 
 template <int Dim>

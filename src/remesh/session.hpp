@@ -47,7 +47,7 @@ template <int Dim>
 class RemeshSession {
  public:
   RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context, const RemeshOptions& options,
-                const RemeshMemory& memory);
+                const RemeshMemory& memory, Strata<Dim>& strata);
 
   const Mesh<Dim>& mesh() const { return mesh_; }
   const RemeshFields<Dim>& fields() const { return fields_; }
@@ -179,7 +179,7 @@ class RemeshSession {
   const RemeshOptions& options_;
   double total_volume_;
   Gate<Dim> gate_;
-  Strata<Dim> strata_;
+  Strata<Dim>& strata_;
   std::deque<LocalScratch<Dim>> lanes_;
   Refusals refusals_;
   std::unordered_map<EdgeKey, int, EdgeKeyHash> depth_;

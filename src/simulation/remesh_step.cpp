@@ -109,7 +109,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   RemeshReport remeshed;
   {
     const ScopedTimer timer(report.seconds.remesh);
-    remeshed = remesh(state.mesh, fields, context, setup.remesh, state.remesh_memory);
+    remeshed = remesh(state.mesh, fields, context, setup.remesh, state.remesh_memory, state.strata);
   }
   report.splits = remeshed.splits;
   report.collapses = remeshed.collapses;
@@ -123,8 +123,9 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   TouchedCells touched;
   for (int c = 0; c < before.mesh.cell_slots(); ++c)
     if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
-  auto [vertex, cell, facet] = state.mesh.compact();
-  MeshRenumbering renumbering{std::move(vertex), std::move(cell), std::move(facet)};
+  auto map = state.mesh.compact();
+  if constexpr (Dim == 3) state.strata.compact(map);
+  MeshRenumbering renumbering{std::move(map.vertex), std::move(map.cell), std::move(map.facet)};
   state.remesh_memory.renumber(renumbering.vertex);
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);

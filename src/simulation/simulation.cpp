@@ -279,6 +279,7 @@ void Simulation<Dim>::restore(State<Dim> state) {
     refuse("saved accelerations", history.a.size(), impl_->state->history.a.size());
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
     if (!impl_->setup.materials.contains(state.mesh.body(c))) refuse("body of a saved cell", state.mesh.body(c), 0);
+  if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
   impl_->state = std::make_shared<State<Dim>>(std::move(state));
   impl_->set_forces_at_rest();
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // What of a mesh's shape each vertex, edge and facet belongs to: the inside, a flat patch of the surface or of an interface
-// between bodies, a straight feature, a corner. Found once a step and carried by its edits from then on, so that what an
-// edit may do does not hang on the round-off of earlier ones.
+// between bodies, a straight feature, a corner. Found once a simulation and carried by edits from then on, over steps and
+// saved states, so that what an edit may do does not hang on the round-off of earlier ones.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,8 +33,24 @@ class Strata {
   /// count as lying on it: coordinates of about 16 digits that were rotated and moved.
   static constexpr double kFlatness = 1e-10;
 
-  Strata() = default;
+  struct Plane {
+    Vec<Dim> point, normal;
+  };
+  /// All that there is, as lists.
+  struct Record {
+    std::vector<Stratum> vertices;                     ///< by vertex slot
+    std::vector<int> patches;                          ///< by facet slot
+    std::vector<std::array<int, Dim + 1>> interfaces;  ///< facets between bodies, each ascending, and its patch; ascending
+    std::vector<Plane> planes;                         ///< by patch
+    double tolerance = 0;                              ///< [m]
+  };
+
+  Strata() = default;  ///< not found yet
   explicit Strata(const Mesh<Dim>& mesh, double flatness = kFlatness);
+  /// What find_misfit() says of it decides whether it may be asked.
+  explicit Strata(const Record& record);
+  Record record() const;
+  bool empty() const { return vertices_.empty(); }
 
   Stratum vertex(VertexId v) const { return vertices_[v]; }
   /// In 2D `surface` are all edges of the boundary and of interfaces.
@@ -61,13 +78,12 @@ class Strata {
   /// Follows an edit that was just applied and created `created` (or kNone).
   void follow(const Edit<Dim>& edit, VertexId created);
   void compact(const typename Mesh<Dim>::Renumbering& map);
-  /// First disagreement with the mesh in words: missing or superfluous facets, a vertex off its patch's plane.
+  /// First disagreement with what the mesh consists of, in words: a vertex or facet too many or without a patch.
+  std::string find_misfit(const Mesh<Dim>& mesh) const;
+  /// That, or with where the mesh is: a vertex off its patch's plane, a facet folded over.
   std::string find_defect(const Mesh<Dim>& mesh) const;
 
  private:
-  struct Plane {
-    Vec<Dim> point, normal;
-  };
   struct FacetHash {
     std::size_t operator()(const Facet& facet) const {
       std::size_t hash = 0;

@@ -10,6 +10,7 @@
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/linear/reuse.hpp"
+#include "itr/mesh/strata.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/remesh/memory.hpp"
 #include "itr/simulation/frame.hpp"
@@ -30,6 +31,7 @@ struct State {
   double t = 0;                 ///< [s]
   BarrierStiffness stiffness;   ///< where it is adaptive
   RemeshMemory remesh_memory;   ///< what remeshing refused, and need not ask again
+  Strata<Dim> strata;           ///< of the mesh, once remeshing in 3D has found them
   linear::FactorRecord factor;  ///< that may serve the next step
   VectorX deviation;            ///< x less x-hat of the last step, with which the next one begins; empty: there was none [m]
   double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
@@ -83,7 +85,8 @@ class Simulation {
   /// after restore() have the bits of those after save(). Takes no time; the next step copies the state once.
   Snapshot<Dim> save() const;
   void restore(const Snapshot<Dim>& snapshot);
-  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup.
+  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup. Strata that are not
+  /// its mesh's are dropped, to be found anew.
   void restore(State<Dim> state);
 
   const State<Dim>& state() const;
