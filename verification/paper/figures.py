@@ -38,7 +38,7 @@ class Scene:
 
 SCENES = {
     "ball-wall-3d": Scene("ball-wall/3D.json", "Figs. 8 and 9", "960.8 s a step, 50k (61k) unknowns, 2.9 GiB",
-                          [0.0, 0.00134, 0.0015, 0.0018, 0.0034, 0.012], "-0.6,0.25,1", "0,0,1,0", 1.2),
+                          [0.0, 0.00134, 0.0015, 0.0018, 0.0034, 0.012], "-0.5,0.25,1", "0,0,1,0", 0.85),
     "masticator-3d": Scene("masticator/3D.json", "Fig. 3", "8 230.8 s a step, 16k (57k) unknowns, 4.1 GiB",
                            [0.0, 2.5, 5.0, 7.5, 10.0], "0.4,0.3,1"),
     "twisting-beam-3d": Scene("twisting-beam/twisting-beam.json", "Fig. 6", "2 234.9 s a step, 24k (78k) unknowns, 3.7 GiB",
