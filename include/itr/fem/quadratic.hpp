@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// Shape functions of simplices with curved edges. With barycentric coordinates l_i, a curved edge ij has 4 l_i l_j, and the
+// vertex i has l_i - sum over its curved edges ij of 2 l_i l_j; a straight edge has none (Lagrange's where all are curved).
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "itr/core/types.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
+
+namespace itr {
+
+template <int Dim>
+inline constexpr int kSimplexEdges = Dim*(Dim + 1) / 2;
+/// Which edges of a simplex are curved: a bit each, in the order of its nodes.
+using CurvedEdges = std::uint8_t;
+template <int Dim>
+inline constexpr CurvedEdges kAllCurved = (1 << kSimplexEdges<Dim>)-1;
+
+/// Calls f(edge, i, j) for the edges of a simplex, i < j.
+template <int Dim, typename F>
+void for_each_edge(const F& f) {
+  for (int i = 0, edge = 0; i <= Dim; ++i)
+    for (int j = i + 1; j <= Dim; ++j, ++edge) f(edge, i, j);
+}
+
+/// Values of the shape functions at barycentric coordinates l; zero at straight edges.
+template <int Dim>
+Vec<kQuadraticNodes<Dim>> quadratic_shapes(CurvedEdges curved, const std::array<double, Dim + 1>& l) {
+  Vec<kQuadraticNodes<Dim>> shapes = Vec<kQuadraticNodes<Dim>>::Zero();
+  for (int i = 0; i <= Dim; ++i) shapes[i] = l[i];
+  for_each_edge<Dim>([&](int edge, int i, int j) {
+    if (!(curved >> edge & 1)) return;
+    const double product = l[i] * l[j];
+    shapes[Dim + 1 + edge] = 4 * product;
+    shapes[i] -= 2 * product;
+    shapes[j] -= 2 * product;
+  });
+  return shapes;
+}
+
+/// Gradients of the shape functions as columns; `linear` has those of l as columns. Zero at straight edges.
+template <int Dim, int Rows>
+Eigen::Matrix<double, Rows, kQuadraticNodes<Dim>> quadratic_gradients(CurvedEdges curved,
+                                                                      const std::array<double, Dim + 1>& l,
+                                                                      const Eigen::Matrix<double, Rows, Dim + 1>& linear) {
+  Eigen::Matrix<double, Rows, kQuadraticNodes<Dim>> gradients = Eigen::Matrix<double, Rows, kQuadraticNodes<Dim>>::Zero();
+  gradients.template leftCols<Dim + 1>() = linear;
+  for_each_edge<Dim>([&](int edge, int i, int j) {
+    if (!(curved >> edge & 1)) return;
+    const Vec<Rows> of_product = l[i] * linear.col(j) + l[j] * linear.col(i);
+    gradients.col(Dim + 1 + edge) = 4 * of_product;
+    gradients.col(i) -= 2 * of_product;
+    gradients.col(j) -= 2 * of_product;
+  });
+  return gradients;
+}
+
+}  // namespace itr

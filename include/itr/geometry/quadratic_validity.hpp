@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// Where a quadratic simplex is positively oriented: everywhere in it, and all along a straight motion of its nodes. The
+// Jacobian matrix is linear in place and in time, so its determinant has a Bernstein form whose coefficients bound it
+// (Johnen, Remacle and Geuzaine 2013); subdivision decides where they do not.
+#pragma once
+
+#include "itr/core/types.hpp"
+
+namespace itr {
+
+/// Vertices first, then edges 01, 02, (03,) 12, (13, 23).
+template <int Dim>
+inline constexpr int kQuadraticNodes = (Dim + 1) * (Dim + 2) / 2;
+/// Positions of the nodes, as columns. A straight edge has its node at the mean of its ends.
+template <int Dim>
+using QuadraticCell = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
+
+/// Whether det dx/dxi > 0 everywhere in the closed simplex, proven in floating point; xi are coordinates on the unit
+/// simplex. False where it is not, and where the proof would take too many subdivisions.
+template <int Dim>
+bool is_positive_everywhere(const QuadraticCell<Dim>& x);
+
+/// A lower bound of det dx/dxi over the simplex, nearer to the minimum than `relative_tolerance` times it where few
+/// subdivisions suffice.
+template <int Dim>
+double min_jacobian_bound(const QuadraticCell<Dim>& x, double relative_tolerance);
+
+/// A t in [0, 1] such that x + s dx is proven positive everywhere for all s in [0, t]: 1, or nearer to the largest one than
+/// `tolerance` times it where few subdivisions suffice; 0 where x is not positive.
+template <int Dim>
+double max_positive_step(const QuadraticCell<Dim>& x, const QuadraticCell<Dim>& dx, double tolerance = 0.01);
+
+/// The same as is_positive_everywhere in exact arithmetic, with more subdivisions.
+template <int Dim>
+bool is_positive_everywhere_exact(const QuadraticCell<Dim>& x);
+
+}  // namespace itr

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#include "itr/fem/space.hpp"
+
+#include <algorithm>
+
+namespace itr {
+
+int Space::find(VertexId a, VertexId b) const {
+  const EdgeKey edge{std::min(a, b), std::max(a, b)};
+  const auto at = std::lower_bound(curved_.begin(), curved_.end(), edge);
+  return at != curved_.end() && *at == edge ? static_cast<int>(at - curved_.begin()) : kNone;
+}
+
+template <int Dim>
+Space space_of_orders(const Mesh<Dim>& mesh, const std::map<int, int>& order) {
+  const auto is_quadratic = [&](CellId c) {
+    const auto entry = order.find(mesh.body(c));
+    return entry != order.end() && entry->second == 2;
+  };
+  if (std::none_of(order.begin(), order.end(), [](const auto& entry) { return entry.second == 2; })) return {};
+  std::vector<EdgeKey> curved, straight;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    auto& edges = is_quadratic(c) ? curved : straight;
+    const auto vertices = ascending(mesh.cell(c));
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = i + 1; j <= Dim; ++j) edges.push_back({vertices[i], vertices[j]});
+  }
+  for (auto* edges : {&curved, &straight}) {
+    std::sort(edges->begin(), edges->end());
+    edges->erase(std::unique(edges->begin(), edges->end()), edges->end());
+  }
+  std::vector<EdgeKey> result;
+  std::set_difference(curved.begin(), curved.end(), straight.begin(), straight.end(), std::back_inserter(result));
+  return Space(std::move(result));
+}
+
+template <int Dim>
+bool is_all_curved(const Mesh<Dim>& mesh, const Space& space) {
+  return !space.is_linear() && mesh.edges() == space.curved_edges();
+}
+
+template <int Dim>
+std::vector<Vec<Dim>> node_rest_positions(const Mesh<Dim>& mesh, const Space& space) {
+  std::vector<Vec<Dim>> rest;
+  rest.reserve(num_nodes(mesh, space));
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  for (const auto& [a, b] : space.curved_edges()) rest.push_back((mesh.rest(a) + mesh.rest(b)) / 2);
+  return rest;
+}
+
+template <>
+void add_chord_facets<2>(const MeshTypes<2>::Facet& facet, const Space& space, int num_vertices,
+                         std::vector<MeshTypes<2>::Facet>& chords) {
+  const int curved = space.find(facet[0], facet[1]);
+  if (curved == kNone) return chords.push_back(facet);
+  chords.push_back({facet[0], num_vertices + curved});
+  chords.push_back({num_vertices + curved, facet[1]});
+}
+
+template <>
+void add_chord_facets<3>(const MeshTypes<3>::Facet& facet, const Space& space, int num_vertices,
+                         std::vector<MeshTypes<3>::Facet>& chords) {
+  std::array<int, 3> middle;  // of the edge from corner k to corner k + 1
+  int count = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int curved = space.find(facet[k], facet[(k + 1) % 3]);
+    middle[k] = curved == kNone ? kNone : num_vertices + curved;
+    count += curved != kNone;
+  }
+  if (count == 0) return chords.push_back(facet);
+  // Turned so that with one curved edge it is the first, and with two the straight one is the last.
+  int turn = 0;
+  while (count == 1 ? middle[turn] == kNone : count == 2 && middle[(turn + 2) % 3] != kNone) ++turn;
+  const auto corner = [&](int k) { return facet[(turn + k) % 3]; };
+  const int m01 = middle[turn], m12 = middle[(turn + 1) % 3], m20 = middle[(turn + 2) % 3];
+  if (count == 1) {
+    chords.push_back({corner(0), m01, corner(2)});
+    chords.push_back({m01, corner(1), corner(2)});
+    return;
+  }
+  chords.push_back({m01, corner(1), m12});
+  if (count == 2) {  // and the quadrilateral 0, m01, m12, 2
+    if (corner(0) < corner(2)) {
+      chords.push_back({corner(0), m01, m12});
+      chords.push_back({corner(0), m12, corner(2)});
+    } else {
+      chords.push_back({corner(0), m01, corner(2)});
+      chords.push_back({m01, m12, corner(2)});
+    }
+    return;
+  }
+  chords.push_back({corner(0), m01, m20});
+  chords.push_back({m20, m12, corner(2)});
+  chords.push_back({m01, m12, m20});
+}
+
+template Space space_of_orders<2>(const Mesh<2>&, const std::map<int, int>&);
+template Space space_of_orders<3>(const Mesh<3>&, const std::map<int, int>&);
+template bool is_all_curved<2>(const Mesh<2>&, const Space&);
+template bool is_all_curved<3>(const Mesh<3>&, const Space&);
+template std::vector<Vec<2>> node_rest_positions<2>(const Mesh<2>&, const Space&);
+template std::vector<Vec<3>> node_rest_positions<3>(const Mesh<3>&, const Space&);
+
+}  // namespace itr
