@@ -400,7 +400,6 @@ TEST_F(CollisionMeshScene, RefusesWhatItCannotBeCombinedWith) {
   expect_refusal("scene.json", "/contact/collision_mesh/mesh", "nothing", "a mesh file", with("mesh", nullptr));
   expect_refusal("scene.json", "/contact/collision_mesh/mesh", "no.ply", "a mesh file", with("mesh", "no.ply"));
   expect_refusal("scene.json", "/contact/collision_mesh/mesh", "star.msh", "a surface", with("mesh", "star.msh"));
-  expect_refusal("scene.json", "/space/discr_order", "2", "", {{"space", {{"discr_order", 2}}}});
   Json refined = scene();
   refined["geometry"][0]["n_refs"] = 1;
   expect_refusal("scene.json", "/geometry/0/n_refs", "1", "0: ", {{"geometry", refined["geometry"]}});

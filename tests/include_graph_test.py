@@ -34,6 +34,7 @@ OPTIONS = {
     "energy/damping_options.hpp",
     "energy/host_terms.hpp",
     "energy/material.hpp",
+    "fem/options.hpp",
     "linear/options.hpp",
     "newton/options.hpp",
     "output/options.hpp",

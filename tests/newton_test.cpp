@@ -52,7 +52,7 @@ NewtonOptions until_steps_below(double tolerance) {
 NewtonSummary minimize_by(linear::Solver& solver, const Energy& energy, VectorX& x, const NewtonOptions& options) {
   SparseSystem system(solver);
   const DofMap dofs = DofMap::from_held(std::vector<char>(x.size(), 0));
-  system.reset(dofs, 2, {}, 3);
+  system.reset(dofs, 2, {});
   Workspace workspace;
   return minimize(energy, x, dofs, VectorX(), system, options, workspace);
 }
@@ -179,7 +179,7 @@ TEST(Newton, LeavesASaddleWithinRoundOffToOneSide) {
       const auto solver = registry.create(name);
       SparseSystem system(*solver);
       const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
-      system.reset(dofs, 2, {}, 3);
+      system.reset(dofs, 2, {});
       VectorX x = VectorX::Constant(2, noise);
       NewtonOptions options;
       options.gradient_tolerance = options.first_gradient_tolerance = 0;

@@ -181,6 +181,7 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
                                                      "history_loss",
                                                      "indefinite",
                                                      "damped_steps",
+                                                     "refined_quadrature",
                                                      "seconds",
                                                      "processor_seconds",
                                                      "peak_rss_mb",

@@ -218,7 +218,7 @@ TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
   EXPECT_EQ(wrong_place({{"time", {{"time_steps", 3}}}}), "/time");
   EXPECT_EQ(wrong_place({{"time", {{"tend", 0}}}}), "/time/tend");
   EXPECT_EQ(wrong_place({{"time", {{"integrator", "Euler"}}}}), "/time/integrator");
-  EXPECT_EQ(wrong_place({{"space", {{"discr_order", 2}}}}), "/space/discr_order");
+  EXPECT_EQ(wrong_place({{"space", {{"discr_order", 3}}}}), "/space/discr_order");
   EXPECT_EQ(wrong_place({{"solver", {{"nonlinear", {{"norm_type", "L1"}}}}}}), "/solver/nonlinear/norm_type");
   EXPECT_EQ(wrong_place({{"time", {{"step_cuts", -1}}}}), "/time/step_cuts");
   EXPECT_EQ(wrong_place({{"input", {{"data", {{"state", "a.hdf5"}}}}}}), "/input/data/state");

@@ -40,7 +40,7 @@ void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const Po
   terms_ = &terms;
   velocity_reference_ = history.velocity_reference;
   renew_term(inertia_, terms.has_inertia, cells_, terms.materials, terms.mass, history.predictor);
-  renew_term(elastic_, true, cells_, terms.materials, terms.scaling);
+  renew_term(elastic_, true, cells_, terms.materials, terms.scaling, terms.quadrature_degree);
   renew_term(loads_, terms.loads.has_dead_loads(), cells_, terms.materials, terms.loads, terms.scaling);
   map_.reset();
   contact_of_cells_.reset();

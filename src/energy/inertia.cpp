@@ -28,9 +28,31 @@ void InertiaEnergy<Dim>::renew(const std::map<int, Material>& materials, MassKin
   mass_.reserve(cells_.elements.size());
   for (const auto& element : cells_.elements)
     mass_.push_back(mass_density<Dim>(materials.at(element.body), rest_barycenter(cells_, element)) * element.volume);
+  renew_curved(materials);
   predictor_ = predictor;
   residual_.resize(0);
   loss_ = 0;
+}
+
+template <int Dim>
+void InertiaEnergy<Dim>::renew_curved(const std::map<int, Material>& materials) {
+  matrices_.clear();
+  curved_mass_.clear();
+  std::map<CurvedEdges, std::size_t> matrix_of;
+  for (const auto& element : cells_.curved_elements) {
+    const Material& material = materials.at(element.body);
+    if (material.density_at) {
+      std::vector<double> density;
+      for (const auto& point : quadrature<Dim>(kMassDegree))
+        density.push_back(mass_density<Dim>(material, rest_position<Dim>(cells_, element, point.weights)));
+      curved_mass_.push_back({element.volume, matrices_.size()});
+      matrices_.push_back(quadratic_mass<Dim>(kind_, element.curved, density));
+      continue;
+    }
+    const auto [entry, is_new] = matrix_of.try_emplace(element.curved, matrices_.size());
+    if (is_new) matrices_.push_back(quadratic_mass<Dim>(kind_, element.curved));
+    curved_mass_.push_back({material.density * element.volume, entry->second});
+  }
 }
 
 template <int Dim>
@@ -57,6 +79,11 @@ double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
     }
     return part;
   });
+  for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
+    const auto& nodes = cells_.curved_elements[e].nodes;
+    const auto d = (at_nodes<Dim>(nodes, x) - at_nodes<Dim>(nodes, predictor)).eval();
+    sum += 0.5 * curved_mass_[e].mass * (d * matrices_[curved_mass_[e].matrix]).cwiseProduct(d).sum();
+  }
   if (residual_.size() > 0) sum += residual_.view().dot(x - predictor) + loss_;
   return sum;
 }
@@ -68,6 +95,11 @@ void InertiaEnergy<Dim>::add_mass_product(ConstVectorView x, VectorView y) const
   Eigen::Map<Rows> to(y.data(), y.size() / Dim, Dim);
   for (std::size_t e = 0; e < mass_.size(); ++e)
     ElementMass<Dim>(kind_, mass_[e]).add_product(cells_.elements[e].vertices, from, to);
+  for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
+    const auto& nodes = cells_.curved_elements[e].nodes;
+    const auto product = (curved_mass_[e].mass * at_nodes<Dim>(nodes, x) * matrices_[curved_mass_[e].matrix]).eval();
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k) y.template segment<Dim>(Dim * nodes[k]) += product.col(k);
+  }
 }
 
 template <int Dim>
@@ -87,6 +119,17 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
     for (int j = 0; j <= Dim; ++j)
       for (int c = 0; c < Dim; ++c) unit(Dim * i + c, Dim * j + c) = unit_mass.off + (i == j ? unit_mass.extra : 0);
   sink.add_multiples<Dim>(cells_, mass_, unit);
+  if (curved_mass_.empty()) return;
+  std::vector<double> factors;  // and what else the blocks follow from, beside their stencils
+  for (const CurvedMass& curved : curved_mass_) factors.push_back(curved.mass);
+  const std::span kept(matrices_.front().data(), static_cast<std::size_t>(matrices_.size() * matrices_.front().size()));
+  sink.add_curved_constant<Dim>(cells_, factors, kept, [&](std::size_t e, Mat<Dim * kQuadraticNodes<Dim>>& block) {
+    const Mat<kQuadraticNodes<Dim>>& mass = matrices_[curved_mass_[e].matrix];
+    block.setZero();
+    for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
+      for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
+        block.template block<Dim, Dim>(Dim * i, Dim * j).diagonal().setConstant(curved_mass_[e].mass * mass(i, j));
+  });
 }
 
 template <int Dim>
@@ -95,6 +138,11 @@ void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal) {
   for (const auto& element : cells.elements)
     for (const int v : element.vertices)
       diagonal.segment<Dim>(Dim * v).array() += 2 * element.volume / ((Dim + 1) * (Dim + 2));
+  for (const auto& element : cells.curved_elements) {
+    const auto mass = quadratic_mass<Dim>(MassKind::consistent, element.curved).diagonal().eval();
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+      diagonal.segment<Dim>(Dim * element.nodes[k]).array() += element.volume * mass[k];
+  }
   const auto used = (diagonal.array() > 0).count();
   const double mean = used > 0 ? diagonal.sum() / static_cast<double>(used) : 1;
   for (double& entry : diagonal)

@@ -2,9 +2,11 @@
 #include "itr/energy/load.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "itr/energy/elastic/laws.hpp"
+#include "itr/fem/quadrature.hpp"
 
 namespace itr {
 
@@ -19,6 +21,20 @@ void add_forces(const std::array<int, Vertices>& vertices, const CellSet<Dim>& c
     for (std::size_t k = 0; k < Vertices; ++k) X += (k == q ? kNear : kFar) * cells.rest[vertices[k]];
     const Vec<Dim> f = weight / Vertices * load(X);
     for (std::size_t k = 0; k < Vertices; ++k) forces.segment<Dim>(Dim * vertices[k]) += (k == q ? kNear : kFar) * f;
+  }
+}
+
+/// The same on a simplex with curved edges, by the rule for products of two quadratic functions.
+template <int Dim, int SimplexDim>
+void add_curved_forces(const std::array<int, kQuadraticNodes<SimplexDim>>& nodes, CurvedEdges curved,
+                       const CellSet<Dim>& cells, double measure, const std::function<double(const Vec<Dim>&)>& density,
+                       const std::function<Vec<Dim>(const Vec<Dim>&)>& load, VectorView forces) {
+  for (const auto& point : quadrature<SimplexDim>(kMassDegree)) {
+    Vec<Dim> X = Vec<Dim>::Zero();
+    for (int k = 0; k <= SimplexDim; ++k) X += point.weights[k] * cells.rest[nodes[k]];
+    const Vec<Dim> f = point.share * measure * density(X) * load(X);
+    const auto shapes = quadratic_shapes<SimplexDim>(curved, point.weights);
+    for (int k = 0; k < kQuadraticNodes<SimplexDim>; ++k) forces.segment<Dim>(Dim * nodes[k]) += shapes[k] * f;
   }
 }
 
@@ -48,6 +64,21 @@ void LoadEnergy<Dim>::renew(const std::map<int, Material>& materials, const Load
     for (const auto& element : cells_.elements) {
       const double density = mass_density<Dim>(materials.at(element.body), rest_barycenter(cells_, element));
       add_forces<Dim>(element.vertices, cells_, density * element.volume, loads.acceleration, forces);
+    }
+  if (loads.acceleration)
+    for (const auto& element : cells_.curved_elements) {
+      const auto density = [&](const Vec<Dim>& X) { return mass_density<Dim>(materials.at(element.body), X); };
+      add_curved_forces<Dim, Dim>(element.nodes, element.curved, cells_, element.volume, density, loads.acceleration,
+                                  forces);
+    }
+  for (const auto& facet : cells_.curved_facets)
+    for (const auto& [tag, traction] : loads.tractions) {
+      if (tag != facet.tag) continue;
+      std::array<int, Dim> corners;
+      std::copy_n(facet.nodes.begin(), Dim, corners.begin());
+      add_curved_forces<Dim, Dim - 1>(
+          facet.nodes, facet.curved, cells_, facet_area(corners, cells_), [](const Vec<Dim>&) { return 1.0; }, traction,
+          forces);
     }
   for (const auto& facet : cells_.facets)
     for (const auto& [tag, traction] : loads.tractions)

@@ -1,23 +1,57 @@
 // SPDX-License-Identifier: MIT
 #include "itr/fem/cell_set.hpp"
 
+#include <algorithm>
+
 namespace itr {
 
+namespace {
+
+/// Nodes of a simplex with these vertices, and which of its edges are curved.
 template <int Dim>
-CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra) {
+CurvedEdges find_nodes(const std::array<int, Dim + 1>& vertices, const Space& space, int num_vertices,
+                       std::array<int, kQuadraticNodes<Dim>>& nodes) {
+  CurvedEdges curved = 0;
+  std::copy(vertices.begin(), vertices.end(), nodes.begin());
+  for_each_edge<Dim>([&](int edge, int i, int j) {
+    const int at = space.find(vertices[i], vertices[j]);
+    if (at != kNone) curved = static_cast<CurvedEdges>(curved | 1 << edge);
+    nodes[Dim + 1 + edge] = at == kNone ? vertices[i] : num_vertices + at;
+  });
+  return curved;
+}
+
+}  // namespace
+
+template <int Dim>
+CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra, const Space& space) {
   CellSet<Dim> set;
-  set.num_vertices = mesh.vertex_slots() + static_cast<int>(extra.size());
-  for (int v = 0; v < mesh.vertex_slots(); ++v) set.rest.push_back(mesh.rest(v));
+  const int vertices = mesh.vertex_slots();
+  set.rest = node_rest_positions(mesh, space);
   set.rest.insert(set.rest.end(), extra.begin(), extra.end());
-  for (int c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c))
+  set.num_vertices = static_cast<int>(set.rest.size());
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    typename CellSet<Dim>::CurvedElement element{{}, 0, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), c};
+    if (!space.is_linear()) element.curved = find_nodes<Dim>(mesh.cell(c), space, vertices, element.nodes);
+    if (element.curved)
+      set.curved_elements.push_back(element);
+    else
       set.elements.push_back({mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)});
-  for (int f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) set.facets.push_back({mesh.facet(f), mesh.facet_tag(f)});
+  }
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+    if (!mesh.is_facet_alive(f)) continue;
+    typename CellSet<Dim>::CurvedFacet facet{{}, 0, mesh.facet_tag(f)};
+    if (!space.is_linear()) facet.curved = find_nodes<Dim - 1>(mesh.facet(f), space, vertices, facet.nodes);
+    if (facet.curved)
+      set.curved_facets.push_back(facet);
+    else
+      set.facets.push_back({mesh.facet(f), mesh.facet_tag(f)});
+  }
   return set;
 }
 
-template CellSet<2> whole_mesh(const Mesh<2>&, const std::vector<Vec<2>>&);
-template CellSet<3> whole_mesh(const Mesh<3>&, const std::vector<Vec<3>>&);
+template CellSet<2> whole_mesh(const Mesh<2>&, const std::vector<Vec<2>>&, const Space&);
+template CellSet<3> whole_mesh(const Mesh<3>&, const std::vector<Vec<3>>&, const Space&);
 
 }  // namespace itr

@@ -44,27 +44,27 @@ void DofMap::hold(const std::vector<char>& held) {
   for (std::size_t i = 0; i < held.size(); ++i) unknown[i] = held[i] ? kNone : num_unknowns++;
 }
 
-void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
+void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils) {
   place_.clear();
   changed_ = true;
-  if (dim == dim_ && stencil_size == stencil_size_ && dofs.unknown == unknown_ && stencils == stencils_) {
+  if (dim == dim_ && dofs.unknown == unknown_ && stencils == stencils_) {
     pattern_ = base_;
     return;
   }
-  kept_factors_.clear();
   pattern_ = {};
   gathers_.clear();
   unknown_ = dofs.unknown;
   stencils_ = std::move(stencils);
-  stencil_size_ = stencil_size;
+  kept_.assign(stencils_.size(), {});
   dim_ = dim;
   const std::size_t num_vertices = unknown_.size() / dim;
   std::vector<std::vector<int>> neighbors(num_vertices);  // and the vertex itself: without cells it still has a diagonal
   for (std::size_t v = 0; v < num_vertices; ++v) neighbors[v].push_back(static_cast<int>(v));
-  for (std::size_t s = 0; s < stencils_.size(); s += stencil_size)
-    for (int i = 0; i < stencil_size; ++i)
-      for (int j = 0; j < stencil_size; ++j)
-        if (stencils_[s + j] > stencils_[s + i]) neighbors[stencils_[s + i]].push_back(stencils_[s + j]);
+  for (const auto& [vertices, size] : stencils_)
+    for (std::size_t s = 0; s < vertices.size(); s += size)
+      for (int i = 0; i < size; ++i)
+        for (int j = 0; j < size; ++j)
+          if (vertices[s + j] > vertices[s + i]) neighbors[vertices[s + i]].push_back(vertices[s + j]);
   pattern_.order = dofs.num_unknowns;
   pattern_.column_starts.assign(1, 0);
   for (std::size_t v = 0; v < num_vertices; ++v) {
@@ -81,19 +81,20 @@ void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<int> stenci
     }
   }
   base_ = pattern_;
-  gathers_.resize((num_stencils() + kBatch - 1) / kBatch);
+  for (const Stencils& kind : stencils_) gathers_.emplace_back((kind.count() + kBatch - 1) / kBatch);
 }
 
-const SparseAssembler::Gather& SparseAssembler::gather(std::size_t batch) {
-  Gather& result = gathers_[batch];
+const SparseAssembler::Gather& SparseAssembler::gather(std::size_t kind, std::size_t batch) {
+  Gather& result = gathers_[kind][batch];
   if (!result.offset.empty()) return result;
-  const std::size_t first = batch * kBatch, count = std::min(kBatch, num_stencils() - first);
-  const int side = dim_ * stencil_size_;
+  const Stencils& stencils = stencils_[kind];
+  const std::size_t first = batch * kBatch, count = std::min(kBatch, stencils.count() - first);
+  const int side = dim_ * stencils.size;
   std::vector<Target> entries;
   entries.reserve(count * side * (side + 1) / 2);
   std::vector<int> unknown(side);
   for (std::size_t s = 0; s < count; ++s) {
-    const int* vertices = &stencils_[(first + s) * stencil_size_];
+    const int* vertices = &stencils.vertices[(first + s) * stencils.size];
     for (int i = 0; i < side; ++i) unknown[i] = unknown_[dim_ * vertices[i / dim_] + i % dim_];
     for (int j = 0; j < side; ++j) {
       if (unknown[j] == kNone) continue;
@@ -120,8 +121,8 @@ const SparseAssembler::Gather& SparseAssembler::gather(std::size_t batch) {
   return result;
 }
 
-void SparseAssembler::add_batch(std::size_t first, const double* blocks) {
-  const Gather& list = gather(first / kBatch);
+void SparseAssembler::add_batch(std::size_t kind, std::size_t first, const double* blocks) {
+  const Gather& list = gather(kind, first / kBatch);
   parallel_blocks(list.nonzero.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       double sum = 0;
@@ -131,11 +132,13 @@ void SparseAssembler::add_batch(std::size_t first, const double* blocks) {
   });
 }
 
-bool SparseAssembler::add_kept(std::span<const double> factors, std::span<const double> block) {
-  if (kept_factors_.empty() || !std::ranges::equal(kept_factors_, factors) || !std::ranges::equal(kept_block_, block))
+bool SparseAssembler::add_kept(std::size_t kind, std::span<const double> factors, std::span<const double> block) {
+  if (kind >= kept_.size()) return false;
+  const Kept& kept = kept_[kind];
+  if (kept.factors.empty() || !std::ranges::equal(kept.factors, factors) || !std::ranges::equal(kept.block, block))
     return false;
-  parallel_blocks(kept_.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) values_[place(static_cast<int>(k))] += kept_[k];
+  parallel_blocks(kept.sum.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) values_[place(static_cast<int>(k))] += kept.sum[k];
   });
   return true;
 }
@@ -145,13 +148,15 @@ void SparseAssembler::begin_keeping() {
   std::fill(values_.begin(), values_.end(), 0.0);
 }
 
-void SparseAssembler::end_keeping(std::span<const double> factors, std::span<const double> block) {
-  kept_factors_.assign(factors.begin(), factors.end());
-  kept_block_.assign(block.begin(), block.end());
-  kept_.resize(base_.row_indices.size());
-  for (std::size_t k = 0; k < kept_.size(); ++k) kept_[k] = values_[place(static_cast<int>(k))];
+void SparseAssembler::end_keeping(std::size_t kind, std::span<const double> factors, std::span<const double> block) {
+  kept_.resize(std::max(kept_.size(), kind + 1));
+  Kept& kept = kept_[kind];
+  kept.factors.assign(factors.begin(), factors.end());
+  kept.block.assign(block.begin(), block.end());
+  kept.sum.resize(base_.row_indices.size());
+  for (std::size_t k = 0; k < kept.sum.size(); ++k) kept.sum[k] = values_[place(static_cast<int>(k))];
   values_ = others_;
-  add_kept(factors, block);
+  add_kept(kind, factors, block);
 }
 
 void SparseAssembler::begin() {
@@ -263,24 +268,9 @@ void HessianSink::add_motion(std::span<const int> vertices, const double* block)
   }
 }
 
-template <int Dim>
-void HessianSink::add_batch(const CellSet<Dim>& cells, std::size_t first, std::span<const Mat<Dim*(Dim + 1)>> blocks) {
-  const bool is_base = sparse_ && sparse_->num_stencils() == cells.elements.size();
-  if (is_base) sparse_->add_batch(first, blocks.data()->data());
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const auto& vertices = cells.elements[first + i].vertices;
-    if (!is_base)
-      add<Dim>(vertices, blocks[i].data());
-    else if (motion_)
-      add_motion<Dim>(vertices, blocks[i].data());
-    else
-      break;
-  }
-}
-
 template void HessianSink::add<2>(std::span<const int>, const double*);
 template void HessianSink::add<3>(std::span<const int>, const double*);
-template void HessianSink::add_batch<2>(const CellSet<2>&, std::size_t, std::span<const Mat<6>>);
-template void HessianSink::add_batch<3>(const CellSet<3>&, std::size_t, std::span<const Mat<12>>);
+template void HessianSink::add_motion<2>(std::span<const int>, const double*);
+template void HessianSink::add_motion<3>(std::span<const int>, const double*);
 
 }  // namespace itr

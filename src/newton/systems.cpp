@@ -38,11 +38,11 @@ double DenseSystem::diagonal_scale() const {
   return scale;
 }
 
-void SparseSystem::reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size) {
+void SparseSystem::reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils) {
   dim_ = dim;
   pattern_changed_ = true;
   may_keep_order_ = false;
-  assembler_.reset(dofs, dim, std::move(stencils), stencil_size);
+  assembler_.reset(dofs, dim, std::move(stencils));
 }
 
 void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,

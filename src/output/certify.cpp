@@ -10,12 +10,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
+#include "itr/fem/quadratic.hpp"
+#include "itr/fem/space.hpp"
 #include "itr/geometry/bvh.hpp"
 #include "itr/geometry/closed_surface.hpp"
 #include "itr/geometry/predicates.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr::output {
 
@@ -83,6 +87,25 @@ std::vector<std::array<int, Dim>> boundary_facets(const std::vector<std::int64_t
   return once;
 }
 
+Space space_of(const StoredFrame& frame) {
+  std::vector<EdgeKey> curved;
+  for (std::size_t i = 0; i < frame.curved_edges.size(); i += 2)
+    curved.push_back({static_cast<int>(frame.curved_edges[i]), static_cast<int>(frame.curved_edges[i + 1])});
+  return Space(std::move(curved));
+}
+
+int num_vertices(const StoredFrame& frame) {
+  return static_cast<int>(frame.x.size()) / frame.dim - static_cast<int>(frame.curved_edges.size()) / 2;
+}
+
+/// The surface through all nodes.
+template <int Dim>
+std::vector<std::array<int, Dim>> chords(const std::vector<std::array<int, Dim>>& facets, const Space& space, int vertices) {
+  std::vector<std::array<int, Dim>> result;
+  for (const auto& facet : facets) add_chord_facets<Dim>(facet, space, vertices, result);
+  return result;
+}
+
 /// Facets as what can intersect, where orientation does not matter.
 void add_facets(const std::vector<std::array<int, 2>>& facets, Surface<2>& surface) { surface.edges = facets; }
 
@@ -122,7 +145,8 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
     surface.own_facets = facets_of(surface);
   } else {
     surface.x = points<Dim>(frame.x);
-    auto facets = surface.own_facets = boundary_facets<Dim>(frame.simplices);
+    surface.own_facets = chords<Dim>(boundary_facets<Dim>(frame.simplices), space_of(frame), num_vertices(frame));
+    auto facets = surface.own_facets;
     for (auto& facet : facets) std::sort(facet.begin(), facet.end());
     add_facets(facets, surface);
   }
@@ -134,14 +158,38 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
 int orientation_of(const std::array<Vec<2>, 3>& p) { return orientation(p[0], p[1], p[2]); }
 int orientation_of(const std::array<Vec<3>, 4>& p) { return orientation(p[0], p[1], p[2], p[3]); }
 
+/// Positions of all nodes of a cell with a curved edge; nothing where all of its edges are straight.
+template <int Dim>
+std::optional<QuadraticCell<Dim>> curved_cell(const StoredFrame& frame, std::size_t c, const std::vector<Vec<Dim>>& x,
+                                              const Space& space) {
+  if (space.is_linear()) return std::nullopt;
+  const std::int64_t* cell = &frame.simplices[(Dim + 1) * c];
+  const int vertices = num_vertices(frame);
+  QuadraticCell<Dim> nodes;
+  bool is_curved = false;
+  for (int k = 0; k <= Dim; ++k) nodes.col(k) = x[cell[k]];
+  for_each_edge<Dim>([&](int edge, int i, int j) {
+    const int at = space.find(static_cast<int>(cell[i]), static_cast<int>(cell[j]));
+    is_curved = is_curved || at != kNone;
+    nodes.col(Dim + 1 + edge) = at != kNone ? x[vertices + at] : Vec<Dim>((x[cell[i]] + x[cell[j]]) / 2);
+  });
+  return is_curved ? std::optional(nodes) : std::nullopt;
+}
+
 /// `what`: of the cells, where `coordinates` say that their vertices are.
 template <int Dim>
 void check_cells(const StoredFrame& frame, const std::vector<double>& coordinates, const char* what, const std::string& name,
                  std::vector<std::string>& violations) {
   const std::vector<Vec<Dim>> x = points<Dim>(coordinates);
+  const Space space = space_of(frame);
   for (std::size_t c = 0; c < frame.simplices.size() / (Dim + 1); ++c) {
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = x[frame.simplices[(Dim + 1) * c + k]];
+    if (const auto nodes = curved_cell<Dim>(frame, c, x, space)) {
+      if (!is_positive_everywhere_exact<Dim>(*nodes))
+        violations.push_back(fmt::format("{}: {}cell {} is not positive everywhere", name, what, c));
+      continue;
+    }
     const int sign = orientation_of(p);
     if (sign <= 0)
       violations.push_back(fmt::format("{}: {}cell {} is {}", name, what, c, sign < 0 ? "inverted" : "degenerate"));

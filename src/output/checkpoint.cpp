@@ -43,10 +43,22 @@ std::vector<int> read_ints(const hdf5::File& file, const std::string& name) {
   return {table.values.begin(), table.values.end()};
 }
 
+Space read_space(const fs::path& path, const hdf5::File& file) {
+  if (!file.contains("/mesh/curved_edges")) return {};
+  auto edges = read_rows<2>(path, file, "/mesh/curved_edges");
+  if (!std::is_sorted(edges.begin(), edges.end()))
+    throw InputError({path.string(), "/mesh/curved_edges", "rows in another order", "ascending rows"});
+  return Space(std::move(edges));
+}
+
+/// `space`: its nodes come after the vertices.
 template <int Dim>
-Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
+Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& space) {
   const auto rest = file.read_doubles("/mesh/rest");
-  std::vector<Vec<Dim>> points(rest.values.size() / Dim);
+  if (rest.rows() < static_cast<std::size_t>(space.num_curved()))
+    throw InputError({path.string(), "/mesh/rest", std::to_string(rest.rows()) + " rows",
+                      "more than curved edges, " + std::to_string(space.num_curved())});
+  std::vector<Vec<Dim>> points(rest.rows() - space.num_curved());
   for (std::size_t v = 0; v < points.size(); ++v) points[v] = Eigen::Map<const Vec<Dim>>(rest.values.data() + Dim * v);
   auto cells = read_rows<Dim + 1>(path, file, "/mesh/simplices");
   auto body = read_ints(file, "/mesh/body");
@@ -219,6 +231,9 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   write_fields("v", state.history.v);
   write_fields("a", state.history.a);
   if (state.deviation.size() > 0) write_fields("deviation", {state.deviation});
+  if (!state.quadrature.empty())
+    file.write("/checkpoint/quadrature_levels", std::vector<std::int64_t>(state.quadrature.begin(), state.quadrature.end()),
+               0);
   const BarrierStiffness& stiffness = state.stiffness;
   file.write("/checkpoint/barrier_stiffness",
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
@@ -260,7 +275,8 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   Checkpoint<Dim> checkpoint;
   State<Dim>& state = checkpoint.state;
   try {
-    state.mesh = read_mesh<Dim>(saved.file, file);
+    state.space = read_space(saved.file, file);
+    state.mesh = read_mesh<Dim>(saved.file, file, state.space);
   } catch (const InputError& error) {
     throw InputError({saved.file.string(), "/mesh " + error.parts().place, error.parts().found, error.parts().expected});
   }
@@ -268,6 +284,14 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.v = read_fields(file, "v");
   state.history.a = read_fields(file, "a");
   if (auto deviation = read_fields(file, "deviation"); !deviation.empty()) state.deviation = std::move(deviation[0]);
+  if (file.contains("/checkpoint/quadrature_levels")) {
+    const auto levels = read_ints(file, "/checkpoint/quadrature_levels");
+    for (const int level : levels)
+      if (level < 0 || level > kMostClosedLevel)
+        throw InputError({saved.file.string(), "/checkpoint/quadrature_levels", std::to_string(level),
+                          "0 to " + std::to_string(kMostClosedLevel)});
+    state.quadrature.assign(levels.begin(), levels.end());
+  }
   const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;
   if (stiffness.size() != 3)
     throw InputError(

@@ -7,6 +7,7 @@
 
 #include "itr/core/check.hpp"
 #include "itr/core/error.hpp"
+#include "itr/fem/quadratic.hpp"
 
 namespace itr::output {
 
@@ -14,12 +15,15 @@ namespace {
 
 using Integers = std::vector<std::int64_t>;
 
+const Space kLinear;
+
 std::span<const double> as_span(ConstVectorView v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 
 template <int Dim>
-VectorX rest_positions(const Mesh<Dim>& mesh) {
-  VectorX rest(Dim * mesh.vertex_slots());
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) vertex_of<Dim>(rest, v) = mesh.rest(v);
+VectorX rest_positions(const Mesh<Dim>& mesh, const Space& space) {
+  const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
+  VectorX rest(Dim * static_cast<Eigen::Index>(nodes.size()));
+  for (std::size_t i = 0; i < nodes.size(); ++i) vertex_of<Dim>(rest, static_cast<int>(i)) = nodes[i];
   return rest;
 }
 
@@ -51,6 +55,30 @@ void write_index_rows(hdf5::File& file, const std::string& name, const std::vect
   Integers flat;
   for (const auto& row : rows) flat.insert(flat.end(), row.begin(), row.end());
   file.write(name, flat, N);
+}
+
+/// Edges of a simplex as XDMF and VTK order the nodes on them.
+template <int Dim>
+constexpr auto drawn_edges() {
+  if constexpr (Dim == 2)
+    return std::array<std::array<int, 2>, 3>{{{0, 1}, {1, 2}, {0, 2}}};
+  else
+    return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
+}
+
+/// The curved edges; where each edge of each cell is curved also the cells with all their nodes, as XDMF draws them.
+template <int Dim>
+void write_space(hdf5::File& file, const Mesh<Dim>& mesh, const Space& space) {
+  if (space.is_linear()) return;
+  write_index_rows(file, "/mesh/curved_edges", space.curved_edges());
+  if (!is_all_curved(mesh, space)) return;
+  Integers nodes;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    const auto& cell = mesh.cell(c);
+    nodes.insert(nodes.end(), cell.begin(), cell.end());
+    for (const auto& [i, j] : drawn_edges<Dim>()) nodes.push_back(mesh.vertex_slots() + space.find(cell[i], cell[j]));
+  }
+  file.write("/mesh/quadratic_cells", nodes, kQuadraticNodes<Dim>);
 }
 
 template <int Dim>
@@ -111,12 +139,14 @@ template <int Dim>
 void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t) {
   const Mesh<Dim>& mesh = frame.mesh;
   ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots() && mesh.num_cells() == mesh.cell_slots(), "mesh is not compact");
-  ITR_CHECK(frame.x.size() == Dim * mesh.num_vertices(), frame.x.size(), mesh.num_vertices());
-  const VectorX rest = rest_positions(mesh);
+  const Space& space = frame.space ? *frame.space : kLinear;
+  ITR_CHECK(frame.x.size() == Dim * num_nodes(mesh, space), frame.x.size(), mesh.num_vertices(), space.num_curved());
+  const VectorX rest = rest_positions(mesh, space);
   const VectorX u = frame.x - rest;
   file.write_attribute("step", static_cast<std::int64_t>(step));
   file.write_attribute("t", t);
   write_mesh(file, mesh, rest);
+  write_space(file, mesh, space);
   write_values(file, "/fields/x", as_span(frame.x), Dim, "m");
   write_values(file, "/fields/u", as_span(u), Dim, "m");
   write_values(file, "/fields/v", as_span(frame.v), Dim, "m/s");
@@ -135,6 +165,7 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
                                     static_cast<std::size_t>(mesh.num_vertices()),
                                     static_cast<std::size_t>(mesh.num_cells()),
                                     static_cast<std::size_t>(mesh.num_facets()),
+                                    static_cast<std::size_t>(frame.space ? frame.space->num_curved() : 0),
                                     size(frame.v),
                                     size(frame.elastic_density),
                                     size(frame.obstacle_x),
@@ -208,7 +239,8 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
   const hdf5::Shape x = file.shape("/fields/x"), body = file.shape("/mesh/body");
-  FrameSizes sizes{file.read_double_attribute("t"), x.columns, static_cast<int>(x.rows), static_cast<int>(body.rows), {}};
+  FrameSizes sizes{file.read_double_attribute("t"),        x.columns, static_cast<int>(x.rows), static_cast<int>(body.rows),
+                   file.contains("/mesh/quadratic_cells"), {}};
   for (const char* name : kAskedFields)
     if (file.contains(std::string("/fields/") + name)) sizes.asked.push_back(name);
   return sizes;
@@ -240,6 +272,13 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   require_shape(path, "/mesh/rest", rest.columns, frame.dim);
   if (rest.rows() != x.rows())
     throw InputError({path.string(), "/mesh/rest", std::to_string(rest.rows()) + " rows", std::to_string(x.rows())});
+  if (file.contains("/mesh/curved_edges")) {
+    frame.curved_edges = read_indices(path, file, "/mesh/curved_edges", 2, x.rows());
+    if (frame.curved_edges.size() / 2 > x.rows())
+      throw InputError({path.string(), "/mesh/curved_edges", std::to_string(frame.curved_edges.size() / 2) + " rows",
+                        "fewer than nodes, " + std::to_string(x.rows())});
+  }
+  require_range(path, "/mesh/simplices", frame.simplices, x.rows() - frame.curved_edges.size() / 2);
   frame.rest = std::move(rest.values);
   frame.x = std::move(x.values);
   frame.obstacles = read_surface(path, file, "/obstacles", frame.dim);

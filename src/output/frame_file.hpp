@@ -48,9 +48,10 @@ constexpr const char* kAskedFields[] = {"contact_force", "friction_force", "reac
 
 /// What an index says of a frame.
 struct FrameSizes {
-  double t = 0;  ///< [s]
-  int dim = 0, vertices = 0, cells = 0;
-  std::vector<std::string> asked;  ///< names of kAskedFields that it has
+  double t = 0;                          ///< [s]
+  int dim = 0, vertices = 0, cells = 0;  ///< vertices: with the nodes of curved edges
+  bool is_quadratic = false;             ///< every edge is curved
+  std::vector<std::string> asked;        ///< names of kAskedFields that it has
 };
 FrameSizes read_frame_sizes(const std::filesystem::path& path);
 
@@ -66,11 +67,13 @@ struct StoredSurface {
 /// What a certificate or a comparison needs of a stored frame. Indices are checked: all within range.
 struct StoredFrame {
   int dim = 0;
-  std::vector<double> rest;             ///< n x dim, row-major [m]
+  std::vector<double> rest;             ///< n x dim, row-major [m]: vertices, then nodes of curved edges
   std::vector<double> x;                ///< n x dim, row-major [m]
   std::vector<std::int64_t> simplices;  ///< m x (dim + 1)
-  std::vector<std::int64_t> body;       ///< m, ids
-  std::vector<std::int64_t> surface;    ///< k x dim, facets of the boundary
+  /// e x 2, ascending: the last e nodes are theirs, in this order; empty: all edges are straight.
+  std::vector<std::int64_t> curved_edges;
+  std::vector<std::int64_t> body;     ///< m, ids
+  std::vector<std::int64_t> surface;  ///< k x dim, facets of the boundary
   StoredSurface obstacles;
   bool has_proxy = false;
   StoredSurface proxy;  ///< what touches in place of the boundary

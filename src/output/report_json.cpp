@@ -68,12 +68,12 @@ std::string common_members(const StepReport& r) {
       R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"factorizations":{},"linear_solves":{},)"
       R"("reused_factors":{},"linear_iterations":{},"energy":{},"energy_before_remesh":{},)"
       R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"bound_by_dhat":{},"min_distance":{},"min_volume_ratio":{},"history_loss":{},)"
-      R"("indefinite":{},"damped_steps":{},"seconds":{},"processor_seconds":{},"peak_rss_mb":{})",
+      R"("indefinite":{},"damped_steps":{},"refined_quadrature":{},"seconds":{},"processor_seconds":{},"peak_rss_mb":{})",
       r.vertices, r.elements, r.unknowns, r.newton_iterations, r.factorizations, r.linear_solves, r.reused_factors,
       r.linear_iterations, energy_json(r.energy), number(r.energy_before_remesh), count_json(r.splits),
       count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), r.bound_by_dhat, number(r.min_distance),
-      number(r.min_volume_ratio), number(r.history_loss), r.indefinite, r.damped_steps, seconds_json(r.seconds),
-      number(r.processor_seconds), number(r.peak_rss_mb));
+      number(r.min_volume_ratio), number(r.history_loss), r.indefinite, r.damped_steps, r.refined_quadrature,
+      seconds_json(r.seconds), number(r.processor_seconds), number(r.peak_rss_mb));
 }
 
 }  // namespace

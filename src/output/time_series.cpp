@@ -62,9 +62,13 @@ std::string grid(const FrameEntry& entry) {
   const std::string cells = std::to_string(entry.cells);
   std::string text =
       fmt::format("      <Grid Name=\"{}\" GridType=\"Uniform\">\n        <Time Value=\"{}\"/>\n", entry.file, entry.t);
+  const char* linear = is_plane ? "Triangle" : "Tetrahedron";
+  const char* quadratic = is_plane ? "Triangle_6" : "Tetrahedron_10";
+  const int nodes = entry.is_quadratic ? (entry.dim + 1) * (entry.dim + 2) / 2 : entry.dim + 1;
   text += fmt::format("        <Topology TopologyType=\"{}\" NumberOfElements=\"{}\">{}</Topology>\n",
-                      is_plane ? "Triangle" : "Tetrahedron", cells,
-                      data_item(entry, "/mesh/simplices", fmt::format("{} {}", cells, entry.dim + 1), "Int"));
+                      entry.is_quadratic ? quadratic : linear, cells,
+                      data_item(entry, entry.is_quadratic ? "/mesh/quadratic_cells" : "/mesh/simplices",
+                                fmt::format("{} {}", cells, nodes), "Int"));
   text += fmt::format("        <Geometry GeometryType=\"{}\">{}</Geometry>\n", is_plane ? "XY" : "XYZ",
                       data_item(entry, "/fields/x", fmt::format("{} {}", entry.vertices, entry.dim), "Float"));
   text += vector_field(entry, "u", "/fields/u") + vector_field(entry, "v", "/fields/v");

@@ -14,7 +14,8 @@ struct FrameEntry {
   std::string file;  ///< relative to the run's folder: "frames/000000.h5"
   double t = 0;      ///< [s]
   int dim = 0;
-  int vertices = 0, cells = 0;
+  int vertices = 0, cells = 0;     ///< vertices: with the nodes of curved edges
+  bool is_quadratic = false;       ///< all edges are curved, and drawn so
   std::vector<std::string> asked;  ///< fields that not every frame has, see kAskedFields
 };
 

@@ -59,7 +59,8 @@ struct Writer::Impl {
     for (const fs::path& path : stored_frames(directory)) {
       const FrameSizes sizes = read_frame_sizes(path);
       last_stored = step_of_frame(path);
-      series.append({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.asked});
+      series.append(
+          {frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.is_quadratic, sizes.asked});
     }
     last_checkpoint = seconds_now();
   }
@@ -107,7 +108,9 @@ struct Writer::Impl {
       if (!frame.asked->von_mises.empty()) asked.push_back("von_mises");
       if (!frame.asked->stress.empty()) asked.push_back("stress");
     }
-    series.add({frame_name(step), t, Dim, frame.mesh.num_vertices(), frame.mesh.num_cells(), std::move(asked)});
+    const int nodes = static_cast<int>(frame.x.size()) / Dim;
+    const bool is_quadratic = frame.space && is_all_curved(frame.mesh, *frame.space);
+    series.add({frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, std::move(asked)});
   }
 
   /// What a checkpoint relies on has to be on the disk before it.
@@ -138,8 +141,8 @@ Writer::Writer(fs::path directory, OutputOptions options, RunInfo info, const Ch
     : impl_(std::make_unique<Impl>(std::move(directory), options, std::move(info), checkpoint.state.step,
                                    checkpoint.log_bytes)) {
   impl_->totals.restore(checkpoint.totals);
-  const Mesh<Dim>& mesh = checkpoint.state.mesh;
-  impl_->norms = displacement_norms(mesh, checkpoint.state.history.x[0].head(Dim * mesh.num_vertices()));
+  const State<Dim>& state = checkpoint.state;
+  impl_->norms = displacement_norms(state.mesh, state.history.x[0], state.space);
 }
 
 Writer::~Writer() = default;
@@ -153,7 +156,7 @@ void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const 
   const std::size_t length = impl_->steps.size();
   impl_->steps.append(step_json(report));
   impl_->totals.add(report);
-  impl_->norms = displacement_norms(frame.mesh, frame.x);
+  impl_->norms = displacement_norms(frame.mesh, frame.x, frame.space ? *frame.space : Space());
   if (!checkpoint && !impl_->is_due(report.step)) return;
   try {
     impl_->store(frame, report.step, report.t, checkpoint);

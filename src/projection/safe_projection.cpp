@@ -237,7 +237,7 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   energy.add(barriers.volume);
   if (barriers.distance) energy.add(barriers.distance);
   SparseSystem sparse(solver);
-  sparse.reset(dofs, Dim, stencil_vertices(problem.cells), Dim + 1);
+  sparse.reset(dofs, Dim, element_stencils(problem.cells));
   NewtonOptions options;
   options.max_iterations = 100;
   options.gradient_tolerance = options.first_gradient_tolerance = 0;

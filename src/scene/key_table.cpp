@@ -56,7 +56,7 @@ const std::vector<Kind>& kinds() {
       {"positive or adaptive", check_stiffness,
        any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "adaptive"}}), "number > 0 or \"adaptive\""},
       {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }, {{"const", "consistent"}}, "\"consistent\""},
-      {"order", nullptr, any_of({{"const", 1}}, {{"type", {"array", "object"}}}), "1"},
+      {"order", nullptr, any_of({{"enum", {1, 2}}}, {{"type", {"array", "object"}}}), "1, 2 or a list"},
       {"list", nullptr, Json::object(), "list"},  // of what its rows with `*` say
       {"object", nullptr, {{"type", "object"}}, "object"},
       {"", nullptr, Json::object(), "object"}};

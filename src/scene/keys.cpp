@@ -259,9 +259,14 @@ constexpr Key kKeys[] = {
     {"/solver/advanced/characteristic_force_density", read, "positive", "1e4", "N/m^3", "scale of grad_norm_tol"},
     {"/solver/advanced/cache_size", ignored, "", "", "", kScheme},
 
-    {"/space/discr_order", read, "order", "1", "", "linear elements: the only ones"},
+    {"/space/discr_order", read, "order", "1", "",
+     "1: linear elements, 2: quadratic ones (curved edges); or a list by body, [{\"id\": 2, \"order\": 2}], bodies that are "
+     "not "
+     "listed are linear. An edge has the least order of the cells at it; 2 not with remeshing yet"},
+    {"/space/advanced/quadrature_order", read, "integer", "-1", "",
+     "degree of elasticity's quadrature on quadratic elements, 1 to 5; -1: 2, and the mass' is exact"},
     {"/space/advanced/bc_method", only, "", "\"sample\"", "", "conditions hold at the vertices"},
-    {"/space/advanced/{quadrature_order,mass_quadrature_order,n_boundary_samples}", only, "", "-1", "", "exact"},
+    {"/space/advanced/{mass_quadrature_order,n_boundary_samples}", only, "", "-1", "", "exact"},
 
     {"/space/remesh/enabled", read, "boolean", "false", "", "in-timestep remeshing"},
     {"/space/remesh/type", read, "physics|sizing_field", "\"physics\"", "",

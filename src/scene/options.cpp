@@ -326,11 +326,31 @@ FieldOptions read_fields(const Node& root) {
 
 bool read_lump_mass(const Node& root) { return root["solver"]["advanced"]["lump_mass_matrix"].boolean(false); }
 
-void check_space(const Node& root) {
+std::map<int, int> read_order(const Node& root, const std::set<int>& bodies) {
+  const auto order_of = [](const Node& node) {
+    const int order = node.integer_at_least(1, 1);
+    if (order > 2) node.fail("1 or 2: higher orders are not supported");
+    return order;
+  };
+  std::map<int, int> order;
   for (const Node& entry : root["space"]["discr_order"].items()) {
-    const Node order = entry.json().is_object() ? entry["order"] : entry;
-    if (order.integer_at_least(1, 1) != 1) order.fail("1: higher orders are not supported yet");
+    if (!entry.json().is_object()) {
+      for (const int body : bodies) order[body] = order_of(entry);
+      continue;
+    }
+    const int id = entry["id"].integer(0);
+    if (!bodies.contains(id)) entry["id"].fail("the id of a body");
+    order[id] = order_of(entry["order"]);
   }
+  return order;
+}
+
+int read_quadrature_degree(const Node& root) {
+  const Node node = root["space"]["advanced"]["quadrature_order"];
+  const int degree = node.integer(-1);
+  if (degree == -1) return kElasticDegree;
+  if (degree < 1 || degree > kMostQuadratureDegree) node.fail("1 to 5, or -1");
+  return degree;
 }
 
 }  // namespace itr::scene

@@ -2,6 +2,8 @@
 // The parts of a scene that are plain options: time, contact, solver, remeshing, output.
 #pragma once
 
+#include <map>
+#include <set>
 #include "itr/scene/scene.hpp"
 #include "node.hpp"
 
@@ -27,6 +29,8 @@ std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& ti
 /// Which fields output/paraview/options asks for.
 FieldOptions read_fields(const Node& root);
 bool read_lump_mass(const Node& root);
-void check_space(const Node& root);
+/// Orders of elements by body, of those that `bodies` names.
+std::map<int, int> read_order(const Node& root, const std::set<int>& bodies);
+int read_quadrature_degree(const Node& root);
 
 }  // namespace itr::scene

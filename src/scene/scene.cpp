@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 
 #include "check_keys.hpp"
 #include "collision_mesh.hpp"
@@ -30,10 +31,13 @@ double shortest_surface_edge(const Setup<Dim>& setup) {
     return shortest;
   }
   const Mesh<Dim>& mesh = setup.mesh;
+  double body_edge = std::numeric_limits<double>::infinity();
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < i; ++j)
-        shortest = std::min(shortest, (mesh.rest(mesh.facet(f)[i]) - mesh.rest(mesh.facet(f)[j])).norm());
+        body_edge = std::min(body_edge, (mesh.rest(mesh.facet(f)[i]) - mesh.rest(mesh.facet(f)[j])).norm());
+  const bool has_curved = std::any_of(setup.order.begin(), setup.order.end(), [](const auto& o) { return o.second == 2; });
+  shortest = std::min(shortest, has_curved ? body_edge / 2 : body_edge);
   return shortest;
 }
 
@@ -45,6 +49,13 @@ double body_diagonal(const Mesh<Dim>& mesh) {
   return bounding_box<Dim>(points).diagonal().norm();
 }
 
+template <int Dim>
+std::set<int> body_ids(const Mesh<Dim>& mesh) {
+  std::set<int> ids;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) ids.insert(mesh.body(c));
+  return ids;
+}
+
 /// All but geometry and the contact that comes with it.
 template <int Dim>
 void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup, std::vector<std::string>& warnings) {
@@ -54,7 +65,8 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
   setup.damping = read_damping(root, setup.time);
   setup.fields = read_fields(root);
   setup.lump_mass = read_lump_mass(root);
-  check_space(root);
+  setup.order = read_order(root, body_ids(setup.mesh));
+  setup.quadrature_degree = read_quadrature_degree(root);
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, std::move(obstacles), setup, warnings);

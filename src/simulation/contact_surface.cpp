@@ -22,19 +22,31 @@ CollisionSurface with_obstacles(std::vector<std::array<int, 2>> edges, std::vect
   return make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
 }
 
+template <int Dim>
+std::vector<typename Mesh<Dim>::Facet> boundary_chords(const Mesh<Dim>& mesh, const Space& space) {
+  std::vector<typename Mesh<Dim>::Facet> chords;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.is_facet_alive(f)) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
+  return chords;
+}
+
 }  // namespace
 
 template <int Dim>
-CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
-  std::vector<Vec<Dim>> rest;
-  rest.reserve(mesh.vertex_slots() + obstacles.rest.size());
-  for (int v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space) {
+  std::vector<Vec<Dim>> points(num_nodes(mesh, space));
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = vertex_of<Dim>(x, static_cast<int>(i));
+  return {std::move(points), boundary_chords(mesh, space)};
+}
+
+template <int Dim>
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space) {
+  std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
+  const auto chords = boundary_chords(mesh, space);
   std::vector<std::array<int, 2>> edges;
   std::vector<std::array<int, 3>> triangles;
   std::vector<char> counts(rest.size(), 0);
-  for (int f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
-    const auto& facet = mesh.facet(f);
+  for (const auto& facet : chords) {
     for (const int v : facet) counts[v] = 1;
     if constexpr (Dim == 2)
       edges.push_back(facet);
@@ -46,9 +58,9 @@ CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& 
 
 /// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
 template <int Dim>
-std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
+std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space) {
   const CollisionProxy<Dim>& proxy = *setup.proxy;
-  const int vertices = mesh.vertex_slots(), own = static_cast<int>(proxy.rest.size());
+  const int vertices = num_nodes(mesh, space), own = static_cast<int>(proxy.rest.size());
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
   std::vector<Eigen::Triplet<double>> entries;
   VectorX offset = VectorX::Zero(Dim * (own + obstacles));
@@ -65,22 +77,24 @@ std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, con
 }
 
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
-  if (!setup.proxy) return {collision_surface(mesh, setup.obstacles), nullptr};
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space) {
+  if (!setup.proxy) return {collision_surface(mesh, setup.obstacles, space), nullptr};
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   std::vector<int> points(proxy.rest.size());
   std::iota(points.begin(), points.end(), 0);
   std::vector<char> counts(proxy.rest.size(), 1);
   return {
       with_obstacles<Dim>(proxy.edges, proxy.triangles, std::move(points), proxy.rest, std::move(counts), setup.obstacles),
-      proxy_map(setup, mesh)};
+      proxy_map(setup, mesh, space)};
 }
 
-template CollisionSurface collision_surface(const Mesh<2>&, const Obstacles<2>&);
-template std::shared_ptr<const VertexMap<2>> proxy_map(const StepSetup<2>&, const Mesh<2>&);
-template ContactSurface<2> contact_surface(const StepSetup<2>&, const Mesh<2>&);
-template CollisionSurface collision_surface(const Mesh<3>&, const Obstacles<3>&);
-template std::shared_ptr<const VertexMap<3>> proxy_map(const StepSetup<3>&, const Mesh<3>&);
-template ContactSurface<3> contact_surface(const StepSetup<3>&, const Mesh<3>&);
+#define ITR_INSTANTIATE(Dim)                                                                                       \
+  template ClosedSurface<Dim> body_boundary(const Mesh<Dim>&, ConstVectorView, const Space&);                      \
+  template CollisionSurface collision_surface(const Mesh<Dim>&, const Obstacles<Dim>&, const Space&);              \
+  template std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&); \
+  template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr

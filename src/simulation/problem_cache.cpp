@@ -8,22 +8,23 @@
 namespace itr {
 
 template <int Dim>
-MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh)
-    : cells(whole_mesh(mesh, setup.obstacles.rest)), diagonal(rest_diagonal(mesh)) {
-  if (setup.contact.enabled) surface = contact_surface(setup, mesh);
+MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space)
+    : space(space), cells(whole_mesh(mesh, setup.obstacles.rest, space)), diagonal(rest_diagonal(mesh)) {
+  if (setup.contact.enabled) surface = contact_surface(setup, mesh, space);
 }
 
 template <int Dim>
-bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) const {
+bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& asked) const {
   const auto& obstacles = setup.obstacles.rest;
-  const int bodies = mesh.vertex_slots();
-  if (cells.num_vertices != bodies + static_cast<int>(obstacles.size()) ||
-      static_cast<int>(cells.elements.size()) != mesh.cell_slots() ||
-      static_cast<int>(cells.facets.size()) != mesh.facet_slots())
+  const int bodies = num_nodes(mesh, space);
+  if (space != asked || cells.num_vertices != bodies + static_cast<int>(obstacles.size()) ||
+      static_cast<int>(cells.elements.size() + cells.curved_elements.size()) != mesh.cell_slots() ||
+      static_cast<int>(cells.facets.size() + cells.curved_facets.size()) != mesh.facet_slots())
     return false;
-  for (VertexId v = 0; v < bodies; ++v)
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
     if (cells.rest[v] != mesh.rest(v)) return false;
   if (!std::equal(obstacles.begin(), obstacles.end(), cells.rest.begin() + bodies)) return false;
+  if (!space.is_linear()) return has_cells_of(mesh);
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
     if (cells.elements[c].vertices != mesh.cell(c) || cells.elements[c].body != mesh.body(c)) return false;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
@@ -31,9 +32,24 @@ bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) c
   return true;
 }
 
+/// The same for cells and facets in a space with curved edges: made anew, since both kinds of each share the mesh's order.
 template <int Dim>
-std::shared_ptr<MeshScope<Dim>> ProblemCache<Dim>::scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
-  if (!scope || !scope->is_of(setup, mesh)) scope = std::make_shared<MeshScope<Dim>>(setup, mesh);
+bool MeshScope<Dim>::has_cells_of(const Mesh<Dim>& mesh) const {
+  const CellSet<Dim> other = whole_mesh(mesh, {}, space);
+  const auto same = [](const auto& a, const auto& b, auto... members) {
+    return std::ranges::equal(a, b, [&](const auto& p, const auto& q) { return ((p.*members == q.*members) && ...); });
+  };
+  using Cells = CellSet<Dim>;
+  return same(cells.elements, other.elements, &Cells::Element::vertices, &Cells::Element::body) &&
+         same(cells.curved_elements, other.curved_elements, &Cells::CurvedElement::nodes, &Cells::CurvedElement::body) &&
+         same(cells.facets, other.facets, &Cells::BoundaryFacet::vertices, &Cells::BoundaryFacet::tag) &&
+         same(cells.curved_facets, other.curved_facets, &Cells::CurvedFacet::nodes, &Cells::CurvedFacet::tag);
+}
+
+template <int Dim>
+std::shared_ptr<MeshScope<Dim>> ProblemCache<Dim>::scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh,
+                                                            const Space& space) {
+  if (!scope || !scope->is_of(setup, mesh, space)) scope = std::make_shared<MeshScope<Dim>>(setup, mesh, space);
   return scope;
 }
 

@@ -32,6 +32,14 @@ void refuse_unsupported(const Setup<Dim>& setup) {
   };
   if (setup.remesh.enabled && setup.proxy)
     refuse("/contact/collision_mesh", "a collision mesh where the bodies' mesh changes");
+  if (const bool is_quadratic =
+          std::any_of(setup.order.begin(), setup.order.end(), [](const auto& e) { return e.second == 2; });
+      is_quadratic) {
+    if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing of quadratic elements");
+    if (setup.proxy) refuse("/contact/collision_mesh", "a collision mesh of quadratic elements");
+    if (!setup.pressure.empty()) refuse("/boundary_conditions/pressure_boundary", "pressure on quadratic elements");
+    if (!setup.terms.empty() || setup.follower.forces) refuse("terms", "terms of a program's own on quadratic elements");
+  }
   for (const auto& [body, material] : setup.materials)
     if (setup.remesh.enabled && material.density_at)
       refuse("/materials", "a density that varies in space (id " + std::to_string(body) + ") where the mesh changes");
@@ -45,16 +53,16 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
     throw InputError({"", "initial state", what + (" inside of a body, at " + describe(p)), "surfaces that do not touch"});
   };
   const VectorX& x = state.history.x[0];
-  const ClosedSurface<Dim> boundary = boundary_at(state.mesh, x);
+  const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.space);
   for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
-  for (Eigen::Index i = Dim * state.mesh.vertex_slots(); i < x.size(); i += Dim)
+  for (Eigen::Index i = Dim * num_nodes(state.mesh, state.space); i < x.size(); i += Dim)
     if (const Vec<Dim> p = x.segment<Dim>(i); boundary.touches(p) || boundary.winding(p) != 0) refuse("an obstacle", p);
 }
 
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!setup.contact.enabled) return;
-  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh);
+  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.space);
   const CollisionSurface& surface = contact.surface;
   const VectorX x = contact.positions(state.history.x[0]);
   const auto corners = [&](const auto& primitive) {
@@ -77,13 +85,20 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
 
 /// Value of the first condition that names the body of one of the vertex's cells; the last cell's body wins.
 template <int Dim>
-VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<Dim>& mesh, int obstacle_vertices) {
-  VectorX field = VectorX::Zero(Dim * (mesh.vertex_slots() + obstacle_vertices));
+VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<Dim>& mesh, const Space& space,
+               int obstacle_vertices) {
+  VectorX field = VectorX::Zero(Dim * (num_nodes(mesh, space) + obstacle_vertices));
   if (conditions.empty()) return field;
+  const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
   for (int c = 0; c < mesh.cell_slots(); ++c)
     for (const auto& condition : conditions) {
       if (condition.body != mesh.body(c)) continue;
-      for (const int v : mesh.cell(c)) field.segment<Dim>(Dim * v) = condition.value(mesh.rest(v), 0);
+      const auto& cell = mesh.cell(c);
+      const auto set = [&](int node) { field.segment<Dim>(Dim * node) = condition.value(rest[node], 0); };
+      for (const int v : cell) set(v);
+      for_each_edge<Dim>([&](int, int i, int j) {
+        if (const int edge = space.find(cell[i], cell[j]); edge != kNone) set(mesh.vertex_slots() + edge);
+      });
       break;
     }
   return field;
@@ -94,15 +109,17 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   State<Dim> state;
   state.mesh = setup.mesh;
   state.mesh.compact();
+  state.space = space_of_orders(state.mesh, setup.order);
   state.t = setup.time.t0;
-  const int obstacles = static_cast<int>(setup.obstacles.rest.size()), bodies = state.mesh.vertex_slots();
-  VectorX x = sample(setup.initial_displacement, state.mesh, obstacles);
-  for (int v = 0; v < bodies; ++v) x.segment<Dim>(Dim * v) += state.mesh.rest(v);
+  const int obstacles = static_cast<int>(setup.obstacles.rest.size());
+  const std::vector<Vec<Dim>> rest = node_rest_positions(state.mesh, state.space);
+  const auto sampled = [&](const auto& conditions) { return sample(conditions, state.mesh, state.space, obstacles); };
+  VectorX x = sampled(setup.initial_displacement);
+  for (std::size_t v = 0; v < rest.size(); ++v) vertex_of<Dim>(x, static_cast<int>(v)) += rest[v];
   x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);
   state.history.x = {std::move(x)};
-  state.history.v = {sample(setup.initial_velocity, state.mesh, obstacles)};
-  if (setup.time.integrator == Integrator::newmark)
-    state.history.a = {sample(setup.initial_acceleration, state.mesh, obstacles)};
+  state.history.v = {sampled(setup.initial_velocity)};
+  if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
   return state;
 }
 
@@ -155,7 +172,8 @@ struct Simulation<Dim>::Impl {
   /// Those of a state that no step of this simulation led to.
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
-    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *cache, state->stiffness);
+    StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
+                             state->quadrature);
     forces = problem.forces(state->history.x[0]);
     forces.reaction.setZero();
   }
@@ -198,7 +216,8 @@ StepReport Simulation<Dim>::initial_report() const {
   report.t = state.t;
   report.vertices = state.mesh.num_vertices();
   report.elements = state.mesh.num_cells();
-  StepProblem<Dim> problem(impl_->setup, state.mesh, state.history, state.t, *impl_->cache, state.stiffness);
+  StepProblem<Dim> problem(impl_->setup, state.mesh, state.space, state.history, state.t, *impl_->cache, state.stiffness,
+                           state.quadrature);
   report.unknowns = problem.dofs().num_unknowns;
   report.energy = problem.report(state.history.x[0]);
   report.energy_before_remesh = report.energy.total;
@@ -269,11 +288,17 @@ void Simulation<Dim>::restore(State<Dim> state) {
   const auto refuse = [](const std::string& place, auto found, auto expected) {
     throw InputError({"", place, std::to_string(found), std::to_string(expected)});
   };
-  const auto size = static_cast<Eigen::Index>(Dim * (state.mesh.vertex_slots() + impl_->setup.obstacles.rest.size()));
+  if (Space expected = space_of_orders(state.mesh, impl_->setup.order); state.space != expected)
+    refuse("curved edges of a saved state", state.space.num_curved(), expected.num_curved());
+  const auto size =
+      static_cast<Eigen::Index>(Dim * (num_nodes(state.mesh, state.space) + impl_->setup.obstacles.rest.size()));
   const History& history = state.history;
   for (const auto* fields : {&history.x, &history.v, &history.a})
     for (const VectorX& field : *fields)
       if (field.size() != size) refuse("length of a saved field", field.size(), size);
+  const std::size_t curved = whole_mesh(state.mesh, {}, state.space).curved_elements.size();
+  if (!state.quadrature.empty() && state.quadrature.size() != curved)
+    refuse("saved levels of quadrature", state.quadrature.size(), curved);
   if (history.x.empty() || history.v.empty()) refuse("saved states", history.x.size(), 1);
   if (history.a.empty() != impl_->state->history.a.empty())
     refuse("saved accelerations", history.a.size(), impl_->state->history.a.size());
@@ -314,24 +339,63 @@ std::string Simulation<Dim>::solver_name_in_use() const {
   return std::string(impl_->solver->name_in_use());
 }
 
+namespace {
+
+/// Where output samples a cell: its mean has the weights `share`.
+template <int Dim>
+struct CellPoint {
+  Mat<Dim> F;
+  Vec<Dim> X;
+  double share;
+};
+
+/// f(material, points) for each cell in the mesh's order: one point where F is constant, those of the elastic energy's
+/// quadrature in cells with curved edges.
+template <int Dim, typename Function>
+void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Setup<Dim>& setup, const Function& f) {
+  const auto& rule = quadrature<Dim>(setup.quadrature_degree);
+  std::vector<CellPoint<Dim>> points;
+  auto straight = cells.elements.begin();
+  auto curved = cells.curved_elements.begin();
+  const std::size_t count = cells.elements.size() + cells.curved_elements.size();
+  for (std::size_t c = 0; c < count; ++c) {
+    points.clear();
+    if (curved == cells.curved_elements.end() || static_cast<std::size_t>(curved->cell) != c) {
+      points.push_back({deformation_gradient<Dim>(*straight, x), rest_barycenter(cells, *straight), 1});
+      f(setup.materials.at(straight->body), std::span<const CellPoint<Dim>>(points));
+      ++straight;
+      continue;
+    }
+    for (const auto& point : rule)
+      points.push_back({at_nodes<Dim>(curved->nodes, x) * shape_gradients<Dim>(*curved, point.weights).transpose(),
+                        rest_position<Dim>(cells, *curved, point.weights), point.share});
+    f(setup.materials.at(curved->body), std::span<const CellPoint<Dim>>(points));
+    ++curved;
+  }
+}
+
+}  // namespace
+
 template <int Dim>
 typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
   const State<Dim>& state = *impl_->state;
-  const int bodies = state.mesh.vertex_slots();
+  const int bodies = num_nodes(state.mesh, state.space);
   FrameData data;
   data.x = state.history.x[0].head(Dim * bodies);
   data.v = state.history.v[0].head(Dim * bodies);
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
-  for (const auto& element : cells.elements) {
-    const Material& material = impl_->setup.materials.at(element.body);
-    data.elastic_density.push_back(elastic_density<Dim>(deformation_gradient<Dim>(element, data.x),
-                                                        elastic_moduli<Dim>(material, rest_barycenter(cells, element))));
-  }
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+  for_each_cell_in_order<Dim>(cells, data.x, impl_->setup,
+                              [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+                                double mean = 0;
+                                for (const auto& [F, X, share] : points)
+                                  mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
+                                data.elastic_density.push_back(mean);
+                              });
   add_asked(cells, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   if (impl_->setup.proxy) {
-    const VectorX y = proxy_map(impl_->setup, state.mesh)->positions(all);
+    const VectorX y = proxy_map(impl_->setup, state.mesh, state.space)->positions(all);
     for (std::size_t v = 0; v < impl_->setup.proxy->rest.size(); ++v)
       data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
   }
@@ -368,15 +432,19 @@ void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, FrameData& data) cons
   AskedFields& asked = data.asked;
   asked.forces = impl_->forces;
   if (options.von_mises || options.stress)
-    for (const auto& element : cells.elements) {
-      const Material& material = impl_->setup.materials.at(element.body);
-      const Mat<Dim> F = deformation_gradient<Dim>(element, data.x);
-      const Vec<Dim> X = rest_barycenter(cells, element);
-      const Mat<Dim> cauchy = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
-      if (options.von_mises) asked.von_mises.push_back(von_mises<Dim>(cauchy, out_of_plane_stress<Dim>(material, F, X)));
-      for (int i = 0; options.stress && i < Dim; ++i)
-        for (int j = 0; j < Dim; ++j) asked.stress.push_back(cauchy(i, j));
-    }
+    for_each_cell_in_order<Dim>(
+        cells, data.x, impl_->setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+          Mat<Dim> cauchy = Mat<Dim>::Zero();
+          double equivalent = 0;
+          for (const auto& [F, X, share] : points) {
+            const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
+            cauchy += share * here;
+            equivalent += share * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
+          }
+          if (options.von_mises) asked.von_mises.push_back(equivalent);
+          for (int i = 0; options.stress && i < Dim; ++i)
+            for (int j = 0; j < Dim; ++j) asked.stress.push_back(cauchy(i, j));
+        });
   if (!options.kinetic_energy && !options.momentum) return;
   VectorX product = VectorX::Zero(data.v.size());
   InertiaEnergy<Dim>(cells, impl_->setup.materials, impl_->setup.lump_mass ? MassKind::lumped : MassKind::consistent,

@@ -53,9 +53,9 @@ std::string reason_of(const NewtonSummary& summary) {
 /// That of the present positions and of those that the history holds.
 template <int Dim>
 std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
-  std::string violation = find_violation(setup, state.mesh, x);
+  std::string violation = find_violation(setup, state.mesh, x, state.space);
   for (const VectorX& past : state.history.x)
-    if (violation.empty()) violation = find_violation(setup, state.mesh, past);
+    if (violation.empty()) violation = find_violation(setup, state.mesh, past, state.space);
   return violation;
 }
 
@@ -101,7 +101,8 @@ class StepAttempt {
  private:
   void make_problem() {
     const ScopedTimer timer(report_.seconds.assembly);
-    problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.history, next_.t, tools_.cache, next_.stiffness);
+    problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.space, next_.history, next_.t, tools_.cache,
+                                                  next_.stiffness, next_.quadrature);
   }
 
   bool has_inertia() const { return !setup_.time.quasistatic && !setup_.time.is_static; }
@@ -173,11 +174,15 @@ class StepAttempt {
     }
     next_.factor = tools_.solver.record();
     next_.stiffness = problem_->stiffness();
+    next_.quadrature = problem_->quadrature_levels();
+    report_.refined_quadrature = static_cast<int>(
+        std::count_if(next_.quadrature.begin(), next_.quadrature.end(), [](int level) { return level > 0; }));
     if (start) {
       *start = next_;
       start->step = before_.step;
       start->t = before_.t;
       start->stiffness = before_.stiffness;
+      start->quadrature = before_.quadrature;
       start->created_energy = before_.created_energy;
       start->history.damp_next = before_.history.damp_next;
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh

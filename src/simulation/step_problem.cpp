@@ -11,6 +11,7 @@
 #include "diagnosis.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/energy/follower.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr {
 
@@ -22,6 +23,7 @@ constexpr int kPressureRounds = 50;          ///< most, where pressure has no po
 constexpr int kPatience = 30;                ///< rounds without a smaller residual after which lagging will not converge
 constexpr double kSameState = 1e-3;          ///< of a solve's step tolerance: states nearer than that are one
 constexpr double kEnergyResolution = 1e-14;  ///< of moduli times volume
+constexpr double kVolumeRatioTolerance = 1e-3;  ///< relative, of the bound that is reported
 
 /// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
 bool has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance, double diagonal) {
@@ -44,16 +46,17 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
 }
 
 template <int Dim>
-HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t) {
-  const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(setup.obstacles.rest.size());
+HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space) {
+  const int bodies = num_nodes(mesh, space), total = bodies + static_cast<int>(setup.obstacles.rest.size());
   HeldDofs<Dim> result{std::vector<char>(Dim * total, 0), VectorX::Zero(Dim * total)};
   std::vector<const DirichletCondition<Dim>*> by_tag;
   for (const auto& condition : setup.dirichlet)
     if (std::none_of(by_tag.begin(), by_tag.end(), [&](const auto* c) { return c->tag == condition.tag; }))
       by_tag.push_back(&condition);
   std::sort(by_tag.begin(), by_tag.end(), [](const auto* a, const auto* b) { return a->tag < b->tag; });
+  const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
   const auto hold = [&](int v, const DirichletCondition<Dim>& condition) {
-    const Vec<Dim> target = mesh.rest(v) + condition.displacement(mesh.rest(v), t);
+    const Vec<Dim> target = rest[v] + condition.displacement(rest[v], t);
     for (int c = 0; c < Dim; ++c) {
       if (!condition.components[c]) continue;
       result.held[Dim * v + c] = 1;
@@ -62,10 +65,15 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
   };
   for (const auto* condition : by_tag)
     for (int f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
-        for (const int v : mesh.facet(f)) hold(v, *condition);
+      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag) {
+        const auto& facet = mesh.facet(f);
+        for (const int v : facet) hold(v, *condition);
+        for_each_edge<Dim - 1>([&](int, int i, int j) {
+          if (const int edge = space.find(facet[i], facet[j]); edge != kNone) hold(mesh.vertex_slots() + edge, *condition);
+        });
+      }
   for (const auto* condition : by_tag)
-    for (VertexId v = 0; v < bodies; ++v)
+    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
       if (mesh.vertex_tag(v) != kNoTag && mesh.vertex_tag(v) == condition->tag) hold(v, *condition);
   for (int o = 0; o < total - bodies; ++o) {
     const Vec<Dim>& X = setup.obstacles.rest[o];
@@ -92,6 +100,7 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
           .loads = loads_at(setup, t),
           .has_inertia = !setup.time.quasistatic && !setup.time.is_static,
           .mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+          .quadrature_degree = setup.quadrature_degree,
           .scaling = integrator.scaling(history),
           .contact = setup.contact,
           .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
@@ -102,15 +111,16 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
 }
 
 template <int Dim>
-StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
-                              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness)
+StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history,
+                              double t, ProblemCache<Dim>& cache, const BarrierStiffness& stiffness,
+                              const QuadratureLevels& levels)
     : setup_(setup),
       terms_(potential_terms(setup, history, t)),
-      scope_(cache.scope_of(setup, mesh)),
+      scope_(cache.scope_of(setup, mesh, space)),
       cells_(scope_->cells),
       surface_(scope_->surface),
       workspace_(scope_->workspace),
-      held_(held_dofs(setup, mesh, t)),
+      held_(held_dofs(setup, mesh, t, space)),
       dofs_(DofMap::from_held(held_.held)),
       potential_(terms_, cells_,
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
@@ -128,7 +138,8 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_.surface, setup.contact, average_mass(), terms_.scaling,
                                                            surface_.map.get());
   }
-  system_.reset(dofs_, Dim, stencil_vertices(cells_), Dim + 1);
+  potential_.elastic()->set_quadrature_levels(levels);
+  system_.reset(dofs_, Dim, element_stencils(cells_));
 }
 
 /// Sum of all entries of the mass matrix by its number of rows, obstacles' included; 1 where there is none [kg].
@@ -162,6 +173,7 @@ template <int Dim>
 VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
   const VectorX start = with_held_at_targets(x);
   const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
+                    (cells_.curved_elements.empty() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
                     potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
   return free ? start : x;
 }
@@ -189,16 +201,21 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
     potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
     extras.way_to_start = std::move(way_to_start);
   }
+  if (!cells_.curved_elements.empty()) {
+    potential_.elastic()->refine_quadrature(x);
+    extras.after_step = [&](const VectorX& iterate) { return potential_.elastic()->refine_quadrature(iterate); };
+  }
   if (!adaptive_)
     return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
   initialize_stiffness(x);
   x = start_of_solve(x);
   bool is_first = true;
   extras.after_step = [&](const VectorX& iterate) {
-    if (std::exchange(is_first, false) || setup_.time.is_static) return false;
+    const bool refined = potential_.elastic()->refine_quadrature(iterate);
+    if (std::exchange(is_first, false) || setup_.time.is_static) return refined;
     const bool changed = adaptive_->update(surface_.positions(iterate), stiffness_, workspace_);
     if (changed) potential_.contact()->set_stiffness(stiffness_.value);
-    return changed;
+    return changed || refined;
   };
   return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
 }
@@ -396,7 +413,7 @@ double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
 template <int Dim>
 double StepProblem<Dim>::energy_resolution() const {
   double stiffness = 0;
-  for (const auto& element : cells_.elements) stiffness += element.volume * setup_.materials.at(element.body).youngs_modulus;
+  for_each_cell(cells_, [&](int body, double volume) { stiffness += volume * setup_.materials.at(body).youngs_modulus; });
   return kEnergyResolution * stiffness;
 }
 
@@ -410,15 +427,18 @@ template <int Dim>
 double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   double least = std::numeric_limits<double>::infinity();
   for (const auto& element : cells.elements) least = std::min(least, deformation_gradient<Dim>(element, x).determinant());
+  for (const auto& element : cells.curved_elements)
+    least = std::min(least, min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kVolumeRatioTolerance) *
+                                element.inverse_edges.determinant());
   return least;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                        \
-  template class StepProblem<Dim>;                                                                  \
-  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                 \
-  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double); \
-  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);           \
-  template double rest_diagonal<Dim>(const Mesh<Dim>&);                                             \
+#define ITR_INSTANTIATE(Dim)                                                                            \
+  template class StepProblem<Dim>;                                                                      \
+  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                     \
+  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double);     \
+  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double, const Space&); \
+  template double rest_diagonal<Dim>(const Mesh<Dim>&);                                                 \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -138,7 +138,7 @@ void Assembly(benchmark::State& state) {
   sum.add(std::make_shared<InertiaEnergy<3>>(cube.cells, kMaterials, MassKind::consistent, cube.x));
   const DofMap dofs = DofMap::from_held(std::vector<char>(cube.x.size(), 0));
   SparseAssembler assembler;
-  assembler.reset(dofs, 3, stencil_vertices(cube.cells), 4);
+  assembler.reset(dofs, 3, element_stencils(cube.cells));
   const ThreadLimit limit(static_cast<int>(state.range(0)));
   Workspace workspace;
   for (auto _ : state) {

@@ -70,7 +70,7 @@ template <int Dim>
 SparseAssembler hessian(const Energy& energy, const CellSet<Dim>& cells, const VectorX& x, Workspace& workspace) {
   const DofMap dofs = DofMap::from_held(std::vector<char>(Dim * cells.num_vertices, 0));
   SparseAssembler assembler;
-  assembler.reset(dofs, Dim, stencil_vertices(cells), Dim + 1);
+  assembler.reset(dofs, Dim, element_stencils(cells));
   assembler.begin();
   HessianSink sink(dofs, assembler);
   energy.add_hessian(x, PsdProjection::none, sink, workspace);

@@ -29,7 +29,8 @@ struct PotentialTerms {
   Loads<Dim> loads;                   ///< at the end of the step
   bool has_inertia = true;
   MassKind mass = MassKind::consistent;
-  double scaling = 1;  ///< alpha h^2 [s^2]
+  int quadrature_degree = kElasticDegree;  ///< of elasticity on curved elements
+  double scaling = 1;                      ///< alpha h^2 [s^2]
   ContactOptions contact;
   std::vector<DampingOptions> damping;  ///< empty in statics
   double velocity_rate = 1;             ///< of VelocityRule [1/s]

@@ -35,7 +35,15 @@ class InertiaEnergy final : public Energy {
 
  private:
   const CellSet<Dim>& cells_;
-  std::vector<double> mass_;  ///< rho |e| by element
+  struct CurvedMass {
+    double mass;  ///< rho |e|
+    std::size_t matrix;
+  };
+  void renew_curved(const std::map<int, Material>& materials);
+
+  std::vector<double> mass_;                         ///< rho |e| by element
+  std::vector<Mat<kQuadraticNodes<Dim>>> matrices_;  ///< by unit mass: one a set of curved edges, or one an element
+  std::vector<CurvedMass> curved_mass_;
   MassKind kind_ = MassKind::consistent;
   KeptVector predictor_;
   KeptVector residual_;  ///< empty: none

@@ -34,23 +34,25 @@ class SparseAssembler {
   /// Stencils that are gathered at a time: what their blocks add to an entry is listed once, and summed entry by entry.
   static constexpr std::size_t kBatch = 512;
 
-  /// Base pattern: all pairs of unknowns of the vertices of one stencil. `stencils` holds `stencil_size` vertices each. What
-  /// was found out about the same stencils before is used again; what blocks added to their pattern is forgotten.
-  void reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size);
+  /// Base pattern: all pairs of unknowns of the vertices of one stencil, of any kind. What was found out about the same
+  /// stencils before is used again; what blocks added to their pattern is forgotten.
+  void reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils);
   void begin();
   /// Adds to entry (row, column), row >= column.
   void add(int row, int column, double value);
-  std::size_t num_stencils() const { return stencils_.size() / stencil_size_; }
-  /// Adds the blocks (column-major, side dim * stencil_size) of base stencils from `first`, a multiple of kBatch, to the end
-  /// of its batch.
-  void add_batch(std::size_t first, const double* blocks);
+  /// Of base stencils of one kind.
+  std::size_t num_stencils(std::size_t kind) const { return kind < stencils_.size() ? stencils_[kind].count() : 0; }
+  /// Adds the blocks (column-major, side dim * size) of base stencils of one kind from `first`, a multiple of kBatch, to the
+  /// end of its batch.
+  void add_batch(std::size_t kind, std::size_t first, const double* blocks);
 
-  /// A part of the matrix that is the same each time, `block` times a factor for each base stencil: adds the sum that was
-  /// kept, if it is of these and the stencils are still those that it was kept with.
-  bool add_kept(std::span<const double> factors, std::span<const double> block);
+  /// A part of the matrix that is the same each time, for each base stencil of one kind a factor times a block that follows
+  /// from the stencil and `block`: adds the sum that was kept, if it is of these and the stencils are still those that it
+  /// was kept with.
+  bool add_kept(std::size_t kind, std::span<const double> factors, std::span<const double> block);
   /// What is added between the two (to entries of the base pattern only) is kept as the sum of these.
   void begin_keeping();
-  void end_keeping(std::span<const double> factors, std::span<const double> block);
+  void end_keeping(std::size_t kind, std::span<const double> factors, std::span<const double> block);
 
   /// Takes in entries that the pattern did not have. Returns whether the pattern changed since the last call.
   bool finish();
@@ -66,7 +68,11 @@ class SparseAssembler {
   struct Gather {
     std::vector<int> nonzero, offset, source;
   };
-  const Gather& gather(std::size_t batch);
+  /// What was kept, by the base's entries, and what it is the sum of; without factors: nothing is kept.
+  struct Kept {
+    std::vector<double> sum, factors, block;
+  };
+  const Gather& gather(std::size_t kind, std::size_t batch);
   int place(int base_nonzero) const { return place_.empty() ? base_nonzero : place_[base_nonzero]; }
 
   linear::SparsityPattern pattern_;
@@ -76,13 +82,13 @@ class SparseAssembler {
   bool changed_ = false;
 
   std::vector<int> unknown_;  ///< per dof
-  std::vector<int> stencils_;
-  int stencil_size_ = 1, dim_ = 1;
+  std::vector<Stencils> stencils_;
+  int dim_ = 1;
   linear::SparsityPattern base_;
-  std::vector<int> place_;  ///< of the base's entries in the present pattern; empty: the same
-  std::vector<Gather> gathers_;
-  std::vector<double> kept_, others_;              ///< by the base's entries; what was there before begin_keeping
-  std::vector<double> kept_factors_, kept_block_;  ///< empty: nothing is kept
+  std::vector<int> place_;                    ///< of the base's entries in the present pattern; empty: the same
+  std::vector<std::vector<Gather>> gathers_;  ///< by kind
+  std::vector<Kept> kept_;                    ///< by kind
+  std::vector<double> others_;                ///< what was there before begin_keeping
 };
 
 /// A step that held dofs are made to take, and what it does to the Newton system of the unknowns.
@@ -115,16 +121,51 @@ class HessianSink {
   template <int Dim>
   void add(std::span<const int> vertices, const double* block);
 
-  /// Adds a block for each element; `fill(e, block)` may be called at the same time for several of them.
+  /// Adds a block for each straight element; `fill(e, block)` may be called at the same time for several of them.
   template <int Dim, typename Fill>
   void add_elements(const CellSet<Dim>& cells, const Fill& fill) {
-    using Block = Mat<Dim*(Dim + 1)>;
-    const std::size_t n = cells.elements.size();
+    add_blocks<Dim>(kStraight, cells.elements, fill);
+  }
+  /// The same for each curved element.
+  template <int Dim, typename Fill>
+  void add_curved_elements(const CellSet<Dim>& cells, const Fill& fill) {
+    if (!cells.curved_elements.empty()) add_blocks<Dim>(kCurved, cells.curved_elements, fill);
+  }
+  /// One block times a factor for each straight element: a sum that is kept, and made anew only where it changes.
+  template <int Dim>
+  void add_multiples(const CellSet<Dim>& cells, const std::vector<double>& factors, const Mat<Dim*(Dim + 1)>& block) {
+    const auto fill = [&](std::size_t e, Mat<Dim*(Dim + 1)>& multiple) { multiple = factors[e] * block; };
+    add_constant<Dim>(kStraight, cells.elements, factors, {block.data(), static_cast<std::size_t>(block.size())}, fill);
+  }
+  /// Blocks of curved elements that follow from `factors` and `block` alone, kept in the same way.
+  template <int Dim, typename Fill>
+  void add_curved_constant(const CellSet<Dim>& cells, std::span<const double> factors, std::span<const double> block,
+                           const Fill& fill) {
+    if (!cells.curved_elements.empty()) add_constant<Dim>(kCurved, cells.curved_elements, factors, block, fill);
+  }
+
+ private:
+  static constexpr std::size_t kElementsPerTask = 64;
+
+  template <int Dim>
+  static const auto& nodes_of(const typename CellSet<Dim>::Element& element) {
+    return element.vertices;
+  }
+  template <int Dim>
+  static const auto& nodes_of(const typename CellSet<Dim>::CurvedElement& element) {
+    return element.nodes;
+  }
+
+  template <int Dim, typename Element, typename Fill>
+  void add_blocks(ElementKind kind, const std::vector<Element>& elements, const Fill& fill) {
+    constexpr int kNodes = static_cast<int>(std::tuple_size_v<std::decay_t<decltype(nodes_of<Dim>(elements[0]))>>);
+    using Block = Mat<Dim * kNodes>;
+    const std::size_t n = elements.size();
     if (dense_ && !motion_) {  // a patch: one block after the other, without a buffer for all
       Block block;
       for (std::size_t e = 0; e < n; ++e) {
         fill(e, block);
-        add<Dim>(cells.elements[e].vertices, block.data());
+        add<Dim>(nodes_of<Dim>(elements[e]), block.data());
       }
       return;
     }
@@ -134,26 +175,29 @@ class HessianSink {
       parallel_blocks(count, kElementsPerTask, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) fill(first + i, blocks[i]);
       });
-      add_batch<Dim>(cells, first, std::span<const Block>(blocks).first(count));
+      const bool is_base = sparse_ && sparse_->num_stencils(kind) == n;
+      if (is_base) sparse_->add_batch(kind, first, blocks.data()->data());
+      if (is_base && !motion_) continue;
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto& nodes = nodes_of<Dim>(elements[first + i]);
+        if (is_base)
+          add_motion<Dim>(nodes, blocks[i].data());
+        else
+          add<Dim>(nodes, blocks[i].data());
+      }
     }
   }
-  /// One block times a factor for each element: a sum that is kept, and made anew only where it changes.
-  template <int Dim>
-  void add_multiples(const CellSet<Dim>& cells, const std::vector<double>& factors, const Mat<Dim*(Dim + 1)>& block) {
-    const auto fill = [&](std::size_t e, Mat<Dim*(Dim + 1)>& multiple) { multiple = factors[e] * block; };
-    if (!sparse_ || motion_) return add_elements<Dim>(cells, fill);
-    const std::span values(block.data(), static_cast<std::size_t>(block.size()));
-    if (sparse_->add_kept(factors, values)) return;
+
+  template <int Dim, typename Element, typename Fill>
+  void add_constant(ElementKind kind, const std::vector<Element>& elements, std::span<const double> factors,
+                    std::span<const double> block, const Fill& fill) {
+    if (!sparse_ || motion_) return add_blocks<Dim>(kind, elements, fill);
+    if (sparse_->add_kept(kind, factors, block)) return;
     sparse_->begin_keeping();
-    add_elements<Dim>(cells, fill);
-    sparse_->end_keeping(factors, values);
+    add_blocks<Dim>(kind, elements, fill);
+    sparse_->end_keeping(kind, factors, block);
   }
 
- private:
-  static constexpr std::size_t kElementsPerTask = 64;
-
-  template <int Dim>
-  void add_batch(const CellSet<Dim>& cells, std::size_t first, std::span<const Mat<Dim*(Dim + 1)>> blocks);
   template <int Dim>
   void add_motion(std::span<const int> vertices, const double* block);
 

@@ -19,6 +19,10 @@ std::vector<std::array<int, 2>> find_intersections(ConstVectorView positions, st
                                                    std::span<const std::array<int, 3>> triangles,
                                                    std::span<const char> counts, std::size_t most);
 
+/// Whether the straight cell on these vertices is positively oriented, decided exactly.
+template <int Dim>
+bool is_positively_oriented(const typename MeshTypes<Dim>::Cell& cell, ConstVectorView positions);
+
 /// The first cell (index among alive ids) that is not positively oriented at these positions, decided exactly; kNone: none.
 template <int Dim>
 CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView positions);

@@ -66,7 +66,7 @@ class SparseSystem final : public NewtonSystem {
   explicit SparseSystem(linear::ReusingSolver& solver) : solver_(solver), reusing_(&solver) {}
   /// For the unknowns of `dofs` and elements of the vertices `stencils`, `stencil_size` each: cheap where they are as
   /// before.
-  void reset(const DofMap& dofs, int dim, std::vector<int> stencils, int stencil_size);
+  void reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils);
   linear::Solver& solver() { return solver_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::Outcome factorize(double shift) override;

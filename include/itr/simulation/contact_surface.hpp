@@ -5,14 +5,21 @@
 #include <vector>
 
 #include "itr/energy/contact/surface.hpp"
+#include "itr/fem/space.hpp"
 #include "itr/fem/vertex_map.hpp"
+#include "itr/geometry/closed_surface.hpp"
 #include "itr/simulation/setup.hpp"
 
 namespace itr {
 
-/// The surface of a compact mesh and of the obstacles, whose vertices follow the mesh's.
+/// The surface of a compact mesh through all nodes of its space (add_chord_facets), and of the obstacles, whose vertices
+/// follow the nodes.
 template <int Dim>
-CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles);
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space = {});
+
+/// The boundary of the bodies through all nodes, at positions x of these [m].
+template <int Dim>
+ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space = {});
 
 /// What can touch in a simulation, and where it is.
 template <int Dim>
@@ -25,12 +32,12 @@ struct ContactSurface {
   VectorX motion(ConstVectorView dx) const { return map ? map->motion(dx) : VectorX(dx); }
 };
 
-/// From the vertices of mesh and obstacles to those of the setup's proxy and obstacles.
+/// From the nodes of the bodies and the vertices of obstacles to those of the setup's proxy and obstacles.
 template <int Dim>
-std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
+std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
 
 /// The proxy's surface where the setup has one, else the boundary of the compact mesh; with the obstacles.
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
 
 }  // namespace itr

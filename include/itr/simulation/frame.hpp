@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "itr/core/types.hpp"
+#include "itr/fem/space.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/remesh/report.hpp"
 
@@ -42,6 +43,7 @@ struct StepReport {
   OperationCount splits, collapses, swaps, smooths;
   int bound_by_dhat = 0;        ///< surface edges that were not split because the halves would be below dhat
   double trial_seconds = 0;     ///< median over the trials of these operations; 0 where there were none
+  int refined_quadrature = 0;   ///< cells with curved edges whose elastic energy has a finer quadrature
   int cut_steps = 0;            ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
   int damped_steps = 0;         ///< Newmark only: 1 if taken by implicit Euler, to keep energy from growing
   double min_distance = 0;      ///< over contact pairs nearer than dhat; infinity where there are none [m]
@@ -86,7 +88,7 @@ struct ProxyView {
 template <int Dim>
 struct FrameView {
   const Mesh<Dim>& mesh;                       ///< compact: no dead slots
-  ConstVectorView x;                           ///< positions of the bodies' vertices, interleaved [m]
+  ConstVectorView x;                           ///< positions of the bodies' nodes (vertices first), interleaved [m]
   ConstVectorView v;                           ///< velocities [m/s]
   const std::vector<double>& elastic_density;  ///< elastic energy by rest volume, a cell [J/m^3]
   const std::vector<Vec<Dim>>& obstacle_x;     ///< obstacle positions now [m]
@@ -94,6 +96,7 @@ struct FrameView {
   const std::vector<std::array<int, 3>>& obstacle_triangles;
   const AskedFields* asked = nullptr;  ///< null: nothing was asked for
   ProxyView<Dim> proxy{};
+  const Space* space = nullptr;  ///< null: all edges are straight
 };
 
 }  // namespace itr

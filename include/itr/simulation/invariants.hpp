@@ -3,14 +3,15 @@
 
 #include <string>
 
+#include "itr/fem/space.hpp"
 #include "itr/simulation/setup.hpp"
 
 namespace itr {
 
 /// What is wrong with positions of bodies and obstacles, in words, decided exactly; empty: nothing. Cells are positively
-/// oriented; with contact, surfaces do not cross, and no body or obstacle is inside of a body. Linear in the size of the
-/// mesh but for a tree of its surface.
+/// oriented everywhere; with contact, surfaces do not cross, and no body or obstacle is inside of a body. Linear in the size
+/// of the mesh but for a tree of its surface.
 template <int Dim>
-std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x);
+std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const Space& space = {});
 
 }  // namespace itr

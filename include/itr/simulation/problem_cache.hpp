@@ -12,14 +12,18 @@ namespace itr {
 template <int Dim>
 struct MeshScope {
   /// The mesh must be compact.
-  MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
-  /// Whether this is of such a mesh, obstacles included: the same vertices, cells, facets and tags.
-  bool is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) const;
+  MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
+  /// Whether this is of such a mesh and space, obstacles included: the same vertices, cells, facets, tags and curved edges.
+  bool is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space) const;
 
+  Space space;
   CellSet<Dim> cells;
   ContactSurface<Dim> surface;  ///< empty without contact
   double diagonal;              ///< of the bodies at rest [m]
   Workspace workspace;          ///< search trees of the surface
+
+ private:
+  bool has_cells_of(const Mesh<Dim>& mesh) const;
 };
 
 /// What a simulation keeps from step to step, so that it is not made again: it changes no result, only the time.
@@ -29,7 +33,7 @@ struct ProblemCache {
   template <typename Solver>
   explicit ProblemCache(Solver& solver) : system(solver) {}
   /// The newest scope, where it is of that mesh; else a new one.
-  std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
+  std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
 
   SparseSystem system;  ///< with its pattern, analysis and factors
   std::shared_ptr<MeshScope<Dim>> scope;

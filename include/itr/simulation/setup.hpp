@@ -15,6 +15,7 @@
 #include "itr/energy/damping_options.hpp"
 #include "itr/energy/host_terms.hpp"
 #include "itr/energy/material.hpp"
+#include "itr/fem/options.hpp"
 #include "itr/linear/options.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/newton/options.hpp"
@@ -103,6 +104,7 @@ struct StepSetup {
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   FieldOptions fields;
   bool lump_mass = false;
+  int quadrature_degree = kElasticDegree;  ///< of elasticity on cells with curved edges: 1 to 5
 
   // What only a program can add.
   std::vector<TermFactory<Dim>> terms;
@@ -118,7 +120,8 @@ struct StepSetup {
 /// A simulation from its start.
 template <int Dim>
 struct Setup : StepSetup<Dim> {
-  Mesh<Dim> mesh;  ///< with body ids and tags of facets and vertices
+  Mesh<Dim> mesh;            ///< with body ids and tags of facets and vertices
+  std::map<int, int> order;  ///< of the elements by body: 1, or 2 for curved edges; bodies that are not named: 1
   std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
   bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
   LinearOptions linear;

@@ -8,6 +8,7 @@
 
 #include "itr/core/log.hpp"
 #include "itr/energy/contact/stiffness.hpp"
+#include "itr/energy/elastic/elastic.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/linear/reuse.hpp"
 #include "itr/mesh/strata.hpp"
@@ -20,16 +21,18 @@
 
 namespace itr {
 
-/// Where a simulation stands: a value. Fields are interleaved over the mesh's vertices followed by the obstacles' ones.
-/// The rest of a simulation is a pure function of this and of its setup, so that a run which is resumed from a saved state
-/// has the same bits: what is added here is to be saved by output/checkpoint.cpp.
+/// Where a simulation stands: a value. Fields are interleaved over the space's nodes (vertices first) followed by the
+/// obstacles' vertices. The rest of a simulation is a pure function of this and of its setup, so that a run which is resumed
+/// from a saved state has the same bits: what is added here is to be saved by output/checkpoint.cpp.
 template <int Dim>
 struct State {
   Mesh<Dim> mesh;   ///< compact
+  Space space;      ///< on the mesh
   History history;  ///< history.x[0] is the present
   int step = 0;
   double t = 0;                 ///< [s]
   BarrierStiffness stiffness;   ///< where it is adaptive
+  QuadratureLevels quadrature;  ///< of the elastic energy, by cell with curved edges
   RemeshMemory remesh_memory;   ///< what remeshing refused, and need not ask again
   Strata<Dim> strata;           ///< of the mesh, once remeshing in 3D has found them
   linear::FactorRecord factor;  ///< that may serve the next step
@@ -106,6 +109,7 @@ class Simulation {
                          setup().obstacles.edges,
                          setup().obstacles.triangles,
                          &data.asked};
+    frame.space = &state().space;
     if (setup().proxy) frame.proxy = {&data.proxy_x, &setup().proxy->edges, &setup().proxy->triangles};
     observer(frame);
   }

@@ -20,15 +20,15 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
 template <int Dim>
 PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t);
 
-/// Which dofs are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two conditions
-/// the one with the larger tag wins.
+/// Which dofs of nodes are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two
+/// conditions the one with the larger tag wins.
 template <int Dim>
 struct HeldDofs {
   std::vector<char> held;
   VectorX target;  ///< only entries of held dofs mean anything
 };
 template <int Dim>
-HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t);
+HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space = {});
 
 /// Of the bounding box of the bodies at rest [m].
 template <int Dim>
@@ -38,9 +38,10 @@ template <int Dim>
 class StepProblem {
  public:
   /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
-  /// `stiffness`, which the barrier starts from where it is adaptive. The cache's system serves the newest problem only.
-  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, ProblemCache<Dim>& cache,
-              const BarrierStiffness& stiffness = {});
+  /// `stiffness`, which the barrier starts from where it is adaptive, and `levels` of quadrature, which the solve may raise.
+  /// The cache's system serves the newest problem only.
+  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history, double t,
+              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
   /// the first round they are lagged at `lagged_x`. Newton begins where the bodies are `expected` (empty: nowhere), if the
@@ -62,6 +63,7 @@ class StepProblem {
   /// Elastic energies that differ by less are the same to round-off, whatever their values [J].
   double energy_resolution() const;
   const BarrierStiffness& stiffness() const { return stiffness_; }
+  QuadratureLevels quadrature_levels() const { return potential_.elastic()->quadrature_levels(); }
   const DofMap& dofs() const { return dofs_; }
   const CellSet<Dim>& cells() const { return cells_; }
   const CollisionSurface& surface() const { return surface_.surface; }
@@ -95,7 +97,7 @@ class StepProblem {
   SparseSystem& system_;
 };
 
-/// The least det F over the elements.
+/// The least det F over the elements; of a curved one a lower bound.
 template <int Dim>
 double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x);
 

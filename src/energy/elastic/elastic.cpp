@@ -8,6 +8,7 @@
 #include "itr/core/check.hpp"
 #include "itr/core/parallel_reduce.hpp"
 #include "itr/geometry/measures.hpp"
+#include "quadratic.hpp"
 
 namespace itr {
 
@@ -15,15 +16,6 @@ namespace {
 
 constexpr std::size_t kBlock = 256;
 constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
-
-/// Gradients of the shape functions as columns: dF = sum over vertices of dx_i * gradient_i^T.
-template <int Dim>
-Eigen::Matrix<double, Dim, Dim + 1> shape_gradients(const Mat<Dim>& inverse_edges) {
-  Eigen::Matrix<double, Dim, Dim + 1> gradients;
-  gradients.template rightCols<Dim>() = inverse_edges.transpose();
-  gradients.col(0) = -inverse_edges.transpose().rowwise().sum();
-  return gradients;
-}
 
 template <int Dim>
 Mat<Dim> edges_of(const typename CellSet<Dim>::Element& element, ConstVectorView x) {
@@ -124,14 +116,21 @@ void project_modes(const NegativeModes<Dim>& negative, const ShapeGradients<Dim>
 }  // namespace
 
 template <int Dim>
-ElasticEnergy<Dim>::ElasticEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale)
+ElasticEnergy<Dim>::ElasticEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale,
+                                  int degree)
     : cells_(cells) {
-  renew(materials, scale);
+  renew(materials, scale, degree);
 }
 
 template <int Dim>
-void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double scale) {
+ElasticEnergy<Dim>::~ElasticEnergy() = default;
+
+template <int Dim>
+void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double scale, int degree) {
   scale_ = scale;
+  curved_.reset();
+  if (!cells_.curved_elements.empty())
+    curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
   by_body_.clear();
   by_element_.clear();
   bool varies = false;
@@ -157,14 +156,15 @@ const ElasticModuli& ElasticEnergy<Dim>::moduli(std::size_t e) const {
 
 template <int Dim>
 double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
-  return scale_ * parallel_sum(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-           double sum = 0;
-           for (std::size_t e = begin; e < end; ++e) {
-             const auto& element = cells_.elements[e];
-             sum += element.volume * elastic_density<Dim>(deformation_gradient<Dim>(element, x), moduli(e));
-           }
-           return sum;
-         });
+  const double straight = scale_ * parallel_sum(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+                            double sum = 0;
+                            for (std::size_t e = begin; e < end; ++e) {
+                              const auto& element = cells_.elements[e];
+                              sum += element.volume * elastic_density<Dim>(deformation_gradient<Dim>(element, x), moduli(e));
+                            }
+                            return sum;
+                          });
+  return curved_ ? straight + curved_->value(x) : straight;
 }
 
 template <int Dim>
@@ -181,6 +181,7 @@ void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
       gradient.segment<Dim>(Dim * vertices[0]) -= forces.col(k);
     }
   });
+  if (curved_) curved_->add_gradient(x, gradient);
 }
 
 template <int Dim>
@@ -188,7 +189,7 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
   sink.add_elements<Dim>(cells_, [&](std::size_t e, ElementBlock<Dim>& block) {
     const auto& element = cells_.elements[e];
     const Mat<Dim> F = deformation_gradient<Dim>(element, x);
-    const auto gradients = shape_gradients<Dim>(element.inverse_edges);
+    const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);
     const double weight = scale_ * element.volume;
     const ElasticModuli& here = moduli(e);
     if (here.law == MaterialLaw::neo_hookean) {
@@ -199,11 +200,12 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
       block_of_modes<Dim>(elastic_eigensystem<Dim>(F, here), gradients, weight, psd, block);
     }
   });
+  if (curved_) curved_->add_hessian(x, psd, sink);
 }
 
 template <int Dim>
 double ElasticEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const {
-  return parallel_min(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  const double straight = parallel_min(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     double step = 1;
     for (std::size_t e = begin; e < end; ++e) {
       const auto& element = cells_.elements[e];
@@ -212,6 +214,22 @@ double ElasticEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
     }
     return step;
   });
+  return curved_ ? std::min(straight, curved_->max_step(x, dx)) : straight;
+}
+
+template <int Dim>
+bool ElasticEnergy<Dim>::refine_quadrature(ConstVectorView x) {
+  return curved_ && curved_->refine_quadrature(x);
+}
+
+template <int Dim>
+QuadratureLevels ElasticEnergy<Dim>::quadrature_levels() const {
+  return curved_ ? curved_->levels() : QuadratureLevels();
+}
+
+template <int Dim>
+void ElasticEnergy<Dim>::set_quadrature_levels(const QuadratureLevels& levels) {
+  if (curved_) curved_->set_levels(levels);
 }
 
 template <int Dim>
@@ -221,6 +239,7 @@ StepLimit ElasticEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx) 
     const double t = kInversionMargin * first_inversion(edges_of<Dim>(element, x), edges_of<Dim>(element, dx));
     if (t < least.step) least = {t, "cell", {element.vertices.begin(), element.vertices.end()}};
   }
+  if (curved_) curved_->limit_step(x, dx, least);
   return least;
 }
 

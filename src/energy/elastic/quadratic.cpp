@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+#include "quadratic.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "itr/core/parallel_reduce.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr std::size_t kBlock = 64;
+constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
+constexpr double kBlindShare = 0.2;       ///< of det F at quadrature points: where it is less, they do not see it
+constexpr double kBlindTolerance = 0.1;   ///< relative, of the bound that tells
+
+template <int Dim>
+using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
+
+/// Hessian of a density by its modes, as a matrix over F by columns.
+template <int Dim>
+Mat<Dim * Dim> stiffness(const EigenSystem<Dim>& system, PsdProjection psd) {
+  Mat<Dim* Dim> C = Mat<Dim * Dim>::Zero();
+  for (std::size_t k = 0; k < system.values.size(); ++k) {
+    const double value = projected(system.values[k], psd);
+    if (value == 0) continue;
+    const Eigen::Map<const Vec<Dim * Dim>> mode(system.modes[k].data());
+    C.noalias() += value * mode * mode.transpose();
+  }
+  return C;
+}
+
+/// block += weight * sum over j, l of g_a[j] C(:j, :l) g_b[l].
+template <int Dim>
+void add_block(const Mat<Dim * Dim>& C, const Nodal<Dim>& gradients, double weight, Mat<Dim * kQuadraticNodes<Dim>>& block) {
+  for (int b = 0; b < kQuadraticNodes<Dim>; ++b) {
+    Eigen::Matrix<double, Dim * Dim, Dim> Cb = weight * gradients(0, b) * C.template leftCols<Dim>();
+    for (int l = 1; l < Dim; ++l) Cb.noalias() += weight * gradients(l, b) * C.template middleCols<Dim>(Dim * l);
+    for (int a = b; a < kQuadraticNodes<Dim>; ++a) {
+      Mat<Dim> part = gradients(0, a) * Cb.template topRows<Dim>();
+      for (int j = 1; j < Dim; ++j) part.noalias() += gradients(j, a) * Cb.template middleRows<Dim>(Dim * j);
+      block.template block<Dim, Dim>(Dim * a, Dim * b) += part;
+    }
+  }
+}
+
+template <int Dim>
+void mirror_lower_blocks(Mat<Dim * kQuadraticNodes<Dim>>& block) {
+  for (int b = 0; b < kQuadraticNodes<Dim>; ++b)
+    for (int a = b + 1; a < kQuadraticNodes<Dim>; ++a)
+      block.template block<Dim, Dim>(Dim * b, Dim * a) = block.template block<Dim, Dim>(Dim * a, Dim * b).transpose();
+}
+
+template <int Dim>
+double first_unproven(const typename CellSet<Dim>::CurvedElement& element, ConstVectorView x, ConstVectorView dx) {
+  return max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, dx));
+}
+
+}  // namespace
+
+template <int Dim>
+QuadraticElasticity<Dim>::QuadraticElasticity(const CellSet<Dim>& cells, const std::map<int, Material>& materials,
+                                              double scale, int degree)
+    : cells_(cells), rule_(quadrature<Dim>(degree)), scale_(scale) {
+  bool varies = false;
+  for (const auto& [body, material] : materials) {
+    varies = varies || material.has_varying_moduli();
+    by_body_[body] = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
+  }
+  by_element_.reserve(cells.curved_elements.size());
+  for (const Element& element : cells.curved_elements) by_element_.push_back(&by_body_.at(element.body));
+  if (!varies) return;
+  materials_ = materials;
+  sample_moduli();
+}
+
+template <int Dim>
+void QuadraticElasticity<Dim>::sample_moduli() {
+  varying_.clear();
+  first_varying_.clear();
+  if (materials_.empty()) return;
+  for (std::size_t e = 0; e < by_element_.size(); ++e) {
+    const Element& element = cells_.curved_elements[e];
+    first_varying_.push_back(varying_.size());
+    for (const auto& point : rule(e))
+      varying_.push_back(
+          elastic_moduli<Dim>(materials_.at(element.body), rest_position<Dim>(cells_, element, point.weights)));
+  }
+}
+
+template <int Dim>
+void QuadraticElasticity<Dim>::set_levels(const QuadratureLevels& levels) {
+  levels_ = levels;
+  sample_moduli();
+}
+
+/// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.
+template <int Dim>
+bool QuadraticElasticity<Dim>::is_blind(std::size_t e, ConstVectorView x) const {
+  const Element& element = cells_.curved_elements[e];
+  const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+  double seen = std::numeric_limits<double>::infinity();
+  for (const auto& point : rule(e))
+    seen = std::min(seen, (positions * shape_gradients<Dim>(element, point.weights).transpose()).determinant());
+  const double least = min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kBlindTolerance);
+  return least * element.inverse_edges.determinant() < kBlindShare * seen;
+}
+
+template <int Dim>
+bool QuadraticElasticity<Dim>::refine_quadrature(ConstVectorView x) {
+  const std::size_t n = by_element_.size();
+  std::vector<char> is_to_refine(n, 0);
+  parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e)
+      is_to_refine[e] = (levels_.empty() || levels_[e] < kMostClosedLevel) && is_blind(e, x);
+  });
+  if (std::find(is_to_refine.begin(), is_to_refine.end(), 1) == is_to_refine.end()) return false;
+  levels_.resize(n, 0);
+  for (std::size_t e = 0; e < n; ++e) levels_[e] = static_cast<std::uint8_t>(levels_[e] + is_to_refine[e]);
+  sample_moduli();
+  return true;
+}
+
+template <int Dim>
+double QuadraticElasticity<Dim>::value(ConstVectorView x) const {
+  return scale_ * parallel_sum(cells_.curved_elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+           double sum = 0;
+           for (std::size_t e = begin; e < end; ++e) {
+             const Element& element = cells_.curved_elements[e];
+             const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+             const auto& rule = this->rule(e);
+             for (std::size_t q = 0; q < rule.size(); ++q) {
+               const Mat<Dim> F = positions * shape_gradients<Dim>(element, rule[q].weights).transpose();
+               sum += rule[q].share * element.volume * elastic_density<Dim>(F, moduli(e, q));
+             }
+           }
+           return sum;
+         });
+}
+
+template <int Dim>
+void QuadraticElasticity<Dim>::add_gradient(ConstVectorView x, VectorView gradient) const {
+  const auto forces_of = [&](std::size_t e) -> Nodal<Dim> {
+    const Element& element = cells_.curved_elements[e];
+    const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+    Nodal<Dim> forces = Nodal<Dim>::Zero();
+    const auto& rule = this->rule(e);
+    for (std::size_t q = 0; q < rule.size(); ++q) {
+      const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
+      const Mat<Dim> P = elastic_stress<Dim>(positions * gradients.transpose(), moduli(e, q));
+      forces.noalias() += (scale_ * rule[q].share * element.volume) * (P * gradients);
+    }
+    return forces;
+  };
+  parallel_then_ordered<Nodal<Dim>>(cells_.curved_elements.size(), kBlock, forces_of,
+                                    [&](std::size_t e, const Nodal<Dim>& forces) {
+                                      const auto& nodes = cells_.curved_elements[e].nodes;
+                                      for (int k = 0; k < kNodes; ++k)
+                                        gradient.segment<Dim>(Dim * nodes[k]) += forces.col(k);
+                                    });
+}
+
+template <int Dim>
+void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const {
+  sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, Mat<Dim * kNodes>& block) {
+    const Element& element = cells_.curved_elements[e];
+    const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+    block.setZero();
+    const auto& rule = this->rule(e);
+    for (std::size_t q = 0; q < rule.size(); ++q) {
+      const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
+      const Mat<Dim> F = positions * gradients.transpose();
+      add_block<Dim>(stiffness<Dim>(elastic_eigensystem<Dim>(F, moduli(e, q)), psd), gradients,
+                     scale_ * rule[q].share * element.volume, block);
+    }
+    mirror_lower_blocks<Dim>(block);
+  });
+}
+
+template <int Dim>
+double QuadraticElasticity<Dim>::max_step(ConstVectorView x, ConstVectorView dx) const {
+  return parallel_min(cells_.curved_elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    double step = 1;
+    for (std::size_t e = begin; e < end; ++e) {
+      const double t = first_unproven<Dim>(cells_.curved_elements[e], x, dx);
+      if (t < 1) step = std::min(step, kInversionMargin * t);
+    }
+    return step;
+  });
+}
+
+template <int Dim>
+void QuadraticElasticity<Dim>::limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const {
+  for (const Element& element : cells_.curved_elements) {
+    const double t = kInversionMargin * first_unproven<Dim>(element, x, dx);
+    if (t < least.step) least = {t, "cell", {element.nodes.begin(), element.nodes.begin() + Dim + 1}};
+  }
+}
+
+template class QuadraticElasticity<2>;
+template class QuadraticElasticity<3>;
+
+}  // namespace itr

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// Elastic energy of cells with curved edges, by quadrature at rest.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "itr/core/types.hpp"
+#include "itr/energy/elastic/elastic.hpp"
+#include "itr/energy/elastic/laws.hpp"
+#include "itr/energy/energy.hpp"
+#include "itr/energy/step_limit.hpp"
+#include "itr/fem/cell_set.hpp"
+#include "itr/fem/quadrature.hpp"
+
+namespace itr {
+
+/// scale * sum over curved elements and points of share * rest volume * W(F). Feasible: det F > 0 everywhere in each cell.
+template <int Dim>
+class QuadraticElasticity {
+ public:
+  QuadraticElasticity(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale, int degree);
+
+  double value(ConstVectorView x) const;
+  void add_gradient(ConstVectorView x, VectorView gradient) const;
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const;
+  double max_step(ConstVectorView x, ConstVectorView dx) const;
+  /// See ElasticEnergy.
+  bool refine_quadrature(ConstVectorView x);
+  const QuadratureLevels& levels() const { return levels_; }
+  void set_levels(const QuadratureLevels& levels);
+  void limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const;
+
+ private:
+  using Element = typename CellSet<Dim>::CurvedElement;
+  static constexpr int kNodes = kQuadraticNodes<Dim>;
+
+  const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
+    return levels_.empty() || levels_[e] == 0 ? rule_ : closed_quadrature<Dim>(levels_[e]);
+  }
+  const ElasticModuli& moduli(std::size_t e, std::size_t point) const {
+    return varying_.empty() ? *by_element_[e] : varying_[first_varying_[e] + point];
+  }
+  void sample_moduli();
+  bool is_blind(std::size_t e, ConstVectorView x) const;
+
+  const CellSet<Dim>& cells_;
+  const std::vector<QuadraturePoint<Dim>>& rule_;  ///< of level 0
+  QuadratureLevels levels_;
+  std::map<int, Material> materials_;  ///< empty unless moduli vary in space
+  std::map<int, ElasticModuli> by_body_;
+  std::vector<const ElasticModuli*> by_element_;
+  std::vector<ElasticModuli> varying_;      ///< by element and point; empty unless moduli vary in space
+  std::vector<std::size_t> first_varying_;  ///< by element
+  double scale_;
+};
+
+}  // namespace itr

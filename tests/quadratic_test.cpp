@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: MIT
+// Quadratic elements: validity everywhere in a cell and along its motion, the space, every term of the potential on curved
+// edges, and whole runs.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "derivatives.hpp"
+#include "itr/core/error.hpp"
+#include "itr/core/parallel.hpp"
+#include "itr/energy/elastic/elastic.hpp"
+#include "itr/energy/inertia.hpp"
+#include "itr/energy/load.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
+#include "itr/simulation/contact_surface.hpp"
+#include "itr/simulation/invariants.hpp"
+#include "itr/simulation/simulation.hpp"
+
+namespace itr {
+namespace {
+
+template <typename T>
+class Quadratic : public ::testing::Test {};
+using Dimensions = ::testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
+TYPED_TEST_SUITE(Quadratic, Dimensions);
+
+/// det dx/dxi at barycentric coordinates, by the shape functions.
+template <int Dim>
+double jacobian_at(const QuadraticCell<Dim>& x, const std::array<double, Dim + 1>& l) {
+  const auto linear = barycentric_gradients<Dim>(Mat<Dim>::Identity());
+  return (x * quadratic_gradients<Dim, Dim>(kAllCurved<Dim>, l, linear).transpose()).determinant();
+}
+
+template <int Dim>
+std::array<double, Dim + 1> random_place(std::mt19937& random) {
+  std::exponential_distribution<double> part(1);
+  std::uniform_int_distribution<int> choice(0, 3);
+  std::array<double, Dim + 1> l;
+  double sum = 0;
+  for (double& value : l) sum += value = choice(random) == 0 ? 0 : part(random);  // often on a face or an edge
+  if (sum == 0) l[0] = sum = 1;
+  for (double& value : l) value /= sum;
+  return l;
+}
+
+template <int Dim>
+QuadraticCell<Dim> unit_cell() {
+  QuadraticCell<Dim> x = QuadraticCell<Dim>::Zero();
+  for (int k = 0; k < Dim; ++k) x(k, k + 1) = 1;
+  for_each_edge<Dim>([&](int edge, int i, int j) { x.col(Dim + 1 + edge) = (x.col(i) + x.col(j)) / 2; });
+  return x;
+}
+
+template <int Dim>
+QuadraticCell<Dim> random_motion(std::mt19937& random, double amount) {
+  std::uniform_real_distribution<double> noise(-amount, amount);
+  return QuadraticCell<Dim>::NullaryExpr([&] { return noise(random); });
+}
+
+template <int Dim>
+double least_sampled(const QuadraticCell<Dim>& x, std::mt19937& random, int samples) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < samples; ++i) least = std::min(least, jacobian_at<Dim>(x, random_place<Dim>(random)));
+  return least;
+}
+
+TYPED_TEST(Quadratic, ValidityIsNeverClaimedFalsely) {
+  constexpr int Dim = TypeParam::value;
+  constexpr int kCells = Dim == 2 ? 100000 : 30000, kSamples = 40;
+  std::mt19937 random(3);
+  int proven = 0, doubtful = 0;
+  for (int i = 0; i < kCells; ++i) {
+    const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.02 * (i % 16));
+    const double sampled = least_sampled<Dim>(x, random, kSamples);
+    if (is_positive_everywhere<Dim>(x)) {
+      ++proven;
+      ASSERT_GT(sampled, 0) << i;
+      ASSERT_GE(sampled, min_jacobian_bound<Dim>(x, 0.01)) << i;
+      ASSERT_TRUE(is_positive_everywhere_exact<Dim>(x)) << i;
+    } else if (sampled > 0 && is_positive_everywhere_exact<Dim>(x)) {
+      ++doubtful;
+    }
+  }
+  EXPECT_GT(proven, kCells / 5);
+  EXPECT_LT(proven, kCells);
+  EXPECT_LE(doubtful, kCells / 1000);  // valid, but not proven in floating point
+}
+
+TYPED_TEST(Quadratic, ValidityDoesNotDependOnScaleAndPlace) {
+  constexpr int Dim = TypeParam::value;
+  std::mt19937 random(5);
+  for (int i = 0; i < 2000; ++i) {
+    const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.02 * (i % 16));
+    const bool is_valid = is_positive_everywhere<Dim>(x);
+    for (const double scale : {0x1p-30, 0x1p30}) EXPECT_EQ(is_positive_everywhere<Dim>(scale * x), is_valid) << i;
+  }
+}
+
+/// Cells that touch validity's border: the middle node of an edge at a quarter of it, where det vanishes at a corner.
+TYPED_TEST(Quadratic, ValidityOfDegenerateCellsIsRefused) {
+  constexpr int Dim = TypeParam::value;
+  for (int k = 0; k < Dim; ++k) {
+    QuadraticCell<Dim> x = unit_cell<Dim>();
+    x.col(Dim + 1 + k) = 0.25 * x.col(k + 1);
+    EXPECT_FALSE(is_positive_everywhere<Dim>(x));
+    EXPECT_FALSE(is_positive_everywhere_exact<Dim>(x));
+    x.col(Dim + 1 + k) = (0.25 + 1e-9) * x.col(k + 1);
+    EXPECT_TRUE(is_positive_everywhere_exact<Dim>(x));
+  }
+}
+
+TYPED_TEST(Quadratic, StepsNeverPassAnInversion) {
+  constexpr int Dim = TypeParam::value;
+  constexpr int kSteps = Dim == 2 ? 20000 : 4000, kTimes = 20, kSamples = 20;
+  std::mt19937 random(7);
+  int cut = 0, far = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.08);
+    if (!is_positive_everywhere<Dim>(x)) continue;
+    const QuadraticCell<Dim> dx = random_motion<Dim>(random, 0.1 * (1 + i % 10));
+    const double t = max_positive_step<Dim>(x, dx);
+    ASSERT_GT(t, 0);
+    for (int k = 0; k <= kTimes; ++k)
+      ASSERT_GT(least_sampled<Dim>(x + (t * k / kTimes) * dx, random, kSamples), 0) << i << ' ' << k;
+    if (t == 1) continue;
+    ++cut;
+    far += is_positive_everywhere_exact<Dim>(x + std::min(1.0, 1.1 * t) * dx);  // stopped early
+  }
+  EXPECT_GT(cut, kSteps / 10);
+  EXPECT_LE(far, cut / 20);
+}
+
+template <int Dim>
+Mesh<Dim> two_cells() {
+  if constexpr (Dim == 2)
+    return {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}, {{0, 1, 2}, {0, 2, 3}}, {1, 2}};
+  else
+    return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}}, {{0, 1, 2, 3}, {1, 4, 2, 3}}, {1, 2}};
+}
+
+/// A space with some of the mesh's edges curved.
+template <int Dim>
+Space random_space(const Mesh<Dim>& mesh, std::mt19937& random) {
+  std::vector<EdgeKey> curved;
+  for (const EdgeKey& edge : mesh.edges())
+    if (random() % 3) curved.push_back(edge);
+  return Space(std::move(curved));
+}
+
+template <int Dim>
+VectorX perturbed(const CellSet<Dim>& cells, std::mt19937& random, double amount) {
+  std::uniform_real_distribution<double> noise(-amount, amount);
+  VectorX x(Dim * cells.num_vertices);
+  for (int v = 0; v < cells.num_vertices; ++v)
+    for (int c = 0; c < Dim; ++c) x[Dim * v + c] = (c == 0 ? 0.8 : 1.1) * cells.rest[v][c] + noise(random);
+  return x;
+}
+
+const std::map<int, Material> kMaterials = {
+    {1, {.youngs_modulus = 100, .poisson_ratio = 0.4, .density = 3}},
+    {2, {.youngs_modulus = 50, .poisson_ratio = 0.2, .density = 1, .density_at = [](const Vec<3>& X) { return 1 + X[0]; }}}};
+
+TYPED_TEST(Quadratic, DerivativesMatchDifferences) {
+  constexpr int Dim = TypeParam::value;
+  const Mesh<Dim> mesh = two_cells<Dim>();
+  std::mt19937 random(11);
+  for (int i = 0; i < 12; ++i) {
+    const CellSet<Dim> cells =
+        whole_mesh(mesh, {}, i == 0 ? space_of_orders(mesh, {{1, 2}, {2, 2}}) : random_space(mesh, random));
+    std::map<int, Material> materials = kMaterials;
+    materials.at(1).law = static_cast<MaterialLaw>(i % 4);
+    materials.at(2).youngs_modulus_at = [](const Vec<3>& X) { return 50 + 20 * X[1]; };
+    const VectorX x = perturbed(cells, random, 0.02);
+    ElasticEnergy<Dim> elastic(cells, materials, 0.3);
+    expect_derivatives(elastic, x, 1e-6, 1e-6);
+    expect_psd(elastic, x);
+    elastic.set_quadrature_levels(QuadratureLevels(cells.curved_elements.size(), 2));
+    expect_derivatives(elastic, x, 1e-6, 1e-6);
+    for (const MassKind kind : {MassKind::consistent, MassKind::lumped})
+      expect_derivatives(InertiaEnergy<Dim>(cells, materials, kind, perturbed(cells, random, 0.2)), x, 1e-4, 1e-7);
+    Loads<Dim> loads;
+    loads.acceleration = [](const Vec<Dim>& X) { return Vec<Dim>(X * 2 + Vec<Dim>::Ones()); };
+    loads.tractions.emplace_back(kNoTag, [](const Vec<Dim>& X) { return Vec<Dim>(X - Vec<Dim>::Ones()); });
+    expect_derivatives(LoadEnergy<Dim>(cells, materials, loads, 0.3), x, 1e-4, 1e-8);
+  }
+}
+
+/// Every space holds the linear functions: there all energies are those of straight cells.
+TYPED_TEST(Quadratic, LinearFunctionsHaveTheEnergiesOfStraightCells) {
+  constexpr int Dim = TypeParam::value;
+  const Mesh<Dim> mesh = two_cells<Dim>();
+  std::mt19937 random(13);
+  Workspace workspace;
+  std::map<int, Material> materials = kMaterials;
+  materials.at(2).density_at = nullptr;
+  for (int i = 0; i < 8; ++i) {
+    const Space space = i == 0 ? space_of_orders(mesh, {{1, 2}, {2, 2}}) : random_space(mesh, random);
+    const CellSet<Dim> straight = whole_mesh(mesh, {}), curved = whole_mesh(mesh, {}, space);
+    const VectorX x = perturbed(straight, random, 0.05);
+    VectorX y(Dim * curved.num_vertices);
+    y.head(x.size()) = x;
+    for (int k = 0; k < space.num_curved(); ++k) {
+      const auto [a, b] = space.curved_edges()[k];
+      vertex_of<Dim>(y, mesh.vertex_slots() + k) = (vertex_of<Dim>(x, a) + vertex_of<Dim>(x, b)) / 2;
+    }
+    const double W = ElasticEnergy<Dim>(straight, materials, 1).value(x, workspace);
+    ElasticEnergy<Dim> elastic(curved, materials, 1);
+    EXPECT_NEAR(elastic.value(y, workspace), W, 1e-12 * W);
+    for (std::uint8_t level = 1; level <= kMostClosedLevel; ++level) {
+      elastic.set_quadrature_levels(QuadratureLevels(curved.curved_elements.size(), level));
+      EXPECT_NEAR(elastic.value(y, workspace), W, 1e-12 * W);
+    }
+    const InertiaEnergy<Dim> of_straight(straight, materials, MassKind::consistent, VectorX::Zero(x.size()));
+    const double T = of_straight.value(x, workspace);
+    const InertiaEnergy<Dim> of_curved(curved, materials, MassKind::consistent, VectorX::Zero(y.size()));
+    EXPECT_NEAR(of_curved.value(y, workspace), T, 1e-12 * T);
+    const InertiaEnergy<Dim> lumped(curved, materials, MassKind::lumped, VectorX::Zero(y.size()));
+    VectorX momentum = VectorX::Zero(y.size()), straight_momentum = VectorX::Zero(x.size());
+    lumped.add_mass_product(VectorX::Ones(y.size()), momentum);
+    of_straight.add_mass_product(VectorX::Ones(x.size()), straight_momentum);
+    EXPECT_NEAR(momentum.sum(), straight_momentum.sum(), 1e-12 * momentum.sum());
+    EXPECT_GE(momentum.minCoeff(), 0);
+  }
+}
+
+/// Neighbours cut a shared facet in the same way whatever its vertices' order is, and the parts cover it.
+TEST(Space, ChordFacetsCoverTheFacet) {
+  const std::vector<Vec<3>> rest = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::vector<EdgeKey> edges = {{0, 1}, {0, 2}, {1, 2}};
+  for (int mask = 0; mask < 8; ++mask) {
+    std::vector<EdgeKey> curved;
+    for (int k = 0; k < 3; ++k)
+      if (mask >> k & 1) curved.push_back(edges[k]);
+    const Space space(curved);
+    std::vector<Vec<3>> nodes = rest;
+    for (const auto& [a, b] : curved) nodes.push_back((rest[a] + rest[b]) / 2);
+    std::set<std::array<int, 3>> first;
+    for (const std::array<int, 3> facet :
+         {std::array{0, 1, 2}, std::array{1, 2, 0}, std::array{2, 0, 1}, std::array{0, 2, 1}}) {
+      std::vector<std::array<int, 3>> chords;
+      add_chord_facets<3>(facet, space, 3, chords);
+      EXPECT_EQ(chords.size(), 1 + curved.size());
+      double area = 0;
+      std::set<std::array<int, 3>> sorted;
+      for (const auto& [a, b, c] : chords) {
+        area += (nodes[b] - nodes[a]).cross(nodes[c] - nodes[a])[2] / 2;
+        sorted.insert(ascending(std::array{a, b, c}));
+      }
+      EXPECT_NEAR(area, facet[1] == 2 && facet[0] == 0 ? -0.5 : 0.5, 1e-15);
+      if (first.empty()) first = sorted;
+      EXPECT_EQ(sorted, first) << mask;
+    }
+  }
+}
+
+TEST(Space, AnEdgeHasTheLeastOrderOfItsCells) {
+  const Mesh<2> mesh = two_cells<2>();
+  EXPECT_EQ(space_of_orders(mesh, {{1, 2}}).curved_edges(), (std::vector<EdgeKey>{{0, 1}, {1, 2}}));
+  EXPECT_EQ(space_of_orders(mesh, {{1, 2}, {2, 2}}).num_curved(), 5);
+  EXPECT_TRUE(space_of_orders(mesh, {{1, 1}}).is_linear());
+}
+
+/// A square of n x n x 2 triangles with its lower left corner at `origin`.
+void add_square(double size, Vec<2> origin, int n, int body, std::vector<Vec<2>>& rest,
+                std::vector<std::array<int, 3>>& cells, std::vector<int>& bodies) {
+  const int first = static_cast<int>(rest.size());
+  const auto id = [&](int i, int j) { return first + j * (n + 1) + i; };
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i) rest.push_back(origin + size / n * Vec<2>(i, j));
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      cells.push_back({id(i, j), id(i + 1, j), id(i + 1, j + 1)});
+      cells.push_back({id(i, j), id(i + 1, j + 1), id(i, j + 1)});
+      bodies.insert(bodies.end(), {body, body});
+    }
+}
+
+/// Two soft squares, one quadratic, that are thrown at each other with friction.
+Setup<2> collision() {
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  std::vector<int> bodies;
+  add_square(1, {0, 0}, 3, 1, rest, cells, bodies);
+  add_square(1, {1.05, 0.3}, 3, 2, rest, cells, bodies);
+  Setup<2> setup;
+  setup.mesh = Mesh<2>(rest, cells, bodies);
+  setup.order = {{1, 2}};
+  for (const int body : {1, 2}) setup.materials[body] = {.youngs_modulus = 1e4, .poisson_ratio = 0.3, .density = 1000};
+  setup.time.dt = 0.01;
+  setup.time.steps = 20;
+  setup.contact.enabled = true;
+  setup.contact.activation_distance = 0.02;
+  setup.contact.barrier_stiffness = 1e3;
+  setup.contact.adaptive_stiffness = false;
+  setup.contact.friction_coefficient = 0.3;
+  setup.initial_velocity = {{1, [](const Vec<2>&, double) { return Vec<2>(2, 0); }},
+                            {2, [](const Vec<2>&, double) { return Vec<2>(-2, 0); }}};
+  return setup;
+}
+
+TEST(QuadraticRun, BodiesThatCollideStayValidAndKeepMomentum) {
+  linear::Registry registry;
+  Simulation<2> simulation(collision(), registry);
+  double nearest = 1;
+  for (int step = 0; step < 20; ++step) {
+    const StepResult result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    nearest = std::min(nearest, result.report.min_distance);
+    const State<2>& state = simulation.state();
+    EXPECT_EQ(find_violation(simulation.setup(), state.mesh, state.history.x[0], state.space), "");
+  }
+  EXPECT_LT(nearest, 0.02);  // they did touch
+  const State<2>& state = simulation.state();
+  const CellSet<2> cells = whole_mesh(state.mesh, {}, state.space);
+  VectorX momentum = VectorX::Zero(state.history.v[0].size());
+  InertiaEnergy<2>(cells, simulation.setup().materials, MassKind::consistent, VectorX::Zero(momentum.size()))
+      .add_mass_product(state.history.v[0], momentum);
+  Vec<2> total = Vec<2>::Zero();
+  for (Eigen::Index i = 0; i < momentum.size(); i += 2) total += momentum.segment<2>(i);
+  EXPECT_LT(total.norm(), 1e-2);  // of 2000 kg m/s each way, at Newton's tolerance
+}
+
+TEST(QuadraticRun, HasTheSameBitsOnAnyNumberOfThreads) {
+  VectorX first;
+  for (const int threads : {1, 2}) {
+    const ThreadLimit limit(threads);
+    linear::Registry registry;
+    Simulation<2> simulation(collision(), registry);
+    for (int step = 0; step < 8; ++step) ASSERT_TRUE(simulation.advance().ok);
+    if (first.size() == 0) first = simulation.state().history.x[0];
+    EXPECT_EQ(simulation.state().history.x[0], first);
+  }
+}
+
+TEST(QuadraticRun, RefusesWhatItCannotDo) {
+  linear::Registry registry;
+  ::itr::Setup<2> setup = collision();
+  setup.remesh.enabled = true;
+  EXPECT_THROW(Simulation<2>(setup, registry), ::itr::InputError);
+  setup = collision();
+  setup.pressure.push_back({1, [](const Vec<2>&, double) { return 1.0; }});
+  EXPECT_THROW(Simulation<2>(setup, registry), ::itr::InputError);
+}
+
+}  // namespace
+}  // namespace itr
