@@ -32,6 +32,7 @@ MAX_ANIMATION_FRAMES = 150
 ANIMATION_DPI = 90
 PANEL_PIXELS = 900
 COLOURS = "YlOrRd"
+CURVE_PARTS = 6  # straight pieces that a curved edge is drawn by
 
 
 class Frame:
@@ -45,6 +46,7 @@ class Frame:
             self.step, self.t = int(file.attrs["step"]), float(file.attrs["t"])
             self.x, self.rest = file["/fields/x"][:], file["/mesh/rest"][:]
             self.cells = file["/mesh/simplices"][:]
+            curved = file["/mesh/curved_edges"][:] if "/mesh/curved_edges" in file else np.empty((0, 2), int)
             values = file["/fields"][field][:]
             self.unit = file["/fields"][field].attrs.get("unit", "")
             self.obstacle_x = file["/obstacles/x"][:]
@@ -53,6 +55,53 @@ class Frame:
         self.dim = self.x.shape[1]
         values = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
         self.values = values if len(values) == len(self.cells) else values[self.cells].mean(axis=1)
+        self.num_vertices = len(self.x) - len(curved)
+        self.middles = {tuple(edge): self.num_vertices + i for i, edge in enumerate(curved.tolist())}
+
+    def nodes(self):
+        curved = f", {len(self.middles)} curved edges" if self.middles else ""
+        return f"{self.num_vertices} vertices{curved}"
+
+    def side(self, a, b, parts=CURVE_PARTS):
+        """Points of the edge from vertex a to b, without b: more than one where it is curved."""
+        middle = self.middles.get((min(a, b), max(a, b)))
+        if middle is None:
+            return self.x[a][None]
+        s = np.arange(parts)[:, None] / parts
+        return (1 - s) * (1 - 2 * s) * self.x[a] + s * (2 * s - 1) * self.x[b] + 4 * s * (1 - s) * self.x[middle]
+
+    def outlines(self):
+        """A polygon for each triangle, along its curved edges."""
+        if not self.middles:
+            return self.x[self.cells]
+        return [np.concatenate([self.side(a, b), self.side(b, c), self.side(c, a)]) for a, b, c in self.cells.tolist()]
+
+    def fine_faces(self, faces, owner):
+        """The faces with curved edges cut into CURVE_PARTS^2 flat triangles: points, triangles, owners, lines of edges."""
+        parts = CURVE_PARTS
+        if not self.middles:
+            return self.x, faces, owner, None
+        weights = [(i / parts, j / parts) for i in range(parts + 1) for j in range(parts + 1 - i)]
+        index = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(parts + 1) for j in range(parts + 1 - i))}
+        cut = [(index[i, j], index[i + 1, j], index[i, j + 1]) for i in range(parts) for j in range(parts - i)]
+        cut += [(index[i + 1, j], index[i + 1, j + 1], index[i, j + 1])
+                for i in range(parts) for j in range(parts - i - 1)]
+        u, v = np.array(weights).T
+        rim = [index[i, 0] for i in range(parts + 1)] + [index[parts - j, j] for j in range(1, parts + 1)]
+        rim += [index[0, parts - j] for j in range(1, parts + 1)]
+        points, triangles, lines = [], [], []
+        for k, (a, b, c) in enumerate(faces.tolist()):
+            corner = (1 - u - v, u, v)
+            x = sum(w[:, None] * self.x[n] for w, n in zip(corner, (a, b, c)))
+            for (i, p), (j, q) in (((0, a), (1, b)), ((1, b), (2, c)), ((0, a), (2, c))):
+                middle = self.middles.get((min(p, q), max(p, q)))
+                if middle is not None:
+                    bulge = 4 * self.x[middle] - 2 * self.x[p] - 2 * self.x[q]
+                    x = x + (corner[i] * corner[j])[:, None] * bulge
+            points.append(x)
+            triangles.append(np.array(cut) + k * len(u))
+            lines.append(np.array(rim) + k * len(u))
+        return np.concatenate(points), np.concatenate(triangles), np.repeat(owner, len(cut)), np.array(lines)
 
     def outer_faces(self, kept):
         """Of the tetrahedra `kept`: the vertices of the faces that only one of them has, and whose they are."""
@@ -120,7 +169,7 @@ class PlaneDrawing:
     def draw(self, axes, frame):
         # An obstacle from triangles comes as its boundary edges: grey lines, heavier than the mesh.
         axes.add_collection(LineCollection(frame.obstacle_x[frame.obstacle_edges], colors="0.35", linewidths=1.8))
-        axes.add_collection(PolyCollection(frame.x[frame.cells], array=frame.values, cmap=COLOURS, norm=self.norm,
+        axes.add_collection(PolyCollection(frame.outlines(), array=frame.values, cmap=COLOURS, norm=self.norm,
                                            edgecolors="0.1", linewidths=0.25))
         axes.set_aspect("equal")
         axes.set_xlim(self.box[0][0], self.box[1][0])
@@ -153,7 +202,7 @@ def draw(drawing, axes, frame):
     for artist in [*axes.collections, *axes.images]:
         artist.remove()
     drawing.draw(axes, frame)
-    axes.set_title(f"step {frame.step}, t = {frame.t:.4g} s: {len(frame.x)} vertices, {len(frame.cells)} cells", fontsize=9)
+    axes.set_title(f"step {frame.step}, t = {frame.t:.4g} s: {frame.nodes()}, {len(frame.cells)} cells", fontsize=9)
 
 
 def make_figure(drawing, frames, options, count):

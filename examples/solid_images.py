@@ -26,7 +26,7 @@ def ensure_display():
     os.execvp("xvfb-run", ["xvfb-run", "-a", "-s", "-screen 0 640x480x24", sys.executable, *sys.argv])
 
 
-def poly_data(points, polygons):
+def poly_data(points, polygons, as_lines=False):
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -38,7 +38,7 @@ def poly_data(points, polygons):
                   numpy_to_vtkIdTypeArray(np.ascontiguousarray(polygons, np.int64).ravel(), deep=True))
     data = vtkPolyData()
     data.SetPoints(places)
-    data.SetPolys(cells)
+    (data.SetLines if as_lines else data.SetPolys)(cells)
     return data
 
 
@@ -84,13 +84,19 @@ class SolidImages:
             normal, offset = cut
             kept = kept[frame.rest[frame.cells].mean(axis=1) @ normal <= offset]
         faces, owner = frame.outer_faces(kept)
-        data = poly_data(frame.x, faces)
+        points, faces, owner, outlines = frame.fine_faces(faces, owner)
+        data = poly_data(points, faces)
         rgb = numpy_to_vtk(np.ascontiguousarray(255 * colours[owner], np.uint8), deep=True)
         data.GetCellData().SetScalars(rgb)
         look = add(data)
-        look.SetEdgeVisibility(True)
-        look.SetEdgeColor(0.15, 0.15, 0.15)
-        look.SetLineWidth(1)
+        if outlines is None:
+            look.SetEdgeVisibility(True)
+            look.SetEdgeColor(0.15, 0.15, 0.15)
+            look.SetLineWidth(1)
+        else:
+            lines = add(poly_data(points, outlines, as_lines=True))
+            lines.SetColor(0.15, 0.15, 0.15)
+            lines.SetLighting(False)
         look.SetInterpolationToFlat()
         look.SetAmbient(0.3)
         if len(frame.obstacle_faces):

@@ -92,6 +92,10 @@ ITR_C_API itr_status itr_model_set_number(itr_model* model, const char* pointer,
 /** vertices: num_vertices * dimension [m]; cells: num_cells * (dimension + 1); bodies: an id a cell, or NULL: all 0. */
 ITR_C_API itr_status itr_model_set_mesh(itr_model* model, size_t num_vertices, const double* vertices, size_t num_cells,
                                         const int* cells, const int* bodies);
+/** The same of cells with a node at the middle of each edge, which then are curved: in 2D 6 nodes a cell, the edges 01, 12, 20;
+ * in 3D 10, the edges 01, 12, 20, 03, 13, 23 (as of VTK). Vertices keep their order. */
+ITR_C_API itr_status itr_model_set_quadratic_mesh(itr_model* model, size_t num_nodes, const double* nodes, size_t num_cells,
+                                                  const int* cells, const int* bodies);
 /** facets: num_facets * dimension vertices. `id` (may be NULL) gets the number for options. */
 ITR_C_API itr_status itr_model_add_boundary(itr_model* model, const char* name, size_t num_facets, const int* facets,
                                             int* id);
@@ -158,7 +162,7 @@ ITR_C_API itr_status itr_move_obstacle(itr_simulation* simulation, const char* o
 /** Where they are at the end of the next steps: num_vertices * dimension [m]. */
 ITR_C_API itr_status itr_move_obstacle_to(itr_simulation* simulation, const char* obstacle, size_t num_vertices,
                                           const double* positions);
-ITR_C_API itr_status itr_set_forces(itr_simulation* simulation, const double* forces); /**< [N]; NULL: none */
+ITR_C_API itr_status itr_set_forces(itr_simulation* simulation, const double* forces); /**< num_nodes * dimension [N]; NULL: none */
 /** Forces of present positions; NULL: none. With their stiffness (NULL: none) a step takes fewer rounds. */
 ITR_C_API itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces,
                                              itr_stiffness_function stiffness, void* user);
@@ -179,22 +183,26 @@ typedef struct itr_term {
 } itr_term;
 /** Adds a term to the incremental potential, or puts it in the place of the one of this name; NULL: it goes. */
 ITR_C_API itr_status itr_set_term(itr_simulation* simulation, const char* name, const itr_term* term, void* user);
-/** Of the bodies: num_vertices * dimension [m/s]. */
+/** Of the bodies: num_nodes * dimension [m/s]. */
 ITR_C_API itr_status itr_set_velocities(itr_simulation* simulation, const double* velocities);
 /** No remeshing while it is not 0. */
 ITR_C_API itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen);
 
 /** The state. Arrays belong to the simulation and are valid until the next call that changes it. */
 ITR_C_API size_t itr_num_vertices(const itr_simulation* simulation);
+/** Vertices, then the nodes of curved edges: equal to the vertices where all edges are straight. */
+ITR_C_API size_t itr_num_nodes(const itr_simulation* simulation);
+/** num_nodes - num_vertices pairs of vertices, in the order of their nodes. */
+ITR_C_API itr_status itr_get_curved_edges(itr_simulation* simulation, int* edges);
 /** Of the present mesh. */
 ITR_C_API size_t itr_num_cells(const itr_simulation* simulation);
 /** Of its boundary. */
 ITR_C_API size_t itr_num_facets(const itr_simulation* simulation);
-/** num_vertices * dimension [m]. */
+/** num_nodes * dimension [m]. */
 ITR_C_API const double* itr_positions(const itr_simulation* simulation);
-/** num_vertices * dimension [m/s]. */
+/** num_nodes * dimension [m/s]. */
 ITR_C_API const double* itr_velocities(const itr_simulation* simulation);
-/** These are copied into arrays of the caller's: */
+/** These are copied into arrays of the caller's; rest positions: num_nodes * dimension [m]. */
 ITR_C_API itr_status itr_get_rest_positions(itr_simulation* simulation, double* X);
 /** num_cells * (dimension + 1) ids of vertices. */
 ITR_C_API itr_status itr_get_cells(itr_simulation* simulation, int* cells);
@@ -209,7 +217,7 @@ ITR_C_API itr_status itr_get_facet_boundaries(itr_simulation* simulation, int* i
 typedef enum itr_force { ITR_CONTACT = 0, ITR_FRICTION = 1, ITR_REACTION = 2, ITR_APPLIED = 3 } itr_force;
 /** Asks for forces, which cost some gradients a step. */
 ITR_C_API itr_status itr_watch_forces(itr_simulation* simulation, int watched);
-/** num_vertices * dimension [N]. */
+/** num_nodes * dimension [N]. */
 ITR_C_API const double* itr_forces(const itr_simulation* simulation, itr_force kind);
 /** On a boundary, of all kinds: force (dimension numbers) and moment about a point (2D: one number, 3D: three). */
 ITR_C_API itr_status itr_resultant(itr_simulation* simulation, const char* boundary, const double* about, double* force,

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "itr/core/error.hpp"
+#include "itr/fem/quadrature.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/linear/choice.hpp"
 #include "itr/simulation/advice.hpp"
@@ -125,12 +126,19 @@ class Explanation {
     fmt::print("bodies ({}D)\n", Dim);
     for (const auto& [id, sum] : sums) {
       const Material& material = setup_.materials.at(id);
-      fmt::print("  id {}: {} elements, {} {:.4g} m^{}, {}, E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^{}, mass {:.4g} kg\n",
-                 id, sum.cells, Dim == 2 ? "area" : "volume", sum.volume, Dim, name_of(material.law),
-                 material.youngs_modulus, material.poisson_ratio, material.density, Dim, material.density * sum.volume);
+      const auto order = setup_.order.find(id);
+      fmt::print("  id {}: {} {} elements, {} {:.4g} m^{}, {}, E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^{}, mass {:.4g} kg\n",
+                 id, sum.cells, order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear",
+                 Dim == 2 ? "area" : "volume", sum.volume, Dim, name_of(material.law), material.youngs_modulus,
+                 material.poisson_ratio, material.density, Dim, material.density * sum.volume);
     }
     fmt::print("  {} vertices, {} elements, edges {:.4g} to {:.4g} m, worst quality {:.3g} (1: regular; element {})\n",
                mesh.num_vertices(), mesh.num_cells(), shortest, longest, worst, worst_cell);
+    if (const Space& space = simulation_.state().space; !space.is_linear())
+      fmt::print(
+          "  {} of {} edges are curved and carry a node: {} nodes in all; elasticity by {} points a cell with curved "
+          "edges\n",
+          space.num_curved(), mesh.edges().size(), num_nodes(mesh, space), quadrature<Dim>(setup_.quadrature_degree).size());
   }
 
   std::array<Vec<Dim>, Dim + 1> corners(CellId c) const {
@@ -170,21 +178,35 @@ class Explanation {
          setup_.remesh.enabled ? "/space/remesh/enabled" : "/space/remesh/enabled is false");
   }
 
+  /// Pairs of nodes that share a cell.
+  static std::set<std::array<int, 2>> coupled_nodes(const CellSet<Dim>& cells) {
+    std::set<std::array<int, 2>> pairs;
+    const auto add = [&](const auto& nodes) {
+      for (const int a : nodes)
+        for (const int b : nodes)
+          if (a < b) pairs.insert({a, b});
+    };
+    for (const auto& element : cells.elements) add(element.vertices);
+    for (const auto& element : cells.curved_elements) add(element.nodes);
+    return pairs;
+  }
+
   /// Of the elements; contact adds to it. Held vertices that move through contact are counted as held.
   linear::MatrixTraits unknowns() {
-    const auto held = held_dofs(setup_, setup_.mesh, setup_.time.t0 + setup_.time.dt).held;
-    const int bodies = Dim * setup_.mesh.vertex_slots();
-    const auto free = [&](VertexId v) {
+    const Space& space = simulation_.state().space;
+    const auto held = held_dofs(setup_, setup_.mesh, setup_.time.t0 + setup_.time.dt, space).held;
+    const int bodies = Dim * num_nodes(setup_.mesh, space);
+    const auto free = [&](int v) {
       return static_cast<int>(std::count(held.begin() + Dim * v, held.begin() + Dim * (v + 1), 0));
     };
     linear::MatrixTraits matrix;
     matrix.block_size = Dim;
     matrix.may_be_indefinite = setup_.newton.indefinite == IndefiniteHessian::accept;
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) {
+    for (int v = 0; v < num_nodes(setup_.mesh, space); ++v) {
       matrix.order += free(v);
       matrix.nonzeros += free(v) * (free(v) + 1) / 2;
     }
-    for (const auto& [a, b] : setup_.mesh.edges()) matrix.nonzeros += free(a) * free(b);
+    for (const auto& [a, b] : coupled_nodes(whole_mesh(setup_.mesh, {}, space))) matrix.nonzeros += free(a) * free(b);
     constexpr double kEntryBytes = 12, kMegabyte = 1e6;
     fmt::print("unknowns\n  {} of {} ({} held); matrix {:.1f} MB, factor of a direct solver up to about {:.1f} MB{}\n",
                matrix.order, bodies, bodies - matrix.order, kEntryBytes * static_cast<double>(matrix.nonzeros) / kMegabyte,
@@ -206,7 +228,7 @@ class Explanation {
 
   /// Surfaces and which of them can meet; what is near at the start.
   void contact() {
-    const ContactSurface<Dim> contact = contact_surface(setup_, setup_.mesh);
+    const ContactSurface<Dim> contact = contact_surface(setup_, setup_.mesh, simulation_.state().space);
     const CollisionSurface& surface = contact.surface;
     const VectorX x = contact.positions(simulation_.state().history.x[0]);
     const auto component = find_components(surface, surface.counts.size());

@@ -57,9 +57,10 @@ VectorX as_field(std::span<const double> values) {
 }
 
 template <int Dim>
-VectorX rest_of(const Mesh<Dim>& mesh) {
-  VectorX X(Dim * mesh.vertex_slots());
-  for (int v = 0; v < mesh.vertex_slots(); ++v) X.segment<Dim>(Dim * v) = mesh.rest(v);
+VectorX rest_of(const Mesh<Dim>& mesh, const Space& space = {}) {
+  const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
+  VectorX X(Dim * static_cast<Eigen::Index>(nodes.size()));
+  for (std::size_t i = 0; i < nodes.size(); ++i) vertex_of<Dim>(X, static_cast<int>(i)) = nodes[i];
   return X;
 }
 
@@ -82,14 +83,20 @@ struct AnySimulation::Impl {
     std::map<std::string, std::size_t> term_places;  ///< in Setup::terms
 
     const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
-    /// Linear on the cells of the present mesh.
+    const Space& space() const { return simulation.state().space; }
+    void refuse_curved(const std::string& place) const {
+      if (!space().is_linear()) refuse(place, "curved edges", "a mesh with straight edges alone (discr_order 1)");
+    }
+    /// Of values by vertex linear on the cells of the present mesh, of values by node quadratic along its curved edges.
     template <int Components = Dim>
     std::function<Vec<Components>(const Vec<Dim>& X, double t)> nodal(const std::string& name,
                                                                       std::span<const double> values) {
-      check_array(name, values, static_cast<std::size_t>(Components * mesh().vertex_slots()));
+      const auto by_node = static_cast<std::size_t>(Components * itr::num_nodes(mesh(), space()));
+      const bool is_by_node = values.size() == by_node;
+      check_array(name, values, is_by_node ? by_node : static_cast<std::size_t>(Components * mesh().vertex_slots()));
       if (!locator) locator = std::make_shared<Locator<Dim>>(mesh());
-      return
-          [f = nodal_function<Dim>(locator, as_field(values))](const Vec<Dim>& X, double) { return Vec<Components>(f(X)); };
+      return [f = nodal_function<Dim>(locator, as_field(values), is_by_node ? space() : Space())](
+                 const Vec<Dim>& X, double) { return Vec<Components>(f(X)); };
     }
     /// Puts a term in the place of the one of its name, which stays that of a null one.
     void set_term(const std::string& name, TermFactory<Dim> term) {
@@ -346,8 +353,8 @@ void AnySimulation::move_obstacle(const std::string& obstacle, std::span<const d
 
 void AnySimulation::set_forces(std::span<const double> forces) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    if (!forces.empty()) check_array("forces", forces, static_cast<std::size_t>(Dim * num_vertices()));
-    d.set_term("", forces.empty() ? nullptr : point_forces<Dim>(d.mesh(), as_field(forces)));
+    if (!forces.empty()) check_array("forces", forces, static_cast<std::size_t>(Dim * num_nodes()));
+    d.set_term("", forces.empty() ? nullptr : point_forces<Dim>(d.mesh(), as_field(forces), d.space()));
   });
 }
 
@@ -357,12 +364,14 @@ void AnySimulation::set_term(const std::string& name, HostTerm term) {
   if (!is_null && !(term.energy && term.add_gradient && term.add_hessian))
     refuse("term '" + name + "'", "only some of its functions", "energy, gradient and Hessian");
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    if (!is_null) d.refuse_curved("term '" + name + "'");
     d.set_term(name, is_null ? nullptr : as_factory<Dim>(std::make_shared<const HostTerm>(std::move(term)), name));
   });
 }
 
 void AnySimulation::set_follower_forces(ForceFunction forces, StiffnessFunction stiffness) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    if (forces) d.refuse_curved("follower forces");
     FollowerForces<Dim>& follower = d.simulation.conditions().follower;
     follower = {};
     if (forces)
@@ -384,7 +393,7 @@ void AnySimulation::set_follower_forces(ForceFunction forces, StiffnessFunction 
 
 void AnySimulation::set_velocities(std::span<const double> velocities) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    check_array("velocities", velocities, static_cast<std::size_t>(Dim * num_vertices()));
+    check_array("velocities", velocities, static_cast<std::size_t>(Dim * num_nodes()));
     State<Dim> state = d.simulation.state();
     state.history.v[0].head(static_cast<Eigen::Index>(velocities.size())) = as_field(velocities);
     d.simulation.restore(std::move(state));
@@ -398,6 +407,15 @@ void AnySimulation::freeze_mesh(bool frozen) {
 int AnySimulation::num_vertices() const {
   return impl_->visit([](const auto& d) { return d.mesh().num_vertices(); });
 }
+int AnySimulation::num_nodes() const {
+  return impl_->visit([](const auto& d) { return itr::num_nodes(d.mesh(), d.space()); });
+}
+std::vector<int> AnySimulation::curved_edges() const {
+  return impl_->visit([](const auto& d) {
+    return joined(
+        d.space().num_curved(), [&](int i) -> auto& { return d.space().curved_edges()[i]; });
+  });
+}
 int AnySimulation::num_cells() const {
   return impl_->visit([](const auto& d) { return d.mesh().num_cells(); });
 }
@@ -406,17 +424,17 @@ int AnySimulation::num_facets() const {
 }
 std::span<const double> AnySimulation::positions() const {
   return impl_->visit([&](const auto& d) {
-    return std::span(d.simulation.state().history.x[0].data(), static_cast<std::size_t>(dimension() * num_vertices()));
+    return std::span(d.simulation.state().history.x[0].data(), static_cast<std::size_t>(dimension() * num_nodes()));
   });
 }
 std::span<const double> AnySimulation::velocities() const {
   return impl_->visit([&](const auto& d) {
-    return std::span(d.simulation.state().history.v[0].data(), static_cast<std::size_t>(dimension() * num_vertices()));
+    return std::span(d.simulation.state().history.v[0].data(), static_cast<std::size_t>(dimension() * num_nodes()));
   });
 }
 std::vector<double> AnySimulation::rest_positions() const {
   return impl_->visit([](const auto& d) {
-    const VectorX X = rest_of(d.mesh());
+    const VectorX X = rest_of(d.mesh(), d.space());
     return std::vector<double>(X.begin(), X.end());
   });
 }
@@ -448,7 +466,7 @@ std::vector<int> AnySimulation::facet_boundaries() const {
 std::vector<double> AnySimulation::obstacle_positions() const {
   return impl_->visit([&](const auto& d) {
     const VectorX& x = d.simulation.state().history.x[0];
-    return std::vector<double>(x.begin() + dimension() * num_vertices(), x.end());
+    return std::vector<double>(x.begin() + dimension() * num_nodes(), x.end());
   });
 }
 

@@ -74,6 +74,9 @@ std::size_t dimension_of(const itr_simulation* s) { return static_cast<std::size
 std::size_t nodal_size(const itr_simulation* s) {
   return dimension_of(s) * static_cast<std::size_t>(s->simulation.num_vertices());
 }
+std::size_t node_size(const itr_simulation* s) {
+  return dimension_of(s) * static_cast<std::size_t>(s->simulation.num_nodes());
+}
 
 /// f on the simulation below; a NULL handle is an error without a place for its message.
 template <typename F>
@@ -145,6 +148,15 @@ itr_status itr_model_set_mesh(itr_model* model, size_t num_vertices, const doubl
     const auto points = array("vertices", vertices, d * num_vertices);
     m.set_mesh(points, array("cells", cells, (d + 1) * num_cells),
                bodies ? std::span(bodies, num_cells) : std::span<const int>());
+  });
+}
+itr_status itr_model_set_quadratic_mesh(itr_model* model, size_t num_nodes, const double* nodes, size_t num_cells,
+                                        const int* cells, const int* bodies) {
+  return with(model, [&](itr::Model& m) {
+    const auto d = static_cast<std::size_t>(m.dimension());
+    const auto points = array("nodes", nodes, d * num_nodes);
+    m.set_quadratic_mesh(points, array("cells", cells, (d + 1) * (d + 2) / 2 * num_cells),
+                         bodies ? std::span(bodies, num_cells) : std::span<const int>());
   });
 }
 itr_status itr_model_add_boundary(itr_model* model, const char* name, size_t num_facets, const int* facets, int* id) {
@@ -269,7 +281,7 @@ itr_status itr_move_obstacle_to(itr_simulation* simulation, const char* obstacle
 }
 itr_status itr_set_forces(itr_simulation* simulation, const double* forces) {
   return with(simulation, [&](itr::AnySimulation& s) {
-    s.set_forces(forces ? std::span(forces, nodal_size(simulation)) : std::span<const double>());
+    s.set_forces(forces ? std::span(forces, node_size(simulation)) : std::span<const double>());
   });
 }
 itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces, itr_stiffness_function stiffness,
@@ -286,7 +298,7 @@ itr_status itr_set_term(itr_simulation* simulation, const char* name, const itr_
 }
 itr_status itr_set_velocities(itr_simulation* simulation, const double* velocities) {
   return with(simulation,
-              [&](itr::AnySimulation& s) { s.set_velocities(array("velocities", velocities, nodal_size(simulation))); });
+              [&](itr::AnySimulation& s) { s.set_velocities(array("velocities", velocities, node_size(simulation))); });
 }
 itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen) {
   return with(simulation, [&](itr::AnySimulation& s) { s.freeze_mesh(frozen != 0); });
@@ -294,6 +306,12 @@ itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen) {
 
 size_t itr_num_vertices(const itr_simulation* simulation) {
   return static_cast<std::size_t>(simulation->simulation.num_vertices());
+}
+size_t itr_num_nodes(const itr_simulation* simulation) {
+  return static_cast<std::size_t>(simulation->simulation.num_nodes());
+}
+itr_status itr_get_curved_edges(itr_simulation* simulation, int* edges) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.curved_edges(), "edges", edges); });
 }
 size_t itr_num_cells(const itr_simulation* simulation) {
   return static_cast<std::size_t>(simulation->simulation.num_cells());

@@ -79,6 +79,52 @@ void Model::set_mesh(std::span<const double> vertices, std::span<const int> cell
   boundaries_.clear();
 }
 
+void Model::set_quadratic_mesh(std::span<const double> nodes, std::span<const int> cells, std::span<const int> bodies) {
+  constexpr std::array<std::array<int, 2>, 6> kEdges = {{{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
+  constexpr double kTolerance = 1e-6;  // of the edge's length: digits of text files
+  const auto d = static_cast<std::size_t>(dimension_), edges = d * (d + 1) / 2, row = d + 1 + edges;
+  check_multiple("nodes", nodes.size(), dimension_);
+  check_finite("nodes", nodes);
+  check_multiple("cells", cells.size(), static_cast<int>(row));
+  check_ids("cells", cells, nodes.size() / d);
+  enum Kind : char { unused, vertex, middle };
+  std::vector<Kind> kinds(nodes.size() / d, unused);
+  const auto mark = [&](std::size_t at, Kind kind) {
+    Kind& known = kinds[static_cast<std::size_t>(cells[at])];
+    if (known != unused && known != kind)
+      refuse(fmt::format("cells[{}]", at), fmt::format("node {} at a corner and at an edge", cells[at]), "one of both");
+    known = kind;
+  };
+  const auto X = [&](int node, std::size_t c) { return nodes[d * static_cast<std::size_t>(node) + c]; };
+  for (std::size_t first = 0; first < cells.size(); first += row) {
+    for (std::size_t k = 0; k < row; ++k) mark(first + k, k <= d ? vertex : middle);
+    for (std::size_t e = 0; e < edges; ++e) {
+      const int a = cells[first + kEdges[e][0]], b = cells[first + kEdges[e][1]], m = cells[first + d + 1 + e];
+      double length = 0, off = 0;
+      for (std::size_t c = 0; c < d; ++c) {
+        length = std::hypot(length, X(a, c) - X(b, c));
+        off = std::hypot(off, X(m, c) - (X(a, c) + X(b, c)) / 2);
+      }
+      if (!(off <= kTolerance * length))
+        refuse(fmt::format("nodes[{}]", m), fmt::format("{:.3g} m off the middle of the edge {}-{}", off, a, b),
+               "a mesh whose edges are straight at rest");
+    }
+  }
+  std::vector<int> vertex_of(kinds.size(), kNone);
+  std::vector<double> vertices;
+  for (std::size_t n = 0; n < kinds.size(); ++n) {
+    if (kinds[n] != vertex) continue;
+    vertex_of[n] = static_cast<int>(vertices.size() / d);
+    vertices.insert(vertices.end(), nodes.begin() + static_cast<std::ptrdiff_t>(d * n),
+                    nodes.begin() + static_cast<std::ptrdiff_t>(d * (n + 1)));
+  }
+  std::vector<int> corners;
+  for (std::size_t first = 0; first < cells.size(); first += row)
+    for (std::size_t k = 0; k <= d; ++k) corners.push_back(vertex_of[static_cast<std::size_t>(cells[first + k])]);
+  set_mesh(vertices, corners, bodies);
+  set_option("/space/discr_order", "2");
+}
+
 int Model::next_id(const std::string& name) const {
   for (const auto* parts : {&boundaries_, &obstacles_})
     for (const Part& part : *parts)

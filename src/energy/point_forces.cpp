@@ -82,24 +82,26 @@ bool are_vertices(const std::vector<Vec<Dim>>& X, const std::vector<Vec<Dim>>& r
 }  // namespace
 
 template <int Dim>
-TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces) {
-  const int n = mesh.vertex_slots();
+TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces, const Space& space) {
+  const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
+  const auto n = static_cast<int>(nodes.size());
   if (forces.size() != Eigen::Index{Dim} * n)
     throw InputError({"", "forces", std::to_string(forces.size()) + " numbers",
-                      std::to_string(Dim * n) + ", " + std::to_string(Dim) + " a vertex"});
+                      std::to_string(Dim * n) + ", " + std::to_string(Dim) + " a node"});
   const auto all = std::make_shared<std::vector<Vec<Dim>>>();
   const auto given = std::make_shared<const VectorX>(forces);
   const auto loaded = std::make_shared<Points<Dim>>();
   std::vector<Box<Dim>> boxes;
   for (int v = 0; v < n; ++v) {
-    const Vec<Dim> f = forces.segment<Dim>(Dim * v), X = mesh.rest(v);
+    const Vec<Dim> f = forces.segment<Dim>(Dim * v), X = nodes[v];
     if (!f.allFinite())
       throw InputError({"", "forces[" + std::to_string(v) + "]", "a number that is not finite", "numbers"});
     all->push_back(X);
     if (f.isZero(0)) continue;
     loaded->X.push_back(X);
     loaded->force.push_back(f);
-    loaded->body.push_back(mesh.cells_of(v).empty() ? 0 : mesh.body(mesh.cells_of(v)[0]));
+    const VertexId end = v < mesh.vertex_slots() ? v : space.curved_edges()[v - mesh.vertex_slots()][0];
+    loaded->body.push_back(mesh.cells_of(end).empty() ? 0 : mesh.body(mesh.cells_of(end)[0]));
     boxes.push_back({X, X});
   }
   loaded->tree.build(boxes);
@@ -118,7 +120,7 @@ TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces) {
   };
 }
 
-template TermFactory<2> point_forces<2>(const Mesh<2>&, ConstVectorView);
-template TermFactory<3> point_forces<3>(const Mesh<3>&, ConstVectorView);
+template TermFactory<2> point_forces<2>(const Mesh<2>&, ConstVectorView, const Space&);
+template TermFactory<3> point_forces<3>(const Mesh<3>&, ConstVectorView, const Space&);
 
 }  // namespace itr

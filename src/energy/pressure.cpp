@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "itr/fem/quadrature.hpp"
 #include "project_block.hpp"
 
 namespace itr {
@@ -29,7 +30,8 @@ Mat<3> cone_gradient(const Mat<3>& p) {
   return gradient;
 }
 
-/// What a unit pressure puts on each corner, up to its sign: area times normal over the number of corners.
+/// What a unit pressure puts on each corner, up to its sign: area times normal over the number of corners. Of the corners of
+/// curved_corners: that of the whole facet, as if x's normal were everywhere.
 Vec<2> corner_share(const Mat<2>& p) {
   const Vec<2> edge = p.col(1) - p.col(0);
   return Vec<2>(edge[1], -edge[0]) / 2;
@@ -58,6 +60,24 @@ Mat<9> cone_hessian(const Mat<3>& p) {
   return hessian;
 }
 
+/// The cone over a curved facet is the mean, over points of the facet, of cones over the corners x, x + t1, x + t1 + t2,
+/// with the tangents t there: their volume is det(x, t1, t2) over 2 or 6. A row of these weights gives what a node adds to a
+/// corner.
+template <int Dim>
+using CornerWeights = Eigen::Matrix<double, kQuadraticNodes<Dim - 1>, Dim>;
+
+template <int Dim>
+CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, Dim>& l) {
+  Eigen::Matrix<double, Dim - 1, Dim> linear;
+  linear.col(0).setConstant(-1);
+  linear.template rightCols<Dim - 1>().setIdentity();
+  const auto tangents = quadratic_gradients<Dim - 1, Dim - 1>(curved, l, linear);
+  CornerWeights<Dim> weights;
+  weights.col(0) = quadratic_shapes<Dim - 1>(curved, l);
+  for (int k = 1; k < Dim; ++k) weights.col(k) = weights.col(k - 1) + tangents.row(k - 1).transpose();
+  return weights;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -72,8 +92,16 @@ PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>&
       facets_.push_back({facet.vertices, pressure(middle)});
       origin_ += middle;
     }
-  if (facets_.empty()) return;
-  origin_ /= static_cast<double>(facets_.size());
+  for (const auto& facet : cells.curved_facets)
+    for (const auto& [tag, pressure] : loads.pressures) {
+      if (tag != facet.tag) continue;
+      Vec<Dim> middle = Vec<Dim>::Zero();
+      for (int k = 0; k < Dim; ++k) middle += cells.rest[facet.nodes[k]] / Dim;
+      curved_facets_.push_back({facet.nodes, facet.curved, pressure(middle)});
+      origin_ += middle;
+    }
+  if (empty()) return;
+  origin_ /= static_cast<double>(facets_.size() + curved_facets_.size());
   for (const LoadedFacet& facet : facets_) {
     const Corners p = corners(facet, lagged_x);
     const Corners gradient = cone_gradient(p);
@@ -82,11 +110,20 @@ PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>&
     for (int k = 0; k < Dim; ++k)
       correction_.segment<Dim>(Dim * facet.vertices[k]) += facet.pressure * (share - gradient.col(k));
   }
-  for (const LoadedFacet& facet : facets_) {
-    Corners p;
-    for (int k = 0; k < Dim; ++k) p.col(k) = cells.rest[facet.vertices[k]] - origin_;
-    rest_work_ += facet.pressure * cone_volume<Dim>(p);
-  }
+  for_each_cone(lagged_x, [&](const CurvedLoadedFacet& facet, double pressure, const auto& weights, const Corners& p) {
+    const Corners gradient = cone_gradient(p);
+    const Vec<Dim> normal = Dim * corner_share(p);
+    largest_force_ = std::max(largest_force_, std::abs(facet.pressure) * normal.norm() / Dim);
+    for (int n = 0; n < kQuadraticNodes<Dim - 1>; ++n)
+      correction_.segment<Dim>(Dim * facet.nodes[n]) +=
+          pressure * (weights(n, 0) * normal - gradient * weights.row(n).transpose());
+  });
+  VectorX rest(correction_.size());
+  for (int v = 0; v < cells.num_vertices; ++v) rest.segment<Dim>(Dim * v) = cells.rest[v];
+  for (const LoadedFacet& facet : facets_) rest_work_ += facet.pressure * cone_volume<Dim>(corners(facet, rest));
+  for_each_cone(rest, [&](const CurvedLoadedFacet&, double pressure, const auto&, const Corners& p) {
+    rest_work_ += pressure * cone_volume<Dim>(p);
+  });
   for (int v = 0; v < cells.num_vertices; ++v) rest_work_ += correction_.segment<Dim>(Dim * v).dot(cells.rest[v]);
 }
 
@@ -98,9 +135,26 @@ auto PressureEnergy<Dim>::corners(const LoadedFacet& facet, ConstVectorView x) c
 }
 
 template <int Dim>
+template <typename F>
+void PressureEnergy<Dim>::for_each_cone(ConstVectorView x, const F& f) const {
+  constexpr int kDegree = Dim == 2 ? 3 : 4;  // of det(x, t1, t2), and of a shape function times the normal
+  for (const CurvedLoadedFacet& facet : curved_facets_) {
+    auto nodes = at_nodes<Dim>(facet.nodes, x);
+    nodes.colwise() -= origin_;
+    for (const auto& point : quadrature<Dim - 1>(kDegree)) {
+      const CornerWeights<Dim> weights = corner_weights<Dim>(facet.curved, point.weights);
+      f(facet, facet.pressure * point.share, weights, Corners(nodes * weights));
+    }
+  }
+}
+
+template <int Dim>
 double PressureEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = correction_.dot(x) - rest_work_;
   for (const LoadedFacet& facet : facets_) sum += facet.pressure * cone_volume<Dim>(corners(facet, x));
+  for_each_cone(x, [&](const CurvedLoadedFacet&, double pressure, const auto&, const Corners& p) {
+    sum += pressure * cone_volume<Dim>(p);
+  });
   return scale_ * sum;
 }
 
@@ -111,6 +165,11 @@ void PressureEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, W
     const Corners forces = scale_ * facet.pressure * cone_gradient(corners(facet, x));
     for (int k = 0; k < Dim; ++k) gradient.segment<Dim>(Dim * facet.vertices[k]) += forces.col(k);
   }
+  for_each_cone(x, [&](const CurvedLoadedFacet& facet, double pressure, const auto& weights, const Corners& p) {
+    const Corners forces = scale_ * pressure * cone_gradient(p);
+    for (int n = 0; n < kQuadraticNodes<Dim - 1>; ++n)
+      gradient.segment<Dim>(Dim * facet.nodes[n]) += forces * weights.row(n).transpose();
+  });
 }
 
 template <int Dim>
@@ -120,6 +179,17 @@ void PressureEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
     project_block(block, psd);
     sink.add<Dim>(facet.vertices, block.data());
   }
+  constexpr int kNodes = kQuadraticNodes<Dim - 1>;
+  for_each_cone(x, [&](const CurvedLoadedFacet& facet, double pressure, const auto& weights, const Corners& p) {
+    Mat<Dim* Dim> block = scale_ * pressure * cone_hessian(p);
+    project_block(block, psd);
+    Eigen::Matrix<double, Dim * Dim, Dim * kNodes> by_nodes;
+    for (int n = 0; n < kNodes; ++n)
+      for (int k = 0; k < Dim; ++k)
+        by_nodes.template block<Dim, Dim>(Dim * k, Dim * n) = weights(n, k) * Mat<Dim>::Identity();
+    const Mat<Dim* kNodes> of_nodes = by_nodes.transpose() * block * by_nodes;
+    sink.add<Dim>(facet.nodes, of_nodes.data());
+  });
 }
 
 template <int Dim>

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "itr/fem/quadratic.hpp"
 #include "itr/geometry/bvh.hpp"
 
 namespace itr {
@@ -104,20 +105,30 @@ int Locator<Dim>::num_vertices() const {
 }
 
 template <int Dim>
-std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values) {
-  const int components = static_cast<int>(values.size()) / std::max(1, locator->num_vertices());
-  return [locator = std::move(locator), values = std::move(values), components](const Vec<Dim>& X) {
+std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
+                                                         Space space) {
+  const int vertices = locator->num_vertices();
+  const int components = static_cast<int>(values.size()) / std::max(1, vertices + space.num_curved());
+  return [locator = std::move(locator), values = std::move(values), space = std::move(space), vertices,
+          components](const Vec<Dim>& X) {
     const auto place = locator->find(X);
+    const auto at = [&](int node) { return values.segment(components * node, components); };
     VectorX sum = VectorX::Zero(components);
     for (int k = 0; k <= Dim; ++k)
-      if (place.weights[k] > 0) sum += place.weights[k] * values.segment(components * place.vertices[k], components);
+      if (place.weights[k] > 0) sum += place.weights[k] * at(place.vertices[k]);
+    if (space.is_linear()) return sum;
+    for_each_edge<Dim>([&](int, int i, int j) {
+      const double product = place.weights[i] * place.weights[j];
+      const int a = place.vertices[i], b = place.vertices[j], curved = product > 0 ? space.find(a, b) : kNone;
+      if (curved != kNone) sum += product * (4 * at(vertices + curved) - 2 * at(a) - 2 * at(b));
+    });
     return sum;
   };
 }
 
 template class Locator<2>;
 template class Locator<3>;
-template std::function<VectorX(const Vec<2>&)> nodal_function<2>(std::shared_ptr<const Locator<2>>, VectorX);
-template std::function<VectorX(const Vec<3>&)> nodal_function<3>(std::shared_ptr<const Locator<3>>, VectorX);
+template std::function<VectorX(const Vec<2>&)> nodal_function<2>(std::shared_ptr<const Locator<2>>, VectorX, Space);
+template std::function<VectorX(const Vec<3>&)> nodal_function<3>(std::shared_ptr<const Locator<3>>, VectorX, Space);
 
 }  // namespace itr

@@ -163,10 +163,30 @@ class MshReader {
       case 4:
         tetrahedra_.push_back(read_node_tags<4>()), mesh_.tetrahedron_body.push_back(body);
         return;
+      case 8:
+        edges_.push_back(read_second_order<2, 1>({{{0, 1}}}));
+        return;
+      case 9:
+        triangles_.push_back(read_second_order<3, 3>({{{0, 1}, {1, 2}, {2, 0}}}));
+        mesh_.triangle_body.push_back(body);
+        return;
+      case 11:
+        tetrahedra_.push_back(read_second_order<4, 6>({{{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}}}));
+        mesh_.tetrahedron_body.push_back(body);
+        return;
       default:
         in_.fail("element " + std::to_string(number) + " of type " + std::to_string(type),
-                 "1 (line), 2 (triangle), 4 (tetrahedron) or 15 (point)");
+                 "1 (line), 2 (triangle), 4 (tetrahedron), 15 (point), or 8, 9, 11 (the same of second order)");
     }
+  }
+
+  /// The corners of an element of second order; its other nodes are kept aside.
+  template <std::size_t Corners, std::size_t Edges>
+  std::array<std::int64_t, Corners> read_second_order(const std::array<std::array<int, 2>, Edges>& edges) {
+    const auto tags = read_node_tags<Corners>();
+    const auto middles = read_node_tags<Edges>();
+    for (std::size_t e = 0; e < Edges; ++e) middles_.push_back({tags[edges[e][0]], tags[edges[e][1]], middles[e]});
+    return tags;
   }
 
   template <std::size_t N>
@@ -191,6 +211,46 @@ class MshReader {
     renumber(edges_, mesh_.edges, index);
     renumber(triangles_, mesh_.triangles, index);
     renumber(tetrahedra_, mesh_.tetrahedra, index);
+    if (!middles_.empty()) drop_middles(index);
+  }
+
+  /// The library's meshes are straight at rest: of a file of second order the corners say all, or it is refused.
+  void drop_middles(const std::unordered_map<std::int64_t, int>& index) {
+    constexpr double kTolerance = 1e-6;  // of the edge's length: digits of text files
+    std::vector<std::array<int, 3>> middles;
+    renumber(middles_, middles, index);
+    std::vector<char> is_middle(mesh_.vertices.size(), 0);
+    for (std::size_t i = 0; i < middles.size(); ++i) {
+      const auto [a, b, m] = middles[i];
+      const Vec<3>&A = mesh_.vertices[a], &B = mesh_.vertices[b];
+      is_middle[m] = 1;
+      if (const double off = (mesh_.vertices[m] - (A + B) / 2).norm(); !(off <= kTolerance * (B - A).norm()))
+        throw InputError({file_.string(), "node " + std::to_string(middles_[i][2]),
+                          std::to_string(off) + " off the middle of its edge",
+                          "a mesh whose edges are straight at rest (curved ones are not supported)"});
+    }
+    std::vector<int> place(mesh_.vertices.size(), -1);
+    std::size_t kept = 0;
+    for (std::size_t v = 0; v < place.size(); ++v) {
+      if (is_middle[v]) continue;
+      place[v] = static_cast<int>(kept);
+      mesh_.vertices[kept++] = mesh_.vertices[v];
+    }
+    mesh_.vertices.resize(kept);
+    move_ids(mesh_.edges, place);
+    move_ids(mesh_.triangles, place);
+    move_ids(mesh_.tetrahedra, place);
+  }
+
+  template <std::size_t N>
+  void move_ids(std::vector<std::array<int, N>>& rows, const std::vector<int>& place) const {
+    for (auto& row : rows)
+      for (int& v : row) {
+        if (place[v] < 0)
+          throw InputError({file_.string(), "$Elements", "a node that is a corner here and in the middle of an edge there",
+                            "one of both"});
+        v = place[v];
+      }
   }
 
   void sort_vertices() {
@@ -222,6 +282,7 @@ class MshReader {
   std::vector<std::array<std::int64_t, 2>> edges_;
   std::vector<std::array<std::int64_t, 3>> triangles_;
   std::vector<std::array<std::int64_t, 4>> tetrahedra_;
+  std::vector<std::array<std::int64_t, 3>> middles_;   ///< of elements of second order: ends of an edge, its node
   std::map<std::pair<int, std::int64_t>, int> group_;  ///< (dimension, entity) -> first physical group
 };
 

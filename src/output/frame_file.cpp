@@ -66,19 +66,72 @@ constexpr auto drawn_edges() {
     return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 }
 
-/// The curved edges; where each edge of each cell is curved also the cells with all their nodes, as XDMF draws them.
+/// Cells as XDMF draws them. A quadratic one needs a node at each of its edges, so that where only some edges are curved the
+/// straight ones of such cells get nodes too.
 template <int Dim>
-void write_space(hdf5::File& file, const Mesh<Dim>& mesh, const Space& space) {
-  if (space.is_linear()) return;
-  write_index_rows(file, "/mesh/curved_edges", space.curved_edges());
-  if (!is_all_curved(mesh, space)) return;
-  Integers nodes;
+struct DrawnCells {
+  std::vector<EdgeKey> straight_edges;  ///< with a node that only the drawing has
+  Integers cells;                       ///< all curved: a row of nodes each; else of XDMF's mixed type, the type in front
+};
+
+/// Nothing for a linear space.
+template <int Dim>
+DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh, const Space& space) {
+  DrawnCells<Dim> drawn;
+  if (space.is_linear()) return drawn;
+  const auto has_curved_edge = [&](const auto& cell) {
+    return std::any_of(drawn_edges<Dim>().begin(), drawn_edges<Dim>().end(),
+                       [&](const auto& edge) { return space.find(cell[edge[0]], cell[edge[1]]) != kNone; });
+  };
+  auto& straight = drawn.straight_edges;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     const auto& cell = mesh.cell(c);
-    nodes.insert(nodes.end(), cell.begin(), cell.end());
-    for (const auto& [i, j] : drawn_edges<Dim>()) nodes.push_back(mesh.vertex_slots() + space.find(cell[i], cell[j]));
+    if (!has_curved_edge(cell)) continue;
+    for (const auto& [i, j] : drawn_edges<Dim>())
+      if (space.find(cell[i], cell[j]) == kNone)
+        straight.push_back({std::min(cell[i], cell[j]), std::max(cell[i], cell[j])});
   }
-  file.write("/mesh/quadratic_cells", nodes, kQuadraticNodes<Dim>);
+  std::sort(straight.begin(), straight.end());
+  straight.erase(std::unique(straight.begin(), straight.end()), straight.end());
+  const Space of_drawing(straight);
+  constexpr int kLinearType = Dim == 2 ? 4 : 6, kQuadraticType = Dim == 2 ? 36 : 38;  // of XDMF
+  const bool is_mixed = !is_all_curved(mesh, space);
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    const auto& cell = mesh.cell(c);
+    const bool is_quadratic = has_curved_edge(cell);
+    if (is_mixed) drawn.cells.push_back(is_quadratic ? kQuadraticType : kLinearType);
+    drawn.cells.insert(drawn.cells.end(), cell.begin(), cell.end());
+    if (!is_quadratic) continue;
+    for (const auto& [i, j] : drawn_edges<Dim>()) {
+      const int curved = space.find(cell[i], cell[j]);
+      drawn.cells.push_back(curved != kNone ? mesh.vertex_slots() + curved
+                                            : num_nodes(mesh, space) + of_drawing.find(cell[i], cell[j]));
+    }
+  }
+  return drawn;
+}
+
+/// The curved edges, and the cells as XDMF draws them; where only some edges are curved with nodal fields of their own,
+/// since those of /fields have no rows for straight edges.
+template <int Dim>
+void write_space(hdf5::File& file, const FrameView<Dim>& frame, const Space& space, ConstVectorView u) {
+  if (space.is_linear()) return;
+  write_index_rows(file, "/mesh/curved_edges", space.curved_edges());
+  const DrawnCells<Dim> drawn = draw_cells(frame.mesh, space);
+  if (is_all_curved(frame.mesh, space)) return file.write("/mesh/quadratic_cells", drawn.cells, kQuadraticNodes<Dim>);
+  file.write("/drawn/cells", drawn.cells, 0);
+  const auto write = [&](const char* name, ConstVectorView field, const char* unit) {
+    VectorX values(field.size() + Dim * static_cast<Eigen::Index>(drawn.straight_edges.size()));
+    values.head(field.size()) = field;
+    for (Eigen::Index i = field.size(); const auto& [a, b] : drawn.straight_edges) {
+      values.segment<Dim>(i) = (field.segment<Dim>(Dim * a) + field.segment<Dim>(Dim * b)) / 2;
+      i += Dim;
+    }
+    write_values(file, name, as_span(values), Dim, unit);
+  };
+  write("/drawn/x", frame.x, "m");
+  write("/drawn/u", u, "m");
+  write("/drawn/v", frame.v, "m/s");
 }
 
 template <int Dim>
@@ -146,7 +199,7 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t) {
   file.write_attribute("step", static_cast<std::int64_t>(step));
   file.write_attribute("t", t);
   write_mesh(file, mesh, rest);
-  write_space(file, mesh, space);
+  write_space<Dim>(file, frame, space, u);
   write_values(file, "/fields/x", as_span(frame.x), Dim, "m");
   write_values(file, "/fields/u", as_span(u), Dim, "m");
   write_values(file, "/fields/v", as_span(frame.v), Dim, "m/s");
@@ -155,6 +208,18 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t) {
   write_surface<Dim>(file, "/obstacles", frame.obstacle_x, frame.obstacle_edges, frame.obstacle_triangles);
   if (frame.proxy.x) write_surface<Dim>(file, "/proxy", *frame.proxy.x, *frame.proxy.edges, *frame.proxy.triangles);
 }
+
+}  // namespace
+
+template <int Dim>
+std::array<int, 2> drawn_sizes(const FrameView<Dim>& frame) {
+  if (!frame.space || frame.space->is_linear() || is_all_curved(frame.mesh, *frame.space)) return {0, 0};
+  const DrawnCells<Dim> drawn = draw_cells(frame.mesh, *frame.space);
+  return {num_nodes(frame.mesh, *frame.space) + static_cast<int>(drawn.straight_edges.size()),
+          static_cast<int>(drawn.cells.size())};
+}
+
+namespace {
 
 /// Lengths of all lists that a frame has: of frames with the same, files differ in numbers alone.
 template <int Dim>
@@ -173,6 +238,8 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
                                     size(frame.obstacle_triangles),
                                     frame.proxy.x != nullptr,
                                     frame.asked != nullptr};
+  const auto [drawn_nodes, drawn_cells] = drawn_sizes(frame);
+  shape.insert(shape.end(), {static_cast<std::size_t>(drawn_nodes), static_cast<std::size_t>(drawn_cells)});
   if (frame.proxy.x)
     shape.insert(shape.end(), {size(*frame.proxy.x), size(*frame.proxy.edges), size(*frame.proxy.triangles)});
   if (frame.asked) {
@@ -239,8 +306,18 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
   const hdf5::Shape x = file.shape("/fields/x"), body = file.shape("/mesh/body");
-  FrameSizes sizes{file.read_double_attribute("t"),        x.columns, static_cast<int>(x.rows), static_cast<int>(body.rows),
-                   file.contains("/mesh/quadratic_cells"), {}};
+  FrameSizes sizes{file.read_double_attribute("t"),
+                   x.columns,
+                   static_cast<int>(x.rows),
+                   static_cast<int>(body.rows),
+                   file.contains("/mesh/quadratic_cells"),
+                   0,
+                   0,
+                   {}};
+  if (file.contains("/drawn/cells")) {
+    sizes.drawn_nodes = static_cast<int>(file.shape("/drawn/x").rows);
+    sizes.drawn_cells = static_cast<int>(file.shape("/drawn/cells").rows);
+  }
   for (const char* name : kAskedFields)
     if (file.contains(std::string("/fields/") + name)) sizes.asked.push_back(name);
   return sizes;
@@ -290,6 +367,7 @@ StoredFrame read_frame(const std::filesystem::path& path) {
 #define ITR_INSTANTIATE(Dim)                                                                                   \
   template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, Durability, \
                                  const FrameExtra&);                                                           \
+  template std::array<int, 2> drawn_sizes<Dim>(const FrameView<Dim>&);                                         \
   template void FrameFiles::write<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -51,8 +51,13 @@ struct FrameSizes {
   double t = 0;                          ///< [s]
   int dim = 0, vertices = 0, cells = 0;  ///< vertices: with the nodes of curved edges
   bool is_quadratic = false;             ///< every edge is curved
+  int drawn_nodes = 0, drawn_cells = 0;  ///< lengths of /drawn/x and /drawn/cells, where only some edges are curved
   std::vector<std::string> asked;        ///< names of kAskedFields that it has
 };
+/// Lengths of a frame's /drawn/x and /drawn/cells.
+template <int Dim>
+std::array<int, 2> drawn_sizes(const FrameView<Dim>& frame);
+
 FrameSizes read_frame_sizes(const std::filesystem::path& path);
 
 FrameTotals read_frame_totals(const std::filesystem::path& path);

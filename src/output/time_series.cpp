@@ -65,16 +65,29 @@ std::string grid(const FrameEntry& entry) {
   const char* linear = is_plane ? "Triangle" : "Tetrahedron";
   const char* quadratic = is_plane ? "Triangle_6" : "Tetrahedron_10";
   const int nodes = entry.is_quadratic ? (entry.dim + 1) * (entry.dim + 2) / 2 : entry.dim + 1;
+  const bool is_mixed = entry.drawn_cells > 0;
+  const std::string shape = is_mixed ? std::to_string(entry.drawn_cells) : fmt::format("{} {}", cells, nodes);
   text += fmt::format("        <Topology TopologyType=\"{}\" NumberOfElements=\"{}\">{}</Topology>\n",
-                      entry.is_quadratic ? quadratic : linear, cells,
-                      data_item(entry, entry.is_quadratic ? "/mesh/quadratic_cells" : "/mesh/simplices",
-                                fmt::format("{} {}", cells, nodes), "Int"));
+                      is_mixed             ? "Mixed"
+                      : entry.is_quadratic ? quadratic
+                                           : linear,
+                      cells,
+                      data_item(entry,
+                                is_mixed             ? "/drawn/cells"
+                                : entry.is_quadratic ? "/mesh/quadratic_cells"
+                                                     : "/mesh/simplices",
+                                shape, "Int"));
+  FrameEntry drawn = entry;
+  if (is_mixed) drawn.vertices = entry.drawn_nodes;
+  const std::string group = is_mixed ? "/drawn/" : "/fields/";
   text += fmt::format("        <Geometry GeometryType=\"{}\">{}</Geometry>\n", is_plane ? "XY" : "XYZ",
-                      data_item(entry, "/fields/x", fmt::format("{} {}", entry.vertices, entry.dim), "Float"));
-  text += vector_field(entry, "u", "/fields/u") + vector_field(entry, "v", "/fields/v");
+                      data_item(entry, group + "x", fmt::format("{} {}", drawn.vertices, entry.dim), "Float"));
+  text += vector_field(drawn, "u", group + "u") + vector_field(drawn, "v", group + "v");
   text += attribute("elastic_density", "Scalar", "Cell", data_item(entry, "/fields/elastic_density", cells, "Float"));
   text += attribute("body", "Scalar", "Cell", data_item(entry, "/mesh/body", cells, "Int"));
-  for (const std::string& name : entry.asked) text += asked_field(entry, name);
+  for (const std::string& name : entry.asked)
+    if (const bool is_on_cells = name == "von_mises" || name == "stress"; is_on_cells || !is_mixed)
+      text += asked_field(entry, name);
   return text + "      </Grid>\n";
 }
 

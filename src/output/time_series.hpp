@@ -16,6 +16,8 @@ struct FrameEntry {
   int dim = 0;
   int vertices = 0, cells = 0;     ///< vertices: with the nodes of curved edges
   bool is_quadratic = false;       ///< all edges are curved, and drawn so
+  int drawn_nodes = 0;             ///< rows of /drawn/x, where only some edges are curved
+  int drawn_cells = 0;             ///< length of /drawn/cells
   std::vector<std::string> asked;  ///< fields that not every frame has, see kAskedFields
 };
 

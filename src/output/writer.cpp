@@ -59,8 +59,8 @@ struct Writer::Impl {
     for (const fs::path& path : stored_frames(directory)) {
       const FrameSizes sizes = read_frame_sizes(path);
       last_stored = step_of_frame(path);
-      series.append(
-          {frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.is_quadratic, sizes.asked});
+      series.append({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.is_quadratic,
+                     sizes.drawn_nodes, sizes.drawn_cells, sizes.asked});
     }
     last_checkpoint = seconds_now();
   }
@@ -110,7 +110,9 @@ struct Writer::Impl {
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
     const bool is_quadratic = frame.space && is_all_curved(frame.mesh, *frame.space);
-    series.add({frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, std::move(asked)});
+    const auto [drawn_nodes, drawn_cells] = drawn_sizes(frame);
+    series.add(
+        {frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, drawn_nodes, drawn_cells, std::move(asked)});
   }
 
   /// What a checkpoint relies on has to be on the disk before it.

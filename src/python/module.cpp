@@ -137,6 +137,10 @@ void add_model(py::module_& m) {
            })
       .def("set_mesh", [](Model& model, const Doubles& vertices, const Ints& cells,
                           const Ints& bodies) { model.set_mesh(view(vertices), view(cells), view(bodies)); })
+      .def("set_quadratic_mesh",
+           [](Model& model, const Doubles& nodes, const Ints& cells, const Ints& bodies) {
+             model.set_quadratic_mesh(view(nodes), view(cells), view(bodies));
+           })
       .def("add_boundary_facets",
            [](Model& model, const std::string& name, const Ints& facets) { return model.add_boundary(name, view(facets)); })
       .def("add_boundary_box", [](Model& model, const std::string& name, const Doubles& low,
@@ -252,6 +256,7 @@ void add_simulation(py::module_& m) {
       .def("set_velocities", [](AnySimulation& s, const Doubles& values) { s.set_velocities(view(values)); })
       .def("freeze_mesh", &AnySimulation::freeze_mesh)
       .def_property_readonly("num_vertices", &AnySimulation::num_vertices)
+      .def_property_readonly("curved_edges", [](const AnySimulation& s) { return copied(s.curved_edges(), 2); })
       .def_property_readonly("positions", [](const AnySimulation& s) { return positions(s, false); })
       .def_property_readonly("velocities", [](const AnySimulation& s) { return positions(s, true); })
       .def_property_readonly("rest_positions",

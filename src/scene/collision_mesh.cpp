@@ -15,7 +15,7 @@ using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 /// The datasets `values`, `rows` and `cols` of /weight_triplets, and its attribute `shape`. Triplets for one entry are
 /// summed.
-Weights read_weights(const std::filesystem::path& path, std::int64_t rows, std::int64_t columns) {
+Weights read_weights(const std::filesystem::path& path, std::int64_t rows, std::int64_t vertices, bool has_curved_edges) {
   const auto fail = [&](const std::string& place, const std::string& found, const std::string& expected) {
     throw InputError({path.string(), place, found, expected});
   };
@@ -25,6 +25,8 @@ Weights read_weights(const std::filesystem::path& path, std::int64_t rows, std::
   for (const char* name : {"values", "rows", "cols"})
     if (!file.contains(group) || !file.contains(group + "/" + name)) fail(group + "/" + name, "no such dataset", "it");
   const std::vector<std::int64_t> shape = file.read_integers_attribute(group, "shape");
+  // How many edges are curved the simulation knows, which checks it.
+  const std::int64_t columns = has_curved_edges && shape.size() == 2 && shape[1] > vertices ? shape[1] : vertices;
   if (shape != std::vector{rows, columns}) {
     std::string found;
     for (const std::int64_t n : shape) found += (found.empty() ? "" : " x ") + std::to_string(n);
@@ -84,9 +86,11 @@ std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const G
     if (geometry["n_refs"].integer(0) != 0) geometry["n_refs"].fail("0: a collision mesh follows the vertices of the file");
   Obstacles<Dim> surface = read_surface<Dim>(node, root["geometry"].items().front(), files);
   const auto vertices = static_cast<std::int64_t>(surface.rest.size());
-  CollisionProxy<Dim> proxy{
-      std::move(surface.rest), std::move(surface.edges), std::move(surface.triangles),
-      read_weights(MeshFiles::find(node["linear_map"], MeshFiles::kWeights), vertices, mesh.num_vertices())};
+  const Node order = root["space"]["discr_order"];
+  const bool has_curved_edges = order.exists() && order.json() != 1;
+  CollisionProxy<Dim> proxy{std::move(surface.rest), std::move(surface.edges), std::move(surface.triangles),
+                            read_weights(MeshFiles::find(node["linear_map"], MeshFiles::kWeights), vertices,
+                                         mesh.num_vertices(), has_curved_edges)};
   if (const int loose = count_loose(proxy); loose > 0)
     warnings.push_back(node["mesh"].pointer() + ": " + std::to_string(loose) +
                        " vertices in no edge and no face touch as points");

@@ -172,7 +172,9 @@ constexpr Key kKeys[] = {
     {"/contact/collision_mesh/mesh", read, "path", "", "",
      "surface, moved by the first geometry's transformation; required"},
     {"/contact/collision_mesh/linear_map", read, "path", "", "",
-     "HDF5 file with weight_triplets/{values,rows,cols}: what a mesh vertex gives to a surface vertex; required"},
+     "HDF5 file with weight_triplets/{values,rows,cols}: what a mesh vertex, or a node of quadratic elements, gives to a "
+     "surface vertex; "
+     "required"},
     {"/contact/collision_mesh/{max_edge_length,tessellation_type}", refused, "", "", "", "not supported yet"},
 
     {"/solver/max_threads", read, "natural", "0", "", "0: all; results do not depend on it; --threads wins"},

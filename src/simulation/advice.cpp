@@ -106,8 +106,9 @@ void find_hard_meshes(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, 
 
 template <int Dim>
 void find_held(const Setup<Dim>& setup, std::vector<std::string>& found) {
-  const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0 + setup.time.dt).held;
-  if (std::all_of(held.begin(), held.begin() + Dim * setup.mesh.vertex_slots(), [](char h) { return h != 0; }))
+  const Space space = space_of_orders(setup.mesh, setup.order);
+  const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0 + setup.time.dt, space).held;
+  if (std::all_of(held.begin(), held.begin() + Dim * num_nodes(setup.mesh, space), [](char h) { return h != 0; }))
     found.emplace_back("every vertex is held: there is nothing to solve for");
 }
 
@@ -156,7 +157,7 @@ template <int Dim>
 void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.contact.enabled) return;
-  const ContactSurface<Dim> contact = contact_surface(setup, simulation.state().mesh);
+  const ContactSurface<Dim> contact = contact_surface(setup, simulation.state().mesh, simulation.state().space);
   const CollisionSurface& surface = contact.surface;
   const double dhat = setup.contact.activation_distance;
   Workspace workspace;
@@ -166,9 +167,10 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
     found.push_back(fmt::format(
         "gap {:.3g} m at the start is below d-hat = {:.3g} m: surfaces push each other from the start", gap, dhat));
   double shortest = kInfinity;
-  const auto rest = [&](int v) { return setup.proxy ? setup.proxy->rest[v] : simulation.state().mesh.rest(v); };
+  const std::vector<Vec<Dim>> rest =
+      setup.proxy ? setup.proxy->rest : node_rest_positions(simulation.state().mesh, simulation.state().space);
   for (const auto& [a, b] : surface.edges)
-    if (surface.counts[a]) shortest = std::min(shortest, (rest(a) - rest(b)).norm());
+    if (surface.counts[a]) shortest = std::min(shortest, (rest[a] - rest[b]).norm());
   if (dhat > shortest)
     found.push_back(fmt::format("d-hat = {:.3g} m is above the shortest surface edge, {:.3g} m: surfaces feel themselves",
                                 dhat, shortest));

@@ -64,11 +64,12 @@ std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, con
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
   std::vector<Eigen::Triplet<double>> entries;
   VectorX offset = VectorX::Zero(Dim * (own + obstacles));
+  const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
   for (int i = 0; i < own; ++i) vertex_of<Dim>(offset, i) = proxy.rest[i];
   for (int i = 0; i < own; ++i)
     for (typename Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, i); it; ++it) {
       entries.emplace_back(i, static_cast<int>(it.col()), it.value());
-      vertex_of<Dim>(offset, i) -= it.value() * mesh.rest(static_cast<int>(it.col()));
+      vertex_of<Dim>(offset, i) -= it.value() * rest[static_cast<std::size_t>(it.col())];
     }
   for (int o = 0; o < obstacles; ++o) entries.emplace_back(own + o, vertices + o, 1);
   typename VertexMap<Dim>::Weights weights(own + obstacles, vertices + obstacles);

@@ -9,6 +9,8 @@
 #include <sstream>
 #include <string_view>
 
+#include "itr/fem/quadrature.hpp"
+
 namespace itr {
 
 namespace {
@@ -125,6 +127,16 @@ void Diagnosis<Dim>::name_worst_cell_at(int vertex) {
     if (ratio >= least) continue;
     least = ratio;
     worst = element.vertices;
+  }
+  for (const auto& element : scope_.cells.curved_elements) {
+    if (!has(element.nodes, vertex)) continue;
+    const auto nodes = at_nodes<Dim>(element.nodes, x_);
+    for (const auto& point : closed_quadrature<Dim>(1)) {
+      const double ratio = (nodes * shape_gradients<Dim>(element, point.weights).transpose()).determinant();
+      if (ratio >= least) continue;
+      least = ratio;
+      worst = std::span<const int>(element.nodes).first(Dim + 1);
+    }
   }
   if (!worst.empty()) text_ << "; its cell " << named_cell(worst) << " has the volume ratio " << least;
 }

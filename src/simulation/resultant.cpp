@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "itr/core/error.hpp"
+#include "itr/fem/quadratic.hpp"
 
 namespace itr {
 
@@ -16,18 +17,25 @@ Vec<3> moment(const Vec<3>& arm, const Vec<3>& f) { return arm.cross(f); }
 template <int Dim>
 Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about) {
   const Mesh<Dim>& mesh = simulation.state().mesh;
+  const Space& space = simulation.state().space;
+  const int nodes = num_nodes(mesh, space);
   const NodalForces& forces = simulation.forces();
   const std::array<const VectorX*, 4> kinds{&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
   for (const VectorX* kind : kinds)
-    if (kind->size() != Eigen::Index{Dim} * mesh.vertex_slots())
+    if (kind->size() != Eigen::Index{Dim} * nodes)
       throw InputError({"", "fields", "not all kinds of forces",
                         "contact_forces, friction_forces, reaction_forces and applied_forces for a resultant"});
-  std::vector<char> is_on(mesh.vertex_slots(), 0);
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (std::find(tags.begin(), tags.end(), mesh.facet_tag(f)) != tags.end())
-      for (const int v : mesh.facet(f)) is_on[v] = 1;
+  std::vector<char> is_on(nodes, 0);
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+    if (std::find(tags.begin(), tags.end(), mesh.facet_tag(f)) == tags.end()) continue;
+    const auto& facet = mesh.facet(f);
+    for (const int v : facet) is_on[v] = 1;
+    for_each_edge<Dim - 1>([&](int, int i, int j) {
+      if (const int curved = space.find(facet[i], facet[j]); curved != kNone) is_on[mesh.vertex_slots() + curved] = 1;
+    });
+  }
   Resultant<Dim> sum;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+  for (int v = 0; v < nodes; ++v) {
     if (!is_on[v]) continue;
     Vec<Dim> f = Vec<Dim>::Zero();
     for (const VectorX* kind : kinds) f += kind->template segment<Dim>(Dim * v);

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "itr/core/error.hpp"
+#include "itr/fem/space.hpp"
 
 namespace itr {
 
@@ -141,10 +142,12 @@ template <int Dim>
 void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
   const CollisionProxy<Dim>& proxy = *setup.proxy;
-  const auto rows = static_cast<Eigen::Index>(proxy.rest.size()), columns = Eigen::Index{setup.mesh.num_vertices()};
-  if (proxy.weights.rows() != rows || proxy.weights.cols() != columns)
+  const auto rows = static_cast<Eigen::Index>(proxy.rest.size()), vertices = Eigen::Index{setup.mesh.num_vertices()};
+  const Eigen::Index nodes = num_nodes(setup.mesh, space_of_orders(setup.mesh, setup.order));
+  if (proxy.weights.rows() != rows || (proxy.weights.cols() != vertices && proxy.weights.cols() != nodes))
     refuse("weights of the collision mesh", fmt::format("{} x {}", proxy.weights.rows(), proxy.weights.cols()),
-           fmt::format("{} x {}", rows, columns));
+           nodes == vertices ? fmt::format("{} x {}", rows, vertices)
+                             : fmt::format("{} x {}, or {} with the nodes of curved edges", rows, vertices, nodes));
   check_primitives("proxy.edges", proxy.edges, proxy.rest.size());
   check_primitives("proxy.triangles", proxy.triangles, proxy.rest.size());
 }

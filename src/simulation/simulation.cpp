@@ -36,8 +36,6 @@ void refuse_unsupported(const Setup<Dim>& setup) {
           std::any_of(setup.order.begin(), setup.order.end(), [](const auto& e) { return e.second == 2; });
       is_quadratic) {
     if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing of quadratic elements");
-    if (setup.proxy) refuse("/contact/collision_mesh", "a collision mesh of quadratic elements");
-    if (!setup.pressure.empty()) refuse("/boundary_conditions/pressure_boundary", "pressure on quadratic elements");
     if (!setup.terms.empty() || setup.follower.forces) refuse("terms", "terms of a program's own on quadratic elements");
   }
   for (const auto& [body, material] : setup.materials)

@@ -12,13 +12,14 @@ from petsc4py import PETSc
 
 TITLE = "Elastodynamics against FEniCSx"
 QUANTITY = "nodal displacement and velocity, the worst of all steps, relative to the largest of the run"
-REFERENCE = "FEniCSx (dolfinx) with the textbook form M a + f(u) = p, same P1 mesh"
+REFERENCE = "FEniCSx (dolfinx) with the textbook form M a + f(u) = p, same P1 or P2 mesh"
 TOLERANCE = 1e-8
 NEEDS = ("dolfinx", "meshio", "h5py")
 
 E, NU, RHO, H = 2e4, 0.35, 900.0, 0.01
 GRAVITY = -9.81
-MESHES = {2: ([24, 8], [1.2, 0.4]), 3: ([9, 3, 3], [1.2, 0.4, 0.3])}
+MESHES = {(2, 1): ([24, 8], [1.2, 0.4]), (3, 1): ([9, 3, 3], [1.2, 0.4, 0.3]),  # by dimension and order
+          (2, 2): ([9, 3], [1.2, 0.4]), (3, 2): ([4, 2, 1], [1.2, 0.4, 0.3])}
 RULES = ["ImplicitEuler", "ImplicitNewmark", "BDF2"]
 
 
@@ -38,10 +39,10 @@ def spin(X):
     return v
 
 
-def scene_of(mesh, dim, rule, steps):
+def scene_of(mesh, dim, order, rule, steps):
     zero = [0] * (dim - 2)
     return scene(
-        mesh, {"type": "NeoHookean", "E": E, "nu": NU, "rho": RHO},
+        mesh, {"type": "NeoHookean", "E": E, "nu": NU, "rho": RHO}, order,
         boundary_conditions={
             "rhs": [0, -GRAVITY] + zero,
             "dirichlet_boundary": [{"id": 1, "value": ["0.1 * sin(8 * t)", "0.05 * t"] + zero}],
@@ -51,19 +52,19 @@ def scene_of(mesh, dim, rule, steps):
 
 
 class Reference:
-    def __init__(self, points, cells):
+    def __init__(self, points, cells, order):
         self.dim = points.shape[1]
-        self.points = points
         length = points[:, 0].max()
         self.body = Body(points, cells, neo_hookean, lame(E, NU, self.dim), RHO,
-                         {3: lambda x: np.isclose(x[0], length)})
+                         {3: lambda x: np.isclose(x[0], length)}, order)
+        self.points = self.body.nodes
         self.t = fem.Constant(self.body.domain, PETSc.ScalarType(0))
         zero = [0] * (self.dim - 2)
         gravity = ufl.as_vector([0, GRAVITY] + zero)
         push = ufl.as_vector([*traction(self.t, self.body.X), *zero])
         self.load = self.body.load(RHO * ufl.inner(gravity, self.body.test) * ufl.dx
                                    + ufl.inner(push, self.body.test) * self.body.ds(3))
-        self.held = np.repeat(np.isclose(points[:, 0], 0), self.dim)
+        self.held = np.repeat(np.isclose(self.points[:, 0], 0), self.dim)
 
     def solve(self, n, inertia, predictor, guess):
         self.t.value = n * H
@@ -74,13 +75,14 @@ class Reference:
 
 def results(context):
     steps = 15 if context.quick else 50
-    for dim, (counts, size) in MESHES.items():
+    for (dim, order), (counts, size) in MESHES.items():
         points, cells = box_mesh(counts, size, jitter=0.25)
-        mesh = context.folder / f"beam{dim}.msh"
+        mesh = context.folder / f"beam{dim}-p{order}.msh"
         write_mesh(mesh, points, cells)
-        reference = Reference(points, cells)
+        reference = Reference(points, cells, order)
+        points = reference.points
         for rule in RULES:
-            run = run_scene(context, f"{dim}d-{rule}", scene_of(mesh, dim, rule, steps))
+            run = run_scene(context, f"{dim}d-p{order}-{rule}", scene_of(mesh, dim, order, rule, steps))
             states = integrate(reference.solve, rule, H, steps, np.zeros(points.size), spin(points).ravel())
             differences, sizes = [], []
             frames = list(run.frames())
@@ -90,5 +92,5 @@ def results(context):
                 sizes.append([np.abs(u).max(), np.abs(v).max()])
             for k, name in enumerate(("displacement", "velocity")):
                 errors = np.array(differences)[:, k] / np.array(sizes)[:, k].max()
-                yield Result(f"{dim}D, {rule}, {name}", float(errors.max()), TOLERANCE,
-                             note=f"{steps} steps, {len(points)} vertices")
+                yield Result(f"{dim}D, P{order}, {rule}, {name}", float(errors.max()), TOLERANCE,
+                             note=f"{steps} steps, {len(points)} nodes")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Manufactured solutions. In space: a static field that P1 does not contain, for every law. In time: a motion that is
+"""Manufactured solutions. In space: a static field that no element contains, for every law, by P1 and P2. In time: a motion that is
 linear in space, so that the mesh adds no error, for every integrator and law."""
 import numpy as np
 import sympy
@@ -7,7 +7,7 @@ from harness import manufactured
 from harness.fields import errors, fitted_order
 from harness.manufactured import X, divergence, expression, function_of_space, gradient, stress, t
 from harness.materials import laws, words
-from harness.scenes import box_mesh, run_scene, scene, write_mesh
+from harness.scenes import box_mesh, run_scene, scene, with_edge_nodes, write_mesh
 from harness.suite import Result, excess
 
 TITLE = "Orders of convergence"
@@ -17,8 +17,8 @@ TOLERANCE = "fitted order at least the expected one - 0.1"
 NEEDS = ("meshio", "h5py", "sympy")
 
 SIZE = [1.0, 0.6, 0.5]
-SERIES = {2: [10, 20, 40, 80], 3: [5, 8, 12]}  # cells along x
-QUICK_SERIES = {2: [10, 20, 40]}
+SERIES = {(2, 1): [10, 20, 40, 80], (3, 1): [5, 8, 12], (2, 2): [5, 10, 20, 40], (3, 2): [3, 5, 8]}  # cells along x
+QUICK_SERIES = {(2, 1): [10, 20, 40], (2, 2): [5, 10, 20]}  # by dimension and order of the elements
 
 IN_FOUR_STEPS = {"dt": 0.25, "tend": 1, "quasistatic": True}  # at once St. Venant-Kirchhoff may invert on the way
 
@@ -33,7 +33,7 @@ def field(dim):
     return [potential.diff(s) for s in X]
 
 
-def in_space(context, name, law, dim):
+def in_space(context, name, law, dim, order):
     """Sizes and errors (L2, H1 seminorm) of a series of meshes."""
     material = law.scene[0]
     u = field(dim)
@@ -44,15 +44,17 @@ def in_space(context, name, law, dim):
                                          for k in range(1, 2 * dim + 1) if k != 3],
                   "neumann_boundary": [{"id": 3, "value": [expression(P[i, 0]) for i in range(dim)]}]}
     exact, exact_gradient = (function_of_space(sympy.Matrix(value).subs(t, 1), dim) for value in (u, slope))
-    series = (QUICK_SERIES if context.quick else SERIES)[dim]
+    series = (QUICK_SERIES if context.quick else SERIES)[dim, order]
     found = []
     for n in series:
         points, cells = box_mesh([max(1, round(n * s)) for s in SIZE[:dim]], SIZE[:dim], jitter=0.15)
         mesh = context.folder / f"box{dim}-{n}.msh"
         write_mesh(mesh, points, cells)
-        content = scene(mesh, material, boundary_conditions=conditions, time=IN_FOUR_STEPS)
-        run = run_scene(context, f"{dim}d-{words(name)}-{n}", content)
-        found.append(errors(points, cells, run.last().u, exact, exact_gradient))
+        content = scene(mesh, material, order, boundary_conditions=conditions, time=IN_FOUR_STEPS)
+        run = run_scene(context, f"{dim}d-p{order}-{words(name)}-{n}", content)
+        if order == 2:
+            points, cells = with_edge_nodes(points, cells)
+        found.append(errors(points, cells, run.last().u, exact, exact_gradient, order))
     return 1 / np.array(series), np.array(found).T
 
 
@@ -111,12 +113,13 @@ def order_result(name, sizes, values, expected):
 def results(context):
     curves = {}
     for dim in (2,) if context.quick else (2, 3):
-        for name, law in laws(dim).items():
-            sizes, (value, slope) = in_space(context, name, law, dim)
-            curves[f"{dim}D {name}"] = sizes, value
-            yield order_result(f"{dim}D, {name}, L2 in space", sizes, value, 2)
-            yield order_result(f"{dim}D, {name}, H1 in space", sizes, slope, 1)
-    context.figure("space", lambda axes: draw(axes, curves, "element size / length", [(2, "order 2")]))
+        for order in (1, 2):
+            for name, law in laws(dim).items():
+                sizes, (value, slope) = in_space(context, name, law, dim, order)
+                curves[f"{dim}D P{order} {name}"] = sizes, value
+                yield order_result(f"{dim}D, P{order}, {name}, L2 in space", sizes, value, order + 1)
+                yield order_result(f"{dim}D, P{order}, {name}, H1 in space", sizes, slope, order)
+    context.figure("space", lambda axes: draw(axes, curves, "element size / length", [(2, "order 2"), (3, "order 3")]))
     curves = {}
     for name, law in laws(2).items():
         for rule, expected, any_start in RULES:

@@ -10,7 +10,7 @@ from harness.two_bodies import two_bodies
 
 TITLE = "Static solutions against FEniCSx"
 QUANTITY = "nodal displacement relative to the largest; elastic energy, relative"
-REFERENCE = "FEniCSx (dolfinx), same P1 mesh, Newton to round-off"
+REFERENCE = "FEniCSx (dolfinx), same P1 or P2 mesh, Newton to round-off"
 TOLERANCE = 1e-9
 NEEDS = ("dolfinx", "meshio", "h5py", "scipy")
 
@@ -19,8 +19,13 @@ PULL, GRAVITY, STRETCH = [60.0, -10.0, 5.0], -0.3, 0.01  # St. Venant-Kirchhoff 
 
 
 def results(context):
-    for case in two_bodies(context.folder, MESHES):
-        dim, name, body, points = case.dim, case.name, case.body, case.points
+    for order in (1, 2):
+        yield from results_of(context, order)
+
+
+def results_of(context, order):
+    for case in two_bodies(context.folder, MESHES, order):
+        dim, name, body, points = case.dim, case.name, case.body, case.body.nodes
         load = case.load(ufl.as_vector([0, GRAVITY, 0][:dim]), ufl.as_vector(PULL[:dim]))
         held = np.repeat(np.isclose(points[:, 0], 0), dim)
         targets = np.zeros_like(points)
@@ -29,18 +34,18 @@ def results(context):
         for share in np.linspace(0.1, 1, 10):  # loads step by step, so that Newton finds its way
             u = body.solve(share * load, held, share * targets.ravel(), u)
         for kind in ("quasi-static", "static") if name.startswith("neo") else ("quasi-static",):
-            run = run_scene(context, f"{dim}d-{words(name)}-{kind}", scene_of(case, kind))
+            run = run_scene(context, f"{dim}d-p{order}-{words(name)}-{kind}", scene_of(case, kind, order))
             ours = run.last().u.ravel()
-            yield Result(f"{dim}D, {name}, {kind}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()),
-                         TOLERANCE, note=f"{len(points)} vertices, up to {np.abs(u).max():.3g} m")
+            yield Result(f"{dim}D, P{order}, {name}, {kind}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()),
+                         TOLERANCE, note=f"{len(points)} nodes, up to {np.abs(u).max():.3g} m")
             energy = body.energy(u)
-            yield Result(f"{dim}D, {name}, {kind}, elastic energy",
+            yield Result(f"{dim}D, P{order}, {name}, {kind}, elastic energy",
                          abs(run.steps[-1]["energy"]["elastic"] / energy - 1), TOLERANCE)
 
 
-def scene_of(case, kind):
+def scene_of(case, kind, order):
     dim, share = case.dim, "1" if kind == "static" else "t"
-    content = scene(case.mesh, case.materials(),
+    content = scene(case.mesh, case.materials(), order,
                     boundary_conditions={
                         "rhs": [0, f"{-GRAVITY} * {share}", 0][:dim],
                         "dirichlet_boundary": [{"id": 1, "value": [0, f"{STRETCH} * y * {share}", 0][:dim]}],

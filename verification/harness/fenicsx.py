@@ -10,6 +10,9 @@ from dolfinx import fem, mesh
 from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.spatial import cKDTree
+
+from harness.scenes import with_edge_nodes
 
 logging.disable(logging.INFO)  # the form compiler tells of every file that it compiles
 
@@ -26,6 +29,13 @@ def create_domain(points, cells):
 def to_csr(matrix):
     indptr, indices, values = matrix.getValuesCSR()
     return scipy.sparse.csr_matrix((values, indices, indptr), shape=matrix.getSize())
+
+
+def nodes_of_dofs(V, nodes):
+    """For each dof (block) of a Lagrange space the index of its place in `nodes`."""
+    distance, node = cKDTree(nodes).query(V.tabulate_dof_coordinates()[:, :nodes.shape[1]])
+    assert len(node) == len(nodes) and distance.max() < 1e-9 * np.ptp(nodes)
+    return node
 
 
 def scalar_mass(points, cells, density):
@@ -54,16 +64,22 @@ def vertices_of_dofs(domain, original, V):
 
 
 class Space:
-    """P1 vectors on a mesh. Arrays are n x dim in the order of `points`; matrices act on them flattened."""
+    """P1 or P2 vectors on a mesh. Arrays are n x dim in the order of `nodes`, which begin with `points`; matrices act on them
+    flattened."""
 
-    def __init__(self, points, cells):
+    def __init__(self, points, cells, order=1):
         self.dim = points.shape[1]
-        self.num_vertices = len(points)
+        self.order = order
+        self.nodes = points if order == 1 else with_edge_nodes(points, cells)[0]
+        self.num_nodes = len(self.nodes)
         self.domain, self.original = create_domain(points, cells)
-        self.V = fem.VectorFunctionSpace(self.domain, ("Lagrange", 1))
-        vertex_of_dof = vertices_of_dofs(self.domain, self.original, self.V)
+        self.V = fem.VectorFunctionSpace(self.domain, ("Lagrange", order))
+        if order == 1:
+            node_of_dof = vertices_of_dofs(self.domain, self.original, self.V)
+        else:
+            node_of_dof = nodes_of_dofs(self.V, self.nodes)
         block = np.arange(self.dim)
-        self.rows = (self.dim * vertex_of_dof[:, None] + block).ravel()  # our flat index of each dolfinx dof
+        self.rows = (self.dim * node_of_dof[:, None] + block).ravel()  # our flat index of each dolfinx dof
 
     def coefficient(self, values):
         """A number, or one value a cell in our order, as something that forms take."""
@@ -84,7 +100,7 @@ class Space:
         return scipy.sparse.csr_matrix((coo.data, (self.rows[coo.row], self.rows[coo.col])), shape=coo.shape)
 
     def to_ours(self, values):
-        flat = np.empty(self.dim * self.num_vertices)
+        flat = np.empty(self.dim * self.num_nodes)
         flat[self.rows] = values
         return flat
 
@@ -100,13 +116,14 @@ class Body(Space):
     value a cell; `sides` names facets by predicates of coordinates.
     """
 
-    def __init__(self, points, cells, law, parameters, rho=1.0, sides=None):
-        super().__init__(points, cells)
+    def __init__(self, points, cells, law, parameters, rho=1.0, sides=None, order=1):
+        super().__init__(points, cells, order)
         self.rho = rho
         constants = [self.coefficient(p) for p in parameters]
         self.u = fem.Function(self.V)
         F = ufl.Identity(self.dim) + ufl.grad(self.u)
-        energy = law(F, *constants, self.dim, ufl) * ufl.dx(metadata={"quadrature_degree": 1})  # constant in a cell
+        # Constant in a linear cell; in a quadratic one by the library's default, so that both solve the same problem.
+        energy = law(F, *constants, self.dim, ufl) * ufl.dx(metadata={"quadrature_degree": order})
         test = ufl.TestFunction(self.V)
         gradient = ufl.derivative(energy, self.u, test)
         self.energy_form = fem.form(energy)

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from harness.scenes import EDGES
+
 # Points in barycentric coordinates and weights (sum 1): Gauss-Legendre on the collapsed square or cube, exact to degree 7.
 
 
@@ -29,21 +31,40 @@ def volumes(points, cells):
 
 
 def gradients(points, cells, u):
-    """Gradient of a field (a row a vertex) in each cell: m x components x dim."""
+    """Gradient of a linear field (a row a vertex) in each cell: m x components x dim. None: of the barycentric coordinates."""
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    if u is None:
+        unit = np.eye(cells.shape[1])
+        return np.linalg.solve(edges, np.broadcast_to(unit[1:] - unit[0], (len(cells), *unit[1:].shape))).transpose(0, 2, 1)
     return np.linalg.solve(edges, u[cells[:, 1:]] - u[cells[:, :1]]).transpose(0, 2, 1)
 
 
-def errors(points, cells, u, exact, exact_gradient):
-    """L2 norms of the difference to a function of points (n x d -> n x d) and of its gradient (-> n x d x d)."""
-    barycentric, weights = simplex_rule(points.shape[1])
-    size = volumes(points, cells)
-    slope = gradients(points, cells, u)
+def shapes(order, b):
+    """Values of the shape functions of a simplex at barycentric coordinates b, and their derivatives by these (a row each)."""
+    if order == 1:
+        return b, np.eye(len(b))
+    edges = np.array(EDGES[len(b) - 1])
+    i, j, unit = edges[:, 0], edges[:, 1], np.eye(len(b))
+    values = np.concatenate([b * (2 * b - 1), 4 * b[i] * b[j]])
+    slopes = np.concatenate([np.diag(4 * b - 1), 4 * (b[i][:, None] * unit[j] + b[j][:, None] * unit[i])])
+    return values, slopes
+
+
+def errors(points, cells, u, exact, exact_gradient, order=1):
+    """L2 norms of the difference to a function of points (n x d -> n x d) and of its gradient (-> n x d x d). Of quadratic
+    elements `cells` have the nodes of their edges too (scenes.with_edge_nodes)."""
+    dim = points.shape[1]
+    corners = cells[:, :dim + 1]
+    barycentric, weights = simplex_rule(dim)
+    size = volumes(points, corners)
+    of_barycentric = gradients(points, corners, None)
     value = semi = 0.0
     for b, w in zip(barycentric, weights):
-        X = np.einsum("k,mkd->md", b, points[cells])
-        value += w * size @ ((np.einsum("k,mkd->md", b, u[cells]) - exact(X))**2).sum(axis=1)
-        semi += w * size @ ((slope - exact_gradient(X))**2).sum(axis=(1, 2))
+        X = np.einsum("k,mkd->md", b, points[corners])
+        values, slopes = shapes(order, b)
+        gradient = np.einsum("mnc,nk,mkd->mcd", u[cells], slopes, of_barycentric)
+        value += w * size @ ((np.einsum("n,mnd->md", values, u[cells]) - exact(X))**2).sum(axis=1)
+        semi += w * size @ ((gradient - exact_gradient(X))**2).sum(axis=(1, 2))
     return math.sqrt(value), math.sqrt(semi)
 
 

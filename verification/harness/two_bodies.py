@@ -35,8 +35,8 @@ class TwoBodies:
         return [{"id": k + 1, **material} for k, material in enumerate(self.law.scene)]
 
 
-def two_bodies(folder, boxes):
-    """One after the other; `boxes` has counts of cells and size by dimension."""
+def two_bodies(folder, boxes, order=1):
+    """One after the other; `boxes` has counts of cells and size by dimension, `order` is that of the elements."""
     for dim, (counts, size) in boxes.items():
         points, cells = box_mesh(counts, size, jitter=0.25, seed=dim)
         bodies = np.where(points[cells].mean(axis=1)[:, 0] < size[0] / 2, 1, 2)
@@ -47,5 +47,5 @@ def two_bodies(folder, boxes):
             parameters = zip(*(law.parameters(material, dim) for material in law.scene))
             rho = by_cell([material["rho"] for material in law.scene])
             body = Body(points, cells, law.density, [by_cell(p) for p in parameters], rho,
-                        {PULLED: lambda x: np.isclose(x[0], size[0])})
+                        {PULLED: lambda x: np.isclose(x[0], size[0])}, order)
             yield TwoBodies(dim, mesh, points, cells, name, law, rho, body)

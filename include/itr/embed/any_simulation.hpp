@@ -73,8 +73,8 @@ class AnySimulation {
   const StepReport& report() const;                  ///< of the last step, or of the state at the start
   const std::vector<std::string>& warnings() const;  ///< of the model's options
 
-  // What acts from the next step on. Arrays of nodal values are by vertex of the present mesh, and are functions of rest
-  // position from then on: linear on its cells.
+  // What acts from the next step on. Arrays of nodal values are by vertex of the present mesh, or by node, and are functions
+  // of rest position from then on: linear on its cells, or quadratic along curved edges.
 
   /// Prescribes displacements [m] of the components for which `mask` (dimension flags) is not 0; all 0: releases.
   void fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement);
@@ -91,7 +91,7 @@ class AnySimulation {
   void move_obstacle(const std::string& obstacle, HostFunction displacement);
   /// Its vertices' positions at the end of the next steps [m]: dimension numbers each, in the order of add_obstacle.
   void move_obstacle(const std::string& obstacle, std::span<const double> positions);
-  /// Dead forces [N] on the vertices, `dimension` each; they stay where they act however the mesh changes. Empty: none.
+  /// Dead forces [N] on the nodes, `dimension` each; they stay where they act however the mesh changes. Empty: none.
   void set_forces(std::span<const double> forces);
   /// Forces of present positions: adds to f [N] for vertices at rest positions X and positions x [m]; `stiffness`, if it is
   /// there, gives blocks of -df/dx. The mesh may be a new one within a step: lengths say so.
@@ -99,20 +99,24 @@ class AnySimulation {
   /// Gives blocks of -df/dx [N/m].
   using StiffnessFunction =
       std::function<void(ConstVectorView X, ConstVectorView x, double t, const StiffnessReceiver& add)>;
-  /// Null: none.
+  /// Null: none. Refused with curved edges.
   void set_follower_forces(ForceFunction forces, StiffnessFunction stiffness = nullptr);
-  /// Adds a term to the incremental potential, or puts it in the place of the one of this name. All null: it goes.
+  /// Adds a term to the incremental potential, or puts it in the place of the one of this name. All null: it goes. Refused
+  /// with curved edges.
   void set_term(const std::string& name, HostTerm term);
-  /// Of the bodies' vertices [m/s]; for a start, or a state that the program has from elsewhere.
+  /// Of the bodies' nodes [m/s]; for a start, or a state that the program has from elsewhere.
   void set_velocities(std::span<const double> velocities);
   void freeze_mesh(bool frozen);  ///< no remeshing while it is; no effect where the options do not ask for it
 
   // The state.
 
-  int num_vertices() const;                        ///< of the bodies
-  int num_cells() const;                           ///< triangles or tetrahedra
-  int num_facets() const;                          ///< of their boundary
-  std::span<const double> positions() const;       ///< dimension numbers a vertex [m]
+  int num_vertices() const;  ///< of the bodies
+  int num_cells() const;     ///< triangles or tetrahedra
+  int num_facets() const;    ///< of their boundary
+  /// Vertices, then the nodes of curved edges; as many as vertices where all edges are straight.
+  int num_nodes() const;
+  std::vector<int> curved_edges() const;           ///< two vertices each, in the order of their nodes
+  std::span<const double> positions() const;       ///< dimension numbers a node [m]
   std::span<const double> velocities() const;      ///< the same [m/s]
   std::vector<double> rest_positions() const;      ///< the same [m]
   std::vector<int> cells() const;                  ///< dimension + 1 vertices each
@@ -122,7 +126,7 @@ class AnySimulation {
   std::vector<double> obstacle_positions() const;  ///< of all obstacles, one after the other [m]
   /// Asks for forces, which then are there after each step: their cost is that of some gradients a step.
   void watch_forces(bool watched);
-  const NodalForces& forces() const;  ///< dimension numbers a vertex [N]; empty where they are not watched
+  const NodalForces& forces() const;  ///< dimension numbers a node [N]; empty where they are not watched
   /// Force [N] and moment about a point [N m] (2D: one number) of all forces on boundaries, see itr::resultant. Forces have
   /// to be watched.
   struct Resultants {

@@ -35,6 +35,11 @@ class Model {
   /// empty: all are body 0.
   void set_mesh(std::span<const double> vertices, std::span<const int> cells, std::span<const int> bodies = {});
 
+  /// The same of cells with a node at the middle of each edge, which then are curved: in 2D 6 nodes a cell, the edges 01,
+  /// 12, 20, in 3D 10, the edges 01, 12, 20, 03, 13, 23 (as of VTK and meshio). Vertices keep their order; nodes at rest off
+  /// the middle of their edge are refused. Sets the option /space/discr_order to 2.
+  void set_quadratic_mesh(std::span<const double> nodes, std::span<const int> cells, std::span<const int> bodies = {});
+
   /// Names facets of the mesh's boundary: dimension vertices each, in any order. Returns its id. A facet is part of one
   /// boundary only. The mesh is to be set before.
   int add_boundary(const std::string& name, std::span<const int> facets);

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "itr/fem/space.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
@@ -46,10 +47,11 @@ class Locator {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The function of rest position with these values at the vertices, linear on cells. `values`: `components` for each vertex,
-/// interleaved. What it returns may be called by several threads at a time.
+/// The function of rest position with these values at the nodes of `space`, on cells linear or, along curved edges,
+/// quadratic. `values`: `components` for each node, interleaved. Several threads may call the result at a time.
 template <int Dim>
-std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values);
+std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
+                                                         Space space = {});
 
 extern template class Locator<2>;
 extern template class Locator<3>;

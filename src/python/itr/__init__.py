@@ -53,13 +53,20 @@ class Model:
     """What is simulated. Simulations copy it."""
 
     def __init__(self, vertices: Array, cells: Array, bodies: Optional[Array] = None):
-        """`vertices`: (n, d) [m], d = 2 or 3; `cells`: (m, d + 1), positive volumes; `bodies`: an id a cell, else all 0."""
+        """`vertices`: (n, d) [m], d = 2 or 3; `cells`: (m, d + 1), positive volumes; `bodies`: an id a cell, else all 0.
+
+        Quadratic cells, (m, 6) in 2D and (m, 10) in 3D, have a node at the middle of each edge, in meshio's order (triangle6,
+        tetra10): their edges are curved from then on. At rest they have to be straight."""
         vertices = np.asarray(vertices, dtype=float)
         if vertices.ndim != 2:
             raise InputError(f"vertices: found an array of shape {vertices.shape}; expected (n, 2) or (n, 3)")
         self._model = _itr.Model(vertices.shape[1])
         self._kept: list = []  # what compiled functions live in
-        self._model.set_mesh(vertices, _ints("cells", cells), _ints("bodies", [] if bodies is None else bodies))
+        ids = _ints("cells", cells)
+        d = vertices.shape[1]
+        is_quadratic = ids.ndim == 2 and ids.shape[1] == (d + 1) * (d + 2) // 2
+        set_mesh = self._model.set_quadratic_mesh if is_quadratic else self._model.set_mesh
+        set_mesh(vertices, ids, _ints("bodies", [] if bodies is None else bodies))
 
     @classmethod
     def from_scene(cls, file: str, overrides: Optional[Mapping[str, Any]] = None) -> "Model":
@@ -302,7 +309,8 @@ class Simulation:
 
     @property
     def positions(self) -> Array:
-        """(n, d) [m]: a view without a copy, read-only, of the state as it is now (later steps leave it as it is)."""
+        """(n, d) [m]: a view without a copy, read-only, of the state as it is now (later steps leave it as it is). Vertices,
+        then the nodes of `curved_edges`."""
         return self._simulation.positions
 
     @property
@@ -314,6 +322,16 @@ class Simulation:
     def rest_positions(self) -> Array:
         """(n, d) [m]"""
         return self._simulation.rest_positions
+
+    @property
+    def num_vertices(self) -> int:
+        """Of the mesh; positions have as many rows more as there are curved edges."""
+        return self._simulation.num_vertices
+
+    @property
+    def curved_edges(self) -> Array:
+        """(k, 2): vertices of each, in the order of their nodes."""
+        return self._simulation.curved_edges
 
     @property
     def cells(self) -> Array:

@@ -17,41 +17,74 @@ if TYPE_CHECKING:
     from . import Simulation
 
 Array = np.ndarray
-TOPOLOGICAL_DIMENSION = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3}
+TOPOLOGICAL_DIMENSION = {"vertex": 0, "line": 1, "line3": 1, "triangle": 2, "triangle6": 2, "quad": 2, "tetra": 3, "tetra10": 3}
+QUADRATIC_EDGES = {2: [(0, 1), (1, 2), (2, 0)], 3: [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]}
 PHYSICAL = "gmsh:physical"
 
 
 def from_meshio(mesh: meshio.Mesh) -> tuple[Array, Array, Array, dict[str, Array]]:
-    """Vertices (n x d), cells (m x (d + 1)), bodies (m,) and boundaries (k x d) by name of a meshio.Mesh. Points that no cell
-    has are left out; cells are turned to positive volume."""
+    """Vertices (n x d), cells (m x (d + 1), or with the nodes of their edges), bodies (m,) and boundaries (k x d) by name of a
+    meshio.Mesh. Points that no cell has are left out; cells are turned to positive volume."""
     kinds = {block.type for block in mesh.cells}
-    dimension = 3 if "tetra" in kinds else 2
-    kind, facet_kind = ("tetra", "triangle") if dimension == 3 else ("triangle", "line")
+    dimension = 3 if kinds & {"tetra", "tetra10"} else 2
+    if kinds & {"triangle6", "tetra10"}:
+        kind, facet_kind = ("tetra10", "triangle6") if dimension == 3 else ("triangle6", "line3")
+    else:
+        kind, facet_kind = ("tetra", "triangle") if dimension == 3 else ("triangle", "line")
     others = {k for k in kinds - {kind} if TOPOLOGICAL_DIMENSION.get(k, dimension) >= dimension}
     if kind not in kinds or others:
-        raise InputError(f"mesh: found cells {', '.join(sorted(others or kinds))}; expected tetra or triangle only")
+        raise InputError(f"mesh: found cells {', '.join(sorted(others or kinds))}; expected tetra, triangle, tetra10 or triangle6 only")
     cells, bodies = _blocks(mesh, kind)
-    used = np.unique(cells)
+    corners = np.unique(cells[:, : dimension + 1])
+    used = np.concatenate([corners, np.setdiff1d(cells, corners)])  # boundaries count corners alone
     new = np.full(len(mesh.points), -1)
     new[used] = np.arange(len(used))
     vertices = np.asarray(mesh.points, float)[used]
     if dimension == 2 and vertices.shape[1] == 3 and np.ptp(vertices[:, 2]) > 0:
         raise InputError(f"mesh: found z from {vertices[:, 2].min()} to {vertices[:, 2].max()}; expected a plane of one z")
     cells = new[cells]
-    edges = vertices[cells[:, 1:], :dimension] - vertices[cells[:, :1], :dimension]
+    edges = vertices[cells[:, 1 : dimension + 1], :dimension] - vertices[cells[:, :1], :dimension]
     inverted = np.linalg.det(edges) < 0
-    cells[inverted, -2:] = cells[inverted, :-3:-1]
+    cells[inverted] = cells[np.ix_(inverted, _turned(dimension, cells.shape[1]))]
     facets, tags = _blocks(mesh, facet_kind)
+    facets = facets[:, :dimension]
     names = {int(tag): name for name, (tag, dim) in mesh.field_data.items() if dim == dimension - 1}
     boundaries = {names.get(tag, str(tag)): new[facets[tags == tag]] for tag in np.unique(tags).tolist() if tag != 0}
     return vertices[:, :dimension], cells, bodies, boundaries
+
+
+def _turned(dimension: int, nodes: int) -> list[int]:
+    """The order of a cell's nodes with its last two corners exchanged."""
+    corners = [*range(dimension - 1), dimension, dimension - 1]
+    if nodes == dimension + 1:
+        return corners
+    edges = [frozenset(edge) for edge in QUADRATIC_EDGES[dimension]]
+    return corners + [dimension + 1 + edges.index(frozenset((corners[i], corners[j]))) for i, j in QUADRATIC_EDGES[dimension]]
+
+
+def _quadratic_cells(simulation: Simulation) -> tuple[Array, Array]:
+    """Cells with a node at each edge in meshio's order, and the straight edges, whose nodes come after the simulation's."""
+    cells, d = simulation.cells, simulation.dimension
+    edges = np.sort(np.concatenate([cells[:, list(edge)] for edge in QUADRATIC_EDGES[d]]), axis=1)
+    unique, of_cell = np.unique(edges, axis=0, return_inverse=True)
+    curved = {tuple(edge): simulation.num_vertices + i for i, edge in enumerate(simulation.curved_edges.tolist())}
+    straight = np.array([edge for edge in unique.tolist() if tuple(edge) not in curved], int).reshape(-1, 2)
+    first = simulation.num_vertices + len(curved)
+    nodes = curved | {tuple(edge): first + i for i, edge in enumerate(straight.tolist())}
+    middle = np.array([nodes[tuple(edge)] for edge in unique.tolist()])[of_cell.ravel()]
+    return np.column_stack([cells, middle.reshape(-1, len(cells)).T]), straight
+
+
+def _with_means(field: Array, edges: Array) -> Array:
+    """A field by node, with the means of the ends of some edges behind it."""
+    return np.concatenate([field, (field[edges[:, 0]] + field[edges[:, 1]]) / 2])
 
 
 def _blocks(mesh: meshio.Mesh, kind: str) -> tuple[Array, Array]:
     """All cells of a kind, and their physical groups, 0 where there are none."""
     places = [i for i, block in enumerate(mesh.cells) if block.type == kind]
     if not places:
-        return np.empty((0, TOPOLOGICAL_DIMENSION[kind] + 1), int), np.empty(0, int)
+        return np.empty((0, 6), int), np.empty(0, int)
     groups = mesh.cell_data.get(PHYSICAL)
     tags = [np.zeros(len(mesh.cells[i].data), int) if groups is None else np.asarray(groups[i], int) for i in places]
     return np.concatenate([np.asarray(mesh.cells[i].data, int) for i in places]), np.concatenate(tags)
@@ -60,15 +93,19 @@ def _blocks(mesh: meshio.Mesh, kind: str) -> tuple[Array, Array]:
 def to_meshio(simulation: Simulation) -> meshio.Mesh:
     import meshio
 
-    pad = [(0, 0), (0, 3 - simulation.dimension)]
-    x = np.pad(simulation.positions, pad)
+    kind, cells, straight = "tetra" if simulation.dimension == 3 else "triangle", simulation.cells, np.empty((0, 2), int)
+    if len(simulation.curved_edges):
+        kind = "tetra10" if simulation.dimension == 3 else "triangle6"
+        cells, straight = _quadratic_cells(simulation)
+
+    def in_space(field: Array) -> Array:
+        return np.pad(_with_means(field, straight), [(0, 0), (0, 3 - simulation.dimension)])
+
+    x = in_space(simulation.positions)
     return meshio.Mesh(
         x,
-        [("tetra" if simulation.dimension == 3 else "triangle", simulation.cells)],
-        point_data={
-            "displacement": x - np.pad(simulation.rest_positions, pad),
-            "velocity": np.pad(simulation.velocities, pad),
-        },
+        [(kind, cells)],
+        point_data={"displacement": x - in_space(simulation.rest_positions), "velocity": in_space(simulation.velocities)},
         cell_data={"body": [simulation.bodies], "elastic_density": [simulation.elastic_density]},
     )
 
@@ -87,20 +124,30 @@ def to_dolfinx(
     d = simulation.dimension
     cell = ufl.Cell("triangle" if d == 2 else "tetrahedron", geometric_dimension=d)
     domain = ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1))
-    mesh = dolfinx.mesh.create_mesh(comm, simulation.cells.astype(np.int64), simulation.rest_positions, domain)
-    vertex = np.asarray(mesh.geometry.input_global_indices)  # of ours, by node of theirs
+    nodes = simulation.num_vertices
+    mesh = dolfinx.mesh.create_mesh(comm, simulation.cells.astype(np.int64), simulation.rest_positions[:nodes], domain)
     ours = np.asarray(mesh.topology.original_cell_index)
-    linear = dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
     constant = dolfinx.fem.FunctionSpace(mesh, ("DG", 0))
-    # Dofs of a linear space are numbered cell by cell as the nodes of the geometry, but not always with their numbers.
-    nodes, dofs = mesh.geometry.dofmap.array, linear.dofmap.list.array
+    fields = {"displacement": simulation.positions - simulation.rest_positions, "velocity": simulation.velocities}
     functions = {}
-    for name, values in (
-        ("displacement", simulation.positions - simulation.rest_positions),
-        ("velocity", simulation.velocities),
-    ):
-        functions[name] = dolfinx.fem.Function(linear, name=name)
-        functions[name].x.array.reshape(-1, d)[dofs] = values[vertex[nodes]]
+    if len(simulation.curved_edges):
+        from scipy.spatial import cKDTree
+
+        straight = _quadratic_cells(simulation)[1]
+        space = dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", 2))
+        tree = cKDTree(_with_means(simulation.rest_positions, straight))
+        place = tree.query(space.tabulate_dof_coordinates()[:, :d])[1]
+        for name, values in fields.items():
+            functions[name] = dolfinx.fem.Function(space, name=name)
+            functions[name].x.array.reshape(-1, d)[:] = _with_means(values, straight)[place]
+    else:
+        vertex = np.asarray(mesh.geometry.input_global_indices)  # of ours, by node of theirs
+        linear = dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", 1))
+        # Dofs of a linear space are numbered cell by cell as the nodes of the geometry, but not always with their numbers.
+        of_cells, dofs = mesh.geometry.dofmap.array, linear.dofmap.list.array
+        for name, values in fields.items():
+            functions[name] = dolfinx.fem.Function(linear, name=name)
+            functions[name].x.array.reshape(-1, d)[dofs] = values[vertex[of_cells]]
     functions["elastic_density"] = dolfinx.fem.Function(constant, name="elastic_density")
     functions["elastic_density"].x.array[constant.dofmap.list.array] = simulation.elastic_density[ours]
     return mesh, functions
