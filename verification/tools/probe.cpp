@@ -80,7 +80,7 @@ SparseAssembler hessian(const Energy& energy, const CellSet<Dim>& cells, const V
 
 template <int Dim>
 void write_matrices(const Setup<Dim>& setup, const MatrixX& displacement, const std::string& folder) {
-  const CellSet<Dim> cells = whole_mesh<Dim>(setup.mesh, {});
+  const CellSet<Dim> cells = whole_mesh<Dim>(setup.mesh, {}, space_of_orders(setup.mesh, setup.order));
   if (displacement.rows() != cells.num_vertices || displacement.cols() != Dim) fail("the displacement has another shape");
   VectorX x(Dim * cells.num_vertices);
   for (int v = 0; v < cells.num_vertices; ++v) x.segment<Dim>(Dim * v) = cells.rest[v] + displacement.row(v).transpose();
@@ -88,7 +88,7 @@ void write_matrices(const Setup<Dim>& setup, const MatrixX& displacement, const 
   Workspace workspace;
   const MassKind kind = setup.lump_mass ? MassKind::lumped : MassKind::consistent;
   const InertiaEnergy<Dim> inertia(cells, setup.materials, kind, x);
-  const ElasticEnergy<Dim> elastic(cells, setup.materials, 1);
+  const ElasticEnergy<Dim> elastic(cells, setup.materials, 1, setup.quadrature_degree);
   const LoadEnergy<Dim> loads(cells, setup.materials, loads_at(setup, 1), 1);
   VectorX force = VectorX::Zero(x.size());
   elastic.add_gradient(x, force, workspace);
