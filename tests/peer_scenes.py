@@ -21,11 +21,12 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 NORMS = ("l2", "h1", "h1_semi", "linf", "lp")
 DEFAULT_MARGIN = 1e-5
+LISTS = ("scenes.txt", "scenes-p2.txt")
 ALSO = ("contact/examples/3D/unit-tests/erleben/wedges.json",)  # known norms that the list leaves out
 
 
 def list_scenes(folder):
-    listed = (folder / "scenes.txt").read_text().split()
+    listed = [scene for name in LISTS for scene in (folder / name).read_text().split()]
     return listed + [scene for scene in ALSO if scene not in listed]
 
 
