@@ -25,14 +25,13 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.cm import ScalarMappable
 from PIL import Image
 
-from solid_images import SolidImages, ensure_display
+from solid_images import CURVE_PARTS, SolidImages, ensure_display
 
 DECADES = 5  # of energy density that the colours span below its maximum
 MAX_ANIMATION_FRAMES = 150
 ANIMATION_DPI = 90
 PANEL_PIXELS = 900
 COLOURS = "YlOrRd"
-CURVE_PARTS = 6  # straight pieces that a curved edge is drawn by
 
 
 class Frame:
@@ -75,33 +74,6 @@ class Frame:
         if not self.middles:
             return self.x[self.cells]
         return [np.concatenate([self.side(a, b), self.side(b, c), self.side(c, a)]) for a, b, c in self.cells.tolist()]
-
-    def fine_faces(self, faces, owner):
-        """The faces with curved edges cut into CURVE_PARTS^2 flat triangles: points, triangles, owners, lines of edges."""
-        parts = CURVE_PARTS
-        if not self.middles:
-            return self.x, faces, owner, None
-        weights = [(i / parts, j / parts) for i in range(parts + 1) for j in range(parts + 1 - i)]
-        index = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(parts + 1) for j in range(parts + 1 - i))}
-        cut = [(index[i, j], index[i + 1, j], index[i, j + 1]) for i in range(parts) for j in range(parts - i)]
-        cut += [(index[i + 1, j], index[i + 1, j + 1], index[i, j + 1])
-                for i in range(parts) for j in range(parts - i - 1)]
-        u, v = np.array(weights).T
-        rim = [index[i, 0] for i in range(parts + 1)] + [index[parts - j, j] for j in range(1, parts + 1)]
-        rim += [index[0, parts - j] for j in range(1, parts + 1)]
-        points, triangles, lines = [], [], []
-        for k, (a, b, c) in enumerate(faces.tolist()):
-            corner = (1 - u - v, u, v)
-            x = sum(w[:, None] * self.x[n] for w, n in zip(corner, (a, b, c)))
-            for (i, p), (j, q) in (((0, a), (1, b)), ((1, b), (2, c)), ((0, a), (2, c))):
-                middle = self.middles.get((min(p, q), max(p, q)))
-                if middle is not None:
-                    bulge = 4 * self.x[middle] - 2 * self.x[p] - 2 * self.x[q]
-                    x = x + (corner[i] * corner[j])[:, None] * bulge
-            points.append(x)
-            triangles.append(np.array(cut) + k * len(u))
-            lines.append(np.array(rim) + k * len(u))
-        return np.concatenate(points), np.concatenate(triangles), np.repeat(owner, len(cut)), np.array(lines)
 
     def outer_faces(self, kept):
         """Of the tetrahedra `kept`: the vertices of the faces that only one of them has, and whose they are."""

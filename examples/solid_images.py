@@ -12,6 +12,7 @@ import sys
 import numpy as np
 
 
+CURVE_PARTS = 6  # straight pieces that a curved edge is drawn by
 PACKAGES = "python3-vtk9, xvfb, xauth and libgl1-mesa-dri"
 
 
@@ -40,6 +41,34 @@ def poly_data(points, polygons, as_lines=False):
     data.SetPoints(places)
     (data.SetLines if as_lines else data.SetPolys)(cells)
     return data
+
+
+def curved_faces(frame, faces, owner):
+    """Points, triangles, their owners and lines of edges; faces are cut into CURVE_PARTS^2 flat triangles where edges of the
+    frame are curved (`middles`: their nodes by the ends), else taken as they are, without lines."""
+    middles, parts = getattr(frame, "middles", None), CURVE_PARTS
+    if not middles:
+        return frame.x, faces, owner, None
+    grid = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
+    index = {place: k for k, place in enumerate(grid)}
+    cut = [(index[i, j], index[i + 1, j], index[i, j + 1]) for i, j in grid if i + j < parts]
+    cut += [(index[i + 1, j], index[i + 1, j + 1], index[i, j + 1]) for i, j in grid if i + j < parts - 1]
+    rim = [index[i, 0] for i in range(parts)] + [index[parts - j, j] for j in range(parts)]
+    rim += [index[0, parts - j] for j in range(parts + 1)]
+    u, v = np.array(grid).T / parts
+    weights = (1 - u - v, u, v)
+    points = []
+    for face in faces.tolist():
+        x = sum(w[:, None] * frame.x[n] for w, n in zip(weights, face))
+        for i, j in ((0, 1), (1, 2), (0, 2)):
+            a, b = sorted((face[i], face[j]))
+            if (a, b) in middles:
+                bulge = 4 * frame.x[middles[a, b]] - 2 * frame.x[a] - 2 * frame.x[b]
+                x = x + (weights[i] * weights[j])[:, None] * bulge
+        points.append(x)
+    first = len(grid) * np.arange(len(faces))[:, None, None]
+    return (np.concatenate(points), (first + np.array(cut)).reshape(-1, 3), np.repeat(owner, len(cut)),
+            first[:, 0] + np.array(rim))
 
 
 class SolidImages:
@@ -84,7 +113,7 @@ class SolidImages:
             normal, offset = cut
             kept = kept[frame.rest[frame.cells].mean(axis=1) @ normal <= offset]
         faces, owner = frame.outer_faces(kept)
-        points, faces, owner, outlines = frame.fine_faces(faces, owner)
+        points, faces, owner, outlines = curved_faces(frame, faces, owner)
         data = poly_data(points, faces)
         rgb = numpy_to_vtk(np.ascontiguousarray(255 * colours[owner], np.uint8), deep=True)
         data.GetCellData().SetScalars(rgb)

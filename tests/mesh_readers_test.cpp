@@ -204,6 +204,34 @@ TEST(MeshReaders, SaysWhereAFileIsWrong) {
   EXPECT_EQ(failure("a.msh", "nonsense").expected, "$MeshFormat");
 }
 
+/// A triangle and a tetrahedron of second order, nodes in Gmsh's order, a middle node before a corner.
+const std::string kSecondOrder =
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n10\n1 0 0 0\n2 0.5 0 0\n3 1 0 0\n4 0 1 0\n5 0 0 1\n6 0.5 0.5 0\n"
+    "7 0 0.5 0\n8 0 0 0.5\n9 0 0.5 0.5\n10 0.5 0 0.5\n$EndNodes\n"
+    "$Elements\n3\n1 8 2 4 1 1 3 2\n2 9 2 7 1 1 3 4 2 6 7\n3 11 2 5 1 1 3 4 5 2 6 7 8 9 10\n$EndElements\n";
+
+TEST(MeshReaders, SecondOrderFilesAreTheirCorners) {
+  const MeshFile mesh = read_bytes("a.msh", kSecondOrder);
+
+  EXPECT_EQ(mesh.vertices.size(), 4u);
+  EXPECT_EQ(mesh.vertices[1], Vec<3>(1, 0, 0));
+  EXPECT_EQ(mesh.edges, (std::vector<std::array<int, 2>>{{0, 1}}));
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}}));
+  EXPECT_EQ(mesh.triangle_body, std::vector<int>{7});
+  EXPECT_EQ(mesh.tetrahedra, (std::vector<std::array<int, 4>>{{0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.tetrahedron_body, std::vector<int>{5});
+}
+
+TEST(MeshReaders, RefusesMeshesThatAreCurvedAtRest) {
+  std::string curved = kSecondOrder, both = kSecondOrder;
+  curved.replace(curved.find("6 0.5 0.5 0\n"), 12, "6 0.6 0.6 0\n");
+  both.replace(both.find("1 8 2 4 1 1 3 2"), 15, "1 1 2 4 1 2 3  ");
+
+  EXPECT_EQ(failure("a.msh", curved).place, "node 6");
+  EXPECT_NE(failure("a.msh", curved).expected.find("straight at rest"), std::string::npos);
+  EXPECT_NE(failure("a.msh", both).found.find("in the middle of an edge"), std::string::npos);
+}
+
 TEST(MeshReaders, RefusesOtherElementTypes) {
   std::string text = kText22;
   text.replace(text.find("3 2 2 7 1 1 2 3"), 15, "3 3 2 7 1 1 2 3");

@@ -85,6 +85,100 @@ class Arrays(unittest.TestCase):
         np.testing.assert_allclose(simulation.positions - corners, np.tile([0.02, 0.04, 0.06], (8, 1)), atol=1e-9)
 
 
+EDGES = {2: [(0, 1), (1, 2), (2, 0)], 3: [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]}
+
+
+def with_middles(vertices, cells):
+    """Nodes before the vertices that have odd ids, so that the order of neither is the simulation's."""
+    d = vertices.shape[1]
+    pairs = np.sort(np.concatenate([cells[:, list(edge)] for edge in EDGES[d]]), axis=1)
+    edges, of_cell = np.unique(pairs, axis=0, return_inverse=True)
+    nodes = np.concatenate([vertices[edges].mean(axis=1), vertices])
+    return nodes, np.column_stack([cells + len(edges), of_cell.reshape(-1, len(cells)).T])
+
+
+class QuadraticElements(unittest.TestCase):
+    def make(self, options=OPTIONS):
+        model = itr.Model(*with_middles(*block()))
+        model.add_boundary("left", box=([0, 0], [0, 1]))
+        model.set_options(options)
+        return itr.Simulation(model)
+
+    def test_nodes_follow_the_vertices(self):
+        simulation = self.make()
+        vertices, cells = block()
+        np.testing.assert_array_equal(simulation.rest_positions[: simulation.num_vertices], vertices)
+        np.testing.assert_array_equal(simulation.cells, cells)
+        edges = simulation.curved_edges
+        self.assertEqual(edges.shape, (33, 2))
+        np.testing.assert_allclose(simulation.rest_positions[16:], vertices[edges].mean(axis=1), atol=1e-16)
+        self.assertEqual(simulation.positions.shape, (16 + 33, 2))
+
+    def test_positions_and_forces_are_of_all_nodes(self):
+        simulation = self.make()
+        X = simulation.rest_positions
+        simulation.fix("left", np.stack([0.01 * X[:, 1] ** 2, 0 * X[:, 0]], 1))  # a curve that quadratic elements hold
+        simulation.set_forces(np.tile([0, 1.0], (len(X), 1)))
+        simulation.watch_forces()
+        simulation.step()
+        on_left = np.abs(X[:, 0]) < 1e-9
+        np.testing.assert_allclose(simulation.positions[on_left, 0], 0.01 * X[on_left, 1] ** 2, atol=1e-12)
+        np.testing.assert_allclose(simulation.forces("applied").sum(0), [0, len(X)])
+        applied, reaction = simulation.forces("applied"), simulation.forces("reaction")
+        force, _ = simulation.resultant("left")
+        np.testing.assert_allclose(force, (applied + reaction)[on_left].sum(0), rtol=1e-12)
+
+    def test_what_does_not_know_them_is_refused(self):
+        simulation = self.make()
+        with self.assertRaises(itr.InputError) as caught:
+            simulation.set_follower_forces(lambda X, x, t: 0 * x)
+        self.assertIn("curved edges", str(caught.exception))
+        nodes, cells = with_middles(*block())
+        nodes[0] += 0.01
+        with self.assertRaises(itr.InputError) as caught:
+            itr.Model(nodes, cells)
+        self.assertIn("straight at rest", str(caught.exception))
+
+    def test_meshio_there_and_back(self):
+        try:
+            import meshio
+        except ImportError:
+            self.skipTest("no meshio")
+        corners = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) * 0.2
+        cells = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
+        cells[1] = cells[1][[0, 1, 3, 2]]  # one that is inverted
+        for kind, (points, blocks) in {"triangle6": block(), "tetra10": (corners, cells)}.items():
+            nodes, quadratic = with_middles(points, blocks)
+            model = itr.Model.from_meshio(meshio.Mesh(nodes, [(kind, quadratic)]))
+            model.set_options(OPTIONS)
+            simulation = itr.Simulation(model)
+            simulation.set_velocities(simulation.rest_positions**2)
+            simulation.step()
+            mesh = simulation.to_meshio()
+            self.assertEqual(mesh.cells[0].type, kind)
+            d = points.shape[1]
+            again = mesh.points[:, :d] - mesh.point_data["displacement"][:, :d]
+            for row in mesh.cells[0].data:
+                for node, (i, j) in zip(row[d + 1 :], EDGES[d]):
+                    np.testing.assert_allclose(again[node], (again[row[i]] + again[row[j]]) / 2, atol=1e-12)
+
+    def test_dolfinx(self):
+        try:
+            import dolfinx.fem
+            import ufl
+        except ImportError:
+            self.skipTest("no dolfinx")
+        simulation = self.make()
+        simulation.set_velocities(simulation.rest_positions**2)
+        simulation.step()
+        mesh, functions = simulation.to_dolfinx()
+        F = ufl.Identity(2) + ufl.grad(functions["displacement"])
+        mu, lame = 1e5 / 2.6, 0.3 * 1e5 / (1 - 0.3**2)
+        W = mu / 2 * (ufl.tr(F.T * F) - 2 - 2 * ufl.ln(ufl.det(F))) + lame / 2 * ufl.ln(ufl.det(F)) ** 2
+        form = dolfinx.fem.form(W * ufl.dx(mesh, metadata={"quadrature_degree": 2}))
+        self.assertAlmostEqual(dolfinx.fem.assemble_scalar(form) / simulation.report["energy"]["elastic"], 1, delta=1e-10)
+
+
 class Conditions(unittest.TestCase):
     def test_constants_arrays_and_functions_are_the_same(self):
         results = []
@@ -520,7 +614,7 @@ class Files(unittest.TestCase):
         quads = meshio.Mesh(points, [("triangle", cells + 1), ("quad", [[1, 2, 6, 5]])])
         with self.assertRaises(itr.InputError) as caught:
             itr.Model.from_meshio(quads)
-        self.assertEqual(str(caught.exception), "mesh: found cells quad; expected tetra or triangle only")
+        self.assertEqual(str(caught.exception), "mesh: found cells quad; expected tetra, triangle, tetra10 or triangle6 only")
 
     def test_dolfinx(self):
         try:

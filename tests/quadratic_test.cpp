@@ -18,6 +18,7 @@
 #include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/invariants.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "random_quadratic.hpp"
 
 namespace itr {
 namespace {
@@ -26,46 +27,6 @@ template <typename T>
 class Quadratic : public ::testing::Test {};
 using Dimensions = ::testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
 TYPED_TEST_SUITE(Quadratic, Dimensions);
-
-/// det dx/dxi at barycentric coordinates, by the shape functions.
-template <int Dim>
-double jacobian_at(const QuadraticCell<Dim>& x, const std::array<double, Dim + 1>& l) {
-  const auto linear = barycentric_gradients<Dim>(Mat<Dim>::Identity());
-  return (x * quadratic_gradients<Dim, Dim>(kAllCurved<Dim>, l, linear).transpose()).determinant();
-}
-
-template <int Dim>
-std::array<double, Dim + 1> random_place(std::mt19937& random) {
-  std::exponential_distribution<double> part(1);
-  std::uniform_int_distribution<int> choice(0, 3);
-  std::array<double, Dim + 1> l;
-  double sum = 0;
-  for (double& value : l) sum += value = choice(random) == 0 ? 0 : part(random);  // often on a face or an edge
-  if (sum == 0) l[0] = sum = 1;
-  for (double& value : l) value /= sum;
-  return l;
-}
-
-template <int Dim>
-QuadraticCell<Dim> unit_cell() {
-  QuadraticCell<Dim> x = QuadraticCell<Dim>::Zero();
-  for (int k = 0; k < Dim; ++k) x(k, k + 1) = 1;
-  for_each_edge<Dim>([&](int edge, int i, int j) { x.col(Dim + 1 + edge) = (x.col(i) + x.col(j)) / 2; });
-  return x;
-}
-
-template <int Dim>
-QuadraticCell<Dim> random_motion(std::mt19937& random, double amount) {
-  std::uniform_real_distribution<double> noise(-amount, amount);
-  return QuadraticCell<Dim>::NullaryExpr([&] { return noise(random); });
-}
-
-template <int Dim>
-double least_sampled(const QuadraticCell<Dim>& x, std::mt19937& random, int samples) {
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < samples; ++i) least = std::min(least, jacobian_at<Dim>(x, random_place<Dim>(random)));
-  return least;
-}
 
 TYPED_TEST(Quadratic, ValidityIsNeverClaimedFalsely) {
   constexpr int Dim = TypeParam::value;

@@ -396,7 +396,15 @@ INSTANTIATE_TEST_SUITE_P(
              kImpact + Arguments{"/solver/nonlinear/max_iterations=8", "/space/remesh/enabled=false"}},
         Case{"damping", "ball_wall.json", 40, R"("dt":2e-5)",
              kImpact + Arguments{R"(/solver/rayleigh_damping=[{"form":"elasticity","stiffness_ratio":0.1}])"}},
-        Case{"cubes", "cubes.json", 45, R"("dt":0.01)", {}},  // 3D; they meet in step 14
+        Case{
+            "quadratic", "ball_wall.json", 40, R"("dt":2e-5)",
+            kImpact + Arguments{"/space/remesh/enabled=false", "/space/discr_order=2", "/contact/friction_coefficient=0.3"}},
+        Case{"cubes_quadratic",
+             "cubes.json",
+             20,
+             R"("dt":0.01)",
+             {R"(/space/discr_order=[{"id":1,"order":2}])"}},  // the other cube is linear
+        Case{"cubes", "cubes.json", 45, R"("dt":0.01)", {}},   // 3D; they meet in step 14
         Case{"cubes_remeshed",
              "cubes.json",
              28,

@@ -16,6 +16,7 @@ import numpy
 
 ASKED = ("contact_forces", "friction_forces", "reaction_forces", "scalar_values", "tensor_values")
 CELLS = {2: "triangle", 3: "tetra"}
+QUADRATIC = {2: "triangle6", 3: "tetra10"}
 
 
 def run(itr, scene, directory, sets):
@@ -55,10 +56,26 @@ def check_attributes(directory, frames):
             assert float(grid.find("Time").get("Value")) == file.attrs["t"]
             names = {attribute.get("Name") for attribute, _ in items(grid)}
             for field in file["fields"]:
-                assert field == "x" or any(n == field or n.startswith(field + "_") for n in names), (field, names)
-            sizes = {"Node": len(file["fields/x"]), "Cell": len(file["mesh/body"])}
+                is_left_out = field == "x" or ("drawn" in file and field.endswith("_force"))
+                assert is_left_out or any(n == field or n.startswith(field + "_") for n in names), (field, names)
+            sizes = {"Node": len(file["drawn/x" if "drawn" in file else "fields/x"]), "Cell": len(file["mesh/body"])}
         for attribute, item in items(grid):
             assert len(read_item(directory, item)) == sizes[attribute.get("Center")], attribute.get("Name")
+
+
+def check_middles(mesh, file, dim):
+    """The node of each drawn edge is that of the curved edge, or else the mean of its ends."""
+    if "curved_edges" not in file["mesh"]:
+        return
+    x, edges = file["fields/x"][()], file["mesh/curved_edges"][()]
+    curved = {tuple(edge): x[len(x) - len(edges) + i] for i, edge in enumerate(edges.tolist())}
+    order = [(0, 1), (1, 2), (0, 2)] + [(0, 3), (1, 3), (2, 3)] * (dim == 3)
+    for block in mesh.cells:
+        for cell in block.data.tolist() if block.type == QUADRATIC[dim] else []:
+            for node, (i, j) in zip(cell[dim + 1 :], order):
+                ends = tuple(sorted((cell[i], cell[j])))
+                expected = curved.get(ends, (x[ends[0]] + x[ends[1]]) / 2)
+                assert numpy.array_equal(mesh.points[node, :dim], expected), (node, ends)
 
 
 def check_meshio(directory, frames):
@@ -76,11 +93,20 @@ def check_meshio(directory, frames):
         ElementTree.ElementTree(single).write(path)
         mesh = meshio.read(path)
         with h5py.File(frame) as file:
-            x = file["fields/x"][()]
-            assert numpy.array_equal(mesh.points[:, : x.shape[1]], x)
-            assert numpy.array_equal(mesh.cells_dict[CELLS[x.shape[1]]], file["mesh/simplices"][()])
-            assert numpy.array_equal(mesh.cell_data["von_mises"][0], file["fields/von_mises"][()])
-            assert numpy.array_equal(mesh.cell_data["body"][0], file["mesh/body"][()])
+            x = file["drawn/x" if "drawn" in file else "fields/x"][()]
+            dim = x.shape[1]
+            assert numpy.array_equal(mesh.points[:, :dim], x)
+            corners = numpy.concatenate([block.data[:, : dim + 1] for block in mesh.cells])
+            kinds = {block.type for block in mesh.cells}
+            if "curved_edges" not in file["mesh"]:
+                assert kinds == {CELLS[dim]}, kinds
+            else:
+                assert kinds == {QUADRATIC[dim]}, kinds
+            for name in ("von_mises", "body"):
+                values = numpy.concatenate(mesh.cell_data[name])
+                assert numpy.array_equal(values, file["fields" if name == "von_mises" else "mesh"][name][()])
+            assert numpy.array_equal(corners, file["mesh/simplices"][()])
+            check_middles(mesh, file, dim)
     return mesh
 
 
@@ -96,9 +122,22 @@ def main(itr, examples):
             '{"geometry": [{"mesh": "tet.msh"}], "materials": {"type": "NeoHookean", "E": 1e5, "nu": 0.3, "rho": 1000},'
             '"boundary_conditions": {"rhs": [0, 9.81, 0]}, "time": {"dt": 0.01, "time_steps": 3}}'
         )
+        (folder / "two.msh").write_text(
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 -1 0.5 0\n$EndNodes\n"
+            "$Elements\n3\n1 2 2 1 1 1 2 3\n2 2 2 2 1 1 3 4\n3 2 2 2 1 1 4 5\n$EndElements\n"
+        )
+        (folder / "two.json").write_text(
+            '{"geometry": [{"mesh": "two.msh"}], "materials": [{"id": 1, "type": "NeoHookean", "E": 1e5, "nu": 0.3, "rho": 1000},'
+            '{"id": 2, "type": "NeoHookean", "E": 1e4, "nu": 0.3, "rho": 1000}],'
+            '"initial_conditions": {"velocity": [{"id": 1, "value": ["y * y", "x"]}]},'
+            '"time": {"dt": 0.01, "time_steps": 3}}'
+        )
         runs = {
             "masticator": (examples / "masticator.json", ['/time={"dt":0.05,"time_steps":12}']),
             "tet": (folder / "tet.json", []),
+            "quadratic tet": (folder / "tet.json", ["/space/discr_order=2"]),
+            "quadratic square": (folder / "two.json", ["/space/discr_order=2"]),
+            "mixed square": (folder / "two.json", ['/space/discr_order=[{"id":1,"order":2}]']),
         }
         for name, (scene, sets) in runs.items():
             directory = folder / name

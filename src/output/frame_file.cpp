@@ -66,46 +66,27 @@ constexpr auto drawn_edges() {
     return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 }
 
-/// Cells as XDMF draws them. A quadratic one needs a node at each of its edges, so that where only some edges are curved the
-/// straight ones of such cells get nodes too.
+/// Cells as XDMF draws them, each with a node at each of its edges: where only some edges are curved the straight ones get
+/// nodes too, that only the drawing has.
 template <int Dim>
 struct DrawnCells {
-  std::vector<EdgeKey> straight_edges;  ///< with a node that only the drawing has
-  Integers cells;                       ///< all curved: a row of nodes each; else of XDMF's mixed type, the type in front
+  std::vector<EdgeKey> straight_edges;
+  Integers cells;  ///< rows of nodes
 };
 
-/// Nothing for a linear space.
 template <int Dim>
 DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh, const Space& space) {
   DrawnCells<Dim> drawn;
-  if (space.is_linear()) return drawn;
-  const auto has_curved_edge = [&](const auto& cell) {
-    return std::any_of(drawn_edges<Dim>().begin(), drawn_edges<Dim>().end(),
-                       [&](const auto& edge) { return space.find(cell[edge[0]], cell[edge[1]]) != kNone; });
-  };
-  auto& straight = drawn.straight_edges;
+  for (const EdgeKey& edge : mesh.edges())
+    if (space.find(edge[0], edge[1]) == kNone) drawn.straight_edges.push_back(edge);
+  const Space straight(drawn.straight_edges);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     const auto& cell = mesh.cell(c);
-    if (!has_curved_edge(cell)) continue;
-    for (const auto& [i, j] : drawn_edges<Dim>())
-      if (space.find(cell[i], cell[j]) == kNone)
-        straight.push_back({std::min(cell[i], cell[j]), std::max(cell[i], cell[j])});
-  }
-  std::sort(straight.begin(), straight.end());
-  straight.erase(std::unique(straight.begin(), straight.end()), straight.end());
-  const Space of_drawing(straight);
-  constexpr int kLinearType = Dim == 2 ? 4 : 6, kQuadraticType = Dim == 2 ? 36 : 38;  // of XDMF
-  const bool is_mixed = !is_all_curved(mesh, space);
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    const auto& cell = mesh.cell(c);
-    const bool is_quadratic = has_curved_edge(cell);
-    if (is_mixed) drawn.cells.push_back(is_quadratic ? kQuadraticType : kLinearType);
     drawn.cells.insert(drawn.cells.end(), cell.begin(), cell.end());
-    if (!is_quadratic) continue;
     for (const auto& [i, j] : drawn_edges<Dim>()) {
       const int curved = space.find(cell[i], cell[j]);
       drawn.cells.push_back(curved != kNone ? mesh.vertex_slots() + curved
-                                            : num_nodes(mesh, space) + of_drawing.find(cell[i], cell[j]));
+                                            : num_nodes(mesh, space) + straight.find(cell[i], cell[j]));
     }
   }
   return drawn;
@@ -118,8 +99,8 @@ void write_space(hdf5::File& file, const FrameView<Dim>& frame, const Space& spa
   if (space.is_linear()) return;
   write_index_rows(file, "/mesh/curved_edges", space.curved_edges());
   const DrawnCells<Dim> drawn = draw_cells(frame.mesh, space);
-  if (is_all_curved(frame.mesh, space)) return file.write("/mesh/quadratic_cells", drawn.cells, kQuadraticNodes<Dim>);
-  file.write("/drawn/cells", drawn.cells, 0);
+  file.write("/mesh/quadratic_cells", drawn.cells, kQuadraticNodes<Dim>);
+  if (drawn.straight_edges.empty()) return;
   const auto write = [&](const char* name, ConstVectorView field, const char* unit) {
     VectorX values(field.size() + Dim * static_cast<Eigen::Index>(drawn.straight_edges.size()));
     values.head(field.size()) = field;
@@ -212,11 +193,10 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t) {
 }  // namespace
 
 template <int Dim>
-std::array<int, 2> drawn_sizes(const FrameView<Dim>& frame) {
-  if (!frame.space || frame.space->is_linear() || is_all_curved(frame.mesh, *frame.space)) return {0, 0};
-  const DrawnCells<Dim> drawn = draw_cells(frame.mesh, *frame.space);
-  return {num_nodes(frame.mesh, *frame.space) + static_cast<int>(drawn.straight_edges.size()),
-          static_cast<int>(drawn.cells.size())};
+int drawn_nodes(const FrameView<Dim>& frame) {
+  if (!frame.space || frame.space->is_linear()) return 0;
+  const int edges = static_cast<int>(frame.mesh.edges().size());
+  return edges == frame.space->num_curved() ? 0 : frame.mesh.num_vertices() + edges;
 }
 
 namespace {
@@ -238,8 +218,7 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
                                     size(frame.obstacle_triangles),
                                     frame.proxy.x != nullptr,
                                     frame.asked != nullptr};
-  const auto [drawn_nodes, drawn_cells] = drawn_sizes(frame);
-  shape.insert(shape.end(), {static_cast<std::size_t>(drawn_nodes), static_cast<std::size_t>(drawn_cells)});
+  shape.push_back(static_cast<std::size_t>(drawn_nodes(frame)));
   if (frame.proxy.x)
     shape.insert(shape.end(), {size(*frame.proxy.x), size(*frame.proxy.edges), size(*frame.proxy.triangles)});
   if (frame.asked) {
@@ -311,13 +290,8 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
                    static_cast<int>(x.rows),
                    static_cast<int>(body.rows),
                    file.contains("/mesh/quadratic_cells"),
-                   0,
-                   0,
+                   file.contains("/drawn/x") ? static_cast<int>(file.shape("/drawn/x").rows) : 0,
                    {}};
-  if (file.contains("/drawn/cells")) {
-    sizes.drawn_nodes = static_cast<int>(file.shape("/drawn/x").rows);
-    sizes.drawn_cells = static_cast<int>(file.shape("/drawn/cells").rows);
-  }
   for (const char* name : kAskedFields)
     if (file.contains(std::string("/fields/") + name)) sizes.asked.push_back(name);
   return sizes;
@@ -367,7 +341,7 @@ StoredFrame read_frame(const std::filesystem::path& path) {
 #define ITR_INSTANTIATE(Dim)                                                                                   \
   template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, Durability, \
                                  const FrameExtra&);                                                           \
-  template std::array<int, 2> drawn_sizes<Dim>(const FrameView<Dim>&);                                         \
+  template int drawn_nodes<Dim>(const FrameView<Dim>&);                                                        \
   template void FrameFiles::write<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -50,13 +50,13 @@ constexpr const char* kAskedFields[] = {"contact_force", "friction_force", "reac
 struct FrameSizes {
   double t = 0;                          ///< [s]
   int dim = 0, vertices = 0, cells = 0;  ///< vertices: with the nodes of curved edges
-  bool is_quadratic = false;             ///< every edge is curved
-  int drawn_nodes = 0, drawn_cells = 0;  ///< lengths of /drawn/x and /drawn/cells, where only some edges are curved
+  bool is_quadratic = false;             ///< some edges are curved
+  int drawn_nodes = 0;                   ///< rows of /drawn/x, which is there where others are straight
   std::vector<std::string> asked;        ///< names of kAskedFields that it has
 };
-/// Lengths of a frame's /drawn/x and /drawn/cells.
+/// Rows of a frame's /drawn/x; 0: it has none.
 template <int Dim>
-std::array<int, 2> drawn_sizes(const FrameView<Dim>& frame);
+int drawn_nodes(const FrameView<Dim>& frame);
 
 FrameSizes read_frame_sizes(const std::filesystem::path& path);
 

@@ -101,7 +101,8 @@ namespace {
 template <typename Report, typename Visit>
 void for_each_number(Report& r, Visit&& visit) {
   for (auto* n : {&r.step, &r.vertices, &r.elements, &r.unknowns, &r.newton_iterations, &r.factorizations, &r.linear_solves,
-                  &r.reused_factors, &r.linear_iterations, &r.indefinite, &r.bound_by_dhat, &r.damped_steps, &r.cut_steps})
+                  &r.reused_factors, &r.linear_iterations, &r.indefinite, &r.bound_by_dhat, &r.damped_steps,
+                  &r.refined_quadrature, &r.cut_steps})
     visit(*n);
   for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths}) {
     visit(count->tried);

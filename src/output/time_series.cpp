@@ -65,18 +65,11 @@ std::string grid(const FrameEntry& entry) {
   const char* linear = is_plane ? "Triangle" : "Tetrahedron";
   const char* quadratic = is_plane ? "Triangle_6" : "Tetrahedron_10";
   const int nodes = entry.is_quadratic ? (entry.dim + 1) * (entry.dim + 2) / 2 : entry.dim + 1;
-  const bool is_mixed = entry.drawn_cells > 0;
-  const std::string shape = is_mixed ? std::to_string(entry.drawn_cells) : fmt::format("{} {}", cells, nodes);
   text += fmt::format("        <Topology TopologyType=\"{}\" NumberOfElements=\"{}\">{}</Topology>\n",
-                      is_mixed             ? "Mixed"
-                      : entry.is_quadratic ? quadratic
-                                           : linear,
-                      cells,
-                      data_item(entry,
-                                is_mixed             ? "/drawn/cells"
-                                : entry.is_quadratic ? "/mesh/quadratic_cells"
-                                                     : "/mesh/simplices",
-                                shape, "Int"));
+                      entry.is_quadratic ? quadratic : linear, cells,
+                      data_item(entry, entry.is_quadratic ? "/mesh/quadratic_cells" : "/mesh/simplices",
+                                fmt::format("{} {}", cells, nodes), "Int"));
+  const bool is_mixed = entry.drawn_nodes > 0;
   FrameEntry drawn = entry;
   if (is_mixed) drawn.vertices = entry.drawn_nodes;
   const std::string group = is_mixed ? "/drawn/" : "/fields/";

@@ -15,9 +15,8 @@ struct FrameEntry {
   double t = 0;      ///< [s]
   int dim = 0;
   int vertices = 0, cells = 0;     ///< vertices: with the nodes of curved edges
-  bool is_quadratic = false;       ///< all edges are curved, and drawn so
-  int drawn_nodes = 0;             ///< rows of /drawn/x, where only some edges are curved
-  int drawn_cells = 0;             ///< length of /drawn/cells
+  bool is_quadratic = false;       ///< some edges are curved, and drawn so
+  int drawn_nodes = 0;             ///< rows of /drawn/x, which is there where others are straight
   std::vector<std::string> asked;  ///< fields that not every frame has, see kAskedFields
 };
 

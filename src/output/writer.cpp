@@ -60,7 +60,7 @@ struct Writer::Impl {
       const FrameSizes sizes = read_frame_sizes(path);
       last_stored = step_of_frame(path);
       series.append({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.is_quadratic,
-                     sizes.drawn_nodes, sizes.drawn_cells, sizes.asked});
+                     sizes.drawn_nodes, sizes.asked});
     }
     last_checkpoint = seconds_now();
   }
@@ -109,10 +109,9 @@ struct Writer::Impl {
       if (!frame.asked->stress.empty()) asked.push_back("stress");
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
-    const bool is_quadratic = frame.space && is_all_curved(frame.mesh, *frame.space);
-    const auto [drawn_nodes, drawn_cells] = drawn_sizes(frame);
+    const bool is_quadratic = frame.space && !frame.space->is_linear();
     series.add(
-        {frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, drawn_nodes, drawn_cells, std::move(asked)});
+        {frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, drawn_nodes(frame), std::move(asked)});
   }
 
   /// What a checkpoint relies on has to be on the disk before it.
