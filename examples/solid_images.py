@@ -101,6 +101,8 @@ class SolidImages:
         from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkWindowToImageFilter
         self.renderer.RemoveAllViewProps()
 
+        vtkPolyDataMapper.SetResolveCoincidentTopologyToPolygonOffset()  # lines on faces are seen whole
+
         def add(data):
             mapper, actor = vtkPolyDataMapper(), vtkActor()
             mapper.SetInputData(data)
