@@ -4,6 +4,8 @@
 // halvings of place and time another 360 u. kUnits = 2048 bounds the sum with room.
 #include "itr/geometry/quadratic_validity.hpp"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -61,6 +63,28 @@ double bound_below(const JacobianCorners<double, Dim, 1>& corners, double tolera
   return bound;
 }
 
+/// A cheap proof for what moves little: J = J0 (I + E), and det (I + E) > 0 while |E| < 1. E is linear in place and in time,
+/// so that its norm is largest at a corner.
+template <int Dim>
+bool varies_little(const JacobianCorners<double, Dim, 2>& way, double offset) {
+  constexpr double kMost = 0.9, kMostRoundOff = 0.01;
+  const auto matrix = [](const auto& J) {
+    Mat<Dim> result;
+    for (int d = 0; d < Dim; ++d)
+      for (int c = 0; c < Dim; ++c) result(c, d) = J[d][c];
+    return result;
+  };
+  Mat<Dim> middle = Mat<Dim>::Zero();
+  for (const auto& J : way[0]) middle += matrix(J) / (Dim + 1);
+  if (!(middle.determinant() > 0)) return false;
+  const Mat<Dim> inverse = middle.inverse();
+  if (!(inverse.norm() * offset * kUnits < kMostRoundOff)) return false;
+  for (const auto& at_time : way)
+    for (const auto& J : at_time)
+      if (!((inverse * (matrix(J) - middle)).squaredNorm() < kMost * kMost)) return false;
+  return true;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -79,7 +103,9 @@ template <int Dim>
 double max_positive_step(const QuadraticCell<Dim>& x, const QuadraticCell<Dim>& dx, double tolerance) {
   const QuadraticCell<Dim> end = x + dx;
   const JacobianCorners<double, Dim, 2> way{jacobians<double, Dim>(x), jacobians<double, Dim>(end)};
-  const double error = round_off<Dim, 2>(way, std::max(largest_offset<Dim>(x), largest_offset<Dim>(end)));
+  const double offset = std::max(largest_offset<Dim>(x), largest_offset<Dim>(end));
+  if (varies_little<Dim>(way, offset)) return 1;
+  const double error = round_off<Dim, 2>(way, offset);
   const auto is_free = [&](double from, double to) {
     JacobianCorners<double, Dim, 2> part;
     for (int v = 0; v <= Dim; ++v) {

@@ -19,39 +19,41 @@ constexpr double kBlindTolerance = 0.1;   ///< relative, of the bound that tells
 template <int Dim>
 using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
 
-/// Hessian of a density by its modes, as a matrix over F by columns.
+/// Sums value * mode * mode^T over modes of the cell's forces, many at a time: a product of matrices.
 template <int Dim>
-Mat<Dim * Dim> stiffness(const EigenSystem<Dim>& system, PsdProjection psd) {
-  Mat<Dim* Dim> C = Mat<Dim * Dim>::Zero();
-  for (std::size_t k = 0; k < system.values.size(); ++k) {
-    const double value = projected(system.values[k], psd);
-    if (value == 0) continue;
-    const Eigen::Map<const Vec<Dim * Dim>> mode(system.modes[k].data());
-    C.noalias() += value * mode * mode.transpose();
-  }
-  return C;
-}
+class ModalSum {
+ public:
+  static constexpr int kRows = Dim * kQuadraticNodes<Dim>;
 
-/// block += weight * sum over j, l of g_a[j] C(:j, :l) g_b[l].
-template <int Dim>
-void add_block(const Mat<Dim * Dim>& C, const Nodal<Dim>& gradients, double weight, Mat<Dim * kQuadraticNodes<Dim>>& block) {
-  for (int b = 0; b < kQuadraticNodes<Dim>; ++b) {
-    Eigen::Matrix<double, Dim * Dim, Dim> Cb = weight * gradients(0, b) * C.template leftCols<Dim>();
-    for (int l = 1; l < Dim; ++l) Cb.noalias() += weight * gradients(l, b) * C.template middleCols<Dim>(Dim * l);
-    for (int a = b; a < kQuadraticNodes<Dim>; ++a) {
-      Mat<Dim> part = gradients(0, a) * Cb.template topRows<Dim>();
-      for (int j = 1; j < Dim; ++j) part.noalias() += gradients(j, a) * Cb.template middleRows<Dim>(Dim * j);
-      block.template block<Dim, Dim>(Dim * a, Dim * b) += part;
+  explicit ModalSum(Mat<kRows>& block) : block_(block) { block.setZero(); }
+  /// Those of a density's Hessian at a point, `weight` times.
+  void add(const EigenSystem<Dim>& system, PsdProjection psd, const Nodal<Dim>& gradients, double weight) {
+    for (std::size_t k = 0; k < system.values.size(); ++k) {
+      const double value = weight * projected(system.values[k], psd);
+      if (value == 0) continue;
+      if (count_ == kBatch) flush();
+      Eigen::Map<Nodal<Dim>>(modes_.col(count_).data()).noalias() = system.modes[k] * gradients;
+      weighted_.col(count_) = value * modes_.col(count_);
+      ++count_;
     }
   }
-}
+  void finish() {
+    flush();
+    block_.template triangularView<Eigen::StrictlyUpper>() = block_.transpose();
+  }
 
-template <int Dim>
-void mirror_lower_blocks(Mat<Dim * kQuadraticNodes<Dim>>& block) {
-  for (int b = 0; b < kQuadraticNodes<Dim>; ++b)
-    for (int a = b + 1; a < kQuadraticNodes<Dim>; ++a)
-      block.template block<Dim, Dim>(Dim * b, Dim * a) = block.template block<Dim, Dim>(Dim * a, Dim * b).transpose();
-}
+ private:
+  static constexpr int kBatch = (Dim == 2 ? 3 : 4) * Dim * Dim;  ///< all modes of the default rule's points
+
+  void flush() {
+    block_.noalias() += weighted_.leftCols(count_) * modes_.leftCols(count_).transpose();
+    count_ = 0;
+  }
+
+  Mat<kRows>& block_;
+  Eigen::Matrix<double, kRows, kBatch> modes_, weighted_;
+  int count_ = 0;
+};
 
 template <int Dim>
 double first_unproven(const typename CellSet<Dim>::CurvedElement& element, ConstVectorView x, ConstVectorView dx) {
@@ -167,15 +169,14 @@ void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd,
   sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, Mat<Dim * kNodes>& block) {
     const Element& element = cells_.curved_elements[e];
     const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
-    block.setZero();
+    ModalSum<Dim> sum(block);
     const auto& rule = this->rule(e);
     for (std::size_t q = 0; q < rule.size(); ++q) {
       const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
       const Mat<Dim> F = positions * gradients.transpose();
-      add_block<Dim>(stiffness<Dim>(elastic_eigensystem<Dim>(F, moduli(e, q)), psd), gradients,
-                     scale_ * rule[q].share * element.volume, block);
+      sum.add(elastic_eigensystem<Dim>(F, moduli(e, q)), psd, gradients, scale_ * rule[q].share * element.volume);
     }
-    mirror_lower_blocks<Dim>(block);
+    sum.finish();
   });
 }
 
