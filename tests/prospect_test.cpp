@@ -8,6 +8,7 @@
 #include "remesh/local_problem.hpp"
 #include "remesh/patch.hpp"
 #include "remesh/prospect.hpp"
+#include "remesh_options.hpp"
 #include "tet_scene.hpp"
 
 namespace itr {
@@ -83,7 +84,7 @@ TEST(Prospect, NoSplitGainsMoreThanIsThere) {
 }
 
 TEST(Prospect, NothingIsAskedInFreeFlightUntilThereIsSomethingToGain) {
-  RemeshOptions options;
+  RemeshOptions options = remesh_options();
   options.enabled = true;
   options.collapse.enabled = false;
   const auto tried = [&](const TetScene& scene) {

@@ -12,6 +12,7 @@
 #include "remesh/patch.hpp"
 #include "remesh/prediction.hpp"
 #include "remesh/trial.hpp"
+#include "remesh_options.hpp"
 #include "tet_scene.hpp"
 
 namespace itr {
@@ -204,7 +205,7 @@ TEST(Remesh3d, KeepsVolumesAndTheStateValidAndHasTheSameBitsForAnyNumberOfThread
       const ThreadLimit limit(threads);
       TetScene scene(seed, 4);
       EXPECT_EQ(find_inverted<3>(scene.mesh, scene.fields.x), kNone);
-      RemeshOptions options;
+      RemeshOptions options = remesh_options();
       options.split.acceptance_tolerance = 2e-3;
       options.split.max_depth = 1;
       options.collapse.acceptance_tolerance = -1e-3;
@@ -296,7 +297,7 @@ struct Swapped {
     context.has_inertia = false;
     context.held_components[9] = {true, true, true};
     context.newton.step_tolerance = 1e-9;
-    RemeshOptions options;
+    RemeshOptions options = remesh_options();
     options.split.enabled = options.collapse.enabled = false;
     options.split.acceptance_tolerance = 1e-3;
     options.swap.enabled = true;

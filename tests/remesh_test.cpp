@@ -11,6 +11,7 @@
 #include "random_mesh.hpp"
 #include "remesh/patch.hpp"
 #include "remesh/prediction.hpp"
+#include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"
 
 namespace itr {
@@ -278,7 +279,7 @@ TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
   for (unsigned seed = 0; seed < 5; ++seed)
     for (const auto screening : {Screening::energy_percentile, Screening::bounds, Screening::none}) {
       TrialScene scene(seed);
-      RemeshOptions options;
+      RemeshOptions options = remesh_options();
       options.collapse.enabled = false;
       options.screening = screening;
       RemeshMemory memory;
@@ -295,7 +296,7 @@ TEST(Remesh, AsksAgainWhatWasRefusedWhereNoPredictionTells) {
   for (const bool pressure : {false, true}) {
     TrialScene scene(1, 6, {.pressure = pressure, .damping = !pressure});
     scene.context.contact.enabled = false;
-    RemeshOptions options;
+    RemeshOptions options = remesh_options();
     options.collapse.enabled = false;
     options.split.acceptance_tolerance = 1e6;  // none gains that
     RemeshMemory memory;
@@ -311,7 +312,7 @@ TEST(Remesh, AsksAgainWhatWasRefusedWhereNoPredictionTells) {
 TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {
   const auto run = [](unsigned seed) {
     TrialScene scene(seed);
-    RemeshOptions options;
+    RemeshOptions options = remesh_options();
     options.split.acceptance_tolerance = 1e-3;
     options.split.culling_threshold = 0.5;
     options.collapse.rel_max_edge_length = 100;

@@ -10,8 +10,9 @@ namespace itr {
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
-  const bool may_split = options.split.enabled &&
-                         available_energy(mesh, fields, context) >= context.scaling * options.split.acceptance_tolerance;
+  const bool may_split =
+      options.split.enabled && !options.sizing_field.enabled &&
+      available_energy(mesh, fields, context) >= context.scaling * options.split.acceptance_tolerance.value();
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
   if (!may_split && !may_collapse && !options.swap.enabled && !options.smooth.enabled && !options.sizing_field.enabled)
     return {};

@@ -39,7 +39,7 @@ bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
 
 template <int Dim>
 bool RemeshSession<Dim>::may_be_split(const EdgeKey& e, bool& is_bound_by_dhat) const {
-  if (!exists(e) || rest_length(e) < options_.split.min_edge_length) return false;
+  if (!exists(e) || rest_length(e) < options_.split.min_edge_length.value()) return false;
   if (!has_contact() || !is_surface(e)) return true;
   const double dhat = context_.contact.activation_distance;
   is_bound_by_dhat = rest_length(e) < 2 * dhat || length(e) < 2 * dhat;

@@ -99,7 +99,7 @@ class RemeshSession {
   /// Whether predictions may leave out trials.
   bool screens() const { return options_.screening != Screening::none; }
   /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
-  double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance : 0; }
+  double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance.value() : 0; }
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
   double predict_split(const EdgeKey& edge) const { return itr::predict_split<Dim>(state(), edge); }

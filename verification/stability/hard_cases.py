@@ -393,7 +393,9 @@ def exactly_scaled(scene, value):
     scaled(scene, value)
     scene.friction, scene.steps = 0.3, 10
     if scene.remesh:
-        scene.operations["swap"] = {"enabled": True, "acceptance_tolerance": 0.1 * scene.remesh}
+        scene.operations |= {"collapse": {"rel_max_edge_length": 3}, "swap": {"enabled": True}}  # tolerances left open
+        if scene.dim == 2:
+            scene.operations["smooth"] = {"enabled": True}
 
 
 LIKE |= {f"exact_{name}{kind}": (f"exact_one{kind}", True) for name in ("small", "large")
