@@ -125,6 +125,7 @@ TEST(Impact, KeepsTheMeshWhereARemeshedStateIsNotValid) {
     const auto result = simulation.advance();
     EXPECT_TRUE(result.ok) << result.reason;
     EXPECT_EQ(warnings.find("keeping the mesh as it was") == std::string::npos, valid) << warnings;
+    EXPECT_EQ(result.report.reverted_remeshes, valid ? 0 : 1);
     return result.report.splits.accepted;
   };
   EXPECT_GT(splits(true), 0);

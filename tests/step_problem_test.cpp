@@ -10,13 +10,13 @@
 namespace itr {
 namespace {
 
-Setup<2> square_of(int cells, double moved) {
+itr::Setup<2> square_of(int cells, double moved) {
   const Grid grid = make_regular_grid(cells, 1, [](int i, int j) { return (i + j) % 2; });
-  Setup<2> setup;
+  itr::Setup<2> setup;
   setup.mesh = Mesh<2>(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
   tag_sides(setup.mesh, 1);
   setup.materials[1] = {.youngs_modulus = 1e4, .poisson_ratio = 0.3, .density = 1000};
-  setup.time = {.dt = 0.1, .steps = 1, .quasistatic = true};
+  setup.time = {.quasistatic = true, .dt = 0.1, .steps = 1};
   setup.newton.step_tolerance = 1e-12;
   setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 0;
   setup.dirichlet = {{1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }},
@@ -36,7 +36,7 @@ History at_rest(const Mesh<2>& mesh) {
 TEST(StepProblem, SolvesAsIfAloneWhereAnotherHasTheCacheToo) {
   linear::Registry registry;
   const auto solver = registry.create("eigen");
-  const Setup<2> coarse = square_of(3, 0.1), fine = square_of(6, 0.1);
+  const itr::Setup<2> coarse = square_of(3, 0.1), fine = square_of(6, 0.1);
   const History of_coarse = at_rest(coarse.mesh), of_fine = at_rest(fine.mesh);
   ProblemCache<2> own(*solver);
   VectorX expected = of_coarse.x[0];

@@ -414,10 +414,13 @@ def far(scene, value):
 # --- obstacles of lower dimension ------------------------------------------------------------------------------------
 
 @case(points_2d=(2, "points", None), points_2d_remeshed=(2, "points", 0.05), points_3d=(3, "points", None),
-      wires_3d=(3, "wires", None), sheet_3d=(3, "sheet", None), wires_3d_remeshed=(3, "wires", 1.0))
+      wires_3d=(3, "wires", None), sheet_3d=(3, "sheet", None), points_3d_remeshed=(3, "points", 0.2),
+      wires_3d_remeshed=(3, "wires", 0.2))
 def codimensional(scene, value):
-    """A block falls on a bed of nails, on wires, on the edge of a sheet."""
+    """A block falls on a bed of nails, on wires, on the edge of a sheet. In 3D swaps of its surface must not take them in."""
     scene.dim, kind, scene.remesh = value
+    if scene.dim == 3 and scene.remesh:
+        scene.operations = {"swap": {"enabled": True}}
     scene.dt, scene.steps = 0.005, 20
     low = -0.001
     if scene.dim == 2:
