@@ -309,6 +309,42 @@ TEST(Remesh, AsksAgainWhatWasRefusedWhereNoPredictionTells) {
   }
 }
 
+/// Bad shapes do harm where the deformation varies, not where it does not.
+TEST(Remesh, BettersShapesWhereTheyDoHarm) {
+  std::mt19937 random(3);
+  Mesh<2> mesh = random_mesh(16, random);
+  StepContext<2> context;
+  for (const int body : {1, 2}) context.materials[body] = {.youngs_modulus = 1000, .poisson_ratio = 0.3, .density = 1};
+  context.has_inertia = false;
+  context.newton.step_tolerance = 1e-9;
+  context.obstacles.past_x.resize(1);
+  RemeshFields<2> fields;
+  fields.x.resize(2 * mesh.vertex_slots());
+  for (int v = 0; v < mesh.vertex_slots(); ++v) {
+    const Vec<2>& X = mesh.rest(v);
+    fields.x.segment<2>(2 * v) = X + (X[0] < 0.4 ? Vec<2>(0, std::pow(0.4 - X[0], 2)) : Vec<2>(0, 0));
+  }
+  fields.past_positions = {fields.x};
+  RemeshOptions options = remesh_options();
+  options.split.enabled = options.collapse.enabled = false;
+  options.split.acceptance_tolerance = 1e-3;
+  options.swap.enabled = options.smooth.enabled = true;
+  const Mesh<2> before = mesh;
+  RemeshMemory memory;
+  Strata<2> strata;
+  remesh(mesh, fields, context, options, memory, strata);
+  int near = 0;
+  for (CellId c = 0; c < before.cell_slots(); ++c) {
+    const double x = before.rest(before.cell(c)[0])[0];
+    const bool is_kept = mesh.is_cell_alive(c);
+    if (x > 0.7) {
+      EXPECT_TRUE(is_kept) << "cell " << c;
+    }
+    near += x < 0.3 && !is_kept;
+  }
+  EXPECT_GT(near, 10);
+}
+
 TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {
   const auto run = [](unsigned seed) {
     TrialScene scene(seed);

@@ -157,6 +157,7 @@ class ShapeBetterer : Mover<Dim> {
 
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
     if (!this->may_move(vertex[0]) || worst_shape(this->mesh_, vertex[0]) < kBadShape) return std::nullopt;
+    if (!this->session_.shape_matters(vertex, this->session_.roughness(vertex))) return std::nullopt;
     return EdgeQueue::Entry{.edge = vertex, .priority = -static_cast<double>(vertex[0])};
   }
 

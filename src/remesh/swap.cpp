@@ -99,7 +99,8 @@ class Swapper {
     if (session_.was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
     trial.edit = policy_.edit(edge);
     if (!trial.edit) return;
-    const double least = policy_.betters_shape(edge, *trial.edit) ? *options_.acceptance_tolerance : least_gain(session_);
+    const bool for_shape = policy_.betters_shape(edge, *trial.edit) && session_.shape_matters(edge, trial.signal);
+    const double least = for_shape ? *options_.acceptance_tolerance : least_gain(session_);
     trial.is_asked = true;
     trial.verdict.decision = Decision::by_bound;
     if (!trial.in_contact && !is_promising(session_, *trial.edit, least)) return;  // there trials tell
