@@ -484,6 +484,20 @@ TEST(AdaptiveStiffness, BalancesTheBarrierAndStaysInItsBounds) {
               1e-10 * least * contact.value(scene.x, workspace));
 }
 
+/// Terms of one surface share a workspace: pairs that were found for a near reach are not those of a farther one.
+TEST(Candidates, AreOfTheReachThatTheyWereFoundFor) {
+  const ContactScene scene(1, true);
+  const auto value_at = [&](double dhat, Workspace& workspace) {
+    ContactOptions options = scene.options;
+    options.activation_distance = dhat;
+    return ContactEnergy<2>(scene.surface, options, 1, 1).value(scene.x, workspace);
+  };
+  Workspace fresh, shared;
+  const double expected = value_at(0.4, fresh);
+  ASSERT_LT(value_at(0.02, shared), expected);
+  EXPECT_EQ(value_at(0.4, shared), expected);
+}
+
 TEST(AdaptiveStiffness, DoublesWhileTinyGapsClose) {
   const std::vector<Vec<2>> rest = {{0, 1}, {-1, 0}, {1, 0}};
   const CollisionSurface surface = make_collision_surface<2>({{1, 2}}, {}, std::vector<int>{0}, rest, {1, 0, 0});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
 
 #include "itr/geometry/bvh.hpp"
@@ -325,6 +326,9 @@ TYPED_TEST(Geometry, TreeFindsWhatBruteForceFinds) {
   }
 }
 
+/// Of the distance at the start: what is kept until a collision, and by what passes by.
+double least_share(double time) { return time < 1 ? CcdOptions{}.min_separation_ratio : CcdOptions{}.passing_ratio; }
+
 TYPED_TEST(Geometry, CollisionTimesAreNeverLateAndNeverZero) {
   constexpr int Dim = TypeParam::value;
   std::mt19937 random(4);
@@ -336,14 +340,21 @@ TYPED_TEST(Geometry, CollisionTimesAreNeverLateAndNeverZero) {
       a[t] = random_point<Dim>(random);
       b[t] = random_point<Dim>(random);
     }
+    if (i % 4 == 0) {  // they meet at half of the way, which in space random ones hardly do
+      const Vec<Dim> on_edge = (0.7 * (a[0] + a[1]) + 0.3 * (b[0] + b[1])) / 2;
+      p[1] = 2 * on_edge - p[0];
+    }
     const double start = std::sqrt(point_edge_distance_squared<Dim>(p[0], a[0], b[0]));
     const double toi = point_edge_ccd<Dim>(p[0], a[0], b[0], p[1], a[1], b[1]);
     EXPECT_GT(toi, 0);
+    if (i % 4 == 0) {
+      EXPECT_LT(toi, 0.5) << i;
+    }
     collisions += toi < 1;
     for (int k = 0; k <= 200; ++k) {
       const double t = toi * k / 200;
       const Vec<Dim> q = p[0] + t * (p[1] - p[0]), c = a[0] + t * (a[1] - a[0]), d = b[0] + t * (b[1] - b[0]);
-      EXPECT_GE(std::sqrt(point_edge_distance_squared<Dim>(q, c, d)), 0.2 * start * (1 - 1e-9)) << i;
+      EXPECT_GE(std::sqrt(point_edge_distance_squared<Dim>(q, c, d)), least_share(toi) * start * (1 - 1e-9)) << i;
     }
   }
   EXPECT_GT(collisions, 50);
@@ -366,8 +377,62 @@ TEST(Ccd, IsNeverLateAndNeverZeroFor3DPairs) {
                                                        : edge_edge_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]);
       EXPECT_GT(toi, 0);
       collisions += toi < 1;
-      for (int k = 0; k <= 100; ++k) EXPECT_GE(now(toi * k / 100), 0.2 * now(0) * (1 - 1e-9)) << i;
+      for (int k = 0; k <= 100; ++k) EXPECT_GE(now(toi * k / 100), least_share(toi) * now(0) * (1 - 1e-9)) << i;
     }
+  EXPECT_GT(collisions, 100);
+}
+
+/// Pairs that meet at half of the way to the last bit, from starts as near as round-off: all numbers are small dyadic ones.
+TEST(Ccd, MissesNothingThatMeetsExactly) {
+  std::mt19937 random(6);
+  const auto grid_point = [&](double unit) -> Vec<3> {
+    std::uniform_int_distribution<int> number(-8, 8);
+    return unit * Vec<3>(number(random), number(random), number(random));
+  };
+  for (int i = 0; i < 4000; ++i) {
+    std::array<Vec<3>, 4> x, y;
+    for (int k = 0; k < 4; ++k) x[k] = grid_point(0.125), y[k] = grid_point(0.125);
+    const Vec<3> near = grid_point(std::ldexp(1, -(i % 40)));
+    const auto middle = [&](int k) -> Vec<3> { return (x[k] + y[k]) / 2; };
+    x[0] = (x[1] + x[2] + 2 * x[3]) / 4 + near;  // the point and the triangle
+    y[0] = (middle(1) + middle(2) + 2 * middle(3)) / 2 - x[0];
+    if (pair_distance_squared<3>(PairKind::face_vertex, x.data()) > 0) {
+      EXPECT_LE(point_triangle_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]), 0.5) << i;
+    }
+    x[1] = grid_point(0.125), y[1] = grid_point(0.125);  // the middles of two edges
+    x[0] = x[2] + x[3] - x[1] + near;
+    y[0] = 2 * (middle(2) + middle(3) - middle(1)) - x[0];
+    if (pair_distance_squared<3>(PairKind::edge_edge, x.data()) > 0) {
+      EXPECT_LE(edge_edge_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]), 0.5) << i;
+    }
+  }
+}
+
+/// What passes by is no collision, however near: only what comes within round-off may be called one.
+TEST(Ccd, LetsPassBy) {
+  std::mt19937 random(3);
+  int near = 0, collisions = 0;
+  for (int i = 0; i < 4000; ++i)
+    for (const PairKind kind : {PairKind::face_vertex, PairKind::edge_edge}) {
+      const auto x = random_pair<3>(random), y = random_pair<3>(random);
+      double nearest = std::numeric_limits<double>::infinity(), start = 0;
+      constexpr int kSamples = 300;
+      for (int k = 0; k <= kSamples; ++k) {
+        std::array<Vec<3>, 4> p;
+        for (int v = 0; v < 4; ++v) p[v] = x[v] + double(k) / kSamples * (y[v] - x[v]);
+        nearest = std::min(nearest, std::sqrt(pair_distance_squared<3>(kind, p.data())));
+        if (k == 0) start = nearest;
+      }
+      double fastest = 0;
+      for (int v = 0; v < 4; ++v) fastest = std::max(fastest, (y[v] - x[v]).norm());
+      const double toi = kind == PairKind::face_vertex ? point_triangle_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3])
+                                                       : edge_edge_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]);
+      collisions += toi < 1;
+      if (nearest <= fastest / kSamples) continue;  // between two samples it may have been anywhere
+      EXPECT_EQ(toi, 1) << i << ": passes at " << nearest / start;
+      near += nearest < 0.2 * start;
+    }
+  EXPECT_GT(near, 100);
   EXPECT_GT(collisions, 100);
 }
 

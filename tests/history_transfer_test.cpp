@@ -256,6 +256,33 @@ TEST(HistoryTransfer, BodyOnRollersSlides) {
   EXPECT_GT(slid, 1e-5);
 }
 
+/// A pin holds a vertex, not a facet: its past positions stay as prescribed too.
+TEST(HistoryTransfer, PinsHoldVertices) {
+  Scene scene(5);
+  scene.bend();
+  scene.setup.dirichlet = {{.tag = 7, .components = {true, true}, .displacement = {}},
+                           {.tag = 8, .components = {false, true}, .displacement = {}}};
+  const std::map<int, Vec<2>> places = {{7, {0.5, 0}}, {8, {0, 0.5}}};
+  for (int v = 0; v < scene.old_mesh.vertex_slots() / 2; ++v)
+    for (const auto& [tag, place] : places)
+      if ((scene.old_mesh.rest(v) - place).norm() < 1e-9) scene.old_mesh.set_vertex_tag(v, tag);
+  scene.coarsen(60, [](const EdgeKey&) { return true; });
+  const History interpolated = scene.history;
+  scene.transfer();
+  int pins = 0;
+  for (int v = 0; v < scene.mesh.vertex_slots(); ++v) {
+    const int tag = scene.mesh.vertex_tag(v);
+    if (tag == kNoTag) continue;
+    ++pins;
+    if (tag == 7) {
+      EXPECT_EQ(scene.history.x[0][2 * v], interpolated.x[0][2 * v]);
+    }
+    EXPECT_EQ(scene.history.x[0][2 * v + 1], interpolated.x[0][2 * v + 1]) << "pin " << tag;
+  }
+  EXPECT_EQ(pins, 2);
+  EXPECT_GT((scene.history.x[0] - interpolated.x[0]).norm(), 1e-3);
+}
+
 /// 1/2 ||xhat_old - xhat_new||^2, from the two meshes alone.
 TEST(HistoryTransfer, LossIsTheDistanceOfThePredictors) {
   Scene scene(4);

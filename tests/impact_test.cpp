@@ -125,10 +125,38 @@ TEST(Impact, KeepsTheMeshWhereARemeshedStateIsNotValid) {
     const auto result = simulation.advance();
     EXPECT_TRUE(result.ok) << result.reason;
     EXPECT_EQ(warnings.find("keeping the mesh as it was") == std::string::npos, valid) << warnings;
+    EXPECT_EQ(result.report.reverted_remeshes, valid ? 0 : 1);
     return result.report.splits.accepted;
   };
   EXPECT_GT(splits(true), 0);
   EXPECT_EQ(splits(false), 0);
+}
+
+/// Corrections of the convergent form have negative weights: its energy is no bound of what splits can gain from it.
+TEST(Impact, EnergyOfConvergentContactIsNoBound) {
+  const auto tried = [](bool convergent) {
+    auto setup = impact();
+    setup.contact.convergent = convergent;
+    setup.contact.friction_coefficient = 0;
+    if (!convergent) setup.contact.barrier_stiffness = 1e9;
+    setup.remesh.enabled = true;
+    setup.remesh.split.acceptance_tolerance = 1e9;  // nothing has so much energy
+    setup.remesh.collapse.enabled = false;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    int count = 0, in_contact = 0;
+    while (!simulation.finished()) {
+      const auto result = simulation.advance();
+      EXPECT_TRUE(result.ok) << result.reason;
+      if (!result.ok) break;
+      in_contact += result.report.energy.contact > 0;
+      count += result.report.splits.tried;
+    }
+    EXPECT_GT(in_contact, 0);
+    return count;
+  };
+  EXPECT_GT(tried(true), 0);
+  EXPECT_EQ(tried(false), 0);
 }
 
 /// The schedule goes on from mesh to mesh, and trials have its stiffness.

@@ -103,6 +103,14 @@ def test_one_message_for_a_solver_without_mpi(scratch):
         assert "does not use MPI" in done.stderr and "mumps" in done.stderr, done.stderr
 
 
+def test_a_mistake_that_one_rank_alone_sees_is_told(scratch):
+    # As a launcher that does not end the others starts it: the file is on no other machine.
+    environment = dict(ENVIRONMENT, OMPI_COMM_WORLD_RANK="1", OMPI_COMM_WORLD_SIZE="2")
+    done = subprocess.run([ITR, "run", str(scratch / "elsewhere.json")], env=environment, capture_output=True, text=True,
+                          timeout=PATIENCE)
+    assert done.returncode == 2 and "rank 1: " in done.stderr and "elsewhere.json" in done.stderr, done
+
+
 def test_all_end_when_rank_0_fails(scratch):
     done = itr_run(2, scratch / "fails", "--solver", "mumps", "--set", "/solver/nonlinear/max_iterations=1",
                    "--set", "/time/dt=5")

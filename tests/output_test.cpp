@@ -176,6 +176,7 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
                                                      "swaps",
                                                      "smooths",
                                                      "bound_by_dhat",
+                                                     "reverted_remeshes",
                                                      "min_distance",
                                                      "min_volume_ratio",
                                                      "history_loss",

@@ -8,6 +8,7 @@
 #include "remesh/local_problem.hpp"
 #include "remesh/patch.hpp"
 #include "remesh/prospect.hpp"
+#include "remesh_options.hpp"
 #include "tet_scene.hpp"
 
 namespace itr {
@@ -83,7 +84,7 @@ TEST(Prospect, NoSplitGainsMoreThanIsThere) {
 }
 
 TEST(Prospect, NothingIsAskedInFreeFlightUntilThereIsSomethingToGain) {
-  RemeshOptions options;
+  RemeshOptions options = remesh_options();
   options.enabled = true;
   options.collapse.enabled = false;
   const auto tried = [&](const TetScene& scene) {
@@ -105,6 +106,39 @@ TEST(Prospect, NothingIsAskedInFreeFlightUntilThereIsSomethingToGain) {
   TetScene pressed = noisy;
   pressed.context.coupling = std::numeric_limits<double>::infinity();  // as where a term's sign is not known
   EXPECT_GT(tried(pressed), 0);
+}
+
+/// Shapes do no harm in free flight: nothing is swapped or moved, and nothing is even set up for it.
+TEST(Prospect, NothingIsStirredInFreeFlight) {
+  RemeshOptions options = remesh_options();
+  options.split.enabled = options.collapse.enabled = false;
+  options.swap.enabled = options.smooth.enabled = true;
+  options.split.acceptance_tolerance = 1e-9;
+  for (const bool flies : {true, false}) {
+    TetScene scene = falling_cube(0, 0);
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> noise(-0.08, 0.08);
+    const auto place = [&](int i, int j, int k) {
+      const auto shift = [&](int at) { return at > 0 && at < 3 ? noise(random) : 0.0; };
+      return Vec<3>(i / 3.0 + shift(i), j / 3.0 + shift(j), k / 3.0 + shift(k));
+    };
+    scene.mesh = make_cubes(3, place, [](int, int, int) { return 1; });
+    const Mat<3> turn = Eigen::AngleAxisd(0.7, Vec<3>(1, 2, 3).normalized()).toRotationMatrix();
+    const Vec<3> fall = scene.context.scaling * scene.context.loads.acceleration(Vec<3>::Zero());
+    scene.fields.x = scene.fields.predictor = VectorX(3 * scene.mesh.vertex_slots());
+    for (int v = 0; v < scene.mesh.vertex_slots(); ++v) {
+      const Vec<3>& X = scene.mesh.rest(v);
+      scene.fields.predictor.segment<3>(3 * v) = turn * X - fall;
+      scene.fields.x.segment<3>(3 * v) = turn * (X + (flies ? 0.0 : 0.1) * Vec<3>(X[1] * X[1], 0, 0));
+    }
+    scene.fields.velocity_reference = scene.fields.x;
+    scene.fields.past_positions = {scene.fields.x};
+    RemeshMemory memory;
+    Strata<3> strata;
+    const RemeshReport report = remesh<3>(scene.mesh, scene.fields, scene.context, options, memory, strata);
+    EXPECT_EQ(report.swaps.tried + report.smooths.tried > 0, !flies);
+    EXPECT_EQ(strata.empty(), flies);
+  }
 }
 
 }  // namespace

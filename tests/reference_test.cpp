@@ -77,11 +77,12 @@ std::string options_of(const Scene& scene) {
                       n.extend_steps, static_cast<int>(n.indefinite));
   text += fmt::format("{} {} {} {} {} {}|{} {} {} {} {}|{} {} {} {} {} {}|{} {} {}|{} {} {}|{} {} {}|", r.enabled,
                       r.sizing_field.enabled, static_cast<int>(r.screening), static_cast<int>(r.history), r.sweeps,
-                      r.relative_tolerance, r.split.enabled, r.split.acceptance_tolerance, r.split.culling_threshold,
-                      r.split.max_depth, r.split.min_edge_length, r.collapse.enabled, r.collapse.acceptance_tolerance,
-                      r.collapse.culling_threshold, r.collapse.max_depth, r.collapse.rel_max_edge_length,
-                      r.collapse.abs_max_edge_length, r.swap.enabled, r.swap.acceptance_tolerance, r.swap.max_depth,
-                      r.smooth.enabled, r.smooth.acceptance_tolerance, r.smooth.max_iterations, r.local.rings,
+                      r.relative_tolerance, r.split.enabled, r.split.acceptance_tolerance.value_or(1e99),
+                      r.split.culling_threshold, r.split.max_depth, r.split.min_edge_length.value_or(1e99),
+                      r.collapse.enabled, r.collapse.acceptance_tolerance.value_or(1e99), r.collapse.culling_threshold,
+                      r.collapse.max_depth, r.collapse.rel_max_edge_length, r.collapse.abs_max_edge_length, r.swap.enabled,
+                      r.swap.acceptance_tolerance.value_or(1e99), r.swap.max_depth, r.smooth.enabled,
+                      r.smooth.acceptance_tolerance.value_or(1e99), r.smooth.max_iterations, r.local.rings,
                       r.local.relative_volume, r.local.max_iterations);
   text += fmt::format("{} {} {} {} {} {}|", s.lump_mass, s.mesh.num_vertices(), fmt::join(s.linear.solvers, ","),
                       s.linear.fallback.size(), s.linear.options.size(), s.damping.size());

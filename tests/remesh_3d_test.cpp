@@ -7,11 +7,13 @@
 #include <random>
 
 #include "itr/core/parallel.hpp"
+#include "itr/geometry/intersection.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "remesh/patch.hpp"
 #include "remesh/prediction.hpp"
 #include "remesh/trial.hpp"
+#include "remesh_options.hpp"
 #include "tet_scene.hpp"
 
 namespace itr {
@@ -204,7 +206,7 @@ TEST(Remesh3d, KeepsVolumesAndTheStateValidAndHasTheSameBitsForAnyNumberOfThread
       const ThreadLimit limit(threads);
       TetScene scene(seed, 4);
       EXPECT_EQ(find_inverted<3>(scene.mesh, scene.fields.x), kNone);
-      RemeshOptions options;
+      RemeshOptions options = remesh_options();
       options.split.acceptance_tolerance = 2e-3;
       options.split.max_depth = 1;
       options.collapse.acceptance_tolerance = -1e-3;
@@ -265,6 +267,55 @@ TEST(Gate3d, LetsCollapsesOnFlatSurfacesPass) {
   EXPECT_EQ(passed, asked);
 }
 
+/// Quads that are flat at rest are not flat when deformed: the other diagonal takes in what is between the two.
+TEST(Gate3d, LetsNoSwapTakeAnObstacleIn) {
+  const Mesh<3> mesh = make_cubes(
+      4, [](int i, int j, int k) { return Vec<3>(Vec<3>(i, j, k) / 4); }, [](int, int, int) { return 1; });
+  const Strata<3> strata(mesh);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> noise(-0.02, 0.02);
+  RemeshFields<3> fields;
+  fields.x.resize(3 * mesh.vertex_slots());
+  for (int v = 0; v < mesh.vertex_slots(); ++v)
+    fields.x.segment<3>(3 * v) = mesh.rest(v) + Vec<3>(noise(random), noise(random), noise(random));
+  fields.past_positions = {fields.x};
+  const auto at = [&](VertexId v) -> Vec<3> { return fields.x.segment<3>(3 * v); };
+  const auto lies_in_a_body = [&](const Vec<3>& p) {
+    for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+      const auto& cell = mesh.cell(c);
+      if (Simplex<3>({at(cell[0]), at(cell[1]), at(cell[2]), at(cell[3])}).barycentric(p).minCoeff() >= 0) return true;
+    }
+    return false;
+  };
+  StepContext<3> context;
+  context.contact = {.enabled = true, .activation_distance = 0.01};
+  GateScratch<3> scratch;
+  int asked = 0, inward = 0;
+  for (const EdgeKey& edge : mesh.edges()) {
+    const auto proposal = propose_edge_removal(mesh, strata, edge, shape_cost(mesh));
+    if (!proposal || proposal.edit->inserted_facets.empty()) continue;
+    const auto passes = [&](const std::vector<Vec<3>>& nails) {
+      context.obstacles.rest = context.obstacles.x = nails;
+      context.obstacles.past_x = {nails};
+      const Gate<3> gate(mesh, fields, context);
+      return gate.passes(*proposal.edit, scratch);
+    };
+    if (!passes({})) continue;
+    Vec<3> middle = Vec<3>::Zero();
+    for (const auto& facet : proposal.edit->inserted_facets)
+      for (const VertexId v : facet.vertices) middle += at(v) / (v == edge[0] || v == edge[1] ? 4 : 8);
+    if (lies_in_a_body(middle)) {
+      ++inward;
+      continue;
+    }
+    ++asked;
+    EXPECT_FALSE(passes({middle})) << "edge " << edge[0] << " " << edge[1];
+    EXPECT_FALSE(passes({Vec<3>(-9, -9, -9), middle})) << "edge " << edge[0] << " " << edge[1];
+  }
+  EXPECT_GT(asked, 5);
+  EXPECT_GT(inward, 5);
+}
+
 TEST(Prediction3d, OfASplitAloneIsThatOfItsEdit) {
   for (unsigned seed = 0; seed < 5; ++seed) {
     const TetScene scene(seed);
@@ -296,7 +347,7 @@ struct Swapped {
     context.has_inertia = false;
     context.held_components[9] = {true, true, true};
     context.newton.step_tolerance = 1e-9;
-    RemeshOptions options;
+    RemeshOptions options = remesh_options();
     options.split.enabled = options.collapse.enabled = false;
     options.split.acceptance_tolerance = 1e-3;
     options.swap.enabled = true;

@@ -9,6 +9,7 @@
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
 #include "remesh/patch.hpp"
+#include "remesh_options.hpp"
 
 namespace itr {
 namespace {
@@ -78,7 +79,7 @@ TEST(Bounds, OfOneVertexNeverExceedWhatAPatchGains) {
 
 TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
   TrialScene scene(3);
-  RemeshOptions options;
+  RemeshOptions options = remesh_options();
   options.split.acceptance_tolerance = 1e-3;
   options.collapse.rel_max_edge_length = 100;
   options.swap.enabled = options.smooth.enabled = true;

@@ -14,6 +14,7 @@
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
 #include "remesh/patch.hpp"
+#include "remesh_options.hpp"
 
 namespace itr {
 namespace {
@@ -211,7 +212,7 @@ RC_GTEST_PROP(TransferProperties, EveryEditKeepsTheIntegralsOfPositionAndVelocit
 }
 
 RemeshOptions only(Kind kind, double tolerance, HistoryRule history) {
-  RemeshOptions options;
+  RemeshOptions options = remesh_options();
   options.screening = Screening::none;
   options.history = history;
   options.split.enabled = kind == Kind::split;
@@ -290,7 +291,7 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
   Mesh<2> mesh;
   RemeshFields<2> fields;
   OperationCount count;
-  RemeshOptions options;
+  RemeshOptions options = remesh_options();
   const double energy = global_energy(scene.mesh, scene.fields, scene.context);
   RC_PRE(std::isfinite(energy));
   double low = -energy / scene.context.scaling, high = -low;
@@ -323,9 +324,9 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
   const int iterations = contact ? local.max_contact_iterations : local.max_iterations;
   const double energy_after = after->relax(iterations).energy;
   const double relaxed_before = before->has_unknowns() ? before->relax(iterations).energy : energy_before;
-  const double tolerance = kind == Kind::split      ? options.split.acceptance_tolerance
-                           : kind == Kind::collapse ? options.collapse.acceptance_tolerance
-                                                    : options.swap.acceptance_tolerance;
+  const double tolerance = kind == Kind::split      ? *options.split.acceptance_tolerance
+                           : kind == Kind::collapse ? *options.collapse.acceptance_tolerance
+                                                    : *options.swap.acceptance_tolerance;
   const double required = scene.context.scaling * tolerance;
   RC_ASSERT(energy_before - energy_after >= required);
   RC_ASSERT(relaxed_before - energy_after >= required);
@@ -352,7 +353,7 @@ RC_GTEST_PROP(TrialProperties, RemeshingHasTheSameBitsForAnyNumberOfThreads, ())
   const auto run = [&](int threads) {
     const ThreadLimit limit(threads);
     TrialScene scene(seed, 12, terms);  // 288 cells: more than one block of a parallel loop
-    RemeshOptions options;
+    RemeshOptions options = remesh_options();
     options.split.culling_threshold = 0.9;
     options.split.acceptance_tolerance = 1e-3;
     options.collapse.rel_max_edge_length = 100;

@@ -7,6 +7,7 @@
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_terms.hpp"
+#include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"
 
 namespace itr {
@@ -16,7 +17,7 @@ using Kind = Edit<2>::Kind;
 
 /// Operations of one kind, with patches relaxed to convergence before the decision.
 RemeshOptions only(Kind kind, HistoryRule history, Screening screening) {
-  RemeshOptions options;
+  RemeshOptions options = remesh_options();
   options.screening = screening;
   options.history = history;
   options.split.enabled = kind == Kind::split;

@@ -11,6 +11,7 @@
 #include "random_mesh.hpp"
 #include "remesh/patch.hpp"
 #include "remesh/prediction.hpp"
+#include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"
 
 namespace itr {
@@ -278,7 +279,7 @@ TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
   for (unsigned seed = 0; seed < 5; ++seed)
     for (const auto screening : {Screening::energy_percentile, Screening::bounds, Screening::none}) {
       TrialScene scene(seed);
-      RemeshOptions options;
+      RemeshOptions options = remesh_options();
       options.collapse.enabled = false;
       options.screening = screening;
       RemeshMemory memory;
@@ -295,7 +296,7 @@ TEST(Remesh, AsksAgainWhatWasRefusedWhereNoPredictionTells) {
   for (const bool pressure : {false, true}) {
     TrialScene scene(1, 6, {.pressure = pressure, .damping = !pressure});
     scene.context.contact.enabled = false;
-    RemeshOptions options;
+    RemeshOptions options = remesh_options();
     options.collapse.enabled = false;
     options.split.acceptance_tolerance = 1e6;  // none gains that
     RemeshMemory memory;
@@ -308,10 +309,46 @@ TEST(Remesh, AsksAgainWhatWasRefusedWhereNoPredictionTells) {
   }
 }
 
+/// Bad shapes do harm where the deformation varies, not where it does not.
+TEST(Remesh, BettersShapesWhereTheyDoHarm) {
+  std::mt19937 random(3);
+  Mesh<2> mesh = random_mesh(16, random);
+  StepContext<2> context;
+  for (const int body : {1, 2}) context.materials[body] = {.youngs_modulus = 1000, .poisson_ratio = 0.3, .density = 1};
+  context.has_inertia = false;
+  context.newton.step_tolerance = 1e-9;
+  context.obstacles.past_x.resize(1);
+  RemeshFields<2> fields;
+  fields.x.resize(2 * mesh.vertex_slots());
+  for (int v = 0; v < mesh.vertex_slots(); ++v) {
+    const Vec<2>& X = mesh.rest(v);
+    fields.x.segment<2>(2 * v) = X + (X[0] < 0.4 ? Vec<2>(0, std::pow(0.4 - X[0], 2)) : Vec<2>(0, 0));
+  }
+  fields.past_positions = {fields.x};
+  RemeshOptions options = remesh_options();
+  options.split.enabled = options.collapse.enabled = false;
+  options.split.acceptance_tolerance = 1e-3;
+  options.swap.enabled = options.smooth.enabled = true;
+  const Mesh<2> before = mesh;
+  RemeshMemory memory;
+  Strata<2> strata;
+  remesh(mesh, fields, context, options, memory, strata);
+  int near = 0;
+  for (CellId c = 0; c < before.cell_slots(); ++c) {
+    const double x = before.rest(before.cell(c)[0])[0];
+    const bool is_kept = mesh.is_cell_alive(c);
+    if (x > 0.7) {
+      EXPECT_TRUE(is_kept) << "cell " << c;
+    }
+    near += x < 0.3 && !is_kept;
+  }
+  EXPECT_GT(near, 10);
+}
+
 TEST(Remesh, EveryRunIsDeterministicAndKeepsTheMeshValid) {
   const auto run = [](unsigned seed) {
     TrialScene scene(seed);
-    RemeshOptions options;
+    RemeshOptions options = remesh_options();
     options.split.acceptance_tolerance = 1e-3;
     options.split.culling_threshold = 0.5;
     options.collapse.rel_max_edge_length = 100;

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <limits>
+#include <optional>
 
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
@@ -61,8 +62,13 @@ const std::vector<Mistake> kMistakes = {
      },
      "dirichlet[0]", "no function", "time"},
     {"no iterations", [](auto& s) { s.newton.max_iterations = 0; }, "/solver/nonlinear/max_iterations", "0", ">= 1"},
+    {"split tolerance of 0", [](auto& s) { s.remesh.enabled = true, s.remesh.split.acceptance_tolerance = 0; },
+     "/space/remesh/split/acceptance_tolerance", "0", "> 0"},
+    {"nan for the swaps' tolerance",
+     [](auto& s) { s.remesh.enabled = true, s.remesh.swap.acceptance_tolerance = std::nan(""); },
+     "/space/remesh/swap/acceptance_tolerance", "nan", "a number"},
     {"negative split tolerance", [](auto& s) { s.remesh.enabled = true, s.remesh.split.acceptance_tolerance = -1; },
-     "/space/remesh/split/acceptance_tolerance", "-1", ">= 0"},
+     "/space/remesh/split/acceptance_tolerance", "-1", "> 0"},
     {"damping", [](auto& s) { s.damping.push_back({.coefficient = -1}); }, "damping[0].coefficient", "-1", ">= 0"},
 };
 
@@ -107,8 +113,8 @@ TEST(SetupDefaults, StiffnessIsAdaptiveAndWithRemeshingFromTheModulus) {
   EXPECT_FALSE(chosen.contact.adaptive_stiffness);
   EXPECT_DOUBLE_EQ(chosen.contact.barrier_stiffness, 1e3);
   // 1 % of E V, times 1e-4: nothing else is known of this scene, as it has neither gravity nor velocity.
-  EXPECT_DOUBLE_EQ(chosen.remesh.split.acceptance_tolerance, 1e-6 * 1e4 * 0.04);
-  EXPECT_DOUBLE_EQ(chosen.remesh.collapse.acceptance_tolerance, -0.01 * chosen.remesh.split.acceptance_tolerance);
+  EXPECT_DOUBLE_EQ(*chosen.remesh.split.acceptance_tolerance, 1e-6 * 1e4 * 0.04);
+  EXPECT_DOUBLE_EQ(*chosen.remesh.collapse.acceptance_tolerance, -0.01 * *chosen.remesh.split.acceptance_tolerance);
   ASSERT_EQ(said.size(), 2u);
   EXPECT_NE(said[0].find("barrier stiffness 1e+03"), std::string::npos) << said[0];
   EXPECT_NE(said[1].find("split tolerance 0.0004 J"), std::string::npos) << said[1];
@@ -124,10 +130,50 @@ TEST(SetupDefaults, ToleranceIsOfTheEnergyThatTheSceneHas) {
   setup.remesh.enabled = true;
   setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(0, -0.01); }});
   const double kinetic = 0.5 * 1000 * 0.04 * 1e-4;
-  EXPECT_NEAR(Simulation<2>(setup, registry).setup().remesh.split.acceptance_tolerance, 1e-4 * kinetic, 1e-15);
+  EXPECT_NEAR(*Simulation<2>(setup, registry).setup().remesh.split.acceptance_tolerance, 1e-4 * kinetic, 1e-15);
   setup.remesh.split.acceptance_tolerance = 0.5;
-  EXPECT_EQ(Simulation<2>(setup, registry).setup().remesh.split.acceptance_tolerance, 0.5);
-  EXPECT_EQ(Simulation<2>(setup, registry).setup().remesh.collapse.acceptance_tolerance, -1e-8);
+  EXPECT_EQ(*Simulation<2>(setup, registry).setup().remesh.split.acceptance_tolerance, 0.5);
+}
+
+/// One rule for what is left open, whoever chose the split tolerance; what is given stays, whatever it is.
+TEST(SetupDefaults, TolerancesLeftOpenFollowTheSplits) {
+  linear::Registry registry;
+  itr::Setup<2> setup = good_setup();
+  setup.remesh.enabled = true;
+  for (const std::optional<double> split : {std::optional<double>(), std::optional(0.5), std::optional(1e-9)}) {
+    setup.remesh.split.acceptance_tolerance = split;
+    const RemeshOptions chosen = Simulation<2>(setup, registry).setup().remesh;
+    const double delta = chosen.split.acceptance_tolerance.value();
+    EXPECT_EQ(delta, split.value_or(delta));
+    EXPECT_DOUBLE_EQ(chosen.collapse.acceptance_tolerance.value(), -0.01 * delta);
+    EXPECT_DOUBLE_EQ(chosen.swap.acceptance_tolerance.value(), -1e-6 * delta);
+    EXPECT_DOUBLE_EQ(chosen.smooth.acceptance_tolerance.value(), -1e-6 * delta);
+    EXPECT_DOUBLE_EQ(chosen.split.min_edge_length.value(), 1e-6 * std::sqrt(0.08));
+  }
+  setup.remesh.split.acceptance_tolerance = std::nullopt;
+  setup.remesh.collapse.acceptance_tolerance = setup.remesh.swap.acceptance_tolerance = -1e-8;
+  setup.remesh.smooth.acceptance_tolerance = 0;
+  setup.remesh.split.min_edge_length = 0;
+  const RemeshOptions chosen = Simulation<2>(setup, registry).setup().remesh;
+  EXPECT_EQ(*chosen.collapse.acceptance_tolerance, -1e-8);
+  EXPECT_EQ(*chosen.swap.acceptance_tolerance, -1e-8);
+  EXPECT_EQ(*chosen.smooth.acceptance_tolerance, 0);
+  EXPECT_EQ(*chosen.split.min_edge_length, 0);
+}
+
+/// What is chosen is checked as what is given: here a tolerance that underflows.
+TEST(SetupDefaults, AreValidated) {
+  linear::Registry registry;
+  itr::Setup<2> setup = good_setup();
+  setup.remesh.enabled = true;
+  setup.remesh.relative_tolerance = 1e-323;
+  setup.materials.at(1).youngs_modulus = 1e-10;
+  try {
+    const Simulation<2> simulation(setup, registry);
+    FAIL() << "began with a tolerance of 0 J";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.parts().place, "/space/remesh/split/acceptance_tolerance");
+  }
 }
 
 /// With chosen defaults alone, a drop with remeshing goes to its end and splits.

@@ -8,6 +8,7 @@
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_cube.hpp"
+#include "remesh_options.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {
@@ -32,7 +33,7 @@ struct SizedBody {
   Mesh<Dim> mesh = make_mesh<Dim>();
   RemeshFields<Dim> fields;
   StepContext<Dim> context;
-  RemeshOptions options;
+  RemeshOptions options = remesh_options();
   RemeshReport report;
 
   explicit SizedBody(const Mat<Dim>& motion) {

@@ -188,11 +188,10 @@ int main(int argc, char** argv) {
   try {
     return dispatch(argc, argv);
   } catch (const itr::InputError& error) {
-    // A launcher ends all ranks when one has failed: the others wait until rank 0 has said why.
-    if (speaks)
-      fmt::print(stderr, "itr: {}\n", error.what());
-    else
-      std::this_thread::sleep_for(std::chrono::seconds(5));
+    // A launcher ends all ranks when one has failed: the others wait until rank 0 has said why. Who is still there then has
+    // seen what rank 0 has not: a file that is not on this machine.
+    if (!speaks) std::this_thread::sleep_for(std::chrono::seconds(5));
+    fmt::print(stderr, "itr: {}{}\n", speaks ? "" : fmt::format("rank {}: ", itr::cli::this_launch().rank), error.what());
     return itr::cli::bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "itr: internal error: {}\n", error.what());

@@ -155,6 +155,9 @@ class Run {
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     if (outcome == kFinished) {
       fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
+      if (const int reverted = writer_->totals().reverted_remeshes; reverted > 0)
+        spdlog::warn("{} times all of a step's remeshing was dropped, as the state on the new mesh failed: see the warnings",
+                     reverted);
       return done;
     }
     fmt::print(stderr, "itr: {}; {}\n", outcome, advice);

@@ -23,7 +23,10 @@ template <int Dim>
 class Collapser {
  public:
   Collapser(RemeshSession<Dim>& session, const EdgeRanks& ranks)
-      : session_(session), options_(session.options().collapse), ranks_(ranks) {}
+      : session_(session),
+        options_(session.options().collapse),
+        tolerance_(options_.acceptance_tolerance.value()),
+        ranks_(ranks) {}
 
   /// Shortest first.
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
@@ -40,12 +43,11 @@ class Collapser {
     trial.is_asked = true;
     trial.edit = collapse_of(session_, edge);
     if (!trial.edit) return;
-    if (!trial.in_contact &&
-        session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), options_.acceptance_tolerance)) {
+    if (!trial.in_contact && session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), tolerance_)) {
       trial.verdict.decision = Decision::by_bound;
       return;
     }
-    session_.judge(trial, trial.edit->value->rest, options_.acceptance_tolerance, session_.options().local, scratch);
+    session_.judge(trial, trial.edit->value->rest, tolerance_, session_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
@@ -77,6 +79,7 @@ class Collapser {
 
   RemeshSession<Dim>& session_;
   const CollapseOptions& options_;
+  double tolerance_;  ///< [J]
   const EdgeRanks& ranks_;
 };
 

@@ -87,6 +87,18 @@ bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex
   return !(positive && negative);
 }
 
+/// What lies between the surface before and after a swap: a quad that is flat at rest is not flat when deformed, and its two
+/// diagonals are edges of a tetrahedron. (Facets of the plane do not swap.)
+std::array<Vec<3>, 4> between_diagonals(const Mesh<3>& mesh, const SurfaceIndex<3>& surface, const Edit<3>& edit) {
+  std::array<Vec<3>, 4> corners;
+  const auto& facet = mesh.facet(edit.removed_facets[0]);
+  for (int k = 0; k < 3; ++k) corners[k] = surface.at(facet[k]);
+  for (const VertexId v : mesh.facet(edit.removed_facets[1]))
+    if (std::find(facet.begin(), facet.end(), v) == facet.end()) corners[3] = surface.at(v);
+  return corners;
+}
+std::array<Vec<2>, 3> between_diagonals(const Mesh<2>&, const SurfaceIndex<2>&, const Edit<2>&) { return {}; }
+
 }  // namespace
 
 template <int Dim>
@@ -139,6 +151,7 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
 
   // What moves on the way to the new surface: the vertex that is set and the one that goes, both to the target.
   scratch.swept.clear();
+  if (edit.kind == Edit<Dim>::Kind::swap) scratch.swept.push_back(between_diagonals(mesh_, surface, edit));
   for (const FacetId f : edit.removed_facets) {
     std::array<Vec<Dim>, Dim + 1> simplex;
     int moving = 0;

@@ -32,7 +32,7 @@ class Gate {
   Gate(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context);
 
   /// Cells that the edit inserts keep their orientation; facets that it inserts touch no other ones (they may share
-  /// vertices), and on the way there sweep over no vertex of the surface and no obstacle point. Decided exactly.
+  /// vertices), and on the way there sweep over no vertex of the surface and no obstacle point; swaps too. Decided exactly.
   bool passes(const Edit<Dim>& edit, GateScratch<Dim>& scratch) const;
 
   const SurfaceIndex<Dim>& present() const { return configurations_.front().surface; }

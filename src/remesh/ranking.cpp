@@ -17,7 +17,7 @@ class Thresholds {
     std::sort(energies.begin(), energies.end());
     const double low = energies.front(), range = energies.back() - low, s = options.split.culling_threshold;
     const auto index = std::min(energies.size() - 1, static_cast<std::size_t>(s * static_cast<double>(energies.size())));
-    top_ = std::max(std::min(low + range * s, energies[index]), std::min(1e-12, options.split.acceptance_tolerance));
+    top_ = std::max(std::min(low + range * s, energies[index]), std::min(1e-12, options.split.acceptance_tolerance.value()));
     bottom_ = low + range * options.collapse.culling_threshold;
   }
   Rank operator()(double energy) const {

@@ -10,25 +10,32 @@ namespace itr {
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
-  const bool may_split = options.split.enabled &&
-                         available_energy(mesh, fields, context) >= context.scaling * options.split.acceptance_tolerance;
+  const bool by_size = options.sizing_field.enabled, may_stir = options.swap.enabled || options.smooth.enabled;
+  const bool asks_what_is_available = (options.split.enabled && !by_size) || may_stir;
+  const double available = asks_what_is_available ? available_energy(mesh, fields, context) : 0;
+  const bool may_split =
+      options.split.enabled && !by_size && available >= context.scaling * options.split.acceptance_tolerance.value();
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
-  if (!may_split && !may_collapse && !options.swap.enabled && !options.smooth.enabled && !options.sizing_field.enabled)
-    return {};
+  // Where less is there than what a swap or a move has to gain, shapes do not matter either: a body in flight.
+  const bool has_to_stir = may_stir && available >= context.scaling * least_worthwhile(options);
+  if (!may_split && !may_collapse && !has_to_stir && !by_size) return {};
   RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();
   for (int sweep = 0; sweep < options.sweeps; ++sweep) {
     const int before = report.accepted();
     EdgeRanks ranks;
     if (options.screening == Screening::energy_percentile) ranks = rank_edges(mesh, fields, context, options);
-    if (options.sizing_field.enabled) {
+    if (by_size) {
       follow_sizing_field(session);
     } else {
       if (may_split) split_edges(session, ranks);
       if (options.collapse.enabled) collapse_edges(session, ranks);
     }
-    if (options.swap.enabled) swap_edges(session);
-    if (options.smooth.enabled) smooth_vertices(session);
+    if (may_stir && (has_to_stir || report.accepted() > 0)) {
+      session.mark_gains();
+      if (options.swap.enabled) swap_edges(session);
+      if (options.smooth.enabled) smooth_vertices(session);
+    }
     if (report.accepted() == before) break;
   }
   fields.trim(mesh.vertex_slots());

@@ -8,6 +8,7 @@
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/validate.hpp"
+#include "itr/remesh/edits.hpp"
 #include "prospect.hpp"
 
 namespace itr {
@@ -39,7 +40,7 @@ bool RemeshSession<Dim>::is_surface(const EdgeKey& e) const {
 
 template <int Dim>
 bool RemeshSession<Dim>::may_be_split(const EdgeKey& e, bool& is_bound_by_dhat) const {
-  if (!exists(e) || rest_length(e) < options_.split.min_edge_length) return false;
+  if (!exists(e) || rest_length(e) < options_.split.min_edge_length.value()) return false;
   if (!has_contact() || !is_surface(e)) return true;
   const double dhat = context_.contact.activation_distance;
   is_bound_by_dhat = rest_length(e) < 2 * dhat || length(e) < 2 * dhat;
@@ -153,6 +154,25 @@ double RemeshSession<Dim>::roughness(const EdgeKey& edge) const {
     result += variation(fields_.predictor, mass);
   }
   return result;
+}
+
+template <int Dim>
+void RemeshSession<Dim>::mark_gains() {
+  gained_.clear(mesh_.vertex_slots());
+  for (VertexId v = 0; v < mesh_.vertex_slots(); ++v)
+    if (changed_at_[v] > 0) gained_.mark(v);
+}
+
+template <int Dim>
+bool RemeshSession<Dim>::shape_matters(const EdgeKey& e, double roughness) const {
+  if (!screens() || roughness >= context_.scaling * least_worthwhile()) return true;
+  if (gained_[e[0]] || (e[1] != kNone && gained_[e[1]])) return true;
+  const auto around = mesh_.cells_of(e[0]);
+  return std::any_of(around.begin(), around.end(), [&](CellId c) {
+    const auto& cell = mesh_.cell(c);
+    return (e[1] == kNone || std::find(cell.begin(), cell.end(), e[1]) != cell.end()) &&
+           mesh_.quality(c) < QualityRule{}.floor;
+  });
 }
 
 template <int Dim>

@@ -20,6 +20,13 @@
 
 namespace itr {
 
+/// Whether predictions may leave out trials.
+inline bool screens(const RemeshOptions& options) { return options.screening != Screening::none; }
+/// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
+inline double least_worthwhile(const RemeshOptions& options) {
+  return screens(options) ? 0.05 * options.split.acceptance_tolerance.value() : 0;
+}
+
 /// What was found about a candidate on the mesh as it was when its wave began.
 template <int Dim>
 struct Trial {
@@ -97,9 +104,14 @@ class RemeshSession {
   RemeshMemory memory() const { return refusals_.remembered(mesh_); }
 
   /// Whether predictions may leave out trials.
-  bool screens() const { return options_.screening != Screening::none; }
-  /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
-  double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance : 0; }
+  bool screens() const { return itr::screens(options_); }
+  double least_worthwhile() const { return itr::least_worthwhile(options_); }
+  /// What was done before is where something was gained: cells there may be badly shaped.
+  void mark_gains();
+  /// Whether cells at an edge (a vertex {v, kNone}) that are badly shaped do harm: where the fields vary by what is worth
+  /// something, where something was gained nearby, and where a shape is so bad that rules only let it become better.
+  /// Elsewhere swaps and moves that better shapes would be work for nothing.
+  bool shape_matters(const EdgeKey& e, double roughness) const;
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
   double predict_split(const EdgeKey& edge) const { return itr::predict_split<Dim>(state(), edge); }
@@ -186,6 +198,7 @@ class RemeshSession {
   RemeshReport report_;
   std::vector<double> trial_seconds_;
   unsigned commits_ = 0, commits_before_wave_ = 0;
+  Marks gained_;                           ///< vertices of cells that splits and collapses changed
   std::vector<unsigned> changed_at_;       ///< by vertex: the last commit that changed a cell around it or a vertex of one
   Marks written_;                          ///< vertices that commits of the wave moved or gave other cells
   std::vector<Box<Dim>> surface_written_;  ///< by the same, in the present configuration

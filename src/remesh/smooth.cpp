@@ -85,7 +85,10 @@ template <int Dim>
 class Mover {
  public:
   explicit Mover(RemeshSession<Dim>& session)
-      : session_(session), mesh_(session.mesh()), options_(session.options().smooth), one_ring_(session.options().local) {
+      : session_(session),
+        mesh_(session.mesh()),
+        tolerance_(session.options().smooth.acceptance_tolerance.value()),
+        one_ring_(session.options().local) {
     one_ring_.rings = 1;
     one_ring_.relative_volume = 0;
   }
@@ -106,7 +109,7 @@ class Mover {
 
   RemeshSession<Dim>& session_;
   const Mesh<Dim>& mesh_;
-  const SmoothOptions& options_;
+  double tolerance_;  ///< [J]
   LocalRelaxationOptions one_ring_;
 };
 
@@ -116,7 +119,7 @@ class ForceFollower : Mover<Dim> {
  public:
   explicit ForceFollower(RemeshSession<Dim>& session)
       : Mover<Dim>(session),
-        worthwhile_(std::max(this->options_.acceptance_tolerance, session.least_worthwhile())),
+        worthwhile_(std::max(this->tolerance_, session.least_worthwhile())),
         least_promise_(session.screens() ? session.context().scaling * worthwhile_ : 0) {}
 
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
@@ -154,6 +157,7 @@ class ShapeBetterer : Mover<Dim> {
 
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
     if (!this->may_move(vertex[0]) || worst_shape(this->mesh_, vertex[0]) < kBadShape) return std::nullopt;
+    if (!this->session_.shape_matters(vertex, this->session_.roughness(vertex))) return std::nullopt;
     return EdgeQueue::Entry{.edge = vertex, .priority = -static_cast<double>(vertex[0])};
   }
 
@@ -165,7 +169,7 @@ class ShapeBetterer : Mover<Dim> {
     trial.is_asked = true;
     const Vec<Dim> target = best_shape(this->session_, v);
     if ((target - this->mesh_.rest(v)).norm() > kLeastMove * shortest_edge(this->mesh_, v))
-      this->judge(trial, target, this->options_.acceptance_tolerance, scratch);
+      this->judge(trial, target, this->tolerance_, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>&) { Mover<Dim>::settle(trial, RemeshMemory::reshape, kSameShape); }

@@ -15,7 +15,7 @@ class Splitter {
   Splitter(RemeshSession<Dim>& session, EdgeRanks& ranks)
       : session_(session),
         options_(session.options().split),
-        tolerance_(session.context().scaling * options_.acceptance_tolerance),
+        tolerance_(options_.acceptance_tolerance.value()),
         ranks_(ranks) {}
 
   // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the same
@@ -42,7 +42,7 @@ class Splitter {
     trial.signal = is_known ? trial.candidate.priority : session_.predict_split(edge);
     trial.edit = make_split(session_.mesh(), edge);
     if (!trial.in_contact && is_hopeless(trial.edit->removed_cells, trial.signal)) return;  // there trials tell
-    session_.judge(trial, trial.edit->value->rest, options_.acceptance_tolerance, session_.options().local, scratch);
+    session_.judge(trial, trial.edit->value->rest, tolerance_, session_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
@@ -67,7 +67,7 @@ class Splitter {
  private:
   bool is_culled() const { return session_.options().screening == Screening::energy_percentile; }
   bool is_hopeless(std::span<const CellId> cells, double gain) const {
-    return session_.is_hopeless(cells, gain, options_.acceptance_tolerance);
+    return session_.is_hopeless(cells, gain, tolerance_);
   }
 
   Rank inherited(const EdgeKey& edge) const {
@@ -82,7 +82,8 @@ class Splitter {
     if (!trial.in_contact) {
       constexpr double kMargin = 1.3;
       refusal.least_signal = 0;
-      if (gain > 0) refusal.most_signal = signal * std::max(kSameSignal, tolerance_ / (kMargin * gain));
+      if (gain > 0)
+        refusal.most_signal = signal * std::max(kSameSignal, session_.context().scaling * tolerance_ / (kMargin * gain));
     }
     session_.remember(RemeshMemory::split, trial.edge(), refusal);
   }
@@ -101,7 +102,7 @@ class Splitter {
 
   RemeshSession<Dim>& session_;
   const SplitOptions& options_;
-  double tolerance_;
+  double tolerance_;  ///< [J]
   EdgeRanks& ranks_;
 };
 

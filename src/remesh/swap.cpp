@@ -41,7 +41,7 @@ double shape_gain(const Mesh<3>& mesh, const Edit<3>& edit) {
 /// What a swap has to gain that is not for the sake of the shape [J].
 template <int Dim>
 double least_gain(const RemeshSession<Dim>& session) {
-  return std::max(session.least_worthwhile(), session.options().swap.acceptance_tolerance);
+  return std::max(session.least_worthwhile(), session.options().swap.acceptance_tolerance.value());
 }
 
 /// Whether the bulk terms say that an edit gains that [J].
@@ -99,7 +99,8 @@ class Swapper {
     if (session_.was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
     trial.edit = policy_.edit(edge);
     if (!trial.edit) return;
-    const double least = policy_.betters_shape(edge, *trial.edit) ? options_.acceptance_tolerance : least_gain(session_);
+    const bool for_shape = policy_.betters_shape(edge, *trial.edit) && session_.shape_matters(edge, trial.signal);
+    const double least = for_shape ? *options_.acceptance_tolerance : least_gain(session_);
     trial.is_asked = true;
     trial.verdict.decision = Decision::by_bound;
     if (!trial.in_contact && !is_promising(session_, *trial.edit, least)) return;  // there trials tell

@@ -65,9 +65,9 @@ void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>
   warnings.push_back(end.str());
 }
 
-void read_acceptance(const Node& node, bool& enabled, double& tolerance) {
+void read_acceptance(const Node& node, bool& enabled, std::optional<double>& tolerance) {
   enabled = node["enabled"].boolean(enabled);
-  tolerance = node["acceptance_tolerance"].number(tolerance);
+  if (node.has("acceptance_tolerance")) tolerance = node["acceptance_tolerance"].number(0);
 }
 
 double read_share(const Node& node, double fallback) {
@@ -266,8 +266,6 @@ RemeshOptions read_remesh(const Node& root) {
   options.split.max_depth = split["max_depth"].integer_at_least(0, options.split.max_depth);
   if (split.has("min_edge_length")) options.split.min_edge_length = split["min_edge_length"].non_negative(0);
 
-  if (split.has("acceptance_tolerance"))
-    options.collapse.acceptance_tolerance = kCollapseShare * options.split.acceptance_tolerance;
   read_acceptance(collapse, options.collapse.enabled, options.collapse.acceptance_tolerance);
   options.collapse.culling_threshold = read_share(collapse["culling_threshold"], options.collapse.culling_threshold);
   options.collapse.max_depth = collapse["max_depth"].integer_at_least(0, options.collapse.max_depth);

@@ -15,7 +15,11 @@ namespace {
 
 constexpr double kSoftness = 0.1;         ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
 constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest
-constexpr double kUsualStrain2 = 0.01;    ///< square of the strain at which bodies are expected to store energy
+/// What operations may cost, in split tolerances. Collapses: with less, what contact has left behind stays fine.
+constexpr double kCollapseShare = 0.01;
+/// Swaps and moves for the sake of the shape: hardly more than round-off, as they gain nothing else.
+constexpr double kShapeShare = 1e-6;
+constexpr double kUsualStrain2 = 0.01;  ///< square of the strain at which bodies are expected to store energy
 
 template <int Dim>
 double facet_measure(const Mesh<Dim>& mesh, FacetId f) {
@@ -88,20 +92,32 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
       contact.barrier_stiffness, stiffest);
 }
 
+/// Chooses the split tolerance [J], and says so.
 template <int Dim>
-std::string choose_tolerances(const Setup<Dim>& setup, RemeshOptions& remesh) {
+std::string choose_split_tolerance(const Setup<Dim>& setup, RemeshOptions& remesh) {
   double energy = 0;
   for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
     if (setup.mesh.is_cell_alive(c))
       energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
   if (const double available = available_energy(setup); available > 0) energy = std::min(energy, available);
-  remesh.split.acceptance_tolerance = remesh.relative_tolerance * energy;
-  if (remesh.collapse.acceptance_tolerance == CollapseOptions{}.acceptance_tolerance)
-    remesh.collapse.acceptance_tolerance = kCollapseShare * remesh.split.acceptance_tolerance;
+  const double tolerance = remesh.relative_tolerance * energy;
+  remesh.split.acceptance_tolerance = tolerance;
   return fmt::format(
       "split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J; collapses may cost {:.2g} J; "
       "/space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
-      remesh.split.acceptance_tolerance, remesh.relative_tolerance, energy, -remesh.collapse.acceptance_tolerance);
+      tolerance, remesh.relative_tolerance, energy,
+      -remesh.collapse.acceptance_tolerance.value_or(-kCollapseShare * tolerance));
+}
+
+/// Of operations beside splits, from the split's.
+void choose_other_tolerances(RemeshOptions& remesh) {
+  const double split = *remesh.split.acceptance_tolerance;
+  const auto choose = [&](std::optional<double>& tolerance, double share) {
+    tolerance = tolerance.value_or(-share * split);
+  };
+  choose(remesh.collapse.acceptance_tolerance, kCollapseShare);
+  choose(remesh.swap.acceptance_tolerance, kShapeShare);
+  choose(remesh.smooth.acceptance_tolerance, kShapeShare);
 }
 
 }  // namespace
@@ -114,8 +130,10 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
-  if (double& length = remesh.split.min_edge_length; length < 0) length = kLeastSplitEdge * rest_diagonal(mesh);
-  if (remesh.enabled && remesh.split.acceptance_tolerance == 0) words.push_back(choose_tolerances(*this, remesh));
+  if (!remesh.enabled) return words;
+  if (!remesh.split.min_edge_length) remesh.split.min_edge_length = kLeastSplitEdge * rest_diagonal(mesh);
+  if (!remesh.split.acceptance_tolerance) words.push_back(choose_split_tolerance(*this, remesh));
+  choose_other_tolerances(remesh);
   return words;
 }
 

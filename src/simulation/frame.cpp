@@ -28,6 +28,7 @@ void StepReport::add_effort(const StepReport& before) {
   smooths += before.smooths;
   history_loss += before.history_loss;
   bound_by_dhat += before.bound_by_dhat;
+  reverted_remeshes += before.reverted_remeshes;
   cut_steps += before.cut_steps;
   damped_steps += before.damped_steps;
   seconds += before.seconds;

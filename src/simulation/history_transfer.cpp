@@ -29,11 +29,18 @@ class HistoryTransfer {
       : setup_(setup), mesh_(mesh), patch_(make_transfer_patch(old_mesh, mesh, touched, setup.materials, kRings<Dim>)) {
     const auto n = patch_.new_cells.vertices.size();
     prescribed_.assign(Dim * n, 0);
-    for (std::size_t i = 0; i < n; ++i)
-      for (const FacetId f : mesh.facets_of(patch_.new_cells.vertices[i]))
-        for (const auto& condition : setup.dirichlet)
-          if (condition.tag == mesh.facet_tag(f))
-            for (int c = 0; c < Dim; ++c) prescribed_[Dim * i + c] |= condition.components[c];
+    const auto hold = [&](std::size_t i, int tag) {
+      for (const auto& condition : setup.dirichlet)
+        if (condition.tag == tag) {
+          for (int c = 0; c < Dim; ++c) prescribed_[Dim * i + c] |= condition.components[c];
+          return;  // the first of a tag counts
+        }
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+      const VertexId v = patch_.new_cells.vertices[i];
+      for (const FacetId f : mesh.facets_of(v)) hold(i, mesh.facet_tag(f));
+      if (mesh.vertex_tag(v) != kNoTag) hold(i, mesh.vertex_tag(v));
+    }
   }
 
   void add(const VectorX& old_field, const VectorX& interpolant) {

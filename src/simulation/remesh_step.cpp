@@ -45,7 +45,9 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   context.newton = setup.newton;
   context.shortest_edge = tools.initial_edges.shortest;
   context.longest_edge = tools.initial_edges.longest;
-  context.coupling = context.scaling * (energy.contact + energy.friction);
+  // Of the convergent form corrections have negative weights: what acts in it may fall below 0.
+  if (!setup.contact.convergent || energy.contact == 0)
+    context.coupling = context.scaling * (energy.contact + energy.friction);
   const int bodies = state.mesh.vertex_slots();
   auto& obstacles = context.obstacles;
   obstacles.rest = setup.obstacles.rest;

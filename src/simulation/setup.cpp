@@ -69,8 +69,12 @@ void check_remeshing(const RemeshOptions& remesh) {
   const auto share = [](const char* place, double value) {
     require(value >= 0 && value <= 1, place, value, "a number of [0, 1]");
   };
-  require_not_negative("/space/remesh/split/acceptance_tolerance", remesh.split.acceptance_tolerance);
-  require(true, "/space/remesh/collapse/acceptance_tolerance", remesh.collapse.acceptance_tolerance, "a number");
+  require_positive("/space/remesh/relative_tolerance", remesh.relative_tolerance);
+  require_positive("/space/remesh/split/acceptance_tolerance", remesh.split.acceptance_tolerance.value_or(1));
+  require_not_negative("/space/remesh/split/min_edge_length", remesh.split.min_edge_length.value_or(0));
+  require(true, "/space/remesh/collapse/acceptance_tolerance", remesh.collapse.acceptance_tolerance.value_or(0), "a number");
+  require(true, "/space/remesh/swap/acceptance_tolerance", remesh.swap.acceptance_tolerance.value_or(0), "a number");
+  require(true, "/space/remesh/smooth/acceptance_tolerance", remesh.smooth.acceptance_tolerance.value_or(0), "a number");
   share("/space/remesh/split/culling_threshold", remesh.split.culling_threshold);
   share("/space/remesh/collapse/culling_threshold", remesh.collapse.culling_threshold);
   share("/space/remesh/local_relaxation/local_mesh_rel_area", remesh.local.relative_volume);

@@ -183,6 +183,7 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   refuse_unsupported(setup);
   setup.validate();
   for (const std::string& chosen : setup.choose_defaults()) logger.info(chosen);
+  setup.validate();  // what was chosen too
   impl_->setup = std::move(setup);
   impl_->logger = std::move(logger);
   const LinearOptions& linear = impl_->setup.linear;

@@ -154,6 +154,7 @@ class StepAttempt {
     x_ = solution;
     problem_ = std::move(problem_before);
     report_.forget_operations();
+    ++report_.reverted_remeshes;
     renumbering_ = {};
     return std::nullopt;
   }

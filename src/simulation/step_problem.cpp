@@ -126,7 +126,7 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
                   .velocity_reference = TimeIntegrator(setup.time).velocity_reference(history)}),
       stiffness_(stiffness),
-      system_(cache.system) {
+      cache_(cache) {
   if (setup.follower.forces)
     terms_.follower = [this, &mesh, t](const VectorX& x) {
       return lag_follower(setup_.follower, mesh, x, t, terms_.scaling);
@@ -139,7 +139,20 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
                                                            surface_.map.get());
   }
   potential_.elastic()->set_quadrature_levels(levels);
-  system_.reset(dofs_, Dim, element_stencils(cells_));
+  reset_system();
+}
+
+template <int Dim>
+void StepProblem<Dim>::reset_system() {
+  cache_.system.reset(dofs_, Dim, element_stencils(cells_));
+  turn_ = ++cache_.served;
+}
+
+/// The cache's, for this problem: another one may have had it since.
+template <int Dim>
+SparseSystem& StepProblem<Dim>::system() {
+  if (turn_ != cache_.served) reset_system();
+  return cache_.system;
 }
 
 /// Sum of all entries of the mass matrix by its number of rows, obstacles' included; 1 where there is none [kg].
@@ -206,7 +219,7 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
     extras.after_step = [&](const VectorX& iterate) { return potential_.elastic()->refine_quadrature(iterate); };
   }
   if (!adaptive_)
-    return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
+    return explained(minimize(sum, x, dofs_, held_.target, system(), setup_.newton, workspace_, extras), sum, x);
   initialize_stiffness(x);
   x = start_of_solve(x);
   bool is_first = true;
@@ -217,7 +230,7 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
     if (changed) potential_.contact()->set_stiffness(stiffness_.value);
     return changed || refined;
   };
-  return explained(minimize(sum, x, dofs_, held_.target, system_, setup_.newton, workspace_, extras), sum, x);
+  return explained(minimize(sum, x, dofs_, held_.target, system(), setup_.newton, workspace_, extras), sum, x);
 }
 
 /// How often the step may be solved, each time with what is lagged at the solution before.

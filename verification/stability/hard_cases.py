@@ -393,7 +393,9 @@ def exactly_scaled(scene, value):
     scaled(scene, value)
     scene.friction, scene.steps = 0.3, 10
     if scene.remesh:
-        scene.operations["swap"] = {"enabled": True, "acceptance_tolerance": 0.1 * scene.remesh}
+        scene.operations |= {"collapse": {"rel_max_edge_length": 3}, "swap": {"enabled": True}}  # tolerances left open
+        if scene.dim == 2:
+            scene.operations["smooth"] = {"enabled": True}
 
 
 LIKE |= {f"exact_{name}{kind}": (f"exact_one{kind}", True) for name in ("small", "large")
@@ -412,10 +414,13 @@ def far(scene, value):
 # --- obstacles of lower dimension ------------------------------------------------------------------------------------
 
 @case(points_2d=(2, "points", None), points_2d_remeshed=(2, "points", 0.05), points_3d=(3, "points", None),
-      wires_3d=(3, "wires", None), sheet_3d=(3, "sheet", None), wires_3d_remeshed=(3, "wires", 1.0))
+      wires_3d=(3, "wires", None), sheet_3d=(3, "sheet", None), points_3d_remeshed=(3, "points", 0.2),
+      wires_3d_remeshed=(3, "wires", 0.2))
 def codimensional(scene, value):
-    """A block falls on a bed of nails, on wires, on the edge of a sheet."""
+    """A block falls on a bed of nails, on wires, on the edge of a sheet. In 3D swaps of its surface must not take them in."""
     scene.dim, kind, scene.remesh = value
+    if scene.dim == 3 and scene.remesh:
+        scene.operations = {"swap": {"enabled": True}}
     scene.dt, scene.steps = 0.005, 20
     low = -0.001
     if scene.dim == 2:

@@ -162,6 +162,8 @@ def judge(name, build, runs):
         verdict.worst_volume = min(s["min_volume_ratio"] for s in steps)
         verdict.worst_quality = quality(run.last())
         verdict.vertices = steps[-1]["vertices"]
+        if reverted := sum(s["reverted_remeshes"] for s in steps):
+            failures.append(f"{reverted} times a step's remeshing was dropped")
         verdict.energy_growth = energy_growth(scene, run, states)
         if not verdict.energy_growth <= ENERGY_BAR:
             failures.append(f"energy grows by {verdict.energy_growth:.2g} in a step")

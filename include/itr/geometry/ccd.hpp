@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Conservative continuous collision detection of linear motions by additive advancement (Li et al. 2021, "Codimensional
-// Incremental Potential Contact", section 5): time moves forward by a lower bound of the time that the primitives need to
-// come within a fraction of their initial distance. It may stop early, never late.
+// Conservative continuous collision detection of linear motions: time moves forward by a lower bound of the time that the
+// primitives need to come within a fraction of their initial distance (Mirtich 1996; Li et al. 2021, "Codimensional
+// Incremental Potential Contact", section 5). It may stop early, never late.
 #pragma once
 
 #include "itr/core/types.hpp"
@@ -10,12 +10,13 @@ namespace itr {
 
 struct CcdOptions {
   double min_separation_ratio = 0.2;  ///< stop at this fraction of the initial distance
-  int max_iterations = 10000;
+  double passing_ratio = 1e-10;       ///< but not where the primitives never come nearer than this one
+  int max_iterations = 200;           ///< it stops early where they do not do
 };
 
-/// Largest t in [0, 1] such that on [0, t] the point p and the edge a b, moving from *0 to *1, keep a distance of at least
-/// `min_separation_ratio` of their initial one (a conservative estimate). 1 if they never come that close; 0 only if they
-/// touch at the start.
+/// 1 if the point p and the edge a b, moving from *0 to *1, keep a distance of at least `passing_ratio` of their initial
+/// one; else the largest t such that on [0, t] they keep at least `min_separation_ratio` of it. Both conservative estimates;
+/// 0 only if they touch at the start.
 template <int Dim>
 double point_edge_ccd(const Vec<Dim>& p0, const Vec<Dim>& a0, const Vec<Dim>& b0, const Vec<Dim>& p1, const Vec<Dim>& a1,
                       const Vec<Dim>& b1, const CcdOptions& options = {});

@@ -2,6 +2,8 @@
 // Options of in-timestep remeshing, with the paper's defaults (CONVENTIONS.md, "Remeshing").
 #pragma once
 
+#include <optional>
+
 namespace itr {
 
 /// Which edges are tried, and how an operation is decided.
@@ -17,21 +19,19 @@ enum class HistoryRule {
   interpolated  ///< interpolated onto the new mesh (the paper's rule)
 };
 
+// Whatever is left open (std::nullopt) Setup::choose_defaults fills in, and nothing else does: `remesh` needs it filled in.
+
 struct SplitOptions {
   bool enabled = true;
-  double acceptance_tolerance = 0;  ///< least energy decrease [J]; 0: as Setup::choose_defaults says
+  std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]
   double culling_threshold = 0.95;
-  int max_depth = 3;            ///< generations of one edge a step
-  double min_edge_length = -1;  ///< shorter rest edges are not split [m]; below 0: 1e-6 of the bodies' diagonal at rest
+  int max_depth = 3;                      ///< generations of one edge a step
+  std::optional<double> min_edge_length;  ///< shorter rest edges are not split [m]
 };
-
-/// What a collapse may cost, in split tolerances, where nothing else is asked for: less, and what contact has left behind
-/// stays fine.
-inline constexpr double kCollapseShare = -0.01;
 
 struct CollapseOptions {
   bool enabled = true;
-  double acceptance_tolerance = -1e-8;  ///< [J]; negative: allowed increase
+  std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]; negative: allowed increase
   double culling_threshold = 0.01;
   int max_depth = 3;
   double rel_max_edge_length = 1;      ///< longest edge collapsed, in shortest edges of the initial mesh
@@ -40,13 +40,13 @@ struct CollapseOptions {
 
 struct SwapOptions {
   bool enabled = false;
-  double acceptance_tolerance = -1e-8;  ///< [J]
+  std::optional<double> acceptance_tolerance;  ///< [J], of swaps that better the shape
   int max_depth = 3;
 };
 
 struct SmoothOptions {
   bool enabled = false;
-  double acceptance_tolerance = -1e-8;  ///< [J]
+  std::optional<double> acceptance_tolerance;  ///< [J], of moves that better the shape
   int max_iterations = 1;
 };
 

@@ -42,6 +42,7 @@ struct StepReport {
   double history_loss = 0;
   OperationCount splits, collapses, swaps, smooths;
   int bound_by_dhat = 0;        ///< surface edges that were not split because the halves would be below dhat
+  int reverted_remeshes = 0;    ///< all of a step's operations were dropped, as the state on the new mesh failed
   double trial_seconds = 0;     ///< median over the trials of these operations; 0 where there were none
   int refined_quadrature = 0;   ///< cells with curved edges whose elastic energy has a finer quadrature
   int cut_steps = 0;            ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
@@ -55,7 +56,7 @@ struct StepReport {
   /// Adds the effort of what came before: iterations, operations, forgotten history, damped and cut steps, seconds,
   /// processor seconds.
   void add_effort(const StepReport& before);
-  /// Of a mesh that was dropped: none was accepted.
+  /// Of a mesh that was dropped: none of the operations was accepted.
   void forget_operations();
 };
 

@@ -35,7 +35,8 @@ struct ProblemCache {
   /// The newest scope, where it is of that mesh; else a new one.
   std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
 
-  SparseSystem system;  ///< with its pattern, analysis and factors
+  SparseSystem system;       ///< with its pattern, analysis and factors
+  unsigned long served = 0;  ///< problems that the system was reset for, so many; it is the last one's
   std::shared_ptr<MeshScope<Dim>> scope;
 };
 

@@ -127,10 +127,11 @@ struct Setup : StepSetup<Dim> {
   LinearOptions linear;
 
   /// Fills in what is left open, and says what with, a sentence each. Barrier stiffness 0: adaptive; with remeshing a tenth
-  /// of the stiffest body's modulus [Pa], or what that is in the other form. Split tolerance 0: relative_tolerance times an
-  /// energy of the scene, the lesser of 1 % of sum(E V), which bodies have at strains of a tenth, and, where nothing
-  /// prescribed feeds it, of what it has at the start and gravity gives; collapses then may cost a hundredth of that. Least
-  /// edge to split below 0: 1e-6 of the bodies' diagonal. A Simulation calls it.
+  /// of the stiffest body's modulus [Pa], or what that is in the other form. With remeshing, what its options leave open:
+  /// the split tolerance is relative_tolerance times an energy of the scene, the lesser of 1 % of sum(E V), which bodies
+  /// have at strains of a tenth, and, where nothing prescribed feeds it, of what it has at the start and gravity gives.
+  /// Whoever chose it, collapses may cost a hundredth of it, swaps and moves that better the shape a millionth. Least edge
+  /// to split: 1e-6 of the bodies' diagonal. A Simulation calls it.
   std::vector<std::string> choose_defaults();
   /// That of all, what belongs to the mesh included. A Simulation calls it.
   void validate() const;

@@ -39,7 +39,7 @@ class StepProblem {
  public:
   /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
   /// `stiffness`, which the barrier starts from where it is adaptive, and `levels` of quadrature, which the solve may raise.
-  /// The cache's system serves the newest problem only.
+  /// Problems may share a cache and solve in turn, each as if alone.
   StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history, double t,
               ProblemCache<Dim>& cache, const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {});
 
@@ -74,6 +74,8 @@ class StepProblem {
   NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {});
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
+  void reset_system();
+  SparseSystem& system();
   VectorX with_held_at_targets(VectorX x) const;
   bool is_better_start(const VectorX& start, const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
@@ -94,7 +96,8 @@ class StepProblem {
   BarrierStiffness stiffness_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
   Lagged lagged_;         ///< of the last solve
-  SparseSystem& system_;
+  ProblemCache<Dim>& cache_;
+  unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this
 };
 
 /// The least det F over the elements; of a curved one a lower bound.

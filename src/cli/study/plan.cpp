@@ -104,15 +104,15 @@ bool contains(const Overrides& all, const scene::Override& one) {
 
 /// The tolerances of the operations of a series, in the ratio of the split's to the scene's own.
 Overrides with_tolerance(const Source& source, const Series& series, double tolerance) {
-  const double own = source.remesh.split.acceptance_tolerance;
+  const double own = *source.remesh.split.acceptance_tolerance;
   Overrides all = {{"/space/remesh/split/acceptance_tolerance", fmt::format("{}", tolerance)}};
   const auto scale = [&](const char* operation, double value) {
     all.push_back(
         {fmt::format("/space/remesh/{}/acceptance_tolerance", operation), fmt::format("{}", value * tolerance / own)});
   };
-  scale("collapse", source.remesh.collapse.acceptance_tolerance);
-  if (contains(series.overrides, kSwap)) scale("swap", source.remesh.swap.acceptance_tolerance);
-  if (contains(series.overrides, kSmooth)) scale("smooth", source.remesh.smooth.acceptance_tolerance);
+  scale("collapse", *source.remesh.collapse.acceptance_tolerance);
+  if (contains(series.overrides, kSwap)) scale("swap", *source.remesh.swap.acceptance_tolerance);
+  if (contains(series.overrides, kSmooth)) scale("smooth", *source.remesh.smooth.acceptance_tolerance);
   return all;
 }
 
@@ -143,7 +143,7 @@ class Planner {
     levels_ = options.levels > 0 ? options.levels : source_.dim == 2 ? 3 : 2;
     skip_ = std::max(1, source_.time.steps / std::max(1, options.frames));
     tolerances_ = options.tolerances;
-    const double own = source_.remesh.split.acceptance_tolerance;
+    const double own = *source_.remesh.split.acceptance_tolerance;
     if (tolerances_.empty())
       for (const double factor : kFactors) tolerances_.push_back(own * factor);
     std::sort(tolerances_.begin(), tolerances_.end(), std::greater<>());

@@ -144,8 +144,9 @@ double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const C
 
 template <int Dim>
 bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
-                                   double room) const {
+                                   double reach, double room) const {
   if (surface_ != &surface || revision_ != surface.revision || boxes_.size() != surface.vertices.size()) return false;
+  if (searched_ != reach) return false;
   if (dx && room_ > kWasteful * room) return false;
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
     const Vec<Dim> p = at<Dim>(x, surface.vertices[i]);
@@ -173,7 +174,7 @@ void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstV
 template <int Dim>
 void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
                                     double reach) {
-  if (!holds(surface, x, dx, room_for(surface, dx, reach, kUnforeseen))) search(surface, x, dx, reach, kUnforeseen);
+  if (!holds(surface, x, dx, reach, room_for(surface, dx, reach, kUnforeseen))) search(surface, x, dx, reach, kUnforeseen);
 }
 
 template <int Dim>
@@ -183,6 +184,7 @@ void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVector
   build_boxes(surface, x, dx, reach, share);
   surface_ = &surface;
   revision_ = surface.revision;
+  searched_ = reach;
   get_boxes<Dim>(surface.edges, reach_, edge_boxes_);
   get_boxes<Dim>(surface.triangles, reach_, triangle_boxes_);
   const auto update_tree = [&](const std::vector<Box<Dim>>& boxes, bool few, Bvh<Dim>& tree) {

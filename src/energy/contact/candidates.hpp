@@ -82,12 +82,13 @@ class ContactCandidates {
  private:
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
   static double room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach, double share);
-  bool holds(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double room) const;
+  bool holds(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double room) const;
   void build_boxes(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach,
                    double share);
 
   const CollisionSurface* surface_ = nullptr;
   int revision_ = 0;             ///< of the surface
+  double searched_ = 0;          ///< reach of the last search [m]
   double room_ = 0;              ///< around the motion of the last search [m]
   std::vector<Box<Dim>> boxes_;  ///< one a surface vertex: while it stays in there, the pairs hold
   std::vector<Box<Dim>> reach_;  ///< by problem vertex, half the reach around its box
