@@ -226,6 +226,18 @@ class StudyPlan : public testing::Test {
   Options options;
 };
 
+TEST_F(StudyPlan, LagsFrictionAlikeInAllRuns) {
+  for (const auto& run : all()) {
+    EXPECT_EQ(settings(run)["/solver/contact/friction_iterations"], "50") << run.name;
+    EXPECT_EQ(settings(run)["/solver/contact/friction_convergence_tol"], "0") << run.name;
+  }
+  EXPECT_TRUE(has(make_plan(options).notes, "friction lagged until it does not change, at most 50 rounds"));
+  options.overrides.push_back({"/solver/contact/friction_iterations", "3"});
+  for (const auto& run : all()) EXPECT_EQ(settings(run)["/solver/contact/friction_iterations"], "3") << run.name;
+  options.overrides = {{"/contact/friction_coefficient", "0"}};
+  for (const auto& run : all()) EXPECT_FALSE(settings(run).contains("/solver/contact/friction_iterations")) << run.name;
+}
+
 TEST_F(StudyPlan, HasASecondReferenceAndSmallerTolerancesForTheFirst) {
   options.tolerances = {1, 0.25};
   const Plan plan = make_plan(options);

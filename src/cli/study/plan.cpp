@@ -25,6 +25,8 @@ constexpr double kReferenceShare = 1.0 / 16;              ///< its tolerance by 
 constexpr int kReferenceTries = 3;                        ///< of tolerances, where none is asked for
 constexpr double kNextTry = 1.0 / 16;                     ///< of the tolerance before, which split nothing
 constexpr double kSecondShare = 4;                        ///< the second reference's tolerance by the first's
+/// Rounds of friction: a remeshed step solves twice, so only friction that has converged is the same on all meshes.
+constexpr int kFrictionRounds = 50;
 
 Overrides operator+(Overrides a, const Overrides& b) {
   a.insert(a.end(), b.begin(), b.end());
@@ -71,6 +73,9 @@ class Source {
       remesh = setup.remesh;
       // What remeshing would choose holds for all runs: they are to have one limit.
       if (is_open) pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness)}};
+      const auto& contact = setup.contact;
+      if (contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0)
+        pin_friction(options.overrides);
     };
     std::visit(look, scene_.setup);
     if (json_["geometry"].is_array()) {
@@ -114,6 +119,23 @@ class Source {
   void find_body(const Json& geometry, const std::string& pointer) {
     if (geometry.value("is_obstacle", false) || !geometry.value("enabled", true)) return;
     bodies_.emplace_back(pointer, geometry.value("n_refs", 0));
+  }
+
+  /// Rounds until nothing moves any more, on all meshes alike; what the study's own `--set` says of them stays.
+  void pin_friction(const Overrides& asked) {
+    const auto pin = [&](const char* pointer, const std::string& value) {
+      const auto is_it = [&](const scene::Override& o) { return o.pointer == pointer; };
+      if (std::none_of(asked.begin(), asked.end(), is_it)) pinned.push_back({pointer, value});
+    };
+    pin("/solver/contact/friction_iterations", std::to_string(kFrictionRounds));
+    pin("/solver/contact/friction_convergence_tol", "0");
+    notes += "friction lagged until it does not change, at most " + json_friction_rounds() + " rounds a solve";
+  }
+
+  std::string json_friction_rounds() const {
+    for (const auto& one : pinned)
+      if (one.pointer == "/solver/contact/friction_iterations") return one.value;
+    return std::to_string(json_["solver"]["contact"]["friction_iterations"].get<int>());
   }
 
   scene::Scene scene_;
