@@ -151,6 +151,24 @@ TEST(StudyAnswers, JudgeByTheBetterOfLevelsAndRows) {
   EXPECT_TRUE(has(choices_table(results), "| h1 | 20 % | `rows-1` |"));
 }
 
+TEST(StudyAnswers, JudgeQuadraticElementsByLinearOnesAndRemeshingByBoth) {
+  Results results = with(
+      {row("itr", "itr-1", 0.2, 5), row("uniform-p2", "uniform-p2-0", 0.2, 2), row("uniform-p2", "uniform-p2-1", 0.02, 20)});
+  const Verdict quadratic = verdict_of(results, "uniform-p2"), remeshed = verdict_of(results, "itr");
+  EXPECT_NEAR(quadratic.points[0].time_ratio, 0.2, 1e-12);
+  EXPECT_TRUE(std::isnan(quadratic.points[1].time_ratio));  // linear elements have not come to it
+  EXPECT_EQ(quadratic.pays_from, 0.2);
+  EXPECT_NEAR(remeshed.points[0].time_ratio, 0.5, 1e-12);
+  EXPECT_NEAR(remeshed.points[0].quadratic_ratio, 2.5, 1e-12);
+  EXPECT_FALSE(remeshed.pays_from);
+  const std::string said = all_of(answers(results)), table = choices_table(results);
+  EXPECT_TRUE(has(said, "2.5 of the time that it takes with quadratic elements. It does not pay here"));
+  EXPECT_TRUE(has(table, "| h1 | 20 % | `uniform-p2-0` |"));
+  EXPECT_TRUE(has(table, "| h1 | 2 % | `uniform-p2-1` |"));
+  EXPECT_FALSE(has(table, "itr-1"));
+  EXPECT_TRUE(has(work_precision_svg(results), "uniform-p2: uniform refinement, quadratic elements (P2)"));
+}
+
 TEST(StudyAnswers, RecommendNothingWhereNoRunIsNearTheReference) {
   const Results results = study_of({row("uniform", "uniform-0", 1.2, 1), row("uniform", "uniform-1", 0.9, 10),
                                     row("itr", "itr-1", 0.8, 2), row("itr", "itr-0.1", 0.7, 3)});
@@ -258,6 +276,18 @@ TEST_F(StudyPlan, HasASecondReferenceAndSmallerTolerancesForTheFirst) {
             std::stoi(settings(plan.references[0])["/geometry/0/n_refs"]));
   options.reference_tolerance = 0.01;
   EXPECT_EQ(make_plan(options).references.size(), 1u);
+}
+
+TEST_F(StudyPlan, HasQuadraticElementsBesideLinearOnes) {
+  std::map<std::string, std::string> order;
+  for (const auto& run : all())
+    if (const auto all_settings = settings(run); all_settings.contains("/space/discr_order"))
+      order[run.name] = all_settings.at("/space/discr_order");
+  EXPECT_EQ(order, (std::map<std::string, std::string>{{"uniform-p2-0", "2"}, {"uniform-p2-1", "2"}}));
+  // Of a scene of quadratic elements the linear series are linear all the same.
+  options.overrides.push_back({"/space/discr_order", "2"});
+  for (const auto& run : all())
+    EXPECT_EQ(settings(run)["/space/discr_order"], run.name.starts_with("uniform-p2") ? "2" : "1") << run.name;
 }
 
 TEST(RowsOfABox, FillItWithAsManyCells) {

@@ -196,6 +196,21 @@ class Study(unittest.TestCase):
                        capture_output=True)  # whatever else finishes in time, the reference does not
         self.assertEqual(rows(self.folder)["reference"]["reason"], "took longer than 0.05 s")
 
+    def test_quadratic_elements_beside_linear_ones(self):
+        study(self.folder, "--series", "uniform,uniform-p2", tolerances="30")
+        found = rows(self.folder)
+        value = lambda run, column: float(found[run][column])
+        self.assertNotIn("uniform-p2-2", found)
+        for k in range(2):  # as many unknowns as the next level's, a part of the error
+            self.assertAlmostEqual(value(f"uniform-p2-{k}", "unknowns"), value(f"uniform-{k + 1}", "unknowns"),
+                                   delta=0.05 * value(f"uniform-{k + 1}", "unknowns"))
+            for measure in ("l2", "h1", "energy"):
+                self.assertLess(value(f"uniform-p2-{k}", measure), 0.6 * value(f"uniform-{k + 1}", measure), (k, measure))
+        content = json.loads((self.folder / "study.json").read_text())
+        verdict = next(v for v in content["verdicts"] if (v["series"], v["measure"]) == ("uniform-p2", "h1"))
+        self.assertTrue(all(point["unknowns_ratio"] is None or point["unknowns_ratio"] < 1 for point in verdict["points"]))
+        self.assertIn("uniform-p2: uniform refinement, quadratic elements (P2)", (self.folder / "study.svg").read_text())
+
     def test_a_given_reference(self):
         reference = self.folder / "given"
         subprocess.run([ITR, "run", EXAMPLES / "cantilever.json", "-o", reference, "--set", "/geometry/0/n_refs=2", "--set",

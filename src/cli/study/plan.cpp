@@ -52,6 +52,7 @@ Overrides remeshed(const Overrides& changes = {}) {
 }
 
 const scene::Override kFixed = {"/space/remesh/enabled", "false"};
+const scene::Override kQuadratic = {"/space/discr_order", "2"};
 const scene::Override kSwap = {"/space/remesh/swap/enabled", "true"}, kSmooth = {"/space/remesh/smooth/enabled", "true"};
 
 /// The scene as its options ask for, merged.
@@ -249,6 +250,8 @@ class Planner {
     add(std::move(second));
   }
 
+  static bool is_quadratic(const Series& series) { return contains(series.overrides, kQuadratic); }
+
   /// Where the scene asks for quadratic elements, linear ones.
   Overrides linear(const Overrides& overrides) const {
     return source_.has("/space/discr_order") ? overrides + Overrides{{"/space/discr_order", "1"}} : overrides;
@@ -276,9 +279,10 @@ class Planner {
   void add(const Series& series) {
     switch (series.kind) {
       case Kind::levels:
-        for (int level = 0; level <= levels_; ++level)
+        // A level of quadratic elements has about as many unknowns as the next one of linear elements.
+        for (int level = 0; level <= levels_ - is_quadratic(series); ++level)
           add({fmt::format("{}-{}", series.name, level), &series, source_.level_label(level),
-               linear(series.overrides) + source_.refined(level), "",
+               (is_quadratic(series) ? series.overrides : linear(series.overrides)) + source_.refined(level), "",
                kReference});
         return;
       case Kind::rows:
@@ -323,6 +327,7 @@ const std::vector<Series>& all_series() {
   static const std::vector<Series> table = {
       {"uniform", Kind::levels, true, "uniform refinement, linear elements (P1)", {kFixed}},
       {"rows", Kind::rows, true, "in 3D, where the body is a box: as many linear elements in rows", {kFixed}},
+      {"uniform-p2", Kind::levels, true, "uniform refinement, quadratic elements (P2)", {kFixed, kQuadratic}},
       {"itr", Kind::tolerances, true, "splits and collapses", remeshed()},
       {"swaps", Kind::tolerances, true, "splits, collapses and swaps", remeshed({kSwap})},
       {"smoothing", Kind::tolerances, true, "splits, collapses, swaps and smoothing", remeshed({kSwap, kSmooth})},
