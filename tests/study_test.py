@@ -99,7 +99,8 @@ class Study(unittest.TestCase):
         given = self.folder / "runs/reference"
         study(self.folder / "one", "--series", "uniform", "--reference", given, levels=1)
         self.assertIn("not known", (self.folder / "one/study.md").read_text())
-        study(self.folder / "two", "--series", "uniform", "--reference", given, "--second-reference", self.folder / "runs/second-reference", levels=1)
+        study(self.folder / "two", "--series", "uniform", "--reference", given, "--second-reference",
+              self.folder / "runs/second-reference", levels=1)
         worth = json.loads((self.folder / "two/study.json").read_text())["worth"]
         self.assertAlmostEqual(worth["h1"], content["worth"]["h1"], delta=1e-9)
 
@@ -109,8 +110,8 @@ class Study(unittest.TestCase):
         self.assertFalse((self.folder / "study.md").exists())
         # One that is given, too.
         given = self.folder / "given"
-        subprocess.run([ITR, "run", EXAMPLES / "cantilever.json", "-o", given, "--set", "/geometry/0/n_refs=2", "--set", "/time/dt=0.25",
-                        "--set", "/space/remesh/enabled=false"], check=True, capture_output=True)
+        subprocess.run([ITR, "run", EXAMPLES / "cantilever.json", "-o", given, "--set", "/geometry/0/n_refs=2", "--set",
+                        "/time/dt=0.25", "--set", "/space/remesh/enabled=false"], check=True, capture_output=True)
         study(self.folder / "same", "--series", "uniform,itr", "--reference", given, levels=1)
         content = json.loads((self.folder / "same/study.json").read_text())
         self.assertIn("it equals the finest uniform level", content["refused"])

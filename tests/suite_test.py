@@ -116,7 +116,8 @@ class HardCases(unittest.TestCase):
     def test_a_certificate_has_to_be_made(self):
         fine = "echo '2 frames, each by itself: no intersection, nothing inside of a body, no inversion'"
         self.assertEqual(self.certified(fine), [])
-        for broken in ("kill -SEGV $$", "exit 0", "exit 2", "echo 'frame 1: not readable' >&2; exit 2", fine + "; exit 4", fine + "; exit 1"):
+        for broken in ("kill -SEGV $$", "exit 0", "exit 2", "echo 'frame 1: not readable' >&2; exit 2", fine + "; exit 4",
+                       fine + "; exit 1"):
             self.assertEqual(len(self.certified(broken)), 1, broken)
         self.assertIn("saw 2 of 3 frames", self.certified(fine, frames=3)[0])
         self.assertEqual(self.certified("echo 'frame 1: edges 3 and 4 cross'; echo '2 frames, each by itself: failed'; exit 4"),
@@ -140,7 +141,8 @@ class HardCases(unittest.TestCase):
         import numpy as np
         scene, steps, states = self.states()
         self.assertLess(self.stability.energy_growth(scene, steps, states), 1e-12)
-        for broken in ({"kinetic": 2.2}, {"kinetic": math.nan}, {"velocity": np.array([[0.0, 0.0], [0.0, 1.4]])}, {"reaction": None}):
+        for broken in ({"kinetic": 2.2}, {"kinetic": math.nan}, {"velocity": np.array([[0.0, 0.0], [0.0, 1.4]])},
+                       {"reaction": None}):
             scene, steps, states = self.states(**broken)
             self.assertFalse(self.stability.energy_growth(scene, steps, states) <= self.stability.DRIVEN_ENERGY_BAR, broken)
         scene, steps, states = self.states()
@@ -149,7 +151,8 @@ class HardCases(unittest.TestCase):
 
     def test_work_of_obstacles_is_that_of_their_motion(self):
         import numpy as np
-        _, _, (before, now) = self.states(touch=np.array([0.0, -4.0]), obstacles=np.array([[0.0, -0.5], [1.0, -0.5]]), reaction=None)
+        _, _, (before, now) = self.states(touch=np.array([0.0, -4.0]), obstacles=np.array([[0.0, -0.5], [1.0, -0.5]]),
+                                          reaction=None)
         before.obstacles, before.touch = np.array([[0.0, 0.0], [1.0, 0.0]]), np.zeros(2)
         self.assertAlmostEqual(self.stability.work(before, now, 0.1), 2.0)
         now.obstacles = np.array([[0.0, -0.5], [1.0, 0.0]])  # they turn: whose force it is is not known
