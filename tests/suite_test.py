@@ -101,7 +101,7 @@ class HardCases(unittest.TestCase):
         except ImportError as error:
             raise unittest.SkipTest(str(error))
 
-    def certified(self, script, frames=2):
+    def certified(self, script, frames=2, contact=True):
         """What the judgement makes of an `itr` that does this."""
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
@@ -111,7 +111,7 @@ class HardCases(unittest.TestCase):
             (folder / "run/frames").mkdir(parents=True)
             for step in range(frames):
                 (folder / f"run/frames/{step:06}.h5").touch()
-            return self.stability.violations(folder, types.SimpleNamespace(contact=True), folder / "run")
+            return self.stability.violations(folder, types.SimpleNamespace(contact=contact), folder / "run")
 
     def test_a_certificate_has_to_be_made(self):
         fine = "echo '2 frames, each by itself: no intersection, nothing inside of a body, no inversion'"
@@ -122,6 +122,12 @@ class HardCases(unittest.TestCase):
         self.assertIn("saw 2 of 3 frames", self.certified(fine, frames=3)[0])
         self.assertEqual(self.certified("echo 'frame 1: edges 3 and 4 cross'; echo '2 frames, each by itself: failed'; exit 4"),
                          ["frame 1: edges 3 and 4 cross"])
+
+    def test_without_contact_only_surfaces_may_meet(self):
+        lines = ["frame 1: edges (1, 2) and (3, 4) intersect", "frame 1: cell 5 is inverted", "frame 2: a position is not finite"]
+        script = "\n".join(f"echo '{line}'" for line in [*lines, "2 frames, each by itself: failed"]) + "\nexit 4"
+        self.assertEqual(self.certified(script, contact=False), lines[1:])
+        self.assertEqual(self.certified(script), lines)
 
     def states(self, **last):
         """Two frames of a block that is pulled up by its held top and gains what that puts in."""

@@ -21,8 +21,8 @@ constexpr double kHighestQuadraticOrder = 5;  ///< energies of quadratic element
 /// The least share of the reference's size that a run is off, or infinity where no run is told of.
 double nearest(const Results& results, const Measure& measure) {
   double least = std::numeric_limits<double>::infinity();
-  for (const auto& point : points(results, {}, measure, costs()[0]))
-    if (const auto share = relative_error(results, *point.row, measure)) least = std::min(least, *share);
+  for (const auto& point : points(results, {}, measure, costs()[0]))  // a reference without a size cannot be far from
+    least = std::min(least, relative_error(results, *point.row, measure).value_or(0));
   return least;
 }
 

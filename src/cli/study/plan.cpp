@@ -65,6 +65,7 @@ class Source {
       time = setup.time;
       if constexpr (std::is_same_v<decltype(setup), Setup<3>>) box = find_box(setup.mesh);
       num_cells = setup.mesh.num_cells();
+      has_contact = setup.contact.enabled;
       body = setup.mesh.body(0);
       for (CellId c = 0; c < setup.mesh.cell_slots(); ++c) has_one_body &= setup.mesh.body(c) == body;
       const bool is_open = setup.contact.enabled && !has("/solver/contact/barrier_stiffness");
@@ -94,7 +95,7 @@ class Source {
   std::string notes;             ///< the same in words
   std::optional<RowsOfBox> box;  ///< that the bodies fill together
   int num_cells = 0, body = 0;   ///< before refinement; the first cell's
-  bool has_one_body = true;
+  bool has_one_body = true, has_contact = false;
 
   bool has(const std::string& pointer) const { return json_.contains(Json::json_pointer(pointer)); }
   /// Every body refined so many times more than the scene has it.
@@ -197,6 +198,7 @@ class Planner {
     std::sort(tolerances_.begin(), tolerances_.end(), std::greater<>());
     starts_ = options.starts.empty() ? std::vector<int>{0} : options.starts;
     plan_.dim = source_.dim;
+    plan_.has_contact = source_.has_contact;
     plan_.is_dynamic = !source_.time.is_static && !source_.time.quasistatic;
   }
 

@@ -34,7 +34,7 @@ struct Row {
   PlannedRun run;
   bool finished = false;
   std::string reason;      ///< why it did not finish
-  bool certified = false;  ///< no frame with an intersection or an inversion
+  bool certified = false;  ///< no frame with an inversion nor, where bodies touch, an intersection
   int steps = 0;
   double unknowns = 0;           ///< mean over the steps
   int first_vertices = 0;        ///< before the first step
@@ -49,8 +49,9 @@ struct Row {
   std::optional<Errors> errors;
 };
 
-/// Reads steps.jsonl and what the run printed, and certifies all frames. Throws InputError where the folder cannot be read.
-Row read_row(const PlannedRun& run, const std::filesystem::path& folder, const std::filesystem::path& log);
+/// Reads steps.jsonl and what the run printed, and certifies all frames: where nothing touches, bodies may pass through
+/// themselves. Throws InputError where the folder cannot be read.
+Row read_row(const PlannedRun& run, const std::filesystem::path& folder, const std::filesystem::path& log, bool has_contact);
 
 /// Distances are kept in the folder until a frame of it or of the reference changes. Throws InputError where the two have no
 /// stored time in common, or bodies of other shapes.

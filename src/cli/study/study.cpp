@@ -137,7 +137,7 @@ class Study {
     failed.run = planned;
     failed.reason = describe_failure(end, log, options_.time_limit);
     if (!failed.reason.empty()) return failed;
-    return read_row(planned, folder, log);
+    return read_row(planned, folder, log, plan_.has_contact);
   }
 
   /// The folder that a run is compared with; empty: none, or none yet.
