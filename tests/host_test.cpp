@@ -294,6 +294,69 @@ TEST(HostForces, OfPositionsBalanceAsTheirPotentialDoes) {
   EXPECT_LT(iterations[2], iterations[1]);  // the Hessian saves rounds
 }
 
+/// A block between springs of so many N/m a vertex, whose forces are lagged: from about 8000 on rounds lead away.
+Setup<2> between_springs(double k, bool with_stiffness = false) {
+  auto setup = block<2>();
+  setup.follower.forces = [k](const Mesh<2>&, ConstVectorView x, double, VectorView f) { f -= k * x; };
+  if (with_stiffness)
+    setup.follower.stiffness = [k](const Mesh<2>& mesh, ConstVectorView, double, const StiffnessReceiver& add) {
+      const Mat<2> block = k * Mat<2>::Identity();
+      for (int v = 0; v < mesh.vertex_slots(); ++v) add(std::array{v}, block.data());
+    };
+  return setup;
+}
+
+StepResult step_of(const Setup<2>& setup, std::string* warnings = nullptr) {
+  static linear::Registry registry;
+  Simulation<2> simulation(setup, registry, Logger([&](LogLevel level, std::string_view message) {
+                             if (warnings && level == LogLevel::warning) *warnings += message;
+                           }));
+  return simulation.advance();
+}
+
+TEST(HostForces, ThatDoNotSettleFailTheStep) {
+  const StepResult result = step_of(between_springs(11000));
+  EXPECT_FALSE(result.ok);
+  EXPECT_NE(result.reason.find("loads do not settle: pressure or follower forces are"), std::string::npos) << result.reason;
+  EXPECT_NE(result.reason.find("/solver/advanced/lagged_load_tolerance"), std::string::npos) << result.reason;
+  EXPECT_EQ(result.reason.find("friction"), std::string::npos) << result.reason;  // there is none
+  EXPECT_FALSE(step_of(between_springs(20000)).ok);                               // they move away
+  EXPECT_TRUE(step_of(between_springs(11000, true)).ok);
+}
+
+TEST(HostForces, ThatHardlySettleAreWarnedOf) {
+  std::string warnings;
+  EXPECT_TRUE(step_of(between_springs(300), &warnings).ok);
+  EXPECT_EQ(warnings, "");
+  EXPECT_TRUE(step_of(between_springs(9000), &warnings).ok);
+  EXPECT_NE(warnings.find("of themselves off those of the positions reached, not coming nearer after"), std::string::npos)
+      << warnings;
+  auto setup = between_springs(11000);
+  setup.lagged_load_tolerance = 1;
+  warnings.clear();
+  EXPECT_TRUE(step_of(setup, &warnings).ok);
+  EXPECT_NE(warnings.find("off those of the positions reached"), std::string::npos) << warnings;
+}
+
+TEST(HostForces, InACycleAreNoSolution) {
+  // On the whole block, of its mass by the square of the time step: it goes there and back from round to round.
+  auto setup = block<2>();
+  setup.newton.step_tolerance = 1e-6;
+  setup.follower.forces = [h = setup.time.dt](const Mesh<2>& mesh, ConstVectorView x, double, VectorView f) {
+    Vec<2> moment = Vec<2>::Zero();  // mass times barycentre
+    const auto for_each_share = [&](const auto& visit) {
+      for (CellId c = 0; c < mesh.cell_slots(); ++c)
+        for (const VertexId v : mesh.cell(c)) visit(v, kDensity * mesh.volume(c) / 3);
+    };
+    for_each_share([&](VertexId v, double mass) { moment += mass * (x.segment<2>(2 * v) - mesh.rest(v)); });
+    const Vec<2> mean = moment / (kDensity * kSize * kSize);
+    for_each_share([&](VertexId v, double mass) { f.segment<2>(2 * v) -= mass / (h * h) * mean; });
+  };
+  const StepResult result = step_of(setup);
+  EXPECT_FALSE(result.ok);
+  EXPECT_NE(result.reason.find("in a cycle"), std::string::npos) << result.reason;
+}
+
 TEST(HostForces, LinearisedHaveTheirDerivatives) {
   const Mesh<2> mesh = make_block<2>();
   FollowerForces<2> follower;

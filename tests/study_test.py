@@ -63,8 +63,8 @@ class Study(unittest.TestCase):
         content = json.loads((self.folder / "study.json").read_text())
         verdict = next(v for v in content["verdicts"] if (v["series"], v["measure"]) == ("itr", "l2"))
         self.assertAlmostEqual(verdict["finest_uniform"]["error"], value("uniform-2", "l2"), delta=1e-5 * value("uniform-2", "l2"))
-        for point, run in zip(verdict["points"], ("itr-4000", "itr-500")):
-            self.assertAlmostEqual(point["error"], value(run, "l2"), delta=1e-5 * point["error"])
+        for point in verdict["points"]:
+            self.assertAlmostEqual(point["error"], value(point["run"], "l2"), delta=1e-5 * point["error"])
             self.assertTrue(point["unknowns_ratio"] is None or point["unknowns_ratio"] < 1)  # None: no uniform level has that error
         orders = {(order["series"], order["measure"]): order for order in content["orders"]}
         self.assertGreater(orders["uniform", "l2"]["in_size"], 1.3)
@@ -83,6 +83,57 @@ class Study(unittest.TestCase):
         study(self.folder, "--series", "uniform,itr,solvers,time")
         self.assertEqual(frames, {path: path.stat().st_mtime_ns for path in self.folder.rglob("frames/*.h5")})
         self.assertEqual(before, (self.folder / "study.csv").read_text())
+
+    def test_says_what_its_reference_is_worth(self):
+        study(self.folder, "--series", "uniform,itr", levels=1)
+        content = json.loads((self.folder / "study.json").read_text())
+        runs = {run["run"]: run for run in content["runs"]}
+        self.assertEqual(content["worth"]["h1"], runs["second-reference"]["errors"]["h1"])
+        self.assertGreater(content["worth"]["h1"], 0)
+        self.assertTrue(any(doubt.startswith("The reference is worth") for doubt in content["doubts"]))
+        for name in ("uniform-0", "itr-4000"):
+            for measure in ("l2", "h1", "energy"):
+                error = runs[name]["errors"][measure]
+                self.assertTrue(error is None or error >= content["worth"][measure], (name, measure))
+        # Of a given reference it is not known, unless a second one is given too.
+        given = self.folder / "runs/reference"
+        study(self.folder / "one", "--series", "uniform", "--reference", given, levels=1)
+        self.assertIn("not known", (self.folder / "one/study.md").read_text())
+        study(self.folder / "two", "--series", "uniform", "--reference", given, "--second-reference",
+              self.folder / "runs/second-reference", levels=1)
+        worth = json.loads((self.folder / "two/study.json").read_text())["worth"]
+        self.assertAlmostEqual(worth["h1"], content["worth"]["h1"], delta=1e-9)
+
+    def test_a_reference_that_splits_nothing_is_refused(self):
+        done = study(self.folder, "--series", "uniform", "--reference-tolerance", "1e9", levels=1, status=2)
+        self.assertIn("a reference that is its uniform level: ", done.stderr)
+        self.assertFalse((self.folder / "study.md").exists())
+        # One that is given, too.
+        given = self.folder / "given"
+        subprocess.run([ITR, "run", EXAMPLES / "cantilever.json", "-o", given, "--set", "/geometry/0/n_refs=2", "--set",
+                        "/time/dt=0.25", "--set", "/space/remesh/enabled=false"], check=True, capture_output=True)
+        study(self.folder / "same", "--series", "uniform,itr", "--reference", given, levels=1)
+        content = json.loads((self.folder / "same/study.json").read_text())
+        self.assertIn("it equals the finest uniform level", content["refused"])
+        self.assertEqual((content["verdicts"], content["orders"]), ([], []))
+        self.assertTrue(all("errors" not in run for run in content["runs"]))
+        self.assertTrue((self.folder / "same/study.md").read_text().split("- ")[1].startswith("Nothing is said of errors"))
+
+    def test_tries_smaller_tolerances_where_the_first_splits_nothing(self):
+        study(self.folder, "--series", "uniform", levels=1, tolerances="4e9,4e8")
+        content = json.loads((self.folder / "study.json").read_text())
+        self.assertTrue(content["reference"].startswith("`reference-"), content["reference"])
+        self.assertIsNone(content["refused"])
+
+    def test_repeats_warnings_of_its_runs(self):
+        study(self.folder, "--series", "uniform", "--set", "/boundary_conditions/rhs=[0,-9.81]", levels=1)
+        page = (self.folder / "study.md").read_text()
+        self.assertIn("## Warnings of the runs", page)
+        self.assertIn("`uniform-0`, `uniform-1`", page[page.index("## Warnings"):])
+        again = page[page.index("## Warnings"):]
+        study(self.folder, "--series", "uniform", "--set", "/boundary_conditions/rhs=[0,-9.81]", levels=1)
+        page = (self.folder / "study.md").read_text()
+        self.assertEqual(again, page[page.index("## Warnings"):])
 
     def test_says_what_its_levels_do_not_tell(self):
         # More accurate than the finest uniform level and dearer: who would be ahead there is not known.
@@ -145,6 +196,21 @@ class Study(unittest.TestCase):
         subprocess.run(command(self.folder, "--series", "uniform", "--time-limit", "0.05", "--set", "/geometry/0/n_refs=4"),
                        capture_output=True)  # whatever else finishes in time, the reference does not
         self.assertEqual(rows(self.folder)["reference"]["reason"], "took longer than 0.05 s")
+
+    def test_quadratic_elements_beside_linear_ones(self):
+        study(self.folder, "--series", "uniform,uniform-p2", tolerances="30")
+        found = rows(self.folder)
+        value = lambda run, column: float(found[run][column])
+        self.assertNotIn("uniform-p2-2", found)
+        for k in range(2):  # as many unknowns as the next level's, a part of the error
+            self.assertAlmostEqual(value(f"uniform-p2-{k}", "unknowns"), value(f"uniform-{k + 1}", "unknowns"),
+                                   delta=0.05 * value(f"uniform-{k + 1}", "unknowns"))
+            for measure in ("l2", "h1", "energy"):
+                self.assertLess(value(f"uniform-p2-{k}", measure), 0.6 * value(f"uniform-{k + 1}", measure), (k, measure))
+        content = json.loads((self.folder / "study.json").read_text())
+        verdict = next(v for v in content["verdicts"] if (v["series"], v["measure"]) == ("uniform-p2", "h1"))
+        self.assertTrue(all(point["unknowns_ratio"] is None or point["unknowns_ratio"] < 1 for point in verdict["points"]))
+        self.assertIn("uniform-p2: uniform refinement, quadratic elements (P2)", (self.folder / "study.svg").read_text())
 
     def test_a_given_reference(self):
         reference = self.folder / "given"

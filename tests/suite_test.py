@@ -83,6 +83,106 @@ class Bars(unittest.TestCase):
             self.assertEqual(self.missed(met, **changes), 1, changes)
 
 
+def load(path):
+    spec = importlib.util.spec_from_file_location(path.replace("/", "_").removesuffix(".py"), SOURCE / "verification" / path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+class HardCases(unittest.TestCase):
+    """Each judgement fails where its subject is broken."""
+
+    @classmethod
+    def setUpClass(cls):
+        try:
+            cls.stability = load("stability/run.py")
+        except ImportError as error:
+            raise unittest.SkipTest(str(error))
+
+    def certified(self, script, frames=2, contact=True):
+        """What the judgement makes of an `itr` that does this."""
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "bin").mkdir()
+            (folder / "bin/itr").write_text("#!/bin/sh\n" + script + "\n")
+            (folder / "bin/itr").chmod(0o755)
+            (folder / "run/frames").mkdir(parents=True)
+            for step in range(frames):
+                (folder / f"run/frames/{step:06}.h5").touch()
+            return self.stability.violations(folder, types.SimpleNamespace(contact=contact), folder / "run")
+
+    def test_a_certificate_has_to_be_made(self):
+        fine = "echo '2 frames, each by itself: no intersection, nothing inside of a body, no inversion'"
+        self.assertEqual(self.certified(fine), [])
+        for broken in ("kill -SEGV $$", "exit 0", "exit 2", "echo 'frame 1: not readable' >&2; exit 2", fine + "; exit 4",
+                       fine + "; exit 1"):
+            self.assertEqual(len(self.certified(broken)), 1, broken)
+        self.assertIn("saw 2 of 3 frames", self.certified(fine, frames=3)[0])
+        self.assertEqual(self.certified("echo 'frame 1: edges 3 and 4 cross'; echo '2 frames, each by itself: failed'; exit 4"),
+                         ["frame 1: edges 3 and 4 cross"])
+
+    def test_without_contact_only_surfaces_may_meet(self):
+        lines = ["frame 1: edges (1, 2) and (3, 4) intersect", "frame 1: cell 5 is inverted", "frame 2: a position is not finite"]
+        script = "\n".join(f"echo '{line}'" for line in [*lines, "2 frames, each by itself: failed"]) + "\nexit 4"
+        self.assertEqual(self.certified(script, contact=False), lines[1:])
+        self.assertEqual(self.certified(script), lines)
+
+    def states(self, **last):
+        """Two frames of a block that is pulled up by its held top and gains what that puts in."""
+        import numpy as np
+        def state(kinetic, momentum, force, velocity):
+            return self.stability.Totals(kinetic, momentum, force, abs(force).sum(), np.array([[0.0, 0.0], force]),
+                                         np.array([[0.0, 0.0], velocity]), 0.0, np.zeros((0, 2)))
+        first = state(0.0, np.zeros(2), np.zeros(2), np.zeros(2))
+        second = state(2.0, np.array([0.0, 1.0]), np.array([0.0, 20.0]), np.array([0.0, 1.5]))  # 20 N over 0.15 m
+        for key, value in last.items():
+            setattr(second, key, value)
+        steps = [{"energy": {"elastic": e, "contact": 0.0, "body": 0.0}} for e in (1.0, 2.0)]
+        scene = types.SimpleNamespace(quasistatic=False, driven=True, dim=2, gravity=10.0, mass=1.0, dt=0.1)
+        return scene, steps, [first, second]
+
+    def test_energy_may_grow_by_the_work_of_what_moves_only(self):
+        import numpy as np
+        scene, steps, states = self.states()
+        self.assertLess(self.stability.energy_growth(scene, steps, states), 1e-12)
+        for broken in ({"kinetic": 2.2}, {"kinetic": math.nan}, {"velocity": np.array([[0.0, 0.0], [0.0, 1.4]])},
+                       {"reaction": None}):
+            scene, steps, states = self.states(**broken)
+            self.assertFalse(self.stability.energy_growth(scene, steps, states) <= self.stability.DRIVEN_ENERGY_BAR, broken)
+        scene, steps, states = self.states()
+        scene.driven = False
+        self.assertGreater(self.stability.energy_growth(scene, steps, states), self.stability.ENERGY_BAR)
+
+    def test_work_of_obstacles_is_that_of_their_motion(self):
+        import numpy as np
+        _, _, (before, now) = self.states(touch=np.array([0.0, -4.0]), obstacles=np.array([[0.0, -0.5], [1.0, -0.5]]),
+                                          reaction=None)
+        before.obstacles, before.touch = np.array([[0.0, 0.0], [1.0, 0.0]]), np.zeros(2)
+        self.assertAlmostEqual(self.stability.work(before, now, 0.1), 2.0)
+        now.obstacles = np.array([[0.0, -0.5], [1.0, 0.0]])  # they turn: whose force it is is not known
+        self.assertTrue(math.isnan(self.stability.work(before, now, 0.1)))
+
+    def test_forces_and_momentum_have_to_balance(self):
+        import numpy as np
+        scene, _, states = self.states()
+        self.assertLess(self.stability.balance(scene, states), 1e-12)
+        for broken in ({"force": np.array([0.0, 19.0])}, {"momentum": np.array([0.1, 1.0])}):
+            scene, _, states = self.states(**broken)
+            self.assertGreater(self.stability.balance(scene, states), self.stability.BALANCE_BAR, broken)
+
+    def test_a_known_failure_is_shown_and_its_passing_is_a_failure(self):
+        case = load("cases/stability.py")
+        verdict = lambda passed: types.SimpleNamespace(passed=passed, failures="" if passed else "energy grows")
+        self.assertTrue(case.result_of("a", verdict(True), {}).passed)
+        self.assertFalse(case.result_of("a", verdict(False), {}).passed)
+        self.assertIsNone(case.result_of("a", verdict(False), {"a": "round-off"}).passed)
+        self.assertFalse(case.result_of("a", verdict(True), {"a": "round-off"}).passed)
+        known = set(self.stability.cases.KNOWN)
+        self.assertTrue(known & set(case.NAMES), "the quick suite shows one of what fails")
+
+
 class Report(unittest.TestCase):
     OVERVIEW = {"commit": "cccc333", "date": "2026-01-01", "never_run": ["waves"], "ages": [["verification/report/results.json: old", "aaaa111", 7],
                                                                     ["verification/hard.csv", "dddd444", 3]],

@@ -37,7 +37,6 @@ def versions(build):
     for name in ("dolfinx", "numpy", "scipy", "h5py", "meshio", "matplotlib"):
         if importlib.util.find_spec(name):
             found[name] = importlib.import_module(name).__version__
-    found["itr"] = provenance.commit() or str(build)
     return found
 
 
@@ -75,7 +74,7 @@ def main():
         ran[name] = run_case(cases[name], Context(folder, report, build, options.shared, options.quick, name))
         print(f"  {ran[name]['status']} in {time.perf_counter() - start:.1f} s"
               + (f": {ran[name]['message']}" if ran[name]["message"] else ""), flush=True)
-        ran[name]["versions"] = found
+        ran[name]["versions"] = {**found, "itr": provenance.made("verification/report/results.json", name)}
     # A case that could not run keeps the figures of when it could.
     entries.update({name: entry for name, entry in ran.items() if entry["status"] != "skipped" or name not in entries})
     entries = {name: entries[name] for name in cases if name in entries}

@@ -113,8 +113,10 @@ void add_study_options(CLI::App& app, study::Options& options, std::vector<std::
       ->check(CLI::NonNegativeNumber);
   app.add_option("--reference", options.reference,
                  "folder of a run to compare with (default: the finest level, split on and never coarsened)");
+  app.add_option("--second-reference", options.second_reference,
+                 "folder of another that tells what the first is worth (default: unknown with --reference, else a run)");
   app.add_option("--reference-tolerance", options.reference_tolerance,
-                 "of its splits [J] (default: a quarter of the smallest tolerance)")
+                 "of its splits [J] (default: a sixteenth of the smallest tolerance)")
       ->check(CLI::PositiveNumber);
   app.add_option("--frames", options.frames, "times at which runs are compared (default: 10)")->check(CLI::PositiveNumber);
   app.add_option("--time-limit", options.time_limit, "of a run [s]")->check(CLI::NonNegativeNumber);

@@ -51,7 +51,7 @@ Logger make_logger() {
         spdlog::info("{}", message);
         break;
       case LogLevel::warning:
-        spdlog::warn("{}", message);
+        spdlog::warn("warning: {}", message);
         break;
     }
   });
@@ -123,7 +123,7 @@ class Run {
   Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
       linear::Registry& registry)
       : directory_(std::move(directory)), simulation_(std::move(setup), registry, make_logger()) {
-    for (const auto& warning : find_suspicious(simulation_)) spdlog::warn("{}", warning);
+    for (const auto& warning : find_suspicious(simulation_)) spdlog::warn("warning: {}", warning);
     const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
     if (const auto saved = find_resumable(scene, directory_, options)) {
       if (saved->backend != info.backend && !options.allow_changes)
@@ -215,7 +215,7 @@ class Run {
 
 int run(const RunOptions& options) {
   scene::Scene scene = scene::read(options.scene, options.overrides);
-  for (const auto& warning : scene.warnings) spdlog::warn("{}", warning);
+  for (const auto& warning : scene.warnings) spdlog::warn("warning: {}", warning);
   std::string directory = options.directory.empty() ? scene.directory : options.directory;
   if (directory.empty()) directory = (std::filesystem::path("results") / options.scene.stem()).string();
   const int threads = options.threads >= 0 ? options.threads : scene.max_threads;
@@ -229,7 +229,7 @@ int run(const RunOptions& options) {
         setup.newton.cancel = &stop_now;
         const SolverChoice solver = choose_solver(setup.linear, options, registry);
         if (this_launch().rank > 0) return serve(registry, solver.name);
-        for (const auto& warning : solver.warnings) spdlog::warn("{}", warning);
+        for (const auto& warning : solver.warnings) spdlog::warn("warning: {}", warning);
         const RankSession session(registry, solver.name);
         return Run(std::move(setup), scene, directory, options, num_threads(), registry).run();
       },

@@ -16,13 +16,13 @@ struct Corner {
   Vec<Dim + 1> in_a, in_b;
 };
 
-/// Clips a simplex by one plane of b after another, depth first, and adds up what is left.
-template <int Dim>
+/// Clips a simplex by one plane of b after another, depth first, and gives what is left, with its share of a, to a sink.
+template <int Dim, typename Sink>
 class Clipper {
  public:
   using Piece = std::array<Corner<Dim>, Dim + 1>;
 
-  explicit Clipper(OverlapIntegrals<Dim>& sum) : sum_(sum) {}
+  explicit Clipper(Sink& sink) : sink_(sink) {}
 
   /// What is left of `piece` behind the planes from `plane` on, where a barycentric coordinate of b is not negative.
   void clip(const Piece& piece, int plane) {
@@ -63,6 +63,21 @@ class Clipper {
     for (int k = 0; k < Dim; ++k) edges.col(k) = piece[k + 1].in_a.template tail<Dim>() - piece[0].in_a.template tail<Dim>();
     const double share = std::abs(edges.determinant());
     if (share < kRoundOff) return;
+    sink_.add(piece, share);
+  }
+
+  Sink& sink_;
+};
+
+template <int Dim>
+using Piece = std::array<Corner<Dim>, Dim + 1>;
+
+/// Sums of products of barycentric coordinates.
+template <int Dim>
+struct ProductSink {
+  OverlapIntegrals<Dim>& sum;
+
+  void add(const Piece<Dim>& piece, double share) {
     Vec<Dim + 1> total_a = Vec<Dim + 1>::Zero(), total_b = Vec<Dim + 1>::Zero();
     for (const auto& corner : piece) {
       total_a += corner.in_a;
@@ -71,14 +86,26 @@ class Clipper {
     }
     add_products(share, total_a, total_b);
   }
-
   void add_products(double share, const Vec<Dim + 1>& a, const Vec<Dim + 1>& b) {
-    sum_.aa.noalias() += share * a * a.transpose();
-    sum_.ab.noalias() += share * a * b.transpose();
-    sum_.bb.noalias() += share * b * b.transpose();
+    sum.aa.noalias() += share * a * a.transpose();
+    sum.ab.noalias() += share * a * b.transpose();
+    sum.bb.noalias() += share * b * b.transpose();
   }
+};
 
-  OverlapIntegrals<Dim>& sum_;
+template <int Dim>
+struct ListSink {
+  std::vector<OverlapPiece<Dim>>& pieces;
+  double volume;  ///< of a
+
+  void add(const Piece<Dim>& piece, double share) {
+    OverlapPiece<Dim>& listed = pieces.emplace_back();
+    for (int k = 0; k <= Dim; ++k) {
+      listed.in_a[k] = piece[k].in_a;
+      listed.in_b[k] = piece[k].in_b;
+    }
+    listed.volume = share * volume;
+  }
 };
 
 /// Whether a plane of `simplex` has all of the other one's corners on its outer side.
@@ -89,6 +116,13 @@ bool separates(const Simplex<Dim>& simplex, const Simplex<Dim>& other) {
   return largest.minCoeff() < kTouching;
 }
 
+template <int Dim>
+Piece<Dim> whole(const Simplex<Dim>& a, const Simplex<Dim>& b) {
+  Piece<Dim> piece;
+  for (int k = 0; k <= Dim; ++k) piece[k] = {Vec<Dim + 1>::Unit(k), b.barycentric(a.corners[k])};
+  return piece;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -97,9 +131,8 @@ bool integrate_overlap(const Simplex<Dim>& a, const Simplex<Dim>& b, OverlapInte
   integrals.ab.setZero();
   integrals.bb.setZero();
   if (separates(a, b) || separates(b, a)) return false;
-  typename Clipper<Dim>::Piece piece;
-  for (int k = 0; k <= Dim; ++k) piece[k] = {Vec<Dim + 1>::Unit(k), b.barycentric(a.corners[k])};
-  Clipper<Dim>(integrals).clip(piece, 0);
+  ProductSink<Dim> sink{integrals};
+  Clipper<Dim, ProductSink<Dim>>(sink).clip(whole(a, b), 0);
   const double scale = a.volume / ((Dim + 1) * (Dim + 2));
   integrals.aa *= scale;
   integrals.ab *= scale;
@@ -107,6 +140,16 @@ bool integrate_overlap(const Simplex<Dim>& a, const Simplex<Dim>& b, OverlapInte
   return integrals.volume() > 0;
 }
 
+template <int Dim>
+void list_overlap(const Simplex<Dim>& a, const Simplex<Dim>& b, std::vector<OverlapPiece<Dim>>& pieces) {
+  pieces.clear();
+  if (separates(a, b) || separates(b, a)) return;
+  ListSink<Dim> sink{pieces, a.volume};
+  Clipper<Dim, ListSink<Dim>>(sink).clip(whole(a, b), 0);
+}
+
+template void list_overlap<2>(const Simplex<2>&, const Simplex<2>&, std::vector<OverlapPiece<2>>&);
+template void list_overlap<3>(const Simplex<3>&, const Simplex<3>&, std::vector<OverlapPiece<3>>&);
 template bool integrate_overlap<2>(const Simplex<2>&, const Simplex<2>&, OverlapIntegrals<2>&);
 template bool integrate_overlap<3>(const Simplex<3>&, const Simplex<3>&, OverlapIntegrals<3>&);
 

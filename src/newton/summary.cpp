@@ -25,6 +25,8 @@ const char* to_string(Termination termination) {
       return "not feasible";
     case Termination::cancelled:
       return "cancelled";
+    case Termination::lagging:
+      return "loads do not settle";
   }
   return "";
 }

@@ -255,6 +255,9 @@ constexpr Key kKeys[] = {
     {"/solver/advanced/lump_mass_matrix", read, "boolean", "false", "", "mass in the vertices"},
     {"/solver/advanced/lagged_regularization_weight", only, "", "0", "", "not supported yet"},
     {"/solver/advanced/lagged_regularization_iterations", only, "", "1", "", "not supported yet"},
+    {"/solver/advanced/lagged_load_tolerance", read, "positive", "0.01", "",
+     "pressure on a boundary that is not closed may end so much of itself off that of the positions it acts on; a step "
+     "fails else"},
     {"/solver/advanced/check_inversion", only, "", "\"Discrete\"", "", "exact for linear elements"},
     {"/solver/advanced/characteristic_length", read, "number", "-1", "m",
      "scale of tolerances *_tol; not positive: diagonal of the bodies' box"},

@@ -65,6 +65,7 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
   setup.damping = read_damping(root, setup.time);
   setup.fields = read_fields(root);
   setup.lump_mass = read_lump_mass(root);
+  setup.lagged_load_tolerance = root["solver"]["advanced"]["lagged_load_tolerance"].positive(setup.lagged_load_tolerance);
   setup.order = read_order(root, body_ids(setup.mesh));
   setup.quadrature_degree = read_quadrature_degree(root);
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});

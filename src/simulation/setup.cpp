@@ -168,6 +168,7 @@ void StepSetup<Dim>::validate() const {
   check_functions("dirichlet", dirichlet, &DirichletCondition<Dim>::displacement);
   check_functions("neumann", neumann, &NeumannCondition<Dim>::traction);
   check_functions("pressure", pressure, &PressureCondition<Dim>::pressure);
+  require_positive("/solver/advanced/lagged_load_tolerance", lagged_load_tolerance);
   for (std::size_t i = 0; i < damping.size(); ++i) {
     require_not_negative(element("damping", i) + ".coefficient", damping[i].coefficient);
     require_at_least(element("damping", i) + ".lagging_rounds", damping[i].lagging_rounds, 1);

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "itr/simulation/step_problem.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "diagnosis.hpp"
@@ -17,19 +20,47 @@ namespace itr {
 
 namespace {
 
-constexpr double kFixedPoint = 1e-12;        ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
-constexpr std::size_t kLongestCycle = 16;    ///< rounds that are remembered
-constexpr int kPressureRounds = 50;          ///< most, where pressure has no potential
-constexpr int kPatience = 30;                ///< rounds without a smaller residual after which lagging will not converge
-constexpr double kSameState = 1e-3;          ///< of a solve's step tolerance: states nearer than that are one
-constexpr double kEnergyResolution = 1e-14;  ///< of moduli times volume
+constexpr double kFixedPoint = 1e-12;       ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
+constexpr std::size_t kLongestCycle = 16;   ///< rounds that are remembered
+constexpr int kPressureRounds = 50;         ///< most, where pressure has no potential
+constexpr double kLoadsWorthSaying = 1e-2;  ///< of what loads may be off: less is not said
+constexpr double kFrictionWorthSaying = 1e-2;   ///< of friction's forces: less is not said
+constexpr int kPatience = 30;                   ///< rounds without a smaller residual after which lagging will not converge
+constexpr double kSameState = 1e-3;             ///< of a solve's step tolerance: states nearer than that are one
+constexpr double kEnergyResolution = 1e-14;     ///< of moduli times volume
 constexpr double kVolumeRatioTolerance = 1e-3;  ///< relative, of the bound that is reported
 
+/// How rounds of lagging end.
+enum class RoundsEnd {
+  settled,  ///< another round changes nothing, to the solver's tolerances
+  asked,    ///< as many as the scene asks for, or forces to its tolerance
+  most,     ///< as many as there may be
+  cycle,    ///< an earlier round has been reached again
+  stalled   ///< forces have not come nearer for long
+};
+
+const char* to_string(RoundsEnd end) {
+  switch (end) {
+    case RoundsEnd::most:
+      return "out of rounds";
+    case RoundsEnd::cycle:
+      return "in a cycle";
+    case RoundsEnd::stalled:
+      return "not coming nearer";
+    default:
+      return "";
+  }
+}
+
 /// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
-bool has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance, double diagonal) {
-  if ((x - previous.back()).lpNorm<Eigen::Infinity>() <= kFixedPoint * diagonal) return true;
-  return std::any_of(previous.begin(), previous.end() - 1,
-                     [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
+std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
+                                      double diagonal) {
+  const double last = (x - previous.back()).lpNorm<Eigen::Infinity>();
+  if (last <= kFixedPoint * diagonal) return RoundsEnd::settled;
+  const bool has_met = std::any_of(previous.begin(), previous.end() - 1,
+                                   [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
+  if (!has_met) return std::nullopt;
+  return (x - previous.back()).norm() <= step_tolerance ? RoundsEnd::settled : RoundsEnd::cycle;
 }
 
 }  // namespace
@@ -241,9 +272,68 @@ int StepProblem<Dim>::most_rounds() const {
     rounds = setup_.contact.friction_iterations < 0 ? std::numeric_limits<int>::max() : setup_.contact.friction_iterations;
   if (!lagged_.damping.empty())
     for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
-  if (lagged_.pressure && lagged_.pressure->is_lagged(dofs_)) rounds = std::max(rounds, kPressureRounds);
-  if (lagged_.follower) rounds = std::max(rounds, kPressureRounds);
+  if (has_lagged_loads()) rounds = std::max(rounds, kPressureRounds);
   return rounds;
+}
+
+/// Loads that depend on the positions and have no potential.
+template <int Dim>
+bool StepProblem<Dim>::has_lagged_loads() const {
+  return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_));
+}
+
+/// By how much of itself what `part` adds to an energy changes from `lagged_` to `now`, in its forces on unknowns at x.
+template <int Dim>
+template <typename Part>
+double StepProblem<Dim>::change_of(const VectorX& x, const Lagged& now, const Part& part) {
+  const auto gradient_of = [&](const Lagged& lagged) {
+    EnergySum sum;
+    part(lagged, sum);
+    VectorX gradient = VectorX::Zero(x.size());
+    sum.add_gradient(x, gradient, workspace_);
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] == kNone) gradient[i] = 0;
+    return gradient;
+  };
+  const VectorX after = gradient_of(now);
+  const double size = after.norm();
+  return size > 0 ? (after - gradient_of(lagged_)).norm() / size : 0;
+}
+
+/// What a step is to say, or to fail for, where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or
+/// nothing.
+template <int Dim>
+void StepProblem<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds,
+                                     NewtonSummary& summary) {
+  if (!now) now = potential_.lag(x, workspace_);
+  if (has_lagged_loads()) {
+    const double off = change_of(x, *now, [](const Lagged& lagged, EnergySum& sum) {
+      if (lagged.pressure) sum.add(lagged.pressure);
+      if (lagged.follower) sum.add(lagged.follower);
+    });
+    if (off > setup_.lagged_load_tolerance) {
+      summary.termination = Termination::lagging;
+      summary.message = fmt::format(
+          "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves; "
+          "expected "
+          "at most {:g} (/solver/advanced/lagged_load_tolerance): a smaller time step, or a stiffness with the forces, may "
+          "settle "
+          "them",
+          off, how, rounds, setup_.lagged_load_tolerance);
+      return;
+    }
+    if (off > kLoadsWorthSaying * setup_.lagged_load_tolerance)
+      summary.message = fmt::format(
+          "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves", off,
+          how, rounds);
+  }
+  if (!lagged_.friction || !now->friction) return;
+  const double off = change_of(x, *now, [](const Lagged& lagged, EnergySum& sum) { sum.add(lagged.friction); });
+  if (off > kFrictionWorthSaying)
+    summary.message += fmt::format(
+        "{}friction is {:.2g} of itself off that of the contact forces reached, {} after {} solves "
+        "(/solver/contact/friction_iterations)",
+        summary.message.empty() ? "" : "; ", off, how, rounds);
 }
 
 /// x with held dofs at their targets.
@@ -289,8 +379,10 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
   VectorX best = x;
   Lagged best_lagged = lagged_;
   double least = std::numeric_limits<double>::infinity();
-  int best_round = 0;
-  for (int round = 1; summary.converged() && round < rounds; ++round) {
+  int best_round = 0, round = 1;
+  RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
+  std::optional<Lagged> now;  // what is lagged at x, where the last round made it
+  for (; summary.converged() && round < rounds; ++round) {
     Lagged next_lagged;
     VectorX gradient = VectorX::Zero(x.size());
     {
@@ -302,7 +394,10 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
     norm = std::sqrt(norm);
-    if (potential_.has_friction() && norm <= tolerance) break;
+    if (potential_.has_friction() && norm <= tolerance) {
+      end = RoundsEnd::asked;
+      break;
+    }
     if (norm < least) {
       least = norm;
       best = x;
@@ -311,11 +406,14 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     } else if (round - best_round >= kPatience) {
       x = best;
       lagged_ = best_lagged;
-      summary.message = "friction lagging does not converge: residual " + std::to_string(least) + " after " +
-                        std::to_string(round) + " rounds, asked " + std::to_string(tolerance);
+      end = RoundsEnd::stalled;
       break;
     }
-    if (has_recurred(x, previous, setup_.newton.step_tolerance, scope_->diagonal)) break;
+    if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, scope_->diagonal)) {
+      end = *recurred;
+      now = std::move(next_lagged);
+      break;
+    }
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
     previous.push_back(x);
     lagged_ = std::move(next_lagged);
@@ -323,8 +421,13 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     const bool is_fixed_point = next.converged() && next.iterations == 0;
     next.add_effort(summary);
     summary = next;
-    if (is_fixed_point) break;
+    if (is_fixed_point) {
+      end = RoundsEnd::settled;
+      break;
+    }
   }
+  const bool is_open = end == RoundsEnd::most || end == RoundsEnd::cycle || end == RoundsEnd::stalled;
+  if (summary.converged() && is_open) judge_lagging(x, std::move(now), to_string(end), round, summary);
   return summary;
 }
 

@@ -91,9 +91,9 @@ def results(context):
     if not context.quick:
         smooth = press(context, "frictionless", 2, 1, friction=0)
         yield compare("frictionless: block's top [mm]", smooth.sinks, SINKS, None, smooth.note)
-        # Not judged: Hertz's formula is of small strains and a flat contact, here are strains of 5 % and an eighth of the radius; on
-        # meshes of half the size it is 2.1 % off. Case hertz has it where it holds.
-        yield compare("frictionless: peak pressure [MPa]", smooth.peak, PEAK, None)
+        # Hertz's formula is of small strains and a flat contact, here are strains of 5 % and an eighth of the radius: on meshes of half
+        # the size the peak is 2.1 % off. On this one 2 % leaves a quarter for what the code does.
+        yield compare("frictionless: peak pressure [MPa]", smooth.peak, PEAK, 0.02)
         yield compare("force through the contact [N/mm]", smooth.force, FORCE, 1e-6)
     context.table("runs", ["series", "unknowns", "processor seconds", "sinks", "half-width", "peak"],
                   [[name, s.unknowns, *(f"{x:.6g}" for x in (s.seconds, s.sinks, s.half_width, s.peak))]

@@ -35,7 +35,7 @@ def counts(entry):
 
 def run_of(entry):
     """When and of which commit; entries of before versions were stored with each have none."""
-    return ", ".join(filter(None, [entry["mode"], entry["date"], entry.get("versions", {}).get("itr")]))
+    return ", ".join(filter(None, [entry["mode"], entry["date"], entry.get("versions", {}).get("itr", "").partition(" ")[0]]))
 
 
 def age(changes):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What is stored of earlier runs, the commit that each was made at, and how much of what it depends on changed since."""
+"""What is stored of earlier runs: the commit that each was made at, the hash of the sources that it depends on, and what is stale."""
 import csv
+import functools
+import hashlib
 import json
 import pathlib
 import subprocess
@@ -8,6 +10,7 @@ import subprocess
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 CODE = ("src", "include", "backends")
 LINEAR = ("src/linear", "include/itr/linear", "backends")
+PAPER = ROOT / "verification/paper"
 
 # File, and what of the project its figures depend on. A case of the report has its own test file in it too.
 STORED = {
@@ -15,12 +18,16 @@ STORED = {
     "verification/paper/results.csv": CODE,
     "verification/newton/results.csv": ("src/newton", "include/itr/newton"),
     "verification/scaling/results.csv": LINEAR,
+    "verification/scaling/million.csv": CODE,
+    "verification/scaling/ranks.csv": LINEAR,
     "verification/solvers/results.csv": LINEAR,
     "verification/solvers/end_to_end.csv": LINEAR,
     "verification/stability/results.csv": CODE,
     "verification/needs/results.csv": CODE,
-    **{str(path.relative_to(ROOT)): CODE for path in sorted((ROOT / "verification/paper").glob("*/study.json"))},
+    **{str(path.relative_to(ROOT)): CODE for path in sorted([*PAPER.glob("*/study.json"), *PAPER.glob("*/steps.csv")])},
 }
+# Tables that the report's cases and the studies write beside what STORED names, and runs that have a made of their own.
+BESIDE = ("verification/report/*.csv", "verification/paper/*/study.csv")
 
 
 def git(*arguments):
@@ -41,30 +48,63 @@ def commit():
     return made if git("diff", "--quiet", "HEAD", "--", *CODE, "verification/*.py") is not None else made + "-dirty"
 
 
-def commits_of(path):
-    """Pairs of what a stored file has and the commit that it was made at."""
+def sources(paths, at=None):
+    """The hash of the files in these paths, as they are in the working tree or at a commit; empty where git does not know it."""
+    if at is None:
+        listed = git("ls-files", "-s", "--", *paths)
+        changed = git("diff", "--name-only", "HEAD", "--", *paths)
+    else:
+        listed, changed = git("ls-tree", "-r", at, "--", *paths), ""
+    if listed is None or changed is None:
+        return ""
+    blobs = {}
+    for line in listed.splitlines():
+        what, _, name = line.partition("\t")
+        blobs[name] = what.split()[1 if at is None else 2]
+    for name in filter(None, changed.splitlines()):
+        if (ROOT / name).exists():
+            blobs[name] = git("hash-object", "--", name)
+        else:
+            blobs.pop(name, None)
+    text = "".join(f"{blob} {name}\n" for name, blob in sorted(blobs.items()))
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def made(path, case=None):
+    """What is stored with a result: "commit hash", the hash of what STORED says that the file depends on, as it is now."""
+    return f"{commit()} {sources(depends_on(path, case))}"
+
+
+def depends_on(path, case=None):
+    return (*STORED.get(path, CODE), *([f"verification/cases/{case}.py"] if case else []))
+
+
+def made_of(path):
+    """(what, case or None, made) of all that a stored file has: "commit hash", or "commit" alone from before there were hashes."""
     if path.endswith(".json"):
         content = json.loads((ROOT / path).read_text())
         if "cases" not in content:
-            return [(path, content.get("commit", ""))]
-        cases = content["cases"]
-        return [(f"{path}: {name}", case.get("versions", {}).get("itr", "")) for name, case in cases.items()]
+            return [(path, None, content.get("commit", ""))]
+        return [(f"{path}: {name}", name, case.get("versions", {}).get("itr", "")) for name, case in content["cases"].items()]
     with open(ROOT / path, newline="") as file:
         rows = list(csv.DictReader(file))
-    made = sorted({row.get("commit") or "" for row in rows})
-    # Files from before there was such a column: made no later than they were stored.
-    return [(path, one or git("log", "-1", "--format=%h", "--", path) or "") for one in made]
+    return [(path, None, one) for one in sorted({row.get("commit") or "" for row in rows})]
 
 
-def changes_since(made, paths):
+def changes_since(at, paths):
     """Commits to these paths after one, uncommitted changes at the time not counted; None where git does not know it."""
-    count = git("rev-list", "--count", f"{made.removesuffix('-dirty')}..HEAD", "--", *paths)
+    count = git("rev-list", "--count", f"{at.removesuffix('-dirty')}..HEAD", "--", *paths)
     return None if count is None else int(count)
 
 
 def ages():
-    """(what, commit, changes since or None) of all that is stored."""
-    for path, depends in STORED.items():
-        for what, made in commits_of(path):
-            case = [f"verification/cases/{what.rpartition(' ')[2]}.py"] if what != path and path.endswith(".json") else []
-            yield what, made, changes_since(made, [*depends, *case]) if made else None
+    """(what, commit, changes since or None) of all that is stored: 0 only where the sources are the same to the byte."""
+    now = functools.cache(sources)
+    for path in STORED:
+        for what, case, one in made_of(path):
+            at, _, then = one.partition(" ")
+            paths = depends_on(path, case)
+            changes = changes_since(at, paths) if at else None
+            if then:
+                changes = 0 if then == now(paths) else max(1, changes) if changes is not None else None
+            yield what, at, changes

@@ -120,7 +120,7 @@ def measure(name, options):
     own = [word for one in sets for word in ("--set", one)]
     terms, unknowns = explained(options.itr, scene, own)
     row = Row(name, " ".join(terms), " ".join(term for term in TERMS if term not in terms and term != "inertia"), unknowns,
-              commit=stored.commit())
+              commit=stored.made("verification/needs/results.csv"))
     folders = [options.runs / name.replace(" ", "_") / kind for kind in ("chosen", "everything")]
     dim = 3 if "3D" in scene.name or scene.parent.name in ("twisting-beam", "rollers", "spikes3d") or "cube" in scene.name else 2
     more = own + [word for one in everything(dim, terms, "remeshing" in terms) for word in ("--set", one)]

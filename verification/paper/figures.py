@@ -70,6 +70,27 @@ def run(name, options):
         return False
 
 
+def note_commit(results):
+    """Which sources make the steps from the next one on; a run may go on with others than it began with."""
+    steps = results / "steps.jsonl"
+    first = sum(1 for _ in open(steps)) if steps.exists() else 0
+    results.mkdir(parents=True, exist_ok=True)
+    with open(results / "commits", "a") as file:
+        file.write(f"{first} {stored.made(f'verification/paper/{results.name}/steps.csv')}\n")
+
+
+def commits_of(results):
+    """Pairs of a first step and what made the steps from there on."""
+    noted = dict(line.split(" ", 1) for line in (results / "commits").read_text().splitlines())
+    pairs = sorted((int(first), made) for first, made in noted.items())
+    return [pair for before, pair in zip([(None, None), *pairs], pairs) if pair[1] != before[1]]
+
+
+def in_words(commits):
+    first, *others = [(step, made.partition(" ")[0]) for step, made in commits]
+    return ", ".join([first[1], *(f"from step {step} on {commit}" for step, commit in others)])
+
+
 def steps_of(results):
     """A row a step. The gain is the paper's -dE: from the end of the first solve to the end of the last, on its mesh [J]."""
     rows = []
@@ -160,15 +181,16 @@ def publish(name, options):
     results = options.runs / name
     (HERE / name).mkdir(exist_ok=True)
     rows = steps_of(results)
+    commits = commits_of(results)
+    made = lambda row: next(one for first, one in reversed(commits) if row["step"] >= first)
     with open(HERE / name / "steps.csv", "w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer = csv.DictWriter(file, [*COLUMNS, "commit"], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows)
+        writer.writerows({**row, "commit": made(row)} for row in rows)
     certified = subprocess.run([str(options.itr), "certify", str(results)], stdout=subprocess.DEVNULL).returncode == 0
     draw_effectiveness(rows, HERE / name / "effectiveness.svg")
     panels = draw(name, options, rows)
-    made = (results / "commit").read_text() if (results / "commit").exists() else stored.commit()
-    (HERE / name / "README.md").write_text(page(name, rows, panels, certified, made))
+    (HERE / name / "README.md").write_text(page(name, rows, panels, certified, in_words(commits)))
     return certified
 
 
@@ -183,8 +205,8 @@ def main():
     failed = 0
     for name in options.only or SCENES:
         if not options.draw:
+            note_commit(options.runs / name)
             done = run(name, options)
-            (options.runs / name / "commit").write_text(stored.commit())
             print(f"{name}: {'to its end' if done else 'stopped'}", flush=True)
         failed += not publish(name, options)
     return 1 if failed else 0

@@ -202,7 +202,7 @@ def run(case, options):
         "unknowns_mean": sum(s["unknowns"] for s in steps) / len(steps), "unknowns_max": max(s["unknowns"] for s in steps),
         "tried": sum(s[k]["tried"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
         "reference_seconds": reference[0] if reference else None, "reference_gain": reference[1] if reference else None,
-        "reference_mb": reference[2] if reference else None, "commit": stored.commit(),
+        "reference_mb": reference[2] if reference else None, "commit": stored.made("verification/paper/results.csv"),
     }
     ratio = f"{row['reference_seconds'] / per_step:8.1f}x" if row["reference_seconds"] else " " * 9
     print(f"{name:38} {'ok' if status == 0 else 'STOPPED':8}{'certified' if certified else 'NOT CERTIFIED':14}"

@@ -113,7 +113,7 @@ def main():
            "line_search_s": seconds("line_search"), "ccd_s": seconds("ccd"), "processor_s": round(total("processor_seconds"), 1),
            "peak_mb": round(max(step["peak_rss_mb"] for step in steps)),
            "certified": subprocess.run([str(itr), "certify", str(folder)], stdout=subprocess.DEVNULL, check=False).returncode == 0,
-           "commit": stored.commit()}
+           "commit": stored.made("verification/scaling/million.csv")}
     print(json.dumps(row, indent=1))
     if arguments.store:
         file = HERE / "million.csv"

@@ -57,7 +57,7 @@ def main():
         cubes.write_system(system, 3, cells)
         for ranks in arguments.ranks:
             row = measure(arguments.build / "bin" / "itr_solver_bench", system, ranks, arguments.work)
-            rows.append({key: row.get(key, "") for key in KEYS} | {"ranks": ranks, "commit": stored.commit()})
+            rows.append({key: row.get(key, "") for key in KEYS} | {"ranks": ranks, "commit": stored.made("verification/scaling/ranks.csv")})
             print(rows[-1], flush=True)
     with open(arguments.output / "ranks.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, KEYS)

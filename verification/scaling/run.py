@@ -207,7 +207,7 @@ def main():
     with open(arguments.output / "results.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, KEYS, extrasaction="ignore")
         writer.writeheader()
-        writer.writerows({**row, "commit": stored.commit()} for row in rows)
+        writer.writerows({**row, "commit": stored.made("verification/scaling/results.csv")} for row in rows)
     (arguments.output / "model.json").write_text(json.dumps(laws, indent=1) + "\n", encoding="utf-8")
     text = tables(rows, laws, memory)
     (arguments.output / "tables.md").write_text(text, encoding="utf-8")

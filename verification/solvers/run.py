@@ -53,7 +53,7 @@ END_KEYS = ["scene", "solver", "reuse", "outcome", "steps", "newton_iterations",
             "linear_iterations", "total_s", "linear_s", "energy", "commit"]
 KEYS = ["scene", "solver", "ranks", "unknowns", "nonzeros", "outcome", "analyze_s", "factorize_s", "solve_s",
         "bare_factorize_s", "bare_solve_s", "overhead", "factor_nonzeros", "factor_mb", "largest_rank_mb", "flops", "iterations",
-        "residual"]
+        "residual", "commit"]
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
                    OMPI_MCA_rmaps_base_oversubscribe="1")
 
@@ -329,7 +329,7 @@ def main():
                         row.update(solve(bench, system, solver, flags, ranks, arguments.seconds, arguments.gib))
                     if row["outcome"] not in ("ok", "not converged"):
                         beaten.add((solver, ranks))
-                    row.update(scene=name, solver=solver, ranks=ranks)
+                    row.update(scene=name, solver=solver, ranks=ranks, commit=stored.made("verification/solvers/results.csv"))
                     rows.append(row)
                     print(json.dumps(row), flush=True)
         for solver, reuse in itertools.product(solvers, (True, False)):
@@ -340,7 +340,8 @@ def main():
             end = {"outcome": "left out"} if solver == "dense" and name.endswith("3D") else kept(
                 folder.with_suffix(".json"),
                 lambda: run_scene(itr, scene, sets, solver, folder, arguments.end_seconds, arguments.gib))
-            ends.append({"scene": name, "solver": solver, "reuse": "on" if reuse else "off", "commit": stored.commit(), **end})
+            ends.append({"scene": name, "solver": solver, "reuse": "on" if reuse else "off",
+                         "commit": stored.made("verification/solvers/end_to_end.csv"), **end})
             print(json.dumps(ends[-1]), flush=True)
         write(rows, ends, arguments.output)
     print(write(rows, ends, arguments.output))

@@ -9,9 +9,11 @@ same end, and two threads to the same bits. The exit status is 1 if one fails th
 among the KNOWN of hard_cases.py, or one of these passes.
 """
 import argparse
+import dataclasses
 import math
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -27,7 +29,11 @@ from table import Verdict, number, read, write  # noqa: E402
 
 TIME_LIMIT = 300  # of a run [s]; a limit on processor time would make the kernel count it by ticks
 OTHER_SOLVER = "cholmod:supernodal"
+CERTIFIED, NOT_CERTIFIED = 0, 4  # exit statuses of `itr certify`
 ENERGY_BAR = 1e-6    # growth in a step, by the largest energy of motion, strain and contact so far
+# The same of driven scenes: the forces at the ends of a step bracket its work only where they change one way within it. Over a sharp
+# corner they do not: 1.3 % there, 0.005 % in steps half as long.
+DRIVEN_ENERGY_BAR = 2e-2
 BALANCE_BAR = 1e-3   # of momentum and forces, by the sum of the forces' sizes
 AGREEMENT_BAR = 1e-6  # of positions by the scene's extent; where meshes differ, of energies AGREEMENT_OF_ENERGY
 AGREEMENT_OF_ENERGY = 1e-2
@@ -45,10 +51,19 @@ def call(build, *arguments):
 
 
 def violations(build, scene, folder):
-    """What `itr certify` finds; where nothing touches, bodies may pass through themselves."""
+    """What `itr certify` finds; where nothing touches, bodies may pass through themselves. A certificate that was not made, or
+    that fails without a reason, is a violation."""
     done = subprocess.run([str(build / "bin/itr"), "certify", str(folder)], capture_output=True, text=True)
-    found = done.stdout.splitlines()[:-1]
-    return found if scene.contact else [line for line in found if "inverted" in line or "degenerate" in line]
+    lines = done.stdout.splitlines()
+    summary = lines[-1] if lines else ""
+    if done.returncode not in (CERTIFIED, NOT_CERTIFIED) or not summary.startswith(tuple("0123456789")) or " frames" not in summary:
+        return [f"certify ended with status {done.returncode}: {(done.stderr.strip().splitlines() or ['nothing said'])[-1]}"]
+    if int(summary.split()[0]) != len(frame_paths(folder)):
+        return [f"certify saw {summary.split()[0]} of {len(frame_paths(folder))} frames"]
+    found = lines[:-1]
+    if (done.returncode == CERTIFIED) != (not found):
+        return [f"certify ended with status {done.returncode} and named {len(found)} violations"]
+    return found if scene.contact else [line for line in found if not re.search(" intersect| inside of | is on ", line)]
 
 
 def simulate(build, scene, folder, *more):
@@ -57,42 +72,74 @@ def simulate(build, scene, folder, *more):
     return "" if status == 0 else words or f"exit status {status}"
 
 
+@dataclasses.dataclass
+class Totals:
+    """Of a frame."""
+    kinetic: float
+    momentum: np.ndarray
+    force: object  # sum of all forces on the bodies
+    size: float    # sum of their sizes
+    reaction: np.ndarray | None = None   # of what holds a vertex
+    velocity: np.ndarray | None = None   # of the vertices
+    touch: object = 0.0                  # sum of contact and friction
+    obstacles: np.ndarray | None = None  # positions
+
+
 def totals(path):
-    """Of a frame: kinetic energy, momentum, sum of all forces, sum of their sizes."""
     import h5py
     with h5py.File(path) as file:
-        forces = [file["fields/" + name][()] for name in ("contact_force", "friction_force", "reaction_force")
-                  if "fields/" + name in file]
-        return (float(file["totals/kinetic_energy"][()][0]), file["totals/momentum"][()].ravel(),
-                sum(f.sum(axis=0) for f in forces) if forces else 0.0, sum(np.abs(f).sum() for f in forces))
+        field = lambda name: file["fields/" + name][()] if "fields/" + name in file else None
+        forces = {name: field(name + "_force") for name in ("contact", "friction", "reaction")}
+        there = [f for f in forces.values() if f is not None]
+        touch = [forces[name] for name in ("contact", "friction") if forces[name] is not None]
+        return Totals(float(file["totals/kinetic_energy"][()][0]), file["totals/momentum"][()].ravel(),
+                      sum(f.sum(axis=0) for f in there) if there else 0.0, sum(np.abs(f).sum() for f in there), forces["reaction"],
+                      field("v"), sum(f.sum(axis=0) for f in touch) if touch else 0.0, file["obstacles/x"][()])
+
+
+def work(before, now, dt):
+    """Most that held vertices and obstacles can have put in between two frames: by the forces at either end, if the mesh is one [J].
+    NaN where obstacles move unlike each other, since contact forces are known by body only."""
+    moved = dt * now.velocity
+    most = []
+    for end in (before, now):
+        if end.reaction is not None and end.reaction.shape == moved.shape:
+            most.append(float((end.reaction * moved).sum()))
+    done = max(most, default=0.0)
+    if len(now.obstacles) and not np.array_equal(now.obstacles, before.obstacles):
+        shift = now.obstacles - before.obstacles
+        alike = np.abs(shift - shift[0]).max() <= 1e-9 * np.abs(shift).max()
+        done += max(float(np.dot(end.touch, shift[0])) for end in (before, now)) if alike else math.nan
+    return done
 
 
 def frame_paths(folder):
     return sorted((folder / "frames").glob("*.h5"))
 
 
-def energy_growth(scene, run, states):
-    """Largest growth in a step by what is stored so far; of driven scenes nothing but that it is finite."""
-    rows = [(0.0 if scene.quasistatic else state[0], s["energy"]) for s, state in zip(run.steps, states)]
-    stored_energy = [kinetic + e["elastic"] + e["contact"] for kinetic, e in rows]
-    whole = [own + e["body"] for own, (_, e) in zip(stored_energy, rows)]
+def energy_growth(scene, steps, states):
+    """Largest growth in a step beyond the work of what moves held vertices and obstacles, by what is stored so far."""
+    stored_energy = [(0.0 if scene.quasistatic else state.kinetic) + s["energy"]["elastic"] + s["energy"]["contact"]
+                     for s, state in zip(steps, states)]
+    whole = [own + s["energy"]["body"] for own, s in zip(stored_energy, steps)]
     if not np.isfinite(whole).all():
         return math.nan
-    if scene.driven or scene.quasistatic:
-        return 0.0
-    return max((b - a) / max(max(np.abs(stored_energy[:k + 2])), 1e-300) for k, (a, b) in enumerate(zip(whole, whole[1:])))
+    done = [work(a, b, scene.dt) if scene.driven else 0.0 for a, b in zip(states, states[1:])]
+    return max((b - a - w) / max(max(np.abs(stored_energy[:k + 2])), 1e-300)
+               for k, (a, b, w) in enumerate(zip(whole, whole[1:], done)))
 
 
 def balance(scene, states):
-    """Largest imbalance of a step: change of momentum, contact, friction, what holds, and weight; by the largest so far."""
+    """Largest imbalance of a step: change of momentum, contact, friction, what holds, and weight; by the largest so far. A
+    projection onto another mesh keeps momentum, so remeshing changes nothing here."""
     weight = np.zeros(scene.dim)
     weight[1] = -scene.gravity * scene.mass
     worst = size = 0.0
     for before, now in zip(states, states[1:]):
-        inertia = 0 if scene.quasistatic else (now[1] - before[1]) / scene.dt
-        size = max(size, now[3] + np.abs(weight).sum() + np.abs(inertia).sum())
+        inertia = 0 if scene.quasistatic else (now.momentum - before.momentum) / scene.dt
+        size = max(size, now.size + np.abs(weight).sum() + np.abs(inertia).sum())
         if size > 0:
-            worst = max(worst, float(np.abs(inertia - now[2] - weight).max() / size))
+            worst = max(worst, float(np.abs(inertia - now.force - weight).max() / size))
     return worst
 
 
@@ -144,7 +191,7 @@ def judge(name, build, runs):
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     scene = cases.build(name, folder)
-    verdict = Verdict(name, dim=scene.dim, remeshed=scene.remesh is not None, commit=stored.commit())
+    verdict = Verdict(name, dim=scene.dim, remeshed=scene.remesh is not None, commit=stored.made("verification/stability/results.csv"))
     failures = []
     if reason := simulate(build, scene, folder / "one", "--threads", 1):
         failures.append("does not finish: " + reason.split("; `itr run`")[0])
@@ -164,13 +211,12 @@ def judge(name, build, runs):
         verdict.vertices = steps[-1]["vertices"]
         if reverted := sum(s["reverted_remeshes"] for s in steps):
             failures.append(f"{reverted} times a step's remeshing was dropped")
-        verdict.energy_growth = energy_growth(scene, run, states)
-        if not verdict.energy_growth <= ENERGY_BAR:
+        verdict.energy_growth = energy_growth(scene, run.steps, states)
+        if not verdict.energy_growth <= (DRIVEN_ENERGY_BAR if scene.driven else ENERGY_BAR):
             failures.append(f"energy grows by {verdict.energy_growth:.2g} in a step")
-        if not verdict.remeshed:
-            verdict.balance = balance(scene, states)
-            if not verdict.balance <= BALANCE_BAR:
-                failures.append(f"forces are off balance by {verdict.balance:.2g}")
+        verdict.balance = balance(scene, states)
+        if not verdict.balance <= BALANCE_BAR:
+            failures.append(f"forces are off balance by {verdict.balance:.2g}")
         failures += compare_runs(build, scene, folder, run, verdict)
     verdict.failures = "; ".join(failures)
     verdict.passed = not failures

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "itr/core/types.hpp"
 #include "itr/geometry/measures.hpp"
@@ -37,5 +38,17 @@ struct OverlapIntegrals {
 /// quadratic. Returns false, with zeros, where a plane of either separates the two or what is left is round-off.
 template <int Dim>
 bool integrate_overlap(const Simplex<Dim>& a, const Simplex<Dim>& b, OverlapIntegrals<Dim>& integrals);
+
+/// A simplex of the intersection of two, by barycentric coordinates of its corners in both.
+template <int Dim>
+struct OverlapPiece {
+  std::array<Vec<Dim + 1>, Dim + 1> in_a, in_b;
+  double volume = 0;
+};
+
+/// For integrands of a higher degree: the simplices that integrate_overlap integrates over, in its order. Empty where it
+/// returns false.
+template <int Dim>
+void list_overlap(const Simplex<Dim>& a, const Simplex<Dim>& b, std::vector<OverlapPiece<Dim>>& pieces);
 
 }  // namespace itr

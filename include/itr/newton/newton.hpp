@@ -101,7 +101,8 @@ enum class Termination {
   iterations,  ///< out of iterations
   no_descent,  ///< no direction or no step that lowers the energy, and the gradient is not small
   infeasible,  ///< the start is not feasible or a number is not finite
-  cancelled    ///< as NewtonOptions::cancel or NewtonExtras::on_iteration asks for
+  cancelled,   ///< as NewtonOptions::cancel or NewtonExtras::on_iteration asks for
+  lagging      ///< of several solves: the loads that are lagged from one to the next do not settle
 };
 const char* to_string(Termination termination);
 

@@ -25,6 +25,10 @@ struct FrameDistance {
 /// have different dimensions.
 FrameDistance frame_distance(const std::filesystem::path& frame, const std::filesystem::path& reference);
 
+/// Largest mean displacement of a body (by id), over the diagonal of the box of the bodies at rest and the obstacles. Throws
+/// InputError where the file is unreadable.
+double flight(const std::filesystem::path& frame);
+
 /// What a frame says of all bodies together, where its scene asked for it (FieldOptions).
 struct FrameTotals {
   int step = 0;

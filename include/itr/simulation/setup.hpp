@@ -104,6 +104,9 @@ struct StepSetup {
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   FieldOptions fields;
   bool lump_mass = false;
+  /// Pressure and follower forces that have no potential are taken at the solution of the solve before. A step fails where
+  /// they end farther off those of its own solution than this share of themselves.
+  double lagged_load_tolerance = 1e-2;
   int quadrature_degree = kElasticDegree;  ///< of elasticity on cells with curved edges: 1 to 5
 
   // What only a program can add.

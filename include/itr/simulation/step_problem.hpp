@@ -80,6 +80,10 @@ class StepProblem {
   bool is_better_start(const VectorX& start, const VectorX& x);
   VectorX start_of_solve(const VectorX& x);
   int most_rounds() const;
+  bool has_lagged_loads() const;
+  template <typename Part>
+  double change_of(const VectorX& x, const Lagged& now, const Part& part);
+  void judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds, NewtonSummary& summary);
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;
 

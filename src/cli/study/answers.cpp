@@ -8,6 +8,8 @@
 #include <limits>
 #include <optional>
 
+#include "curves.hpp"
+
 namespace itr::cli::study {
 
 namespace {
@@ -16,65 +18,10 @@ using Kind = Series::Kind;
 
 constexpr int kDecades = 6;  ///< of errors, at most, in a table
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kQuadratic = "uniform-p2";
 
-/// A run with an error and a cost, both positive.
-struct Point {
-  const Row* row;
-  double error, cost;
-};
-
-/// Of one series (or, without a name, of all but those that vary something else than the mesh), the largest error first.
-std::vector<Point> points(const Results& results, const char* series, const Measure& measure, const Cost& cost) {
-  std::vector<Point> found;
-  for (const auto& row : results.rows) {
-    const bool is_meant = series ? std::string(series) == row.run.series->name
-                                 : row.run.series->kind != Kind::solvers && row.run.series->kind != Kind::time_steps;
-    if (!is_meant || !row.errors || !row.certified) continue;
-    const Point point{&row, (*row.errors).*measure.value, row.*cost.value};
-    if (point.error > 0 && point.cost > 0) found.push_back(point);
-  }
-  std::stable_sort(found.begin(), found.end(), [](const Point& a, const Point& b) { return a.error > b.error; });
-  return found;
-}
-
-/// Those that no other run beats in both.
-std::vector<Point> front(const std::vector<Point>& all) {
-  std::vector<Point> kept;
-  for (std::size_t i = all.size(); i-- > 0;) {  // the least error first
-    if (kept.empty() || all[i].cost < kept.back().cost) kept.push_back(all[i]);
-  }
-  std::reverse(kept.begin(), kept.end());
-  return kept;
-}
-
-/// What an error costs, by straight lines in logarithms; the cheapest run's cost for larger errors; none for smaller ones.
-std::optional<double> cost_at(const std::vector<Point>& front, double error) {
-  if (front.empty() || error < front.back().error) return std::nullopt;
-  if (error >= front.front().error) return front.front().cost;
-  const auto after = std::find_if(front.begin(), front.end(), [&](const Point& p) { return p.error <= error; });
-  const Point &a = *(after - 1), &b = *after;
-  const double share = std::log(error / a.error) / std::log(b.error / a.error);
-  return a.cost * std::pow(b.cost / a.cost, share);
-}
-
-double slope(const std::vector<Point>& all) {
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
-  for (const auto& p : all) {
-    const double u = std::log(p.cost), v = std::log(p.error);
-    n += 1, x += u, y += v, xx += u * u, xy += u * v;
-  }
-  const double spread = n * xx - x * x;
-  return spread > 1e-12 * n * xx ? (n * xy - x * y) / spread : kNan;
-}
-
-std::string show(double error, const Measure& measure) {
-  if (*measure.unit) return fmt::format("{:.2g} {}", error, measure.unit);
-  return error < 1e-3 ? fmt::format("{:.2g} %", 100 * error) : fmt::format("{:.3g} %", 100 * error);
-}
-
-/// Those that answers are about; the others are in tables and plots.
-bool is_judged(const Measure& measure) {
-  return measure.value == &Errors::l2 || measure.value == &Errors::h1 || measure.value == &Errors::energy;
+bool is_any_of(const std::string& name, const std::vector<std::string>& names) {
+  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 /// The step-th of ..., 0.1, 0.2, 0.5, 1, ... from the largest not above `value`, downward.
@@ -87,25 +34,66 @@ double ladder_below(double value, int step) {
 }
 
 /// "0.3", "0.3 to 0.5"
-std::string range(double a, double b) {
-  const std::string low = fmt::format("{:.2g}", std::min(a, b)), high = fmt::format("{:.2g}", std::max(a, b));
+std::string range(const std::vector<double>& values) {
+  const auto [least, largest] = std::minmax_element(values.begin(), values.end());
+  const std::string low = fmt::format("{:.2g}", *least), high = fmt::format("{:.2g}", *largest);
   return low == high ? low : low + " to " + high;
 }
 
+/// "at 5 %", "from 5 % to 2 %"
+std::string from_to(const std::vector<double>& errors, const Measure& measure) {
+  const std::string first = show(errors.front(), measure), last = show(errors.back(), measure);
+  return first == last ? "at " + first : "from " + first + " to " + last;
+}
+
+/// Uniform refinement's costs, by fronts.
+struct Uniform {
+  std::vector<Point> linear, quadratic, linear_unknowns;
+
+  Uniform(const Results& results, const Measure& measure, bool with_quadratic)
+      : linear(front(points(results, linear_uniform(), measure, costs()[0]))),
+        linear_unknowns(front(points(results, linear_uniform(), measure, costs()[1]))) {
+    if (with_quadratic) quadratic = front(points(results, {kQuadratic}, measure, costs()[0]));
+  }
+  bool empty() const { return linear.empty() && quadratic.empty(); }
+  /// The lesser of both.
+  std::optional<double> cost_at(double error) const {
+    const auto a = study::cost_at(linear, error), b = study::cost_at(quadratic, error);
+    return a && b ? std::min(*a, *b) : a ? a : b;
+  }
+  Verdict::Point finest() const {
+    Verdict::Point finest;
+    finest.error = std::numeric_limits<double>::infinity();
+    for (const auto* all : {&linear, &quadratic}) {
+      if (all->empty()) continue;
+      finest.error = std::min(finest.error, all->back().error);
+      finest.seconds = std::max(finest.seconds, all->back().cost);
+    }
+    return finest;
+  }
+};
+
 std::optional<Verdict> judge(const Results& results, const Series& series, const Measure& measure) {
-  const Cost &time = costs()[0], &unknowns = costs()[1];
-  const auto uniform = front(points(results, "uniform", measure, time));
-  const auto uniform_unknowns = front(points(results, "uniform", measure, unknowns));
-  const auto own = front(points(results, series.name, measure, time));
+  const Uniform uniform(results, measure, series.name != std::string(kQuadratic));
+  const auto own = points(results, {series.name}, measure, costs()[0]), best = front(own);
   if (uniform.empty() || own.empty()) return std::nullopt;
-  Verdict verdict{&series, &measure, {}, {}, {}, own.front().error, {}};
-  verdict.finest_uniform = {uniform.back().error, 0, 0, 0};
-  for (const auto& point : points(results, "uniform", measure, time))
-    verdict.finest_uniform.seconds = std::max(verdict.finest_uniform.seconds, point.cost);
+  Verdict verdict{&series, &measure, {}, true, {}, {}, 0, uniform.finest()};
+  verdict.is_recommended = can_recommend(results, measure) && can_recommend(results, measure, series.name);
+  const auto ratio = [](double cost, std::optional<double> by) { return by ? cost / *by : kNan; };
   for (const auto& point : own) {
-    const auto cost = cost_at(uniform, point.error), size = cost_at(uniform_unknowns, point.error);
-    verdict.points.push_back(
-        {point.error, point.cost, cost ? point.cost / *cost : kNan, size ? point.row->unknowns / *size : kNan});
+    const auto beats = [&](const Point& p) { return p.error <= point.error && p.cost <= point.cost && p.row != point.row; };
+    const auto better = std::find_if(best.begin(), best.end(), beats);
+    verdict.points.push_back({.run = point.row->run.name,
+                              .error = point.error,
+                              .seconds = point.cost,
+                              .time_ratio = ratio(point.cost, cost_at(uniform.linear, point.error)),
+                              .quadratic_ratio = ratio(point.cost, cost_at(uniform.quadratic, point.error)),
+                              .unknowns_ratio = ratio(point.row->unknowns, cost_at(uniform.linear_unknowns, point.error)),
+                              .beaten_by = better == best.end() ? "" : better->row->run.name,
+                              .is_large = is_large(results, *point.row, measure)});
+    if (verdict.points.back().is_large) continue;
+    if (verdict.largest_error == 0) verdict.largest_error = point.error;
+    const auto cost = uniform.cost_at(point.error);
     const bool pays = point.cost < cost.value_or(verdict.finest_uniform.seconds);
     if (!pays && !cost) {
       if (!verdict.untold_from) verdict.untold_from = point.error;
@@ -114,28 +102,37 @@ std::optional<Verdict> judge(const Results& results, const Series& series, const
     if (!pays) verdict.pays_from.reset();
     if (pays && !verdict.pays_from) verdict.pays_from = point.error;
   }
+  verdict.is_recommended &= verdict.largest_error > 0;
+  if (!verdict.is_recommended) verdict.pays_from.reset();
   return verdict;
 }
 
 std::string in_words(const Verdict& verdict) {
   const Measure& measure = *verdict.measure;
-  std::string text = fmt::format("{}, `{}` ({}):", measure.label, verdict.series->name, verdict.series->what);
-  std::vector<double> times, sizes, errors;
+  const std::string head = fmt::format("{}, `{}` ({}):", measure.label, verdict.series->name, verdict.series->what);
+  if (!verdict.is_recommended) return head + " nothing is recommended.";
+  std::string text = head;
+  std::vector<double> times, quadratic, sizes, errors;
+  const Verdict::Point* last = nullptr;
+  std::string beaten;
   for (const auto& point : verdict.points) {
+    if (point.is_large) continue;
+    last = &point;
+    if (!point.beaten_by.empty())
+      beaten += fmt::format("{}`{}` by `{}`", beaten.empty() ? "" : ", ", point.run, point.beaten_by);
+    if (!std::isnan(point.quadratic_ratio)) quadratic.push_back(point.quadratic_ratio);
     if (std::isnan(point.time_ratio) || std::isnan(point.unknowns_ratio)) continue;
     times.push_back(point.time_ratio), sizes.push_back(point.unknowns_ratio), errors.push_back(point.error);
   }
-  if (!times.empty()) {
-    const auto [fast, slow] = std::minmax_element(times.begin(), times.end());
-    const auto [few, many] = std::minmax_element(sizes.begin(), sizes.end());
+  if (!times.empty())
+    text += fmt::format(" {} of uniform refinement's time at equal error, with {} of its unknowns, {}.", range(times),
+                        range(sizes), from_to(errors, measure));
+  if (!quadratic.empty()) text += fmt::format(" {} of the time that it takes with quadratic elements.", range(quadratic));
+  if (std::isnan(last->time_ratio) && std::isnan(last->quadratic_ratio))
     text +=
-        fmt::format(" {} of uniform refinement's time at equal error, with {} of its unknowns, from {} to {}.",
-                    range(*fast, *slow), range(*few, *many), show(errors.front(), measure), show(errors.back(), measure));
-  }
-  if (const auto& last = verdict.points.back(); std::isnan(last.time_ratio))
-    text +=
-        fmt::format(" {} takes it {:.3g} s; uniform refinement has come to {} after {:.3g} s.", show(last.error, measure),
-                    last.seconds, show(verdict.finest_uniform.error, measure), verdict.finest_uniform.seconds);
+        fmt::format(" {} takes it {:.3g} s; uniform refinement has come to {} after {:.3g} s.", show(last->error, measure),
+                    last->seconds, show(verdict.finest_uniform.error, measure), verdict.finest_uniform.seconds);
+  if (!beaten.empty()) text += fmt::format(" Beaten in both error and time: {}.", beaten);
   if (verdict.untold_from == verdict.largest_error) return text + " Whether it pays, a finer uniform level would tell.";
   if (!verdict.pays_from)
     text += " It does not pay here";
@@ -186,6 +183,20 @@ std::string solver_answer(const Results& results) {
   return text + (high > 0 ? fmt::format("; their H1 errors agree to {:.1e} of it.", (high - low) / high) : ".");
 }
 
+bool is_uniform(const Row& row) { return is_any_of(row.run.series->name, {"uniform", "rows", kQuadratic}); }
+
+/// Runs that a table may recommend: uniform ones, and those of series that a verdict does not speak against.
+std::vector<Point> candidates_of(const Results& results, const Measure& measure, const std::vector<Verdict>& all) {
+  std::vector<Point> kept;
+  for (const auto& point : points(results, {}, measure, costs()[0])) {
+    if (is_large(results, *point.row, measure)) continue;
+    const auto is_it = [&](const Verdict& v) { return v.measure == &measure && v.series == point.row->run.series; };
+    const auto verdict = std::find_if(all.begin(), all.end(), is_it);
+    if (verdict == all.end() ? is_uniform(*point.row) : verdict->is_recommended) kept.push_back(point);
+  }
+  return kept;
+}
+
 std::string failures(const Results& results) {
   std::string text;
   for (const auto& row : results.rows) {
@@ -198,26 +209,12 @@ std::string failures(const Results& results) {
 
 }  // namespace
 
-std::vector<Order> orders(const Results& results) {
-  std::vector<Order> found;
-  for (const auto& series : all_series()) {
-    if (series.kind == Kind::solvers || series.kind == Kind::time_steps) continue;
-    for (const auto& measure : measures()) {
-      const auto by_seconds = points(results, series.name, measure, costs()[0]);
-      if (by_seconds.size() < 3) continue;
-      const double in_size = -results.dim * slope(points(results, series.name, measure, costs()[1]));
-      found.push_back({series.name, measure.name, in_size, -slope(by_seconds), static_cast<int>(by_seconds.size())});
-    }
-  }
-  return found;
-}
-
 std::vector<Verdict> verdicts(const Results& results) {
   std::vector<Verdict> found;
   for (const auto& measure : measures()) {
     if (!is_judged(measure)) continue;
     for (const auto& series : all_series())
-      if (series.kind == Kind::tolerances || std::string(series.name) == "sizing-field")
+      if (series.kind == Kind::tolerances || is_any_of(series.name, {"sizing-field", kQuadratic}))
         if (auto verdict = judge(results, series, measure)) found.push_back(std::move(*verdict));
   }
   return found;
@@ -232,7 +229,7 @@ std::vector<std::string> answers(const Results& results) {
   for (const auto& measure : measures()) {
     if (!is_judged(measure)) continue;
     for (const auto& verdict : all)
-      if (verdict.measure == &measure) add(in_words(verdict));
+      if (verdict.measure == &measure && can_recommend(results, measure)) add(in_words(verdict));
     add(time_step_answer(results, measure));
   }
   add(solver_answer(results));
@@ -243,17 +240,24 @@ std::vector<std::string> answers(const Results& results) {
 std::string choices_table(const Results& results) {
   std::string rows;
   std::vector<const Row*> chosen;
+  const auto all = verdicts(results);
   for (const auto& measure : measures()) {
-    if (!is_judged(measure)) continue;
-    const auto all = front(points(results, nullptr, measure, costs()[0]));
-    const auto uniform = front(points(results, "uniform", measure, costs()[0]));
-    if (all.empty()) continue;
+    if (!is_judged(measure) || !can_recommend(results, measure)) continue;
+    const auto candidates = candidates_of(results, measure, all);
+    if (candidates.empty()) continue;
+    const Uniform uniform(results, measure, true);
     for (int step = 0; step > -3 * kDecades; --step) {
-      const double target = ladder_below(all.front().error, step);
-      const auto cheapest = std::find_if(all.begin(), all.end(), [&](const Point& p) { return p.error <= target; });
-      if (cheapest == all.end()) break;
+      const double target = ladder_below(candidates.front().error, step);
+      const auto cost = uniform.cost_at(target);
+      // What remeshing's run takes is compared with what a uniform mesh of that error would: so do the answers.
+      const auto is_chosen = [&](const Point& p) {
+        return p.error <= target && (is_uniform(*p.row) || !cost || p.cost < *cost);
+      };
+      const Point* cheapest = nullptr;
+      for (const auto& point : candidates)
+        if (is_chosen(point) && (!cheapest || point.cost < cheapest->cost)) cheapest = &point;
+      if (!cheapest) break;
       const Row& row = *cheapest->row;
-      const auto cost = cost_at(uniform, target);
       rows +=
           fmt::format("| {} | {} | `{}` | {} | {:.3g} | {} | {:.0f} |\n", measure.name, show(target, measure), row.run.name,
                       row.vertices, cheapest->cost, cost ? fmt::format("{:.3g}", *cost) : "not reached", row.memory_mb);
@@ -262,7 +266,7 @@ std::string choices_table(const Results& results) {
   }
   if (rows.empty()) return rows;
   std::string text =
-      "| error | at most | run | vertices | processor s | uniform refinement's, between its levels | MB |\n"
+      "| error | at most | run | vertices | processor s | that of uniform refinement, between its levels | MB |\n"
       "|---|---|---|---|---|---|---|\n" +
       rows + "\n";
   for (const Row* row : chosen) {

@@ -6,41 +6,40 @@
 #include <string>
 #include <vector>
 
+#include "doubts.hpp"
 #include "report.hpp"
 
 namespace itr::cli::study {
 
-/// Of a series, fitted over its runs: error = C * size^in_size, error = C * seconds^-in_seconds.
-struct Order {
-  std::string series, measure;
-  double in_size = 0, in_seconds = 0;
-  int runs = 0;
-};
-/// For series of at least three runs with that error.
-std::vector<Order> orders(const Results& results);
-
-/// What one series costs against uniform refinement at equal error.
+/// What one series costs against uniform refinement at equal error: with linear elements, and with quadratic ones.
 struct Verdict {
   struct Point {
+    std::string run;
     double error = 0, seconds = 0;
-    double time_ratio = 0,
-           unknowns_ratio = 0;  ///< by uniform refinement's, between its levels; NaN where it has not that error
+    double time_ratio = 0,    ///< by uniform refinement's with linear elements, between its levels
+        quadratic_ratio = 0,  ///< by that with quadratic ones
+        unknowns_ratio = 0;   ///< all NaN where it has not that error
+    std::string beaten_by;    ///< run of the series with a smaller error in less time; empty: none
+    bool is_large = false;    ///< an error of which nothing is said
   };
   const Series* series;
   const Measure* measure;
-  std::vector<Point> points;        ///< the largest error first; runs that another of the series beats are left out
-  std::optional<double> pays_from;  ///< the largest error from which on it takes less time at all errors; none: nowhere
+  std::vector<Point> points;   ///< the largest error first
+  bool is_recommended = true;  ///< false: its errors are not those of meshes, or all are large
+  /// The largest error from which on all of its runs take less time than either uniform refinement; none: nowhere.
+  std::optional<double> pays_from;
   /// The largest error at which it takes longer than the finest uniform run, whose error is larger still: what uniform
   /// refinement would take is not known from there on.
   std::optional<double> untold_from;
-  double largest_error = 0;
-  Point finest_uniform;  ///< the least error of the uniform levels, and the seconds of the dearest
+  double largest_error = 0;  ///< of which something is said
+  Point finest_uniform;      ///< the least error of the uniform levels, and the seconds of the dearest
 };
 std::vector<Verdict> verdicts(const Results& results);
 
 std::vector<std::string> answers(const Results& results);
 
-/// For each error of a ladder the run that reaches it in least time, as Markdown; empty where no run has an error.
+/// For each error of a ladder the run to take, as Markdown: the cheapest that reaches it, of those that a verdict says to
+/// pay at it; where none does, of uniform refinement, if that reaches it. Empty where nothing is recommended.
 std::string choices_table(const Results& results);
 
 }  // namespace itr::cli::study

@@ -4,10 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
+#include "rows.hpp"
 
 namespace itr::cli::study {
 
@@ -18,7 +21,12 @@ using Kind = Series::Kind;
 using Overrides = std::vector<scene::Override>;
 
 constexpr double kFactors[] = {4, 1, 1.0 / 4, 1.0 / 16};  ///< of the scene's tolerance
-constexpr double kReferenceShare = 0.25;                  ///< its tolerance by the smallest of the study
+constexpr double kReferenceShare = 1.0 / 16;              ///< its tolerance by the smallest of the study
+constexpr int kReferenceTries = 3;                        ///< of tolerances, where none is asked for
+constexpr double kNextTry = 1.0 / 16;                     ///< of the tolerance before, which split nothing
+constexpr double kSecondShare = 4;                        ///< the second reference's tolerance by the first's
+/// Rounds of friction: a remeshed step solves twice, so only friction that has converged is the same on all meshes.
+constexpr int kFrictionRounds = 50;
 
 Overrides operator+(Overrides a, const Overrides& b) {
   a.insert(a.end(), b.begin(), b.end());
@@ -44,6 +52,7 @@ Overrides remeshed(const Overrides& changes = {}) {
 }
 
 const scene::Override kFixed = {"/space/remesh/enabled", "false"};
+const scene::Override kQuadratic = {"/space/discr_order", "2"};
 const scene::Override kSwap = {"/space/remesh/swap/enabled", "true"}, kSmooth = {"/space/remesh/smooth/enabled", "true"};
 
 /// The scene as its options ask for, merged.
@@ -54,6 +63,11 @@ class Source {
     const auto look = [&](auto setup) {
       dim = static_cast<int>(setup.mesh.rest(0).size());
       time = setup.time;
+      if constexpr (std::is_same_v<decltype(setup), Setup<3>>) box = find_box(setup.mesh);
+      num_cells = setup.mesh.num_cells();
+      has_contact = setup.contact.enabled;
+      body = setup.mesh.body(0);
+      for (CellId c = 0; c < setup.mesh.cell_slots(); ++c) has_one_body &= setup.mesh.body(c) == body;
       const bool is_open = setup.contact.enabled && !has("/solver/contact/barrier_stiffness");
       if (is_open) setup.contact.adaptive_stiffness = false, setup.contact.barrier_stiffness = 0;
       setup.remesh.enabled = true;
@@ -61,6 +75,9 @@ class Source {
       remesh = setup.remesh;
       // What remeshing would choose holds for all runs: they are to have one limit.
       if (is_open) pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness)}};
+      const auto& contact = setup.contact;
+      if (contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0)
+        pin_friction(options.overrides);
     };
     std::visit(look, scene_.setup);
     if (json_["geometry"].is_array()) {
@@ -73,14 +90,28 @@ class Source {
 
   int dim = 0;
   TimeOptions time;
-  RemeshOptions remesh;  ///< with its defaults chosen
-  Overrides pinned;      ///< what the scene leaves open and all runs have to agree on
+  RemeshOptions remesh;          ///< with its defaults chosen
+  Overrides pinned;              ///< what the scene leaves open and all runs have to agree on
+  std::string notes;             ///< the same in words
+  std::optional<RowsOfBox> box;  ///< that the bodies fill together
+  int num_cells = 0, body = 0;   ///< before refinement; the first cell's
+  bool has_one_body = true, has_contact = false;
 
   bool has(const std::string& pointer) const { return json_.contains(Json::json_pointer(pointer)); }
   /// Every body refined so many times more than the scene has it.
   Overrides refined(int more) const {
     Overrides all;
     for (const auto& [pointer, own] : bodies_) all.push_back({pointer + "/n_refs", std::to_string(own + more)});
+    return all;
+  }
+  /// The bodies' mesh replaced by one in a file; none where that would lose what only the scene's own file says.
+  std::optional<Overrides> with_mesh(const std::filesystem::path& file) const {
+    if (bodies_.size() != 1) return std::nullopt;
+    const std::string& pointer = bodies_.front().first;
+    if (has(pointer + "/array") || has("/contact/collision_mesh")) return std::nullopt;
+    if (!has_one_body && !has(pointer + "/volume_selection")) return std::nullopt;
+    Overrides all = {{pointer + "/mesh", Json(file.generic_string()).dump()}, {pointer + "/n_refs", "0"}};
+    if (has(pointer + "/transformation")) all.push_back({pointer + "/transformation", "{}"});
     return all;
   }
   /// As messages name a level.
@@ -90,6 +121,23 @@ class Source {
   void find_body(const Json& geometry, const std::string& pointer) {
     if (geometry.value("is_obstacle", false) || !geometry.value("enabled", true)) return;
     bodies_.emplace_back(pointer, geometry.value("n_refs", 0));
+  }
+
+  /// Rounds until nothing moves any more, on all meshes alike; what the study's own `--set` says of them stays.
+  void pin_friction(const Overrides& asked) {
+    const auto pin = [&](const char* pointer, const std::string& value) {
+      const auto is_it = [&](const scene::Override& o) { return o.pointer == pointer; };
+      if (std::none_of(asked.begin(), asked.end(), is_it)) pinned.push_back({pointer, value});
+    };
+    pin("/solver/contact/friction_iterations", std::to_string(kFrictionRounds));
+    pin("/solver/contact/friction_convergence_tol", "0");
+    notes += "friction lagged until it does not change, at most " + json_friction_rounds() + " rounds a solve";
+  }
+
+  std::string json_friction_rounds() const {
+    for (const auto& one : pinned)
+      if (one.pointer == "/solver/contact/friction_iterations") return one.value;
+    return std::to_string(json_["solver"]["contact"]["friction_iterations"].get<int>());
   }
 
   scene::Scene scene_;
@@ -141,6 +189,7 @@ class Planner {
  public:
   explicit Planner(const Options& options) : options_(options), source_(options) {
     levels_ = options.levels > 0 ? options.levels : source_.dim == 2 ? 3 : 2;
+    plan_.notes = source_.notes;
     skip_ = std::max(1, source_.time.steps / std::max(1, options.frames));
     tolerances_ = options.tolerances;
     const double own = *source_.remesh.split.acceptance_tolerance;
@@ -149,11 +198,14 @@ class Planner {
     std::sort(tolerances_.begin(), tolerances_.end(), std::greater<>());
     starts_ = options.starts.empty() ? std::vector<int>{0} : options.starts;
     plan_.dim = source_.dim;
+    plan_.has_contact = source_.has_contact;
     plan_.is_dynamic = !source_.time.is_static && !source_.time.quasistatic;
   }
 
   Plan make() {
-    if (options_.reference.empty()) add_reference();
+    plan_.finest = fmt::format("uniform-{}", levels_);
+    plan_.coarser = fmt::format("uniform-{}", levels_ - 1);
+    if (options_.reference.empty()) add_references();
     for (const auto& series : all_series()) {
       const auto& asked = options_.series;
       const bool is_asked = asked.empty() ? series.is_default
@@ -165,34 +217,78 @@ class Planner {
   }
 
  private:
-  void add(PlannedRun run) {
+  PlannedRun complete(PlannedRun run) const {
     run.overrides.insert(run.overrides.begin(), {{"/output/paraview/skip_frame", std::to_string(skip_)},
                                                  {"/output/paraview/options/kinetic_energy", "true"},
                                                  {"/output/paraview/options/momentum", "true"}});
     run.overrides.insert(run.overrides.begin(), source_.pinned.begin(), source_.pinned.end());
     run.overrides.insert(run.overrides.begin(), options_.overrides.begin(), options_.overrides.end());
     if (run.solver.empty()) run.solver = options_.solver;
-    plan_.runs.push_back(std::move(run));
+    return run;
   }
 
+  void add(PlannedRun run) { plan_.runs.push_back(complete(std::move(run))); }
+
   /// The finest level, split on where that gains least of all, and never coarsened: its space has all of the uniform ones.
-  void add_reference() {
-    static const Series series = {"reference", Kind::levels, true, "what the others are compared with",
+  /// What it is worth says one that is coarser by a level and by its tolerance.
+  void add_references() {
+    static const Series series = {kReference, Kind::levels, true, "what the others are compared with",
                                   remeshed({{"/space/remesh/collapse/enabled", "false"}})};
     const double asked = options_.reference_tolerance;
     const double tolerance = asked > 0 ? asked : kReferenceShare * tolerances_.back();
-    plan_.reference = "reference";
-    plan_.fallback = fmt::format("uniform-{}", levels_);
-    add({plan_.reference, &series, fmt::format("{}, split on to {:g} J", source_.level_label(levels_), tolerance),
-         series.overrides + source_.refined(levels_) + with_tolerance(source_, series, tolerance), "", ""});
+    const auto split_on = [&](std::string name, int level, double by) {
+      return PlannedRun{std::move(name),
+                        &series,
+                        fmt::format("{}, split on to {:g} J", source_.level_label(level), by),
+                        linear(series.overrides) + source_.refined(level) + with_tolerance(source_, series, by),
+                        "",
+                        ""};
+    };
+    plan_.references.push_back(complete(split_on(kReference, levels_, tolerance)));
+    for (double next = tolerance * kNextTry; asked == 0 && plan_.references.size() < kReferenceTries; next *= kNextTry)
+      plan_.references.push_back(complete(split_on(fmt::format("{}-{:g}", kReference, next), levels_, next)));
+    PlannedRun second = split_on(kSecondReference, levels_ - 1, kSecondShare * tolerance);
+    second.reference = kReference;
+    add(std::move(second));
   }
+
+  static bool is_quadratic(const Series& series) { return contains(series.overrides, kQuadratic); }
+
+  /// Where the scene asks for quadratic elements, linear ones.
+  Overrides linear(const Overrides& overrides) const {
+    return source_.has("/space/discr_order") ? overrides + Overrides{{"/space/discr_order", "1"}} : overrides;
+  }
+
+  /// A run for each level by about as many cells in rows, where the bodies are one box.
+  void add_rows(const Series& series) {
+    if (!source_.box) return;
+    const auto folder = directory_of(options_) / "meshes";
+    for (int level = 0; level <= levels_; ++level) {
+      const auto file = folder / fmt::format("rows-{}.msh", level);
+      const auto mesh = source_.with_mesh(path_in_scene(file));
+      if (!mesh) return;
+      const auto n = source_.box->counts(source_.num_cells * std::pow(8.0, level));
+      std::filesystem::create_directories(folder);
+      write_rows(*source_.box, n, source_.has_one_body ? source_.body : 0, file);
+      add({fmt::format("{}-{}", series.name, level), &series, fmt::format("{} x {} x {} cubes", n[0], n[1], n[2]),
+           linear(series.overrides) + *mesh, "", kReference});
+    }
+  }
+
+  /// As the scene may name a file: from the working folder, so that what is stored holds no place of this machine.
+  static std::filesystem::path path_in_scene(const std::filesystem::path& file) { return std::filesystem::proximate(file); }
 
   void add(const Series& series) {
     switch (series.kind) {
       case Kind::levels:
-        for (int level = 0; level <= levels_; ++level)
+        // A level of quadratic elements has about as many unknowns as the next one of linear elements.
+        for (int level = 0; level <= levels_ - is_quadratic(series); ++level)
           add({fmt::format("{}-{}", series.name, level), &series, source_.level_label(level),
-               series.overrides + source_.refined(level), "", plan_.reference});
+               (is_quadratic(series) ? series.overrides : linear(series.overrides)) + source_.refined(level), "",
+               kReference});
+        return;
+      case Kind::rows:
+        add_rows(series);
         return;
       case Kind::tolerances:
         for (const int start : starts_)
@@ -201,12 +297,12 @@ class Planner {
       case Kind::solvers:
         for (const auto& solver : solvers_there())
           add({fmt::format("{}-{}", series.name, folder_name(solver)), &series, solver,
-               series.overrides + source_.refined(levels_ - 1), solver, plan_.reference});
+               linear(series.overrides) + source_.refined(levels_ - 1), solver, kReference});
         return;
       case Kind::time_steps:
         for (const int parts : {1, 2, 4})
           add({fmt::format("{}-{}", series.name, parts), &series, fmt::format("dt {:g} s", source_.time.dt / parts),
-               series.overrides + source_.refined(levels_ - 1) + with_time_step(source_, parts, skip_), "",
+               linear(series.overrides) + source_.refined(levels_ - 1) + with_time_step(source_, parts, skip_), "",
                fmt::format("{}-4", series.name)});
         return;
     }
@@ -215,8 +311,8 @@ class Planner {
   void add_remeshed(const Series& series, int start, double tolerance) {
     std::string name = fmt::format("{}-{:g}", series.name, tolerance), label = fmt::format("tolerance {:g} J", tolerance);
     if (start > 0) name += fmt::format("-from-{}", start), label += ", from " + source_.level_label(start);
-    add({name, &series, label, series.overrides + source_.refined(start) + with_tolerance(source_, series, tolerance), "",
-         plan_.reference});
+    add({name, &series, label,
+         linear(series.overrides) + source_.refined(start) + with_tolerance(source_, series, tolerance), "", kReference});
   }
 
   const Options& options_;
@@ -231,7 +327,9 @@ class Planner {
 
 const std::vector<Series>& all_series() {
   static const std::vector<Series> table = {
-      {"uniform", Kind::levels, true, "uniform refinement", {kFixed}},
+      {"uniform", Kind::levels, true, "uniform refinement, linear elements (P1)", {kFixed}},
+      {"rows", Kind::rows, true, "in 3D, where the body is a box: as many linear elements in rows", {kFixed}},
+      {"uniform-p2", Kind::levels, true, "uniform refinement, quadratic elements (P2)", {kFixed, kQuadratic}},
       {"itr", Kind::tolerances, true, "splits and collapses", remeshed()},
       {"swaps", Kind::tolerances, true, "splits, collapses and swaps", remeshed({kSwap})},
       {"smoothing", Kind::tolerances, true, "splits, collapses, swaps and smoothing", remeshed({kSwap, kSmooth})},
@@ -245,6 +343,10 @@ const std::vector<Series>& all_series() {
       {"time", Kind::time_steps, false, "dt, dt/2 and dt/4 without remeshing, against dt/4", {kFixed}},
   };
   return table;
+}
+
+std::filesystem::path directory_of(const Options& options) {
+  return options.directory.empty() ? std::filesystem::path("study") / options.scene.stem() : options.directory;
 }
 
 Plan make_plan(const Options& options) {

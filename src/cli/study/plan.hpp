@@ -21,7 +21,8 @@ struct Options {
   std::vector<int> starts;                 ///< uniform refinements beyond the scene's own that remeshing begins from
   std::vector<double> tolerances;          ///< of splits [J]; empty: 4, 1, 1/4 and 1/16 times the scene's
   std::filesystem::path reference;         ///< folder of a run to compare with; empty: a run of the study
-  double reference_tolerance = 0;          ///< of that run's splits [J]; 0: a quarter of the smallest of the study
+  std::filesystem::path second_reference;  ///< of another that tells what the first is worth; empty: unknown, or a run
+  double reference_tolerance = 0;          ///< of that run's splits [J]; 0: a sixteenth of the smallest of the study
   int frames = 10;                         ///< times at which runs are compared
   double time_limit = 0;                   ///< of a run [s]; 0: none
 };
@@ -30,6 +31,7 @@ struct Options {
 struct Series {
   enum class Kind {
     levels,      ///< a run for each uniform level
+    rows,        ///< the same with about as many cells in rows, where the body is a box; else none
     tolerances,  ///< a run for each tolerance and start
     solvers,     ///< a run for each linear solver that is there, on the finest uniform level but one
     time_steps   ///< dt, dt/2 and dt/4 on the finest uniform level but one, against dt/4
@@ -54,12 +56,23 @@ struct PlannedRun {
 struct Plan {
   int dim = 0;
   bool is_dynamic = false;  ///< has kinetic energy and momentum
-  std::vector<PlannedRun> runs;
-  std::string reference;  ///< name of the run that the others are compared with; empty where Options::reference is
-  std::string fallback;   ///< compared with where that does not finish: the finest uniform level
+  bool has_contact = false;
+  /// What the others are compared with: the first of these that splits anything; none where Options::reference is.
+  std::vector<PlannedRun> references;
+  std::vector<PlannedRun> runs;  ///< without these
+  std::string finest;            ///< uniform level; compared with where no reference finishes
+  std::string coarser;           ///< that before it; tells then what the finest is worth
+  std::string notes;             ///< what holds for all runs that the scene does not say
 };
 
-/// Throws InputError: for the scene, and for names of series that there are not.
+inline constexpr const char* kReference = "reference";  ///< what PlannedRun::reference names, and the first's run
+inline constexpr const char* kSecondReference = "second-reference";  ///< run that tells what the reference is worth
+
+/// Where a study's files are.
+std::filesystem::path directory_of(const Options& options);
+
+/// Writes the meshes that runs need and the scene does not have. Throws InputError: for the scene, and for names of series
+/// that there are not.
 Plan make_plan(const Options& options);
 
 }  // namespace itr::cli::study

@@ -12,7 +12,8 @@ namespace itr::cli::study {
 namespace {
 
 constexpr int kWidth = 340, kHeight = 250, kLeft = 62, kRight = 12, kTop = 12, kBottom = 44, kLegendLine = 18;
-constexpr const char* kColours[] = {"#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
+constexpr const char* kColours[] = {"#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
+                                    "#56b4e9", "#8c510a", "#6a3d9a", "#999999", "#b15928"};
 
 struct Point {
   double x, y;
@@ -76,8 +77,10 @@ std::vector<Line> lines_of(const Results& results, const Measure& measure, const
     const std::size_t colour = static_cast<std::size_t>(&series - all_series().data()) % std::size(kColours);
     Line line{series.name, kColours[colour], {}};
     for (const auto& row : results.rows) {
-      if (std::string(row.run.series->name) != series.name || !row.errors) continue;
-      const Point point{row.*cost.value, (*row.errors).*measure.value};
+      if (row.run.series->name != std::string(series.name)) continue;
+      const auto error = told_error(results, row, measure);
+      if (!error) continue;
+      const Point point{row.*cost.value, *error};
       if (point.x > 0 && point.y > 0) line.points.push_back(point);
     }
     std::stable_sort(line.points.begin(), line.points.end(), [](const Point& a, const Point& b) { return a.y > b.y; });

@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
@@ -19,8 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr double kSameShape = 1e-6;  ///< share of the volume that two meshes of one shape may leave uncovered
-constexpr double kSameTime = 1e-9;   ///< relative
+constexpr double kSameShape = 1e-6;           ///< share of the volume that two meshes of one shape may leave uncovered
+constexpr double kSameTime = 1e-9;            ///< relative
+constexpr const char* kFormOfErrors = "2: ";  ///< of what is kept in folders: changes with what Errors has or means
 
 std::vector<Json> read_steps(const fs::path& folder) {
   std::vector<Json> steps;
@@ -40,6 +43,7 @@ struct Moment {
   fs::path file;
   output::FrameTotals totals;
   double energy = 0;  ///< kinetic, elastic, body and contact [J]
+  double stored = 0;  ///< the same without body [J]
 };
 
 std::vector<Moment> read_moments(const fs::path& folder, bool is_dynamic) {
@@ -48,9 +52,9 @@ std::vector<Moment> read_moments(const fs::path& folder, bool is_dynamic) {
   for (auto& [file, totals] : output::list_frames(folder)) {
     if (totals.step >= static_cast<int>(steps.size())) continue;
     const Json& energy = steps[totals.step]["energy"];
-    double sum = is_dynamic ? totals.kinetic_energy.value_or(0) : 0;
-    for (const char* term : {"elastic", "body", "contact"}) sum += energy[term].get<double>();
-    moments.push_back({file, totals, sum});
+    double stored = is_dynamic ? totals.kinetic_energy.value_or(0) : 0;
+    for (const char* term : {"elastic", "contact"}) stored += energy[term].get<double>();
+    moments.push_back({file, totals, stored + energy["body"].get<double>(), stored});
   }
   return moments;
 }
@@ -64,7 +68,12 @@ std::string stamp(const std::vector<Moment>& moments) {
 }
 
 Json to_json(const Errors& e) {
-  return {{"l2", e.l2},      {"h1", e.h1}, {"surface", e.surface}, {"energy", e.energy}, {"momentum", e.momentum},
+  return {{"l2", e.l2},
+          {"h1", e.h1},
+          {"surface", e.surface},
+          {"energy", e.energy},
+          {"momentum", e.momentum},
+          {"reference_energy", e.reference_energy},
           {"times", e.times}};
 }
 
@@ -73,7 +82,7 @@ std::optional<Errors> read_kept(const fs::path& file, const std::string& key) {
   const Json kept = stream ? Json::parse(stream, nullptr, false) : Json();
   if (!kept.is_object() || kept.value("of", "") != key) return std::nullopt;
   const Json& e = kept["errors"];
-  return Errors{e["l2"], e["h1"], e["surface"], e["energy"], e["momentum"], e["times"]};
+  return Errors{e["l2"], e["h1"], e["surface"], e["energy"], e["momentum"], e["reference_energy"], e["times"]};
 }
 
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
@@ -84,7 +93,7 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
 
 Errors compare(const std::vector<Moment>& moments, const std::vector<Moment>& references, bool is_dynamic) {
   struct Squares {
-    double l2 = 0, h1 = 0, reference_l2 = 0, reference_h1 = 0, energy = 0, momentum = 0;
+    double l2 = 0, h1 = 0, reference_l2 = 0, reference_h1 = 0, energy = 0, momentum = 0, reference_energy = 0;
   } sum;
   Errors errors;
   for (const auto& moment : moments) {
@@ -103,6 +112,7 @@ Errors compare(const std::vector<Moment>& moments, const std::vector<Moment>& re
     sum.reference_l2 += at.reference_l2 * at.reference_l2;
     sum.reference_h1 += at.reference_h1_semi * at.reference_h1_semi;
     sum.energy += std::pow(moment.energy - found->energy, 2);
+    sum.reference_energy += found->stored * found->stored;
     if (is_dynamic) sum.momentum += std::pow(distance(moment.totals.momentum, found->totals.momentum), 2);
     errors.surface = std::max(errors.surface, at.surface);
     ++errors.times;
@@ -113,12 +123,45 @@ Errors compare(const std::vector<Moment>& moments, const std::vector<Moment>& re
   errors.h1 = ratio(sum.h1, sum.reference_h1);
   errors.energy = std::sqrt(sum.energy / errors.times);
   errors.momentum = std::sqrt(sum.momentum / errors.times);
+  errors.reference_energy = std::sqrt(sum.reference_energy / errors.times);
   return errors;
+}
+
+/// "step 12: what" as "what": the same of many steps is one.
+std::string without_step(const std::string& text) {
+  const auto colon = text.find(": ");
+  const bool has_step = text.starts_with("step ") && colon != std::string::npos &&
+                        std::all_of(text.begin() + 5, text.begin() + static_cast<std::ptrdiff_t>(colon),
+                                    [](unsigned char c) { return std::isdigit(c); });
+  return has_step ? text.substr(colon + 2) : text;
+}
+
+std::vector<Warning> read_warnings(const fs::path& log) {
+  const std::string mark = "warning: ";
+  std::vector<Warning> warnings;
+  std::set<std::string> seen;  // a run that goes on, or is done already, says again what its scene gives cause to
+  std::ifstream file(log);
+  for (std::string line; std::getline(file, line);) {
+    if (!line.starts_with(mark) || !seen.insert(line).second) continue;
+    const std::string text = without_step(line.substr(mark.size()));
+    const auto same = std::find_if(warnings.begin(), warnings.end(), [&](const Warning& w) { return w.text == text; });
+    if (same == warnings.end())
+      warnings.push_back({text, 1});
+    else
+      ++same->times;
+  }
+  return warnings;
+}
+
+/// Whether a violation is that surfaces meet.
+bool is_of_surfaces(const std::string& violation) {
+  const auto has = [&](const char* part) { return violation.find(part) != std::string::npos; };
+  return has(" intersect") || has(" inside of ") || has(" is on ");
 }
 
 }  // namespace
 
-Row read_row(const PlannedRun& run, const fs::path& folder) {
+Row read_row(const PlannedRun& run, const fs::path& folder, const fs::path& log, bool has_contact) {
   Row row;
   row.run = run;
   const std::vector<Json> steps = read_steps(folder);
@@ -131,16 +174,21 @@ Row read_row(const PlannedRun& run, const fs::path& folder) {
     row.memory_mb = std::max(row.memory_mb, step["peak_rss_mb"].get<double>());
   }
   row.steps = static_cast<int>(steps.size()) - 1;
+  row.first_vertices = steps.front()["vertices"];
   row.vertices = steps.back()["vertices"];
   row.potential = steps.back()["energy"]["total"];
   row.finished = true;
-  row.certified = output::certify(folder).passed();
+  const output::Certificate certificate = output::certify(folder);
+  row.certified = certificate.frames > 0 && std::all_of(certificate.violations.begin(), certificate.violations.end(),
+                                                        [&](const auto& v) { return !has_contact && is_of_surfaces(v); });
+  for (const auto& frame : output::list_frames(folder)) row.flight = std::max(row.flight, output::flight(frame.file));
+  row.warnings = read_warnings(log);
   return row;
 }
 
 Errors measure_errors(const fs::path& folder, const fs::path& reference, bool is_dynamic) {
   const std::vector<Moment> moments = read_moments(folder, is_dynamic), references = read_moments(reference, is_dynamic);
-  const std::string key = stamp(moments) + "/ " + stamp(references);
+  const std::string key = kFormOfErrors + stamp(moments) + "/ " + stamp(references);
   const fs::path file = folder / "errors.json";
   if (const auto kept = read_kept(file, key)) return *kept;
   const Errors errors = compare(moments, references, is_dynamic);

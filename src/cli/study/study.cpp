@@ -21,6 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 using namespace study;
 
+constexpr double kLeastSplit = 0.01;  ///< of its uniform level's vertices that a reference has to add
+constexpr double kSame = 1e-9;        ///< relative errors below it are of one and the same solution
+
 volatile std::sig_atomic_t interrupted = 0;
 
 void on_interrupt(int) { interrupted = 1; }
@@ -66,10 +69,10 @@ void show(const Row& row, std::size_t number, std::size_t count) {
 
 class Study {
  public:
-  explicit Study(const Options& options) : options_(options), plan_(make_plan(options)) {
-    directory_ = options.directory.empty() ? fs::path("study") / options.scene.stem() : options.directory;
+  explicit Study(const Options& options) : options_(options), plan_(make_plan(options)), directory_(directory_of(options)) {
     fs::create_directories(directory_ / "runs");
     results_.scene = options.scene.string();
+    results_.notes = plan_.notes;
     results_.dim = plan_.dim;
     results_.is_dynamic = plan_.is_dynamic;
     results_.frames = options.frames;
@@ -82,17 +85,11 @@ class Study {
   int run() {
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
-    for (const auto& planned : plan_.runs) {
-      results_.rows.push_back(run_one(planned));
-      Row& row = results_.rows.back();
-      if (interrupted) {
-        fmt::print(stderr, "itr: interrupted in {}; the same command goes on from there\n", planned.name);
-        return simulation_stopped;
-      }
-      measure(row);
-      show(row, results_.rows.size(), plan_.runs.size());
-    }
+    if (!find_reference()) return simulation_stopped;
+    for (const auto& planned : plan_.runs)
+      if (!add(planned)) return simulation_stopped;
     for (Row& row : results_.rows) measure(row);  // what waited for the run that it is compared with
+    judge_reference();
     write();
     const bool any = std::any_of(results_.rows.begin(), results_.rows.end(), [](const Row& row) { return row.finished; });
     return any ? done : simulation_stopped;
@@ -100,6 +97,37 @@ class Study {
 
  private:
   fs::path folder_of(const std::string& name) const { return directory_ / "runs" / name; }
+
+  /// False where the study is told to stop.
+  bool add(const PlannedRun& planned) {
+    results_.rows.push_back(run_one(planned));
+    Row& row = results_.rows.back();
+    if (interrupted) {
+      fmt::print(stderr, "itr: interrupted in {}; the same command goes on from there\n", planned.name);
+      return false;
+    }
+    measure(row);
+    show(row, results_.rows.size(), plan_.runs.size() + (options_.reference.empty() ? 1 : 0));
+    return true;
+  }
+
+  /// Runs references until one splits: one that does not is its uniform level, and against that nothing would be told.
+  bool find_reference() {
+    for (const auto& planned : plan_.references) {
+      if (!add(planned)) return false;
+      const Row& row = results_.rows.back();
+      reference_ = row.run.name;
+      if (!row.finished || row.vertices > (1 + kLeastSplit) * row.first_vertices) return true;
+      if (&planned == &plan_.references.back())
+        throw InputError({options_.scene.string(), "--reference-tolerance",
+                          fmt::format("a reference that is its uniform level: {} vertices, {} of them by splits ({})",
+                                      row.vertices, row.vertices - row.first_vertices, row.run.label),
+                          "a smaller tolerance, or --reference DIR"});
+      spdlog::info("{} splits nothing: {} vertices, as its uniform level", row.run.name, row.vertices);
+      results_.rows.pop_back();
+    }
+    return true;
+  }
 
   Row run_one(const PlannedRun& planned) {
     const fs::path folder = folder_of(planned.name), log = directory_ / "runs" / (planned.name + ".log");
@@ -109,39 +137,66 @@ class Study {
     failed.run = planned;
     failed.reason = describe_failure(end, log, options_.time_limit);
     if (!failed.reason.empty()) return failed;
-    return read_row(planned, folder);
+    return read_row(planned, folder, log, plan_.has_contact);
   }
 
   /// The folder that a run is compared with; empty: none, or none yet.
-  fs::path reference_of(const Row& row) {
-    if (row.run.reference != plan_.reference) {
+  fs::path reference_of(const Row& row) const {
+    if (row.run.reference != kReference) {
       const bool is_there = finished(row.run.reference);
       return is_there && row.run.reference != row.run.name ? folder_of(row.run.reference) : fs::path();
     }
     if (!options_.reference.empty()) return options_.reference;
-    if (finished(plan_.reference)) return folder_of(plan_.reference);
-    return finished(plan_.fallback) && row.run.name != plan_.fallback ? folder_of(plan_.fallback) : fs::path();
+    if (finished(reference_)) return folder_of(reference_);
+    return finished(plan_.finest) && row.run.name != plan_.finest ? folder_of(plan_.finest) : fs::path();
   }
 
-  bool finished(const std::string& name) const {
-    return std::any_of(results_.rows.begin(), results_.rows.end(),
-                       [&](const Row& row) { return row.run.name == name && row.finished; });
+  const Row* find(const std::string& name) const {
+    const auto found = std::find_if(results_.rows.begin(), results_.rows.end(),
+                                    [&](const Row& row) { return row.run.name == name && row.finished; });
+    return found == results_.rows.end() ? nullptr : &*found;
   }
+  bool finished(const std::string& name) const { return find(name) != nullptr; }
 
   void measure(Row& row) {
-    if (!row.finished || row.errors || (row.run.reference.empty() && options_.reference.empty())) return;
+    if (!row.finished || row.errors || row.run.reference.empty()) return;
     const fs::path reference = reference_of(row);
     if (!reference.empty()) row.errors = measure_errors(folder_of(row.run.name), reference, plan_.is_dynamic);
   }
 
+  /// What the reference is worth, and whether it is one.
+  void judge_reference() {
+    const auto take = [&](const Errors& errors, std::string name) {
+      results_.worth = errors;
+      results_.second_reference = std::move(name);
+    };
+    const Row* second = find(kSecondReference);
+    if (!second && options_.reference.empty() && !finished(reference_)) second = find(plan_.coarser);
+    if (!options_.second_reference.empty() && !options_.reference.empty())
+      take(measure_errors(options_.second_reference, options_.reference, plan_.is_dynamic),
+           "the run in `" + options_.second_reference.string() + "`");
+    else if (second && second->errors)
+      take(*second->errors, fmt::format("`{}` ({}: {} vertices)", second->run.name, second->run.label, second->vertices));
+
+    const Row *finest = find(plan_.finest), *reference = find(reference_);
+    if (finest && finest->errors && finest->errors->l2 < kSame && finest->errors->h1 < kSame)
+      results_.refused = fmt::format("it equals the finest uniform level, `{}`", plan_.finest);
+    else if (reference && flies(results_, *reference))
+      results_.refused = "a body flies away in it";
+    else if (reference && !reference->certified)
+      results_.refused = "a frame of it has an intersection or an inversion";
+    if (results_.refused.empty()) return;
+    results_.worth.reset();
+    for (Row& row : results_.rows)
+      if (is_against_reference(row)) row.errors.reset();
+  }
+
   std::string describe_reference() const {
     if (!options_.reference.empty()) return "the run in `" + options_.reference.string() + "`";
-    const std::string& name = finished(plan_.reference) ? plan_.reference : plan_.fallback;
-    for (const Row& row : results_.rows)
-      if (row.run.name == name)
-        return fmt::format("`{}` ({}: {} vertices, potential {:.8g} J in the last step)", name, row.run.label, row.vertices,
-                           row.potential);
-    return "nothing";
+    const Row* row = find(finished(reference_) ? reference_ : plan_.finest);
+    if (!row) return "nothing";
+    return fmt::format("`{}` ({}: {} vertices, potential {:.8g} J in the last step)", row->run.name, row->run.label,
+                       row->vertices, row->potential);
   }
 
   void write() {
@@ -162,6 +217,7 @@ class Study {
   const Options& options_;
   Plan plan_;
   fs::path directory_;
+  std::string reference_;  ///< name of the run
   Results results_;
 };
 
