@@ -136,7 +136,7 @@ class Run {
       spdlog::info("going on after step {}", simulation_.state().step);
     } else {
       writer_ = std::make_unique<output::Writer>(directory_, scene.output, info);
-      write(simulation_.initial_report());
+      write(simulation_.report());
     }
   }
 

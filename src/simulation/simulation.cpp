@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -123,6 +125,13 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   return state;
 }
 
+[[noreturn]] void refuse_state(const std::string& place, const std::string& found, const std::string& expected) {
+  throw InputError({"", place, found, expected});
+}
+
+/// Where a simulation is when it calls the program.
+enum class Phase { between_steps, in_step, after_mesh_change };
+
 }  // namespace
 
 template <int Dim>
@@ -132,14 +141,89 @@ struct Simulation<Dim>::Impl {
   std::unique_ptr<linear::Solver> direct;  ///< or iterative
   std::unique_ptr<linear::ReusingSolver> solver;
   std::unique_ptr<ProblemCache<Dim>> cache;
-  std::shared_ptr<State<Dim>> state = std::make_shared<State<Dim>>();  ///< snapshots may share it
+  std::shared_ptr<const State<Dim>> state;  ///< snapshots may share it
+  std::uint64_t mesh_revision = 0;
+  const std::shared_ptr<const char> identity = std::make_shared<const char>();  ///< of what save() gave
+  std::atomic<Phase> phase = Phase::between_steps;                              ///< terms are asked by several threads
   EdgeLengths initial_edges;
-  NodalForces forces;   ///< of the last step
-  double first_dt = 1;  ///< what the setup's tolerances are for [s]
+  NodalForces forces;                        ///< of the last step
+  mutable std::optional<StepReport> report;  ///< empty: of the state as it stands, not made yet
+  double first_dt = 1;                       ///< what the setup's tolerances are for [s]
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
 
   StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger}; }
+
+  /// While a step is taken, or a listener told of it.
+  class Inside {
+   public:
+    Inside(Impl& impl, Phase phase) : impl_(impl), before_(impl.phase.exchange(phase)) {}
+    Inside(const Inside&) = delete;
+    Inside& operator=(const Inside&) = delete;
+    ~Inside() { impl_.phase = before_; }
+
+   private:
+    Impl& impl_;
+    Phase before_;
+  };
+
+  /// `what` the program may not do while a step refers to what it would change.
+  void refuse_in_step(const char* what) const {
+    if (phase == Phase::in_step) throw InputError({"", what, "a call from inside of a step", "one between steps"});
+  }
+  /// `what` it may not do from a listener of mesh changes either.
+  void refuse_in_callback(const char* what) const {
+    refuse_in_step(what);
+    if (phase != Phase::between_steps)
+      throw InputError({"", what, "a call from inside of a listener of mesh changes", "one between steps"});
+  }
+
+  /// f() with steps of this length. Where it does nothing the length and what belongs to it are as before.
+  template <typename F>
+  StepResult with_step(double dt, F&& f) {
+    const std::shared_ptr<const State<Dim>> state_before = state;
+    const TimeOptions time_before = setup.time;
+    const auto put_back = [&] {
+      if (state->step != state_before->step || state->t != state_before->t) return;  // it was done before a listener threw
+      state = state_before;
+      setup.time = time_before;
+      scale_tolerances();
+    };
+    try {
+      set_step(dt);
+      StepResult result = f();
+      if (!result.ok) put_back();
+      return result;
+    } catch (...) {
+      put_back();
+      throw;
+    }
+  }
+
+  void tell(const State<Dim>& before, const StepResult& result) {
+    if (!on_mesh_change || result.renumbering.empty()) return;
+    const Inside inside(*this, Phase::after_mesh_change);
+    on_mesh_change(describe_change(before.mesh, state->mesh, result.renumbering), before.mesh);
+  }
+
+  /// Of the state as it stands.
+  StepReport report_of_state() const {
+    StepReport made;
+    made.step = state->step;
+    made.t = state->t;
+    made.vertices = state->mesh.num_vertices();
+    made.elements = state->mesh.num_cells();
+    const VectorX& x = state->history.x[0];
+    StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
+                             state->quadrature);
+    made.unknowns = problem.dofs().num_unknowns;
+    made.energy = problem.report(x);
+    made.energy_before_remesh = made.energy.total;
+    made.min_distance = problem.min_distance(x);
+    made.min_volume_ratio = min_volume_ratio(problem.cells(), x);
+    made.peak_rss_mb = peak_rss_mb();
+    return made;
+  }
 
   /// Steps from now on have this length.
   void set_step(double dt) {
@@ -151,9 +235,10 @@ struct Simulation<Dim>::Impl {
     time.dt = dt;
     scale_tolerances();
     if (time.integrator != Integrator::bdf || state->history.x.size() == 1) return;
-    own_state();
-    state->history.x.resize(1);
-    state->history.v.resize(1);
+    State<Dim> shorter = *state;
+    shorter.history.x.resize(1);
+    shorter.history.v.resize(1);
+    state = std::make_shared<const State<Dim>>(std::move(shorter));
   }
 
   void scale_tolerances() {
@@ -162,11 +247,6 @@ struct Simulation<Dim>::Impl {
     setup.newton.step_tolerance = factor * first_newton.step_tolerance;
     setup.newton.gradient_tolerance = factor * first_newton.gradient_tolerance;
     setup.newton.first_gradient_tolerance = factor * first_newton.first_gradient_tolerance;
-  }
-
-  /// Before the state changes: snapshots keep theirs.
-  void own_state() {
-    if (state.use_count() > 1) state = std::make_shared<State<Dim>>(*state);
   }
 
   /// Those of a state that no step of this simulation led to.
@@ -195,11 +275,12 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   impl_->cache = std::make_unique<ProblemCache<Dim>>(*impl_->solver);
   impl_->first_dt = impl_->setup.time.dt;
   impl_->first_newton = impl_->setup.newton;
-  *impl_->state = initial_state(impl_->setup);
-  impl_->initial_edges = edge_lengths(impl_->state->mesh);
-  refuse_intersections(impl_->setup, *impl_->state);
-  if (impl_->setup.consistent_initial_acceleration && !impl_->state->history.a.empty())
-    set_consistent_acceleration(impl_->setup, *impl_->state, *impl_->cache);
+  auto state = std::make_shared<State<Dim>>(initial_state(impl_->setup));
+  impl_->initial_edges = edge_lengths(state->mesh);
+  refuse_intersections(impl_->setup, *state);
+  if (impl_->setup.consistent_initial_acceleration && !state->history.a.empty())
+    set_consistent_acceleration(impl_->setup, *state, *impl_->cache);
+  impl_->state = std::move(state);
   impl_->set_forces_at_rest();
 }
 
@@ -209,82 +290,101 @@ template <int Dim>
 Simulation<Dim>::Simulation(Simulation&&) noexcept = default;
 
 template <int Dim>
-StepReport Simulation<Dim>::initial_report() const {
-  StepReport report;
-  const State<Dim>& state = *impl_->state;
-  report.step = state.step;
-  report.t = state.t;
-  report.vertices = state.mesh.num_vertices();
-  report.elements = state.mesh.num_cells();
-  StepProblem<Dim> problem(impl_->setup, state.mesh, state.space, state.history, state.t, *impl_->cache, state.stiffness,
-                           state.quadrature);
-  report.unknowns = problem.dofs().num_unknowns;
-  report.energy = problem.report(state.history.x[0]);
-  report.energy_before_remesh = report.energy.total;
-  report.min_distance = problem.min_distance(state.history.x[0]);
-  report.min_volume_ratio = min_volume_ratio(problem.cells(), state.history.x[0]);
-  report.peak_rss_mb = peak_rss_mb();
-  return report;
+const StepReport& Simulation<Dim>::report() const {
+  if (!impl_->report) {
+    impl_->refuse_in_step("report");
+    impl_->report = impl_->report_of_state();
+  }
+  return *impl_->report;
 }
 
 template <int Dim>
 StepResult Simulation<Dim>::adapt(double dt) {
-  impl_->set_step(dt);
-  State<Dim> end = *impl_->state;
-  const auto start = std::make_shared<State<Dim>>();
-  StepResult result = take_step(impl_->tools(), end, false, start.get());
-  if (!result.ok || result.renumbering.empty()) return result;
-  const std::shared_ptr<const State<Dim>> before = std::exchange(impl_->state, start);
-  impl_->set_forces_at_rest();
-  if (impl_->on_mesh_change)
-    impl_->on_mesh_change(describe_change(before->mesh, start->mesh, result.renumbering), before->mesh);
+  impl_->refuse_in_callback("adapt");
+  if (impl_->setup.on_iteration) report();  // which it may ask for
+  const auto before = impl_->state;
+  StepResult result = impl_->with_step(dt, [&] {
+    const typename Impl::Inside inside(*impl_, Phase::in_step);
+    State<Dim> end;
+    const auto start = std::make_shared<State<Dim>>();
+    StepResult adapted = take_step(impl_->tools(), *impl_->state, end, false, start.get());
+    if (!adapted.ok || adapted.renumbering.empty()) return adapted;
+    impl_->state = start;
+    ++impl_->mesh_revision;
+    impl_->set_forces_at_rest();
+    return adapted;
+  });
+  if (!result.ok) return result;
+  impl_->report = impl_->report_of_state();
+  impl_->report->add_effort(result.report);
+  impl_->tell(*before, result);
   return result;
 }
 
 template <int Dim>
 StepResult Simulation<Dim>::advance() {
-  const std::shared_ptr<const State<Dim>> before =
-      impl_->on_mesh_change && impl_->setup.remesh.enabled ? impl_->state : nullptr;
-  impl_->own_state();
-  StepResult result = take_step_in_parts(impl_->tools(), *impl_->state);
-  if (!result.ok) return result;
+  impl_->refuse_in_callback("step");
+  if (impl_->setup.on_iteration) report();
+  StepResult result;
+  std::shared_ptr<const State<Dim>> before;
+  {
+    const typename Impl::Inside inside(*impl_, Phase::in_step);
+    auto end = std::make_shared<State<Dim>>();
+    result = take_step_in_parts(impl_->tools(), *impl_->state, *end);
+    if (!result.ok) return result;
+    before = std::exchange(impl_->state, std::move(end));
+  }
   impl_->forces = result.forces;
-  if (before && !result.renumbering.empty())
-    impl_->on_mesh_change(describe_change(before->mesh, impl_->state->mesh, result.renumbering), before->mesh);
+  impl_->report = result.report;
+  if (!result.renumbering.empty()) ++impl_->mesh_revision;
+  impl_->tell(*before, result);
   return result;
 }
 
 template <int Dim>
 StepResult Simulation<Dim>::advance(double dt) {
-  impl_->set_step(dt);
-  return advance();
+  impl_->refuse_in_callback("step");
+  return impl_->with_step(dt, [&] { return advance(); });
 }
 
 template <int Dim>
 Setup<Dim>& Simulation<Dim>::conditions() {
+  impl_->refuse_in_step("conditions");
   return impl_->setup;
 }
 
 template <int Dim>
 void Simulation<Dim>::on_mesh_change(std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> listener) {
+  impl_->refuse_in_callback("listener of mesh changes");
   impl_->on_mesh_change = std::move(listener);
 }
 
 template <int Dim>
+std::uint64_t Simulation<Dim>::mesh_revision() const {
+  return impl_->mesh_revision;
+}
+
+template <int Dim>
 Snapshot<Dim> Simulation<Dim>::save() const {
-  return {impl_->state, impl_->setup.time, impl_->forces};
+  return {impl_->state, impl_->setup.time, impl_->forces, impl_->report, impl_->identity};
 }
 
 template <int Dim>
 void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
-  impl_->state = std::const_pointer_cast<State<Dim>>(snapshot.state);  // own_state() before it changes
+  impl_->refuse_in_callback("restore");
+  if (snapshot.owner != impl_->identity)
+    refuse_state("saved state", "one of another simulation", "one that this simulation has saved");
+  impl_->state = snapshot.state;
+  ++impl_->mesh_revision;
   impl_->setup.time = snapshot.time;
   impl_->scale_tolerances();
   impl_->forces = snapshot.forces;
+  impl_->report = snapshot.report;
 }
 
 template <int Dim>
 void Simulation<Dim>::restore(State<Dim> state) {
+  impl_->refuse_in_callback("restore");
   const auto refuse = [](const std::string& place, auto found, auto expected) {
     throw InputError({"", place, std::to_string(found), std::to_string(expected)});
   };
@@ -305,7 +405,9 @@ void Simulation<Dim>::restore(State<Dim> state) {
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
     if (!impl_->setup.materials.contains(state.mesh.body(c))) refuse("body of a saved cell", state.mesh.body(c), 0);
   if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
-  impl_->state = std::make_shared<State<Dim>>(std::move(state));
+  impl_->state = std::make_shared<const State<Dim>>(std::move(state));
+  ++impl_->mesh_revision;
+  impl_->report.reset();
   impl_->set_forces_at_rest();
 }
 
@@ -377,8 +479,7 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const S
 }  // namespace
 
 template <int Dim>
-typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
-  const State<Dim>& state = *impl_->state;
+typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>& state, const NodalForces& forces) const {
   const int bodies = num_nodes(state.mesh, state.space);
   FrameData data;
   data.x = state.history.x[0].head(Dim * bodies);
@@ -391,6 +492,7 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
                                   mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
                                 data.elastic_density.push_back(mean);
                               });
+  data.asked.forces = forces;
   add_asked(cells, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
@@ -430,7 +532,6 @@ template <int Dim>
 void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, FrameData& data) const {
   const FieldOptions& options = impl_->setup.fields;
   AskedFields& asked = data.asked;
-  asked.forces = impl_->forces;
   if (options.von_mises || options.stress)
     for_each_cell_in_order<Dim>(
         cells, data.x, impl_->setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {
