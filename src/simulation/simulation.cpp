@@ -14,6 +14,7 @@
 #include "itr/core/process.hpp"
 #include "itr/linear/choice.hpp"
 #include "itr/mesh/validate.hpp"
+#include "itr/simulation/invariants.hpp"
 #include "itr/simulation/step.hpp"
 
 namespace itr {
@@ -127,6 +128,65 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
 
 [[noreturn]] void refuse_state(const std::string& place, const std::string& found, const std::string& expected) {
   throw InputError({"", place, found, expected});
+}
+
+void require_size(const std::string& place, std::size_t found, std::size_t expected) {
+  if (found != expected) refuse_state(place, std::to_string(found), std::to_string(expected));
+}
+
+void require_finite(const std::string& place, const VectorX& field) {
+  for (Eigen::Index i = 0; i < field.size(); ++i)
+    if (!std::isfinite(field[i]))
+      refuse_state(place + "[" + std::to_string(i) + "]", fmt::format("{}", field[i]), "a number");
+}
+
+/// How many past states there are, and how long they are.
+template <int Dim>
+void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
+  const TimeIntegrator integrator(setup.time);
+  const History& history = state.history;
+  if (history.x.empty() || history.x.size() > static_cast<std::size_t>(integrator.depth()))
+    refuse_state("saved positions", std::to_string(history.x.size()) + " past states",
+                 fmt::format("1 to {}, as the integrator remembers", integrator.depth()));
+  require_size("past states of saved velocities", history.v.size(), history.x.size());
+  require_size("past states of saved accelerations", history.a.size(),
+               integrator.uses_acceleration() ? history.x.size() : 0);
+  const auto size = static_cast<std::size_t>(Dim) *
+                    (static_cast<std::size_t>(num_nodes(state.mesh, state.space)) + setup.obstacles.rest.size());
+  const auto check = [&](const std::string& name, const VectorX& field) {
+    require_size("length of saved " + name, static_cast<std::size_t>(field.size()), size);
+    require_finite("saved " + name, field);
+  };
+  for (const VectorX& x : history.x) check("positions", x);
+  for (const VectorX& v : history.v) check("velocities", v);
+  for (const VectorX& a : history.a) check("accelerations", a);
+  if (state.deviation.size() > 0) check("deviation", state.deviation);
+}
+
+/// Throws InputError for a state that no steps of this setup lead to.
+template <int Dim>
+void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
+  const Mesh<Dim>& mesh = state.mesh;
+  if (mesh.num_vertices() != mesh.vertex_slots() || mesh.num_cells() != mesh.cell_slots())
+    refuse_state("saved mesh", "dead slots", "a compact mesh");
+  if (const Space expected = space_of_orders(mesh, setup.order); state.space != expected)
+    refuse_state("curved edges of a saved state", fmt::format("{}, others than the setup's", state.space.num_curved()),
+                 std::to_string(expected.num_curved()));
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (!setup.materials.contains(mesh.body(c)))
+      refuse_state("body of a saved cell", std::to_string(mesh.body(c)), "one that has a material");
+  check_history(setup, state);
+  if (!state.quadrature.empty())
+    require_size("saved levels of quadrature", state.quadrature.size(),
+                 whole_mesh(mesh, {}, state.space).curved_elements.size());
+  if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
+  for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
+                                    std::pair("barrier stiffness", state.stiffness.value)})
+    if (!std::isfinite(value)) refuse_state(std::string("saved ") + name, fmt::format("{}", value), "a number");
+  for (std::size_t age = 0; age < state.history.x.size(); ++age)
+    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.space); !violation.empty())
+      refuse_state(age == 0 ? "saved positions" : fmt::format("saved positions of {} steps before", age), violation,
+                   "positions without inversions and intersections");
 }
 
 /// Where a simulation is when it calls the program.
@@ -385,25 +445,7 @@ void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
 template <int Dim>
 void Simulation<Dim>::restore(State<Dim> state) {
   impl_->refuse_in_callback("restore");
-  const auto refuse = [](const std::string& place, auto found, auto expected) {
-    throw InputError({"", place, std::to_string(found), std::to_string(expected)});
-  };
-  if (Space expected = space_of_orders(state.mesh, impl_->setup.order); state.space != expected)
-    refuse("curved edges of a saved state", state.space.num_curved(), expected.num_curved());
-  const auto size =
-      static_cast<Eigen::Index>(Dim * (num_nodes(state.mesh, state.space) + impl_->setup.obstacles.rest.size()));
-  const History& history = state.history;
-  for (const auto* fields : {&history.x, &history.v, &history.a})
-    for (const VectorX& field : *fields)
-      if (field.size() != size) refuse("length of a saved field", field.size(), size);
-  const std::size_t curved = whole_mesh(state.mesh, {}, state.space).curved_elements.size();
-  if (!state.quadrature.empty() && state.quadrature.size() != curved)
-    refuse("saved levels of quadrature", state.quadrature.size(), curved);
-  if (history.x.empty() || history.v.empty()) refuse("saved states", history.x.size(), 1);
-  if (history.a.empty() != impl_->state->history.a.empty())
-    refuse("saved accelerations", history.a.size(), impl_->state->history.a.size());
-  for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
-    if (!impl_->setup.materials.contains(state.mesh.body(c))) refuse("body of a saved cell", state.mesh.body(c), 0);
+  refuse_misfit(impl_->setup, state);
   if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
   impl_->state = std::make_shared<const State<Dim>>(std::move(state));
   ++impl_->mesh_revision;

@@ -97,8 +97,8 @@ class Simulation {
   Snapshot<Dim> save() const;
   /// Throws InputError for a snapshot of another simulation.
   void restore(const Snapshot<Dim>& snapshot);
-  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup. Strata that are not
-  /// its mesh's are dropped, to be found anew.
+  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup, has numbers that are
+  /// not finite or violates invariants (find_violation). Strata that are not its mesh's are dropped, to be found anew.
   void restore(State<Dim> state);
 
   const State<Dim>& state() const;
