@@ -115,6 +115,21 @@ TEST(HostLoop, ReplaysWithTheSameBits) {
   expect_same_state(go_on(), first);
 }
 
+/// As programs may hold it, while no snapshot does.
+TEST(HostLoop, AReferenceToTheStateFollowsIt) {
+  auto setup = block<2>();
+  setup.time = {.integrator = Integrator::bdf, .bdf_order = 2, .dt = 0.01, .steps = 1000};
+  auto simulation = simulate(setup);
+  const State<2>& state = simulation.state();
+  for (const double dt : {0.01, 0.01, 0.02, 0.02}) {
+    ASSERT_TRUE(simulation.advance(dt).ok);
+    ASSERT_EQ(&simulation.state(), &state);
+  }
+  simulation.restore(State<2>(state));
+  EXPECT_EQ(&simulation.state(), &state);
+  EXPECT_EQ(state.step, 4);
+}
+
 /// What they take on meshes of 10^4 vertices: `itr_bench --benchmark_filter=Snapshot`.
 TEST(HostLoop, SavingAndRestoringCopyNothing) {
   auto simulation = simulate(pressed_block());

@@ -201,10 +201,10 @@ struct Simulation<Dim>::Impl {
   std::unique_ptr<linear::Solver> direct;  ///< or iterative
   std::unique_ptr<linear::ReusingSolver> solver;
   std::unique_ptr<ProblemCache<Dim>> cache;
-  std::shared_ptr<const State<Dim>> state;  ///< snapshots may share it
+  std::shared_ptr<State<Dim>> state;  ///< snapshots may share it: see change_to
   std::uint64_t mesh_revision = 0;
   const std::shared_ptr<const char> identity = std::make_shared<const char>();  ///< of what save() gave
-  std::atomic<Phase> phase = Phase::between_steps;                              ///< terms are asked by several threads
+  mutable std::atomic<Phase> phase = Phase::between_steps;                      ///< terms are asked by several threads
   EdgeLengths initial_edges;
   NodalForces forces;                        ///< of the last step
   mutable std::optional<StepReport> report;  ///< empty: of the state as it stands, not made yet
@@ -217,13 +217,13 @@ struct Simulation<Dim>::Impl {
   /// While a step is taken, or a listener told of it.
   class Inside {
    public:
-    Inside(Impl& impl, Phase phase) : impl_(impl), before_(impl.phase.exchange(phase)) {}
+    Inside(const Impl& impl, Phase phase) : impl_(impl), before_(impl.phase.exchange(phase)) {}
     Inside(const Inside&) = delete;
     Inside& operator=(const Inside&) = delete;
     ~Inside() { impl_.phase = before_; }
 
    private:
-    Impl& impl_;
+    const Impl& impl_;
     Phase before_;
   };
 
@@ -238,19 +238,28 @@ struct Simulation<Dim>::Impl {
       throw InputError({"", what, "a call from inside of a listener of mesh changes", "one between steps"});
   }
 
+  /// The only way in which the state changes. What snapshots share stays; else a reference to state() stays good. Returns
+  /// the state before.
+  std::shared_ptr<const State<Dim>> change_to(std::shared_ptr<State<Dim>> end) {
+    if (state.use_count() > 1) return std::exchange(state, std::move(end));
+    std::swap(*state, *end);
+    return end;
+  }
+
   /// f() with steps of this length. Where it does nothing the length and what belongs to it are as before.
   template <typename F>
   StepResult with_step(double dt, F&& f) {
-    const std::shared_ptr<const State<Dim>> state_before = state;
     const TimeOptions time_before = setup.time;
+    const int step_before = state->step;
+    std::shared_ptr<const State<Dim>> longer;  // of the history that another step cuts
     const auto put_back = [&] {
-      if (state->step != state_before->step || state->t != state_before->t) return;  // it was done before a listener threw
-      state = state_before;
+      if (state->step != step_before) return;  // it was done before a listener threw
+      if (longer) change_to(std::make_shared<State<Dim>>(*longer));
       setup.time = time_before;
       scale_tolerances();
     };
     try {
-      set_step(dt);
+      longer = set_step(dt);
       StepResult result = f();
       if (!result.ok) put_back();
       return result;
@@ -268,6 +277,7 @@ struct Simulation<Dim>::Impl {
 
   /// Of the state as it stands.
   StepReport report_of_state() const {
+    const Inside inside(*this, Phase::in_step);  // terms and functions of conditions are asked
     StepReport made;
     made.step = state->step;
     made.t = state->t;
@@ -285,20 +295,20 @@ struct Simulation<Dim>::Impl {
     return made;
   }
 
-  /// Steps from now on have this length.
-  void set_step(double dt) {
+  /// Steps from now on have this length. Returns the state before where its history was cut.
+  std::shared_ptr<const State<Dim>> set_step(double dt) {
     TimeOptions& time = setup.time;
     if (!(dt > 0) || !std::isfinite(dt)) throw InputError({"", "dt", fmt::format("{}", dt), "a number > 0"});
-    if (dt == time.dt) return;
+    if (dt == time.dt) return nullptr;
     time.t0 = state->t;
     time.first_step = state->step;
     time.dt = dt;
     scale_tolerances();
-    if (time.integrator != Integrator::bdf || state->history.x.size() == 1) return;
-    State<Dim> shorter = *state;
-    shorter.history.x.resize(1);
-    shorter.history.v.resize(1);
-    state = std::make_shared<const State<Dim>>(std::move(shorter));
+    if (time.integrator != Integrator::bdf || state->history.x.size() == 1) return nullptr;
+    auto shorter = std::make_shared<State<Dim>>(*state);
+    shorter->history.x.resize(1);
+    shorter->history.v.resize(1);
+    return change_to(std::move(shorter));
   }
 
   void scale_tolerances() {
@@ -312,6 +322,7 @@ struct Simulation<Dim>::Impl {
   /// Those of a state that no step of this simulation led to.
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
+    const Inside inside(*this, Phase::in_step);
     StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
                              state->quadrature);
     forces = problem.forces(state->history.x[0]);
@@ -362,14 +373,14 @@ template <int Dim>
 StepResult Simulation<Dim>::adapt(double dt) {
   impl_->refuse_in_callback("adapt");
   if (impl_->setup.on_iteration) report();  // which it may ask for
-  const auto before = impl_->state;
+  std::shared_ptr<const State<Dim>> before;
   StepResult result = impl_->with_step(dt, [&] {
     const typename Impl::Inside inside(*impl_, Phase::in_step);
     State<Dim> end;
     const auto start = std::make_shared<State<Dim>>();
     StepResult adapted = take_step(impl_->tools(), *impl_->state, end, false, start.get());
     if (!adapted.ok || adapted.renumbering.empty()) return adapted;
-    impl_->state = start;
+    before = impl_->change_to(start);
     ++impl_->mesh_revision;
     impl_->set_forces_at_rest();
     return adapted;
@@ -377,7 +388,7 @@ StepResult Simulation<Dim>::adapt(double dt) {
   if (!result.ok) return result;
   impl_->report = impl_->report_of_state();
   impl_->report->add_effort(result.report);
-  impl_->tell(*before, result);
+  if (before) impl_->tell(*before, result);
   return result;
 }
 
@@ -392,7 +403,7 @@ StepResult Simulation<Dim>::advance() {
     auto end = std::make_shared<State<Dim>>();
     result = take_step_in_parts(impl_->tools(), *impl_->state, *end);
     if (!result.ok) return result;
-    before = std::exchange(impl_->state, std::move(end));
+    before = impl_->change_to(std::move(end));
   }
   impl_->forces = result.forces;
   impl_->report = result.report;
@@ -434,7 +445,7 @@ void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
   impl_->refuse_in_callback("restore");
   if (snapshot.owner != impl_->identity)
     refuse_state("saved state", "one of another simulation", "one that this simulation has saved");
-  impl_->state = snapshot.state;
+  impl_->state = std::const_pointer_cast<State<Dim>>(snapshot.state);  // change_to leaves it as it is
   ++impl_->mesh_revision;
   impl_->setup.time = snapshot.time;
   impl_->scale_tolerances();
@@ -447,7 +458,7 @@ void Simulation<Dim>::restore(State<Dim> state) {
   impl_->refuse_in_callback("restore");
   refuse_misfit(impl_->setup, state);
   if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
-  impl_->state = std::make_shared<const State<Dim>>(std::move(state));
+  impl_->change_to(std::make_shared<State<Dim>>(std::move(state)));
   ++impl_->mesh_revision;
   impl_->report.reset();
   impl_->set_forces_at_rest();

@@ -101,7 +101,7 @@ class Simulation {
   /// not finite or violates invariants (find_violation). Strata that are not its mesh's are dropped, to be found anew.
   void restore(State<Dim> state);
 
-  const State<Dim>& state() const;
+  const State<Dim>& state() const;      ///< valid while no snapshot shares it; spans of its fields until it changes
   std::uint64_t mesh_revision() const;  ///< another one whenever state().mesh may be another mesh
   const Setup<Dim>& setup() const;
   const NodalForces& forces() const;       ///< at the end of the last step, those that the setup asks for
