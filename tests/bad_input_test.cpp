@@ -147,9 +147,9 @@ std::map<std::string, Says> all_cases() {
   const itr_law c_law{[](int, const double*, void*) { return 0.0; }, [](int, const double*, double*, void*) {},
                       [](int, const double*, double*, void*) {}};
   const auto values = [&](void (AnySimulation::*set)(std::span<const double>),
-                          itr_status (*c_set)(itr_simulation*, const double*)) {
+                          itr_status (*c_set)(itr_simulation*, std::size_t, const double*)) {
     return Says{cpp_step([&](AnySimulation& s) { (s.*set)(nans); }),
-                c_step([&](itr_simulation* s) { return c_set(s, nans.data()); })};
+                c_step([&](itr_simulation* s) { return c_set(s, nans.size(), nans.data()); })};
   };
   return {
       {"vertex", of_block([](Block& b) { b.vertices[5] = kNan; })},
@@ -181,16 +181,16 @@ std::map<std::string, Says> all_cases() {
                })}},
       {"step", {cpp_step([](AnySimulation& s) { s.step(-1); }), c_step([](itr_simulation* s) { return itr_step(s, -1); })}},
       {"boundary", {cpp_step([&](AnySimulation& s) { s.fix("lefd", kMask, nans); }), c_step([&](itr_simulation* s) {
-                      return itr_fix_values(s, "lefd", kMask.data(), nans.data());
+                      return itr_fix_values(s, "lefd", kMask.data(), nans.size(), nans.data());
                     })}},
       {"displacement", {cpp_step([&](AnySimulation& s) { s.fix("left", kMask, nans); }), c_step([&](itr_simulation* s) {
-                          return itr_fix_values(s, "left", kMask.data(), nans.data());
+                          return itr_fix_values(s, "left", kMask.data(), nans.size(), nans.data());
                         })}},
       {"traction", {cpp_step([&](AnySimulation& s) { s.set_traction("left", nans); }), c_step([&](itr_simulation* s) {
-                      return itr_set_traction_values(s, "left", nans.data());
+                      return itr_set_traction_values(s, "left", nans.size(), nans.data());
                     })}},
       {"pressure", {cpp_step([&](AnySimulation& s) { s.set_pressure("left", pressures); }), c_step([&](itr_simulation* s) {
-                      return itr_set_pressure_values(s, "left", pressures.data());
+                      return itr_set_pressure_values(s, "left", pressures.size(), pressures.data());
                     })}},
       {"acceleration", values(&AnySimulation::set_acceleration, &itr_set_acceleration_values)},
       {"force", values(&AnySimulation::set_forces, &itr_set_forces)},

@@ -155,7 +155,7 @@ TEST_F(CollisionMeshTest, BlockRestsOnABumpThatItsMeshDoesNotHave) {
   const auto store = [&](const StepReport& report) {
     simulation.observe([&](const FrameView<3>& frame) { writer.write(frame, report); });
   };
-  store(simulation.initial_report());
+  store(simulation.report());
   const auto momentum = [&] {
     const AskedFields fields = asked(simulation);
     return Vec<3>(Eigen::Map<const Vec<3>>(fields.momentum.data()));

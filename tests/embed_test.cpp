@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "block.hpp"
 #include "itr/itr.h"
@@ -97,7 +98,7 @@ TEST(Facade, ErrorsNameArrayIndexFoundAndExpected) {
   EXPECT_NE(message_of([&] { simulation.set_forces(forces); }).find("forces[7]"), std::string::npos);
   EXPECT_EQ(message_of([&] { simulation.step(-1); }), "dt: found -1; expected a number > 0");
   AnySimulation other(block_model<3>());
-  EXPECT_NE(message_of([&] { simulation.restore(other.save()); }).find("another dimension"), std::string::npos);
+  EXPECT_NE(message_of([&] { simulation.restore(other.save()); }).find("another simulation"), std::string::npos);
 }
 
 template <int Dim>
@@ -202,6 +203,53 @@ TEST(Facade, MeshChangesReachTheHost) {
   EXPECT_EQ(simulation.num_vertices(), vertices);
 }
 
+constexpr const char* kRemesh = R"({"space": {"remesh": {"enabled": true, "split": {"acceptance_tolerance": 1e-4}}}})";
+
+/// Also where the mesh changed behind the facade's back.
+TEST(Facade, ValuesByVertexAreOfTheMeshThatThereIs) {
+  Model model = block_model<2>();
+  model.set_options(kRemesh);
+  AnySimulation simulation(model);
+  const std::array mask{1, 1};
+  const auto stretched = [&] {
+    std::vector<double> u = simulation.rest_positions();
+    for (double& component : u) component *= 0.05;
+    return u;
+  };
+  simulation.fix("left", mask, stretched());
+  simulation.set_traction("top", [](const double*, double, double* f) { f[0] = 1000, f[1] = 0; });
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(simulation.as<2>().advance().ok);
+  ASSERT_GT(simulation.num_vertices(), 16);
+  EXPECT_EQ(simulation.report().step, 2);
+  EXPECT_EQ(simulation.report().vertices, simulation.num_vertices());
+  simulation.freeze_mesh(true);
+  simulation.fix("left", mask, stretched());
+  ASSERT_TRUE(simulation.step().ok);
+  const std::vector<double> X = simulation.rest_positions();
+  for (std::size_t v = 0; v < X.size() / 2; ++v)
+    if (X[2 * v] == 0) {
+      EXPECT_NEAR(simulation.positions()[2 * v + 1], 1.05 * X[2 * v + 1], 1e-15);
+    }
+}
+
+TEST(Facade, AProjectionIsOverWithItsListener) {
+  Model model = block_model<2>();
+  model.set_options(kRemesh);
+  AnySimulation simulation(model);
+  simulation.set_traction("top", [](const double*, double, double* f) { f[0] = 1000, f[1] = 0; });
+  simulation.fix("left", std::array{1, 1}, [](const double*, double, double* u) { u[0] = u[1] = 0; });
+  std::optional<AnyMeshChange> kept;
+  simulation.on_mesh_change([&](const AnyMeshChange& change) {
+    kept = change;
+    EXPECT_NE(message_of([&] { change.project(VectorX::Ones(3)); }).find("found 3 rows"), std::string::npos);
+  });
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(simulation.step().ok);
+  ASSERT_TRUE(kept.has_value());
+  const VectorX field = VectorX::Ones(static_cast<Eigen::Index>(kept->vertex.size()));
+  EXPECT_EQ(message_of([&] { kept->project(field); }),
+            "project: found a call after that of the listener; expected one from inside of the listener");
+}
+
 // --- in C ---
 
 struct CBlock {
@@ -241,6 +289,95 @@ TEST(CInterface, SaysWhatIsWrongAndGoesOn) {
   EXPECT_STREQ(itr_simulation_message(block.simulation), "boundary: found 'right'; expected 'left'");
   EXPECT_EQ(itr_fix(block.simulation, "left", mask, nullptr, nullptr), ITR_BAD_INPUT);
   EXPECT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+}
+
+TEST(CInterface, AnswersAnErrorWithoutASimulation) {
+  EXPECT_TRUE(std::isnan(itr_time(nullptr)));
+  EXPECT_EQ(itr_steps(nullptr), -1);
+  EXPECT_EQ(itr_finished(nullptr), -1);
+  EXPECT_EQ(itr_dimension(nullptr), -1);
+  EXPECT_EQ(itr_num_vertices(nullptr) + itr_num_cells(nullptr) + itr_num_facets(nullptr), 0u);
+  EXPECT_EQ(itr_positions(nullptr), nullptr);
+  EXPECT_EQ(itr_velocities(nullptr), nullptr);
+  EXPECT_EQ(itr_forces(nullptr, ITR_CONTACT), nullptr);
+  EXPECT_EQ(itr_save(nullptr), nullptr);
+  itr_energies energies;
+  itr_step_statistics statistics;
+  EXPECT_EQ(itr_get_energies(nullptr, &energies), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_get_statistics(nullptr, &statistics), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_fix_values(nullptr, "left", nullptr, 0, nullptr), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_get_cells(nullptr, 0, nullptr), ITR_BAD_INPUT);
+  CBlock block;
+  EXPECT_EQ(itr_get_energies(block.simulation, nullptr), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(block.simulation), "energies: found NULL; expected an argument");
+  EXPECT_EQ(itr_get_statistics(block.simulation, nullptr), ITR_BAD_INPUT);
+}
+
+TEST(CInterface, ChecksTheLengthsOfArrays) {
+  CBlock block;
+  itr_simulation* s = block.simulation;
+  const int mask[] = {1, 1};
+  std::vector<double> numbers(32, 0.0);
+  std::vector<int> ids(54);
+  EXPECT_EQ(itr_fix_values(s, "left", mask, 31, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(s), "displacements: found 31 numbers; expected 32");
+  EXPECT_EQ(itr_set_traction_values(s, "left", 16, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_pressure_values(s, "left", 32, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_acceleration_values(s, 30, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_forces(s, 30, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_forces(s, 0, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_velocities(s, 33, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_get_rest_positions(s, 31, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(s), "X: found a length of 31; expected 32");
+  EXPECT_EQ(itr_get_cells(s, 53, ids.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_fix_values(s, "left", mask, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_traction_values(s, "left", 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_pressure_values(s, "left", 16, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_acceleration_values(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_forces(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_forces(s, 0, nullptr), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_velocities(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_get_rest_positions(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_get_cells(s, 54, ids.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_step(s, 0), ITR_SUCCESS);
+}
+
+TEST(CInterface, RefusesChangesFromInsideOfAStep) {
+  CBlock block, other;
+  struct Seen {
+    itr_simulation* simulation;
+    itr_snapshot *start, *inside;
+    int calls, refused;
+  } seen{block.simulation, itr_save(block.simulation), nullptr, 0, 0};
+  itr_set_acceleration(
+      block.simulation, [](const double*, double, double* a, void*) { a[0] = 0, a[1] = -10; }, nullptr);
+  itr_on_iteration(
+      block.simulation,
+      [](int, double, double, double, void* user) {
+        auto& s = *static_cast<Seen*>(user);
+        const std::vector<double> zero(32);
+        ++s.calls;
+        s.refused += itr_restore(s.simulation, s.start) == ITR_BAD_INPUT;
+        s.refused += itr_set_velocities(s.simulation, 32, zero.data()) == ITR_BAD_INPUT;
+        s.refused += itr_step(s.simulation, 0) == ITR_BAD_INPUT;
+        s.refused += itr_set_acceleration(s.simulation, nullptr, nullptr) == ITR_BAD_INPUT;
+        s.refused += itr_on_iteration(s.simulation, nullptr, nullptr) == ITR_BAD_INPUT;
+        itr_snapshot_destroy(s.inside);
+        s.inside = itr_save(s.simulation);
+        return 1;
+      },
+      &seen);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS) << itr_simulation_message(block.simulation);
+  EXPECT_GT(seen.calls, 0);
+  EXPECT_EQ(seen.refused, 5 * seen.calls);
+  EXPECT_NEAR(itr_time(block.simulation), 0.01, 1e-15);
+  ASSERT_EQ(itr_restore(block.simulation, seen.inside), ITR_SUCCESS);
+  EXPECT_EQ(itr_time(block.simulation), 0);
+  EXPECT_EQ(itr_restore(other.simulation, seen.inside), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(other.simulation),
+               "saved state: found one of another simulation; expected one that this simulation has saved");
+  itr_snapshot_destroy(seen.start);
+  itr_snapshot_destroy(seen.inside);
 }
 
 TEST(CInterface, CancelsSavesAndRestores) {
@@ -373,8 +510,6 @@ class Foundation final : public Energy {
   const CellSet<2>& cells_;
   std::vector<std::pair<int, double>> springs_;
 };
-
-constexpr const char* kRemesh = R"({"space": {"remesh": {"enabled": true, "split": {"acceptance_tolerance": 1e-4}}}})";
 
 TEST(CInterface, TakesTermsThatTrialsAskToo) {
   Model model = block_model<2>();

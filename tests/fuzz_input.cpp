@@ -270,7 +270,7 @@ class Fuzzer {
   template <int Dim>
   void start(const Setup<Dim>& setup) {
     linear::Registry registry;
-    Simulation<Dim>(setup, registry).initial_report();
+    Simulation<Dim>(setup, registry).report();
   }
 
   Random random_;

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
 
 #include "block.hpp"
 #include "derivatives.hpp"
@@ -111,6 +115,21 @@ TEST(HostLoop, ReplaysWithTheSameBits) {
   expect_same_state(go_on(), first);
 }
 
+/// As programs may hold it, while no snapshot does.
+TEST(HostLoop, AReferenceToTheStateFollowsIt) {
+  auto setup = block<2>();
+  setup.time = {.integrator = Integrator::bdf, .bdf_order = 2, .dt = 0.01, .steps = 1000};
+  auto simulation = simulate(setup);
+  const State<2>& state = simulation.state();
+  for (const double dt : {0.01, 0.01, 0.02, 0.02}) {
+    ASSERT_TRUE(simulation.advance(dt).ok);
+    ASSERT_EQ(&simulation.state(), &state);
+  }
+  simulation.restore(State<2>(state));
+  EXPECT_EQ(&simulation.state(), &state);
+  EXPECT_EQ(state.step, 4);
+}
+
 /// What they take on meshes of 10^4 vertices: `itr_bench --benchmark_filter=Snapshot`.
 TEST(HostLoop, SavingAndRestoringCopyNothing) {
   auto simulation = simulate(pressed_block());
@@ -173,6 +192,140 @@ TEST(Events, AnIterationCanEndTheStep) {
   EXPECT_EQ(simulation.state().step, 0);
   simulation.conditions().on_iteration = nullptr;
   EXPECT_TRUE(simulation.advance().ok);
+}
+
+/// What a listener keeps stays as it is, and takes the simulation back to before the step.
+TEST(Events, AListenerSeesTheStateBeforeTheStep) {
+  auto setup = pressed_block();
+  setup.time = {.integrator = Integrator::bdf, .bdf_order = 2, .dt = 0.01, .steps = 1000};
+  auto simulation = simulate(setup), plain = simulate(setup);
+  ASSERT_TRUE(simulation.advance().ok);
+  ASSERT_TRUE(plain.advance().ok);
+  const State<2> before = simulation.state();
+  std::optional<Snapshot<2>> kept;
+  simulation.conditions().on_iteration = [&](const NewtonProgress&) {
+    kept = simulation.save();
+    expect_same_state(simulation.state(), before);
+    EXPECT_EQ(simulation.report().step, 1);
+    return true;
+  };
+  ASSERT_TRUE(simulation.advance().ok);
+  ASSERT_TRUE(plain.advance().ok);
+  expect_same_state(simulation.state(), plain.state());
+  ASSERT_TRUE(kept.has_value());
+  expect_same_state(*kept->state, before);
+  simulation.restore(*kept);
+  expect_same_state(simulation.state(), before);
+  ASSERT_TRUE(simulation.advance().ok);
+  expect_same_state(simulation.state(), plain.state());
+}
+
+/// Each is refused with a message, from a listener and from a function of a condition, and the step goes on.
+TEST(Events, AListenerMayNotChangeWhatTheStepRefersTo) {
+  auto plain = simulate(pressed_block());
+  std::optional<Simulation<2>> simulation;
+  std::optional<Snapshot<2>> start;
+  int refused = 0;
+  const auto try_all = [&] {
+    const std::function<void()> changes[] = {[&] { simulation->restore(*start); },
+                                             [&] { simulation->restore(State<2>(*start->state)); },
+                                             [&] { simulation->advance(); },
+                                             [&] { simulation->advance(0.01); },
+                                             [&] { simulation->adapt(0.01); },
+                                             [&] { simulation->conditions().on_iteration = nullptr; },
+                                             [&] { simulation->on_mesh_change(nullptr); }};
+    for (const auto& change : changes) {
+      try {
+        change();
+        ADD_FAILURE() << "change " << &change - changes << " was not refused";
+      } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("from inside of a step"), std::string::npos) << error.what();
+        ++refused;
+      }
+    }
+  };
+  auto setup = pressed_block();
+  setup.on_iteration = [&](const NewtonProgress&) { return try_all(), true; };
+  setup.dirichlet[0].displacement = [&, given = setup.dirichlet[0].displacement](const Vec<2>& X, double t) {
+    if (t > 0 && simulation) try_all();
+    return given(X, t);
+  };
+  simulation.emplace(simulate(setup));
+  start = simulation->save();
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(simulation->advance().ok);
+    ASSERT_TRUE(plain.advance().ok);
+  }
+  EXPECT_GT(refused, 20);
+  expect_same_state(simulation->state(), plain.state());
+}
+
+/// The step is done: conditions may follow the mesh, but no step may begin.
+TEST(Events, AListenerOfMeshChangesMayChangeConditionsOnly) {
+  auto simulation = simulate(pressed_block());
+  const Snapshot<2> start = simulation.save();
+  int calls = 0;
+  simulation.on_mesh_change([&](const MeshChange<2>&, const Mesh<2>& before) {
+    ++calls;
+    EXPECT_EQ(simulation.report().vertices, simulation.state().mesh.num_vertices());
+    EXPECT_NE(before.num_vertices(), simulation.state().mesh.num_vertices());
+    simulation.conditions().body_acceleration = nullptr;
+    EXPECT_THROW(simulation.advance(), InputError);
+    EXPECT_THROW(simulation.adapt(0.01), InputError);
+    EXPECT_THROW(simulation.restore(start), InputError);
+    EXPECT_THROW(simulation.restore(State<2>(*start.state)), InputError);
+    EXPECT_THROW(simulation.on_mesh_change(nullptr), InputError);
+  });
+  ASSERT_TRUE(simulation.advance().ok);
+  EXPECT_EQ(calls, 1);
+  simulation.restore(start);
+}
+
+TEST(HostLoop, AStepThatFailsKeepsItsLengthToItself) {
+  auto setup = block<2>();
+  setup.time = {.integrator = Integrator::bdf, .bdf_order = 2, .dt = 0.01, .steps = 1000};
+  auto simulation = simulate(setup), plain = simulate(setup);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(simulation.advance().ok && plain.advance().ok);
+  const State<2> before = simulation.state();
+  simulation.conditions().on_iteration = [](const NewtonProgress&) { return false; };
+  EXPECT_TRUE(simulation.advance(0.002).cancelled);
+  simulation.conditions().on_iteration = [](const NewtonProgress&) -> bool { throw std::runtime_error("mine"); };
+  EXPECT_THROW(simulation.advance(0.002), std::runtime_error);
+  simulation.conditions().on_iteration = nullptr;
+  expect_same_state(simulation.state(), before);
+  EXPECT_EQ(simulation.setup().time.dt, 0.01);
+  ASSERT_TRUE(simulation.advance().ok && plain.advance().ok);
+  expect_same_state(simulation.state(), plain.state());
+}
+
+TEST(HostLoop, ASnapshotOfAnotherSimulationIsRefused) {
+  auto simulation = simulate(pressed_block()), other = simulate(block<2>());
+  EXPECT_THROW(simulation.restore(other.save()), InputError);
+  ASSERT_TRUE(simulation.advance().ok);
+  Simulation<2> moved = std::move(other);
+  moved.restore(moved.save());
+}
+
+TEST(HostLoop, TheReportIsOfTheStateThatThereIs) {
+  auto simulation = simulate(pressed_block());
+  EXPECT_EQ(simulation.report().vertices, 16);
+  const Snapshot<2> start = simulation.save();
+  const StepResult step = simulation.advance();
+  ASSERT_TRUE(step.ok);
+  EXPECT_EQ(simulation.report().energy.total, step.report.energy.total);
+  EXPECT_EQ(simulation.report().splits.accepted, step.report.splits.accepted);
+  simulation.restore(start);
+  EXPECT_EQ(simulation.report().step, 0);
+  EXPECT_EQ(simulation.report().vertices, 16);
+  const StepResult adapted = simulation.adapt(0.01);
+  EXPECT_EQ(simulation.report().step, 0);
+  EXPECT_EQ(simulation.report().t, 0);
+  EXPECT_EQ(simulation.report().vertices, simulation.state().mesh.num_vertices());
+  EXPECT_GT(simulation.report().vertices, 16);
+  EXPECT_EQ(simulation.report().splits.accepted, adapted.report.splits.accepted);
+  simulation.restore(State<2>(*start.state));
+  EXPECT_EQ(simulation.report().vertices, 16);
+  EXPECT_EQ(simulation.report().splits.accepted, 0);
 }
 
 TEST(Events, TheProgramIsToldOfMeshChanges) {

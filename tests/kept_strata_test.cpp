@@ -140,6 +140,10 @@ class SavedStrata : public ::testing::Test {
 
   void expect_refused(const std::string& name, const std::vector<std::int64_t>& values, int columns,
                       const std::string& found) {
+    expect_refused<std::int64_t>(name, values, columns, found);
+  }
+  template <typename T>
+  void expect_refused(const std::string& name, const std::vector<T>& values, int columns, const std::string& found) {
     try {
       saved([&](hdf5::File& file) {
         file.unlink(name);
@@ -197,9 +201,9 @@ TEST_F(SavedStrata, ThatAreWrongAreRefused) {
   expect_refused("/checkpoint/strata/interfaces", with(interfaces, 0, 99999), 4, "vertex 99999");
   expect_refused("/checkpoint/strata/interfaces", {0, 1, 2, 0}, 4, "without a patch");
   expect_refused("/checkpoint/strata/interfaces", interfaces, 2, "2 columns");
-  expect_refused("/checkpoint/strata/planes", {0, 0, 0, 0, 0, 1}, 3, "3 columns");
-  expect_refused("/checkpoint/strata/planes", {0, 0, 0, 0, 0, 2}, 6, "length 2");
-  expect_refused("/checkpoint/strata/tolerance", {0, 0}, 0, "2 numbers");
+  expect_refused<double>("/checkpoint/strata/planes", {0, 0, 0, 0, 0, 1}, 3, "3 columns");
+  expect_refused<double>("/checkpoint/strata/planes", {0, 0, 0, 0, 0, 2}, 6, "length 2");
+  expect_refused<double>("/checkpoint/strata/tolerance", {0, 0}, 0, "2 numbers");
 }
 
 }  // namespace

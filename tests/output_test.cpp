@@ -290,14 +290,14 @@ TEST_F(OutputTest, SeriesIsReadableAtAnyMomentAndCompleteAtTheEnd) {
     EXPECT_EQ(count_of(xdmf, "</Xdmf>"), 1);
     EXPECT_GE(count_of(xdmf, "<Time "), step * 15 / 16);
     const hdf5::Session session;
-    const hdf5::File file = hdf5::File::open(folder / "sim.h5");
+    const hdf5::File file = hdf5::File::open(folder / "sim.h5", hdf5::OtherFiles::followed);
     EXPECT_EQ(file.read_doubles(fmt::format("/frames/{:06}/fields/x", step)).rows(), 8u);
   }
   writer.finish("finished");
   EXPECT_EQ(count_of(text_of(folder / "sim.xdmf"), "<Time "), kSteps);
 
   const hdf5::Session session;
-  const hdf5::File file = hdf5::File::open(folder / "sim.h5");
+  const hdf5::File file = hdf5::File::open(folder / "sim.h5", hdf5::OtherFiles::followed);
   for (const char* frame : {"/frames/000000", "/frames/000059"}) {
     EXPECT_EQ(file.read_doubles(std::string(frame) + "/fields/x").rows(), 8u);
   }

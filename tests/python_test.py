@@ -377,6 +377,15 @@ class Remeshing(unittest.TestCase):
         self.assertGreater(own["changes"], 0)
         np.testing.assert_allclose(own["field"], self.simulation.rest_positions @ [2, 3] + 1, atol=1e-12)
 
+    def test_a_projection_is_over_with_its_listener(self):
+        kept = []
+        self.simulation.on_mesh_change(kept.append)
+        for _ in range(3):
+            self.simulation.step()
+        for change in kept:
+            with self.assertRaisesRegex(itr.InputError, "after that of the listener"):
+                change.project(np.ones(16))
+
     def test_saved_states_replay_with_the_same_bits(self):
         self.simulation.step()
         saved = self.simulation.save()
@@ -408,6 +417,46 @@ class Events(unittest.TestCase):
         self.assertEqual(simulation.time, 0)
         simulation.on_iteration(None)
         simulation.step()
+
+    def test_a_listener_sees_the_state_before_the_step_and_may_not_change_it(self):
+        simulation = make_simulation()
+        simulation.set_acceleration([0, -10])
+        simulation.step()
+        before, start = simulation.positions.copy(), simulation.save()
+        simulation.set_acceleration([0, -20])
+        kept = []
+
+        def listen(*_):
+            kept.append((simulation.positions, simulation.save()))
+            for change in (
+                lambda: simulation.restore(start),
+                lambda: simulation.set_velocities([0, 0]),
+                lambda: simulation.step(),
+                lambda: simulation.adapt(0.01),
+                lambda: simulation.set_acceleration([0, 0]),
+                lambda: simulation.on_iteration(None),
+                lambda: simulation.on_mesh_change(None),
+            ):
+                with self.assertRaisesRegex(itr.InputError, "from inside of a step"):
+                    change()
+            return True
+
+        simulation.on_iteration(listen)
+        simulation.step()
+        self.assertTrue(kept)
+        after = simulation.positions
+        for x, saved in kept:
+            np.testing.assert_array_equal(x, before)
+            simulation.restore(saved)
+            self.assertEqual(simulation.steps, 1)
+        simulation.on_iteration(None)
+        simulation.step()
+        np.testing.assert_array_equal(simulation.positions, after)
+
+    def test_a_snapshot_of_another_simulation_is_refused(self):
+        saved = make_simulation().save()
+        with self.assertRaisesRegex(itr.InputError, "another simulation"):
+            make_simulation().restore(saved)
 
     def test_what_a_listener_raises_comes_out(self):
         simulation = make_simulation()

@@ -10,10 +10,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 #include <thread>
 
@@ -21,6 +24,7 @@
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
 #include "itr/output/checkpoint.hpp"
+#include "itr/scene/scene.hpp"
 #include "output/frame_file.hpp"
 
 namespace itr::output {
@@ -42,13 +46,14 @@ int count_lines(const fs::path& path) {
   return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
 }
 
-/// `itr run`, its output in a file.
+/// `itr run`, or another command, its output in a file.
 class Command {
  public:
   /// `largest_file` [bytes]: writes beyond fail, as those on a full disk do; 0: no limit.
-  Command(const Arguments& arguments, const fs::path& log, rlim_t largest_file = 0) : log_(log) {
-    std::vector<std::string> words = {std::string(ITR_BINARY_DIR) + "/bin/itr", "run"};
-    words.insert(words.end(), arguments.begin(), arguments.end());
+  Command(const Arguments& arguments, const fs::path& log, rlim_t largest_file = 0, const Arguments& command = {"run"})
+      : log_(log) {
+    std::vector<std::string> words = {std::string(ITR_BINARY_DIR) + "/bin/itr"};
+    for (const Arguments* part : {&command, &arguments}) words.insert(words.end(), part->begin(), part->end());
     std::vector<char*> argv;
     for (auto& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -153,7 +158,8 @@ void expect_same_results(const fs::path& a, const fs::path& b) {
   const auto frames = stored_frames(a);
   ASSERT_EQ(frames.size(), stored_frames(b).size());
   const hdf5::Session session;
-  const hdf5::File file_a = hdf5::File::open(a / "sim.h5"), file_b = hdf5::File::open(b / "sim.h5");
+  const auto open_series = [](const fs::path& run) { return hdf5::File::open(run / "sim.h5", hdf5::OtherFiles::followed); };
+  const hdf5::File file_a = open_series(a), file_b = open_series(b);
   for (const auto& frame : frames) expect_same_bits(file_a, file_b, "/frames/" + frame.stem().string());
 }
 
@@ -170,7 +176,7 @@ void expect_readable(const fs::path& directory) {
   for (const auto& frame : stored_frames(directory)) EXPECT_NO_THROW(read_frame(frame)) << frame;
   const int steps = static_cast<int>(results_of(directory).size());
   const hdf5::Session session;
-  const hdf5::File file = hdf5::File::open(directory / "sim.h5");
+  const hdf5::File file = hdf5::File::open(directory / "sim.h5", hdf5::OtherFiles::followed);
   for (int step = 0; step + 1 < steps; ++step)
     EXPECT_GT(file.read_doubles(fmt::format("/frames/{:06}/fields/x", step)).rows(), 0u) << step;
 }
@@ -331,6 +337,227 @@ TEST_F(InterruptTest, TheSecondSignalIsHeardWithinRemeshing) {
   expect_readable(run);
   EXPECT_EQ(count_lines(run / "steps.jsonl"), steps) << "it was no long step";
   EXPECT_TRUE(find_saved_state(run).has_value());
+}
+
+/// Time that batch systems give after it: seconds.
+TEST_F(InterruptTest, ATerminatedRunSavesTheLastWholeStep) {
+  const Case slow{"slow",
+                  "masticator.json",
+                  5,
+                  R"("dt":0.05)",
+                  {"/geometry/0/n_refs=2", "/space/remesh/screening=\"none\"",
+                   R"(/space/remesh/local_relaxation={"local_mesh_n_ring":9,"local_mesh_max_cells":2000})",
+                   R"j(/initial_conditions/velocity=[{"id":0,"value":["sin(7*x)",0]}])j"}};
+  const fs::path run = folder / "run";
+  const Command command = start(arguments(slow, run, 30));
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (count_lines(run / "steps.jsonl") < 1 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  const int steps = count_lines(run / "steps.jsonl");
+  const auto signal = std::chrono::steady_clock::now();
+  command.send(SIGTERM);
+  EXPECT_EQ(command.wait(), 3) << command.said();
+  EXPECT_LT(std::chrono::steady_clock::now() - signal, std::chrono::seconds(10));
+  EXPECT_NE(command.said().find("which is dropped"), std::string::npos) << command.said();
+  EXPECT_EQ(count_lines(run / "steps.jsonl"), steps);
+  const auto saved = find_saved_state(run);
+  ASSERT_TRUE(saved.has_value());
+  EXPECT_EQ(saved->step, steps - 1);
+  EXPECT_TRUE(fs::exists(run / "summary.json"));
+}
+
+/// A step that looks at nothing for long: one factorisation by a slow solver.
+TEST_F(InterruptTest, ATerminatedRunDoesNotWaitForAFactorisation) {
+  const Case slow{"slow",
+                  "cubes.json",
+                  2,
+                  R"("dt":0.01)",
+                  {"/space/remesh/enabled=false", "/geometry/0/n_refs=3", "/geometry/1/n_refs=3",
+                   "/solver/linear/solver=\"eigen:ldlt\""}};
+  const fs::path run = folder / "run";
+  const Command command = start(arguments(slow, run, 30));
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+  while (count_lines(run / "steps.jsonl") < 1 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  const int steps = count_lines(run / "steps.jsonl");
+  const auto signal = std::chrono::steady_clock::now();
+  command.send(SIGTERM);
+  EXPECT_EQ(command.wait(), 3) << command.said();
+  EXPECT_LT(std::chrono::steady_clock::now() - signal, std::chrono::seconds(15));
+  EXPECT_NE(command.said().find("which is dropped"), std::string::npos) << command.said();
+  const auto saved = find_saved_state(run);
+  ASSERT_TRUE(saved.has_value());
+  EXPECT_EQ(saved->step, steps - 1);
+  EXPECT_TRUE(fs::exists(run / "summary.json"));
+}
+
+/// The state before a step that fails is saved, and the reason is said, also where the frame of that state is being kept in
+/// memory for the next one.
+TEST_F(InterruptTest, AStepThatFailsDoesNotFailItsCheckpoint) {
+  Case which = kStopped;
+  which.time = R"("dt":2e-5,"quasistatic":true)";
+  which.sets = {"/space/remesh/enabled=false", "/geometry/0/surface_selection=1", "/geometry/1/surface_selection=2",
+                R"(/boundary_conditions/dirichlet_boundary=[{"id":1,"value":[0,0]}])",
+                R"j(/boundary_conditions/obstacle_displacements=[{"id":2,"value":["-if(t-3e-5,0.2,0)",0]}])j"};
+  const fs::path run = folder / "run";
+  const Command command = start(arguments(which, run, 30));
+  EXPECT_EQ(command.wait(), 3) << command.said();
+  EXPECT_NE(command.said().find("stopped in step 2"), std::string::npos) << command.said();
+  EXPECT_NE(command.said().find("held vertices cannot reach their targets"), std::string::npos) << command.said();
+  EXPECT_EQ(command.said().find("HDF5"), std::string::npos) << command.said();
+  const auto saved = find_saved_state(run);
+  ASSERT_TRUE(saved.has_value());
+  EXPECT_EQ(saved->step, 1);
+}
+
+class DamageTest : public InterruptTest {
+ protected:
+  /// A run of 12 steps, each of which is saved.
+  fs::path make_run() const {
+    const fs::path run = folder / "run";
+    Case which = kStopped;
+    which.steps = 12;
+    EXPECT_EQ(start(arguments(which, run, 0)).wait(), 0) << text_of(folder / "log");
+    return run;
+  }
+  Command resume(const fs::path& run) const {
+    Case which = kStopped;
+    which.steps = 16;
+    return start(arguments(which, run, 30, true));
+  }
+  Command certify_run(const fs::path& run) const { return Command({}, folder / "log", 0, {"certify", run.string()}); }
+  static void flip(const fs::path& file, std::size_t at, int bit) {
+    std::string bytes = text_of(file);
+    bytes.at(at) = static_cast<char>(bytes.at(at) ^ (1 << bit));
+    std::ofstream(file, std::ios::binary) << bytes;
+  }
+  /// Where the values of a dataset begin.
+  static std::size_t place_of(const fs::path& file, const std::string& name) {
+    const hdf5::Session session;
+    const std::vector<double> values = hdf5::File::open(file).read_doubles(name).values;
+    const std::string bytes = text_of(file);
+    const std::string_view pattern(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double));
+    const std::size_t at = bytes.rfind(pattern);
+    EXPECT_NE(at, std::string::npos) << name;
+    return at;
+  }
+};
+
+TEST_F(DamageTest, OfTheNewestStateIsSaidAndAnOlderOneServes) {
+  const fs::path whole = folder / "whole", run = make_run();
+  Case which = kStopped;
+  which.steps = 16;
+  ASSERT_EQ(start(arguments(which, whole, 0)).wait(), 0);
+  const auto frames = stored_frames(run);
+  flip(frames[12], place_of(frames[12], "/checkpoint/history/v/0") + 8, 3);
+  std::ofstream(frames[11], std::ios::binary) << text_of(frames[11]).substr(0, 3000);
+  const Command certified = certify_run(run);
+  EXPECT_EQ(certified.wait(), 2);  // of a frame that is cut off
+  fs::remove(frames[11]);
+  const Command again = certify_run(run);
+  EXPECT_EQ(again.wait(), 4) << again.said();
+  EXPECT_NE(again.said().find("frames/000012.h5: /checkpoint/history/v/0 is damaged"), std::string::npos) << again.said();
+  const Command resumed = resume(run);
+  ASSERT_EQ(resumed.wait(), 0) << resumed.said();
+  EXPECT_NE(resumed.said().find("/checkpoint/history/v/0: found values of another digest"), std::string::npos);
+  EXPECT_NE(resumed.said().find("going on after step 10"), std::string::npos) << resumed.said();
+  EXPECT_EQ(results_of(run), results_of(whole));
+}
+
+TEST_F(DamageTest, OfOneBitOfAnArrayIsAlwaysSaid) {
+  const fs::path run = make_run(), file = stored_frames(run).back();
+  const std::string bytes = text_of(file);
+  struct Array {
+    std::string name;
+    std::size_t begin, size;
+  };
+  std::vector<Array> arrays;
+  {
+    const hdf5::Session session;
+    const hdf5::File frame = hdf5::File::open(file);
+    const auto add = [&](const std::string& name, const auto& values) {
+      const std::string_view pattern(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
+      const std::size_t at = bytes.find(pattern);
+      if (pattern.size() >= 16 && at != std::string::npos && at == bytes.rfind(pattern))
+        arrays.push_back({name, at, pattern.size()});
+    };
+    for (const std::string& name : frame.digest_names()) {
+      if (name[0] == '@' || !(name.starts_with("/mesh/") || name.starts_with("/checkpoint/"))) continue;
+      if (frame.holds_text(name))
+        add(name, frame.read_text(name));
+      else if (frame.holds_integers(name))
+        add(name, frame.read_integers(name).values);
+      else
+        add(name, frame.read_doubles(name).values);
+    }
+  }
+  EXPECT_GT(arrays.size(), 8u);
+  std::mt19937 random(1);
+  for (int i = 0; i < 200; ++i) {
+    const Array& array = arrays[random() % arrays.size()];
+    flip(file, array.begin + random() % array.size, static_cast<int>(random() % 8));
+    EXPECT_EQ(find_damage(file), std::vector{array.name});
+    const auto saved = find_saved_state(run);
+    ASSERT_TRUE(saved.has_value());
+    if (saved->step == 12) {
+      EXPECT_THROW(read_checkpoint<2>(*saved), InputError) << array.name;
+    } else {
+      EXPECT_EQ(saved->passed_over.size(), 1u) << array.name;
+    }
+    std::ofstream(file, std::ios::binary) << bytes;
+  }
+}
+
+/// As a host may hand in, or a file whose digests are right.
+TEST_F(DamageTest, OfInvariantsIsRefused) {
+  const fs::path run = make_run();
+  const auto saved = find_saved_state(run);
+  ASSERT_TRUE(saved.has_value());
+  auto checkpoint = read_checkpoint<2>(*saved);
+  const State<2> good = checkpoint.state;
+  const scene::Scene scene =
+      scene::read(fmt::format("{}/examples/{}", ITR_SOURCE_DIR, kStopped.scene), {{"/space/remesh/enabled", "false"}});
+  linear::Registry registry;
+  Simulation<2> simulation(std::get<itr::Setup<2>>(scene.setup), registry);
+  EXPECT_NO_THROW(simulation.restore(good));
+  const auto message_of = [&](const std::function<void(State<2>&)>& change) {
+    State<2> state = good;
+    change(state);
+    try {
+      simulation.restore(std::move(state));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("taken");
+  };
+  const auto expect = [&](const char* part, const std::function<void(State<2>&)>& change) {
+    EXPECT_NE(message_of(change).find(part), std::string::npos) << message_of(change);
+  };
+  expect("saved velocities", [](State<2>& s) { s.history.v.clear(); });
+  expect("saved velocities", [](State<2>& s) { s.history.v[0].conservativeResize(4); });
+  expect("saved positions: found 2 past states", [](State<2>& s) { s.history.x.push_back(s.history.x[0]); });
+  expect("saved accelerations", [](State<2>& s) { s.history.a.push_back(s.history.x[0]); });
+  expect("saved velocities[3]: found nan", [](State<2>& s) { s.history.v[0][3] = NAN; });
+  expect("saved positions[0]: found inf", [](State<2>& s) { s.history.x[0][0] = HUGE_VAL; });
+  expect("length of saved deviation", [](State<2>& s) { s.deviation = VectorX::Zero(2); });
+  expect("saved deviation[1]", [](State<2>& s) { s.deviation = s.history.x[0], s.deviation[1] = NAN; });
+  expect("saved time", [](State<2>& s) { s.t = NAN; });
+  expect("saved step", [](State<2>& s) { s.step = -1; });
+  expect("body of a saved cell", [](State<2>& s) {
+    std::vector<Vec<2>> rest;
+    std::vector<std::array<int, 3>> cells;
+    for (int v = 0; v < s.mesh.vertex_slots(); ++v) rest.push_back(s.mesh.rest(v));
+    for (int c = 0; c < s.mesh.cell_slots(); ++c) cells.push_back(s.mesh.cell(c));
+    const std::vector<int> body(cells.size(), 77);
+    s.mesh = Mesh<2>(rest, cells, body);
+  });
+  expect("is inverted", [](State<2>& s) { std::swap(s.history.x[0][0], s.history.x[0][2]); });
+  expect("surfaces intersect", [](State<2>& s) {  // through the wall
+    for (int v = 0; v < s.mesh.vertex_slots(); ++v) s.history.x[0][2 * v] += 0.1;
+  });
+  EXPECT_EQ(message_of([](State<2>&) {}), "taken");
 }
 
 /// As after an update of itr that changed the format of saved states.

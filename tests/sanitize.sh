@@ -7,12 +7,12 @@ set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 preset=${1:?asan or tsan} jobs=${2:-2}
 build=build/$preset
-tests=(remesh_test remesh_3d_test remesh_decision_test remesh_allocation_test prospect_test history_transfer_test simulation_test host_test embed_test mesh_change_test bad_input_test)
+tests=(remesh_test remesh_3d_test remesh_decision_test remesh_allocation_test prospect_test history_transfer_test simulation_test host_test embed_test mesh_change_test bad_input_test hdf5_test)
 examples=(own_time_loop own_energy_term own_material own_solver contact_only transfer two_threads coupling)
 export OMP_NUM_THREADS=1 TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=4" UBSAN_OPTIONS=print_stacktrace=1
 case $preset in asan) sanitizer=address,undefined ;; tsan) sanitizer=thread ;; *) echo "asan or tsan, not $preset" >&2; exit 2 ;; esac
 
-cmake --preset "$preset" && cmake --build --preset "$preset" --target "${tests[@]}" -- -j "$jobs" || exit 1
+cmake --preset "$preset" && cmake --build --preset "$preset" --target "${tests[@]}" fuzz_readers -- -j "$jobs" || exit 1
 
 mkdir -p "$build/examples"
 flags=(-O1 -fno-omit-frame-pointer -fsanitize=$sanitizer -march=x86-64-v3 -DEIGEN_MAX_ALIGN_BYTES=32 -Iinclude -isystem /usr/include/eigen3)
@@ -33,6 +33,7 @@ run() {  # NAME COMMAND...
   [ "$status" = 0 ] && [ "$reports" = 0 ] || failed=1
 }
 for name in "${tests[@]}"; do run "$name" "$build/tests/$name"; done
+[ "$preset" = tsan ] || run fuzz_readers "$build/tests/fuzz_readers" 10000
 for name in "${examples[@]}" bounce; do
   if [ "$name" = own_solver ]; then run "$name" "$build/examples/$name" examples/masticator.json 10; else run "$name" "$build/examples/$name"; fi
 done

@@ -70,7 +70,7 @@ int main(void) {
     if (itr_step(simulation, 0.002)) return fail(itr_simulation_message(simulation));
 
   double* X = malloc(2 * itr_num_vertices(simulation) * sizeof *X);
-  itr_get_rest_positions(simulation, X);
+  itr_get_rest_positions(simulation, 2 * itr_num_vertices(simulation), X);
   for (size_t v = 0; v < itr_num_vertices(simulation); ++v)
     if (fabs(field[v] - 1 - X[2 * v] - 2 * X[2 * v + 1]) > 1e-12) return fail("the field was not carried along");
   free(X);

@@ -29,12 +29,13 @@ program hanging
     subroutine itr_simulation_destroy(simulation) bind(c)
       import; type(c_ptr), value :: simulation
     end subroutine
-    function itr_fix_values(simulation, boundary, mask, displacements) bind(c) result(status)
+    function itr_fix_values(simulation, boundary, mask, length, displacements) bind(c) result(status)
       import; type(c_ptr), value :: simulation; character(c_char) :: boundary(*)
-      integer(c_int) :: mask(*), status; real(c_double) :: displacements(*)
+      integer(c_int) :: mask(*), status; integer(c_size_t), value :: length; real(c_double) :: displacements(*)
     end function
-    function itr_set_forces(simulation, forces) bind(c) result(status)
-      import; type(c_ptr), value :: simulation; real(c_double) :: forces(*); integer(c_int) :: status
+    function itr_set_forces(simulation, length, forces) bind(c) result(status)
+      import; type(c_ptr), value :: simulation; integer(c_size_t), value :: length
+      real(c_double) :: forces(*); integer(c_int) :: status
     end function
     function itr_watch_forces(simulation, watched) bind(c) result(status)
       import; type(c_ptr), value :: simulation; integer(c_int), value :: watched; integer(c_int) :: status
@@ -73,8 +74,8 @@ program hanging
     '"time": {"dt": 1, "time_steps": 1, "quasistatic": true}, "solver": {"nonlinear": {"grad_norm": 1e-9}}}'//c_null_char))
   call check(itr_simulation_create(model, c_null_funptr, c_null_ptr, simulation))
   call itr_model_destroy(model)
-  call check(itr_fix_values(simulation, "top"//c_null_char, [1, 1], zero))
-  call check(itr_set_forces(simulation, forces))
+  call check(itr_fix_values(simulation, "top"//c_null_char, [1, 1], size(zero, kind=c_size_t), zero))
+  call check(itr_set_forces(simulation, size(forces, kind=c_size_t), forces))
   call check(itr_watch_forces(simulation, 1))
   call check(itr_step(simulation, 0d0))
   call check(itr_resultant(simulation, "top"//c_null_char, [0d0, 0d0], force, moment))

@@ -4,7 +4,11 @@
  *
  * Objects are handles, arrays are plain: interleaved, ids from 0, SI units; the library copies what it is given. Functions
  * that can fail return a status and leave a message in the handle: which array, which index, what was found, what was
- * expected. Handles are used by one thread at a time; different handles do not disturb each other. Nothing is printed. */
+ * expected. Handles are used by one thread at a time; different handles do not disturb each other. Nothing is printed.
+ *
+ * `length` is the number of entries of the array after it; another one than is needed is ITR_BAD_INPUT. Callbacks may read
+ * and save the simulation that calls them, which stands before the step; what would change it is ITR_BAD_INPUT there, but
+ * for conditions in a listener of mesh changes. They must not destroy it. */
 #ifndef ITR_ITR_H
 #define ITR_ITR_H
 
@@ -130,39 +134,43 @@ ITR_C_API const char* itr_simulation_message(const itr_simulation* simulation);
 ITR_C_API itr_status itr_step(itr_simulation* simulation, double dt);
 /** Finds the mesh of the next step and stays at its start, on that mesh: before sub-iterations on a frozen one. */
 ITR_C_API itr_status itr_adapt(itr_simulation* simulation, double dt);
-/** [s] The functions that return no status want a handle, not NULL. */
+/** [s]; not a number without a simulation. */
 ITR_C_API double itr_time(const itr_simulation* simulation);
-/** How many were done. */
+/** How many were done; -1 without a simulation. */
 ITR_C_API int itr_steps(const itr_simulation* simulation);
-ITR_C_API int itr_finished(const itr_simulation* simulation); /**< as many steps as the options ask for */
-/** 2 or 3. */
+/** Whether as many steps as the options ask for; -1 without a simulation. */
+ITR_C_API int itr_finished(const itr_simulation* simulation);
+/** 2 or 3; -1 without a simulation. */
 ITR_C_API int itr_dimension(const itr_simulation* simulation);
 
 /** Conditions from the next step on; mask: `dimension` flags, all 0 releases. Arrays are by vertex of the present mesh. */
 ITR_C_API itr_status itr_fix(itr_simulation* simulation, const char* boundary, const int* mask, itr_function displacement,
                              void* user);
 /** displacements: num_vertices * dimension [m]. */
-ITR_C_API itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, const int* mask,
+ITR_C_API itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, const int* mask, size_t length,
                                     const double* displacements);
 /** Force by rest area [N/m^2], in 2D by length [N/m]; NULL: none. */
 ITR_C_API itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, itr_function traction, void* user);
 /** tractions: num_vertices * dimension. */
-ITR_C_API itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, const double* tractions);
+ITR_C_API itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, size_t length,
+                                             const double* tractions);
 /** Along inward normals as they are then, the same unit: one number; NULL: none. */
 ITR_C_API itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, itr_function pressure, void* user);
 /** pressures: num_vertices. */
-ITR_C_API itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, const double* pressures);
+ITR_C_API itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, size_t length,
+                                             const double* pressures);
 /** Body force by mass [m/s^2]; NULL: none. */
 ITR_C_API itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user);
 /** accelerations: num_vertices * dimension. */
-ITR_C_API itr_status itr_set_acceleration_values(itr_simulation* simulation, const double* accelerations);
+ITR_C_API itr_status itr_set_acceleration_values(itr_simulation* simulation, size_t length, const double* accelerations);
 /** Displacement of an obstacle's vertices from rest [m]. */
 ITR_C_API itr_status itr_move_obstacle(itr_simulation* simulation, const char* obstacle, itr_function displacement,
                                        void* user);
 /** Where they are at the end of the next steps: num_vertices * dimension [m]. */
 ITR_C_API itr_status itr_move_obstacle_to(itr_simulation* simulation, const char* obstacle, size_t num_vertices,
                                           const double* positions);
-ITR_C_API itr_status itr_set_forces(itr_simulation* simulation, const double* forces); /**< num_nodes * dimension [N]; NULL: none */
+/** num_nodes * dimension [N]; NULL: none. */
+ITR_C_API itr_status itr_set_forces(itr_simulation* simulation, size_t length, const double* forces);
 /** Forces of present positions; NULL: none. With their stiffness (NULL: none) a step takes fewer rounds. */
 ITR_C_API itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces,
                                              itr_stiffness_function stiffness, void* user);
@@ -184,16 +192,17 @@ typedef struct itr_term {
 /** Adds a term to the incremental potential, or puts it in the place of the one of this name; NULL: it goes. */
 ITR_C_API itr_status itr_set_term(itr_simulation* simulation, const char* name, const itr_term* term, void* user);
 /** Of the bodies: num_nodes * dimension [m/s]. */
-ITR_C_API itr_status itr_set_velocities(itr_simulation* simulation, const double* velocities);
+ITR_C_API itr_status itr_set_velocities(itr_simulation* simulation, size_t length, const double* velocities);
 /** No remeshing while it is not 0. */
 ITR_C_API itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen);
 
-/** The state. Arrays belong to the simulation and are valid until the next call that changes it. */
+/** The state. Arrays belong to the simulation and are valid until the next call that changes it. Without a simulation they
+ * are NULL and numbers are 0. */
 ITR_C_API size_t itr_num_vertices(const itr_simulation* simulation);
 /** Vertices, then the nodes of curved edges: equal to the vertices where all edges are straight. */
 ITR_C_API size_t itr_num_nodes(const itr_simulation* simulation);
 /** num_nodes - num_vertices pairs of vertices, in the order of their nodes. */
-ITR_C_API itr_status itr_get_curved_edges(itr_simulation* simulation, int* edges);
+ITR_C_API itr_status itr_get_curved_edges(itr_simulation* simulation, size_t length, int* edges);
 /** Of the present mesh. */
 ITR_C_API size_t itr_num_cells(const itr_simulation* simulation);
 /** Of its boundary. */
@@ -203,15 +212,15 @@ ITR_C_API const double* itr_positions(const itr_simulation* simulation);
 /** num_nodes * dimension [m/s]. */
 ITR_C_API const double* itr_velocities(const itr_simulation* simulation);
 /** These are copied into arrays of the caller's; rest positions: num_nodes * dimension [m]. */
-ITR_C_API itr_status itr_get_rest_positions(itr_simulation* simulation, double* X);
+ITR_C_API itr_status itr_get_rest_positions(itr_simulation* simulation, size_t length, double* X);
 /** num_cells * (dimension + 1) ids of vertices. */
-ITR_C_API itr_status itr_get_cells(itr_simulation* simulation, int* cells);
+ITR_C_API itr_status itr_get_cells(itr_simulation* simulation, size_t length, int* cells);
 /** num_cells ids. */
-ITR_C_API itr_status itr_get_bodies(itr_simulation* simulation, int* bodies);
+ITR_C_API itr_status itr_get_bodies(itr_simulation* simulation, size_t length, int* bodies);
 /** num_facets * dimension ids of vertices, outward. */
-ITR_C_API itr_status itr_get_facets(itr_simulation* simulation, int* facets);
+ITR_C_API itr_status itr_get_facets(itr_simulation* simulation, size_t length, int* facets);
 /** num_facets ids of boundaries; -1: none. */
-ITR_C_API itr_status itr_get_facet_boundaries(itr_simulation* simulation, int* ids);
+ITR_C_API itr_status itr_get_facet_boundaries(itr_simulation* simulation, size_t length, int* ids);
 
 /** Forces on vertices [N], by kind; there are some after the first step since they are watched, else it is NULL. */
 typedef enum itr_force { ITR_CONTACT = 0, ITR_FRICTION = 1, ITR_REACTION = 2, ITR_APPLIED = 3 } itr_force;
@@ -233,14 +242,14 @@ typedef struct itr_step_statistics {
   int newton_iterations, linear_solves, factorizations, splits, collapses, swaps, smooths, cut_steps;
   double history_loss, min_distance, min_volume_ratio, seconds;
 } itr_step_statistics;
-/** Of the last step. */
-ITR_C_API void itr_get_energies(const itr_simulation* simulation, itr_energies* energies);
-/** Of the last step. */
-ITR_C_API void itr_get_statistics(const itr_simulation* simulation, itr_step_statistics* statistics);
+/** Of the last step, of what itr_adapt or itr_restore led to, or of the start. */
+ITR_C_API itr_status itr_get_energies(itr_simulation* simulation, itr_energies* energies);
+/** Of the same. */
+ITR_C_API itr_status itr_get_statistics(itr_simulation* simulation, itr_step_statistics* statistics);
 
-/** Saved states: cheap; the same steps from one have the same bits. NULL where there is no memory. */
+/** Saved states: cheap; the same steps from one have the same bits. NULL where there is no memory or no simulation. */
 ITR_C_API itr_snapshot* itr_save(const itr_simulation* simulation);
-/** To a state of this simulation; the snapshot stays. */
+/** To a state that this simulation has saved; the snapshot stays. */
 ITR_C_API itr_status itr_restore(itr_simulation* simulation, const itr_snapshot* snapshot);
 ITR_C_API void itr_snapshot_destroy(itr_snapshot* snapshot); /**< NULL is allowed */
 

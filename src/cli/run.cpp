@@ -5,10 +5,16 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <stop_token>
+#include <thread>
 
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
@@ -23,11 +29,20 @@ namespace itr::cli {
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
+volatile std::sig_atomic_t terminated = 0;
 std::atomic<bool> stop_now = false;  // what a solve looks at
 
 template <std::size_t N>
 void say(const char (&text)[N]) {  // all that a signal's handler may do
   [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text, N - 1);
+}
+
+/// As batch systems send it, with little time left: the step is dropped, and the state before it is saved.
+void on_termination(int) {
+  if (!stop_now) say("\nitr: dropping the step\n");
+  interrupted = 1;
+  terminated = 1;
+  stop_now = true;
 }
 
 /// The step is finished and saved; the second signal drops it, and the third is the system's.
@@ -100,8 +115,7 @@ void check_changes(const std::vector<scene::Change>& changes, const RunOptions& 
 }
 
 /// The state to go on from; none without --resume or where the folder has no frames.
-std::optional<output::SavedState> find_resumable(const scene::Scene& scene, const std::string& directory,
-                                                 const RunOptions& options) {
+std::optional<output::SavedState> find_resumable(const std::string& directory, const RunOptions& options) {
   if (!options.resume) {
     if (!options.overwrite && output::has_results(directory))
       throw InputError({directory, "output folder", "results of an earlier run",
@@ -109,13 +123,30 @@ std::optional<output::SavedState> find_resumable(const scene::Scene& scene, cons
     return std::nullopt;
   }
   auto saved = output::find_saved_state(directory);
-  if (!saved) {
-    spdlog::info("no saved state in {}: starting from the beginning", directory);
-    return std::nullopt;
-  }
-  check_changes(scene::find_changes(saved->scene, scene.identity), options, *saved);
+  if (!saved) spdlog::info("no saved state in {}: starting from the beginning", directory);
   return saved;
 }
+
+/// The one to try where `saved` is damaged.
+std::optional<output::SavedState> find_older(const std::string& directory, const output::SavedState& saved) {
+  try {
+    return output::find_saved_state(directory, saved.step);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+/// Opens a lock while it lives.
+class Unlocked {
+ public:
+  explicit Unlocked(std::unique_lock<std::mutex>& lock) : lock_(lock) { lock_.unlock(); }
+  Unlocked(const Unlocked&) = delete;
+  Unlocked& operator=(const Unlocked&) = delete;
+  ~Unlocked() { lock_.lock(); }
+
+ private:
+  std::unique_lock<std::mutex>& lock_;
+};
 
 template <int Dim>
 class Run {
@@ -125,32 +156,30 @@ class Run {
       : directory_(std::move(directory)), simulation_(std::move(setup), registry, make_logger()) {
     for (const auto& warning : find_suspicious(simulation_)) spdlog::warn("warning: {}", warning);
     const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
-    if (const auto saved = find_resumable(scene, directory_, options)) {
-      if (saved->backend != info.backend && !options.allow_changes)
-        throw InputError(
-            {directory_, "--resume", "solver " + info.backend, saved->backend + ", as before, or --allow-changes"});
-      output::Checkpoint<Dim> checkpoint = output::read_checkpoint<Dim>(*saved);
-      simulation_.restore(checkpoint.state);
-      writer_ = std::make_unique<output::Writer>(directory_, scene.output, info, checkpoint);
+    if (const auto saved = find_resumable(directory_, options)) {
+      writer_ = std::make_unique<output::Writer>(directory_, scene.output, info, restore(*saved, scene, options));
       is_saved_ = true;
       spdlog::info("going on after step {}", simulation_.state().step);
     } else {
       writer_ = std::make_unique<output::Writer>(directory_, scene.output, info);
-      write(simulation_.initial_report());
+      write(simulation_.report());
     }
   }
 
   int run() {
     std::signal(SIGINT, on_interrupt);
-    std::signal(SIGTERM, on_interrupt);
+    std::signal(SIGTERM, on_termination);
     std::string outcome, advice = "`itr run` with --resume goes on from the last saved state in " + directory_;
+    std::unique_lock at_output(output_);
+    const std::jthread watching([this, advice](const std::stop_token& end) { watch(end, advice); });
     try {
-      outcome = advance(advice);
+      outcome = advance(at_output, advice);
       if (outcome != kFinished && !is_saved_) save();
       writer_->finish(outcome, simulation_.solver_name_in_use());
     } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
-      outcome = fmt::format("stopped at step {}, whose files could not all be written: {}", simulation_.state().step,
-                            error.what());
+      const std::string of_output =
+          fmt::format("step {}, whose files could not all be written: {}", simulation_.state().step, error.what());
+      outcome = outcome.empty() || outcome == kFinished ? "stopped at " + of_output : outcome + "; and at " + of_output;
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     if (outcome == kFinished) {
@@ -166,12 +195,71 @@ class Run {
 
  private:
   static constexpr const char* kFinished = "finished";
+  static constexpr std::chrono::milliseconds kLook{100};  ///< between looks at what a signal said
+  static constexpr double kGrace = 5;                     ///< for a step that is to be dropped [s]
 
-  /// Until the end or until something stops it; says what, and in `advice` what can be done.
-  std::string advance(std::string& advice) {
+  /// Takes the newest state that is whole: `saved`, or one before it.
+  output::Checkpoint<Dim> restore(output::SavedState saved, const scene::Scene& scene, const RunOptions& options) {
+    for (std::optional<InputError> newest;;) {
+      for (const std::string& text : saved.passed_over) spdlog::warn("a frame cannot be read, going further back: {}", text);
+      check_changes(scene::find_changes(saved.scene, scene.identity), options, saved);
+      if (saved.backend != simulation_.solver_name() && !options.allow_changes)
+        throw InputError({directory_, "--resume", "solver " + simulation_.solver_name(),
+                          saved.backend + ", as before, or --allow-changes"});
+      try {
+        output::Checkpoint<Dim> checkpoint = output::read_checkpoint<Dim>(saved);
+        simulation_.restore(checkpoint.state);
+        return checkpoint;
+      } catch (const InputError& error) {
+        if (!newest) newest = error;
+        auto older = find_older(directory_, saved);
+        if (!older) throw InputError(*newest);
+        spdlog::warn("the state saved in {} cannot be used, going back to step {}: {}", saved.file.string(), older->step,
+                     error.what());
+        saved = std::move(*older);
+      }
+    }
+  }
+
+  /// Ends the process where a terminated step goes on: a factorisation, say, cannot be interrupted. The state before the
+  /// step is saved first.
+  void watch(const std::stop_token& end, const std::string& advice) {
+    std::mutex mutex;
+    std::condition_variable_any none;
+    std::unique_lock waiting(mutex);
+    std::optional<double> since;
+    while (!none.wait_for(waiting, end, kLook, [&] { return end.stop_requested(); })) {
+      if (!terminated) continue;
+      if (!since) since = seconds_now();
+      if (seconds_now() - *since < kGrace) continue;
+      if (const std::unique_lock in_step(output_, std::try_to_lock); in_step) drop_step(advice);
+    }
+  }
+
+  [[noreturn]] void drop_step(const std::string& advice) {
+    std::string outcome = fmt::format("interrupted in step {}, which is dropped", before_.state->step + 1);
+    try {
+      if (!is_saved_)
+        simulation_.observe(before_, [&](const FrameView<Dim>& frame) { writer_->save(frame, *before_.state); });
+      writer_->finish(outcome, "");
+    } catch (const InputError& error) {
+      outcome += fmt::format("; its files could not all be written: {}", error.what());
+    }
+    fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
+    std::fflush(nullptr);
+    std::_Exit(simulation_stopped);
+  }
+
+  /// Until the end or until something stops it; says what, and in `advice` what can be done. Only while it is in a step, the
+  /// output is not `at_output`.
+  std::string advance(std::unique_lock<std::mutex>& at_output, std::string& advice) {
     const int steps = simulation_.setup().time.steps;
     while (!simulation_.finished()) {
-      const StepResult result = simulation_.advance();
+      before_ = simulation_.save();
+      const StepResult result = [&] {
+        const Unlocked while_stepping(at_output);
+        return simulation_.advance();
+      }();
       if (!result.ok && stop_now)
         return fmt::format("interrupted in step {}, which is dropped", simulation_.state().step + 1);
       if (!result.ok) {
@@ -209,6 +297,8 @@ class Run {
   std::unique_ptr<output::Writer> writer_;
   double output_seconds_ = 0;
   bool is_saved_ = false;  ///< whether the present state is
+  std::mutex output_;      ///< of the writer and of what is below
+  Snapshot<Dim> before_;   ///< the state that the step begins with
 };
 
 }  // namespace

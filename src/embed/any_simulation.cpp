@@ -78,7 +78,8 @@ struct AnySimulation::Impl {
   template <int Dim>
   struct Of {
     Simulation<Dim> simulation;
-    std::shared_ptr<const Locator<Dim>> locator;  ///< of the present mesh, once needed
+    std::shared_ptr<const Locator<Dim>> locator;  ///< of a mesh that was needed
+    std::uint64_t locator_revision = 0;           ///< which that was
     std::map<std::string, std::vector<int>> obstacle_vertices;
     std::map<std::string, std::size_t> term_places;  ///< in Setup::terms
 
@@ -94,7 +95,10 @@ struct AnySimulation::Impl {
       const auto by_node = static_cast<std::size_t>(Components * itr::num_nodes(mesh(), space()));
       const bool is_by_node = values.size() == by_node;
       check_array(name, values, is_by_node ? by_node : static_cast<std::size_t>(Components * mesh().vertex_slots()));
-      if (!locator) locator = std::make_shared<Locator<Dim>>(mesh());
+      if (!locator || locator_revision != simulation.mesh_revision()) {
+        locator = std::make_shared<Locator<Dim>>(mesh());
+        locator_revision = simulation.mesh_revision();
+      }
       return [f = nodal_function<Dim>(locator, as_field(values), is_by_node ? space() : Space())](
                  const Vec<Dim>& X, double) { return Vec<Components>(f(X)); };
     }
@@ -118,13 +122,12 @@ struct AnySimulation::Impl {
   std::variant<Of<2>, Of<3>> of;
   bool remeshes = false;
   int max_threads = 0;
-  StepReport report;
 
   template <int Dim>
   static Of<Dim> make(const Model& model, linear::Registry& registry, const Logger& logger,
                       std::vector<std::string>& warnings) {
     Setup<Dim> setup = model.setup<Dim>(warnings);
-    return {Simulation<Dim>(std::move(setup), registry, logger), nullptr, {}, {}};
+    return {Simulation<Dim>(std::move(setup), registry, logger), nullptr, 0, {}, {}};
   }
   using Either = std::variant<Of<2>, Of<3>>;
 
@@ -152,10 +155,7 @@ struct AnySimulation::Impl {
       });
       first += count;
     }
-    visit([&](auto& d) {
-      remeshes = d.simulation.setup().remesh.enabled;
-      report = d.simulation.initial_report();
-    });
+    visit([&](auto& d) { remeshes = d.simulation.setup().remesh.enabled; });
   }
 
   int tag(const std::string& name) const {
@@ -199,23 +199,13 @@ Simulation<3>& AnySimulation::as<3>() {
 StepResult AnySimulation::step(double dt) {
   std::optional<ThreadLimit> limit;
   if (impl_->max_threads > 0) limit.emplace(impl_->max_threads);
-  return impl_->visit([&](auto& d) {
-    StepResult result = dt == 0 ? d.simulation.advance() : d.simulation.advance(dt);
-    if (!result.ok) return result;
-    if (!result.renumbering.empty()) d.locator = nullptr;
-    impl_->report = result.report;
-    return result;
-  });
+  return impl_->visit([&](auto& d) { return dt == 0 ? d.simulation.advance() : d.simulation.advance(dt); });
 }
 
 StepResult AnySimulation::adapt(double dt) {
   std::optional<ThreadLimit> limit;
   if (impl_->max_threads > 0) limit.emplace(impl_->max_threads);
-  return impl_->visit([&](auto& d) {
-    StepResult result = d.simulation.adapt(dt);
-    d.locator = nullptr;
-    return result;
-  });
+  return impl_->visit([&](auto& d) { return d.simulation.adapt(dt); });
 }
 
 double AnySimulation::step_length() const {
@@ -230,7 +220,9 @@ int AnySimulation::steps() const {
 bool AnySimulation::finished() const {
   return impl_->visit([](const auto& d) { return d.simulation.finished(); });
 }
-const StepReport& AnySimulation::report() const { return impl_->report; }
+const StepReport& AnySimulation::report() const {
+  return impl_->visit([](const auto& d) -> const StepReport& { return d.simulation.report(); });
+}
 const std::vector<std::string>& AnySimulation::warnings() const { return impl_->warnings; }
 
 namespace {
@@ -507,9 +499,8 @@ AnySimulation::Saved AnySimulation::save() const {
 void AnySimulation::restore(const Saved& saved) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const auto* snapshot = std::get_if<Snapshot<Dim>>(&saved);
-    if (!snapshot) refuse("saved state", "one of another dimension", fmt::format("one in {}D", Dim));
+    if (!snapshot) refuse("saved state", "one of another simulation", "one that this simulation has saved");
     d.simulation.restore(*snapshot);
-    d.locator = nullptr;
   });
 }
 
@@ -523,9 +514,16 @@ void AnySimulation::on_mesh_change(std::function<void(const AnyMeshChange&)> lis
     // The simulation may be moved, its implementation not.
     d.simulation.on_mesh_change(
         [listener = std::move(listener), &d](const MeshChange<Dim>& change, const Mesh<Dim>& before) {
-          d.locator = nullptr;
+          const auto call = std::make_shared<char>();  // ends with this one
           listener({change.vertex, change.cell, change.facet, change.facet_parent, change.interpolation,
-                    [&](const MatrixX& fields) { return project_fields(before, d.mesh(), change, fields); }});
+                    [&d, &change, &before, call = std::weak_ptr(call)](const MatrixX& fields) {
+                      if (call.expired())
+                        refuse("project", "a call after that of the listener", "one from inside of the listener");
+                      if (fields.rows() != before.vertex_slots())
+                        refuse("fields", fmt::format("{} rows", fields.rows()),
+                               fmt::format("{}, one a vertex of the mesh before", before.vertex_slots()));
+                      return project_fields(before, d.mesh(), change, fields);
+                    }});
         });
   });
 }

@@ -2,6 +2,7 @@
 // itr.h over AnySimulation: no exception leaves it.
 #include <algorithm>
 #include <exception>
+#include <limits>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -71,13 +72,6 @@ itr::HostFunction as_function(itr_function function, void* user) {
 }
 
 std::size_t dimension_of(const itr_simulation* s) { return static_cast<std::size_t>(s->simulation.dimension()); }
-std::size_t nodal_size(const itr_simulation* s) {
-  return dimension_of(s) * static_cast<std::size_t>(s->simulation.num_vertices());
-}
-std::size_t node_size(const itr_simulation* s) {
-  return dimension_of(s) * static_cast<std::size_t>(s->simulation.num_nodes());
-}
-
 /// f on the simulation below; a NULL handle is an error without a place for its message.
 template <typename F>
 itr_status with(itr_simulation* s, F&& f) noexcept {
@@ -100,6 +94,18 @@ template <typename T>
 void copy(const std::vector<T>& values, const char* name, T* result) {
   require(result, name);
   std::copy(values.begin(), values.end(), result);
+}
+template <typename T>
+void copy(const std::vector<T>& values, const char* name, std::size_t length, T* result) {
+  if (length != values.size())
+    throw itr::InputError({"", name, "a length of " + std::to_string(length), std::to_string(values.size())});
+  copy(values, name, result);
+}
+
+/// get() of the simulation, `none` without one.
+template <typename T, typename F>
+T value_of(const itr_simulation* s, T none, F&& get) {
+  return s ? static_cast<T>(get(s->simulation)) : none;
 }
 
 }  // namespace
@@ -215,10 +221,18 @@ itr_status itr_step(itr_simulation* simulation, double dt) {
 itr_status itr_adapt(itr_simulation* simulation, double dt) {
   return with(simulation, [&](itr::AnySimulation& s) { return status_of(s.adapt(dt), simulation->message); });
 }
-double itr_time(const itr_simulation* simulation) { return simulation->simulation.time(); }
-int itr_steps(const itr_simulation* simulation) { return simulation->simulation.steps(); }
-int itr_finished(const itr_simulation* simulation) { return simulation->simulation.finished() ? 1 : 0; }
-int itr_dimension(const itr_simulation* simulation) { return simulation->simulation.dimension(); }
+double itr_time(const itr_simulation* simulation) {
+  return value_of(simulation, std::numeric_limits<double>::quiet_NaN(), [](const auto& s) { return s.time(); });
+}
+int itr_steps(const itr_simulation* simulation) {
+  return value_of(simulation, -1, [](const auto& s) { return s.steps(); });
+}
+int itr_finished(const itr_simulation* simulation) {
+  return value_of(simulation, -1, [](const auto& s) { return s.finished(); });
+}
+int itr_dimension(const itr_simulation* simulation) {
+  return value_of(simulation, -1, [](const auto& s) { return s.dimension(); });
+}
 
 itr_status itr_fix(itr_simulation* simulation, const char* boundary, const int* mask, itr_function displacement,
                    void* user) {
@@ -227,11 +241,11 @@ itr_status itr_fix(itr_simulation* simulation, const char* boundary, const int* 
     s.fix(boundary, array("mask", mask, dimension_of(simulation)), as_function(displacement, user));
   });
 }
-itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, const int* mask, const double* displacements) {
+itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, const int* mask, size_t length,
+                          const double* displacements) {
   return with(simulation, [&](itr::AnySimulation& s) {
     require(boundary, "boundary");
-    s.fix(boundary, array("mask", mask, dimension_of(simulation)),
-          array("displacements", displacements, nodal_size(simulation)));
+    s.fix(boundary, array("mask", mask, dimension_of(simulation)), array("displacements", displacements, length));
   });
 }
 itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, itr_function traction, void* user) {
@@ -240,10 +254,11 @@ itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, it
     s.set_traction(boundary, as_function(traction, user));
   });
 }
-itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, const double* tractions) {
+itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, size_t length,
+                                   const double* tractions) {
   return with(simulation, [&](itr::AnySimulation& s) {
     require(boundary, "boundary");
-    s.set_traction(boundary, array("tractions", tractions, nodal_size(simulation)));
+    s.set_traction(boundary, array("tractions", tractions, length));
   });
 }
 itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, itr_function pressure, void* user) {
@@ -252,19 +267,18 @@ itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, it
     s.set_pressure(boundary, as_function(pressure, user));
   });
 }
-itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, const double* pressures) {
+itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, size_t length,
+                                   const double* pressures) {
   return with(simulation, [&](itr::AnySimulation& s) {
     require(boundary, "boundary");
-    s.set_pressure(boundary, array("pressures", pressures, static_cast<std::size_t>(s.num_vertices())));
+    s.set_pressure(boundary, array("pressures", pressures, length));
   });
 }
 itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user) {
   return with(simulation, [&](itr::AnySimulation& s) { s.set_acceleration(as_function(acceleration, user)); });
 }
-itr_status itr_set_acceleration_values(itr_simulation* simulation, const double* accelerations) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    s.set_acceleration(array("accelerations", accelerations, nodal_size(simulation)));
-  });
+itr_status itr_set_acceleration_values(itr_simulation* simulation, size_t length, const double* accelerations) {
+  return with(simulation, [&](itr::AnySimulation& s) { s.set_acceleration(array("accelerations", accelerations, length)); });
 }
 itr_status itr_move_obstacle(itr_simulation* simulation, const char* obstacle, itr_function displacement, void* user) {
   return with(simulation, [&](itr::AnySimulation& s) {
@@ -279,9 +293,10 @@ itr_status itr_move_obstacle_to(itr_simulation* simulation, const char* obstacle
     s.move_obstacle(obstacle, array("positions", positions, num_vertices * dimension_of(simulation)));
   });
 }
-itr_status itr_set_forces(itr_simulation* simulation, const double* forces) {
+itr_status itr_set_forces(itr_simulation* simulation, size_t length, const double* forces) {
   return with(simulation, [&](itr::AnySimulation& s) {
-    s.set_forces(forces ? std::span(forces, node_size(simulation)) : std::span<const double>());
+    if (forces && length == 0) throw itr::InputError({"", "forces", "a length of 0", "that of the array, or NULL"});
+    s.set_forces(forces ? std::span(forces, length) : std::span<const double>());
   });
 }
 itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces, itr_stiffness_function stiffness,
@@ -296,52 +311,56 @@ itr_status itr_set_term(itr_simulation* simulation, const char* name, const itr_
     s.set_term(name, term ? itr::term_of(*term, user) : itr::HostTerm());
   });
 }
-itr_status itr_set_velocities(itr_simulation* simulation, const double* velocities) {
-  return with(simulation,
-              [&](itr::AnySimulation& s) { s.set_velocities(array("velocities", velocities, node_size(simulation))); });
+itr_status itr_set_velocities(itr_simulation* simulation, size_t length, const double* velocities) {
+  return with(simulation, [&](itr::AnySimulation& s) { s.set_velocities(array("velocities", velocities, length)); });
 }
 itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen) {
   return with(simulation, [&](itr::AnySimulation& s) { s.freeze_mesh(frozen != 0); });
 }
 
 size_t itr_num_vertices(const itr_simulation* simulation) {
-  return static_cast<std::size_t>(simulation->simulation.num_vertices());
+  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_vertices(); });
 }
 size_t itr_num_nodes(const itr_simulation* simulation) {
-  return static_cast<std::size_t>(simulation->simulation.num_nodes());
+  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_nodes(); });
 }
-itr_status itr_get_curved_edges(itr_simulation* simulation, int* edges) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.curved_edges(), "edges", edges); });
+itr_status itr_get_curved_edges(itr_simulation* simulation, size_t length, int* edges) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.curved_edges(), "edges", length, edges); });
 }
 size_t itr_num_cells(const itr_simulation* simulation) {
-  return static_cast<std::size_t>(simulation->simulation.num_cells());
+  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_cells(); });
 }
 size_t itr_num_facets(const itr_simulation* simulation) {
-  return static_cast<std::size_t>(simulation->simulation.num_facets());
+  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_facets(); });
 }
-const double* itr_positions(const itr_simulation* simulation) { return simulation->simulation.positions().data(); }
-const double* itr_velocities(const itr_simulation* simulation) { return simulation->simulation.velocities().data(); }
+const double* itr_positions(const itr_simulation* simulation) {
+  return value_of<const double*>(simulation, nullptr, [](const auto& s) { return s.positions().data(); });
+}
+const double* itr_velocities(const itr_simulation* simulation) {
+  return value_of<const double*>(simulation, nullptr, [](const auto& s) { return s.velocities().data(); });
+}
 
-itr_status itr_get_rest_positions(itr_simulation* simulation, double* X) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.rest_positions(), "X", X); });
+itr_status itr_get_rest_positions(itr_simulation* simulation, size_t length, double* X) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.rest_positions(), "X", length, X); });
 }
-itr_status itr_get_cells(itr_simulation* simulation, int* cells) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.cells(), "cells", cells); });
+itr_status itr_get_cells(itr_simulation* simulation, size_t length, int* cells) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.cells(), "cells", length, cells); });
 }
-itr_status itr_get_bodies(itr_simulation* simulation, int* bodies) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.bodies(), "bodies", bodies); });
+itr_status itr_get_bodies(itr_simulation* simulation, size_t length, int* bodies) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.bodies(), "bodies", length, bodies); });
 }
-itr_status itr_get_facets(itr_simulation* simulation, int* facets) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facets(), "facets", facets); });
+itr_status itr_get_facets(itr_simulation* simulation, size_t length, int* facets) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facets(), "facets", length, facets); });
 }
-itr_status itr_get_facet_boundaries(itr_simulation* simulation, int* ids) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facet_boundaries(), "ids", ids); });
+itr_status itr_get_facet_boundaries(itr_simulation* simulation, size_t length, int* ids) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facet_boundaries(), "ids", length, ids); });
 }
 
 itr_status itr_watch_forces(itr_simulation* simulation, int watched) {
   return with(simulation, [&](itr::AnySimulation& s) { s.watch_forces(watched != 0); });
 }
 const double* itr_forces(const itr_simulation* simulation, itr_force kind) {
+  if (!simulation) return nullptr;
   const itr::NodalForces& forces = simulation->simulation.forces();
   const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
   if (kind < ITR_CONTACT || kind > ITR_APPLIED || kinds[kind]->size() == 0) return nullptr;
@@ -358,18 +377,25 @@ itr_status itr_resultant(itr_simulation* simulation, const char* boundary, const
   });
 }
 
-void itr_get_energies(const itr_simulation* simulation, itr_energies* energies) {
-  const itr::EnergyReport& e = simulation->simulation.report().energy;
-  *energies = {e.inertia, e.elastic, e.body, e.contact, e.friction, e.damping, e.host, e.total};
+itr_status itr_get_energies(itr_simulation* simulation, itr_energies* energies) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(energies, "energies");
+    const itr::EnergyReport& e = s.report().energy;
+    *energies = {e.inertia, e.elastic, e.body, e.contact, e.friction, e.damping, e.host, e.total};
+  });
 }
-void itr_get_statistics(const itr_simulation* simulation, itr_step_statistics* statistics) {
-  const itr::StepReport& r = simulation->simulation.report();
-  *statistics = {r.newton_iterations,  r.linear_solves,  r.factorizations,   r.splits.accepted,
-                 r.collapses.accepted, r.swaps.accepted, r.smooths.accepted, r.cut_steps,
-                 r.history_loss,       r.min_distance,   r.min_volume_ratio, r.seconds.total};
+itr_status itr_get_statistics(itr_simulation* simulation, itr_step_statistics* statistics) {
+  return with(simulation, [&](itr::AnySimulation& s) {
+    require(statistics, "statistics");
+    const itr::StepReport& r = s.report();
+    *statistics = {r.newton_iterations,  r.linear_solves,  r.factorizations,   r.splits.accepted,
+                   r.collapses.accepted, r.swaps.accepted, r.smooths.accepted, r.cut_steps,
+                   r.history_loss,       r.min_distance,   r.min_volume_ratio, r.seconds.total};
+  });
 }
 
 itr_snapshot* itr_save(const itr_simulation* simulation) {
+  if (!simulation) return nullptr;
   try {
     return new itr_snapshot{simulation->simulation.save()};
   } catch (...) {

@@ -328,14 +328,19 @@ std::vector<fs::path> frame_files(const fs::path& directory) {
 Certificate certify(const fs::path& directory) {
   Certificate certificate;
   for (const fs::path& file : frame_files(directory)) {
-    const StoredFrame frame = read_frame(file);
     const std::string name = "frames/" + file.filename().string();
+    ++certificate.frames;
+    if (const auto damaged = find_damage(file); !damaged.empty()) {
+      for (const std::string& what : damaged)
+        certificate.violations.push_back(fmt::format("{}: {} is damaged: not what was written", name, what));
+      continue;
+    }
+    const StoredFrame frame = read_frame(file);
     if (frame.dim == 2) {
       check_frame<2>(frame, name, certificate.violations);
     } else {
       check_frame<3>(frame, name, certificate.violations);
     }
-    ++certificate.frames;
   }
   return certificate;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
@@ -13,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 6;
+constexpr std::int64_t kFormat = 7;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -28,25 +29,33 @@ std::vector<VectorX> read_fields(const hdf5::File& file, const char* kind) {
   return fields;
 }
 
+/// `value`, of a dataset, as an int.
+template <typename T>
+int as_int(const fs::path& path, const std::string& name, T value) {
+  if (value >= std::numeric_limits<int>::min() && value <= std::numeric_limits<int>::max()) return static_cast<int>(value);
+  throw InputError({path.string(), name, std::to_string(value), "a number of 32 bits"});
+}
+
 template <std::size_t N>
 std::vector<std::array<int, N>> read_rows(const fs::path& path, const hdf5::File& file, const std::string& name) {
   const auto table = file.read_integers(name);
   if (table.columns != N)
     throw InputError({path.string(), name, std::to_string(table.columns) + " columns", std::to_string(N)});
   std::vector<std::array<int, N>> rows(table.rows());
-  for (std::size_t i = 0; i < table.values.size(); ++i) rows[i / N][i % N] = static_cast<int>(table.values[i]);
+  for (std::size_t i = 0; i < table.values.size(); ++i) rows[i / N][i % N] = as_int(path, name, table.values[i]);
   return rows;
 }
 
-std::vector<int> read_ints(const hdf5::File& file, const std::string& name) {
-  const auto table = file.read_integers(name);
-  return {table.values.begin(), table.values.end()};
+std::vector<int> read_ints(const fs::path& path, const hdf5::File& file, const std::string& name) {
+  std::vector<int> numbers;
+  for (const std::int64_t value : file.read_integers(name).values) numbers.push_back(as_int(path, name, value));
+  return numbers;
 }
 
 Space read_space(const fs::path& path, const hdf5::File& file) {
   if (!file.contains("/mesh/curved_edges")) return {};
   auto edges = read_rows<2>(path, file, "/mesh/curved_edges");
-  if (!std::is_sorted(edges.begin(), edges.end()))
+  if (std::adjacent_find(edges.begin(), edges.end(), std::greater_equal<>()) != edges.end())
     throw InputError({path.string(), "/mesh/curved_edges", "rows in another order", "ascending rows"});
   return Space(std::move(edges));
 }
@@ -55,15 +64,19 @@ Space read_space(const fs::path& path, const hdf5::File& file) {
 template <int Dim>
 Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& space) {
   const auto rest = file.read_doubles("/mesh/rest");
+  if (rest.columns != Dim)
+    throw InputError({path.string(), "/mesh/rest", std::to_string(rest.columns) + " columns", std::to_string(Dim)});
+  for (const double X : rest.values)
+    if (!std::isfinite(X)) throw InputError({path.string(), "/mesh/rest", std::to_string(X), "finite positions"});
   if (rest.rows() < static_cast<std::size_t>(space.num_curved()))
     throw InputError({path.string(), "/mesh/rest", std::to_string(rest.rows()) + " rows",
                       "more than curved edges, " + std::to_string(space.num_curved())});
   std::vector<Vec<Dim>> points(rest.rows() - space.num_curved());
   for (std::size_t v = 0; v < points.size(); ++v) points[v] = Eigen::Map<const Vec<Dim>>(rest.values.data() + Dim * v);
   auto cells = read_rows<Dim + 1>(path, file, "/mesh/simplices");
-  auto body = read_ints(file, "/mesh/body");
+  auto body = read_ints(path, file, "/mesh/body");
   const auto facets = read_rows<Dim>(path, file, "/mesh/surface");
-  const auto tags = read_ints(file, "/checkpoint/facet_tag");
+  const auto tags = read_ints(path, file, "/checkpoint/facet_tag");
   if (body.size() != cells.size() || tags.size() != facets.size())
     throw InputError({path.string(), "/mesh", "lists of different lengths", "one entry for every cell and facet"});
   Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
@@ -106,8 +119,8 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
           {path.string(), refusals_name(kind), std::to_string(table.columns) + " columns", std::to_string(kRefusalColumns)});
     for (std::size_t i = 0; i < table.values.size(); i += kRefusalColumns) {
       const double* row = &table.values[i];
-      const EdgeKey edge{static_cast<int>(row[0]), static_cast<int>(row[1])};
-      if (edge[0] < 0 || edge[0] >= num_vertices || edge[1] >= num_vertices)
+      const EdgeKey edge{as_int(path, refusals_name(kind), row[0]), as_int(path, refusals_name(kind), row[1])};
+      if (edge[0] < 0 || edge[0] >= num_vertices || edge[1] < kNone || edge[1] >= num_vertices)
         throw InputError({path.string(), refusals_name(kind),
                           "vertices " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]),
                           "numbers below " + std::to_string(num_vertices)});
@@ -139,12 +152,12 @@ Strata<3> read_strata(const fs::path& path, const hdf5::File& file, const Mesh<3
     throw InputError({path.string(), "/checkpoint/strata" + name, found, expected});
   };
   Strata<3>::Record record;
-  for (const int stratum : read_ints(file, "/checkpoint/strata/vertices")) {
+  for (const int stratum : read_ints(path, file, "/checkpoint/strata/vertices")) {
     if (stratum < 0 || stratum > static_cast<int>(Stratum::non_manifold))
       refuse("/vertices", "stratum " + std::to_string(stratum), "0 to 4");
     record.vertices.push_back(static_cast<Stratum>(stratum));
   }
-  record.patches = read_ints(file, "/checkpoint/strata/patches");
+  record.patches = read_ints(path, file, "/checkpoint/strata/patches");
   if (file.contains("/checkpoint/strata/interfaces"))
     record.interfaces = read_rows<4>(path, file, "/checkpoint/strata/interfaces");
   for (const auto& row : record.interfaces)
@@ -189,14 +202,14 @@ linear::FactorRecord read_factor(const fs::path& path, const hdf5::File& file) {
   factor.spent = numbers[0];
   factor.served = numbers[1];
   factor.iterations = numbers[2];
-  factor.pause = static_cast<int>(numbers[3]);
-  factor.next_pause = static_cast<int>(numbers[4]);
+  factor.pause = as_int(path, "/checkpoint/factor_record", numbers[3]);
+  factor.next_pause = as_int(path, "/checkpoint/factor_record", numbers[4]);
   if (!file.contains("/checkpoint/factor")) return factor;
   linear::SparsityPattern pattern;
-  pattern.column_starts = read_ints(file, "/checkpoint/factor/starts");
-  pattern.row_indices = read_ints(file, "/checkpoint/factor/rows");
+  pattern.column_starts = read_ints(path, file, "/checkpoint/factor/starts");
+  pattern.row_indices = read_ints(path, file, "/checkpoint/factor/rows");
   pattern.order = static_cast<int>(pattern.column_starts.size()) - 1;
-  const auto block_size = read_ints(file, "/checkpoint/factor/block_size");
+  const auto block_size = read_ints(path, file, "/checkpoint/factor/block_size");
   if (block_size.size() == 1)
     factor.matrix = linear::make_factored_matrix(std::move(pattern), file.read_doubles("/checkpoint/factor/values").values,
                                                  block_size[0]);
@@ -248,22 +261,30 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   file.write_attribute("checkpoint_log_bytes", static_cast<std::int64_t>(progress.log_bytes));
 }
 
-std::optional<SavedState> find_saved_state(const fs::path& directory) {
+std::optional<SavedState> find_saved_state(const fs::path& directory, int before) {
   std::vector<fs::path> files = stored_frames(directory);
   std::reverse(files.begin(), files.end());
+  std::vector<std::string> passed_over;
   for (const fs::path& path : files) {
+    if (step_of_frame(path) >= before) continue;
     try {
       const hdf5::Session session;
       const hdf5::File file = hdf5::File::open(path);
       if (!file.contains("/checkpoint")) continue;
       if (file.read_integer_attribute("checkpoint_format") != kFormat) continue;
-      return SavedState{path, file.read_text("/checkpoint/scene"), file.read_text("/checkpoint/backend"),
-                        file.shape("/mesh/rest").columns};
-    } catch (const InputError&) {  // cut off by a loss of power: the one before it is the newest
+      return SavedState{path,
+                        file.read_text("/checkpoint/scene"),
+                        file.read_text("/checkpoint/backend"),
+                        file.shape("/mesh/rest").columns,
+                        step_of_frame(path),
+                        passed_over};
+    } catch (const InputError& error) {  // damaged, by a loss of power, say: the one before it is the newest
+      passed_over.push_back(error.what());
     }
   }
   if (!files.empty())
-    throw InputError({directory.string(), "saved states", "frames but no state that can be read",
+    throw InputError({directory.string(), "saved states",
+                      "frames but no state that can be read" + (passed_over.empty() ? "" : " (" + passed_over[0] + ")"),
                       "a folder that this version of itr wrote"});
   return std::nullopt;
 }
@@ -272,6 +293,7 @@ template <int Dim>
 Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(saved.file);
+  if (!file.has_digests()) throw InputError({saved.file.string(), "/digests", "none", "those of what was saved"});
   Checkpoint<Dim> checkpoint;
   State<Dim>& state = checkpoint.state;
   try {
@@ -285,7 +307,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.a = read_fields(file, "a");
   if (auto deviation = read_fields(file, "deviation"); !deviation.empty()) state.deviation = std::move(deviation[0]);
   if (file.contains("/checkpoint/quadrature_levels")) {
-    const auto levels = read_ints(file, "/checkpoint/quadrature_levels");
+    const auto levels = read_ints(saved.file, file, "/checkpoint/quadrature_levels");
     for (const int level : levels)
       if (level < 0 || level > kMostClosedLevel)
         throw InputError({saved.file.string(), "/checkpoint/quadrature_levels", std::to_string(level),
@@ -305,10 +327,13 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.remesh_memory = read_memory(saved.file, file, state.mesh.vertex_slots());
   if constexpr (Dim == 3) state.strata = read_strata(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);
-  state.step = static_cast<int>(file.read_integer_attribute("step"));
+  state.step = as_int(saved.file, "attribute step", file.read_integer_attribute("step"));
   state.t = file.read_double_attribute("t");
   checkpoint.totals = file.read_doubles("/checkpoint/totals").values;
-  checkpoint.log_bytes = static_cast<std::size_t>(file.read_integer_attribute("checkpoint_log_bytes"));
+  const std::int64_t log_bytes = file.read_integer_attribute("checkpoint_log_bytes");
+  if (log_bytes < 0)
+    throw InputError({saved.file.string(), "attribute checkpoint_log_bytes", std::to_string(log_bytes), "0 or more"});
+  checkpoint.log_bytes = static_cast<std::size_t>(log_bytes);
   return checkpoint;
 }
 

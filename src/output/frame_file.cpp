@@ -301,10 +301,18 @@ FrameTotals read_frame_totals(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
   FrameTotals totals{step_of_frame(path), file.read_double_attribute("t"), {}, {}};
-  if (const char* name = "/totals/kinetic_energy"; file.contains(name))
-    totals.kinetic_energy = file.read_doubles(name).values.at(0);
+  if (const char* name = "/totals/kinetic_energy"; file.contains(name)) {
+    const auto values = file.read_doubles(name).values;
+    if (values.size() != 1) throw InputError({path.string(), name, std::to_string(values.size()) + " numbers", "1"});
+    totals.kinetic_energy = values[0];
+  }
   if (const char* name = "/totals/momentum"; file.contains(name)) totals.momentum = file.read_doubles(name).values;
   return totals;
+}
+
+std::vector<std::string> find_damage(const std::filesystem::path& path) {
+  const hdf5::Session session;
+  return hdf5::File::open(path).find_damage();
 }
 
 StoredFrame read_frame(const std::filesystem::path& path) {
@@ -329,7 +337,14 @@ StoredFrame read_frame(const std::filesystem::path& path) {
       throw InputError({path.string(), "/mesh/curved_edges", std::to_string(frame.curved_edges.size() / 2) + " rows",
                         "fewer than nodes, " + std::to_string(x.rows())});
   }
-  require_range(path, "/mesh/simplices", frame.simplices, x.rows() - frame.curved_edges.size() / 2);
+  const std::size_t vertices = x.rows() - frame.curved_edges.size() / 2;
+  require_range(path, "/mesh/simplices", frame.simplices, vertices);
+  require_range(path, "/mesh/surface", frame.surface, vertices);
+  require_range(path, "/mesh/curved_edges", frame.curved_edges, vertices);
+  for (std::size_t i = 2; i < frame.curved_edges.size(); i += 2)
+    if (const std::int64_t* edge = &frame.curved_edges[i];
+        std::lexicographical_compare(edge, edge + 2, edge - 2, edge) || std::equal(edge, edge + 2, edge - 2))
+      throw InputError({path.string(), "/mesh/curved_edges", "rows in another order", "ascending rows"});
   frame.rest = std::move(rest.values);
   frame.x = std::move(x.values);
   frame.obstacles = read_surface(path, file, "/obstacles", frame.dim);

@@ -84,7 +84,10 @@ struct StoredFrame {
   StoredSurface proxy;  ///< what touches in place of the boundary
 };
 
-/// Throws InputError where the file is unreadable or inconsistent.
+/// Names of what is not as it was written. Throws InputError where the file is unreadable.
+std::vector<std::string> find_damage(const std::filesystem::path& path);
+
+/// Throws InputError where the file is unreadable, inconsistent, or what is read is not as it was written.
 StoredFrame read_frame(const std::filesystem::path& path);
 
 }  // namespace itr::output

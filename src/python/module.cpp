@@ -299,7 +299,8 @@ void add_simulation(py::module_& m) {
           const py::gil_scoped_acquire lock;
           const auto& P = change.interpolation;
           const auto ints = [](const int* p, Eigen::Index n) { return py::array_t<int>(n, p); };
-          const auto project = py::cpp_function([&change](const itr::MatrixX& fields) { return change.project(fields); });
+          const auto project =
+              py::cpp_function([project = change.project](const itr::MatrixX& fields) { return project(fields); });
           listener(py::dict(
               "vertex"_a = copied(change.vertex, 1), "cell"_a = copied(change.cell, 1), "facet"_a = copied(change.facet, 1),
               "facet_parent"_a = copied(change.facet_parent, 1), "shape"_a = py::make_tuple(P.rows(), P.cols()),

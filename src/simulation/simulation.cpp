@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -12,6 +14,7 @@
 #include "itr/core/process.hpp"
 #include "itr/linear/choice.hpp"
 #include "itr/mesh/validate.hpp"
+#include "itr/simulation/invariants.hpp"
 #include "itr/simulation/step.hpp"
 
 namespace itr {
@@ -121,6 +124,72 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   return state;
 }
 
+[[noreturn]] void refuse_state(const std::string& place, const std::string& found, const std::string& expected) {
+  throw InputError({"", place, found, expected});
+}
+
+void require_size(const std::string& place, std::size_t found, std::size_t expected) {
+  if (found != expected) refuse_state(place, std::to_string(found), std::to_string(expected));
+}
+
+void require_finite(const std::string& place, const VectorX& field) {
+  for (Eigen::Index i = 0; i < field.size(); ++i)
+    if (!std::isfinite(field[i]))
+      refuse_state(place + "[" + std::to_string(i) + "]", fmt::format("{}", field[i]), "a number");
+}
+
+/// How many past states there are, and how long they are.
+template <int Dim>
+void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
+  const TimeIntegrator integrator(setup.time);
+  const History& history = state.history;
+  if (history.x.empty() || history.x.size() > static_cast<std::size_t>(integrator.depth()))
+    refuse_state("saved positions", std::to_string(history.x.size()) + " past states",
+                 fmt::format("1 to {}, as the integrator remembers", integrator.depth()));
+  require_size("past states of saved velocities", history.v.size(), history.x.size());
+  require_size("past states of saved accelerations", history.a.size(),
+               integrator.uses_acceleration() ? history.x.size() : 0);
+  const auto size = static_cast<std::size_t>(Dim) *
+                    (static_cast<std::size_t>(num_nodes(state.mesh, state.space)) + setup.obstacles.rest.size());
+  const auto check = [&](const std::string& name, const VectorX& field) {
+    require_size("length of saved " + name, static_cast<std::size_t>(field.size()), size);
+    require_finite("saved " + name, field);
+  };
+  for (const VectorX& x : history.x) check("positions", x);
+  for (const VectorX& v : history.v) check("velocities", v);
+  for (const VectorX& a : history.a) check("accelerations", a);
+  if (state.deviation.size() > 0) check("deviation", state.deviation);
+}
+
+/// Throws InputError for a state that no steps of this setup lead to.
+template <int Dim>
+void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
+  const Mesh<Dim>& mesh = state.mesh;
+  if (mesh.num_vertices() != mesh.vertex_slots() || mesh.num_cells() != mesh.cell_slots())
+    refuse_state("saved mesh", "dead slots", "a compact mesh");
+  if (const Space expected = space_of_orders(mesh, setup.order); state.space != expected)
+    refuse_state("curved edges of a saved state", fmt::format("{}, others than the setup's", state.space.num_curved()),
+                 std::to_string(expected.num_curved()));
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (!setup.materials.contains(mesh.body(c)))
+      refuse_state("body of a saved cell", std::to_string(mesh.body(c)), "one that has a material");
+  check_history(setup, state);
+  if (!state.quadrature.empty())
+    require_size("saved levels of quadrature", state.quadrature.size(),
+                 whole_mesh(mesh, {}, state.space).curved_elements.size());
+  if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
+  for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
+                                    std::pair("barrier stiffness", state.stiffness.value)})
+    if (!std::isfinite(value)) refuse_state(std::string("saved ") + name, fmt::format("{}", value), "a number");
+  for (std::size_t age = 0; age < state.history.x.size(); ++age)
+    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.space); !violation.empty())
+      refuse_state(age == 0 ? "saved positions" : fmt::format("saved positions of {} steps before", age), violation,
+                   "positions without inversions and intersections");
+}
+
+/// Where a simulation is when it calls the program.
+enum class Phase { between_steps, in_step, after_mesh_change };
+
 }  // namespace
 
 template <int Dim>
@@ -130,28 +199,114 @@ struct Simulation<Dim>::Impl {
   std::unique_ptr<linear::Solver> direct;  ///< or iterative
   std::unique_ptr<linear::ReusingSolver> solver;
   std::unique_ptr<ProblemCache<Dim>> cache;
-  std::shared_ptr<State<Dim>> state = std::make_shared<State<Dim>>();  ///< snapshots may share it
+  std::shared_ptr<State<Dim>> state;  ///< snapshots may share it: see change_to
+  std::uint64_t mesh_revision = 0;
+  const std::shared_ptr<const char> identity = std::make_shared<const char>();  ///< of what save() gave
+  mutable std::atomic<Phase> phase = Phase::between_steps;                      ///< terms are asked by several threads
   EdgeLengths initial_edges;
-  NodalForces forces;   ///< of the last step
-  double first_dt = 1;  ///< what the setup's tolerances are for [s]
+  NodalForces forces;                        ///< of the last step
+  mutable std::optional<StepReport> report;  ///< empty: of the state as it stands, not made yet
+  double first_dt = 1;                       ///< what the setup's tolerances are for [s]
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
 
   StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger}; }
 
-  /// Steps from now on have this length.
-  void set_step(double dt) {
+  /// While a step is taken, or a listener told of it.
+  class Inside {
+   public:
+    Inside(const Impl& impl, Phase phase) : impl_(impl), before_(impl.phase.exchange(phase)) {}
+    Inside(const Inside&) = delete;
+    Inside& operator=(const Inside&) = delete;
+    ~Inside() { impl_.phase = before_; }
+
+   private:
+    const Impl& impl_;
+    Phase before_;
+  };
+
+  /// `what` the program may not do while a step refers to what it would change.
+  void refuse_in_step(const char* what) const {
+    if (phase == Phase::in_step) throw InputError({"", what, "a call from inside of a step", "one between steps"});
+  }
+  /// `what` it may not do from a listener of mesh changes either.
+  void refuse_in_callback(const char* what) const {
+    refuse_in_step(what);
+    if (phase != Phase::between_steps)
+      throw InputError({"", what, "a call from inside of a listener of mesh changes", "one between steps"});
+  }
+
+  /// The only way in which the state changes. What snapshots share stays; else a reference to state() stays good. Returns
+  /// the state before.
+  std::shared_ptr<const State<Dim>> change_to(std::shared_ptr<State<Dim>> end) {
+    if (state.use_count() > 1) return std::exchange(state, std::move(end));
+    std::swap(*state, *end);
+    return end;
+  }
+
+  /// f() with steps of this length. Where it does nothing the length and what belongs to it are as before.
+  template <typename F>
+  StepResult with_step(double dt, F&& f) {
+    const TimeOptions time_before = setup.time;
+    const int step_before = state->step;
+    std::shared_ptr<const State<Dim>> longer;  // of the history that another step cuts
+    const auto put_back = [&] {
+      if (state->step != step_before) return;  // it was done before a listener threw
+      if (longer) change_to(std::make_shared<State<Dim>>(*longer));
+      setup.time = time_before;
+      scale_tolerances();
+    };
+    try {
+      longer = set_step(dt);
+      StepResult result = f();
+      if (!result.ok) put_back();
+      return result;
+    } catch (...) {
+      put_back();
+      throw;
+    }
+  }
+
+  void tell(const State<Dim>& before, const StepResult& result) {
+    if (!on_mesh_change || result.renumbering.empty()) return;
+    const Inside inside(*this, Phase::after_mesh_change);
+    on_mesh_change(describe_change(before.mesh, state->mesh, result.renumbering), before.mesh);
+  }
+
+  /// Of the state as it stands.
+  StepReport report_of_state() const {
+    const Inside inside(*this, Phase::in_step);  // terms and functions of conditions are asked
+    StepReport made;
+    made.step = state->step;
+    made.t = state->t;
+    made.vertices = state->mesh.num_vertices();
+    made.elements = state->mesh.num_cells();
+    const VectorX& x = state->history.x[0];
+    StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
+                             state->quadrature);
+    made.unknowns = problem.dofs().num_unknowns;
+    made.energy = problem.report(x);
+    made.energy_before_remesh = made.energy.total;
+    made.min_distance = problem.min_distance(x);
+    made.min_volume_ratio = min_volume_ratio(problem.cells(), x);
+    made.peak_rss_mb = peak_rss_mb();
+    return made;
+  }
+
+  /// Steps from now on have this length. Returns the state before where its history was cut.
+  std::shared_ptr<const State<Dim>> set_step(double dt) {
     TimeOptions& time = setup.time;
     if (!(dt > 0) || !std::isfinite(dt)) throw InputError({"", "dt", fmt::format("{}", dt), "a number > 0"});
-    if (dt == time.dt) return;
+    if (dt == time.dt) return nullptr;
     time.t0 = state->t;
     time.first_step = state->step;
     time.dt = dt;
     scale_tolerances();
-    if (time.integrator != Integrator::bdf || state->history.x.size() == 1) return;
-    own_state();
-    state->history.x.resize(1);
-    state->history.v.resize(1);
+    if (time.integrator != Integrator::bdf || state->history.x.size() == 1) return nullptr;
+    auto shorter = std::make_shared<State<Dim>>(*state);
+    shorter->history.x.resize(1);
+    shorter->history.v.resize(1);
+    return change_to(std::move(shorter));
   }
 
   void scale_tolerances() {
@@ -162,14 +317,10 @@ struct Simulation<Dim>::Impl {
     setup.newton.first_gradient_tolerance = factor * first_newton.first_gradient_tolerance;
   }
 
-  /// Before the state changes: snapshots keep theirs.
-  void own_state() {
-    if (state.use_count() > 1) state = std::make_shared<State<Dim>>(*state);
-  }
-
   /// Those of a state that no step of this simulation led to.
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
+    const Inside inside(*this, Phase::in_step);
     StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
                              state->quadrature);
     forces = problem.forces(state->history.x[0]);
@@ -194,11 +345,12 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   impl_->cache = std::make_unique<ProblemCache<Dim>>(*impl_->solver);
   impl_->first_dt = impl_->setup.time.dt;
   impl_->first_newton = impl_->setup.newton;
-  *impl_->state = initial_state(impl_->setup);
-  impl_->initial_edges = edge_lengths(impl_->state->mesh);
-  refuse_intersections(impl_->setup, *impl_->state);
-  if (impl_->setup.consistent_initial_acceleration && !impl_->state->history.a.empty())
-    set_consistent_acceleration(impl_->setup, *impl_->state, *impl_->cache);
+  auto state = std::make_shared<State<Dim>>(initial_state(impl_->setup));
+  impl_->initial_edges = edge_lengths(state->mesh);
+  refuse_intersections(impl_->setup, *state);
+  if (impl_->setup.consistent_initial_acceleration && !state->history.a.empty())
+    set_consistent_acceleration(impl_->setup, *state, *impl_->cache);
+  impl_->state = std::move(state);
   impl_->set_forces_at_rest();
 }
 
@@ -208,103 +360,106 @@ template <int Dim>
 Simulation<Dim>::Simulation(Simulation&&) noexcept = default;
 
 template <int Dim>
-StepReport Simulation<Dim>::initial_report() const {
-  StepReport report;
-  const State<Dim>& state = *impl_->state;
-  report.step = state.step;
-  report.t = state.t;
-  report.vertices = state.mesh.num_vertices();
-  report.elements = state.mesh.num_cells();
-  StepProblem<Dim> problem(impl_->setup, state.mesh, state.space, state.history, state.t, *impl_->cache, state.stiffness,
-                           state.quadrature);
-  report.unknowns = problem.dofs().num_unknowns;
-  report.energy = problem.report(state.history.x[0]);
-  report.energy_before_remesh = report.energy.total;
-  report.min_distance = problem.min_distance(state.history.x[0]);
-  report.min_volume_ratio = min_volume_ratio(problem.cells(), state.history.x[0]);
-  report.peak_rss_mb = peak_rss_mb();
-  return report;
+const StepReport& Simulation<Dim>::report() const {
+  if (!impl_->report) {
+    impl_->refuse_in_step("report");
+    impl_->report = impl_->report_of_state();
+  }
+  return *impl_->report;
 }
 
 template <int Dim>
 StepResult Simulation<Dim>::adapt(double dt) {
-  impl_->set_step(dt);
-  State<Dim> end = *impl_->state;
-  const auto start = std::make_shared<State<Dim>>();
-  StepResult result = take_step(impl_->tools(), end, false, start.get());
-  if (!result.ok || result.renumbering.empty()) return result;
-  const std::shared_ptr<const State<Dim>> before = std::exchange(impl_->state, start);
-  impl_->set_forces_at_rest();
-  if (impl_->on_mesh_change)
-    impl_->on_mesh_change(describe_change(before->mesh, start->mesh, result.renumbering), before->mesh);
+  impl_->refuse_in_callback("adapt");
+  if (impl_->setup.on_iteration) report();  // which it may ask for
+  std::shared_ptr<const State<Dim>> before;
+  StepResult result = impl_->with_step(dt, [&] {
+    const typename Impl::Inside inside(*impl_, Phase::in_step);
+    State<Dim> end;
+    const auto start = std::make_shared<State<Dim>>();
+    StepResult adapted = take_step(impl_->tools(), *impl_->state, end, false, start.get());
+    if (!adapted.ok || adapted.renumbering.empty()) return adapted;
+    before = impl_->change_to(start);
+    ++impl_->mesh_revision;
+    impl_->set_forces_at_rest();
+    return adapted;
+  });
+  if (!result.ok) return result;
+  impl_->report = impl_->report_of_state();
+  impl_->report->add_effort(result.report);
+  if (before) impl_->tell(*before, result);
   return result;
 }
 
 template <int Dim>
 StepResult Simulation<Dim>::advance() {
-  const std::shared_ptr<const State<Dim>> before =
-      impl_->on_mesh_change && impl_->setup.remesh.enabled ? impl_->state : nullptr;
-  impl_->own_state();
-  StepResult result = take_step_in_parts(impl_->tools(), *impl_->state);
-  if (!result.ok) return result;
+  impl_->refuse_in_callback("step");
+  if (impl_->setup.on_iteration) report();
+  StepResult result;
+  std::shared_ptr<const State<Dim>> before;
+  {
+    const typename Impl::Inside inside(*impl_, Phase::in_step);
+    auto end = std::make_shared<State<Dim>>();
+    result = take_step_in_parts(impl_->tools(), *impl_->state, *end);
+    if (!result.ok) return result;
+    before = impl_->change_to(std::move(end));
+  }
   impl_->forces = result.forces;
-  if (before && !result.renumbering.empty())
-    impl_->on_mesh_change(describe_change(before->mesh, impl_->state->mesh, result.renumbering), before->mesh);
+  impl_->report = result.report;
+  if (!result.renumbering.empty()) ++impl_->mesh_revision;
+  impl_->tell(*before, result);
   return result;
 }
 
 template <int Dim>
 StepResult Simulation<Dim>::advance(double dt) {
-  impl_->set_step(dt);
-  return advance();
+  impl_->refuse_in_callback("step");
+  return impl_->with_step(dt, [&] { return advance(); });
 }
 
 template <int Dim>
 Setup<Dim>& Simulation<Dim>::conditions() {
+  impl_->refuse_in_step("conditions");
   return impl_->setup;
 }
 
 template <int Dim>
 void Simulation<Dim>::on_mesh_change(std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> listener) {
+  impl_->refuse_in_callback("listener of mesh changes");
   impl_->on_mesh_change = std::move(listener);
 }
 
 template <int Dim>
+std::uint64_t Simulation<Dim>::mesh_revision() const {
+  return impl_->mesh_revision;
+}
+
+template <int Dim>
 Snapshot<Dim> Simulation<Dim>::save() const {
-  return {impl_->state, impl_->setup.time, impl_->forces};
+  return {impl_->state, impl_->setup.time, impl_->forces, impl_->report, impl_->identity};
 }
 
 template <int Dim>
 void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
-  impl_->state = std::const_pointer_cast<State<Dim>>(snapshot.state);  // own_state() before it changes
+  impl_->refuse_in_callback("restore");
+  if (snapshot.owner != impl_->identity)
+    refuse_state("saved state", "one of another simulation", "one that this simulation has saved");
+  impl_->state = std::const_pointer_cast<State<Dim>>(snapshot.state);  // change_to leaves it as it is
+  ++impl_->mesh_revision;
   impl_->setup.time = snapshot.time;
   impl_->scale_tolerances();
   impl_->forces = snapshot.forces;
+  impl_->report = snapshot.report;
 }
 
 template <int Dim>
 void Simulation<Dim>::restore(State<Dim> state) {
-  const auto refuse = [](const std::string& place, auto found, auto expected) {
-    throw InputError({"", place, std::to_string(found), std::to_string(expected)});
-  };
-  if (Space expected = space_of_orders(state.mesh, impl_->setup.order); state.space != expected)
-    refuse("curved edges of a saved state", state.space.num_curved(), expected.num_curved());
-  const auto size =
-      static_cast<Eigen::Index>(Dim * (num_nodes(state.mesh, state.space) + impl_->setup.obstacles.rest.size()));
-  const History& history = state.history;
-  for (const auto* fields : {&history.x, &history.v, &history.a})
-    for (const VectorX& field : *fields)
-      if (field.size() != size) refuse("length of a saved field", field.size(), size);
-  const std::size_t curved = whole_mesh(state.mesh, {}, state.space).curved_elements.size();
-  if (!state.quadrature.empty() && state.quadrature.size() != curved)
-    refuse("saved levels of quadrature", state.quadrature.size(), curved);
-  if (history.x.empty() || history.v.empty()) refuse("saved states", history.x.size(), 1);
-  if (history.a.empty() != impl_->state->history.a.empty())
-    refuse("saved accelerations", history.a.size(), impl_->state->history.a.size());
-  for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
-    if (!impl_->setup.materials.contains(state.mesh.body(c))) refuse("body of a saved cell", state.mesh.body(c), 0);
+  impl_->refuse_in_callback("restore");
+  refuse_misfit(impl_->setup, state);
   if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
-  impl_->state = std::make_shared<State<Dim>>(std::move(state));
+  impl_->change_to(std::make_shared<State<Dim>>(std::move(state)));
+  ++impl_->mesh_revision;
+  impl_->report.reset();
   impl_->set_forces_at_rest();
 }
 
@@ -376,8 +531,7 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const S
 }  // namespace
 
 template <int Dim>
-typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
-  const State<Dim>& state = *impl_->state;
+typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>& state, const NodalForces& forces) const {
   const int bodies = num_nodes(state.mesh, state.space);
   FrameData data;
   data.x = state.history.x[0].head(Dim * bodies);
@@ -390,6 +544,7 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
                                   mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
                                 data.elastic_density.push_back(mean);
                               });
+  data.asked.forces = forces;
   add_asked(cells, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
@@ -429,7 +584,6 @@ template <int Dim>
 void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, FrameData& data) const {
   const FieldOptions& options = impl_->setup.fields;
   AskedFields& asked = data.asked;
-  asked.forces = impl_->forces;
   if (options.von_mises || options.stress)
     for_each_cell_in_order<Dim>(
         cells, data.x, impl_->setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {

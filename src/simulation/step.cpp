@@ -72,8 +72,8 @@ class StepAttempt {
     report_.t = next_.t;
   }
 
-  /// On success `state` is that after the step, and `start` (unless null) that before it, on its mesh.
-  StepResult run(State<Dim>& state, State<Dim>* start) {
+  /// On success `after` is the state after the step, and `start` (unless null) that before it, on its mesh.
+  StepResult run(State<Dim>& after, State<Dim>* start) {
     x_ = next_.history.x[0];
     {
       const ScopedTimer timer(report_.seconds.linear_solve);
@@ -92,7 +92,7 @@ class StepAttempt {
       return failed(summary);
     }
     ITR_AUDIT(find_violation(setup_, next_, x_).empty(), find_violation(setup_, next_, x_));
-    return finish(state, start);
+    return finish(after, start);
   }
 
   /// Whether EnergyGuard was the one that ended it.
@@ -159,7 +159,7 @@ class StepAttempt {
     return std::nullopt;
   }
 
-  StepResult finish(State<Dim>& state, State<Dim>* start) {
+  StepResult finish(State<Dim>& after, State<Dim>* start) {
     StepResult result;
     next_.created_energy = guard_.created_energy();
     {
@@ -190,7 +190,7 @@ class StepAttempt {
     }
     if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     TimeIntegrator(setup_.time).push(std::move(x_), next_.history);
-    state = std::move(next_);
+    after = std::move(next_);  // before_ may be the same, and is not needed any more
     stop_clocks();
     report_.peak_rss_mb = peak_rss_mb();
     result.report = report_;
@@ -236,15 +236,16 @@ class StepAttempt {
 }  // namespace
 
 template <int Dim>
-StepResult take_step(const StepTools<Dim>& tools, State<Dim>& state, bool damped, State<Dim>* start) {
-  StepAttempt<Dim> attempt(tools, state, damped);
-  StepResult result = attempt.run(state, start);
+StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
+                     State<Dim>* start) {
+  StepAttempt<Dim> attempt(tools, before, damped);
+  StepResult result = attempt.run(after, start);
   if (!attempt.creates_energy()) return result;
   tools.logger.warning(
       fmt::format("step {}: Newmark would create energy here, implicit Euler takes this step", result.report.step));
   StepReport effort = result.report;
   effort.forget_operations();
-  result = StepAttempt<Dim>(tools, state, true).run(state, start);
+  result = StepAttempt<Dim>(tools, before, true).run(after, start);
   result.report.add_effort(effort);
   result.report.damped_steps = 1;
   return result;
@@ -252,7 +253,7 @@ StepResult take_step(const StepTools<Dim>& tools, State<Dim>& state, bool damped
 
 #define ITR_INSTANTIATE(Dim)                                \
   template EdgeLengths edge_lengths<Dim>(const Mesh<Dim>&); \
-  template StepResult take_step<Dim>(const StepTools<Dim>&, State<Dim>&, bool, State<Dim>*);
+  template StepResult take_step<Dim>(const StepTools<Dim>&, const State<Dim>&, State<Dim>&, bool, State<Dim>*);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -30,15 +30,15 @@ StepSetup<Dim> halved(const StepSetup<Dim>& setup, const State<Dim>& state) {
 }  // namespace
 
 template <int Dim>
-StepResult take_step_in_parts(const StepTools<Dim>& tools, State<Dim>& state, bool damped) {
+StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped) {
   const StepSetup<Dim>& setup = tools.setup;
-  StepResult whole = take_step(tools, state, damped);
+  StepResult whole = take_step(tools, before, after, damped);
   if (whole.ok || whole.cancelled || setup.time.step_cuts == 0) return whole;
-  const StepSetup<Dim> half = halved(setup, state);
+  const StepSetup<Dim> half = halved(setup, before);
   const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.cache, tools.solver, tools.logger};
   tools.logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
                        "), cutting it into two of " + std::to_string(half.time.dt) + " s");
-  State<Dim> part = state;
+  State<Dim> part = before;
   part.step = 0;
   if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);
   StepReport effort = whole.report;
@@ -46,7 +46,7 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, State<Dim>& state, bo
   MeshRenumbering renumbering;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
-    StepResult result = take_step_in_parts(tools_of_half, part, true);
+    StepResult result = take_step_in_parts(tools_of_half, part, part, true);
     parts += std::max(1, result.report.cut_steps);
     result.report.add_effort(effort);
     if (!result.ok) return result;
@@ -57,13 +57,13 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, State<Dim>& state, bo
   }
   whole = {.reason = {}, .report = effort, .forces = std::move(forces), .renumbering = std::move(renumbering)};
   whole.report.cut_steps = parts;
-  whole.report.step = part.step = state.step + 1;
+  whole.report.step = part.step = before.step + 1;
   whole.report.t = part.t = setup.time.time_after(part.step);
-  state = std::move(part);
+  after = std::move(part);
   return whole;
 }
 
-template StepResult take_step_in_parts<2>(const StepTools<2>&, State<2>&, bool);
-template StepResult take_step_in_parts<3>(const StepTools<3>&, State<3>&, bool);
+template StepResult take_step_in_parts<2>(const StepTools<2>&, const State<2>&, State<2>&, bool);
+template StepResult take_step_in_parts<3>(const StepTools<3>&, const State<3>&, State<3>&, bool);
 
 }  // namespace itr

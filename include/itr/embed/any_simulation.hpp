@@ -41,12 +41,14 @@ struct HostTerm {
 struct AnyMeshChange {
   std::vector<int> vertex, cell, facet, facet_parent;
   Eigen::SparseMatrix<double, Eigen::RowMajor> interpolation;
-  /// project_fields: rows by old vertex in, by new vertex out; integrals are kept.
+  /// project_fields: rows by old vertex in, by new vertex out; integrals are kept. Throws InputError once the listener's
+  /// call has ended.
   std::function<MatrixX(const MatrixX& fields)> project;
 };
 
 /// Everything between steps is done by the thread that steps. Two objects do not disturb each other. Spans are valid until
-/// the next call that changes the simulation. A name that is not known is an InputError that lists the known ones.
+/// the next call that changes the simulation. A name that is not known is an InputError that lists the known ones. What a
+/// step calls may read and save the state, which is that before the step, and change nothing (see Simulation).
 class AnySimulation {
  public:
   /// Copies the model. Throws InputError for what cannot be simulated. `registry` has the linear solvers; null: those that
@@ -70,7 +72,7 @@ class AnySimulation {
   double time() const;                               ///< [s]
   int steps() const;                                 ///< done
   bool finished() const;                             ///< as many as the options ask for
-  const StepReport& report() const;                  ///< of the last step, or of the state at the start
+  const StepReport& report() const;                  ///< see Simulation::report
   const std::vector<std::string>& warnings() const;  ///< of the model's options
 
   // What acts from the next step on. Arrays of nodal values are by vertex of the present mesh, or by node, and are functions
@@ -140,7 +142,7 @@ class AnySimulation {
   /// See Snapshot.
   using Saved = std::variant<Snapshot<2>, Snapshot<3>>;
   Saved save() const;  ///< cheap, see Simulation::save
-  /// Throws InputError for one of another dimension.
+  /// Throws InputError for one of another simulation.
   void restore(const Saved& saved);
 
   // Events; null: nobody listens. What they throw comes out of step(), which then did nothing or (mesh change) was done.

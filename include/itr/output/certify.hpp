@@ -13,7 +13,7 @@ namespace itr::output {
 
 struct Certificate {
   int frames = 0;
-  std::vector<std::string> violations;  ///< one line each: frame, what, which ids
+  std::vector<std::string> violations;  ///< one line each: frame, what, which ids; also of arrays that are damaged
   bool passed() const { return violations.empty() && frames > 0; }
 };
 

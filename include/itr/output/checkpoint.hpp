@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,14 +18,18 @@ struct SavedState {
   std::string scene;    ///< RunInfo::scene_identity of the run that saved it
   std::string backend;  ///< solver of that run
   int dim = 0;
+  int step = 0;
+  std::vector<std::string> passed_over{};  ///< what is wrong with newer ones, a sentence each
 };
 
 /// Whether a run has left something in the folder.
 bool has_results(const std::filesystem::path& directory);
 
-/// The newest state in DIR/frames that can be read; none where there are no frames. Throws InputError where there are frames
-/// but none of them has a state that can be read (another version wrote them, or they are damaged).
-std::optional<SavedState> find_saved_state(const std::filesystem::path& directory);
+/// The newest state in DIR/frames, of a step before `before`, that can be read; none where there are no frames. Throws
+/// InputError where there are frames but none of them has a state that can be read (another version wrote them, or they are
+/// damaged). Its arrays are read by read_checkpoint, which may find damage still.
+std::optional<SavedState> find_saved_state(const std::filesystem::path& directory,
+                                           int before = std::numeric_limits<int>::max());
 
 template <int Dim>
 struct Checkpoint {
@@ -33,7 +38,7 @@ struct Checkpoint {
   std::size_t log_bytes = 0;   ///< length of steps.jsonl then
 };
 
-/// Throws InputError where the file is unreadable or inconsistent.
+/// Throws InputError where the file is unreadable, inconsistent, or not as it was written.
 template <int Dim>
 Checkpoint<Dim> read_checkpoint(const SavedState& saved);
 

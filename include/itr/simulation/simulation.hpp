@@ -2,9 +2,11 @@
 // A simulation: the state, and one time step after another. `src/simulation/step.cpp` is the whole method on a page.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "itr/core/log.hpp"
 #include "itr/energy/contact/stiffness.hpp"
@@ -55,8 +57,13 @@ struct Snapshot {
   std::shared_ptr<const State<Dim>> state;
   TimeOptions time;
   NodalForces forces;
+  std::optional<StepReport> report;   ///< empty: nobody has asked for it
+  std::shared_ptr<const void> owner;  ///< names the simulation that saved it
 };
 
+/// What a step calls (listeners of iterations, terms, functions of conditions, the log) sees the state before the step,
+/// which the step does not write to, and may save it. To step, to restore and to change conditions from there is an
+/// InputError; a listener of mesh changes, called when the step is done, may change conditions.
 template <int Dim>
 class Simulation {
  public:
@@ -66,13 +73,14 @@ class Simulation {
   ~Simulation();
   Simulation(Simulation&&) noexcept;
 
-  /// What the state at t0 looks like: all counters 0.
-  StepReport initial_report() const;
+  /// Of the last step; after adapt() of the state on the new mesh with what adapting took; after restore() as it was when it
+  /// was saved; of a state that no step led to: all counters 0. Valid until the next call that changes the simulation.
+  const StepReport& report() const;
   /// One time step with remeshing inside it. Numerical failure is a result with a reason.
   StepResult advance();
   /// The same by another length of the step than before [s], which is that of steps from now on. Newton's Euclidean
-  /// tolerances go with it, from what the setup has for its own; BDF begins with order 1 again. Throws InputError for a
-  /// length that is not positive.
+  /// tolerances go with it, from what the setup has for its own; BDF begins with order 1 again. A step that fails changes
+  /// none of that. Throws InputError for a length that is not positive.
   StepResult advance(double dt);
   /// Finds the mesh of a step of the length dt and stays at its start, on the new mesh: for a program that goes over the
   /// step several times, remesh.enabled off, from what save() has then. As advance() but for that; steps are not cut.
@@ -85,14 +93,16 @@ class Simulation {
   void on_mesh_change(std::function<void(const MeshChange<Dim>& change, const Mesh<Dim>& before)> listener);
 
   /// All that the next steps depend on, but for what conditions() and the program have set: with the same of that, steps
-  /// after restore() have the bits of those after save(). Takes no time; the next step copies the state once.
+  /// after restore() have the bits of those after save(). Takes no time.
   Snapshot<Dim> save() const;
+  /// Throws InputError for a snapshot of another simulation.
   void restore(const Snapshot<Dim>& snapshot);
-  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup. Strata that are not
-  /// its mesh's are dropped, to be found anew.
+  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup, has numbers that are
+  /// not finite or violates invariants (find_violation). Strata that are not its mesh's are dropped, to be found anew.
   void restore(State<Dim> state);
 
-  const State<Dim>& state() const;
+  const State<Dim>& state() const;      ///< valid while no snapshot shares it; spans of its fields until it changes
+  std::uint64_t mesh_revision() const;  ///< another one whenever state().mesh may be another mesh
   const Setup<Dim>& setup() const;
   const NodalForces& forces() const;       ///< at the end of the last step, those that the setup asks for
   std::string solver_name() const;         ///< as it was asked for: "auto", say
@@ -100,8 +110,14 @@ class Simulation {
   /// Calls `observer` with the present state as output sees it.
   template <typename Observer>
   void observe(Observer&& observer) const {
-    const FrameData data = frame_data();
-    FrameView<Dim> frame{state().mesh,
+    observe(save(), std::forward<Observer>(observer));
+  }
+  /// With one that it has saved, also from another thread while a step is taken.
+  template <typename Observer>
+  void observe(const Snapshot<Dim>& snapshot, Observer&& observer) const {
+    const State<Dim>& state = *snapshot.state;
+    const FrameData data = frame_data(state, snapshot.forces);
+    FrameView<Dim> frame{state.mesh,
                          data.x,
                          data.v,
                          data.elastic_density,
@@ -109,7 +125,7 @@ class Simulation {
                          setup().obstacles.edges,
                          setup().obstacles.triangles,
                          &data.asked};
-    frame.space = &state().space;
+    frame.space = &state.space;
     if (setup().proxy) frame.proxy = {&data.proxy_x, &setup().proxy->edges, &setup().proxy->triangles};
     observer(frame);
   }
@@ -121,7 +137,7 @@ class Simulation {
     std::vector<Vec<Dim>> obstacle_x, proxy_x;
     AskedFields asked;
   };
-  FrameData frame_data() const;
+  FrameData frame_data(const State<Dim>& state, const NodalForces& forces) const;
   void add_asked(const CellSet<Dim>& cells, FrameData& data) const;
 
   struct Impl;

@@ -25,13 +25,14 @@ struct StepTools {
 };
 
 /// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again.
-/// `damped`: Newmark leaves the step to implicit Euler. On failure `state` is left as it was. `start`, if there is one, gets
-/// the state before the step as it is on the mesh at the end of it.
+/// From `before` to `after`, which may be the same and on failure is left as it was. `damped`: Newmark leaves the step to
+/// implicit Euler. `start`, if there is one, gets the state before the step as it is on the mesh at the end of it.
 template <int Dim>
-StepResult take_step(const StepTools<Dim>& tools, State<Dim>& state, bool damped = false, State<Dim>* start = nullptr);
+StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped = false,
+                     State<Dim>* start = nullptr);
 
 /// That, with a step whose solve fails cut into smaller ones, as TimeOptions::step_cuts allows and the logger is told.
 template <int Dim>
-StepResult take_step_in_parts(const StepTools<Dim>& tools, State<Dim>& state, bool damped = false);
+StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped = false);
 
 }  // namespace itr
