@@ -13,6 +13,7 @@
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
+#include "itr/output/report.hpp"
 #include "ranks.hpp"
 #include "run.hpp"
 #include "scene/node.hpp"
@@ -63,6 +64,14 @@ int certify(const std::string& directory) {
   fmt::print("{} frames, each by itself: {}\n", certificate.frames,
              certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
   return certificate.passed() ? cli::done : cli::certificate_failed;
+}
+
+int report(const std::string& directory, std::string file, const output::ReportOptions& options) {
+  if (file.empty()) file = (std::filesystem::path(directory) / "report.html").string();
+  const auto summary = output::write_report(directory, file, options);
+  fmt::print("{}: {} frames, {:.1f} MB\n", file, summary.frames, summary.mb);
+  for (const auto& note : summary.notes) fmt::print("{}\n", note);
+  return cli::done;
 }
 
 /// What `run` and `explain` are told of a scene.
@@ -140,6 +149,16 @@ int dispatch(int argc, char** argv) {
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
+  auto* report_command = app.add_subcommand("report", "one HTML file that shows a run: opens in a browser, from the disk");
+  std::string report_file;
+  output::ReportOptions report_options;
+  report_command->add_option("directory", directory, "result folder, of a run that is finished or not")->required();
+  report_command->add_option("-o,--output", report_file, "the file (default: report.html in the folder)");
+  report_command->add_option("--every", report_options.every, "takes each so many-th of the stored frames")
+      ->check(CLI::PositiveNumber);
+  report_command
+      ->add_option("--max-mb", report_options.max_mb, "of the file (default: 30): leaves out cells inside, then frames")
+      ->check(CLI::PositiveNumber);
   auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   study::Options study_options;
   add_study_options(*study, study_options, sets);
@@ -156,6 +175,7 @@ int dispatch(int argc, char** argv) {
     throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
+  if (*report_command) return report(directory, report_file, report_options);
   if (*schema) {
     fmt::print("{}{}", as_page ? scene::reference_page() : scene::json_schema(), as_page ? "" : "\n");
     return cli::done;
