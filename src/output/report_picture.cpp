@@ -127,7 +127,7 @@ Colour lit(const Colour& colour, const std::array<Point, 3>& p) {
   for (int k = 0; k < 3; ++k) a[k] = p[1][k] - p[0][k], b[k] = p[2][k] - p[0][k];
   for (int k = 0; k < 3; ++k) n[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
   const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-  const double share = length > 0 ? 0.45 + 0.55 * std::abs(0.25 * n[0] + 0.45 * n[1] + 0.86 * n[2]) / length : 1;
+  const double share = length > 0 ? 0.55 + 0.45 * std::abs(0.25 * n[0] + 0.45 * n[1] + 0.86 * n[2]) / length : 1;
   return {share * colour[0], share * colour[1], share * colour[2]};
 }
 

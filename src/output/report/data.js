@@ -90,16 +90,17 @@ class Run {
     const n = this.meta.counts, dim = this.dim;
     const [topology, steps] = await Promise.all([inflate(this.prefix + 'topology'), inflate(this.prefix + 'steps')]);
     const r = new Reader(topology);
-    this.rest = Array.from({length: dim}, () => r.floats(n.vertices));
+    const rest = r.floats(dim * n.vertices);
+    this.rest = Array.from({length: dim}, (_, k) => rest.subarray(k * n.vertices, (k + 1) * n.vertices));
     this.vertices = r.living(n.vertices, 1);
     this.kind = this.vertices.columns[0];
     this.cells = r.living(n.cells, dim + 2);
     this.body = this.cells.columns[dim + 1];
     this.facets = r.living(n.facets, dim + 1);
     this.curved = r.living(n.curved, 3);
-    this.obstacleEdges = r.columns(n.obstacle_edges, 2);
-    this.obstacleFaces = r.columns(n.obstacle_faces, 3);
-    this.obstacleIds = alive(this.vertices, 0).filter(v => this.kind[v] === KIND.obstacle);
+    const ids = this.obstacleIds = alive(this.vertices, 0).filter(v => this.kind[v] === KIND.obstacle);
+    this.obstacleEdges = r.columns(n.obstacle_edges, 2).map(column => column.map(i => ids[i]));
+    this.obstacleFaces = r.columns(n.obstacle_faces, 3).map(column => column.map(i => ids[i]));
     this.steps = new TextDecoder().decode(steps).split('\n').filter(Boolean).map(line => JSON.parse(line));
     return this;
   }

@@ -23,7 +23,7 @@ void main() {
   if (value < -0.5 && flatColour.a < 0.5) base = vec3(0.86);
   if (dot(light, light) > 0.0) {
     vec3 n = normalize(cross(dFdx(at), dFdy(at)));
-    base *= 0.45 + 0.55 * abs(dot(n, light));
+    base *= 0.55 + 0.45 * abs(dot(n, light));
   }
   vec3 width = fwidth(weights);
   vec3 lines = smoothstep(vec3(0.35), vec3(1.25), weights / max(width, vec3(1e-6)));

@@ -73,7 +73,7 @@ class View {
       html('hr'), labelled('deformed ×', factor), check('edges', 'edges of cells'), check('obstacles', 'obstacles'),
       check('edits', 'edits of remeshing'),
       ...(this.dim === 3 ? [html('hr'), labelled('cut', axis), labelled('at', cut), check('flip', 'other side')] : []), html('hr'),
-      html('label', {}, html('button', {onclick: () => this.look(this.home), title: 'key f'}, 'fit'), ...(this.dim === 3 ? views : []), link,
+      html('label', {className: 'many'}, html('button', {onclick: () => this.look(this.home), title: 'key f'}, 'fit'), ...(this.dim === 3 ? views : []), link,
            html('button', {onclick: () => this.savePicture()}, 'PNG')),
       html('hr'), this.pickText);
     this.slider = html('input', {type: 'range', min: 0, max: run.frames.length - 1, step: 1, oninput: () => set('frame', Number(this.slider.value))});
@@ -242,7 +242,7 @@ class View {
       painter.draw(this.obstacleBuffer, {flat: [0.74, 0.75, 0.77], edges: state.edges ? 0.25 : 0});
       painter.draw(this.lineBuffer, {flat: [0.2, 0.22, 0.26], lines: true});
     }
-    painter.draw(this.buffer, {cut, edges: state.edges ? 0.75 : 0});
+    painter.draw(this.buffer, {cut, edges: state.edges ? 0.6 : 0});
     this.drawOver();
   }
 

@@ -33,6 +33,7 @@ function ticksOf(low, high, log) {
     for (let e = Math.ceil(Math.log10(low) - 1e-9); e <= Math.log10(high) + 1e-9; e += every) found.push(10 ** e);
     return found.length > 1 ? found : [low, high];
   }
+  if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)))) return [low];
   const raw = (high - low) / 4, power = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].find(m => m * power >= raw) * power;
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) found.push(k * step);
   return found;
@@ -70,7 +71,7 @@ class Plot {
     const used = this.series.flatMap(s => s.values).filter(v => Number.isFinite(v) && (!this.log || v > 0));
     let low = used.reduce((a, b) => Math.min(a, b), Infinity), high = used.reduce((a, b) => Math.max(a, b), -Infinity);
     if (!this.log && low > 0 && low < 0.6 * high) low = 0;
-    if (low === high) [low, high] = this.log ? [low / 2, high * 2] : [low - (Math.abs(low) || 1) / 2, high + (Math.abs(high) || 1) / 2];
+    if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)))) [low, high] = this.log ? [low / 2, high * 2] : [low - (Math.abs(low) || 1) / 2, high + (Math.abs(high) || 1) / 2];
     const [t0, t1] = [this.times[0], this.times[this.times.length - 1]];
     this.x = t => left + (t - t0) / (t1 - t0) * (width - left - right);
     const share = this.log ? v => Math.log(v / low) / Math.log(high / low) : v => (v - low) / (high - low);
