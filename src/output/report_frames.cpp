@@ -153,12 +153,12 @@ void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField
   largest_.assign(vertex_fields_.size() + cell_fields_.size(), 0);
 }
 
-/// Logarithmic, 128 codes an octave: three digits over all magnitudes. 0 is zero.
+/// Logarithmic, 512 codes an octave: three digits of all between 10^-21 and 10^17. 0 is zero.
 std::uint16_t FrameEncoder::code(std::size_t field, double value) {
   if (!(value > 0) || !std::isfinite(value)) return 0;
   largest_[field] = std::max(largest_[field], value);
   if (value < kNothing * largest_[field]) return 0;
-  return static_cast<std::uint16_t>(std::clamp(std::round(128 * (std::log2(value) + 256)), 1.0, 65535.0));
+  return static_cast<std::uint16_t>(std::clamp(std::round(512 * (std::log2(value) + 70)), 0.0, 65535.0));
 }
 
 void FrameEncoder::add(const std::filesystem::path& path) {

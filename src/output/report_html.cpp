@@ -46,7 +46,8 @@ std::string json_string(std::string_view text) {
 
 std::string escaped(std::string_view text) {
   std::string out;
-  for (const char c : text) out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  for (const char c : text)
+    out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
   return out;
 }
 
@@ -195,7 +196,7 @@ class Page {
 
     std::string counts;
     const std::string topology = encoder.topology(counts), pngs = pictures(chosen_, encoder);
-    std::string name = fs::weakly_canonical(directory_).filename().string();
+    std::string name = fs::canonical(directory_).filename().string();
     std::string data =
         block("meta", in_script(meta(encoder, name, counts, inside, read_text(directory_ / "summary.json"), notes_)), true);
     data += block("steps", base64(deflate(step_lines(directory_)))) + block("topology", base64(topology));

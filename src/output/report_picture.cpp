@@ -149,7 +149,7 @@ std::string draw_frame(const StoredFrame& frame, const std::vector<double>& cell
     for (int k = 0; k < dim; ++k) p[k] = x[i * dim + k];
     return eye.turn(p);
   };
-  const Colour grey = {190, 190, 195}, dark = {60, 60, 70};
+  const Colour grey = {225, 226, 230}, dark = {60, 60, 70};
   const auto& obstacles = frame.obstacles;
   for (std::size_t f = 0; f + 2 < obstacles.faces.size(); f += 3) {
     std::array<Point, 3> p;

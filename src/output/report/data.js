@@ -4,8 +4,8 @@
 
 const NEVER = 1 << 30;
 const KIND = {vertex: 0, node: 1, obstacle: 2};
-// Codes of magnitudes: 128 an octave, 0 is zero.
-const MAGNITUDES = Float32Array.from({length: 65536}, (_, code) => code ? 2 ** (code / 128 - 256) : 0);
+// Codes of magnitudes: 512 an octave, 0 is zero.
+const MAGNITUDES = Float32Array.from({length: 65536}, (_, code) => code ? 2 ** (code / 512 - 70) : 0);
 
 async function inflate(id) {
   const element = document.getElementById(id);

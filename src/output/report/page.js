@@ -239,7 +239,7 @@ class View {
     this.matrix = camera.matrix(this.scale(), this.width, this.height, 2 * factor * this.radius + away);
     painter.begin(canvas.width, canvas.height, this.matrix, light);
     if (state.obstacles) {
-      painter.draw(this.obstacleBuffer, {flat: [0.74, 0.75, 0.77], edges: state.edges ? 0.25 : 0});
+      painter.draw(this.obstacleBuffer, {flat: [0.88, 0.885, 0.9], edges: state.edges ? 0.25 : 0});
       painter.draw(this.lineBuffer, {flat: [0.2, 0.22, 0.26], lines: true});
     }
     painter.draw(this.buffer, {cut, edges: state.edges ? 0.6 : 0});
@@ -304,7 +304,7 @@ class View {
     const steps = this.run.steps.filter(s => before && s.step > before.step && s.step <= now.step), gain = steps.reduce((sum, s) => sum + gainOf(s), 0);
     this.made.replaceChildren(...EDITS.filter(([kind]) => this.edits[kind].length).map(([kind, colour, title]) =>
       html('div', {}, html('i', {style: `background:${colour}`}), `${this.edits[kind].length} ${title}`)),
-      before ? `Steps ${before.step + 1} to ${now.step}: energy lower by ${shortNumber(gain)} J` : 'The first frame: nothing before it');
+      before ? `${now.step === before.step + 1 ? 'Step' : `Steps ${before.step + 1} to`} ${now.step}: energy lower by ${shortNumber(gain)} J` : 'The first frame: nothing before it');
   }
 
   isThere(pick) {
@@ -346,7 +346,7 @@ class View {
     const show = (of, id) => {
       for (const name of this.fields()) {
         const values = frame.field(name);
-        if (values.of === of) lines.push(`  ${FIELD_LABELS[name] ?? name}  ${shortNumber(Number(values.values[id].toPrecision(4)))} ${this.unit(name)}`);
+        if (values.of === of) lines.push(`  ${FIELD_LABELS[name] ?? name}  ${shortNumber(Number(values.values[id].toPrecision(3)))} ${this.unit(name)}`);
       }
     };
     show('vertex', vertex);
