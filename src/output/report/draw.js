@@ -2,33 +2,42 @@
 // Triangles of a frame, and how WebGL shows them.
 'use strict';
 
-const VERTEX_SHADER = `#version 300 es
-in vec3 place; in float share; in vec4 corner;
+// In variants, as software has to run them too: CUT, EDGES and FLAT (one colour).
+const VERTEX_SHADER = `
+in vec3 place; in float share; in vec4 corner; in vec3 normal;
 uniform mat4 toClip;
-out vec3 at; out float value; out vec3 weights;
-void main() { at = place; value = share; weights = corner.xyz; gl_Position = toClip * vec4(place, 1.0); }`;
+uniform vec3 light;  // 0: none
+uniform vec4 cut;
+out float value; out vec3 weights; out float beyond; flat out float shine;
+void main() {
+  value = share;
+  weights = corner.xyz;
+  beyond = dot(cut.xyz, place) - cut.w;
+  shine = light == vec3(0.0) ? 1.0 : 0.55 + 0.45 * abs(dot(normalize(normal), light));
+  gl_Position = toClip * vec4(place, 1.0);
+}`;
 
-const FRAGMENT_SHADER = `#version 300 es
+const FRAGMENT_SHADER = `
 precision highp float;
-in vec3 at; in float value; in vec3 weights;
+in float value; in vec3 weights; in float beyond; flat in float shine;
 uniform sampler2D colours;
-uniform vec4 cut;      // what is beyond this plane is not shown
-uniform vec4 flatColour;  // with alpha 1: instead of the field's
-uniform vec3 light;    // 0: none
+uniform vec3 flatColour;
 uniform float edges;   // how dark
 out vec4 colour;
 void main() {
-  if (dot(cut.xyz, at) > cut.w) discard;
-  vec3 base = flatColour.a > 0.5 ? flatColour.rgb : texture(colours, vec2(clamp(value, 0.002, 0.998), 0.5)).rgb;
-  if (value < -0.5 && flatColour.a < 0.5) base = vec3(0.86);
-  if (dot(light, light) > 0.0) {
-    vec3 n = normalize(cross(dFdx(at), dFdy(at)));
-    base *= 0.55 + 0.45 * abs(dot(n, light));
-  }
-  vec3 width = fwidth(weights);
-  vec3 lines = smoothstep(vec3(0.35), vec3(1.25), weights / max(width, vec3(1e-6)));
+#ifdef CUT
+  if (beyond > 0.0) discard;
+#endif
+#ifdef FLAT
+  vec3 base = shine * flatColour;
+#else
+  vec3 base = shine * texture(colours, vec2(value, 0.5)).rgb;
+#endif
+#ifdef EDGES
+  vec3 width = fwidth(weights), far = weights / max(width, vec3(1e-6));
   float fade = clamp(0.22 / max(max(width.x, width.y), width.z), 0.15, 1.0);
-  base *= 1.0 - edges * fade * (1.0 - min(min(lines.x, lines.y), lines.z));
+  base *= 1.0 - edges * fade * (1.0 - smoothstep(0.35, 1.25, min(min(far.x, far.y), far.z)));
+#endif
   colour = vec4(base, 1.0);
 }`;
 
@@ -48,6 +57,7 @@ class Triangles {
     this.place = larger(this.place, Float32Array, 9 * n);
     this.share = larger(this.share, Float32Array, 3 * n);
     this.corner = larger(this.corner, Uint8Array, 12 * n);
+    this.normal = larger(this.normal, Float32Array, 9 * n);
     this.cell = larger(this.cell, Int32Array, n);
     this.nodes = larger(this.nodes, Int32Array, 3 * n);
   }
@@ -58,6 +68,11 @@ class Triangles {
     q[at] = p[3 * i]; q[at + 1] = p[3 * i + 1]; q[at + 2] = p[3 * i + 2];
     q[at + 3] = p[3 * j]; q[at + 4] = p[3 * j + 1]; q[at + 5] = p[3 * j + 2];
     q[at + 6] = p[3 * k]; q[at + 7] = p[3 * k + 1]; q[at + 8] = p[3 * k + 2];
+    const ax = q[at + 3] - q[at], ay = q[at + 4] - q[at + 1], az = q[at + 5] - q[at + 2];
+    const bx = q[at + 6] - q[at], by = q[at + 7] - q[at + 1], bz = q[at + 8] - q[at + 2], m = this.normal;
+    m[at] = m[at + 3] = m[at + 6] = ay * bz - az * by;
+    m[at + 1] = m[at + 4] = m[at + 7] = az * bx - ax * bz;
+    m[at + 2] = m[at + 5] = m[at + 8] = ax * by - ay * bx;
     this.share[3 * t] = a; this.share[3 * t + 1] = b; this.share[3 * t + 2] = c;
     const w = this.corner, o = 12 * t;
     for (let e = 0; e < 3; ++e) {
@@ -161,71 +176,91 @@ function addSection(out, frame, x, field, share, cut) {
   }
 }
 
+const ATTRIBUTES = [['place', 3], ['share', 1], ['corner', 4], ['normal', 3]];
+
+// Whether triangles are drawn by the processor: smooth outlines would take most of its time.
+function isSoftware() {
+  const gl = document.createElement('canvas').getContext('webgl2'), info = gl?.getExtension('WEBGL_debug_renderer_info');
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : '';
+  gl?.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software/i.test(name);
+}
+
 class Painter {
   // Throws where there is no WebGL2.
   constructor(canvas, colours) {
-    const gl = this.gl = canvas.getContext('webgl2', {antialias: true, alpha: false});
+    const gl = this.gl = canvas.getContext('webgl2', {antialias: !isSoftware(), alpha: false});
     if (!gl) throw new Error('no WebGL2');
-    const program = gl.createProgram();
-    for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, text);
-      gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-      gl.attachShader(program, shader);
-    }
-    ['place', 'share', 'corner'].forEach((name, i) => gl.bindAttribLocation(program, i, name));
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-    gl.useProgram(program);
-    this.at = Object.fromEntries(['toClip', 'cut', 'flatColour', 'light', 'edges', 'colours'].map(n => [n, gl.getUniformLocation(program, n)]));
-    const texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    const pixels = new Uint8Array(256 * 4);
-    for (let i = 0; i < 256; ++i) pixels.set([...colourAt(colours, i / 255), 255], 4 * i);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE],
+    this.programs = new Map();
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    const pixels = new Uint8Array(1024 * 4);
+    for (let i = 0; i < 1024; ++i) pixels.set([...colourAt(colours, i / 1023), 255], 4 * i);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 1024, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE],
                                  [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]]) gl.texParameteri(gl.TEXTURE_2D, name, value);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
   }
 
+  program(...words) {
+    const key = words.filter(Boolean).join(' '), known = this.programs.get(key);
+    if (known) return known;
+    const {gl} = this, program = gl.createProgram(), head = '#version 300 es\n' + key.split(' ').map(word => word && `#define ${word}\n`).join('');
+    for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, head + text);
+      gl.compileShader(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+      gl.attachShader(program, shader);
+    }
+    ATTRIBUTES.forEach(([name], i) => gl.bindAttribLocation(program, i, name));
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+    const at = Object.fromEntries(['toClip', 'cut', 'flatColour', 'light', 'edges'].map(n => [n, gl.getUniformLocation(program, n)]));
+    this.programs.set(key, {program, at});
+    return this.programs.get(key);
+  }
+
   buffers() {
     const {gl} = this, array = gl.createVertexArray(), list = [];
     gl.bindVertexArray(array);
-    for (const [i, size, type] of [[0, 3, gl.FLOAT], [1, 1, gl.FLOAT], [2, 4, gl.UNSIGNED_BYTE]]) {
+    ATTRIBUTES.forEach(([name, size], i) => {
+      const isBytes = name === 'corner';
       list.push(gl.createBuffer());
       gl.bindBuffer(gl.ARRAY_BUFFER, list[i]);
       gl.enableVertexAttribArray(i);
-      gl.vertexAttribPointer(i, size, type, type === gl.UNSIGNED_BYTE, 0, 0);
-    }
+      gl.vertexAttribPointer(i, size, isBytes ? gl.UNSIGNED_BYTE : gl.FLOAT, isBytes, 0, 0);
+    });
     return {array, list, count: 0};
   }
 
   upload(to, from) {
     const {gl} = this, n = from.count;
     to.count = 3 * n;
-    [from.place.subarray(0, 9 * n), from.share.subarray(0, 3 * n), from.corner.subarray(0, 12 * n)].forEach((data, i) => {
+    ATTRIBUTES.forEach(([name, size], i) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, to.list[i]);
-      gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
+      gl.bufferData(gl.ARRAY_BUFFER, from[name].subarray(0, 3 * size * n), gl.DYNAMIC_DRAW);
     });
   }
 
   begin(width, height, toClip, light) {
-    const {gl, at} = this;
+    const {gl} = this;
+    Object.assign(this, {toClip, light});
     gl.viewport(0, 0, width, height);
     gl.clearColor(1, 1, 1, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.uniformMatrix4fv(at.toClip, false, toClip);
-    gl.uniform3fv(at.light, light);
   }
 
-  draw(what, {cut = [0, 0, 0, 1], flat = null, edges = 0, lines = false} = {}) {
-    const {gl, at} = this;
+  draw(what, {cut = null, flat = null, edges = 0, lines = false} = {}) {
+    const {gl} = this;
     if (!what.count) return;
-    gl.uniform4f(at.cut, cut[0], cut[1], cut[2], cut[3]);
-    gl.uniform4fv(at.flatColour, flat ? [...flat, 1] : [0, 0, 0, 0]);
-    gl.uniform1f(at.edges, edges);
+    const {program, at} = this.program(cut && 'CUT', edges > 0 && 'EDGES', flat && 'FLAT');
+    gl.useProgram(program);
+    gl.uniformMatrix4fv(at.toClip, false, this.toClip);
+    gl.uniform3fv(at.light, lines ? [0, 0, 0] : this.light);
+    if (cut) gl.uniform4f(at.cut, cut[0], cut[1], cut[2], cut[3]);
+    if (flat) gl.uniform3fv(at.flatColour, flat);
+    if (edges > 0) gl.uniform1f(at.edges, edges);
     gl.bindVertexArray(what.array);
     gl.drawArrays(lines ? gl.LINES : gl.TRIANGLES, 0, what.count);
   }

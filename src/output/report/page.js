@@ -12,7 +12,7 @@ const EDITS = [['new', '#0a8f3c', 'new vertices'], ['gone', '#d0021b', 'collapse
 
 class View {
   constructor(run, {onChange = () => {}, camera} = {}) {
-    Object.assign(this, {run, onChange, meta: run.meta, dim: run.dim, playing: false, ready: Promise.resolve()});
+    Object.assign(this, {run, onChange, meta: run.meta, dim: run.dim, playing: false, sharpness: 1, ready: Promise.resolve()});
     this.camera = camera ?? new Camera(run.dim, run.meta.azimuth, run.meta.elevation);
     this.state = {frame: run.frames.length - 1, field: 'elastic_density', log: false, least: null, most: null, factor: 1, edges: true,
                   obstacles: true, edits: false, axis: '', cut: 0.5, flip: false, pick: null};
@@ -140,7 +140,8 @@ class View {
     for (let i = 0; i < a.length; ++i) out.add(x, a[i], b[i], c[i], 0, 0, 0, -1, 7, null);
     this.painter.upload(this.obstacleBuffer, out);
     if (a.length) return this.lineBuffer.count = 0;
-    const n = e0.length, lines = {count: 0, place: new Float32Array(9 * n), share: new Float32Array(3 * n), corner: new Uint8Array(12 * n).fill(255)};
+    const n = e0.length, lines = {count: 0, place: new Float32Array(9 * n), share: new Float32Array(3 * n), corner: new Uint8Array(12 * n).fill(255),
+                                     normal: new Float32Array(9 * n)};
     for (let i = 0; i < n; ++i)
       for (let k = 0; k < 3; ++k) lines.place[6 * i + k] = x[3 * e0[i] + k], lines.place[6 * i + 3 + k] = x[3 * e1[i] + k];
     lines.count = n;
@@ -208,7 +209,7 @@ class View {
   }
 
   resize() {
-    const box = this.stage.getBoundingClientRect(), ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const box = this.stage.getBoundingClientRect(), ratio = Math.min(window.devicePixelRatio || 1, 2) * this.sharpness;
     this.width = box.width;
     this.height = box.height;
     for (const canvas of [this.canvas, this.over]) {
@@ -225,9 +226,14 @@ class View {
     return 0.92 * Math.min(this.width / extent(right), this.height / extent(up)) * this.camera.zoom;
   }
 
+  sharpen(sharpness) {
+    this.sharpness = sharpness;
+    this.resize();
+  }
+
   draw() {
     if (!this.width || !this.field) return;
-    const {painter, state, camera, canvas} = this, cut = this.cutPlane ?? [0, 0, 0, 1];
+    const {painter, state, camera, canvas} = this, cut = this.cutPlane;
     if (!this.radius) {
       let most = Math.hypot(...this.high.map((h, i) => h - this.low[i]));
       for (const id of this.run.obstacleIds) most = Math.max(most, Math.hypot(...[0, 1, 2].map(k => this.x[3 * id + k] - this.home.target[k])));
@@ -444,12 +450,17 @@ class View {
     const turn = this.playTurn = {};
     if (on && this.state.frame === this.run.frames.length - 1) await this.set({frame: 0});
     const pause = Math.max(1000 / 30, Math.min(200, 4000 / this.run.frames.length));
+    let taken = pause;
     while (this.playing && turn === this.playTurn && this.state.frame + 1 < this.run.frames.length) {
       const start = performance.now();
       await this.set({frame: this.state.frame + 1});
       do await new Promise(requestAnimationFrame);
       while (performance.now() - start < pause - 5);
+      // Where drawing is slow, pixels are larger while it plays.
+      taken += 0.2 * (performance.now() - start - taken);
+      if (taken > 1.3 * pause && this.sharpness > 0.5) this.sharpen(this.sharpness - 0.25), taken = pause;
     }
+    if (this.sharpness < 1 && turn === this.playTurn) this.sharpen(1);
     if (turn === this.playTurn && this.playing) this.play(false);
   }
 
