@@ -389,9 +389,8 @@ class Report(unittest.TestCase):
 
     def test_positions_are_those_of_the_frames(self):
         folder = self.folder / "masticator"
-        subprocess.run([ITR, "run", EXAMPLES / "masticator.json", "-o", folder, "--set", "/time/tend=2.2", "--threads", "1"], check=True,
-                       capture_output=True)
-        self.report(folder)
+        subprocess.run([ITR, "run", EXAMPLES / "masticator.json", "-o", folder, "--set", "/time/tend=2.2", "--threads", "1", "--report"],
+                       check=True, capture_output=True)
         self.open(folder / "report.html")
         stored = sorted((folder / "frames").glob("*.h5"))
         for index in (0, 17, len(stored) - 1):

@@ -13,8 +13,8 @@
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
-#include "itr/output/report.hpp"
 #include "ranks.hpp"
+#include "report.hpp"
 #include "run.hpp"
 #include "scene/node.hpp"
 #include "study/study.hpp"
@@ -64,14 +64,6 @@ int certify(const std::string& directory) {
   fmt::print("{} frames, each by itself: {}\n", certificate.frames,
              certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
   return certificate.passed() ? cli::done : cli::certificate_failed;
-}
-
-int report(const std::string& directory, std::string file, const output::ReportOptions& options) {
-  if (file.empty()) file = (std::filesystem::path(directory) / "report.html").string();
-  const auto summary = output::write_report(directory, file, options);
-  fmt::print("{}: {} frames, {:.1f} MB\n", file, summary.frames, summary.mb);
-  for (const auto& note : summary.notes) fmt::print("{}\n", note);
-  return cli::done;
 }
 
 /// What `run` and `explain` are told of a scene.
@@ -142,6 +134,7 @@ int dispatch(int argc, char** argv) {
   bool as_page = false;
   auto* run = app.add_subcommand("run", "simulate a scene");
   add_scene_options(*run, options, sets);
+  run->add_flag("--report", options.report, "at the end, write report.html into the folder: see `itr report`");
   auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing; takes options of run");
   add_scene_options(*explain, options, sets);
   auto* schema = app.add_subcommand("schema", "JSON Schema of scenes");
@@ -175,7 +168,7 @@ int dispatch(int argc, char** argv) {
     throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
-  if (*report_command) return report(directory, report_file, report_options);
+  if (*report_command) return cli::report(directory, report_file, report_options);
   if (*schema) {
     fmt::print("{}{}", as_page ? scene::reference_page() : scene::json_schema(), as_page ? "" : "\n");
     return cli::done;

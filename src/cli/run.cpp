@@ -16,6 +16,7 @@
 #include "itr/output/writer.hpp"
 #include "itr/simulation/advice.hpp"
 #include "ranks.hpp"
+#include "report.hpp"
 #include "solver_choice.hpp"
 
 namespace itr::cli {
@@ -122,7 +123,9 @@ class Run {
  public:
   Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
       linear::Registry& registry)
-      : directory_(std::move(directory)), simulation_(std::move(setup), registry, make_logger()) {
+      : directory_(std::move(directory)),
+        with_report_(options.report),
+        simulation_(std::move(setup), registry, make_logger()) {
     for (const auto& warning : find_suspicious(simulation_)) spdlog::warn("{}", warning);
     const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
     if (const auto saved = find_resumable(scene, directory_, options)) {
@@ -153,10 +156,11 @@ class Run {
                             error.what());
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
-    if (outcome == kFinished) {
+    const bool is_finished = outcome == kFinished;
+    if (is_finished)
       fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
-      return done;
-    }
+    if (with_report_) report(directory_, "", {});
+    if (is_finished) return done;
     fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
     return simulation_stopped;
   }
@@ -202,6 +206,7 @@ class Run {
   }
 
   std::string directory_;
+  bool with_report_;
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
   double output_seconds_ = 0;
