@@ -78,7 +78,7 @@ class Browser:
         return self.run("return r.failed ? String(r.failed.stack) : ''")
 
     def run(self, script):
-        """`r` is the page's report, `v` its view. Returns what the script returns, once frames are drawn."""
+        """`r` is the page's report, `v` its view, of a run. Returns what the script returns, once frames are drawn."""
         whole = ("const done = arguments[0]; (async () => { const r = await window.itrReport, v = r.view; "
                  f"if (v) await v.ready; {script} }})().then(done, e => done('failed: ' + e.stack));")
         return self.call("POST", self.session + "/execute/async", {"script": whole, "args": []})
@@ -411,9 +411,60 @@ class Report(unittest.TestCase):
             self.assertLess(numpy.abs(numpy.sort(found["e"]) - numpy.sort(density)).max(), 2e-3 * density.max() + 1e-20)
         self.assertEqual(self.browser.errors(), [])
 
+    def write_study(self, folder):
+        """Two runs of the square: on two cells, and on four that move on by 0.1 x."""
+        more = SQUARE + [[0.25, 0.75]]
+        write_frame(folder / "runs/coarse", 4, 1, SQUARE, SQUARE, [[0, 1, 2], [0, 2, 3]], [1, 2])
+        moved = numpy.array(more, float) + [[0.1 * x, 0] for x, y in more]
+        write_frame(folder / "runs/fine", 4, 1, more, moved, [[0, 1, 2], [0, 2, 4], [2, 3, 4], [3, 0, 4]], [1, 1, 2, 4])
+        run = lambda name, k: {"run": name, "series": "uniform", "label": f"n_refs {k}", "set": [f"/geometry/0/n_refs={k}", '/a="b c"'],
+                               "solver": "", "status": "finished", "vertices": 4 + k, "unknowns": 10 * 4 ** k, "memory_mb": 20 + k,
+                               "processor_seconds": 0.5 * 8 ** k, "against": "reference", "errors": {"l2": 0.1 / 4 ** k, "h1": 0.3 / 2 ** k}}
+        failed = {"run": "worse", "series": "itr", "label": "tolerance 1 J", "set": [], "solver": "", "status": "failed", "reason": "too <long>"}
+        study = {"scene": "my scene.json", "settings": "", "version": "0", "reference": "`reference`", "times": 1, "verdicts": [], "orders": [],
+                 "answers": ["Refining pays by <b>4</b>."], "runs": [run("coarse", 0), run("fine", 1), failed]}
+        (folder / "study.json").write_text(json.dumps(study))
+        (folder / "study.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" id="stored" width="50" height="50"></svg>')
+
+    def test_a_study_is_shown_with_two_runs_side_by_side(self):
+        folder = self.folder / "study"
+        self.write_study(folder)
+        self.assertIn("2 runs", self.report(folder).stdout)
+        self.open(folder / "report.html")
+        browser = self.browser
+        self.assertEqual(browser.run("await Promise.all(r.views.map(v => v.ready)); return [r.shown, r.diagrams.length, r.views.map(v => v.state.field)]"),
+                         [["fine", "coarse"], 6, ["difference", "difference"]])
+        self.assertIn("Refining pays by <b>4</b>.", browser.run("return document.querySelector('.words').textContent"))
+        # The difference is 0.1 x, from 0 on the left to 0.1 m on the right, in both.
+        browser.run("await r.show(1, 'fine'); await r.show(1, 'coarse'); r.views.forEach(v => v.set({edges: false})); await Promise.all(r.views.map(v => v.ready))")
+        self.assertIn("0.1", browser.run("return r.views[0].legend.textContent"))
+        place = lambda i, x, y: browser.run(f"const w = r.views[{i}], b = w.stage.getBoundingClientRect(), s = w.project([{x}, {y}, 0]);"
+                                            "return [Math.round(b.left + s[0]), Math.round(b.top + s[1])]")
+        at = [place(i, x * (1.1 if i == 0 else 1), y) for i in (0, 1) for x, y in ((0.25, 0.5), (0.75, 0.5), (0.9, 0.2))]
+        picture = browser.picture()
+        for point, x in zip(at, (0.25, 0.75, 0.9) * 2):
+            self.assert_colour(picture, point, colour(x), 8)
+        # One camera and one field for both.
+        browser.run("r.views[0].zoomAt(2); await r.views[0].set({field: 'elastic_density'}); await r.views[1].ready")
+        self.assertEqual(browser.run("return r.views.map(v => [v.camera.zoom, v.state.field, v.range[1]])"), [[2, "elastic_density", 4]] * 2)
+        # A point tells its run and the command; a click shows it.
+        browser.run("document.querySelector('circle[data-run=coarse]').dispatchEvent(new MouseEvent('click')); await r.show(1, 'fine')")
+        self.assertEqual(browser.run("return r.shown"), ["coarse", "fine"])
+        self.assertEqual(browser.run("return document.querySelector('.words code').textContent"),
+                         "itr run 'my scene.json' -o coarse --set /geometry/0/n_refs=0 --set '/a=\"b c\"'")
+        browser.run("[...document.querySelectorAll('.words tr')].pop().click()")
+        self.assertIn("failed: too <long>", browser.run("return document.querySelector('.words pre').textContent"))
+        self.assertEqual(browser.errors(), [])
+        self.assertIn("the mesh of fine is left out", self.report(folder, "--max-mb", "0.0001").stdout)
+        self.open(folder / "report.html", "?pictures")
+        self.assertEqual(browser.run("return [!!document.getElementById('stored'), r.diagrams.length]"), [True, 6])
+        self.assertEqual(browser.errors(), [])
+
     def test_what_cannot_be_shown_is_said(self):
         (self.folder / "empty").mkdir()
         self.assertIn("no stored frame", self.report(self.folder / "empty", status=2).stderr)
+        (self.folder / "empty/study.json").write_text("[1")
+        self.assertIn("no results of a study", self.report(self.folder / "empty", status=2).stderr)
         self.assertIn("--every", self.report(self.plane, "--every", "0", status=2).stderr)
 
 

@@ -142,10 +142,11 @@ int dispatch(int argc, char** argv) {
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
-  auto* report_command = app.add_subcommand("report", "one HTML file that shows a run: opens in a browser, from the disk");
+  auto* report_command =
+      app.add_subcommand("report", "one HTML file that shows a run, or a study: opens in a browser, from the disk");
   std::string report_file;
   output::ReportOptions report_options;
-  report_command->add_option("directory", directory, "result folder, of a run that is finished or not")->required();
+  report_command->add_option("directory", directory, "folder of a run that is finished or not, or of a study")->required();
   report_command->add_option("-o,--output", report_file, "the file (default: report.html in the folder)");
   report_command->add_option("--every", report_options.every, "takes each so many-th of the stored frames")
       ->check(CLI::PositiveNumber);

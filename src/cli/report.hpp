@@ -7,7 +7,7 @@
 
 namespace itr::cli {
 
-/// Shows the run in a folder as one HTML file (empty: report.html in the folder) and says what it has. Returns the exit
+/// Shows the run, or the study, in a folder as one HTML file (empty: report.html in the folder) and says what it has. Returns the exit
 /// status; throws InputError.
 int report(const std::string& directory, std::string file, const output::ReportOptions& options);
 

@@ -153,6 +153,18 @@ std::string fill(std::string_view page, const std::vector<std::pair<std::string,
   return out += page.substr(at);
 }
 
+/// All that a page holds of a run; ids of its elements begin with `prefix`.
+std::string run_blocks(const std::string& prefix, const std::string& name, const fs::path& directory,
+                       const FrameEncoder& encoder, bool has_inside, const std::vector<std::string>& notes) {
+  std::string counts;
+  const std::string topology = encoder.topology(counts), summary = read_text(directory / "summary.json");
+  std::string data = block(prefix + "meta", in_script(meta(encoder, name, counts, has_inside, summary, notes)), true);
+  data += block(prefix + "steps", base64(deflate(step_lines(directory)))) + block(prefix + "topology", base64(topology));
+  for (std::size_t i = 0; i < encoder.chunks().size(); ++i)
+    data += block(fmt::format("{}chunk{}", prefix, i), base64(encoder.chunks()[i].bytes));
+  return data;
+}
+
 class Page {
  public:
   Page(const fs::path& directory, const ReportOptions& options) : directory_(directory), options_(options) {
@@ -194,14 +206,8 @@ class Page {
                       every > std::max(options_.every, 1) ? fmt::format(", for at most {:g} MB", options_.max_mb) : ""));
     if (!inside) notes_.push_back(fmt::format("cells inside of solids are left out, for at most {:g} MB", options_.max_mb));
 
-    std::string counts;
-    const std::string topology = encoder.topology(counts), pngs = pictures(chosen_, encoder);
-    std::string name = fs::canonical(directory_).filename().string();
-    std::string data =
-        block("meta", in_script(meta(encoder, name, counts, inside, read_text(directory_ / "summary.json"), notes_)), true);
-    data += block("steps", base64(deflate(step_lines(directory_)))) + block("topology", base64(topology));
-    for (std::size_t i = 0; i < encoder.chunks().size(); ++i)
-      data += block(fmt::format("chunk{}", i), base64(encoder.chunks()[i].bytes));
+    const std::string pngs = pictures(chosen_, encoder), name = fs::canonical(directory_).filename().string();
+    const std::string data = run_blocks("", name, directory_, encoder, inside, notes_);
     return fill(assets::page, {{"TITLE", escaped(name)},
                                {"STYLE", assets::style},
                                {"PICTURES", pngs},
@@ -225,6 +231,53 @@ ReportSummary write_report(const fs::path& directory, const fs::path& file, cons
   const std::string html = page.text();
   write_file(file, html);
   ReportSummary summary = page.summary();
+  summary.mb = static_cast<double>(html.size()) / 1e6;
+  return summary;
+}
+
+ReportSummary write_study_report(const std::string& title, const std::string& results, const std::string& diagram,
+                                 const std::vector<StudyRun>& runs, const fs::path& file, const ReportOptions& options) {
+  struct Shown {
+    std::string name, blocks;
+  };
+  ReportSummary summary;
+  std::vector<Shown> shown;
+  std::size_t size = assets::script.size() + results.size() + diagram.size();
+  for (const StudyRun& run : runs) {
+    const std::vector<fs::path> frames = stored_frames(run.directory);
+    if (frames.empty()) continue;
+    ++summary.stored;
+    FrameEncoder encoder(true);
+    encoder.add(frames.back());
+    encoder.finish();
+    shown.push_back({run.name, run_blocks("run-" + run.name + "-", run.name, run.directory, encoder, true, {})});
+    size += shown.back().blocks.size();
+  }
+  while (static_cast<double>(size) > 1e6 * options.max_mb && !shown.empty()) {
+    const auto largest = std::max_element(shown.begin(), shown.end(),
+                                          [](const Shown& a, const Shown& b) { return a.blocks.size() < b.blocks.size(); });
+    summary.notes.push_back(fmt::format("the mesh of {} is left out, for at most {:g} MB", largest->name, options.max_mb));
+    size -= largest->blocks.size();
+    shown.erase(largest);
+  }
+  std::vector<std::string> names, notes;
+  std::string data = block("study", in_script(results), true);
+  for (const Shown& run : shown) {
+    names.push_back(json_string(run.name));
+    data += run.blocks;
+  }
+  for (const std::string& note : summary.notes) notes.push_back(json_string(note));
+  data += block("study-runs",
+                in_script(fmt::format(R"({{"runs":[{}],"notes":[{}],"colours":[{}]}})", fmt::join(names, ","),
+                                      fmt::join(notes, ","), colours())),
+                true);
+  const std::string html = fill(assets::page, {{"TITLE", escaped(title)},
+                                               {"STYLE", assets::style},
+                                               {"PICTURES", diagram},
+                                               {"DATA", data},
+                                               {"SCRIPT", assets::script}});
+  write_file(file, html);
+  summary.frames = static_cast<int>(shown.size());
   summary.mb = static_cast<double>(html.size()) / 1e6;
   return summary;
 }

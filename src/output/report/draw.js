@@ -87,9 +87,14 @@ class Triangles {
 
 const PARTS = 6;  // into which a curved edge is drawn
 
+// The weights of the last triangle's corners in the facet that it is a part of: lines go on from part to part.
+function weigh(out, ...corners) {
+  corners.forEach((l, c) => l.forEach((w, k) => out.corner[12 * (out.count - 1) + 4 * c + k] = Math.round(255 * w)));
+}
+
 // Adds a facet with curved edges in straight parts; nodes: of the edges opposite of its corners, -1 where straight.
 function addCurved(out, x, v, node, shares, cell) {
-  const p = new Float32Array(3 * (PARTS + 1) * (PARTS + 2) / 2), s = [], index = [];
+  const p = new Float32Array(3 * (PARTS + 1) * (PARTS + 2) / 2), s = [], index = [], all = [];
   let n = 0;
   for (let i = 0; i <= PARTS; ++i) {
     index.push([]);
@@ -115,16 +120,18 @@ function addCurved(out, x, v, node, shares, cell) {
       for (let e = 0; e < 3; ++e) share += weight[e] * shares[e] + (node[e] >= 0 ? ofNode[e] * shares[3 + e] : 0);
       s.push(share);
       index[i].push(n);
+      all.push(l);
     }
   }
   for (let i = 0; i < PARTS; ++i)
     for (let j = 0; j < PARTS - i; ++j) {
-      // Corners: along v1 by i, along v2 by j. The edge opposite of v0 has i + j = PARTS, of v1 i = 0, of v2 j = 0.
       const a = index[i][j], b = index[i + 1][j], c = index[i][j + 1];
-      out.add(p, a, b, c, s[a], s[b], s[c], cell, (i + j === PARTS - 1) | (i === 0) << 1 | (j === 0) << 2, v);
+      out.add(p, a, b, c, s[a], s[b], s[c], cell, 0, v);
+      weigh(out, all[a], all[b], all[c]);
       if (i + j + 1 < PARTS) {
         const d = index[i + 1][j + 1];
         out.add(p, b, d, c, s[b], s[d], s[c], cell, 0, v);
+        weigh(out, all[b], all[d], all[c]);
       }
     }
 }
