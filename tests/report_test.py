@@ -233,6 +233,8 @@ class Report(unittest.TestCase):
         self.assert_drawn(((2.25, 0.25), 0.5))
         self.assertIn("200", self.browser.run("return v.legend.textContent"))
         self.assertIn("elastic energy density [J/m^2]", self.browser.run("return v.legend.textContent"))
+        self.assertEqual(self.browser.run("await v.set({field: 'J', least: null, most: null}); return r.run.meta.ranges.J"), [1, 1])
+        self.assertAlmostEqual(self.browser.run("await v.set({frame: 0, field: 'size'}); return r.run.meta.ranges.size[0]"), 1)
         self.assertEqual(self.browser.errors(), [])
 
     def test_edges_obstacles_and_edits_are_drawn(self):

@@ -161,6 +161,45 @@ std::uint16_t FrameEncoder::code(std::size_t field, double value) {
   return static_cast<std::uint16_t>(std::clamp(std::round(512 * (std::log2(value) + 70)), 0.0, 65535.0));
 }
 
+namespace {
+
+void include(std::array<double, 2>& range, double value) {
+  if (!std::isfinite(value)) return;
+  range[0] = std::min(range[0], value);
+  range[1] = std::max(range[1], value);
+}
+
+/// Dim! times the volume of a simplex with these corners.
+double volume_of(const std::array<std::array<double, 3>, 4>& p, int dim) {
+  std::array<std::array<double, 3>, 3> m{};
+  for (int i = 0; i < dim; ++i)
+    for (int k = 0; k < dim; ++k) m[i][k] = p[i + 1][k] - p[0][k];
+  if (dim == 2) return m[0][0] * m[1][1] - m[0][1] * m[1][0];
+  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
+
+}  // namespace
+
+void FrameEncoder::measure(const StoredFrame& frame, int cell) {
+  std::array<std::array<double, 3>, 4> rest{}, now{};
+  for (int i = 0; i <= dim_; ++i)
+    for (int k = 0; k < dim_; ++k) {
+      const auto at = static_cast<std::size_t>(frame.simplices[static_cast<std::size_t>(cell) * (dim_ + 1) + i]) * dim_ + k;
+      rest[i][k] = frame.rest[at];
+      now[i][k] = frame.x[at];
+    }
+  include(volume_ratios_, volume_of(now, dim_) / volume_of(rest, dim_));
+  double longest = 0;
+  for (int i = 0; i <= dim_; ++i)
+    for (int j = 0; j < i; ++j) {
+      double square = 0;
+      for (int k = 0; k < dim_; ++k) square += (now[i][k] - now[j][k]) * (now[i][k] - now[j][k]);
+      longest = std::max(longest, square);
+    }
+  include(longest_edges_, std::sqrt(longest));
+}
+
 void FrameEncoder::add(const std::filesystem::path& path) {
   const StoredFrame frame = read_frame(path);
   const std::vector<StoredField> fields = read_frame_fields(path);
@@ -224,6 +263,7 @@ void FrameEncoder::add(const std::filesystem::path& path) {
   std::vector<int> cell_id(cells, -1);
   for (int c = 0; c < cells; ++c) {
     if (!keep_cell[c]) continue;
+    measure(frame, c);
     std::vector<int> row(corners);
     for (int k = 0; k < corners; ++k) row[k] = id_of[frame.simplices[c * corners + k]];
     std::vector<std::uint64_t> key = sorted_key(row);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -89,6 +90,9 @@ class FrameEncoder {
   std::string topology(std::string& counts) const;
   const std::vector<double>& largest() const { return largest_; }  ///< by field, those of vertices first
   double largest_u() const { return largest_u_; }
+  /// Over all cells and frames, least and most.
+  const std::array<double, 2>& volume_ratios() const { return volume_ratios_; }
+  const std::array<double, 2>& longest_edges() const { return longest_edges_; }
   std::size_t bytes() const;  ///< of all that is compressed so far, without the topology
 
  private:
@@ -99,6 +103,7 @@ class FrameEncoder {
   };
   void start(const StoredFrame& frame, const std::vector<StoredField>& fields);
   std::uint16_t code(std::size_t field, double value);
+  void measure(const StoredFrame& frame, int cell);
   void flush();
 
   bool with_inside_;
@@ -110,6 +115,7 @@ class FrameEncoder {
   std::vector<FieldName> vertex_fields_, cell_fields_;
   std::vector<double> largest_;
   double largest_u_ = 0;
+  std::array<double, 2> volume_ratios_{INFINITY, -INFINITY}, longest_edges_{INFINITY, -INFINITY};
   std::vector<EncodedFrame> frames_;
   std::vector<EncodedChunk> chunks_;
   std::vector<Pending> pending_;

@@ -55,6 +55,10 @@ std::string json_list(const std::array<double, 3>& values, int n) {
   return fmt::format("[{}]", fmt::join(values.begin(), values.begin() + n, ","));
 }
 
+std::string json_range(const std::array<double, 2>& range) {
+  return range[0] <= range[1] ? fmt::format("[{},{}]", range[0], range[1]) : "[0,0]";
+}
+
 std::string json_fields(const std::vector<FieldName>& fields) {
   std::vector<std::string> items;
   for (const FieldName& field : fields)
@@ -131,11 +135,12 @@ std::string meta(const FrameEncoder& encoder, const std::string& title, const st
   for (const std::string& note : notes) said.push_back(json_string(note));
   return fmt::format(
       R"({{"title":{},"version":{},"dim":{},"origin":{},"low":{},"high":{},"counts":{},"inside":{},"azimuth":{},)"
-      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"largest_u":{},"notes":[{}],"summary":{},)"
+      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"largest_u":{},"ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},)"
       R"("colours":[{}],"chunks":[{}],"frames":[{}]}})",
       json_string(title), json_string(ITR_VERSION), dim, json_list(encoder.origin(), dim), json_list(encoder.low(), dim),
       json_list(encoder.high(), dim), counts, has_inside, kAzimuth, kElevation, json_fields(encoder.vertex_fields()),
-      json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), encoder.largest_u(), fmt::join(said, ","),
+      json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), encoder.largest_u(),
+      json_range(encoder.volume_ratios()), json_range(encoder.longest_edges()), fmt::join(said, ","),
       summary.empty() ? "null" : summary, colours(), fmt::join(chunks, ","), fmt::join(frames, ","));
 }
 

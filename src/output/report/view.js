@@ -156,7 +156,7 @@ class View {
   // Fixed over time: of all frames where the file says it, else of those seen so far.
   rangeOf(field) {
     const {state, run} = this, name = state.field, stored = run.stored.find(f => f.name === name);
-    let range = stored ? [0, stored.shown ?? stored.largest] : field.largest !== undefined ? [0, field.largest] : {u: [0, this.largestU], quality: [0, 1], order: [1, 2]}[name];
+    let range = stored ? [0, stored.shown ?? stored.largest] : field.largest !== undefined ? [0, field.largest] : {u: [0, this.largestU], quality: [0, 1], order: [1, 2], ...run.meta.ranges}[name];
     if (!range) {
       const seen = this.found[name] ??= [Infinity, -Infinity];
       for (const c of this.frame.mesh.cells) {
