@@ -304,6 +304,18 @@ class Report(unittest.TestCase):
         self.assertTrue(self.browser.run("return v.pickAt(...v.project([0.05, 0.02, 0])) === null || v.cutPlane[2] === 1"))
         self.assertEqual(self.browser.errors(), [])
 
+    def test_a_certificate_is_shown_if_asked_for(self):
+        self.report(self.plane, "--certify")
+        self.open(self.plane / "report.html")
+        self.assertIn("3 stored frames, each by itself: no intersection", self.browser.run("return document.querySelector('header').textContent"))
+        folder = self.folder / "inverted"
+        write_frame(folder, 0, 0, SQUARE, [[0, 0], [1, 0], [1, 1], [0.8, 0.2]], [[0, 1, 2], [0, 2, 3]], [1, 1])
+        write_steps(folder, [0])
+        self.report(folder, "--certify")
+        self.open(folder / "report.html")
+        text = self.browser.run("return document.querySelector('.certificate.failed').textContent")
+        self.assertRegex(text, r"1 stored frames, each by itself: \d+ violations.*000000")
+
     def test_curved_edges_are_drawn_curved(self):
         folder = self.folder / "curved"
         rest = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]

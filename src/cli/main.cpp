@@ -148,6 +148,8 @@ int dispatch(int argc, char** argv) {
   output::ReportOptions report_options;
   report_command->add_option("directory", directory, "folder of a run that is finished or not, or of a study")->required();
   report_command->add_option("-o,--output", report_file, "the file (default: report.html in the folder)");
+  report_command->add_flag("--certify", report_options.certify,
+                           "of a run: re-checks all its stored frames, as `itr certify`");
   report_command->add_option("--every", report_options.every, "takes each so many-th of the stored frames")
       ->check(CLI::PositiveNumber);
   report_command

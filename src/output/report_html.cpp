@@ -8,6 +8,7 @@
 #include "deflate.hpp"
 #include "files.hpp"
 #include "itr/core/error.hpp"
+#include "itr/output/certify.hpp"
 #include "itr/output/report.hpp"
 #include "report_assets.hpp"
 #include "report_frames.hpp"
@@ -123,7 +124,7 @@ std::string colours() {
 }
 
 std::string meta(const FrameEncoder& encoder, const std::string& title, const std::string& counts, bool has_inside,
-                 const std::string& summary, const std::vector<std::string>& notes) {
+                 const std::string& summary, const std::vector<std::string>& notes, const std::string& certificate) {
   const int dim = encoder.dim();
   std::vector<std::string> frames, chunks, said;
   for (const EncodedFrame& f : encoder.frames())
@@ -135,13 +136,14 @@ std::string meta(const FrameEncoder& encoder, const std::string& title, const st
   for (const std::string& note : notes) said.push_back(json_string(note));
   return fmt::format(
       R"({{"title":{},"version":{},"dim":{},"origin":{},"low":{},"high":{},"counts":{},"inside":{},"azimuth":{},)"
-      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"largest_u":{},"ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},)"
+      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"largest_u":{},"ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},"certificate":{},)"
       R"("colours":[{}],"chunks":[{}],"frames":[{}]}})",
       json_string(title), json_string(ITR_VERSION), dim, json_list(encoder.origin(), dim), json_list(encoder.low(), dim),
       json_list(encoder.high(), dim), counts, has_inside, kAzimuth, kElevation, json_fields(encoder.vertex_fields()),
       json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), encoder.largest_u(),
       json_range(encoder.volume_ratios()), json_range(encoder.longest_edges()), fmt::join(said, ","),
-      summary.empty() ? "null" : summary, colours(), fmt::join(chunks, ","), fmt::join(frames, ","));
+      summary.empty() ? "null" : summary, certificate.empty() ? "null" : certificate, colours(), fmt::join(chunks, ","),
+      fmt::join(frames, ","));
 }
 
 std::string fill(std::string_view page, const std::vector<std::pair<std::string, std::string_view>>& parts) {
@@ -158,12 +160,23 @@ std::string fill(std::string_view page, const std::vector<std::pair<std::string,
   return out += page.substr(at);
 }
 
+std::string certificate_json(const Certificate& certificate) {
+  constexpr std::size_t kShown = 20;  // a run that went wrong may have as many as it has cells
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < std::min(certificate.violations.size(), kShown); ++i)
+    lines.push_back(json_string(certificate.violations[i]));
+  return fmt::format(R"({{"frames":{},"count":{},"violations":[{}]}})", certificate.frames, certificate.violations.size(),
+                     fmt::join(lines, ","));
+}
+
 /// All that a page holds of a run; ids of its elements begin with `prefix`.
 std::string run_blocks(const std::string& prefix, const std::string& name, const fs::path& directory,
-                       const FrameEncoder& encoder, bool has_inside, const std::vector<std::string>& notes) {
+                       const FrameEncoder& encoder, bool has_inside, const std::vector<std::string>& notes,
+                       const std::string& certificate = {}) {
   std::string counts;
   const std::string topology = encoder.topology(counts), summary = read_text(directory / "summary.json");
-  std::string data = block(prefix + "meta", in_script(meta(encoder, name, counts, has_inside, summary, notes)), true);
+  std::string data =
+      block(prefix + "meta", in_script(meta(encoder, name, counts, has_inside, summary, notes, certificate)), true);
   data += block(prefix + "steps", base64(deflate(step_lines(directory)))) + block(prefix + "topology", base64(topology));
   for (std::size_t i = 0; i < encoder.chunks().size(); ++i)
     data += block(fmt::format("{}chunk{}", prefix, i), base64(encoder.chunks()[i].bytes));
@@ -176,6 +189,7 @@ class Page {
     all_ = stored_frames(directory);
     if (all_.empty())
       throw InputError({directory.string(), "frames", "no stored frame", "the folder of a run, with frames/NNNNNN.h5"});
+    if (options.certify) certificate_ = certificate_json(certify(directory));
   }
 
   /// Leaves out what makes it too large: cells inside first, then frames.
@@ -212,7 +226,7 @@ class Page {
     if (!inside) notes_.push_back(fmt::format("cells inside of solids are left out, for at most {:g} MB", options_.max_mb));
 
     const std::string pngs = pictures(chosen_, encoder), name = fs::canonical(directory_).filename().string();
-    const std::string data = run_blocks("", name, directory_, encoder, inside, notes_);
+    const std::string data = run_blocks("", name, directory_, encoder, inside, notes_, certificate_);
     return fill(assets::page, {{"TITLE", escaped(name)},
                                {"STYLE", assets::style},
                                {"PICTURES", pngs},
@@ -224,6 +238,7 @@ class Page {
 
   fs::path directory_;
   ReportOptions options_;
+  std::string certificate_;  ///< JSON; empty: not asked for
   std::vector<fs::path> all_, chosen_;
   std::vector<std::string> notes_;
   int dim_ = 0;

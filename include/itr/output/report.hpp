@@ -9,8 +9,9 @@
 namespace itr::output {
 
 struct ReportOptions {
-  int every = 1;       ///< of the stored frames, which the page has; the last one it always has
-  double max_mb = 30;  ///< of the file: cells inside of solids are left out first, then frames
+  int every = 1;         ///< of the stored frames, which the page has; the last one it always has
+  double max_mb = 30;    ///< of the file: cells inside of solids are left out first, then frames
+  bool certify = false;  ///< re-checks all stored frames, see certify.hpp, and says so in the page
 };
 
 /// What the file has, and what was left out for its size.

@@ -11,6 +11,14 @@ function describe(run) {
   return parts.join(' · ');
 }
 
+function showCertificate({certificate}) {
+  if (!certificate) return;
+  const good = !certificate.count, head = `${certificate.frames} stored frames, each by itself: `;
+  const text = good ? 'no intersection, nothing inside of a body, no inversion' : `${certificate.count} violations`;
+  const element = html('details', {className: good ? 'certificate' : 'certificate failed'}, html('summary', {}, head + text), ...certificate.violations.map(v => html('div', {}, v)));
+  document.querySelector('header').append(element);
+}
+
 function showPlots(run, onTime) {
   const plots = plotsOf(run).map(p => new Plot(p, onTime));
   document.getElementById('plots').append(...plots.map(p => p.figure));
@@ -26,6 +34,7 @@ function stayWithPictures(error) {
 async function openPage() {
   const run = await new Run().load();
   document.getElementById('said').textContent = describe(run);
+  showCertificate(run.meta);
   document.getElementById('foot').textContent = [...run.meta.notes, `ITR ${run.meta.version}`, 'drag: turn (shift: move), wheel: zoom; keys: space, comma, dot, arrows, + − f e l']
     .join(' · ');
   let view = null, pending = 0;
