@@ -183,6 +183,16 @@ function addSection(out, frame, x, field, share, cut) {
   }
 }
 
+// Six times the volume within closed surfaces.
+function enclosedVolume({place: p, count}) {
+  let sum = 0;
+  for (let i = 0; i < 9 * count; i += 9) {
+    sum += p[i] * (p[i + 4] * p[i + 8] - p[i + 5] * p[i + 7]) - p[i + 1] * (p[i + 3] * p[i + 8] - p[i + 5] * p[i + 6]) +
+      p[i + 2] * (p[i + 3] * p[i + 7] - p[i + 4] * p[i + 6]);
+  }
+  return sum;
+}
+
 const ATTRIBUTES = [['place', 3], ['share', 1], ['corner', 4], ['normal', 3]];
 
 // Whether triangles are drawn by the processor: smooth outlines would take most of its time.
@@ -258,9 +268,11 @@ class Painter {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
-  draw(what, {cut = null, flat = null, edges = 0, lines = false} = {}) {
+  // isClosed: the triangles enclose bodies, their fronts outside.
+  draw(what, {cut = null, flat = null, edges = 0, lines = false, isClosed = false} = {}) {
     const {gl} = this;
     if (!what.count) return;
+    isClosed ? gl.enable(gl.CULL_FACE) : gl.disable(gl.CULL_FACE);
     const {program, at} = this.program(cut && 'CUT', edges > 0 && 'EDGES', flat && 'FLAT');
     gl.useProgram(program);
     gl.uniformMatrix4fv(at.toClip, false, this.toClip);

@@ -130,6 +130,7 @@ class View {
     const share = state.log ? v => v > 0 ? Math.max(Math.log(v / least) / Math.log(most / least), 0) : 0 : v => Math.max((v - least) / (most - least), 0);
     this.cutPlane = this.plane();
     triangles(this.bodies, frame, this.x, field, share, this.cutPlane);
+    this.isOutward ??= this.dim === 3 && enclosedVolume(this.bodies) > 0;  // then the back of facets is never seen
     this.painter.upload(this.buffer, this.bodies);
     this.prepareObstacles();
     this.edits = state.edits ? await this.findEdits() : null;
@@ -257,9 +258,9 @@ class View {
     painter.begin(canvas.width, canvas.height, this.matrix, light);
     if (state.obstacles) {
       painter.draw(this.obstacleBuffer, {flat: [0.88, 0.885, 0.9], edges: state.edges ? 0.25 : 0});
-      painter.draw(this.lineBuffer, {flat: [0.2, 0.22, 0.26], lines: true});
+      if (this.dim === 3) painter.draw(this.lineBuffer, {flat: [0.2, 0.22, 0.26], lines: true});
     }
-    painter.draw(this.buffer, {cut, edges: state.edges ? 0.6 : 0});
+    painter.draw(this.buffer, {cut, edges: state.edges ? 0.6 : 0, isClosed: this.isOutward && !cut});
     this.drawOver();
   }
 
@@ -286,6 +287,17 @@ class View {
     if (this.edits)
       for (const [kind, colour] of EDITS)
         for (const p of this.edits[kind]) dot(p, 3, colour);
+    if (this.dim === 2 && this.state.obstacles) {
+      const [from, to] = this.run.obstacleEdges;
+      context.strokeStyle = '#33383f';
+      context.lineWidth = 1.5;
+      context.beginPath();
+      for (let i = 0; i < from.length; ++i) {
+        context.moveTo(...this.project(this.x.subarray(3 * from[i], 3 * from[i] + 3)).slice(0, 2));
+        context.lineTo(...this.project(this.x.subarray(3 * to[i], 3 * to[i] + 3)).slice(0, 2));
+      }
+      context.stroke();
+    }
     const pick = this.state.pick;
     if (pick && this.isThere(pick)) {
       const [x, y] = this.project([0, 1, 2].map(k => this.x[3 * pick.vertex + k]));
