@@ -50,6 +50,7 @@ WALLS = {
     r"CGAL/": {"geometry"},
     r"(oneapi/)?tbb/": {"core"},
     r"hdf5\.h|H5": {"core"},
+    r"zlib\.h": {"output"},
     r"CLI/|spdlog/": {"cli"},
 }
 

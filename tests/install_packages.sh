@@ -7,7 +7,7 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build
-  libeigen3-dev libtbb-dev libhdf5-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
+  libeigen3-dev libtbb-dev libhdf5-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
   libcgal-dev libgmp-dev libmpfr-dev
   python3 python3-h5py python3-matplotlib python3-numpy
 )
@@ -19,6 +19,7 @@ optional=(
   libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
   gfortran doxygen pkg-config python3-dev pybind11-dev python3-pip
+  chromium chromium-driver
   python3-vtk9 xvfb xauth libgl1-mesa-dri
   python3-pil python3-dolfinx python3-meshio python3-scipy python3-sympy
 )

@@ -622,6 +622,27 @@ class Files(unittest.TestCase):
             itr.Model.from_scene(ROOT / "examples/masticator.json", {"/time/dtt": 0.1})
         self.assertIn("/time/dtt", str(caught.exception))
 
+    def test_records_and_writes_a_page(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            simulation = make_simulation(**REMESH)
+            simulation.write_report(folder / "now.html")
+            self.assertIn('"step":0', (folder / "now.html").read_text())
+            simulation.record(folder / "run", every=2)
+            for _ in range(5):
+                simulation.step()
+            self.assertEqual(simulation.write_report(folder / "run.html"), [])
+            text = (folder / "run.html").read_text()
+            self.assertTrue('"outcome":"finished"' in text)
+            self.assertTrue('"step":4' in text and '"step":3' not in text)
+            self.assertEqual(len(list((folder / "run/frames").glob("*.h5"))), 3)
+            self.assertIn("every 2nd", simulation.write_report(folder / "run.html", every=2)[0])
+            with self.assertRaises(itr.InputError) as caught:
+                make_simulation().record(folder / "run")
+            self.assertIn("results of an earlier run", str(caught.exception))
+            simulation.record(folder / "run", overwrite=True)
+            self.assertEqual(len(list((folder / "run/frames").glob("*.h5"))), 1)
+
     def test_meshio(self):
         try:
             import meshio

@@ -14,6 +14,7 @@
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
 #include "ranks.hpp"
+#include "report.hpp"
 #include "run.hpp"
 #include "scene/node.hpp"
 #include "study/study.hpp"
@@ -135,6 +136,7 @@ int dispatch(int argc, char** argv) {
   bool as_page = false;
   auto* run = app.add_subcommand("run", "simulate a scene");
   add_scene_options(*run, options, sets);
+  run->add_flag("--report", options.report, "at the end, write report.html into the folder: see `itr report`");
   auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing; takes options of run");
   add_scene_options(*explain, options, sets);
   auto* schema = app.add_subcommand("schema", "JSON Schema of scenes");
@@ -142,6 +144,19 @@ int dispatch(int argc, char** argv) {
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
+  auto* report_command =
+      app.add_subcommand("report", "one HTML file that shows a run, or a study: opens in a browser, from the disk");
+  std::string report_file;
+  output::ReportOptions report_options;
+  report_command->add_option("directory", directory, "folder of a run that is finished or not, or of a study")->required();
+  report_command->add_option("-o,--output", report_file, "the file (default: report.html in the folder)");
+  report_command->add_flag("--certify", report_options.certify,
+                           "of a run: re-checks all its stored frames, as `itr certify`");
+  report_command->add_option("--every", report_options.every, "takes each so many-th of the stored frames")
+      ->check(CLI::PositiveNumber);
+  report_command
+      ->add_option("--max-mb", report_options.max_mb, "of the file (default: 30): leaves out cells inside, then frames")
+      ->check(CLI::PositiveNumber);
   auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   study::Options study_options;
   add_study_options(*study, study_options, sets);
@@ -158,6 +173,7 @@ int dispatch(int argc, char** argv) {
     throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
+  if (*report_command) return cli::report(directory, report_file, report_options);
   if (*schema) {
     fmt::print("{}{}", as_page ? scene::reference_page() : scene::json_schema(), as_page ? "" : "\n");
     return cli::done;

@@ -22,6 +22,7 @@
 #include "itr/output/writer.hpp"
 #include "itr/simulation/advice.hpp"
 #include "ranks.hpp"
+#include "report.hpp"
 #include "solver_choice.hpp"
 
 namespace itr::cli {
@@ -153,7 +154,9 @@ class Run {
  public:
   Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
       linear::Registry& registry)
-      : directory_(std::move(directory)), simulation_(std::move(setup), registry, make_logger()) {
+      : directory_(std::move(directory)),
+        with_report_(options.report),
+        simulation_(std::move(setup), registry, make_logger()) {
     for (const auto& warning : find_suspicious(simulation_)) spdlog::warn("warning: {}", warning);
     const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
     if (const auto saved = find_resumable(directory_, options)) {
@@ -182,13 +185,14 @@ class Run {
       outcome = outcome.empty() || outcome == kFinished ? "stopped at " + of_output : outcome + "; and at " + of_output;
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
-    if (outcome == kFinished) {
+    const bool is_finished = outcome == kFinished;
+    if (is_finished)
       fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
-      if (const int reverted = writer_->totals().reverted_remeshes; reverted > 0)
-        spdlog::warn("{} times all of a step's remeshing was dropped, as the state on the new mesh failed: see the warnings",
-                     reverted);
-      return done;
-    }
+    if (const int reverted = writer_->totals().reverted_remeshes; is_finished && reverted > 0)
+      spdlog::warn("{} times all of a step's remeshing was dropped, as the state on the new mesh failed: see the warnings",
+                   reverted);
+    if (with_report_) report(directory_, "", {});
+    if (is_finished) return done;
     fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
     return simulation_stopped;
   }
@@ -293,6 +297,7 @@ class Run {
   }
 
   std::string directory_;
+  bool with_report_;
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
   double output_seconds_ = 0;

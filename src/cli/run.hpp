@@ -20,6 +20,7 @@ struct RunOptions {
   bool resume = false;         ///< go on from the newest saved state of the folder, if there is one
   bool allow_changes = false;  ///< then also with another solver, other tolerances, step cuts
   bool overwrite = false;      ///< replace what the folder has
+  bool report = false;         ///< at the end, finished or not, the folder gets report.html
 };
 
 enum ExitStatus { done = 0, bad_input = 2, simulation_stopped = 3, certificate_failed = 4 };

@@ -353,6 +353,21 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   return frame;
 }
 
+std::vector<StoredField> read_frame_fields(const std::filesystem::path& path) {
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(path);
+  std::vector<std::string> names = {"v", "elastic_density"};
+  names.insert(names.end(), std::begin(kAskedFields), std::end(kAskedFields));
+  std::vector<StoredField> fields;
+  for (const std::string& name : names) {
+    const std::string set = "/fields/" + name;
+    if (!file.contains(set)) continue;
+    hdf5::Table<double> table = file.read_doubles(set);
+    fields.push_back({name, file.read_text_attribute(set, "unit"), table.columns, std::move(table.values)});
+  }
+  return fields;
+}
+
 #define ITR_INSTANTIATE(Dim)                                                                                   \
   template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, Durability, \
                                  const FrameExtra&);                                                           \

@@ -90,4 +90,14 @@ std::vector<std::string> find_damage(const std::filesystem::path& path);
 /// Throws InputError where the file is unreadable, inconsistent, or what is read is not as it was written.
 StoredFrame read_frame(const std::filesystem::path& path);
 
+/// A dataset of /fields.
+struct StoredField {
+  std::string name, unit;
+  int columns = 0;             ///< 0: a plain vector
+  std::vector<double> values;  ///< row-major
+};
+
+/// Those of v, elastic_density and kAskedFields that the frame has.
+std::vector<StoredField> read_frame_fields(const std::filesystem::path& path);
+
 }  // namespace itr::output

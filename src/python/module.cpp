@@ -11,7 +11,10 @@
 #include <filesystem>
 
 #include "embed/c_callbacks.hpp"
+#include "itr/core/parallel.hpp"
 #include "itr/itr.hpp"
+#include "itr/output/report.hpp"
+#include "itr/output/writer.hpp"
 
 namespace py = pybind11;
 
@@ -208,6 +211,57 @@ void set_follower_forces(AnySimulation& s, const py::object& forces, const py::o
       std::move(blocks));
 }
 
+/// Writes steps into a folder as the command does.
+class Recorder {
+ public:
+  Recorder(AnySimulation& simulation, std::filesystem::path directory, int every, bool overwrite) : directory_(directory) {
+    if (every < 1) throw itr::InputError({"", "every", std::to_string(every), "a number > 0"});
+    if (!overwrite && itr::output::has_results(directory))
+      throw itr::InputError(
+          {directory.string(), "folder", "results of an earlier run", "another folder, or overwrite=True"});
+    with(simulation, [&](auto& s) {
+      const itr::output::RunInfo info{"a program", s.solver_name(), itr::num_threads()};
+      writer_ = std::make_unique<itr::output::Writer>(directory_, itr::OutputOptions{every}, info);
+      write(s, s.initial_report());
+    });
+  }
+  void add(AnySimulation& simulation) {
+    with(simulation, [&](auto& s) { write(s, simulation.report()); });
+  }
+  /// Indexes and sums are as of now.
+  void finish(AnySimulation& simulation) {
+    with(simulation, [&](auto& s) {
+      const std::string outcome = simulation.finished() ? "finished" : "recorded so far";
+      writer_->finish(outcome, s.solver_name_in_use());
+    });
+  }
+  std::string directory() const { return directory_.string(); }
+
+ private:
+  template <typename F>
+  static void with(AnySimulation& simulation, const F& f) {
+    simulation.dimension() == 2 ? f(simulation.as<2>()) : f(simulation.as<3>());
+  }
+  template <typename Simulation>
+  void write(Simulation& s, const itr::StepReport& report) {
+    s.observe([&](const auto& frame) { writer_->write(frame, report); });
+  }
+
+  std::filesystem::path directory_;
+  std::unique_ptr<itr::output::Writer> writer_;
+};
+
+void add_recorder(py::module_& m) {
+  py::class_<Recorder>(m, "Recorder")
+      .def(py::init<AnySimulation&, std::string, int, bool>())
+      .def("add", &Recorder::add)
+      .def("finish", &Recorder::finish)
+      .def_property_readonly("directory", &Recorder::directory);
+  m.def("write_report", [](const std::string& directory, const std::string& file, int every, double max_mb) {
+    return itr::output::write_report(directory, file, {every, max_mb}).notes;
+  });
+}
+
 void add_simulation(py::module_& m) {
   py::class_<Saved>(m, "Saved");
   py::class_<AnySimulation>(m, "Simulation")
@@ -318,4 +372,5 @@ PYBIND11_MODULE(_itr, m) {
   py::register_exception<itr::InputError>(m, "InputError", PyExc_ValueError);
   add_model(m);
   add_simulation(m);
+  add_recorder(m);
 }

@@ -14,6 +14,7 @@ array, which index, what was found and what was expected.
 
 from __future__ import annotations
 
+import tempfile
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, Optional, Sequence, Union
 
 import numpy as np
@@ -171,12 +172,15 @@ class Simulation:
         self._simulation = _itr.Simulation(model._model, log)
         self._functions: dict[tuple, Callable[[float], None]] = {}
         self._kept = {"laws": list(model._kept)}  # what compiled functions live in
+        self._recorder: Optional[_itr.Recorder] = None
 
     # Steps.
 
     def step(self, dt: Optional[float] = None) -> dict:
         """One step of the length dt [s], else as the one before or as the options say. Returns `report`. Raises StepFailed."""
         self._do(self._simulation.step, dt)
+        if self._recorder:
+            self._recorder.add(self._simulation)
         return self.report
 
     def adapt(self, dt: Optional[float] = None) -> None:
@@ -384,7 +388,26 @@ class Simulation:
         return self._simulation.save()
 
     def restore(self, saved: Saved) -> None:
+        self._recorder = None
         self._simulation.restore(saved)
+
+    # Files.
+
+    def record(self, folder: str, every: int = 1, overwrite: bool = False) -> None:
+        """Stores this state and from now on each `every`-th step in `folder`, as `itr run` does: for `write_report`, ParaView and
+        `itr certify`. A restored state ends it."""
+        self._recorder = None
+        self._recorder = _itr.Recorder(self._simulation, str(folder), every, overwrite)
+
+    def write_report(self, file: str, every: int = 1, max_mb: float = 30) -> list[str]:
+        """One HTML file that shows what `record` has stored, else the present state, in a browser; `every` and `max_mb` as of
+        `itr report`. Returns what was left out for the size, as sentences."""
+        if self._recorder:
+            self._recorder.finish(self._simulation)
+            return _itr.write_report(self._recorder.directory, str(file), every, max_mb)
+        with tempfile.TemporaryDirectory() as folder:
+            _itr.Recorder(self._simulation, folder, 1, False).finish(self._simulation)
+            return _itr.write_report(folder, str(file), every, max_mb)
 
     # Events; None: nobody listens.
 

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Opens what the file holds: a run with its plots, or a study.
+'use strict';
+
+function describe(run) {
+  const {meta} = run, last = run.steps[run.steps.length - 1], s = meta.summary, parts = [];
+  if (s) parts.push(`${s.scene}: ${s.outcome}`, `solver ${s.solver}`);
+  else parts.push('not finished');
+  if (last) parts.push(`${last.step} steps to t = ${shortNumber(last.t)} s`);
+  if (s) parts.push(`${shortNumber(s.seconds.total)} s`);
+  return parts.join(' · ');
+}
+
+function showCertificate({certificate}) {
+  if (!certificate) return;
+  const good = !certificate.count, head = `${certificate.frames} stored frames, each by itself: `;
+  const text = good ? 'no intersection, nothing inside of a body, no inversion' : `${certificate.count} violations`;
+  const element = html('details', {className: good ? 'certificate' : 'certificate failed'}, html('summary', {}, head + text), ...certificate.violations.map(v => html('div', {}, v)));
+  document.querySelector('header').append(element);
+}
+
+function showPlots(run, onTime) {
+  const plots = plotsOf(run).map(p => new Plot(p, onTime));
+  document.getElementById('plots').append(...plots.map(p => p.figure));
+  return plots;
+}
+
+// What fails is said on the page, and pictures stay.
+function stayWithPictures(error) {
+  document.body.classList.remove('with-view');
+  document.getElementById('why').textContent = `Pictures only, as there is no 3D drawing here (${error.message}).`;
+}
+
+async function openPage() {
+  const run = await new Run().load();
+  document.getElementById('said').textContent = describe(run);
+  showCertificate(run.meta);
+  document.getElementById('foot').textContent = [...run.meta.notes, `ITR ${run.meta.version}`, 'drag: turn (shift: move), wheel: zoom; keys: space, comma, dot, arrows, + − f e l']
+    .join(' · ');
+  let view = null, pending = 0;
+  const report = {run, plots: [], view: null};
+  const showTime = () => report.plots.forEach(p => p.show(run.frames[view ? view.state.frame : run.frames.length - 1].t));
+  report.plots = showPlots(run, t => {
+    if (!view) return report.plots.forEach(p => p.show(t));
+    const frame = nearest(run.frames.map(f => f.t), t);
+    if (frame !== view.state.frame) view.set({frame});
+  });
+  try {
+    if (new URLSearchParams(location.search).has('pictures')) throw new Error('pictures asked for');
+    const remember = () => {
+      pending = 0;
+      try {
+        history.replaceState(null, '', view.toHash());
+      } catch {  // some browsers do not allow that for files
+      }
+    };
+    view = report.view = new View(run, {onChange: () => {
+      showTime();
+      if (!pending) pending = setTimeout(remember, 300);
+    }});
+    document.getElementById('main').append(view.root);
+    document.body.classList.add('with-view');
+    view.resize();
+    await view.fromHash(location.hash);
+    addEventListener('hashchange', () => location.hash !== view.toHash() && view.fromHash(location.hash));
+  } catch (error) {
+    view = report.view = null;
+    document.getElementById('main').replaceChildren();
+    stayWithPictures(error);
+  }
+  showTime();
+  return report;
+}
+
+window.itrReport = (document.getElementById('study') ? openStudy() : openPage()).catch(error => (stayWithPictures(error), {failed: error}));

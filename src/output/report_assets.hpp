@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+// The files of src/output/report, which CMake puts into the library.
+#pragma once
+
+#include <string_view>
+
+namespace itr::output::assets {
+
+extern const std::string_view page;    ///< page.html: where `{{NAME}}` stands, something is put in
+extern const std::string_view style;   ///< style.css
+extern const std::string_view script;  ///< all scripts, one after another
+
+}  // namespace itr::output::assets
