@@ -12,7 +12,7 @@ import subprocess
 import sys
 import unittest
 
-SOURCE = pathlib.Path(sys.argv.pop(1))
+SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
 README_WORDS = 700
 PICTURE_BYTES = 150_000
 
