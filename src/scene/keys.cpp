@@ -327,7 +327,7 @@ constexpr Key kKeys[] = {
     {"/space/remesh/local_relaxation/max_nl_iterations", read, "count", "1", "",
      "Newton iterations of a trial before it is judged"},
 
-    {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/<name of the scene>", basic},
+    {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/ and the name of the scene", basic},
     {"/output/checkpoint_period", read, "non_negative", "30", "s",
      "between states that --resume can go on from; 0: all frames"},
     {"/output/paraview/skip_frame", read, "count", "1", "", "store every n-th step", basic},
