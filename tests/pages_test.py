@@ -5,6 +5,7 @@
 usage: pages_test.py SOURCE_DIR [UNITTEST_ARGUMENT]...
 """
 
+import csv
 import json
 import pathlib
 import re
@@ -98,6 +99,32 @@ class Readme(unittest.TestCase):
         for language in ["cpp", "python"]:
             [block] = blocks("README.md", language)
             self.assertLessEqual(len(block.splitlines()), 10, language)
+
+
+class Quotes(unittest.TestCase):
+    """Figures in prose are those of the stored results."""
+
+    def test_ratios_to_the_reference(self):
+        scenes = ["cantilever", "masticator h=0.1", "ball-wall 2D to t=0.0024", "ball-wall 3D to t=0.00132", "masticator 3D to t=1.1",
+                  "twisting-beam to t=0.2, tolerance 10"]
+        rows = [[cell.strip() for cell in line.strip("|").split("|")]
+                for line in (SOURCE / "verification/paper/README.md").read_text().splitlines() if line.startswith("| ")]
+        found = {row[0]: row for row in rows if row[0] in scenes and len(row) > 5}
+        self.assertEqual(set(found), set(scenes))
+        ratios = [int(row[4]) for row in found.values()]
+        for page in ["FAQ.md", "verification/README.md"]:
+            self.assertIn(f"{min(ratios)} to {max(ratios)} times as fast", (SOURCE / page).read_text())
+        text = (SOURCE / "FAQ.md").read_text()
+        for name in ["masticator h=0.1", "ball-wall 3D to t=0.00132"]:
+            self.assertIn(f"{1000 * float(found[name][2]):.0f} ms", text)
+
+    def test_cook_with_quadratic_elements(self):
+        with open(SOURCE / "verification/paper/cantilever/study.csv", newline="") as file:
+            [linear] = [row for row in csv.DictReader(file) if row["run"] == "uniform-3"]
+        exact = float(re.search(r"STORED_ENERGY = ([-\d.]+)", (SOURCE / "verification/cases/cook.py").read_text())[1])
+        text = (SOURCE / "README.md").read_text()
+        self.assertIn(f"need {float(linear['unknowns']):,.0f} for".replace(",", " "), text)
+        self.assertIn(f"for {(float(linear['potential']) - exact) / 1000:.0f} kJ", text)
 
 
 class Refusals(unittest.TestCase):
