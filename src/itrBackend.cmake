@@ -9,7 +9,8 @@ function(itr_add_backend name)
   endif()
   set_target_properties(${target} PROPERTIES PREFIX "" CXX_VISIBILITY_PRESET hidden
     LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/itr/backends)
-  install(TARGETS ${target} LIBRARY DESTINATION ${ITR_BACKEND_DIR})
+  install(TARGETS ${target} LIBRARY DESTINATION ${ITR_BACKEND_DIR} COMPONENT backends)
+  set_property(GLOBAL APPEND PROPERTY ITR_SOLVER_MODULES ${target})
   message(STATUS "solver module ${name}: will be built")
 endfunction()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pages of the public headers come without a warning, and in those that a program begins with (itr.h, embed/) every function and
+"""The site of pages and public headers comes without a warning and can be searched, and in those that a program begins with (itr.h, embed/) every function and
 type says what it is; fields are described by their struct.
 
 usage: doc_test.py DOXYGEN SOURCE_DIR DOXYFILE
@@ -26,6 +26,11 @@ def main():
         failures = complaints(doxygen, settings)
         if not list(pathlib.Path(folder).glob("html/itr_8h.html")):
             failures.append("no page of itr.h")
+        for page in ["TUTORIAL", "SCENES", "EMBEDDING"]:
+            if not list(pathlib.Path(folder).glob(f"html/md*{page}.html")):
+                failures.append(f"no page of {page}.md")
+        if not list(pathlib.Path(folder).glob("html/search/*.js")):
+            failures.append("the site cannot be searched")
         strict = f"INPUT = {first}\nEXTRACT_ALL = NO\nWARN_IF_UNDOCUMENTED = YES\nUSE_MDFILE_AS_MAINPAGE =\n"
         strict += "GENERATE_HTML = NO\nGENERATE_XML = YES\n"
         failures += [line for line in complaints(doxygen, settings + strict) if "(variable)" not in line]

@@ -41,7 +41,7 @@ OPTIONS = {
     "remesh/options.hpp",
     "time/options.hpp",
 }
-EXTRA = {"scene": OPTIONS | {"simulation/setup.hpp"}, "embed": {"itr.h"}}
+EXTRA = {"scene": OPTIONS | {"simulation/setup.hpp", "simulation/unsupported.hpp"}, "embed": {"itr.h"}}
 SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp"}
 
 # Third-party header -> the modules that may know it.

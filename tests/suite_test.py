@@ -196,21 +196,26 @@ class Report(unittest.TestCase):
         old, new = run(Result("x", 0.0, 1.0)), run(Result("x", 0.0, 1.0))
         old["versions"], new["versions"] = {"itr": "aaaa111"}, {"itr": "bbbb222", "numpy": "1.24"}
         text = self.page(old=old, new=new, older=run(Result("x", 0.0, 1.0)))
-        old_row, new_row, _ = (line for line in text.splitlines() if "| passed |" in line)
+        old_row, new_row, _ = (line for line in text.splitlines() if " passed | 0 | 1 |" in line)
         self.assertIn("aaaa111 | 7 |", old_row)
         self.assertIn("bbbb222 | unknown |", new_row)
         self.assertIn("Run with itr bbbb222, numpy 1.24.", text)
 
     def test_the_first_page_names_all_that_failed(self):
         text = self.page(fine=run(Result("x", 0.0, 1.0)), bad=run(Result("y", 2.0, 1.0), Result("z", 0.0, 1.0)))
-        first = text[:text.index("What was verified")]
-        self.assertIn("2 cases hold 3 results", first)
-        self.assertIn("2 are within", first)
-        self.assertIn("Never run in full: waves.", first)
-        self.assertIn("| bad | y | 2, at most 1 |", first)
-        self.assertIn("| hard | sliver | does not finish |", first)
-        self.assertNotIn("fine", first)
-        self.assertIn("| hard | Hard cases | hard.md | **FAILED** | 1/2 | dddd444 | 3 |", text)
+        first, _, rest = text.partition("## What failed")
+        failed = rest[:rest.index("\n## ")]
+        self.assertIn("2 cases: 2 of 3 results are within their tolerances", first)
+        self.assertIn("1 of 2 rows pass", first)
+        self.assertIn("never run in full: waves.", first)
+        self.assertIn("| hard: Hard cases | hard.md | 1/2 **FAILED** |  |  | dddd444 | 3 |", first)
+        self.assertIn("| bad | y | 2, at most 1 |", failed)
+        self.assertIn("| hard | sliver | does not finish |", failed)
+        self.assertNotIn("fine", failed)
+
+    def test_the_first_table_shows_the_result_nearest_to_its_bar(self):
+        text = self.page(some=run(Result("far", 0.5, 100.0), Result("near", 0.09, 0.1), Result("shown", 7.0, None)))
+        self.assertIn("| 2/2 passed | 0.09 | 0.1 |", text)
 
     def test_the_page_has_its_pictures_in_it(self):
         with tempfile.TemporaryDirectory() as folder:

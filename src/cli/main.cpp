@@ -13,6 +13,7 @@
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
+#include "itr_commit.hpp"
 #include "ranks.hpp"
 #include "report.hpp"
 #include "run.hpp"
@@ -129,7 +130,8 @@ void add_study_options(CLI::App& app, study::Options& options, std::vector<std::
 int dispatch(int argc, char** argv) {
   CLI::App app("In-Timestep Remeshing for contacting elastodynamics");
   app.require_subcommand(1);
-  app.set_version_flag("--version", ITR_VERSION);
+  const std::string commit = ITR_COMMIT;
+  app.set_version_flag("--version", ITR_VERSION + (commit.empty() ? "" : " (" + commit + ")"));
   cli::RunOptions options;
   std::vector<std::string> sets;
   std::string directory;

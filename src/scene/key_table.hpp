@@ -20,6 +20,12 @@ enum class Role {
   refused     ///< changes results, not built
 };
 
+/// Who needs a key.
+enum class Level {
+  expert,  ///< who knows why
+  basic    ///< a first scene of one's own
+};
+
 /// A row. New keys come with their reader and a test; after that `itr schema --markdown > SCENES.md`.
 struct Key {
   const char* pointer;  ///< `*` stands for the elements of a list, `{a,b}` for either
@@ -28,8 +34,16 @@ struct Key {
   const char* fallback;  ///< JSON of the default, or words in parentheses; empty: none
   const char* unit;
   const char* meaning;
+  Level level = Level::expert;
 };
 std::span<const Key> keys();
+
+/// Values of keys that are read, known and refused.
+struct RefusedValue {
+  const char* pointer;
+  const char* values;
+};
+std::span<const RefusedValue> refused_values();
 
 /// What a value may be: as the reader checks it and as the schema says it.
 struct Kind {

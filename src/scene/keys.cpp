@@ -7,10 +7,11 @@ namespace itr::scene {
 namespace {
 
 using enum Role;
+using enum Level;
 
-constexpr const char* kPolyfem = "PolyFEM's; changes no result here";
-constexpr const char* kScheme = "how PolyFEM searches; changes no converged result";
-constexpr const char* kUnwritten = "PolyFEM's output, which is not written here";
+constexpr const char* kPolyfem = "an option of PolyFEM that changes no result here";
+constexpr const char* kScheme = "an option of PolyFEM's solvers that changes no converged result";
+constexpr const char* kUnwritten = "output of PolyFEM that is not written here";
 
 // Of what stands in several places.
 #define SELECTION "/geometry/*/{volume,surface,point}_selection/*"
@@ -27,32 +28,33 @@ constexpr Key kKeys[] = {
     {"/input/data/state", only, "", "\"\"", "", "`itr run --resume` goes on from a folder's saved state"},
     {"/input/data/{reorder,u_path}", ignored, "", "", "", kPolyfem},
 
-    {"/geometry", read, "list", "", "", "bodies and obstacles, in this order; required"},
+    {"/geometry", read, "list", "", "", "bodies and obstacles, in this order; required", basic},
     {"/geometry/*", read, "", "", "", "one mesh file and what is made of it"},
     {"/geometry/*/mesh", read, "path", "", "",
-     "mesh file: .msh (Gmsh 2.2 or 4.1), .obj or .ply; relative to the scene's folder; required"},
+     "mesh file: .msh (Gmsh 2.2 or 4.1), .obj or .ply; relative to the scene's folder; required", basic},
     {"/geometry/*/type", read, "mesh|mesh_array|plane|ground|mesh_sequence", "\"mesh\"", "",
      "mesh_array makes copies; plane, ground and mesh_sequence are not supported yet"},
     {"/geometry/*/enabled", read, "boolean", "true", "", "false: as if the entry were not there, its file is not opened"},
     {"/geometry/*/is_obstacle", read, "boolean", "false", "",
-     "only collides: it has no material and no unknowns, stands still or moves as prescribed"},
+     "only collides: it has no material and no unknowns, stands still or moves as prescribed", basic},
     {"/geometry/*/extract", read, "volume|surface|edges|points", "\"volume\"", "",
      "of an obstacle: what of it collides; bodies are volumes"},
     {"/geometry/*/n_refs", read, "natural", "0", "",
-     "uniform refinements: each takes 4 times the elements in 2D, 8 times in 3D"},
+     "uniform refinements: each takes 4 times the elements in 2D, 8 times in 3D", basic},
     {"/geometry/*/unit", only, "", "\"\"", "", "meshes are in metres; transformation/scale converts"},
     {"/geometry/*/{curve_selection,height,point,normal,fps,mesh_sequence}", refused, "", "", "", "not supported yet"},
     {"/geometry/*/array/offset", read, "number", "", "m", "distance between copies; required with mesh_array"},
     {"/geometry/*/array/size", read, "counts", "", "", "copies along each axis; required with mesh_array"},
     {"/geometry/*/array/relative", read, "boolean", "false", "", "offset is in extents of the mesh"},
-    {"/geometry/*/transformation/scale", read, "number or numbers", "1", "", "first: about the origin, one or one an axis"},
+    {"/geometry/*/transformation/scale", read, "number or numbers", "1", "", "first: about the origin, one or one an axis",
+     basic},
     {"/geometry/*/transformation/dimensions", read, "number or numbers", "", "m",
      "a list scales to these extents instead of `scale`; a number has no effect"},
     {"/geometry/*/transformation/rotation", read, "number or numbers", "", "deg",
-     "second: about the origin; 2D: one angle, counter-clockwise; 3D: as rotation_mode says"},
+     "second: about the origin; 2D: one angle, counter-clockwise; 3D: as rotation_mode says", basic},
     {"/geometry/*/transformation/rotation_mode", read, "string", "\"xyz\"", "",
      "order of rotations about axes (angles are listed by axis), or axis_angle, quaternion (x, y, z, w), rotation_vector"},
-    {"/geometry/*/transformation/translation", read, "numbers", "", "m", "third"},
+    {"/geometry/*/transformation/translation", read, "numbers", "", "m", "third", basic},
     {"/geometry/*/advanced/normalize_mesh", read, "boolean", "false", "",
      "before all that: moves and scales the mesh into the unit box"},
     {"/geometry/*/advanced/refinement_location", read, "number", "0.5", "",
@@ -61,15 +63,17 @@ constexpr Key kKeys[] = {
     {"/geometry/*/advanced/min_component", only, "", "-1", "", "all components are kept"},
     {"/geometry/*/{volume,surface,point}_selection", read, "list", "", "",
      "ids of cells (which material), of boundary facets (which condition; for an obstacle one id), of boundary vertices "
-     "(held by conditions): a number for all, or rules, of which the first that matches wins"},
+     "(held by conditions): a number for all, or rules, of which the first that matches wins",
+     basic},
     {"/geometry/*/{volume,surface,point}_selection/*", read, "id", "", "", "id of all, or a rule with an id and a region"},
     {SELECTION "/id", read, "id", "", "",
-     "given to what the region contains: barycentres of cells and facets, positions of vertices; no condition acts on id 0"},
+     "given to what the region contains: barycentres of cells and facets, positions of vertices; no condition acts on id 0",
+     basic},
     {SELECTION "/id_offset", read, "integer", "0", "",
      "alone: added to ids of the file; with threshold: added to the side's number"},
     {SELECTION "/threshold", read, "number", "", "m",
-     "sides of the mesh's box, nearer than this: left 1, bottom 2, right 3, top 4, back 5, front 6, the rest 7"},
-    {SELECTION "/box", read, "points", "", "m", "region: [[lowest corner], [highest]]"},
+     "sides of the mesh's box, nearer than this: left 1, bottom 2, right 3, top 4, back 5, front 6, the rest 7", basic},
+    {SELECTION "/box", read, "points", "", "m", "region: [[lowest corner], [highest]]", basic},
     {SELECTION "/center", read, "numbers", "", "m", "region: sphere, with radius"},
     {SELECTION "/radius", read, "non_negative", "", "m", "of the sphere or cylinder"},
     {SELECTION "/{p1,p2}", read, "numbers", "", "m", "region: cylinder between two points, with radius"},
@@ -85,39 +89,39 @@ constexpr Key kKeys[] = {
     {SELECTION "/file", refused, "", "", "", "not supported yet"},
 
     {"/materials", read, "list", "", "",
-     "of the bodies; an object instead of a list is for everything, whatever its id; required"},
+     "of the bodies; an object instead of a list is for everything, whatever its id; required", basic},
     {"/materials/*", read, "", "", "", "one material"},
     {"/materials/*/type", read,
      "NeoHookean|LinearElasticity|HookeLinearElasticity|SaintVenant|FixedCorotational|MooneyRivlin|MooneyRivlin3Param", "",
-     "", "the law, see CONVENTIONS.md; required"},
-    {"/materials/*/id", read, "id or ids", "0", "", "of cells, as volume_selection or the mesh file gives them"},
-    {"/materials/*/E", read, "number or expression", "", "Pa", "Young's modulus, > 0"},
-    {"/materials/*/nu", read, "number or expression", "", "", "Poisson's ratio, in (-1, 0.5)"},
+     "", "the law, see CONVENTIONS.md; required", basic},
+    {"/materials/*/id", read, "id or ids", "0", "", "of cells, as volume_selection or the mesh file gives them", basic},
+    {"/materials/*/E", read, "number or expression", "", "Pa", "Young's modulus, > 0", basic},
+    {"/materials/*/nu", read, "number or expression", "", "", "Poisson's ratio, in (-1, 0.5)", basic},
     {"/materials/*/{lambda,mu}", read, "number or expression", "", "Pa", "Lame's parameters, both, instead of E and nu"},
     {"/materials/*/rho", read, "number or expression", "1", "kg/m^3",
-     "density; 2D: kg/m^2, that is for a thickness of 1 m; a warning where it is absent and matters"},
+     "density; 2D: kg/m^2, that is for a thickness of 1 m; a warning where it is absent and matters", basic},
     {"/materials/*/plane_strain", read, "boolean", "false", "", "2D: plane strain; false: plane stress"},
     {"/materials/*/{c1,c2,c3,d1,k}", read, "number", "", "Pa", "of the Mooney-Rivlin laws"},
     {"/materials/*/{phi,psi}", only, "", "0", "", "viscous damping of materials; see /solver/rayleigh_damping"},
     {"/materials/*/{elasticity_tensor,alphas,mus,Ds,models}", refused, "", "", "", "not supported yet"},
 
     {"/boundary_conditions/rhs", read, "vector", "[]", "m/s^2",
-     "pushes in the NEGATIVE direction, as in PolyFEM: gravity that pulls down y is [0, 9.81]"},
+     "pushes in the NEGATIVE direction, as in PolyFEM: gravity that pulls down y is [0, 9.81]", basic},
     {"/boundary_conditions/{pressure_cavity,normal_aligned_neumann_boundary,normal_aligned_dirichlet_boundary}", only, "",
      "[]", "", "not supported yet"},
-    {"/boundary_conditions/dirichlet_boundary", read, "list", "[]", "", "prescribed displacements"},
-    {"/boundary_conditions/neumann_boundary", read, "list", "[]", "", "tractions, by rest area"},
+    {"/boundary_conditions/dirichlet_boundary", read, "list", "[]", "", "prescribed displacements", basic},
+    {"/boundary_conditions/neumann_boundary", read, "list", "[]", "", "tractions, by rest area", basic},
     {"/boundary_conditions/pressure_boundary", read, "list", "[]", "",
      "pressures on the deformed surface, positive against the outward normal"},
-    {"/boundary_conditions/obstacle_displacements", read, "list", "[]", "", "motion of obstacles"},
+    {"/boundary_conditions/obstacle_displacements", read, "list", "[]", "", "motion of obstacles", basic},
     {CONDITIONS "/*", read, "", "", "", "one condition; of several with one id the first wins"},
-    {CONDITIONS "/*/id", read, "id or all", "", "", "of surface_selection or point_selection, or \"all\""},
+    {CONDITIONS "/*/id", read, "id or all", "", "", "of surface_selection or point_selection, or \"all\"", basic},
     {"/boundary_conditions/{dirichlet_boundary,obstacle_displacements}/*/value", read, "vector", "", "m",
-     "displacement from rest at time t (not an increment)"},
-    {"/boundary_conditions/neumann_boundary/*/value", read, "vector", "", "N/m^2", "2D: N/m, for a thickness of 1 m"},
+     "displacement from rest at time t (not an increment)", basic},
+    {"/boundary_conditions/neumann_boundary/*/value", read, "vector", "", "N/m^2", "2D: N/m, for a thickness of 1 m", basic},
     {"/boundary_conditions/pressure_boundary/*/value", read, "number or expression", "", "N/m^2", "2D: N/m"},
     {"/boundary_conditions/dirichlet_boundary/*/dimension", read, "booleans", "(all true)", "",
-     "which components are prescribed: [true, false] is a roller"},
+     "which components are prescribed: [true, false] is a roller", basic},
     {CONDITIONS "/*/interpolation", read, "list", "[]", "",
      "factors of time g(t), one or one a component, that the value is multiplied by"},
     {INTERPOLATION "/type", read, "none|linear|linear_ramp|piecewise_constant|piecewise_linear|piecewise_cubic", "", "",
@@ -129,7 +133,7 @@ constexpr Key kKeys[] = {
     {INTERPOLATION "/extend", read, "constant|extrapolate|repeat|repeat_offset", "\"constant\"", "",
      "before the first and after the last"},
     {"/initial_conditions/{solution,velocity}", read, "list", "[]", "",
-     "displacement [m] or velocity [m/s] of bodies at t0; 0 where nothing is said"},
+     "displacement [m] or velocity [m/s] of bodies at t0; 0 where nothing is said", basic},
     {"/initial_conditions/acceleration", read, "list", "[]", "m/s^2",
      "for Newmark; \"consistent\": that which the forces at the start give"},
     {"/initial_conditions/{solution,velocity}/*", read, "", "", "", "one body"},
@@ -137,13 +141,13 @@ constexpr Key kKeys[] = {
     {"/initial_conditions/{solution,velocity,acceleration}/*/id", read, "id", "", "", "of the body's cells; required"},
     {"/initial_conditions/{solution,velocity,acceleration}/*/value", read, "vector", "", "", "of rest position"},
 
-    {"/time", read, "", "(absent: one static solve)", "", "two of tend, dt and time_steps"},
+    {"/time", read, "", "(absent: one static solve)", "", "two of tend, dt and time_steps", basic},
     {"/time/t0", read, "number", "0", "s", "where time begins"},
-    {"/time/tend", read, "number", "", "s", "where it ends; a warning where it is no multiple of dt"},
-    {"/time/dt", read, "positive", "", "s", "step; half of it costs twice the steps, which converge faster"},
+    {"/time/tend", read, "number", "", "s", "where it ends; a warning where it is no multiple of dt", basic},
+    {"/time/dt", read, "positive", "", "s", "step; half of it costs twice the steps, which converge faster", basic},
     {"/time/time_steps", read, "count", "", "", "number of steps"},
     {"/time/integrator", read, "ImplicitEuler|ImplicitNewmark|BDF|BDF1|BDF2|BDF3|BDF4|BDF5|BDF6", "\"ImplicitEuler\"", "",
-     "implicit Euler damps motion faster than a step, BDF2 much less, Newmark not at all; or an object with type"},
+     "implicit Euler damps motion faster than a step, BDF2 much less, Newmark not at all; or an object with type", basic},
     {"/time/integrator/type", read, "ImplicitEuler|ImplicitNewmark|BDF|BDF1|BDF2|BDF3|BDF4|BDF5|BDF6", "", "",
      "as above; required"},
     {"/time/integrator/steps", read, "count", "1", "", "order of BDF, 1 to 6"},
@@ -151,20 +155,22 @@ constexpr Key kKeys[] = {
     {"/time/integrator/gamma", read, "positive", "0.5", "", "of Newmark"},
     {"/time/integrator/energy_growth_limit", read, "positive", "0.05", "",
      "of Newmark: a step that would create more than this part of the energy is taken by implicit Euler"},
-    {"/time/quasistatic", read, "boolean", "false", "", "no inertia: each step is an equilibrium"},
+    {"/time/quasistatic", read, "boolean", "false", "", "no inertia: each step is an equilibrium", basic},
     {"/time/step_cuts", read, "natural", "0", "",
      "a step whose solve fails is cut in half, so many times over, at most 20; 0: the run stops"},
 
     {"/contact/enabled", read, "boolean", "false", "",
-     "contact between all surfaces, of one body too; without it bodies pass through each other"},
+     "contact between all surfaces, of one body too; without it bodies pass through each other", basic},
     {"/contact/dhat", read, "positive", "0.001", "m",
      "distance below which surfaces push each other; unless given, at most dhat_percentage of the shortest surface edge; "
-     "smaller: nearer to hard contact, more Newton iterations"},
+     "smaller: nearer to hard contact, more Newton iterations",
+     basic},
     {"/contact/dhat_percentage", read, "positive", "0.8", "", "see dhat"},
     {"/contact/epsv", read, "positive", "0.001", "m/s", "sliding slower than this is smoothed to sticking"},
-    {"/contact/friction_coefficient", read, "non_negative", "0", "", "Coulomb's, of all pairs; 0: no friction is computed"},
+    {"/contact/friction_coefficient", read, "non_negative", "0", "", "Coulomb's, of all pairs; 0: no friction is computed",
+     basic},
     {"/contact/use_convergent_formulation", read, "boolean", "false", "",
-     "weights pairs by area, so that barrier_stiffness is a pressure and results converge with the mesh"},
+     "weights pairs by area, so that barrier_stiffness is a pressure and results converge with the mesh", basic},
     {"/contact/{use_area_weighting,use_improved_max_operator,use_physical_barrier}", only, "", "true", "",
      "parts of the convergent formulation"},
     {"/contact/collision_mesh", read, "", "", "", "another surface touches in place of the boundary; not with remeshing"},
@@ -185,7 +191,7 @@ constexpr Key kKeys[] = {
     {"/solver/rayleigh_damping/*/lagging_iterations", read, "count", "1", "", "rounds in which the Hessian is taken anew"},
 
     {"/solver/linear/solver", read, "names", "\"eigen\"", "",
-     "`itr solvers` lists them; of a list the first that is there; PolyFEM's names are understood; --solver wins"},
+     "`itr solvers` lists them; of a list the first that is there; PolyFEM's names are understood; --solver wins", basic},
     {"/solver/linear/fallback", read, "names", "[]", "", "solvers that take over where that one fails"},
     {"/solver/linear/reuse_factors", read, "boolean", "true", "",
      "the last factor preconditions conjugate gradients on the systems after it, where that is cheaper by count"},
@@ -267,13 +273,14 @@ constexpr Key kKeys[] = {
     {"/space/discr_order", read, "order", "1", "",
      "1: linear elements, 2: quadratic ones (curved edges); or a list by body, [{\"id\": 2, \"order\": 2}], bodies that are "
      "not "
-     "listed are linear. An edge has the least order of the cells at it; 2 not with remeshing yet"},
+     "listed are linear. An edge has the least order of the cells at it; 2 not with remeshing yet",
+     basic},
     {"/space/advanced/quadrature_order", read, "integer", "-1", "",
      "degree of elasticity's quadrature on quadratic elements, 1 to 5; -1: 2, and the mass' is exact"},
     {"/space/advanced/bc_method", only, "", "\"sample\"", "", "conditions hold at the vertices"},
     {"/space/advanced/{mass_quadrature_order,n_boundary_samples}", only, "", "-1", "", "exact"},
 
-    {"/space/remesh/enabled", read, "boolean", "false", "", "in-timestep remeshing"},
+    {"/space/remesh/enabled", read, "boolean", "false", "", "in-timestep remeshing", basic},
     {"/space/remesh/type", read, "physics|sizing_field", "\"physics\"", "",
      "what decides about splits and collapses: energies, or lengths of edges, the baseline that the paper compares with "
      "(CONVENTIONS.md)"},
@@ -287,12 +294,14 @@ constexpr Key kKeys[] = {
      "what an operation is charged for forgetting of the past: what the new mesh cannot represent, or nothing (the paper)"},
     {"/space/remesh/relative_tolerance", read, "positive", "1e-4", "",
      "chooses split and collapse tolerances where split/acceptance_tolerance is not given: this part of the energy that the "
-     "scene can store (CONVENTIONS.md); `itr run` and `itr explain` print them"},
+     "scene can store (CONVENTIONS.md); `itr run` and `itr explain` print them",
+     basic},
     {"/space/remesh/split/enabled", read, "boolean", "true", "", ""},
     {"/space/remesh/split/acceptance_tolerance", read, "positive", "(relative_tolerance chooses)", "J",
      "least decrease of energy by a split, 2D: for a thickness of 1 m; smaller: more vertices, smaller error; time goes "
      "with "
-     "the vertices"},
+     "the vertices",
+     basic},
     {"/space/remesh/split/culling_threshold", read, "share", "0.95", "",
      "with energy-percentile: edges below this share of the energies are not split"},
     {"/space/remesh/split/max_depth", read, "natural", "3", "", "generations of one edge a step"},
@@ -325,17 +334,17 @@ constexpr Key kKeys[] = {
     {"/space/remesh/local_relaxation/max_nl_iterations", read, "count", "1", "",
      "Newton iterations of a trial before it is judged"},
 
-    {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/<name of the scene>"},
+    {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/ and the name of the scene", basic},
     {"/output/checkpoint_period", read, "non_negative", "30", "s",
      "between states that --resume can go on from; 0: all frames"},
-    {"/output/paraview/skip_frame", read, "count", "1", "", "store every n-th step"},
-    {"/output/paraview/options/contact_forces", read, "boolean", "false", "N", "frames get /fields/contact_force"},
+    {"/output/paraview/skip_frame", read, "count", "1", "", "store every n-th step", basic},
+    {"/output/paraview/options/contact_forces", read, "boolean", "false", "N", "frames get /fields/contact_force", basic},
     {"/output/paraview/options/friction_forces", read, "boolean", "false", "N", "/fields/friction_force"},
     {"/output/paraview/options/reaction_forces", read, "boolean", "false", "N",
-     "/fields/reaction_force: of what holds a vertex in its prescribed directions"},
-    {"/output/paraview/options/scalar_values", read, "boolean", "false", "Pa", "/fields/von_mises, a cell"},
+     "/fields/reaction_force: of what holds a vertex in its prescribed directions", basic},
+    {"/output/paraview/options/scalar_values", read, "boolean", "false", "Pa", "/fields/von_mises, a cell", basic},
     {"/output/paraview/options/tensor_values", read, "boolean", "false", "Pa",
-     "/fields/stress, Cauchy's, a cell, row by row"},
+     "/fields/stress, Cauchy's, a cell, row by row", basic},
     {"/output/paraview/options/kinetic_energy", read, "boolean", "false", "J", "/totals/kinetic_energy"},
     {"/output/paraview/options/momentum", read, "boolean", "false", "kg m/s", "/totals/momentum"},
     {"/output/paraview/options/{velocity,body_ids}", ignored, "", "", "", "frames always have /fields/v and /mesh/body"},
@@ -357,6 +366,11 @@ constexpr Key kKeys[] = {
     {"/output/reference/{solution,gradient}", ignored, "", "", "", kPolyfem},
 };
 
+constexpr RefusedValue kRefusedValues[] = {
+    {"/geometry/*/type", "plane, ground, mesh_sequence"},
+    {"/space/discr_order", "3 and above"},
+};
+
 #undef SELECTION
 #undef CONDITIONS
 #undef INTERPOLATION
@@ -364,5 +378,7 @@ constexpr Key kKeys[] = {
 }  // namespace
 
 std::span<const Key> keys() { return kKeys; }
+
+std::span<const RefusedValue> refused_values() { return kRefusedValues; }
 
 }  // namespace itr::scene

@@ -4,6 +4,7 @@
 
 #include "itr/scene/scene.hpp"
 #include "key_table.hpp"
+#include "simulation/unsupported.hpp"
 
 namespace itr::scene {
 
@@ -71,6 +72,7 @@ std::string row(const Key& key) {
   std::string names, fallback = key.fallback;
   for (const std::string& name : expand(pointer.substr(parent.size() + 1)))
     names += (names.empty() ? "`" : ", `") + name + "`";
+  if (key.level == Level::basic) names = "**" + names + "**";
   if (!fallback.empty() && fallback[0] != '(') fallback = "`" + fallback + "`";
   return "| " + names + " | " + in_cell(kind_of(key).words) + " | " + in_cell(fallback) + " | " + key.unit + " | " +
          in_cell(key.meaning) + " |\n";
@@ -106,20 +108,47 @@ std::string list_of_others(Role role) {
   return text;
 }
 
+/// Where a first scene begins: the basic keys with their whole pointers.
+std::string table_of_basic_keys() {
+  std::string text =
+      "\n## Basic keys\n\nA first scene needs no others. The tables below have them in bold.\n\n"
+      "| key | unit | meaning |\n|---|---|---|\n";
+  for (const Key& key : keys())
+    if (key.level == Level::basic)
+      text += "| `" + std::string(key.pointer) + "` | " + key.unit + " | " + in_cell(key.meaning) + " |\n";
+  return text;
+}
+
+/// What is refused: combinations, values, keys.
+std::string section_of_refusals() {
+  std::string text =
+      "\n## Not there yet\n\nA scene that asks for one of these is refused with a message before anything is computed. "
+      "Nothing is ignored silently.\n\n### Combinations\n\n";
+  for (const auto& [place, words] : unsupported_combinations()) text += "- `" + std::string(place) + "`: " + words + "\n";
+  text += "\n### Values\n\n";
+  for (const auto& [pointer, values] : refused_values()) text += "- `" + std::string(pointer) + "`: " + values + "\n";
+  return text + "\n### Keys with one value\n\nAnother value than this one is an error.\n\n" + list_of_others(Role::only) +
+         "\n### Keys\n\nTheir presence is an error.\n\n" + list_of_others(Role::refused);
+}
+
 constexpr const char* kIntroduction = R"(# Scenes: all keys
 
-Made by `itr schema --markdown` from the table that scenes are checked against; a test holds this page against it.
-`itr schema` is the same as JSON Schema, for editors. CONVENTIONS.md says what signs, dimensions, laws and tolerances mean,
-examples/README.md has a scene for each of some tasks.
+A scene is a JSON file in PolyFEM's format. This page is made by `itr schema --markdown` from the table of keys that the reader
+checks scenes against. `itr schema` prints the same as JSON Schema, for editors. [TUTORIAL.md](TUTORIAL.md) builds a first scene,
+[CONVENTIONS.md](CONVENTIONS.md) says what signs, dimensions, laws and tolerances mean, and
+[examples/README.md](examples/README.md) has scenes to start from.
 
-Scenes are JSON in PolyFEM's format. `*` stands for the elements of a list, where one that stands alone is a list of one;
-`{a,b}` for either. A key that is not here is an error, with the nearest that is.
+- `*` stands for the elements of a list. A list of one element may be written as that element alone.
+- `{a,b}` stands for either.
+- A key that is not on this page is an error. The message names the nearest key that exists.
+- An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^` and the functions that
+  [CONVENTIONS.md](CONVENTIONS.md#expressions) lists.
 
-A file may build on another: `"common": "base.json"` takes that file's keys, the file's own ones merged over them (objects key by
-key, lists as a whole, `null` removes); then `"patch"` is applied, a list of JSON Patch operations. Paths are relative to
-`root_path`, by default the folder of the file that is run. `--set /json/pointer=VALUE` acts after that.
+A file may build on another one. `"common": "base.json"` takes the keys of that file and merges the file's own keys over them:
+objects key by key, lists as a whole, and `null` removes a key. Then `"patch"` is applied, a list of JSON Patch operations. Then
+`--set /json/pointer=VALUE` acts. Paths are relative to `root_path`, by default the folder of the file that is run.
 
-An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^`, and the functions that CONVENTIONS.md lists.
+Jump to: [basic keys](#basic-keys), [not there yet](#not-there-yet), [not written](#not-written), [without effect](#without-effect).
 )";
 
 }  // namespace
@@ -137,11 +166,10 @@ std::string json_schema() {
 }
 
 std::string reference_page() {
-  return std::string(kIntroduction) + tables_of_what_is_read() +
-         "\n## With one value\n\nKnown, and an error where they have another value than this.\n\n" +
-         list_of_others(Role::only) + "\n## Not supported\n\nKnown, and an error.\n\n" + list_of_others(Role::refused) +
-         "\n## Not written\n\nA warning where it is asked for.\n\n" + list_of_others(Role::unwritten) +
-         "\n## Without effect\n\nKnown, and passed over.\n\n" + list_of_others(Role::ignored);
+  return std::string(kIntroduction) + table_of_basic_keys() + tables_of_what_is_read() + section_of_refusals() +
+         "\n## Not written\n\nOutput of PolyFEM. A scene that asks for it gets a warning.\n\n" +
+         list_of_others(Role::unwritten) + "\n## Without effect\n\nKnown to PolyFEM, and passed over here.\n\n" +
+         list_of_others(Role::ignored);
 }
 
 }  // namespace itr::scene

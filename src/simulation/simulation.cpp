@@ -16,6 +16,7 @@
 #include "itr/mesh/validate.hpp"
 #include "itr/simulation/invariants.hpp"
 #include "itr/simulation/step.hpp"
+#include "unsupported.hpp"
 
 namespace itr {
 
@@ -26,24 +27,6 @@ std::string describe(const Vec<Dim>& p) {
   std::string text = "(";
   for (int c = 0; c < Dim; ++c) text += (c ? ", " : "") + std::to_string(p[c]);
   return text + ")";
-}
-
-template <int Dim>
-void refuse_unsupported(const Setup<Dim>& setup) {
-  const auto refuse = [](const char* place, const std::string& found) {
-    throw InputError({"", place, found, "something that this version supports"});
-  };
-  if (setup.remesh.enabled && setup.proxy)
-    refuse("/contact/collision_mesh", "a collision mesh where the bodies' mesh changes");
-  if (const bool is_quadratic =
-          std::any_of(setup.order.begin(), setup.order.end(), [](const auto& e) { return e.second == 2; });
-      is_quadratic) {
-    if (setup.remesh.enabled) refuse("/space/remesh/enabled", "remeshing of quadratic elements");
-    if (!setup.terms.empty() || setup.follower.forces) refuse("terms", "terms of a program's own on quadratic elements");
-  }
-  for (const auto& [body, material] : setup.materials)
-    if (setup.remesh.enabled && material.density_at)
-      refuse("/materials", "a density that varies in space (id " + std::to_string(body) + ") where the mesh changes");
 }
 
 /// Where no surfaces cross: what is wholly inside of a body.

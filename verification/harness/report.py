@@ -56,41 +56,58 @@ def failures(entries, overview):
             yield [table["what"], what, why]
 
 
+def worst(entry):
+    """Error and tolerance of the judged result that comes nearest to its tolerance, or beyond it."""
+    numbers = [(result["error"], result["tolerance"]) for result in entry["results"]
+               if result["passed"] is not None and all(isinstance(result[key], (int, float)) for key in ("error", "tolerance"))]
+    return max((pair for pair in numbers if pair[1] > 0), key=lambda pair: pair[0] / pair[1], default=(None, None))
+
+
+def rounded(value):
+    return "" if value is None else f"{value:.2g}"
+
+
 def summary_rows(entries, overview):
     ages = {what.rpartition(" ")[2]: changes for what, _, changes in overview["ages"] if what.startswith("verification/report/")}
     for name, entry in entries.items():
-        status = "**FAILED**" if entry["status"] == "failed" else entry["status"]
-        yield [name, entry.get("title", ""), entry.get("reference", ""), status, counts(entry), run_of(entry), age(ages.get(name))]
+        status = "**FAILED**" if entry["status"] == "failed" else f"{counts(entry)} {entry['status']}"
+        yield [f"{name}: {entry.get('title', '')}", entry.get("reference", ""), status, *map(rounded, worst(entry)),
+               run_of(entry), age(ages.get(name))]
     for table in overview["tables"]:
         made = [(commit, changes) for what, commit, changes in overview["ages"] if what in table["files"]]
         oldest = max((changes for _, changes in made if changes is not None), default=None)
         commits = sorted({commit for commit, _ in made})
         shown = ", ".join(commits) if len(commits) <= 3 else f"{len(commits)} commits"
-        status = "**FAILED**" if table["failures"] else "passed"
-        yield [table["what"], table["title"], table["page"], status, f"{table['passed']}/{table['judged']}", shown, age(oldest)]
+        status = f"{table['passed']}/{table['judged']} " + ("**FAILED**" if table["failures"] else "passed")
+        yield [f"{table['what']}: {table['title']}", table["page"], status, "", "", shown, age(oldest)]
 
 
-SUMMARY_HEADER = ["what", "", "held against, or its page", "status", "results", "run", "commits to its code since"]
+SUMMARY_HEADER = ["case", "against", "results", "worst error", "its bar", "run", "commits since"]
+MESSAGE = 200  # characters of a failure that the first page shows
+
+
+def shortened(text):
+    """The first part of a message; the page of its case has all of it."""
+    first = text.split("; ")[0]
+    return first if len(first) <= MESSAGE else first[:MESSAGE].rsplit(" ", 1)[0] + " ..."
 
 
 def page_one(entries, overview):
     """What was verified, what failed, how old it is."""
     judged = [result["passed"] for entry in entries.values() for result in entry["results"] if result["passed"] is not None]
-    failed = list(failures(entries, overview))
-    yield "p", (f"As of commit {overview['commit']}, {overview['date']}. {len(entries)} cases hold {len(judged)} results against FEniCSx, "
-                f"closed forms, published benchmarks and peers: {sum(judged)} are within their tolerances. "
-                f"{sum(t['passed'] for t in overview['tables'])} of {sum(t['judged'] for t in overview['tables'])} rows of the tables "
-                "beside them pass. The last column counts commits to the code that a result depends on since it was made: results are "
-                "only as good as that number is small.")
+    rows, good = (sum(table[key] for table in overview["tables"]) for key in ("judged", "passed"))
+    yield "p", (f"As of commit {overview['commit']}, {overview['date']}. {len(entries)} cases: {sum(judged)} of {len(judged)} results are "
+                f"within their tolerances. {len(overview['tables'])} tables beside them: {good} of {rows} rows pass.")
+    yield "table", (SUMMARY_HEADER, list(summary_rows(entries, overview)))
+    yield "p", ("The worst error is that of the judged result which comes nearest to its bar. The last column counts commits, since the "
+                "run, to the code that a result depends on. The smaller it is, the more the result says about the present code.")
     if missing := overview["never_run"]:
-        yield "p", f"Never run in full: {', '.join(missing)}."
+        yield "p", f"Cases that were never run in full: {', '.join(missing)}."
     yield "h2", "What failed"
-    if failed:
-        yield "table", (["what", "which", "how"], failed)
+    if failed := list(failures(entries, overview)):
+        yield "table", (["case", "which", "how"], [[what, which, shortened(how)] for what, which, how in failed])
     else:
         yield "p", "Nothing."
-    yield "h2", "What was verified, and how old it is"
-    yield "table", (SUMMARY_HEADER, list(summary_rows(entries, overview)))
 
 
 def blocks(entries, overview):

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A simulation of either dimension that a host program advances: the facade over Simulation<2> and Simulation<3>, which
-// stay reachable for what needs types (terms, materials).
+// A simulation whose dimension is chosen at run time, advanced by a host program. It wraps Simulation<2> or Simulation<3>,
+// which stay reachable for features that need the type.
 #pragma once
 
 #include <functional>
@@ -18,8 +18,8 @@ namespace itr {
 /// Writes `dimension` numbers (a scalar: one) for the rest position X [m] and the time t [s].
 using HostFunction = std::function<void(const double* X, double t, double* value)>;
 
-/// What a term of the program's own is a sum over: the whole mesh, or the patch around an edit, which numbers its vertices
-/// itself. Valid during a call.
+/// The part of the mesh over which a term sums: the whole mesh, or the patch around an operation of the remesher. A patch
+/// has its own vertex numbers. Valid during a call.
 struct HostPart {
   int dimension;
   std::span<const double> X;                ///< rest positions [m]; obstacles' vertices come last
@@ -28,87 +28,96 @@ struct HostPart {
   double t;                                 ///< end of the step [s]
 };
 
-/// An energy E(x) of the program's own, its gradient and Hessian, at positions x [m] as long as part.X: a sum over cells,
-/// facets or points at rest positions, not over vertex numbers. All three are needed; several threads may call them.
+/// An energy E(x) of the program with gradient and Hessian, at positions x [m] of the same size as part.X. It must be a sum
+/// over cells, facets or points at rest positions, because vertex numbers change. Several threads may call the functions.
 struct HostTerm {
-  std::function<double(const HostPart& part, ConstVectorView x)> energy;  ///< [J]; not a number: not defined there
+  std::function<double(const HostPart& part, ConstVectorView x)> energy;  ///< [J]; NaN where it is not defined
   std::function<void(const HostPart& part, ConstVectorView x, VectorView gradient)> add_gradient;  ///< [N]
-  /// Symmetric blocks [N/m]; the library projects them where it needs to.
+  /// Passes symmetric blocks [N/m] to `add`. The library projects them to semi-definite ones where it needs to.
   std::function<void(const HostPart& part, ConstVectorView x, const StiffnessReceiver& add)> add_hessian;
 };
 
-/// What MeshChange says, for a program that does not know the dimension at compile time.
+/// MeshChange for a program that does not know the dimension at compile time.
 struct AnyMeshChange {
   std::vector<int> vertex, cell, facet, facet_parent;
   Eigen::SparseMatrix<double, Eigen::RowMajor> interpolation;
-  /// project_fields: rows by old vertex in, by new vertex out; integrals are kept. Throws InputError once the listener's
-  /// call has ended.
+  /// L2 projection, which keeps integrals: takes a row for each old vertex, returns a row for each new one. Throws
+  /// InputError once the listener's call has ended.
   std::function<MatrixX(const MatrixX& fields)> project;
 };
 
-/// Everything between steps is done by the thread that steps. Two objects do not disturb each other. Spans are valid until
-/// the next call that changes the simulation. A name that is not known is an InputError that lists the known ones. What a
-/// step calls may read and save the state, which is that before the step, and change nothing (see Simulation).
+/// A simulation that a program advances step by step. One thread uses it at a time; different objects are independent.
+/// Spans are valid until a call changes the simulation. An unknown name throws an InputError that lists the known ones.
+/// A callback may read and save the state, which is that before the step, and must change nothing (see Simulation).
+///
+///     itr::AnySimulation simulation(itr::Model::from_scene("scene.json"));
+///     while (!simulation.finished() && simulation.step().ok) use(simulation.positions());
 class AnySimulation {
  public:
-  /// Copies the model. Throws InputError for what cannot be simulated. `registry` has the linear solvers; null: those that
-  /// the library finds.
+  /// Copies the model. Throws InputError if the model cannot be simulated. `registry` holds the linear solvers; null means
+  /// those that the library finds.
   explicit AnySimulation(const Model& model, Logger logger = {}, std::shared_ptr<linear::Registry> registry = nullptr);
   ~AnySimulation();
-  AnySimulation(AnySimulation&&) noexcept;  ///< what is moved from can only be destroyed
+  AnySimulation(AnySimulation&&) noexcept;  ///< a moved-from object may only be destroyed
 
   int dimension() const;  ///< 2 or 3
-  /// The simulation below. Throws std::bad_variant_access for the other dimension.
+  /// The wrapped simulation. Throws std::bad_variant_access for the other dimension.
   template <int Dim>
   Simulation<Dim>& as();
 
   // Steps.
 
-  /// One of the length dt [s] (0: as the step before, or as the options say). Where it is not ok the state is as before.
+  /// Takes one step of length dt [s]. With dt = 0 the length is that of the step before, or the one in the options. If the
+  /// result is not ok, the state is as before the step.
   StepResult step(double dt = 0);
-  /// Finds the mesh of the next step and stays at its start, on that mesh: before sub-iterations on a frozen one.
+  /// Finds the mesh of the next step and stays at the start of that step, on the new mesh. Sub-iterations on a frozen mesh
+  /// begin with it.
   StepResult adapt(double dt);
-  double step_length() const;                        ///< dt of the next step unless step() says another one [s]
+  double step_length() const;                        ///< dt of the next step() without argument [s]
   double time() const;                               ///< [s]
-  int steps() const;                                 ///< done
-  bool finished() const;                             ///< as many as the options ask for
+  int steps() const;                                 ///< number of steps taken
+  bool finished() const;                             ///< whether all steps of the options are taken
   const StepReport& report() const;                  ///< see Simulation::report
   const std::vector<std::string>& warnings() const;  ///< of the model's options
 
-  // What acts from the next step on. Arrays of nodal values are by vertex of the present mesh, or by node, and are functions
-  // of rest position from then on: linear on its cells, or quadratic along curved edges.
+  // Conditions, from the next step on. An array has values at the vertices of the present mesh, or at all nodes. It is taken
+  // as a function of rest position, linear on the present cells or quadratic along curved edges, so that it survives
+  // remeshing.
 
-  /// Prescribes displacements [m] of the components for which `mask` (dimension flags) is not 0; all 0: releases.
+  /// Prescribes displacements [m] of the components whose flag in `mask` is not 0. If all flags are 0, the boundary is
+  /// released.
   void fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement);
   void fix(const std::string& boundary, std::span<const int> mask, std::span<const double> displacements);  ///< the same
-  /// Force by rest area [N/m^2] (2D: length [N/m]). Null: none.
+  /// Sets the force by rest area [N/m^2], in 2D by rest length [N/m]. Null removes it.
   void set_traction(const std::string& boundary, HostFunction traction);
   void set_traction(const std::string& boundary, std::span<const double> tractions);  ///< dimension numbers a vertex
-  /// Along inward normals as they are then, the same unit. Null: none.
+  /// Sets the pressure against the deformed surface [N/m^2], in 2D [N/m]. Null removes it.
   void set_pressure(const std::string& boundary, HostFunction pressure);
   void set_pressure(const std::string& boundary, std::span<const double> pressures);  ///< a number a vertex
-  void set_acceleration(HostFunction acceleration);              ///< body force by mass [m/s^2]; null: none
+  void set_acceleration(HostFunction acceleration);              ///< body force by mass [m/s^2]; null removes it
   void set_acceleration(std::span<const double> accelerations);  ///< dimension numbers a vertex
-  /// Displacement of an obstacle from rest [m].
+  /// Moves an obstacle by a displacement from rest [m].
   void move_obstacle(const std::string& obstacle, HostFunction displacement);
-  /// Its vertices' positions at the end of the next steps [m]: dimension numbers each, in the order of add_obstacle.
+  /// Moves the vertices of an obstacle to positions at the end of the next steps [m], in the order of add_obstacle.
   void move_obstacle(const std::string& obstacle, std::span<const double> positions);
-  /// Dead forces [N] on the nodes, `dimension` each; they stay where they act however the mesh changes. Empty: none.
+  /// Sets dead forces [N] on the nodes, `dimension` numbers each. They keep acting on the same points of the body when
+  /// the mesh changes. An empty span removes them.
   void set_forces(std::span<const double> forces);
-  /// Forces of present positions: adds to f [N] for vertices at rest positions X and positions x [m]; `stiffness`, if it is
-  /// there, gives blocks of -df/dx. The mesh may be a new one within a step: lengths say so.
+  /// Adds forces that depend on present positions to f [N], for vertices at rest positions X and positions x [m]. The
+  /// vectors' sizes change when the mesh does, also within a step.
   using ForceFunction = std::function<void(ConstVectorView X, ConstVectorView x, double t, VectorView f)>;
-  /// Gives blocks of -df/dx [N/m].
+  /// Passes blocks of -df/dx [N/m] to `add`.
   using StiffnessFunction =
       std::function<void(ConstVectorView X, ConstVectorView x, double t, const StiffnessReceiver& add)>;
-  /// Null: none. Refused with curved edges.
+  /// Sets forces that depend on present positions. Null removes them. With their stiffness a step takes fewer rounds.
+  /// Throws InputError if the mesh has curved edges.
   void set_follower_forces(ForceFunction forces, StiffnessFunction stiffness = nullptr);
-  /// Adds a term to the incremental potential, or puts it in the place of the one of this name. All null: it goes. Refused
-  /// with curved edges.
+  /// Adds a term to the incremental potential, or replaces the one of this name. A term of null functions is removed.
+  /// Throws InputError if the mesh has curved edges.
   void set_term(const std::string& name, HostTerm term);
-  /// Of the bodies' nodes [m/s]; for a start, or a state that the program has from elsewhere.
+  /// Sets the velocities of the bodies' nodes [m/s], for a start or for a state from elsewhere.
   void set_velocities(std::span<const double> velocities);
-  void freeze_mesh(bool frozen);  ///< no remeshing while it is; no effect where the options do not ask for it
+  void freeze_mesh(bool frozen);  ///< stops remeshing while true
 
   // The state.
 
@@ -126,26 +135,26 @@ class AnySimulation {
   std::vector<int> facets() const;                 ///< of the boundary: dimension vertices each, outward
   std::vector<int> facet_boundaries() const;       ///< ids of Model::add_boundary; -1: none
   std::vector<double> obstacle_positions() const;  ///< of all obstacles, one after the other [m]
-  /// Asks for forces, which then are there after each step: their cost is that of some gradients a step.
+  /// Turns the computation of forces after each step on or off. It costs a few gradients a step.
   void watch_forces(bool watched);
-  const NodalForces& forces() const;  ///< dimension numbers a node [N]; empty where they are not watched
-  /// Force [N] and moment about a point [N m] (2D: one number) of all forces on boundaries, see itr::resultant. Forces have
-  /// to be watched.
+  const NodalForces& forces() const;  ///< dimension numbers a node [N]; empty unless watched
+  /// Sum of all forces on boundaries [N] and its moment about a point [N m], see itr::resultant. Forces must be watched.
   struct Resultants {
     std::vector<double> force, moment;  ///< dimension numbers; one in 2D, three in 3D
   };
-  /// On several boundaries together.
+  /// The resultant on several boundaries together.
   Resultants resultant(std::span<const std::string> boundaries, std::span<const double> about) const;
   Resultants resultant(const std::string& boundary) const;  ///< about the origin
   std::vector<double> elastic_density() const;              ///< by cell, of rest volume [J/m^Dim]
 
-  /// See Snapshot.
+  /// A saved state, see Snapshot.
   using Saved = std::variant<Snapshot<2>, Snapshot<3>>;
-  Saved save() const;  ///< cheap, see Simulation::save
-  /// Throws InputError for one of another simulation.
+  Saved save() const;  ///< costs almost nothing, see Simulation::save
+  /// Goes back to a saved state. Throws InputError for a state of another simulation.
   void restore(const Saved& saved);
 
-  // Events; null: nobody listens. What they throw comes out of step(), which then did nothing or (mesh change) was done.
+  // Events. Null removes a listener. An exception of a listener leaves step(): the step is undone, except after a change of
+  // the mesh, when it is done.
 
   void on_iteration(std::function<bool(const NewtonProgress&)> listener);   ///< false cancels the step
   void on_mesh_change(std::function<void(const AnyMeshChange&)> listener);  ///< after a step that changed the mesh

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a program simulates, in plain arrays, with the dimension chosen at run time.
+// The description of a problem in plain arrays. The dimension is chosen at run time.
 #pragma once
 
 #include <functional>
@@ -15,45 +15,45 @@
 
 namespace itr {
 
-/// A description: a value that simulations are made from, and that they copy. Arrays are interleaved, positions in metres,
-/// vertices are numbered from 0. Errors are InputErrors that name the array, the index, what was found and what was
-/// expected.
+/// The description of a problem, from which simulations are made by copy. Arrays are interleaved, positions are in metres,
+/// vertices are numbered from 0. Wrong arguments throw an InputError, which names the array, the index, what was found and
+/// what was expected.
 class Model {
  public:
-  /// 2 or 3.
+  /// An empty model of dimension 2 or 3.
   explicit Model(int dimension);
-  /// Bodies, obstacles and options of a scene file; its surfaces are boundaries of the names "1", "2", ...: their ids.
+  /// Reads bodies, obstacles and options of a scene file. Its surfaces become boundaries named by their ids: "1", "2", ...
   static Model from_scene(const std::string& file, const std::vector<scene::Override>& overrides = {});
 
-  /// Keys of a scene file but for `geometry` and `output`, as JSON: an object that is merged into what was given before.
-  /// Materials by body; boundaries and obstacles have as `id` the number that their add function returns.
+  /// Merges a JSON object with keys of a scene, other than `geometry` and `output`, into the options. Materials refer to
+  /// bodies by `id`. Conditions refer to boundaries and obstacles by the id that their add function returns.
   void set_options(const std::string& json);
-  /// One of them: a JSON pointer and JSON text. Of a scene that was read, any key: it is read again.
+  /// Sets one key by its JSON pointer and JSON text. A scene that was read is read again, so any key may be set.
   void set_option(const std::string& pointer, const std::string& value);
 
-  /// `vertices`: dimension numbers each; `cells`: dimension + 1 vertices each, positive volume; `bodies`: one id a cell,
-  /// empty: all are body 0.
+  /// Sets the mesh: `dimension` numbers a vertex [m], dimension + 1 vertices a cell, cells of positive volume, and one body
+  /// id a cell. Without ids all cells belong to body 0.
   void set_mesh(std::span<const double> vertices, std::span<const int> cells, std::span<const int> bodies = {});
 
-  /// The same of cells with a node at the middle of each edge, which then are curved: in 2D 6 nodes a cell, the edges 01,
-  /// 12, 20, in 3D 10, the edges 01, 12, 20, 03, 13, 23 (as of VTK and meshio). Vertices keep their order; nodes at rest off
-  /// the middle of their edge are refused. Sets the option /space/discr_order to 2.
+  /// The same for quadratic cells, which have a node at the middle of each edge: 6 nodes in 2D (edges 01, 12, 20), 10 in 3D
+  /// (01, 12, 20, 03, 13, 23), as in VTK and meshio. Vertices keep their order. Throws InputError for a node off the middle
+  /// of its edge. Sets the option /space/discr_order to 2.
   void set_quadratic_mesh(std::span<const double> nodes, std::span<const int> cells, std::span<const int> bodies = {});
 
-  /// Names facets of the mesh's boundary: dimension vertices each, in any order. Returns its id. A facet is part of one
-  /// boundary only. The mesh is to be set before.
+  /// Names facets of the mesh's boundary, `dimension` vertices each in any order, and returns their id. A facet belongs to
+  /// at most one boundary. The mesh must be set before.
   int add_boundary(const std::string& name, std::span<const int> facets);
-  /// Those facets whose vertices are all in the box, its faces included. Throws where there are none.
+  /// Names the facets whose vertices are all in the closed box. Throws InputError if there are none.
   int add_boundary(const std::string& name, std::span<const double> box_min, std::span<const double> box_max);
-  /// Those whose middle the rule takes (X: dimension numbers).
+  /// Names the facets whose middle X (`dimension` numbers) satisfies the rule.
   int add_boundary(const std::string& name, const std::function<bool(const double* X)>& rule);
 
-  /// Geometry that only collides: edges of two vertices each, in 3D triangles of three; vertices of neither are points.
-  /// Returns its id.
+  /// Adds an obstacle of edges (two vertices each) and, in 3D, triangles (three vertices each), and returns its id. Vertices
+  /// of no edge and no triangle collide as points.
   int add_obstacle(const std::string& name, std::span<const double> vertices, std::span<const int> edges,
                    std::span<const int> triangles = {});
 
-  /// A law of the program's own for a body that the options give a material: its E, nu (a scale) and density stay.
+  /// Sets a law of the program for a body. The options still give that body a material, for its density and as a scale.
   void set_law(int body, std::shared_ptr<const OwnLaw> law);
 
   int dimension() const { return dimension_; }  ///< 2 or 3

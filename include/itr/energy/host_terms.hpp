@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a program that embeds the library adds to the incremental potential.
+// Terms and forces that a program adds to the incremental potential.
 #pragma once
 
 #include <functional>
@@ -15,24 +15,23 @@ class Energy;
 template <int Dim>
 struct CellSet;
 
-/// Makes a term for some cells: E(x) [J] times `scale` (alpha h^2 [s^2]) at the time t [s] of the end of a step; null where
-/// it does not act. It is asked for the whole mesh in each step and, with remeshing, for the patches around edits, before
-/// and after them: a sum over cells, facets or points at rest positions, not over vertex numbers. `cells` outlives the
-/// energy.
+/// Makes a term for some cells: E(x) [J] times `scale` (alpha h^2 [s^2]) at the time t [s] of the end of a step, or null if
+/// it does not act there. It is called for the whole mesh in each step and, with remeshing, for patches before and after an
+/// edit. So E must be a sum over cells, facets or points at rest positions, because vertex numbers change. `cells` outlives
+/// the energy.
 template <int Dim>
 using TermFactory = std::function<std::shared_ptr<const Energy>(const CellSet<Dim>& cells, double t, double scale)>;
 
-/// Takes symmetric blocks (column-major, Dim * vertices.size() squared [N/m]) of the vertices of a mesh.
+/// Receives the symmetric block of some vertices, column-major, (Dim * vertices.size())^2 numbers [N/m].
 using StiffnessReceiver = std::function<void(std::span<const int> vertices, const double* block)>;
 
-/// Forces that depend on present positions and need no potential. A step is solved with them, linearised, at the solution
-/// before, until they are in balance; remeshing sees those at the solution of the step's first mesh.
+/// Forces that depend on present positions and need no potential. A step linearises them at the last solution and solves
+/// again until they balance. Remeshing uses those at the solution on the step's first mesh.
 template <int Dim>
 struct FollowerForces {
-  /// Adds forces [N] on the vertices of `mesh` at positions x [m] and the time t [s]; both interleaved. Empty: there are
-  /// none.
+  /// Adds forces [N] on the vertices of `mesh` at positions x [m] and the time t [s], both interleaved. Empty: no forces.
   std::function<void(const Mesh<Dim>& mesh, ConstVectorView x, double t, VectorView forces)> forces;
-  /// Gives (the symmetric part of) minus their derivative, block by block: fewer rounds. Empty: none.
+  /// Passes blocks of the symmetric part of -df/dx, which saves rounds. Empty: no blocks.
   std::function<void(const Mesh<Dim>& mesh, ConstVectorView x, double t, const StiffnessReceiver& add)> stiffness;
 };
 

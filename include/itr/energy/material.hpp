@@ -23,8 +23,8 @@ struct MooneyRivlinModuli {
   double volume_d = 0;  ///< d of d (J - 1)^2 [Pa]
 };
 
-/// A stored-energy density W(F) of a program's own, for F of det F > 0 (other F are infinite). Called from several threads
-/// at a time. W is to be frame-indifferent: W(R F) = W(F).
+/// An energy density W(F) of a program, for F with positive determinant; other F count as infinite. W must be
+/// frame-indifferent: W(R F) = W(F). Several threads call it at a time.
 class OwnLaw {
  public:
   virtual ~OwnLaw() = default;
@@ -35,7 +35,7 @@ class OwnLaw {
   virtual void hessian(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> H) const = 0;
 };
 
-/// What a body is made of. In 2D all is per unit thickness.
+/// The material of a body. In 2D all values are per unit thickness.
 struct Material {
   MaterialLaw law = MaterialLaw::neo_hookean;
   double youngs_modulus = 1e5;  ///< E [Pa]; of small strains where the law has other moduli; the largest where it varies
@@ -45,7 +45,7 @@ struct Material {
   MooneyRivlinModuli mooney_rivlin{};
   std::shared_ptr<const OwnLaw> own{};  ///< of MaterialLaw::own; E and nu then are those of small strains, a scale
 
-  /// Where they are there, they take the place of the constants above; sampled at an element's rest barycentre.
+  /// Functions that replace the constants above, sampled at the rest barycentre of each element. Empty: the constant.
   SpaceFunction youngs_modulus_at{}, poisson_ratio_at{}, density_at{};
 
   double lame_mu() const { return lame_mu(youngs_modulus, poisson_ratio); }

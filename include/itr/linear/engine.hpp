@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a program implements to bring its own solver: one factorisation, no residuals. make_checked_solver adds what all
-// engines need: finite input, trivial orders, achieved residuals, refinement.
+// The interface that a program implements to bring its own solver: factorise and solve. make_checked_solver adds the checks
+// of input, trivial orders, residuals and refinement.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@ namespace itr::linear {
 class Engine {
  public:
   virtual ~Engine() = default;
-  /// False where the engine has no such option, or not with that value.
+  /// Sets an option. Returns false if the engine has no such option or refuses the value.
   virtual bool set_option(const std::string& key, const std::string& value) = 0;
   virtual Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) = 0;
   virtual Outcome factorize(std::span<const double> values) = 0;
@@ -24,7 +24,7 @@ class Engine {
   virtual std::string message() const = 0;  ///< of the last outcome that was not ok; may be empty
 };
 
-/// The Solver that users see, over an engine.
+/// Makes the checked Solver over an engine.
 std::unique_ptr<Solver> make_checked_solver(std::string name, Capabilities capabilities, std::unique_ptr<Engine> engine);
 
 }  // namespace itr::linear

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a sparse direct or iterative solver does for Newton, whatever library is behind it.
+// The interface of sparse direct and iterative solvers that Newton uses.
 //
 // A symmetric matrix of order n is stored as its lower triangle with the diagonal, by columns, rows ascending.
 #pragma once
@@ -12,7 +12,7 @@
 
 namespace itr::linear {
 
-/// Where the entries of the lower triangle stand. column_starts has n + 1 entries; rows of column j are
+/// The positions of the entries of the lower triangle. column_starts has n + 1 entries; rows of column j are
 /// row_indices[column_starts[j] .. column_starts[j+1]), ascending, the first one j itself.
 struct SparsityPattern {
   int order = 0;
@@ -39,28 +39,28 @@ struct Capabilities {
   bool iterative = false;
   bool threads = false;
   bool mpi = false;
-  bool keeps_order = false;         ///< makes use of AnalyzeHints::may_keep_order
-  bool tells_definiteness = false;  ///< by the outcome or by Statistics::negative_pivots
+  bool keeps_order = false;         ///< uses AnalyzeHints::may_keep_order
+  bool tells_definiteness = false;  ///< reports indefinite matrices by the outcome or by Statistics::negative_pivots
 };
 
-/// What may help an analysis; all optional.
+/// Optional hints for an analysis.
 struct AnalyzeHints {
-  int block_size = 1;                        ///< unknowns a node where none is held: the dimension; 1: nothing is known
+  int block_size = 1;                        ///< unknowns of a free node, that is the dimension; 1: unknown
   std::span<const int> dofs = {};            ///< of each unknown: block_size * node + component, ascending
   std::span<const double> coordinates = {};  ///< block_size of each unknown: where its node is [m]
-  /// The fill-reducing order of an analysis before may serve again, where the patterns are much alike. Without it the
-  /// analysis depends on the pattern alone, and so can be repeated from a saved state.
+  /// Allows the fill-reducing order of an earlier analysis for a similar pattern. Without it the analysis depends on the
+  /// pattern alone and can be repeated from a saved state.
   bool may_keep_order = false;
 };
 
-/// What the last factorisation and solve took, or what the analysis foresees; zero where the library does not tell.
+/// Costs of the last factorisation and solve, or those that the analysis foresees. Zero if the library does not report them.
 struct Statistics {
   double factor_nonzeros = 0;
   double factor_bytes = 0;   ///< summed over MPI ranks
   double largest_bytes = 0;  ///< of any one rank
   double flops = 0;          ///< of the factorisation
   int iterations = 0;        ///< of the last solve
-  int negative_pivots = 0;   ///< of the last factorisation L D L^T: as many as negative eigenvalues
+  int negative_pivots = 0;   ///< of the last factorisation L D L^T: the number of negative eigenvalues
 };
 
 /// Options of a backend by name, as `itr solvers` lists them: {"ordering", "metis"}.
@@ -71,21 +71,21 @@ struct SolveReport {
   double relative_residual = 0;  ///< max over right-hand sides of |b - A x| / |b| (Euclidean), as achieved
 };
 
-/// One solver of one matrix at a time. Not thread-safe; two objects do not disturb each other.
+/// A solver of one matrix at a time. Not thread-safe; different objects are independent.
 class Solver {
  public:
   virtual ~Solver() = default;
   virtual std::string_view name() const = 0;  ///< "eigen:ldlt"
-  /// Who answers now, behind `name`: what `auto` has picked, a fallback that has taken over.
+  /// The solver in charge now: the pick of `auto`, or a fallback that took over.
   virtual std::string_view name_in_use() const { return name(); }
   virtual Capabilities capabilities() const = 0;
-  /// Once per pattern; a direct solver does nothing for the pattern that it analysed last. The pattern is copied where the
-  /// solver needs it later.
+  /// Analyses a pattern. A direct solver does nothing if it analysed the same pattern last. Solvers that need the pattern
+  /// later copy it.
   virtual Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) = 0;
-  /// `values` in the order of the analysed pattern.
+  /// Factorises the matrix with `values` in the order of the analysed pattern.
   virtual Outcome factorize(std::span<const double> values) = 0;
-  /// Solves A X = B for `columns` right-hand sides, columns of length n one after another. Refines until the relative
-  /// residual is at most `asked_residual` or no longer falls; reports what was achieved.
+  /// Solves A X = B for `columns` right-hand sides, stored one after another, n numbers each. Refines until the relative
+  /// residual is at most `asked_residual` or no longer falls. The report has the residual that was reached.
   virtual SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked_residual) = 0;
   virtual Statistics statistics() const = 0;
   virtual std::string message() const = 0;  ///< details of the last outcome that was not ok

@@ -15,16 +15,16 @@ enum class NewtonNorm {
   linf        ///< max |g/D|, max |p|
 };
 
-/// What Newton does where the Hessian has negative eigenvalues, whatever the linear solver.
+/// Treatment of Hessians with negative eigenvalues. It does not depend on the linear solver.
 enum class IndefiniteHessian {
-  /// Looks for a minimum: projects the Hessian, and calls no state converged while a factorisation says that its Hessian is
-  /// indefinite. With solvers that cannot tell, Hessians are always projected.
+  /// Looks for a minimum: projects the Hessian, and does not converge while a factorisation finds the Hessian indefinite.
+  /// Solvers that cannot find that get projected Hessians always.
   project,
-  /// Takes the true Hessian's direction where it is one of descent, as PolyFEM does with an L D L^T: may end at a saddle.
+  /// Takes the direction of the true Hessian if it descends, as PolyFEM does with an L D L^T. May end at a saddle.
   accept
 };
 
-/// Where a solve is, after an iteration.
+/// Progress of a solve after an iteration.
 struct NewtonProgress {
   int iteration = 0;         ///< 1 after the first
   double energy = 0;         ///< [J s^2]
@@ -32,8 +32,8 @@ struct NewtonProgress {
   double step_norm = 0;
 };
 
-/// When a solve has converged, and how it searches. Tolerances are those of the scene (CONVENTIONS.md, "Tolerances") already
-/// multiplied by what its vocabulary multiplies them with; 0 turns a test off.
+/// Convergence tests and search of a solve. Tolerances are those of the scene, already multiplied by the factors of
+/// CONVENTIONS.md, "Tolerances". 0 turns a test off.
 struct NewtonOptions {
   int max_iterations = 3000;
   NewtonNorm norm = NewtonNorm::euclidean;
@@ -51,8 +51,8 @@ struct NewtonOptions {
   bool absolute_eigenvalues = false;  ///< by changing the sign of negative eigenvalues instead of clamping them
   int projected_iterations = 5;       ///< iterations with it before the true Hessian is tried again; 0: it never is
   bool extend_steps = true;           ///< go on along a step over which the energy fell in a straight line
-  /// Where it becomes true, solves end before their next iteration, not converged, and a step is not done. It must outlive
-  /// them and may be set by another thread or a signal's handler. Null: nobody can.
+  /// If it becomes true, the solve ends before its next iteration without convergence and the step is dropped. Another
+  /// thread or a signal handler may set it. It must outlive the solves. Null: solves cannot be cancelled.
   const std::atomic<bool>* cancel = nullptr;
 
   bool is_cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }

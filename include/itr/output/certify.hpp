@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Re-checks stored frames with exact predicates, each by itself: every cell has a positive volume, at rest and now; no
-// surfaces share a point but that of a common vertex or edge; no obstacle (points and edges too) is inside of a body or of a
-// closed proxy, and no body inside of a body. What happens between two frames it cannot see: a point that has gone through a
-// body by the next frame is a matter of the steps.
+// Checks each stored frame with exact predicates. Every cell has a positive volume, at rest and deformed. Surfaces share no
+// point except common vertices and edges. No obstacle, points and edges included, is inside a body or a closed proxy, and no
+// body is inside another. Motion between two frames is not checked; the steps' own collision detection answers for it.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writes what a simulation shows into a folder: frames/NNNNNN.h5, sim.h5, sim.xdmf, steps.jsonl, summary.json
+// Writes the results of a simulation into a folder: frames/NNNNNN.h5, sim.h5, sim.xdmf, steps.jsonl, summary.json
 // (CONVENTIONS.md, "Output"). Reads state, never changes it.
 #pragma once
 
@@ -25,16 +25,16 @@ struct RunInfo {
   std::string scene;    ///< path of the scene file
   std::string backend;  ///< solver that was used
   int threads = 1;
-  std::string scene_identity{};  ///< all of the scene that a resumed run must have in common with this one
+  std::string scene_identity{};  ///< the part of the scene that a resumed run must share
 };
 
-/// One a run. Every file is either complete or absent; steps.jsonl is flushed a line at a time. Throws InputError where the
-/// folder cannot be written (unwritable, full): what was written before stays readable.
+/// The writer of a run. Every file is complete or absent; steps.jsonl is flushed after each line. Throws InputError if the
+/// folder is unwritable or full. Files that were written before stay readable.
 class Writer {
  public:
-  /// A new run: files of an earlier one are removed.
+  /// Begins a new run and removes files of an earlier one.
   Writer(std::filesystem::path directory, OutputOptions options, RunInfo info);
-  /// Goes on after a saved state of this folder: what the run wrote after it is removed, to be computed again.
+  /// Goes on after a saved state of this folder. Files that were written after that state are removed.
   template <int Dim>
   Writer(std::filesystem::path directory, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint);
   ~Writer();
@@ -48,7 +48,7 @@ class Writer {
   /// Saves the state after the step that was written last.
   template <int Dim>
   void save(const FrameView<Dim>& frame, const State<Dim>& state);
-  /// Sums over the run as in summary.json, what was before --resume included.
+  /// Sums over the run as in summary.json, steps before --resume included.
   const StepReport& totals() const;
   /// `outcome` is "finished" or the reason why the simulation stopped, `solver` who solved at the end (empty: the backend).
   /// Writes summary.json with totals, threads, versions and norms of the last frame.

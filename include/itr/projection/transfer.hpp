@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// L2 transfer of piecewise linear fields between two meshes of one domain (paper eq. 7), density-weighted so that
-// momentum is kept, in the local form: M (u_new - u_bar) = A u_old - M u_bar has a right-hand side on touched cells only.
+// L2 transfer of piecewise linear fields between two meshes of one domain (paper eq. 7). It is weighted by density, so that
+// it keeps momentum. It is local: M (u_new - u_bar) = A u_old - M u_bar has a right-hand side on touched cells only.
 #pragma once
 
 #include <span>
@@ -11,7 +11,7 @@
 
 namespace itr {
 
-/// A mesh, or a patch of one, as the transfer sees it: rest positions, cells, density of each cell.
+/// A mesh, or a patch of one, as plain arrays: rest positions, cells, density of each cell.
 template <int Dim>
 struct TransferMesh {
   std::span<const Vec<Dim>> rest;                   ///< [m]
@@ -19,8 +19,8 @@ struct TransferMesh {
   std::span<const double> density;                  ///< [kg/m^Dim] a cell
 };
 
-/// The cells by which the two meshes differ; they cover the same region on both sides. All other cells stand in both with
-/// the same rest positions and (on the new mesh) u_bar equal to u_old at their vertices.
+/// The cells by which two meshes differ. They cover the same region in both. All other cells are the same in both meshes,
+/// and u_bar equals u_old at their vertices.
 struct TouchedCells {
   std::vector<int> old_cells;
   std::vector<int> new_cells;
@@ -30,10 +30,10 @@ struct TransferReport {
   int iterations = 0;  ///< of the conjugate gradients
   double relative_residual = 0;
   double l2_error_squared = 0;  ///< sum over columns of ||u_new - u_old||^2 in the density-weighted norm
-  VectorX lost;                 ///< by column: integral of rho (u_old - u_new), 0 to round-off unless all vertices are fixed
+  VectorX lost;                 ///< integral of rho (u_old - u_new) by column; 0 to round-off unless all vertices are fixed
 };
 
-/// What u_bar lacks of u_old, integrated over the intersections of old and new touched cells, by columns.
+/// The difference u_old - u_bar, integrated over the intersections of old and new touched cells, by column.
 struct TouchedDifference {
   MatrixX residual;  ///< num_new_vertices x k: integral of rho phi_i^new (u_old - u_bar)
   VectorX squares;   ///< integral of rho (u_old - u_bar)^2
@@ -42,22 +42,22 @@ template <int Dim>
 TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh,
                                      const TouchedCells& touched, const MatrixX& u_old, const MatrixX& u_bar);
 
-/// The correction d = u_new - u_bar for a residual as above: least ||u_new - u_old|| among those that vanish where
-/// `fixed` (a flag for each entry, row by row; empty: nowhere) and that keep the integrals of rho u and rho X u over each
-/// connected part of the mesh. Where nothing is fixed that is the L2 projection, which keeps them anyhow; where the mesh
-/// is a patch, fixed at its rim, or a boundary is held, they are kept by constraints (of rho u alone where too few vertices
-/// are free). Conjugate gradients to round-off.
+/// Returns the correction d = u_new - u_bar for a residual of touched_difference. d minimises ||u_new - u_old||, vanishes
+/// where `fixed` is set, and keeps the integrals of rho u and rho X u over each connected part of the mesh. `fixed` has a
+/// flag for each entry, row by row; empty means that nothing is fixed. Without fixed entries d gives the L2 projection,
+/// which keeps the integrals by itself. With fixed entries (the rim of a patch, a held boundary) constraints keep them,
+/// those of rho u alone where too few vertices are free. Conjugate gradients solve to round-off.
 template <int Dim>
 MatrixX solve_projection(const TransferMesh<Dim>& mesh, const MatrixX& residual, std::span<const char> fixed,
                          TransferReport& report);
 
-/// Both: u_new = u_bar + d. `u_old` is num_old_vertices x k, `u_bar` num_new_vertices x k. With no touched cells u_bar is
-/// returned bit for bit.
+/// Returns u_new = u_bar + d, num_new_vertices x k, for `u_old` (num_old_vertices x k) and `u_bar` (num_new_vertices x k).
+/// Without touched cells it returns u_bar bit for bit.
 template <int Dim>
 MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh, const TouchedCells& touched,
                    const MatrixX& u_old, const MatrixX& u_bar, std::span<const char> fixed, TransferReport& report);
 
-/// By column, d^T M d with the consistent mass.
+/// Returns d^T M d for each column d, with the consistent mass M.
 template <int Dim>
 VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d);
 

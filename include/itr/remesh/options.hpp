@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Options of in-timestep remeshing, with the paper's defaults (CONVENTIONS.md, "Remeshing").
+// Options of in-timestep remeshing, with the paper's defaults (REMESHING.md).
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@ namespace itr {
 /// Which edges are tried, and how an operation is decided.
 enum class Screening {
   energy_percentile,  ///< the paper's culling: splits at the top by energy, collapses at the bottom; patches decide
-  bounds,             ///< every edge; what the new vertex alone gains decides, patches where it does not
+  bounds,             ///< asks every edge; the gain of the new vertex alone decides, or else a patch
   none                ///< every edge; patches decide
 };
 
-/// What x-hat, x_t and v_t are on a changed mesh when an operation is judged.
+/// How x-hat, x_t and v_t are taken on a changed mesh when an operation is judged.
 enum class HistoryRule {
-  function,     ///< the functions on the mesh before the operation: what the new mesh cannot represent counts
+  function,     ///< as functions on the mesh before; the new mesh pays for motion that it cannot represent
   interpolated  ///< interpolated onto the new mesh (the paper's rule)
 };
 
@@ -58,10 +58,10 @@ struct LocalRelaxationOptions {
   int max_contact_iterations = 4;  ///< the same where the patch touches contact
 };
 
-/// The baseline of CONVENTIONS.md, "Remeshing", where lengths of edges decide instead of energies.
+/// The baseline of REMESHING.md, "The sizing field": lengths of edges decide instead of energies.
 struct SizingFieldOptions {
   bool enabled = false;
-  /// Shorter rest edges are not split, in longest sides of the bodies' box at rest: in contact nothing else ends it.
+  /// Shorter rest edges are not split, in longest sides of the bodies' box. In contact nothing else ends the splitting.
   double rel_min_edge_length = 0.01;
 };
 
@@ -73,7 +73,7 @@ struct RemeshOptions {
   SwapOptions swap;
   SmoothOptions smooth;
   LocalRelaxationOptions local;
-  double relative_tolerance = 1e-4;  ///< what choose_defaults takes of the scene's energy for a split
+  double relative_tolerance = 1e-4;  ///< share of the scene's energy that choose_defaults takes as tolerance of splits
   Screening screening = Screening::bounds;
   HistoryRule history = HistoryRule::function;
   int sweeps = 1;

@@ -10,11 +10,10 @@
 
 namespace itr {
 
-/// Remeshes in place. The fields follow: x by local relaxation, all others interpolated at the vertices that edits set.
-/// On entry x is the solution on the mesh; on return it is feasible and no higher in energy than the operations' tolerances
-/// allow. Cells of ids below the entry's cell_slots() that are still alive were not touched.
-/// `memory` has what was refused before, and is brought up to date. So are `strata` of the mesh; where they are empty they
-/// are found (in 3D; 2D does without).
+/// Remeshes in place. On entry x is the solution on the mesh. On return x is feasible, and its energy exceeds that on entry
+/// by at most the tolerances of the accepted operations. Patches relax x; all other fields are interpolated at the vertices
+/// that edits set. A living cell whose id is below the entry's cell_slots() was not touched. `memory` holds earlier refusals
+/// and is updated. So are the `strata` of the mesh, which are found first if they are empty (3D only).
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// What a remesher did.
+// Counts of a remesher.
 #pragma once
 
 namespace itr {
 
 struct OperationCount {
   int tried = 0, accepted = 0;
-  int relaxed = 0;  ///< of those tried: a patch was relaxed to decide; the others were decided by bounds
+  int relaxed = 0;  ///< tried operations that a relaxed patch decided; bounds decided the others
   OperationCount& operator+=(const OperationCount& other) {
     tried += other.tried;
     accepted += other.accepted;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Scene files (PolyFEM's JSON, the keys in SCENES.md) into typed setups. The only module that knows JSON and
-// expressions. Everything wrong with a scene is an InputError, thrown before anything is computed.
+// Reads scene files (PolyFEM's JSON, the keys in SCENES.md) into setups. This is the only module that knows JSON and
+// expressions. A wrong scene throws an InputError before anything is computed.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +24,7 @@ struct Scene {
   OutputOptions output;
   int max_threads = 0;                ///< solver/max_threads; 0: all
   std::string directory;              ///< output/directory, may be empty
-  std::vector<std::string> warnings;  ///< legal but suspicious things
+  std::vector<std::string> warnings;  ///< on values that are legal and suspicious
   std::string identity;               ///< JSON of all that the results depend on: the merged scene, hashes of its files
 };
 
@@ -42,7 +42,7 @@ std::vector<Change> find_changes(const std::string& before, const std::string& n
 /// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides = {});
 
-/// What a program brings itself.
+/// Geometry that a program brings instead of the files of a scene.
 template <int Dim>
 struct Geometry {
   Mesh<Dim> mesh;            ///< with the facet tags that conditions refer to as `id`
@@ -50,8 +50,8 @@ struct Geometry {
   std::vector<int> id;       ///< by obstacle vertex, as of a `surface_selection`; kNoTag: none
 };
 
-/// A setup from a mesh and the other keys of a scene, as JSON text: materials, time, contact, conditions, ... Throws
-/// InputError as read(), and for keys of geometry and output. `warnings` gets what is legal but suspicious.
+/// Makes a setup from a mesh and the other keys of a scene as JSON text: materials, time, contact, conditions, ... Throws
+/// InputError as read(), and for keys of geometry and output. Appends to `warnings`.
 template <int Dim>
 Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const std::vector<Override>& overrides,
                       std::vector<std::string>& warnings);

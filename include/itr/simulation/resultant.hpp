@@ -7,17 +7,17 @@
 
 namespace itr {
 
-/// Of the forces of FieldOptions at the end of a step, all four kinds of them, on some vertices.
+/// Sum of the four kinds of forces of FieldOptions on some vertices, at the end of a step.
 template <int Dim>
 struct Resultant {
   Vec<Dim> force = Vec<Dim>::Zero();                                 ///< [N]; 2D: by thickness
   Vec<Dim == 2 ? 1 : 3> moment = Vec < Dim == 2 ? 1 : 3 > ::Zero();  ///< of them [N m]; 2D: about the axis out of the plane
 };
 
-/// On the boundary facets with these tags: what contact, friction, held components, tractions, pressures and the program do
-/// to their vertices, each of which counts once (those that other facets share, too), by its moment about `about` [m]. Over
-/// the whole boundary, and with body forces and the program's forces inside, that is the rate of the bodies' momentum.
-/// Throws InputError where the setup does not ask for the four kinds of forces.
+/// Returns the sum of contact, friction, reactions, tractions, pressures and forces of the program on the vertices of the
+/// boundary facets with these tags, and its moment about `about` [m]. A vertex counts once, also if other facets share it.
+/// Over the whole boundary, together with body forces and the program's forces inside, it is the rate of the bodies'
+/// momentum. Throws InputError if the setup does not ask for the four kinds of forces.
 template <int Dim>
 Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Everything that defines a simulation, as plain values with units: what a scene file is read into, and what a program
-// that embeds the library fills in itself. SI units throughout.
+// Everything that defines a simulation, as plain values in SI units. A scene file is read into it; a program that embeds the
+// library fills it in directly.
 #pragma once
 
 #include <Eigen/SparseCore>
@@ -38,8 +38,8 @@ struct Obstacles {
   std::vector<SpaceTimeFunction<Dim>> motions;  ///< displacement from rest [m]
 };
 
-/// A surface that touches in place of the bodies' boundary and moves with their vertices: displacements of its vertices are
-/// `weights` times those of the mesh's.
+/// A surface that collides in place of the bodies' boundary. Its vertices are displaced by `weights` times the displacements
+/// of the mesh's vertices.
 template <int Dim>
 struct CollisionProxy {
   std::vector<Vec<Dim>> rest;                            ///< vertices [m]
@@ -48,8 +48,8 @@ struct CollisionProxy {
   Eigen::SparseMatrix<double, Eigen::RowMajor> weights;  ///< a row for each of its vertices, a column for each of the mesh's
 };
 
-/// Displacement prescribed at the vertices of the boundary facets with a tag, and at the vertices that have it themselves,
-/// whatever their facets say.
+/// A displacement prescribed at the vertices of the boundary facets with a tag, and at vertices with this tag. The tag of a
+/// vertex goes before those of its facets.
 template <int Dim>
 struct DirichletCondition {
   int tag = 0;
@@ -77,7 +77,7 @@ struct InitialCondition {
   SpaceTimeFunction<Dim> value;  ///< evaluated at t = 0
 };
 
-/// What observers are shown beside positions, velocities and elastic density. What is not asked for is not computed.
+/// Fields that observers get beside positions, velocities and elastic density. Others are not computed.
 struct FieldOptions {
   bool contact_forces = false, friction_forces = false, reaction_forces = false;
   bool von_mises = false, stress = false;
@@ -86,7 +86,7 @@ struct FieldOptions {
   bool any_forces() const { return contact_forces || friction_forces || reaction_forces || applied_forces; }
 };
 
-/// What acts in a step, whatever mesh it begins on.
+/// The part of a setup that does not depend on the mesh: materials, conditions, options.
 template <int Dim>
 struct StepSetup {
   Obstacles<Dim> obstacles;
@@ -95,7 +95,7 @@ struct StepSetup {
   std::vector<DirichletCondition<Dim>> dirichlet;
   std::vector<NeumannCondition<Dim>> neumann;
   std::vector<PressureCondition<Dim>> pressure;
-  SpaceTimeFunction<Dim> body_acceleration;  ///< acts along +: gravity is (0, -9.81) [m/s^2]; empty: none
+  SpaceTimeFunction<Dim> body_acceleration;  ///< [m/s^2], positive along the axes: gravity is (0, -9.81); empty: none
 
   TimeOptions time;
   ContactOptions contact;
@@ -109,34 +109,35 @@ struct StepSetup {
   double lagged_load_tolerance = 1e-2;
   int quadrature_degree = kElasticDegree;  ///< of elasticity on cells with curved edges: 1 to 5
 
-  // What only a program can add.
+  // Only a program can set the following.
   std::vector<TermFactory<Dim>> terms;
   FollowerForces<Dim> follower;
-  /// Called after each Newton iteration of a whole mesh; false ends the step, which is then not done. Empty: nobody asks.
+  /// Called after each Newton iteration on the whole mesh. Returning false cancels the step.
   std::function<bool(const NewtonProgress&)> on_iteration;
 
-  /// Throws InputError for the first thing that is out of range, missing, or not finite. Places are those of a scene file
-  /// where it has them.
+  /// Throws InputError for the first value that is out of range, missing or not finite. Its place is the JSON pointer of a
+  /// scene if there is one.
   void validate() const;
 };
 
-/// A simulation from its start.
+/// A whole problem: mesh, initial conditions, and everything of StepSetup.
 template <int Dim>
 struct Setup : StepSetup<Dim> {
   Mesh<Dim> mesh;            ///< with body ids and tags of facets and vertices
-  std::map<int, int> order;  ///< of the elements by body: 1, or 2 for curved edges; bodies that are not named: 1
+  std::map<int, int> order;  ///< order of elements by body: 1, or 2 for curved edges; 1 for bodies that are not listed
   std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
   bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
   LinearOptions linear;
 
-  /// Fills in what is left open, and says what with, a sentence each. Barrier stiffness 0: adaptive; with remeshing a tenth
-  /// of the stiffest body's modulus [Pa], or what that is in the other form. With remeshing, what its options leave open:
-  /// the split tolerance is relative_tolerance times an energy of the scene, the lesser of 1 % of sum(E V), which bodies
-  /// have at strains of a tenth, and, where nothing prescribed feeds it, of what it has at the start and gravity gives.
-  /// Whoever chose it, collapses may cost a hundredth of it, swaps and moves that better the shape a millionth. Least edge
-  /// to split: 1e-6 of the bodies' diagonal. A Simulation calls it.
+  /// Fills in values that are left open and returns a sentence on each. A Simulation calls it.
+  /// - Barrier stiffness 0 becomes adaptive. With remeshing it becomes a tenth of the stiffest body's modulus [Pa] in the
+  ///   convergent form, and its equivalent in the plain form.
+  /// - An open split tolerance becomes relative_tolerance times an energy of the scene (REMESHING.md).
+  /// - Whoever chose the split tolerance, collapses may cost a hundredth of it, and swaps and moves that improve the shape a
+  ///   millionth.
+  /// - A shortest edge to split that is left open becomes 1e-6 of the bodies' diagonal.
   std::vector<std::string> choose_defaults();
-  /// That of all, what belongs to the mesh included. A Simulation calls it.
+  /// The same for the whole setup, mesh included. A Simulation calls it.
   void validate() const;
 };
 

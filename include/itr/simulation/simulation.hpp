@@ -23,9 +23,9 @@
 
 namespace itr {
 
-/// Where a simulation stands: a value. Fields are interleaved over the space's nodes (vertices first) followed by the
-/// obstacles' vertices. The rest of a simulation is a pure function of this and of its setup, so that a run which is resumed
-/// from a saved state has the same bits: what is added here is to be saved by output/checkpoint.cpp.
+/// The state of a simulation. Fields are interleaved over the space's nodes, vertices first, and then the obstacles'
+/// vertices. The rest of a simulation is a pure function of state and setup, so that a resumed run has the same bits. A new
+/// member must be saved by output/checkpoint.cpp.
 template <int Dim>
 struct State {
   Mesh<Dim> mesh;   ///< compact
@@ -35,23 +35,23 @@ struct State {
   double t = 0;                 ///< [s]
   BarrierStiffness stiffness;   ///< where it is adaptive
   QuadratureLevels quadrature;  ///< of the elastic energy, by cell with curved edges
-  RemeshMemory remesh_memory;   ///< what remeshing refused, and need not ask again
+  RemeshMemory remesh_memory;   ///< operations that remeshing refused and need not try again
   Strata<Dim> strata;           ///< of the mesh, once remeshing in 3D has found them
-  linear::FactorRecord factor;  ///< that may serve the next step
-  VectorX deviation;            ///< x less x-hat of the last step, with which the next one begins; empty: there was none [m]
+  linear::FactorRecord factor;  ///< factor that may serve the next step
+  VectorX deviation;            ///< x - x-hat of the last step, where the next one begins [m]; empty before the first
   double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 
 struct StepResult {
   bool ok = true;
-  bool cancelled = false;  ///< not ok because Setup::on_iteration or NewtonOptions::cancel said so
-  std::string reason;      ///< where not ok: why the step could not be done; the state is that before the step
+  bool cancelled = false;  ///< not ok because Setup::on_iteration or NewtonOptions::cancel ended the step
+  std::string reason;      ///< if not ok: why the step failed; the state is as before it
   StepReport report;
-  NodalForces forces;           ///< those that the setup asks for
+  NodalForces forces;           ///< the forces that the setup asks for
   MeshRenumbering renumbering;  ///< of the mesh, where the step changed it; else empty
 };
 
-/// A simulation as it stood: to go back to, as often as one likes. Cheap to have and to copy.
+/// A saved state of a simulation. It costs almost nothing to make and copy, and may be restored any number of times.
 template <int Dim>
 struct Snapshot {
   std::shared_ptr<const State<Dim>> state;
@@ -68,45 +68,45 @@ template <int Dim>
 class Simulation {
  public:
   /// Samples initial conditions. Throws InputError for a setup that cannot be simulated: surfaces that intersect at the
-  /// start (with the edges), what is not supported yet, an unknown solver.
+  /// start, an unsupported combination, an unknown solver.
   explicit Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger = {});
   ~Simulation();
   Simulation(Simulation&&) noexcept;
 
-  /// Of the last step; after adapt() of the state on the new mesh with what adapting took; after restore() as it was when it
-  /// was saved; of a state that no step led to: all counters 0. Valid until the next call that changes the simulation.
+  /// The report of the last step. After adapt() it is that of the state on the new mesh with the cost of adapting, after
+  /// restore() that of the saved state, before any step one whose counters are 0. Valid until a call changes the simulation.
   const StepReport& report() const;
-  /// One time step with remeshing inside it. Numerical failure is a result with a reason.
+  /// Takes one time step with remeshing inside it. Numerical failure gives a result with a reason and does not throw.
   StepResult advance();
-  /// The same by another length of the step than before [s], which is that of steps from now on. Newton's Euclidean
-  /// tolerances go with it, from what the setup has for its own; BDF begins with order 1 again. A step that fails changes
-  /// none of that. Throws InputError for a length that is not positive.
+  /// Takes one step of another length dt [s], which later steps keep. Newton's Euclidean tolerances scale with dt. BDF
+  /// begins with order 1 again. A step that fails changes none of that. Throws InputError if dt is not positive.
   StepResult advance(double dt);
-  /// Finds the mesh of a step of the length dt and stays at its start, on the new mesh: for a program that goes over the
-  /// step several times, remesh.enabled off, from what save() has then. As advance() but for that; steps are not cut.
+  /// Finds the mesh of a step of length dt and stays at the start of that step, on the new mesh. A program that repeats the
+  /// step saves the state then, turns remesh.enabled off, and restores before each repetition. Steps are not cut.
   StepResult adapt(double dt);
   bool finished() const;
-  /// What acts from the next step on may be changed between steps: values of conditions, loads, motions of obstacles, terms,
-  /// remesh.enabled. Mesh, bodies, numbers of vertices, contact, solver and integrator may not.
+  /// Conditions that a program may change between steps: values, loads, motions of obstacles, terms, remesh.enabled. Mesh,
+  /// bodies, numbers of vertices, contact, solver and integrator must stay.
   Setup<Dim>& conditions();
-  /// Called after each step that changed the mesh, with the mesh before; the new one is state().mesh. Null: nobody is told.
+  /// Sets the listener that is called with the old mesh after each step that changed the mesh. state().mesh is the new one.
+  /// Null removes the listener.
   void on_mesh_change(std::function<void(const MeshChange<Dim>& change, const Mesh<Dim>& before)> listener);
 
-  /// All that the next steps depend on, but for what conditions() and the program have set: with the same of that, steps
-  /// after restore() have the bits of those after save(). Takes no time.
+  /// Saves the state, which takes no time. Steps after restore() have the same bits as those after save(), if conditions()
+  /// and the program's functions are the same.
   Snapshot<Dim> save() const;
   /// Throws InputError for a snapshot of another simulation.
   void restore(const Snapshot<Dim>& snapshot);
-  /// Goes on from a state of the same setup. Throws InputError where the state does not fit the setup, has numbers that are
-  /// not finite or violates invariants (find_violation). Strata that are not its mesh's are dropped, to be found anew.
+  /// Restores a state of the same setup. Throws InputError if the state does not fit the setup, has numbers that are not
+  /// finite or violates invariants (find_violation). Strata of another mesh are dropped and found anew.
   void restore(State<Dim> state);
 
   const State<Dim>& state() const;      ///< valid while no snapshot shares it; spans of its fields until it changes
   std::uint64_t mesh_revision() const;  ///< another one whenever state().mesh may be another mesh
   const Setup<Dim>& setup() const;
-  const NodalForces& forces() const;       ///< at the end of the last step, those that the setup asks for
-  std::string solver_name() const;         ///< as it was asked for: "auto", say
-  std::string solver_name_in_use() const;  ///< who answers now
+  const NodalForces& forces() const;       ///< the forces that the setup asks for, at the end of the last step
+  std::string solver_name() const;         ///< the name in the setup, such as "auto"
+  std::string solver_name_in_use() const;  ///< the solver in charge now
   /// Calls `observer` with the present state as output sees it.
   template <typename Observer>
   void observe(Observer&& observer) const {

@@ -33,31 +33,31 @@ __all__ = ["Cancelled", "InputError", "MeshChange", "Model", "Saved", "Simulatio
 
 Array = np.ndarray
 Value = Union[float, Sequence[float], Array, Callable[[Array, float], Array]]
-"""A constant (d numbers; a pressure: one), values by vertex of the present mesh (n x d; n), or a function of the rest positions
-(n x d) and the time at the end of a step, which is called once before each step."""
+"""A constant (d numbers, one for a pressure), an array over the vertices of the present mesh (n x d, or n), or a function
+of rest positions (n x d) and the time at the end of the step. A function is called once before each step."""
 Compiled = Any
-"""A function of C's calling convention: of a ctypes library, of numba.cfunc, or an address. A step calls it without Python's
-lock, from several threads."""
+"""A function of C's calling convention: from a ctypes library, from numba.cfunc, or an address. Several threads call it within
+a step, without Python's lock."""
 
 FORCES = ("contact", "friction", "reaction", "applied")
 
 
 class StepFailed(RuntimeError):
-    """A step could not be done; the state is that before it."""
+    """A step failed. The state is as before it."""
 
 
 class Cancelled(StepFailed):
-    """A listener of Newton iterations ended the step; the state is that before it."""
+    """A listener of Newton iterations cancelled the step. The state is as before it."""
 
 
 class Model:
-    """What is simulated. Simulations copy it."""
+    """The description of a problem. Simulations copy it."""
 
     def __init__(self, vertices: Array, cells: Array, bodies: Optional[Array] = None):
-        """`vertices`: (n, d) [m], d = 2 or 3; `cells`: (m, d + 1), positive volumes; `bodies`: an id a cell, else all 0.
+        """`vertices`: (n, d) [m], d = 2 or 3. `cells`: (m, d + 1) of positive volume. `bodies`: an id a cell, by default 0.
 
-        Quadratic cells, (m, 6) in 2D and (m, 10) in 3D, have a node at the middle of each edge, in meshio's order (triangle6,
-        tetra10): their edges are curved from then on. At rest they have to be straight."""
+        Quadratic cells, (m, 6) in 2D and (m, 10) in 3D, have a node at the middle of each edge in meshio's order (triangle6,
+        tetra10). They must be straight at rest."""
         vertices = np.asarray(vertices, dtype=float)
         if vertices.ndim != 2:
             raise InputError(f"vertices: found an array of shape {vertices.shape}; expected (n, 2) or (n, 3)")
@@ -71,7 +71,7 @@ class Model:
 
     @classmethod
     def from_scene(cls, file: str, overrides: Optional[Mapping[str, Any]] = None) -> "Model":
-        """All of a scene file; `overrides`: values by JSON pointer. Its surfaces are boundaries "1", "2", ...: their ids."""
+        """Reads a scene file. `overrides` has values by JSON pointer. Surfaces become boundaries named "1", "2": their ids."""
         model = cls.__new__(cls)
         model._model = _itr.Model.from_scene(str(file), dict(overrides or {}))
         model._kept = []
@@ -79,8 +79,8 @@ class Model:
 
     @classmethod
     def from_meshio(cls, mesh: meshio.Mesh) -> Model:
-        """The tetrahedra of a meshio.Mesh, or else its triangles, in the plane z = 0. Gmsh's physical groups are bodies (their
-        numbers) and, of facets, boundaries (their names, or else numbers)."""
+        """Takes the tetrahedra of a meshio.Mesh, or if there are none its triangles in the plane z = 0. Gmsh's physical groups
+        of cells become bodies of the same numbers, those of facets boundaries of the same names or numbers."""
         from ._convert import from_meshio
 
         vertices, cells, bodies, boundaries = from_meshio(mesh)
@@ -94,11 +94,11 @@ class Model:
         return self._model.dimension
 
     def set_options(self, options: Mapping[str, Any]) -> None:
-        """Keys of a scene file but for geometry and output, merged into what was given before."""
+        """Merges keys of a scene, other than geometry and output, into the options."""
         self._model.set_options(dict(options))
 
     def set_option(self, pointer: str, value: Any) -> None:
-        """One of them: set_option("/time/dt", 0.01)."""
+        """Sets one key: set_option("/time/dt", 0.01)."""
         self._model.set_option(pointer, value)
 
     def add_boundary(
@@ -108,8 +108,8 @@ class Model:
         box: Optional[tuple[Sequence[float], Sequence[float]]] = None,
         where: Optional[Callable[[Array], bool]] = None,
     ) -> int:
-        """Names facets of the boundary: by their vertices (k, d), as those in a box (low, high), or as those whose middle X
-        `where` takes. Returns the id that options know it by."""
+        """Names facets of the boundary: given by vertices (k, d), all in a box (low, high), or all whose middle X satisfies
+        `where`. Returns the id for options."""
         if (facets is not None) + (box is not None) + (where is not None) != 1:
             raise InputError(f"boundary '{name}': expected one of facets, box and where")
         if facets is not None:
@@ -119,18 +119,18 @@ class Model:
         return self._model.add_boundary_rule(name, where)
 
     def add_obstacle(self, name: str, vertices: Array, edges: Array = (), triangles: Array = ()) -> int:
-        """Geometry that only collides. Returns the id that options know it by."""
+        """Adds an obstacle, which only collides. Returns the id for options."""
         return self._model.add_obstacle(name, vertices, _ints("edges", edges), _ints("triangles", triangles))
 
     def set_law(self, body: int, density: Compiled, stress: Compiled, hessian: Compiled, user: int = 0) -> None:
-        """A stored-energy density of the program's own, of the functions of `itr_law` in itr.h, for a body that the options
-        give a material: its E, nu (a scale) and density stay. `user` is the address that the functions get."""
+        """Sets the law of a body by the compiled functions of `itr_law` in itr.h. The options still give the body a material,
+        for its density and as a scale. `user` is the address that the functions receive."""
         self._kept += [density, stress, hessian]
         self._model.set_law(body, _address(density), _address(stress), _address(hessian), user)
 
 
 class MeshChange:
-    """The change of a mesh within a step; projection only during the call that is told of it.
+    """The change of a mesh within a step. `project` works only during the call of the listener.
 
     `vertex`, `cell`, `facet`: the new id by old one, -1 where it is gone. `facet_parent`: by new facet, the old one on which
     its middle lies.
@@ -144,13 +144,13 @@ class MeshChange:
         self._data = data
 
     def interpolation(self) -> scipy.sparse.csr_matrix:
-        """The transfer operator, a scipy.sparse.csr_matrix (new vertices x old ones): `P @ field`."""
+        """Interpolation P as a scipy.sparse.csr_matrix, new vertices x old ones: `P @ field`."""
         from scipy.sparse import csr_matrix
 
         return csr_matrix((self._data["data"], self._data["indices"], self._data["indptr"]), shape=self._data["shape"])
 
     def interpolate(self, field: Array) -> Array:
-        """The same without SciPy: values at the new vertices of a field (n,) or (n, k)."""
+        """Interpolates a field (n,) or (n, k) at the new vertices, without SciPy."""
         field = np.asarray(field, dtype=float)
         rows = np.repeat(np.arange(self._data["shape"][0]), np.diff(self._data["indptr"]))
         result = np.zeros((self._data["shape"][0],) + field.shape[1:])
@@ -159,16 +159,16 @@ class MeshChange:
         return result
 
     def project(self, field: Array) -> Array:
-        """The L2 projection, which keeps integrals."""
+        """Projects a field in L2, which keeps integrals."""
         field = np.asarray(field, dtype=float)
         return self._data["project"](field.reshape(len(field), -1)).reshape((-1,) + field.shape[1:])
 
 
 class Simulation:
-    """A simulation that goes on step by step. It copies the model; two of them do not disturb each other."""
+    """A simulation, advanced step by step. It copies the model. Two simulations are independent."""
 
     def __init__(self, model: Model, log: Optional[Callable[[int, str], None]] = None):
-        """`log` gets messages with their level: 0 debug, 1 information, 2 warning."""
+        """`log(level, message)` receives messages; levels are 0 debug, 1 information, 2 warning."""
         self._simulation = _itr.Simulation(model._model, log)
         self._functions: dict[tuple, Callable[[float], None]] = {}
         self._kept = {"laws": list(model._kept)}  # what compiled functions live in
@@ -177,14 +177,14 @@ class Simulation:
     # Steps.
 
     def step(self, dt: Optional[float] = None) -> dict:
-        """One step of the length dt [s], else as the one before or as the options say. Returns `report`. Raises StepFailed."""
+        """Takes one step of length dt [s], by default that of the step before. Returns `report`. Raises StepFailed."""
         self._do(self._simulation.step, dt)
         if self._recorder:
             self._recorder.add(self._simulation)
         return self.report
 
     def adapt(self, dt: Optional[float] = None) -> None:
-        """Finds the mesh of the next step and stays at its start, on that mesh: before sub-iterations on a frozen one."""
+        """Finds the mesh of the next step and stays at the start of that step. Sub-iterations on a frozen mesh begin so."""
         self._do(self._simulation.adapt, self._simulation.step_length if dt is None else dt)
 
     def _do(self, step: Callable[[float], tuple], dt: Optional[float]) -> None:
@@ -199,33 +199,33 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Present time [s]."""
         return self._simulation.time
 
     @property
     def steps(self) -> int:
-        """How many were done."""
+        """Number of steps taken."""
         return self._simulation.steps
 
     @property
     def finished(self) -> bool:
-        """Whether as many steps were done as the options ask for."""
+        """Whether all steps of the options are taken."""
         return self._simulation.finished
 
     @property
     def report(self) -> dict:
-        """Of the last step, or of the start: sizes, iterations, operations, energies [J]."""
+        """Sizes, iterations, operations and energies [J] of the last step, or of the start."""
         return self._simulation.report
 
     @property
     def warnings(self) -> list[str]:
-        """What is legal but suspicious in the options."""
+        """Warnings about options that are legal and suspicious."""
         return self._simulation.warnings
 
     # What acts from the next step on.
 
     def fix(self, boundary: str, displacement: Value, mask: Optional[Sequence[bool]] = None) -> None:
-        """Prescribes displacements from rest [m], of the components in `mask` only; release() takes that back."""
+        """Prescribes displacements from rest [m], for the components in `mask`. release() takes it back."""
         flags = np.ones(self.dimension, int) if mask is None else np.asarray(mask, int)
         self._set(("fix", boundary), displacement, lambda values: self._simulation.fix(boundary, flags, values))
 
@@ -234,19 +234,19 @@ class Simulation:
         self._simulation.fix(boundary, np.zeros(self.dimension, int), np.zeros(self.dimension))
 
     def set_traction(self, boundary: str, traction: Value) -> None:
-        """Force by rest area [N/m^2] (2D: length [N/m])."""
+        """Sets the force by rest area [N/m^2], in 2D by rest length [N/m]."""
         self._set(("traction", boundary), traction, lambda values: self._simulation.set_traction(boundary, values))
 
     def set_pressure(self, boundary: str, pressure: Value) -> None:
-        """Along inward normals as they are then, the same unit; a number, or one a vertex."""
+        """Sets the pressure against the deformed surface [N/m^2], in 2D [N/m]: a number, or one a vertex."""
         self._set(("pressure", boundary), pressure, lambda p: self._simulation.set_pressure(boundary, p))
 
     def set_acceleration(self, acceleration: Value) -> None:
-        """Body force by mass [m/s^2]."""
+        """Sets the body force by mass [m/s^2]."""
         self._set(("acceleration",), acceleration, self._simulation.set_acceleration)
 
     def move_obstacle(self, obstacle: str, positions: Union[Array, Callable[[float], Array]]) -> None:
-        """Where its vertices are at the end of the next steps [m], or a function that says so of a time."""
+        """Moves an obstacle to positions at the end of the next steps [m], or by a function of time that returns them."""
         if callable(positions):
             move = self._functions[("obstacle", obstacle)] = lambda t: self._simulation.move_obstacle(obstacle, positions(t))
             move(self.time)
@@ -255,7 +255,7 @@ class Simulation:
             self._simulation.move_obstacle(obstacle, positions)
 
     def set_forces(self, forces: Optional[Value]) -> None:
-        """Dead forces [N] on the vertices; they stay where they act however the mesh changes. None: no forces."""
+        """Sets dead forces [N] on the vertices. They act on the same points when the mesh changes. None removes them."""
         if forces is None:
             self._functions.pop(("forces",), None)
             self._simulation.set_forces([])
@@ -267,15 +267,15 @@ class Simulation:
         forces: Optional[Callable[[Array, Array, float], Array]],
         stiffness: Optional[Callable[[Array, Array, float], tuple[Array, Array]]] = None,
     ) -> None:
-        """Forces [N] of present positions: forces(X, x, t) gives an array as x (n x d). A step is solved with them, linearised,
+        """Sets forces [N] that depend on positions: forces(X, x, t) returns (n, d). A step is solved with them, linearised,
         at the solution before, until they balance; with blocks of -df/dx that takes fewer rounds: stiffness(X, x, t) gives
         their vertices (m x k) and the blocks (m x kd x kd) [N/m]. Both are called once a round; n may be that of a new mesh.
         None: no such forces."""
         self._simulation.set_follower_forces(forces, stiffness)
 
     def set_term(self, name: str, energy: Compiled, gradient: Compiled, hessian: Compiled, user: int = 0) -> None:
-        """Adds a term to the incremental potential, of the functions of `itr_term` in itr.h, or puts it in the place of the
-        one of this name. `user` is the address that the functions get."""
+        """Adds a term to the incremental potential by the compiled functions of `itr_term` in itr.h, or replaces the one of
+        this name. `user` is the address that the functions receive."""
         self._simulation.set_term(name, _address(energy), _address(gradient), _address(hessian), user)
         self._kept[name] = [energy, gradient, hessian]
 
@@ -284,11 +284,11 @@ class Simulation:
         self._kept.pop(name, None)
 
     def set_velocities(self, velocities: Value) -> None:
-        """[m/s]"""
+        """Sets the velocities of the bodies' vertices, (n, d) [m/s]."""
         self._simulation.set_velocities(self._nodal(self._sample(velocities, self.time)))
 
     def freeze_mesh(self, frozen: bool = True) -> None:
-        """No remeshing while it is."""
+        """Stops remeshing while `frozen` is true."""
         self._simulation.freeze_mesh(frozen)
 
     def _sample(self, value: Value, t: float) -> Array:
@@ -313,18 +313,18 @@ class Simulation:
 
     @property
     def positions(self) -> Array:
-        """(n, d) [m]: a view without a copy, read-only, of the state as it is now (later steps leave it as it is). Vertices,
-        then the nodes of `curved_edges`."""
+        """Positions (n, d) [m] of the vertices, then of the nodes of `curved_edges`, as a read-only view of the present state.
+        Later steps do not change the view."""
         return self._simulation.positions
 
     @property
     def velocities(self) -> Array:
-        """(n, d) [m/s], as positions."""
+        """Velocities (n, d) [m/s], a view like `positions`."""
         return self._simulation.velocities
 
     @property
     def rest_positions(self) -> Array:
-        """(n, d) [m]"""
+        """Rest positions (n, d) [m]."""
         return self._simulation.rest_positions
 
     @property
@@ -339,22 +339,22 @@ class Simulation:
 
     @property
     def cells(self) -> Array:
-        """(m, d + 1)"""
+        """Cells (m, d + 1): ids of vertices."""
         return self._simulation.cells
 
     @property
     def bodies(self) -> Array:
-        """(m,)"""
+        """Body of each cell (m,)."""
         return self._simulation.bodies
 
     @property
     def facets(self) -> Array:
-        """Of the boundary, outward: (k, d)"""
+        """Boundary facets (k, d), oriented outward."""
         return self._simulation.facets
 
     @property
     def facet_boundaries(self) -> Array:
-        """(k,): ids of add_boundary, -1: none."""
+        """Boundary of each facet (k,): ids of add_boundary, -1 for none."""
         return self._simulation.facet_boundaries
 
     @property
@@ -363,15 +363,15 @@ class Simulation:
 
     @property
     def elastic_density(self) -> Array:
-        """(m,): of rest volume [J/m^d]"""
+        """Elastic energy by rest volume of each cell (m,) [J/m^d]."""
         return self._simulation.elastic_density
 
     def watch_forces(self, watched: bool = True) -> None:
-        """Asks for forces, which are there after the next step."""
+        """Turns the computation of forces on or off, from the next step."""
         self._simulation.watch_forces(watched)
 
     def forces(self, kind: str) -> Optional[Array]:
-        """(n, d) [N] of one of FORCES; None before a step with watched forces."""
+        """Forces (n, d) [N] of one kind of FORCES. None before the first step in which forces are watched."""
         if kind not in FORCES:
             raise InputError(f"kind: found '{kind}'; expected one of {', '.join(FORCES)}")
         return self._simulation.forces(FORCES.index(kind))
@@ -379,12 +379,12 @@ class Simulation:
     def resultant(
         self, boundaries: Union[str, Iterable[str]], about: Optional[Sequence[float]] = None
     ) -> tuple[Array, Array]:
-        """Force [N] and moment [N m] of all kinds on one or more boundaries. Forces have to be watched."""
+        """Sum of all kinds of forces [N] on one or more boundaries, and its moment [N m]. Forces must be watched."""
         names = [boundaries] if isinstance(boundaries, str) else list(boundaries)
         return self._simulation.resultant(names, np.zeros(self.dimension) if about is None else about)
 
     def save(self) -> Saved:
-        """The state as it is, mesh included: cheap; the same steps from it have the same bits."""
+        """Saves the state, mesh included, at almost no cost. The same steps from it give the same bits."""
         return self._simulation.save()
 
     def restore(self, saved: Saved) -> None:
@@ -412,24 +412,24 @@ class Simulation:
     # Events; None: nobody listens.
 
     def on_iteration(self, listener: Optional[Callable[[int, float, float, float], bool]]) -> None:
-        """Called after each Newton iteration with its number, energy, norms of gradient and step; False ends the step."""
+        """Calls `listener` after each Newton iteration with its number, energy and norms of gradient and step. False ends."""
         self._simulation.on_iteration(listener)
 
     def on_mesh_change(self, listener: Optional[Callable[[MeshChange], None]]) -> None:
-        """Called after a step that changed the mesh. Values by vertex that fix() and others were given stay functions of the
-        rest position."""
+        """Calls `listener` with a MeshChange after a step that changed the mesh. Arrays given to fix() and others remain
+        functions of rest position."""
         self._simulation.on_mesh_change(None if listener is None else lambda data: listener(MeshChange(data)))
 
     # To other libraries.
 
     def to_meshio(self) -> meshio.Mesh:
-        """A meshio.Mesh of the present positions with `displacement`, `velocity`, `body` and `elastic_density`."""
+        """Returns a meshio.Mesh at present positions with `displacement`, `velocity`, `body` and `elastic_density`."""
         from ._convert import to_meshio
 
         return to_meshio(self)
 
     def to_dolfinx(self, comm: Any = None) -> tuple[dolfinx.mesh.Mesh, dict[str, dolfinx.fem.Function]]:
-        """The mesh at rest in dolfinx, on one rank, and functions on it: `displacement` and `velocity`, linear, and
+        """Returns the mesh at rest in dolfinx, on one rank, and functions on it: `displacement` and `velocity`, linear, and
         `elastic_density`, constant on cells. `comm`: an MPI communicator of one rank, else MPI.COMM_SELF."""
         from ._convert import to_dolfinx
 

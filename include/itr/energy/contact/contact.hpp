@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Contact barrier of IPC (Li et al. 2020) between surface primitives, in both forms of CONVENTIONS.md, "Contact": vertices
-// and edges in 2D, vertices and triangles, edges and edges in 3D.
+// Contact barrier of IPC (Li et al. 2020) between surface primitives, in both forms of CONVENTIONS.md, "Contact". Pairs are
+// a vertex and an edge in 2D, a vertex and a triangle or two edges in 3D.
 #pragma once
 
 #include "itr/energy/contact/options.hpp"
@@ -11,12 +11,12 @@
 
 namespace itr {
 
-/// One active pair of features, reduced to those that are closest (except for nearly parallel edges, which stay edges).
+/// An active pair of primitives, reduced to its closest features. Nearly parallel edges stay edges.
 struct ContactStencil {
   PairKind kind = PairKind::vertex_vertex;
   std::array<int, 4> vertices{kNone, kNone, kNone, kNone};
   double weight = 0;  ///< area weights and corrections included; may be negative
-  /// Nearly parallel edges only: |u x v|^2 below which the pair fades out [m^4], and the features whose distance counts.
+  /// For nearly parallel edges: |u x v|^2 below which the pair fades out [m^4], and the features whose distance counts.
   double mollifier_threshold = 0;
   ClosestFeatures closest{};
 
@@ -24,37 +24,37 @@ struct ContactStencil {
   bool is_mollified() const { return mollifier_threshold > 0; }
 };
 
-/// scale * kappa * sum of weight * m * b(D), b(D) = -(D - dhat^2)^2 ln(D / dhat^2) of the squared distance D below dhat^2, m
-/// the mollifier of nearly parallel edges.
+/// The energy scale * kappa * sum of weight * m * b(D). b(D) = -(D - dhat^2)^2 ln(D / dhat^2) for squared distances D below
+/// dhat^2, and m is the mollifier of nearly parallel edges.
 template <int Dim>
 class ContactEnergy final : public Energy {
  public:
-  /// `surface` must outlive this. `scale` is alpha h^2. A workspace serves one surface: another one in its place needs a new
-  /// workspace, or another revision.
+  /// `surface` must outlive this object. `scale` is alpha h^2 [s^2]. A workspace serves one surface; another surface needs a
+  /// new workspace or a new revision.
   ContactEnergy(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale);
-  /// Makes it what a new one would be.
+  /// Resets this object as if it were constructed anew.
   void renew(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale);
   std::string_view name() const override { return "contact"; }
   double value(ConstVectorView x, Workspace& workspace) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
-  /// Time of impact by conservative CCD; feasible: no pair touches.
+  /// Largest share of dx without impact, by conservative CCD. Positions are feasible if no pair touches.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
-  /// By planar bounds of each pair (`planar_shares`).
+  /// Shares of dx by vertex, from planar bounds of each pair (`planar_shares`).
   bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
-  /// Looks for pairs where a solve that begins at x is expected to go by dx, so that one search serves its start and its
-  /// first step. It always looks: what is found then does not depend on earlier solves.
+  /// Finds candidate pairs for a solve that begins at x and is expected to move by dx. One search then serves its start and
+  /// its first step. The search is always made, so that its result does not depend on earlier solves.
   void foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;
   /// The pair with the earliest time of impact.
   StepLimit step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
 
   /// Active pairs at x, merged and sorted. Valid until the next call with this workspace.
   const std::vector<ContactStencil>& active(ConstVectorView x, Workspace& workspace) const;
-  /// Smallest distance [m] over counted pairs nearer than dhat; infinity where there are none.
+  /// Smallest distance [m] of the pairs nearer than dhat; infinity if there are none.
   double min_distance(ConstVectorView x, Workspace& workspace) const;
-  /// What a pair adds to the energy of `scale` 1 [J].
+  /// Energy of one pair for `scale` 1 [J].
   double pair_energy(const ContactStencil& stencil, ConstVectorView x) const;
-  /// Distance of the pair's closest features.
+  /// Distance of the closest features of a pair.
   PairDistance<Dim> distance(const ContactStencil& stencil, ConstVectorView x) const;
   /// b(D) and its derivatives with respect to D.
   double barrier(double squared_distance) const;
@@ -66,7 +66,7 @@ class ContactEnergy final : public Energy {
  private:
   struct Active {
     std::vector<ContactStencil> stencils;
-    double least_squared = 0;  ///< distance over counted pairs nearer than dhat; infinity where there are none
+    double least_squared = 0;  ///< smallest squared distance of the pairs nearer than dhat; infinity if there are none
   };
   struct ActiveCache;
   struct HessianBlocks;

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// Combinations of features that no simulation takes: one table, for the check and for the page SCENES.md.
+#pragma once
+
+#include <vector>
+
+#include "itr/simulation/setup.hpp"
+
+namespace itr {
+
+struct UnsupportedCombination {
+  const char* place;  ///< JSON pointer of the key that a scene would have to drop, or the field of a Setup
+  const char* words;  ///< what is refused, as the error message names it
+};
+/// In the order in which they are checked.
+std::vector<UnsupportedCombination> unsupported_combinations();
+
+/// Throws InputError for the first combination that the setup has.
+template <int Dim>
+void refuse_unsupported(const Setup<Dim>& setup);
+
+}  // namespace itr
