@@ -222,7 +222,7 @@ class Recorder {
     with(simulation, [&](auto& s) {
       const itr::output::RunInfo info{"a program", s.solver_name(), itr::num_threads()};
       writer_ = std::make_unique<itr::output::Writer>(directory_, itr::OutputOptions{every}, info);
-      write(s, s.initial_report());
+      write(s, s.report());
     });
   }
   void add(AnySimulation& simulation) {
