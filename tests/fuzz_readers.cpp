@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Damaged files, so many a reader: whatever is in one, reading it ends, in an InputError or in what is there. Meant to run
-// under the sanitizers, which turn what is wrong into a crash.
+// under the sanitizers, which turn what is wrong into a crash. HDF5 1.10.8 itself crashes on some files whose metadata are
+// damaged (H5F__accum_read, from H5Lexists: seeds 3 and 7 of hdf5-weights); those of seed 1 are got over.
 // usage: fuzz_readers [CASES [SEED [READER]]]
 #include <unistd.h>
 
@@ -300,6 +301,29 @@ std::string rewritten(const fs::path& folder, const std::string& bytes, Random& 
   return made.image();
 }
 
+/// A tetrahedron that touches with a surface of its own, in a folder; returns the file of that one's weights.
+std::string make_collision_mesh(const fs::path& folder) {
+  fs::create_directories(folder);
+  write(folder / "tet.msh",
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+        "$Elements\n1\n1 4 2 3 1 1 2 3 4\n$EndElements\n");
+  write(folder / "fine.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  write(folder / "scene.json",
+        R"({"geometry": [{"mesh": "tet.msh", "volume_selection": 1}],
+            "materials": {"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000}, "time": {"dt": 0.01, "time_steps": 2},
+            "contact": {"enabled": true, "dhat": 1e-2,
+                        "collision_mesh": {"mesh": "fine.obj", "linear_map": "weights.h5"}}})");
+  const hdf5::Session session;
+  hdf5::File file = hdf5::File::create(folder / "weights.h5");
+  const std::vector<std::int64_t> ids = {0, 1, 2, 3};
+  const std::vector<double> ones(4, 1.0);
+  file.write("/weight_triplets/values", ones, 0);
+  file.write("/weight_triplets/rows", ids, 0);
+  file.write("/weight_triplets/cols", ids, 0);
+  file.write_attribute("weight_triplets", "shape", std::vector<std::int64_t>{4, 4});
+  return file.image();
+}
+
 class Fuzzer {
  public:
   explicit Fuzzer(unsigned seed)
@@ -318,6 +342,12 @@ class Fuzzer {
     std::sort(scenes.begin(), scenes.end(), [](const auto& a, const auto& b) { return a.bytes < b.bytes; });
     fs::copy(examples / "meshes", folder_ / "meshes");
     readers_.push_back({"json", std::move(scenes), [](const fs::path& path) { scene::read(path); }});
+    readers_.push_back({"hdf5-weights",
+                        {{"weights/weights.h5", make_collision_mesh(folder_ / "weights")}},
+                        [](const fs::path& path) { scene::read(path.parent_path() / "scene.json"); },
+                        [](const Original& original, Random& random) {
+                          return damaged(random() % 2 ? original.bytes : without_digests(original.bytes), random);
+                        }});
     add_frames<2>("hdf5-2d", small_setup<2>(examples, "ball_wall.json", {{"/solver/linear/solver", "\"eigen\""}}));
     add_frames<3>("hdf5-3d", small_setup<3>(examples, "cubes.json",
                                             {{"/solver/linear/solver", "\"eigen\""},

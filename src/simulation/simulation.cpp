@@ -236,6 +236,7 @@ struct Simulation<Dim>::Impl {
     const auto put_back = [&] {
       if (state->step != step_before) return;  // it was done before a listener threw
       if (longer) change_to(std::make_shared<State<Dim>>(*longer));
+      if (setup.time.dt == time_before.dt) return;
       setup.time = time_before;
       scale_tolerances();
     };
