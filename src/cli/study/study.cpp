@@ -75,6 +75,7 @@ class Study {
     results_.notes = plan_.notes;
     results_.dim = plan_.dim;
     results_.is_dynamic = plan_.is_dynamic;
+    results_.has_friction = plan_.has_friction;
     results_.frames = options.frames;
     for (const auto& set : options.overrides)
       results_.settings += fmt::format("{}`{}={}`", results_.settings.empty() ? "" : ", ", set.pointer, set.value);
@@ -201,6 +202,7 @@ class Study {
 
   void write() {
     results_.reference = describe_reference();
+    if (options_.reference.empty()) results_.reference_run = finished(reference_) ? reference_ : plan_.finest;
     const std::string text = page(results_);
     const std::pair<const char*, std::string> files[] = {{"study.csv", csv(results_)},
                                                          {"study.json", json(results_)},
