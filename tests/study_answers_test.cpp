@@ -143,6 +143,29 @@ TEST(StudyAnswers, TableRecommendsWhatTheSentenceDoes) {
   EXPECT_TRUE(has(choices_table(alone), "| h1 | 5 % | `itr-1` |"));
 }
 
+TEST(StudyAnswers, CountRunsBelowTheWorthAsReachingIt) {
+  // uniform-2's error is not told, but it is no larger than 0.12: a run that takes longer for 0.12 is not recommended.
+  Results results = with({row("itr", "itr-1", 0.121, 200)});
+  results.worth->h1 = 0.12;
+  EXPECT_EQ(points(results, {"uniform"}, measure("h1"), costs()[0]).size(), 2u);
+  EXPECT_EQ(points_reached(results, {"uniform"}, measure("h1"), costs()[0]).back().error, 0.12);
+  EXPECT_GT(verdict_of(results, "itr").points[0].time_ratio, 1.9);
+  EXPECT_TRUE(has(choices_table(results), "| h1 | 20 % | `uniform-1` |"));
+  EXPECT_FALSE(has(choices_table(results), "itr-1"));
+}
+
+TEST(StudyAnswers, SayThatARunIsNearerToTheLimitThanTheReference) {
+  Results results = with({row("uniform-p2", "uniform-p2-2", 0.05, 20)});
+  results.reference_run = "reference";
+  results.rows.push_back(row("uniform", "reference", 0, 1));
+  results.rows.back().run.reference = "";
+  results.rows.back().potential = -10;
+  results.rows[3].potential = -12;
+  EXPECT_TRUE(has(all_of(doubts(results)), "`uniform-p2-2` ends with a potential lower than the reference's, by 2 J"));
+  results.has_friction = true;
+  EXPECT_FALSE(has(all_of(doubts(results)), "potential"));
+}
+
 TEST(StudyAnswers, JudgeByTheBetterOfLevelsAndRows) {
   Results results = with({row("itr", "itr-1", 0.2, 5)});
   EXPECT_NEAR(verdict_of(results, "itr").points[0].time_ratio, 0.5, 1e-12);

@@ -4,6 +4,8 @@
 import csv
 import json
 import pathlib
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -221,6 +223,26 @@ class Study(unittest.TestCase):
         self.assertNotIn("reference", found)
         self.assertEqual(float(found["uniform-1"]["l2"]), 0)
         self.assertGreater(float(found["uniform-2"]["l2"]), 1e-3)
+
+    def test_its_program_may_be_replaced_meanwhile(self):
+        prefix = self.folder / "prefix"
+        (prefix / "bin").mkdir(parents=True)
+        (prefix / "lib").symlink_to(pathlib.Path(ITR).resolve().parent.parent / "lib")
+        copied = prefix / "bin/itr"
+        shutil.copy(ITR, copied)
+        solvers = subprocess.run([copied, "solvers"], capture_output=True, text=True).stdout
+        solver = next((name for name in ("cholmod", "umfpack", "mumps") if re.search(rf"^{name} .*self-test residual", solvers, re.M)), None)
+        if solver is None:
+            self.skipTest("no solver module")
+        words = [copied, *command(self.folder / "study", "--series", "uniform", "--solver", solver, levels=1)[1:]]
+        running = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        for line in running.stderr:
+            if line.startswith("[1/"):
+                copied.unlink()
+                break
+        running.communicate()
+        for name, row in rows(self.folder / "study").items():
+            self.assertEqual(row["status"], "finished", f"{name}: {row['reason']}")
 
     def test_names_of_series_are_checked(self):
         done = study(self.folder, "--series", "uniform,nothing", status=2)

@@ -51,9 +51,9 @@ struct Uniform {
   std::vector<Point> linear, quadratic, linear_unknowns;
 
   Uniform(const Results& results, const Measure& measure, bool with_quadratic)
-      : linear(front(points(results, linear_uniform(), measure, costs()[0]))),
-        linear_unknowns(front(points(results, linear_uniform(), measure, costs()[1]))) {
-    if (with_quadratic) quadratic = front(points(results, {kQuadratic}, measure, costs()[0]));
+      : linear(front(points_reached(results, linear_uniform(), measure, costs()[0]))),
+        linear_unknowns(front(points_reached(results, linear_uniform(), measure, costs()[1]))) {
+    if (with_quadratic) quadratic = front(points_reached(results, {kQuadratic}, measure, costs()[0]));
   }
   bool empty() const { return linear.empty() && quadratic.empty(); }
   /// The lesser of both.
@@ -188,7 +188,7 @@ bool is_uniform(const Row& row) { return is_any_of(row.run.series->name, {"unifo
 /// Runs that a table may recommend: uniform ones, and those of series that a verdict does not speak against.
 std::vector<Point> candidates_of(const Results& results, const Measure& measure, const std::vector<Verdict>& all) {
   std::vector<Point> kept;
-  for (const auto& point : points(results, {}, measure, costs()[0])) {
+  for (const auto& point : points_reached(results, {}, measure, costs()[0])) {
     if (is_large(results, *point.row, measure)) continue;
     const auto is_it = [&](const Verdict& v) { return v.measure == &measure && v.series == point.row->run.series; };
     const auto verdict = std::find_if(all.begin(), all.end(), is_it);

@@ -19,18 +19,33 @@ bool is_among(const Row& row, const std::vector<std::string>& series) {
   return std::find(series.begin(), series.end(), row.run.series->name) != series.end();
 }
 
-}  // namespace
-
-std::vector<Point> points(const Results& results, const std::vector<std::string>& series, const Measure& measure,
-                          const Cost& cost) {
+template <typename ErrorOf>
+std::vector<Point> collect(const Results& results, const std::vector<std::string>& series, const Cost& cost,
+                           const ErrorOf& error_of) {
   std::vector<Point> found;
   for (const auto& row : results.rows) {
     if (!is_among(row, series) || !row.certified || flies(results, row)) continue;
-    const auto error = told_error(results, row, measure);
+    const std::optional<double> error = error_of(row);
     if (error && *error > 0 && row.*cost.value > 0) found.push_back({&row, *error, row.*cost.value});
   }
   std::stable_sort(found.begin(), found.end(), [](const Point& a, const Point& b) { return a.error > b.error; });
   return found;
+}
+
+}  // namespace
+
+std::vector<Point> points(const Results& results, const std::vector<std::string>& series, const Measure& measure,
+                          const Cost& cost) {
+  return collect(results, series, cost, [&](const Row& row) { return told_error(results, row, measure); });
+}
+
+std::vector<Point> points_reached(const Results& results, const std::vector<std::string>& series, const Measure& measure,
+                                  const Cost& cost) {
+  return collect(results, series, cost, [&](const Row& row) -> std::optional<double> {
+    if (!row.errors) return std::nullopt;
+    const double error = (*row.errors).*measure.value;
+    return results.worth ? std::max(error, (*results.worth).*measure.value) : error;
+  });
 }
 
 std::vector<Point> front(const std::vector<Point>& all) {

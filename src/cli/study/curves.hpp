@@ -20,6 +20,9 @@ struct Point {
 /// are not certified or that flies() names have none, nor has the reference.
 std::vector<Point> points(const Results& results, const std::vector<std::string>& series, const Measure& measure,
                           const Cost& cost);
+/// The same with those whose errors are not told, at what the reference is worth: they reach that, if not less.
+std::vector<Point> points_reached(const Results& results, const std::vector<std::string>& series, const Measure& measure,
+                                  const Cost& cost);
 
 /// Those that no other run beats in both.
 std::vector<Point> front(const std::vector<Point>& all);

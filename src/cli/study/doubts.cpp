@@ -56,6 +56,21 @@ std::string about_large_errors(const Results& results, const Measure& measure) {
                      listed(names), names.size() > 1 ? "are" : "is", 100 * kLargeError, names.size() > 1 ? "them" : "it");
 }
 
+/// In equilibrium without friction, of two states the one of lower potential is nearer to the limit.
+std::string about_better_runs(const Results& results) {
+  const auto is_reference = [&](const Row& row) { return row.run.name == results.reference_run; };
+  const auto reference = std::find_if(results.rows.begin(), results.rows.end(), is_reference);
+  if (reference == results.rows.end() || results.is_dynamic || results.has_friction) return "";
+  const Row* best = &*reference;
+  for (const auto& row : results.rows)
+    if (row.finished && row.certified && is_against_reference(row) && row.potential < best->potential) best = &row;
+  if (best == &*reference) return "";
+  return fmt::format(
+      "`{}` ends with a potential lower than the reference's, by {:.2g} J: it is nearer to the limit, and the better "
+      "reference (`--reference`).",
+      best->run.name, reference->potential - best->potential);
+}
+
 std::string about_worth(const Results& results) {
   if (!results.worth)
     return "What the reference is worth is not known: there is no second one to hold it against (`--second-reference`).";
@@ -136,6 +151,7 @@ std::vector<std::string> doubts(const Results& results) {
   int warning_runs = 0;
   for (const auto& row : results.rows) warning_runs += !row.warnings.empty();
   if (warning_runs > 0) add(fmt::format("{} of {} runs gave warnings, listed below.", warning_runs, results.rows.size()));
+  add(about_better_runs(results));
   add(about_worth(results));
   return sentences;
 }

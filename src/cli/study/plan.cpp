@@ -76,8 +76,8 @@ class Source {
       // What remeshing would choose holds for all runs: they are to have one limit.
       if (is_open) pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness)}};
       const auto& contact = setup.contact;
-      if (contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0)
-        pin_friction(options.overrides);
+      has_friction = contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0;
+      if (has_friction) pin_friction(options.overrides);
     };
     std::visit(look, scene_.setup);
     if (json_["geometry"].is_array()) {
@@ -95,7 +95,7 @@ class Source {
   std::string notes;             ///< the same in words
   std::optional<RowsOfBox> box;  ///< that the bodies fill together
   int num_cells = 0, body = 0;   ///< before refinement; the first cell's
-  bool has_one_body = true, has_contact = false;
+  bool has_one_body = true, has_contact = false, has_friction = false;
 
   bool has(const std::string& pointer) const { return json_.contains(Json::json_pointer(pointer)); }
   /// Every body refined so many times more than the scene has it.
@@ -199,6 +199,7 @@ class Planner {
     starts_ = options.starts.empty() ? std::vector<int>{0} : options.starts;
     plan_.dim = source_.dim;
     plan_.has_contact = source_.has_contact;
+    plan_.has_friction = source_.has_friction;
     plan_.is_dynamic = !source_.time.is_static && !source_.time.quasistatic;
   }
 

@@ -56,7 +56,7 @@ struct PlannedRun {
 struct Plan {
   int dim = 0;
   bool is_dynamic = false;  ///< has kinetic energy and momentum
-  bool has_contact = false;
+  bool has_contact = false, has_friction = false;
   /// What the others are compared with: the first of these that splits anything; none where Options::reference is.
   std::vector<PlannedRun> references;
   std::vector<PlannedRun> runs;  ///< without these

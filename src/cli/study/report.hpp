@@ -28,17 +28,18 @@ struct Cost {
 const std::vector<Cost>& costs();
 
 struct Results {
-  std::string scene;      ///< path
-  std::string settings;   ///< what `--set` and `--solver` gave to all runs
-  std::string notes;      ///< what else holds for all runs
-  std::string reference;  ///< in words
-  std::string refused;    ///< why nothing is said against the reference; empty: it is said
+  std::string scene;          ///< path
+  std::string settings;       ///< what `--set` and `--solver` gave to all runs
+  std::string notes;          ///< what else holds for all runs
+  std::string reference;      ///< in words
+  std::string reference_run;  ///< its name; empty: it is none of the rows
+  std::string refused;        ///< why nothing is said against the reference; empty: it is said
   /// How far a second reference is from the first: smaller errors are not told. None: unknown.
   std::optional<Errors> worth;
   std::string second_reference;  ///< in words
   int dim = 2;
   int frames = 0;  ///< at most so many times are compared
-  bool is_dynamic = false;
+  bool is_dynamic = false, has_friction = false;
   std::vector<Row> rows;  ///< by plan
 };
 

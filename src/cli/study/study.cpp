@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 
 #include "cli/run.hpp"
 #include "itr/core/error.hpp"
+#include "linear/modules.hpp"
 #include "plot.hpp"
 #include "process.hpp"
 #include "report.hpp"
@@ -67,6 +69,13 @@ void show(const Row& row, std::size_t number, std::size_t count) {
   spdlog::info("{}", text);
 }
 
+/// Runs find their solver modules beside this program's file; they still do where that is replaced while a study runs.
+void keep_module_folders() {
+  std::string folders;
+  for (const auto& folder : linear::module_folders()) folders += (folders.empty() ? "" : ":") + folder.string();
+  setenv("ITR_BACKEND_PATH", folders.c_str(), 1);
+}
+
 class Study {
  public:
   explicit Study(const Options& options) : options_(options), plan_(make_plan(options)), directory_(directory_of(options)) {
@@ -75,6 +84,7 @@ class Study {
     results_.notes = plan_.notes;
     results_.dim = plan_.dim;
     results_.is_dynamic = plan_.is_dynamic;
+    results_.has_friction = plan_.has_friction;
     results_.frames = options.frames;
     for (const auto& set : options.overrides)
       results_.settings += fmt::format("{}`{}={}`", results_.settings.empty() ? "" : ", ", set.pointer, set.value);
@@ -83,6 +93,7 @@ class Study {
   }
 
   int run() {
+    keep_module_folders();
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
     if (!find_reference()) return simulation_stopped;
@@ -201,6 +212,7 @@ class Study {
 
   void write() {
     results_.reference = describe_reference();
+    if (options_.reference.empty()) results_.reference_run = finished(reference_) ? reference_ : plan_.finest;
     const std::string text = page(results_);
     const std::pair<const char*, std::string> files[] = {{"study.csv", csv(results_)},
                                                          {"study.json", json(results_)},
