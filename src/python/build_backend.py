@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Builds the wheel for `pip install .`: CMake makes the extension module, this packs it (PEP 517, PEP 427).
+"""Builds the wheel for `pip install .`: CMake makes the extension module and the solver modules whose libraries
+are there, this packs them (PEP 517, PEP 427).
 
 ITR_PYTHON_BUILD names a build tree to use; by default one is made in build/python.
 """
@@ -20,15 +21,17 @@ WHEEL_TAG = f"{TAG}-{TAG}-" + sysconfig.get_platform().replace("-", "_").replace
 
 
 def build_package():
-    """The folder of the built package."""
+    """Builds package and solver modules; returns the files of the wheel with their names in it."""
     tree = pathlib.Path(os.environ.get("ITR_PYTHON_BUILD") or ROOT / "build" / "python").resolve()
     if not (tree / "CMakeCache.txt").exists():
         subprocess.run(
             ["cmake", "-S", ROOT, "-B", tree, "-D", "CMAKE_BUILD_TYPE=Release", "-D", "ITR_BUILD_TESTS=OFF"], check=True
         )
     jobs = os.environ.get("ITR_JOBS", "2")
-    subprocess.run(["cmake", "--build", tree, "--target", "itr_python", "--", "-j", jobs], check=True)
-    return tree / "python" / "itr"
+    subprocess.run(["cmake", "--build", tree, "--target", "itr_python", "itr_modules", "--", "-j", jobs], check=True)
+    files = {f"itr/{path.name}": path for path in sorted((tree / "python/itr").iterdir()) if path.is_file()}
+    # The extension module looks for solvers in itr/backends beside itself.
+    return files | {f"itr/itr/backends/{path.name}": path for path in sorted((tree / "lib/itr/backends").glob("*.so"))}
 
 
 def metadata():
@@ -39,7 +42,7 @@ def metadata():
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     info = f"{PROJECT['name']}-{PROJECT['version']}.dist-info"
-    files = {f"itr/{path.name}": path.read_bytes() for path in sorted(build_package().iterdir()) if path.is_file()}
+    files = {name: path.read_bytes() for name, path in build_package().items()}
     files[f"{info}/METADATA"] = metadata().encode()
     files[f"{info}/WHEEL"] = f"Wheel-Version: 1.0\nGenerator: itr\nRoot-Is-Purelib: false\nTag: {WHEEL_TAG}\n".encode()
     record = []

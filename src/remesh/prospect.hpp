@@ -17,7 +17,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
 /// Edges up to this length may collapse [m] ...
 template <int Dim>
 double longest_collapse(const CollapseOptions& options, const StepContext<Dim>& context);
-/// ... where a cell around is not larger than one whose edges are that long (CONVENTIONS.md, "Remeshing").
+/// ... where a cell around is not larger than one whose edges are that long (REMESHING.md).
 template <int Dim>
 bool is_small(const Mesh<Dim>& mesh, CellId cell, double longest);
 /// Whether there is such an edge.

@@ -12,7 +12,7 @@ namespace itr {
 enum class Rank : char { bottom, middle, top };
 using EdgeRanks = std::unordered_map<EdgeKey, Rank, EdgeKeyHash>;
 
-/// CONVENTIONS.md, "Remeshing": elastic energy of an edge = mean over incident cells, contact energy = mean over its ends;
+/// REMESHING.md, "The rules": elastic energy of an edge = mean over incident cells, contact energy = mean over its ends;
 /// top if either is among the tops, bottom only if both are at the bottom.
 template <int Dim>
 EdgeRanks rank_edges(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,

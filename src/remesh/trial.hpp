@@ -43,7 +43,7 @@ struct TrialOptions {
   LocalRelaxationOptions local;
 };
 
-/// The decrease of the energy by the edit (CONVENTIONS.md, "Remeshing", rules a-d; paper eq. 11): both sides have one
+/// The decrease of the energy by the edit (REMESHING.md, "The rules", rules a-d; paper eq. 11): both sides have one
 /// support and get the same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex
 /// that it sets free: what that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it
 /// refuses. A patch decides what lies between. Once scratch and verdict have served for similar edits, nothing is allocated

@@ -283,7 +283,7 @@ constexpr Key kKeys[] = {
     {"/space/remesh/enabled", read, "boolean", "false", "", "in-timestep remeshing", basic},
     {"/space/remesh/type", read, "physics|sizing_field", "\"physics\"", "",
      "what decides about splits and collapses: energies, or lengths of edges, the baseline that the paper compares with "
-     "(CONVENTIONS.md)"},
+     "(REMESHING.md)"},
     {"/space/remesh/sizing_field/rel_min_edge_length", read, "non_negative", "0.01", "",
      "shorter edges are not split, in longest sides of the bodies' box: in contact nothing else ends it"},
     {"/space/remesh/screening", read, "energy-percentile|bounds|none", "\"bounds\"", "",
@@ -294,7 +294,7 @@ constexpr Key kKeys[] = {
      "what an operation is charged for forgetting of the past: what the new mesh cannot represent, or nothing (the paper)"},
     {"/space/remesh/relative_tolerance", read, "positive", "1e-4", "",
      "chooses split and collapse tolerances where split/acceptance_tolerance is not given: this part of the energy that the "
-     "scene can store (CONVENTIONS.md); `itr run` and `itr explain` print them",
+     "scene can store (REMESHING.md); `itr run` and `itr explain` print them",
      basic},
     {"/space/remesh/split/enabled", read, "boolean", "true", "", ""},
     {"/space/remesh/split/acceptance_tolerance", read, "positive", "(relative_tolerance chooses)", "J",
@@ -334,7 +334,8 @@ constexpr Key kKeys[] = {
     {"/space/remesh/local_relaxation/max_nl_iterations", read, "count", "1", "",
      "Newton iterations of a trial before it is judged"},
 
-    {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/ and the name of the scene", basic},
+    {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/ and the name of the scene",
+     basic},
     {"/output/checkpoint_period", read, "non_negative", "30", "s",
      "between states that --resume can go on from; 0: all frames"},
     {"/output/paraview/skip_frame", read, "count", "1", "", "store every n-th step", basic},

@@ -100,6 +100,10 @@ if(package)
     run(${CMAKE_COMMAND} -E env ITR_PYTHON_BUILD=${BUILD_DIR} ${PYTHON} -m pip install --quiet --no-index
         --no-build-isolation --no-deps --target ${WORK_DIR}/pip ${SOURCE_DIR})
     run(${CMAKE_COMMAND} -E env PYTHONPATH=${WORK_DIR}/pip ${PYTHON} ${SOURCE_DIR}/tests/python_test.py ${SOURCE_DIR} Arrays)
+    if(modules)  # the wheel brings its own
+      set(program "__import__('itr').Simulation(__import__('itr').Model.from_scene('${scene}', {'/solver/linear/solver': 'cholmod'})).step()")
+      run(${CMAKE_COMMAND} -E env PYTHONPATH=${WORK_DIR}/pip ${PYTHON} -c ${program})
+    endif()
   endif()
 endif()
 
