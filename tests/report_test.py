@@ -254,6 +254,19 @@ class Report(unittest.TestCase):
         self.assert_colour(self.browser.picture(), self.browser.place(1.75, 0.75), [10, 143, 60])
         self.assertEqual(self.browser.errors(), [])
 
+    def test_vertices_that_are_gone_are_shown_where_their_material_is(self):
+        folder = self.folder / "coarsened"
+        more = SQUARE + [[0.25, 0.75]]
+        write_frame(folder, 0, 0, more, more, [[0, 1, 2], [0, 2, 4], [2, 3, 4], [3, 0, 4]], [1, 1, 1, 1])
+        write_frame(folder, 1, 0.1, SQUARE, numpy.array(SQUARE, float) + [2, 0], [[0, 1, 2], [0, 2, 3]], [1, 1])
+        write_steps(folder, [0, 0.1])
+        self.report(folder)
+        self.open(folder / "report.html", "#t=0.1&edits=1&edges=0")
+        self.assertIn("1 collapsed vertices", self.browser.run("return v.made.textContent"))
+        self.assertNotIn("swap", self.browser.run("return v.made.textContent"))
+        self.assert_colour(self.browser.picture(), self.browser.place(2.25, 0.75), [208, 2, 27])
+        self.assertEqual(self.browser.errors(), [])
+
     def test_a_click_tells_ids_and_values(self):
         self.report(self.plane)
         self.open(self.plane / "report.html", "#t=0.1")
@@ -375,6 +388,8 @@ class Report(unittest.TestCase):
 
     def test_needs_nothing_beside_it(self):
         self.report(self.plane, "-o", self.folder / "alone.html")
+        self.report(self.plane, "-o", self.folder / "again.html")
+        self.assertTrue((self.folder / "alone.html").read_bytes() == (self.folder / "again.html").read_bytes())
         text = (self.folder / "alone.html").read_text()
         self.assertEqual(re.findall(r"(?:src|href)=\"(?!data:|#).{9}", text), [])
         self.assertEqual(re.findall(r"https?://(?!www\.w3\.org/2000/svg).{9}", text), [])
