@@ -329,6 +329,26 @@ class Report(unittest.TestCase):
         text = self.browser.run("return document.querySelector('.certificate.failed').textContent")
         self.assertRegex(text, r"1 stored frames, each by itself: \d+ violations.*000000")
 
+    def test_gaps_are_those_to_obstacles_and_other_bodies(self):
+        folder = self.folder / "gaps"
+        rest = numpy.array([[0, 0], [1, 0], [0, 1], [1.02, 0.5], [2, 0.5], [2, 1.5]])
+        floor = (numpy.array([[-1, -0.01], [0.5, -0.01]]), [[0, 1]])
+        write_frame(folder, 0, 0, rest, rest, [[0, 1, 2], [3, 4, 5]], [1, 1], obstacle=floor)
+        write_steps(folder, [0])
+        self.report(folder)
+        self.open(folder / "report.html")
+        limit = 0.02 * numpy.hypot(2, 1.5)
+        found = self.browser.run("const g = v.frame.field('gap'); return [...v.frame.mesh.vertices].filter(i => r.run.kind[i] === 0).map(i => g.values[i])")
+        numpy.testing.assert_allclose(found, [0.01, limit, limit, limit, limit, limit], rtol=2e-3)
+        x = rest.copy()
+        x[3:] -= [0.5, 0]  # beside the first one's slanted side: x + y = 1
+        write_frame(folder, 1, 0.1, rest, x, [[0, 1, 2], [3, 4, 5]], [1, 1], obstacle=floor)
+        self.report(folder)
+        self.open(folder / "report.html", "#t=0.1&field=gap")
+        found = self.browser.run("const g = v.frame.field('gap'); return [...v.frame.mesh.vertices].filter(i => r.run.kind[i] === 0).map(i => g.values[i])")
+        numpy.testing.assert_allclose(found, [0.01, limit, limit, 0.02 / numpy.sqrt(2), limit, limit], rtol=2e-3)
+        self.assertEqual(self.browser.errors(), [])
+
     def test_curved_edges_are_drawn_curved(self):
         folder = self.folder / "curved"
         rest = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]

@@ -9,6 +9,7 @@
 
 #include "deflate.hpp"
 #include "itr/core/error.hpp"
+#include "report_gap.hpp"
 
 namespace itr::output {
 
@@ -16,6 +17,7 @@ namespace {
 
 constexpr int kFramesOfChunk = 16;  // decoded together: the more, the smaller; the fewer, the sooner the first is seen
 constexpr int kNever = 1 << 30;     // a frame that there is not
+constexpr double kGapShare = 0.02;  // of the bodies' diagonal: gaps beyond are not told apart
 constexpr double kNothing = 1e-9;   // times the largest value: is shown as zero, as its digits are round-off
 
 enum Kind { vertex_kind, node_kind, obstacle_kind };
@@ -41,6 +43,17 @@ std::string encode_floats(const std::vector<float>& values) {
 double magnitude(const double* values, int columns) {
   double sum = 0;
   for (int k = 0; k < columns; ++k) sum += values[k] * values[k];
+  return std::sqrt(sum);
+}
+
+double diagonal(const StoredFrame& frame) {
+  double sum = 0;
+  for (int k = 0; k < frame.dim; ++k) {
+    double low = INFINITY, high = -INFINITY;
+    for (std::size_t i = k; i < frame.x.size(); i += frame.dim)
+      low = std::min(low, frame.x[i]), high = std::max(high, frame.x[i]);
+    if (low < high) sum += (high - low) * (high - low);
+  }
   return std::sqrt(sum);
 }
 
@@ -145,7 +158,8 @@ void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField
   obstacles_ = frame.obstacles;
   const std::size_t nodes = frame.x.size() / dim_, cells = frame.body.size();
   for (const StoredField& field : fields) {
-    if (field.columns == dim_ && field.values.size() == nodes * dim_)
+    const bool is_by_vertex = field.columns == dim_ || field.columns == 1;
+    if (is_by_vertex && field.values.size() == nodes * field.columns)
       vertex_fields_.push_back({field.name, field.unit});
     else if (field.columns == 0 && field.values.size() == cells)
       cell_fields_.push_back({field.name, field.unit});
@@ -202,7 +216,10 @@ void FrameEncoder::measure(const StoredFrame& frame, int cell) {
 
 void FrameEncoder::add(const std::filesystem::path& path) {
   const StoredFrame frame = read_frame(path);
-  const std::vector<StoredField> fields = read_frame_fields(path);
+  std::vector<StoredField> fields = read_frame_fields(path);
+  if (frames_.empty()) gap_limit_ = kGapShare * diagonal(frame);
+  if (std::vector<double> values = gaps(frame, gap_limit_); !values.empty())
+    fields.push_back({"gap", "m", 1, std::move(values)});
   if (frames_.empty()) start(frame, fields);
   if (frame.dim != dim_)
     throw InputError(
@@ -319,10 +336,12 @@ void FrameEncoder::add(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < vertex_fields_.size(); ++i) {
     std::vector<std::uint16_t>& codes = pending.vertex_codes.emplace_back();
     const auto field = find(vertex_fields_[i].name);
-    const bool is_there = field != fields.end() && field->values.size() == static_cast<std::size_t>(nodes) * dim;
-    for (const auto& [id, node] : order)
-      codes.push_back(
-          is_there && node < nodes ? code(i, magnitude(&field->values[static_cast<std::size_t>(node) * dim], dim)) : 0);
+    const int columns = field != fields.end() ? field->columns : 0;
+    const bool is_there = columns > 0 && field->values.size() == static_cast<std::size_t>(nodes) * columns;
+    for (const auto& [id, node] : order) {
+      const bool has_value = is_there && node < nodes;
+      codes.push_back(has_value ? code(i, magnitude(&field->values[static_cast<std::size_t>(node) * columns], columns)) : 0);
+    }
     if (!is_there || field->unit != "N") continue;
     std::array<double, 3>& sum = entry.forces[field->name];
     for (std::size_t k = 0; k < field->values.size(); ++k) sum[k % dim] += field->values[k];

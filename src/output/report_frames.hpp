@@ -114,7 +114,7 @@ class FrameEncoder {
   StoredSurface obstacles_;                  ///< of the first frame
   std::vector<FieldName> vertex_fields_, cell_fields_;
   std::vector<double> largest_;
-  double largest_u_ = 0;
+  double largest_u_ = 0, gap_limit_ = 0;
   std::array<double, 2> volume_ratios_{INFINITY, -INFINITY}, longest_edges_{INFINITY, -INFINITY};
   std::vector<EncodedFrame> frames_;
   std::vector<EncodedChunk> chunks_;

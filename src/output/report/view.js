@@ -7,6 +7,7 @@ const FIELD_LABELS = {
   von_mises: 'von Mises stress',
   u: 'displacement |u|',
   v: 'velocity |v|',
+  gap: 'gap, to other bodies and obstacles',
   contact_force: 'contact force',
   friction_force: 'friction force',
   reaction_force: 'reaction force',
