@@ -436,6 +436,38 @@ class Report(unittest.TestCase):
         self.assertIn("61 of 120 stored frames", self.browser.run("return document.getElementById('foot').textContent"))
         self.assertEqual(self.browser.run("return r.run.frames[r.run.frames.length - 1].step"), 119)
 
+    def test_cells_inside_of_solids_are_left_out_first(self):
+        folder, n = self.folder / "block", 8
+        random = numpy.random.default_rng(1)
+        rest = numpy.array([[i, j, k] for i in range(n) for j in range(n) for k in range(n)], float)
+        at = lambda i, j, k: (i * n + j) * n + k
+        cells = []
+        for i, j, k in numpy.ndindex(n - 1, n - 1, n - 1):
+            for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
+                corner, cell = [i, j, k], [at(i, j, k)]
+                for axis in order:
+                    corner[axis] += 1
+                    cell.append(at(*corner))
+                even = order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+                cells.append(cell if even else [cell[0], cell[1], cell[3], cell[2]])
+        for step in range(30):
+            write_frame(folder, step, step, rest, rest + random.uniform(-0.2, 0.2, rest.shape), cells, random.uniform(1, 2, len(cells)))
+        write_steps(folder, range(30))
+        self.report(folder)
+        size = (folder / "report.html").stat().st_size / 1e6
+        said = self.report(folder, "--max-mb", f"{0.9 * size}").stdout
+        self.assertIn("30 frames", said)
+        self.assertIn("cells inside of solids are left out", said)
+        self.assertLess((folder / "report.html").stat().st_size / 1e6, 0.9 * size)
+        self.open(folder / "report.html", "#view=0,0,1,3.5,3.5,3.5&cut=z,0.9,0")
+        counts = self.browser.run("return [v.frame.mesh.facets.length, v.frame.mesh.cells.length, v.bodies.count]")
+        self.assertEqual(counts[0], 12 * (n - 1) ** 2)
+        self.assertLess(counts[1], len(cells))
+        self.assertGreater(counts[2], counts[0])
+        x, y = self.browser.place(3.5, 3.5, 7)
+        self.assertLess(self.browser.picture()[y, x].min(), 250)
+        self.assertEqual(self.browser.errors(), [])
+
     def test_positions_are_those_of_the_frames(self):
         folder = self.folder / "masticator"
         subprocess.run([ITR, "run", EXAMPLES / "masticator.json", "-o", folder, "--set", "/time/tend=2.2", "--threads", "1", "--report"],
