@@ -171,15 +171,19 @@ function triangles(out, frame, x, field, share, cut) {
   if (cut && !inPlane) addSection(out, frame, x, field, share, cut);
 }
 
-// What a plane cuts of the cells: their sections, moved a little towards the eye's side of the plane by nothing.
+// What a plane cuts of the cells, taken as straight: their sections, a hair within what is shown.
 function addSection(out, frame, x, field, share, cut) {
   const {run, mesh} = frame, corners = run.cells.columns, byCell = field.of === 'cell', p = new Float32Array(12);
-  const height = id => cut[0] * x[3 * id] + cut[1] * x[3 * id + 1] + cut[2] * x[3 * id + 2] - cut[3];
+  const heights = new Float32Array(run.meta.counts.vertices), [c0, c1, c2, c3] = corners;
+  for (const id of mesh.vertices)
+    heights[id] = cut[0] * x[3 * id] + cut[1] * x[3 * id + 1] + cut[2] * x[3 * id + 2] - cut[3];
   for (const cell of mesh.cells) {
-    const v = [corners[0][cell], corners[1][cell], corners[2][cell], corners[3][cell]], h = v.map(height);
+    const isAbove = heights[c0[cell]] > 0;
+    if (isAbove === heights[c1[cell]] > 0 && isAbove === heights[c2[cell]] > 0 && isAbove === heights[c3[cell]] > 0)
+      continue;
+    const v = [c0[cell], c1[cell], c2[cell], c3[cell]], h = v.map(id => heights[id]);
     const above = [], below = [];
     for (let i = 0; i < 4; ++i) (h[i] > 0 ? above : below).push(i);
-    if (!above.length || !below.length) continue;
     const pairs = above.length === 2 ?
         [[above[0], below[0]], [above[0], below[1]], [above[1], below[1]], [above[1], below[0]]] :
         above.length === 1 ? below.map(i => [above[0], i]) :

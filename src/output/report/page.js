@@ -43,7 +43,7 @@ async function openPage() {
     ...run.meta.notes, `ITR ${run.meta.version}`,
     'drag: turn (shift: move), wheel: zoom; keys: space, comma, dot, arrows, + − f e l'
   ].join(' · ');
-  let view = null, pending = 0;
+  let view = null, pending = 0, shown = 0;
   const report = {run, plots: [], view: null};
   const showTime = () => report.plots.forEach(p => p.show(run.frames[view ? view.state.frame : run.frames.length - 1].t));
   report.plots = showPlots(run, t => {
@@ -62,7 +62,8 @@ async function openPage() {
     };
     view = report.view = new View(run, {
       onChange: () => {
-        showTime();
+        const now = performance.now();
+        if (!view?.playing || now - shown > 100) showTime(), shown = now;  // text takes as long as a frame
         if (!pending) pending = setTimeout(remember, 300);
       }
     });

@@ -447,7 +447,15 @@ class View {
   pickAt(px, py) {
     const t = this.bodies, m = this.matrix, p = t.place, cut = this.cutPlane;
     let best = Infinity, found = null;
+    // In clip coordinates first, as most triangles are elsewhere.
+    const cx = 2 * px / this.width - 1, cy = 1 - 2 * py / this.height;
+    const isBeside = (i, row, value) => {
+      const along = k => m[row] * p[k] + m[4 + row] * p[k + 1] + m[8 + row] * p[k + 2] + m[12 + row] - value;
+      const a = along(9 * i), b = along(9 * i + 3), c = along(9 * i + 6);
+      return a < 0 && b < 0 && c < 0 || a > 0 && b > 0 && c > 0;
+    };
     for (let i = 0; i < t.count; ++i) {
+      if (isBeside(i, 0, cx) || isBeside(i, 1, cy)) continue;
       const c = [0, 1, 2].map(k => this.project(p.subarray(9 * i + 3 * k, 9 * i + 3 * k + 3)));
       const area = (c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[1][1] - c[0][1]) * (c[2][0] - c[0][0]);
       if (!area) continue;
@@ -606,6 +614,7 @@ class View {
     }
     if (this.sharpness < 1 && turn === this.playTurn) this.sharpen(1);
     if (turn === this.playTurn && this.playing) this.play(false);
+    this.onChange(this);
   }
 
   // All that makes a view, for a link.
