@@ -57,9 +57,11 @@ double diagonal(const StoredFrame& frame) {
   return std::sqrt(sum);
 }
 
-std::vector<std::uint64_t> sorted_key(std::vector<int> ids) {
+LivingRows::Key sorted_key(std::vector<int> ids) {
   std::sort(ids.begin(), ids.end());
-  return {ids.begin(), ids.end()};
+  LivingRows::Key key{};
+  std::copy(ids.begin(), ids.end(), key.begin());
+  return key;
 }
 
 }  // namespace
@@ -102,7 +104,7 @@ std::string encode_integers(const std::vector<int>& values, int columns) {
   return bytes;
 }
 
-std::size_t LivingRows::Hash::operator()(const std::vector<std::uint64_t>& key) const {
+std::size_t LivingRows::Hash::operator()(const Key& key) const {
   std::uint64_t hash = 0x9e3779b97f4a7c15;
   for (const std::uint64_t part : key) {
     hash = (hash ^ part) * 0xff51afd7ed558ccd;
@@ -111,7 +113,7 @@ std::size_t LivingRows::Hash::operator()(const std::vector<std::uint64_t>& key) 
   return hash;
 }
 
-int LivingRows::touch(const std::vector<std::uint64_t>& key, const std::vector<int>& row) {
+int LivingRows::touch(const Key& key, const std::vector<int>& row) {
   const auto [place, is_new] = ids_.try_emplace(key, size());
   if (is_new) {
     columns_ = static_cast<int>(row.size());
@@ -248,11 +250,11 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     return p;
   };
   // Where vertices coincide, the first of them at a place is the first of them in the next frame.
-  std::unordered_map<std::vector<std::uint64_t>, int, LivingRows::Hash> repeats;
+  std::unordered_map<LivingRows::Key, int, LivingRows::Hash> repeats;
   std::vector<int> id_of(nodes, -1);
   std::vector<std::pair<int, int>> order;  // id, node; nodes of obstacles after those of the bodies
   vertices_.begin(index);
-  const auto touch_vertex = [&](Kind kind, std::vector<std::uint64_t> key, const std::array<double, 3>& rest) {
+  const auto touch_vertex = [&](Kind kind, const LivingRows::Key& key, const std::array<double, 3>& rest) {
     const int known = vertices_.size();
     const int id = vertices_.touch(key, {kind});
     if (id == known) rest_.push_back(rest);
@@ -262,10 +264,10 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     if (!keep_node[i]) continue;
     const Kind kind = i < num_vertices ? vertex_kind : node_kind;
     const std::array<double, 3> rest = read_point(frame.rest, i);
-    std::vector<std::uint64_t> key = {static_cast<std::uint64_t>(kind), 0};
-    for (int k = 0; k < dim; ++k) key.push_back(std::bit_cast<std::uint64_t>(rest[k] + 0.0));
+    LivingRows::Key key = {static_cast<std::uint64_t>(kind), 0};
+    for (int k = 0; k < dim; ++k) key[2 + k] = std::bit_cast<std::uint64_t>(rest[k] + 0.0);
     key[1] = repeats[key]++;
-    id_of[i] = touch_vertex(kind, std::move(key), rest);
+    id_of[i] = touch_vertex(kind, key, rest);
     order.emplace_back(id_of[i], i);
   }
   const int num_obstacle = static_cast<int>(obstacles_.x.size()) / dim;
@@ -283,7 +285,7 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     measure(frame, c);
     std::vector<int> row(corners);
     for (int k = 0; k < corners; ++k) row[k] = id_of[frame.simplices[c * corners + k]];
-    std::vector<std::uint64_t> key = sorted_key(row);
+    LivingRows::Key key = sorted_key(row);
     row.push_back(static_cast<int>(frame.body[c]));
     cell_id[c] = cells_.touch(key, row);
     cell_order.emplace_back(cell_id[c], c);
@@ -296,9 +298,9 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     if (owner[f] < 0) continue;
     std::vector<int> row(dim);
     for (int k = 0; k < dim; ++k) row[k] = id_of[frame.surface[f * dim + k]];
-    std::vector<std::uint64_t> key = sorted_key(row);
+    LivingRows::Key key = sorted_key(row);
     row.push_back(cell_id[owner[f]]);
-    key.push_back(cell_id[owner[f]]);
+    key[dim] = cell_id[owner[f]];
     facets_.touch(key, row);
   }
   facets_.end();
