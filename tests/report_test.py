@@ -541,6 +541,16 @@ class Report(unittest.TestCase):
         self.assertEqual(browser.run("return [!!document.getElementById('stored'), r.diagrams.length]"), [True, 6])
         self.assertEqual(browser.errors(), [])
 
+    def test_a_run_that_stops_is_shown_as_far_as_it_came(self):
+        folder = self.folder / "stopped"
+        done = subprocess.run([ITR, "run", EXAMPLES / "ball_wall.json", "-o", folder, "--threads", "1", "--report", "--set",
+                               "/solver/nonlinear/max_iterations=2"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.open(folder / "report.html")
+        self.assertIn("stopped in step", self.browser.run("return document.getElementById('said').textContent"))
+        self.assertGreater(self.browser.run("return r.run.frames.length"), 3)
+        self.assertEqual(self.browser.errors(), [])
+
     def test_what_cannot_be_shown_is_said(self):
         (self.folder / "empty").mkdir()
         self.assertIn("no stored frame", self.report(self.folder / "empty", status=2).stderr)

@@ -159,7 +159,7 @@ class Run {
     const bool is_finished = outcome == kFinished;
     if (is_finished)
       fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
-    if (with_report_) report(directory_, "", {});
+    if (with_report_) write_report();
     if (is_finished) return done;
     fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
     return simulation_stopped;
@@ -189,6 +189,14 @@ class Run {
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
     }
     return kFinished;
+  }
+
+  void write_report() const {
+    try {
+      report(directory_, "", {});
+    } catch (const InputError& error) {  // the run is what it is without
+      spdlog::warn("no report: {}", error.what());
+    }
   }
 
   void write(StepReport report) {
