@@ -254,6 +254,19 @@ class Report(unittest.TestCase):
         self.assert_colour(self.browser.picture(), self.browser.place(1.75, 0.75), [10, 143, 60])
         self.assertEqual(self.browser.errors(), [])
 
+    def test_vertices_that_are_gone_are_shown_where_their_material_is(self):
+        folder = self.folder / "coarsened"
+        more = SQUARE + [[0.25, 0.75]]
+        write_frame(folder, 0, 0, more, more, [[0, 1, 2], [0, 2, 4], [2, 3, 4], [3, 0, 4]], [1, 1, 1, 1])
+        write_frame(folder, 1, 0.1, SQUARE, numpy.array(SQUARE, float) + [2, 0], [[0, 1, 2], [0, 2, 3]], [1, 1])
+        write_steps(folder, [0, 0.1])
+        self.report(folder)
+        self.open(folder / "report.html", "#t=0.1&edits=1&edges=0")
+        self.assertIn("1 collapsed vertices", self.browser.run("return v.made.textContent"))
+        self.assertNotIn("swap", self.browser.run("return v.made.textContent"))
+        self.assert_colour(self.browser.picture(), self.browser.place(2.25, 0.75), [208, 2, 27])
+        self.assertEqual(self.browser.errors(), [])
+
     def test_a_click_tells_ids_and_values(self):
         self.report(self.plane)
         self.open(self.plane / "report.html", "#t=0.1")
@@ -316,6 +329,26 @@ class Report(unittest.TestCase):
         text = self.browser.run("return document.querySelector('.certificate.failed').textContent")
         self.assertRegex(text, r"1 stored frames, each by itself: \d+ violations.*000000")
 
+    def test_gaps_are_those_to_obstacles_and_other_bodies(self):
+        folder = self.folder / "gaps"
+        rest = numpy.array([[0, 0], [1, 0], [0, 1], [1.02, 0.5], [2, 0.5], [2, 1.5]])
+        floor = (numpy.array([[-1, -0.01], [0.5, -0.01]]), [[0, 1]])
+        write_frame(folder, 0, 0, rest, rest, [[0, 1, 2], [3, 4, 5]], [1, 1], obstacle=floor)
+        write_steps(folder, [0])
+        self.report(folder)
+        self.open(folder / "report.html")
+        limit = 0.02 * numpy.hypot(2, 1.5)
+        found = self.browser.run("const g = v.frame.field('gap'); return [...v.frame.mesh.vertices].filter(i => r.run.kind[i] === 0).map(i => g.values[i])")
+        numpy.testing.assert_allclose(found, [0.01, limit, limit, limit, limit, limit], rtol=2e-3)
+        x = rest.copy()
+        x[3:] -= [0.5, 0]  # beside the first one's slanted side: x + y = 1
+        write_frame(folder, 1, 0.1, rest, x, [[0, 1, 2], [3, 4, 5]], [1, 1], obstacle=floor)
+        self.report(folder)
+        self.open(folder / "report.html", "#t=0.1&field=gap")
+        found = self.browser.run("const g = v.frame.field('gap'); return [...v.frame.mesh.vertices].filter(i => r.run.kind[i] === 0).map(i => g.values[i])")
+        numpy.testing.assert_allclose(found, [0.01, limit, limit, 0.02 / numpy.sqrt(2), limit, limit], rtol=2e-3)
+        self.assertEqual(self.browser.errors(), [])
+
     def test_curved_edges_are_drawn_curved(self):
         folder = self.folder / "curved"
         rest = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]
@@ -375,6 +408,8 @@ class Report(unittest.TestCase):
 
     def test_needs_nothing_beside_it(self):
         self.report(self.plane, "-o", self.folder / "alone.html")
+        self.report(self.plane, "-o", self.folder / "again.html")
+        self.assertTrue((self.folder / "alone.html").read_bytes() == (self.folder / "again.html").read_bytes())
         text = (self.folder / "alone.html").read_text()
         self.assertEqual(re.findall(r"(?:src|href)=\"(?!data:|#).{9}", text), [])
         self.assertEqual(re.findall(r"https?://(?!www\.w3\.org/2000/svg).{9}", text), [])
@@ -400,6 +435,38 @@ class Report(unittest.TestCase):
         self.open(folder / "report.html")
         self.assertIn("61 of 120 stored frames", self.browser.run("return document.getElementById('foot').textContent"))
         self.assertEqual(self.browser.run("return r.run.frames[r.run.frames.length - 1].step"), 119)
+
+    def test_cells_inside_of_solids_are_left_out_first(self):
+        folder, n = self.folder / "block", 8
+        random = numpy.random.default_rng(1)
+        rest = numpy.array([[i, j, k] for i in range(n) for j in range(n) for k in range(n)], float)
+        at = lambda i, j, k: (i * n + j) * n + k
+        cells = []
+        for i, j, k in numpy.ndindex(n - 1, n - 1, n - 1):
+            for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
+                corner, cell = [i, j, k], [at(i, j, k)]
+                for axis in order:
+                    corner[axis] += 1
+                    cell.append(at(*corner))
+                even = order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+                cells.append(cell if even else [cell[0], cell[1], cell[3], cell[2]])
+        for step in range(30):
+            write_frame(folder, step, step, rest, rest + random.uniform(-0.2, 0.2, rest.shape), cells, random.uniform(1, 2, len(cells)))
+        write_steps(folder, range(30))
+        self.report(folder)
+        size = (folder / "report.html").stat().st_size / 1e6
+        said = self.report(folder, "--max-mb", f"{0.9 * size}").stdout
+        self.assertIn("30 frames", said)
+        self.assertIn("cells inside of solids are left out", said)
+        self.assertLess((folder / "report.html").stat().st_size / 1e6, 0.9 * size)
+        self.open(folder / "report.html", "#view=0,0,1,3.5,3.5,3.5&cut=z,0.9,0")
+        counts = self.browser.run("return [v.frame.mesh.facets.length, v.frame.mesh.cells.length, v.bodies.count]")
+        self.assertEqual(counts[0], 12 * (n - 1) ** 2)
+        self.assertLess(counts[1], len(cells))
+        self.assertGreater(counts[2], counts[0])
+        x, y = self.browser.place(3.5, 3.5, 7)
+        self.assertLess(self.browser.picture()[y, x].min(), 250)
+        self.assertEqual(self.browser.errors(), [])
 
     def test_positions_are_those_of_the_frames(self):
         folder = self.folder / "masticator"
@@ -473,6 +540,16 @@ class Report(unittest.TestCase):
         self.open(folder / "report.html", "?pictures")
         self.assertEqual(browser.run("return [!!document.getElementById('stored'), r.diagrams.length]"), [True, 6])
         self.assertEqual(browser.errors(), [])
+
+    def test_a_run_that_stops_is_shown_as_far_as_it_came(self):
+        folder = self.folder / "stopped"
+        done = subprocess.run([ITR, "run", EXAMPLES / "ball_wall.json", "-o", folder, "--threads", "1", "--report", "--set",
+                               "/solver/nonlinear/max_iterations=2"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.open(folder / "report.html")
+        self.assertIn("stopped in step", self.browser.run("return document.getElementById('said').textContent"))
+        self.assertGreater(self.browser.run("return r.run.frames.length"), 3)
+        self.assertEqual(self.browser.errors(), [])
 
     def test_what_cannot_be_shown_is_said(self):
         (self.folder / "empty").mkdir()

@@ -191,7 +191,7 @@ class Run {
     if (const int reverted = writer_->totals().reverted_remeshes; is_finished && reverted > 0)
       spdlog::warn("{} times all of a step's remeshing was dropped, as the state on the new mesh failed: see the warnings",
                    reverted);
-    if (with_report_) report(directory_, "", {});
+    if (with_report_) write_report();
     if (is_finished) return done;
     fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
     return simulation_stopped;
@@ -280,6 +280,14 @@ class Run {
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
     }
     return kFinished;
+  }
+
+  void write_report() const {
+    try {
+      report(directory_, "", {});
+    } catch (const InputError& error) {  // the run is what it is without
+      spdlog::warn("no report: {}", error.what());
+    }
   }
 
   void write(StepReport report) {

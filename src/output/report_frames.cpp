@@ -9,6 +9,7 @@
 
 #include "deflate.hpp"
 #include "itr/core/error.hpp"
+#include "report_gap.hpp"
 
 namespace itr::output {
 
@@ -16,6 +17,7 @@ namespace {
 
 constexpr int kFramesOfChunk = 16;  // decoded together: the more, the smaller; the fewer, the sooner the first is seen
 constexpr int kNever = 1 << 30;     // a frame that there is not
+constexpr double kGapShare = 0.02;  // of the bodies' diagonal: gaps beyond are not told apart
 constexpr double kNothing = 1e-9;   // times the largest value: is shown as zero, as its digits are round-off
 
 enum Kind { vertex_kind, node_kind, obstacle_kind };
@@ -44,9 +46,22 @@ double magnitude(const double* values, int columns) {
   return std::sqrt(sum);
 }
 
-std::vector<std::uint64_t> sorted_key(std::vector<int> ids) {
+double diagonal(const StoredFrame& frame) {
+  double sum = 0;
+  for (int k = 0; k < frame.dim; ++k) {
+    double low = INFINITY, high = -INFINITY;
+    for (std::size_t i = k; i < frame.x.size(); i += frame.dim)
+      low = std::min(low, frame.x[i]), high = std::max(high, frame.x[i]);
+    if (low < high) sum += (high - low) * (high - low);
+  }
+  return std::sqrt(sum);
+}
+
+LivingRows::Key sorted_key(std::vector<int> ids) {
   std::sort(ids.begin(), ids.end());
-  return {ids.begin(), ids.end()};
+  LivingRows::Key key{};
+  std::copy(ids.begin(), ids.end(), key.begin());
+  return key;
 }
 
 }  // namespace
@@ -89,7 +104,7 @@ std::string encode_integers(const std::vector<int>& values, int columns) {
   return bytes;
 }
 
-std::size_t LivingRows::Hash::operator()(const std::vector<std::uint64_t>& key) const {
+std::size_t LivingRows::Hash::operator()(const Key& key) const {
   std::uint64_t hash = 0x9e3779b97f4a7c15;
   for (const std::uint64_t part : key) {
     hash = (hash ^ part) * 0xff51afd7ed558ccd;
@@ -98,7 +113,7 @@ std::size_t LivingRows::Hash::operator()(const std::vector<std::uint64_t>& key) 
   return hash;
 }
 
-int LivingRows::touch(const std::vector<std::uint64_t>& key, const std::vector<int>& row) {
+int LivingRows::touch(const Key& key, const std::vector<int>& row) {
   const auto [place, is_new] = ids_.try_emplace(key, size());
   if (is_new) {
     columns_ = static_cast<int>(row.size());
@@ -145,7 +160,8 @@ void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField
   obstacles_ = frame.obstacles;
   const std::size_t nodes = frame.x.size() / dim_, cells = frame.body.size();
   for (const StoredField& field : fields) {
-    if (field.columns == dim_ && field.values.size() == nodes * dim_)
+    const bool is_by_vertex = field.columns == dim_ || field.columns == 1;
+    if (is_by_vertex && field.values.size() == nodes * field.columns)
       vertex_fields_.push_back({field.name, field.unit});
     else if (field.columns == 0 && field.values.size() == cells)
       cell_fields_.push_back({field.name, field.unit});
@@ -202,7 +218,10 @@ void FrameEncoder::measure(const StoredFrame& frame, int cell) {
 
 void FrameEncoder::add(const std::filesystem::path& path) {
   const StoredFrame frame = read_frame(path);
-  const std::vector<StoredField> fields = read_frame_fields(path);
+  std::vector<StoredField> fields = read_frame_fields(path);
+  if (frames_.empty()) gap_limit_ = kGapShare * diagonal(frame);
+  if (std::vector<double> values = gaps(frame, gap_limit_); !values.empty())
+    fields.push_back({"gap", "m", 1, std::move(values)});
   if (frames_.empty()) start(frame, fields);
   if (frame.dim != dim_)
     throw InputError(
@@ -231,11 +250,11 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     return p;
   };
   // Where vertices coincide, the first of them at a place is the first of them in the next frame.
-  std::unordered_map<std::vector<std::uint64_t>, int, LivingRows::Hash> repeats;
+  std::unordered_map<LivingRows::Key, int, LivingRows::Hash> repeats;
   std::vector<int> id_of(nodes, -1);
   std::vector<std::pair<int, int>> order;  // id, node; nodes of obstacles after those of the bodies
   vertices_.begin(index);
-  const auto touch_vertex = [&](Kind kind, std::vector<std::uint64_t> key, const std::array<double, 3>& rest) {
+  const auto touch_vertex = [&](Kind kind, const LivingRows::Key& key, const std::array<double, 3>& rest) {
     const int known = vertices_.size();
     const int id = vertices_.touch(key, {kind});
     if (id == known) rest_.push_back(rest);
@@ -245,10 +264,10 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     if (!keep_node[i]) continue;
     const Kind kind = i < num_vertices ? vertex_kind : node_kind;
     const std::array<double, 3> rest = read_point(frame.rest, i);
-    std::vector<std::uint64_t> key = {static_cast<std::uint64_t>(kind), 0};
-    for (int k = 0; k < dim; ++k) key.push_back(std::bit_cast<std::uint64_t>(rest[k] + 0.0));
+    LivingRows::Key key = {static_cast<std::uint64_t>(kind), 0};
+    for (int k = 0; k < dim; ++k) key[2 + k] = std::bit_cast<std::uint64_t>(rest[k] + 0.0);
     key[1] = repeats[key]++;
-    id_of[i] = touch_vertex(kind, std::move(key), rest);
+    id_of[i] = touch_vertex(kind, key, rest);
     order.emplace_back(id_of[i], i);
   }
   const int num_obstacle = static_cast<int>(obstacles_.x.size()) / dim;
@@ -266,7 +285,7 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     measure(frame, c);
     std::vector<int> row(corners);
     for (int k = 0; k < corners; ++k) row[k] = id_of[frame.simplices[c * corners + k]];
-    std::vector<std::uint64_t> key = sorted_key(row);
+    LivingRows::Key key = sorted_key(row);
     row.push_back(static_cast<int>(frame.body[c]));
     cell_id[c] = cells_.touch(key, row);
     cell_order.emplace_back(cell_id[c], c);
@@ -279,9 +298,9 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     if (owner[f] < 0) continue;
     std::vector<int> row(dim);
     for (int k = 0; k < dim; ++k) row[k] = id_of[frame.surface[f * dim + k]];
-    std::vector<std::uint64_t> key = sorted_key(row);
+    LivingRows::Key key = sorted_key(row);
     row.push_back(cell_id[owner[f]]);
-    key.push_back(cell_id[owner[f]]);
+    key[dim] = cell_id[owner[f]];
     facets_.touch(key, row);
   }
   facets_.end();
@@ -319,10 +338,12 @@ void FrameEncoder::add(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < vertex_fields_.size(); ++i) {
     std::vector<std::uint16_t>& codes = pending.vertex_codes.emplace_back();
     const auto field = find(vertex_fields_[i].name);
-    const bool is_there = field != fields.end() && field->values.size() == static_cast<std::size_t>(nodes) * dim;
-    for (const auto& [id, node] : order)
-      codes.push_back(
-          is_there && node < nodes ? code(i, magnitude(&field->values[static_cast<std::size_t>(node) * dim], dim)) : 0);
+    const int columns = field != fields.end() ? field->columns : 0;
+    const bool is_there = columns > 0 && field->values.size() == static_cast<std::size_t>(nodes) * columns;
+    for (const auto& [id, node] : order) {
+      const bool has_value = is_there && node < nodes;
+      codes.push_back(has_value ? code(i, magnitude(&field->values[static_cast<std::size_t>(node) * columns], columns)) : 0);
+    }
     if (!is_there || field->unit != "N") continue;
     std::array<double, 3>& sum = entry.forces[field->name];
     for (std::size_t k = 0; k < field->values.size(); ++k) sum[k % dim] += field->values[k];

@@ -18,10 +18,11 @@ namespace itr::output {
 /// Rows of integers, each of which is there from frame `birth` to the one before `death`.
 class LivingRows {
  public:
+  using Key = std::array<std::uint64_t, 5>;  ///< of one kind of rows all as long, and then 0
   explicit LivingRows(int columns) : columns_(columns) {}
   void begin(int frame) { frame_ = frame; }
   /// The row of this key, which is a new one where the frame before has none: `row` is copied then.
-  int touch(const std::vector<std::uint64_t>& key, const std::vector<int>& row);
+  int touch(const Key& key, const std::vector<int>& row);
   /// Rows that were not touched are no more.
   void end();
   int size() const { return static_cast<int>(birth_.size()); }
@@ -34,14 +35,14 @@ class LivingRows {
   std::string encode() const;
 
   struct Hash {
-    std::size_t operator()(const std::vector<std::uint64_t>& key) const;
+    std::size_t operator()(const Key& key) const;
   };
 
  private:
   int columns_, frame_ = 0, changes_ = 0, first_unborn_ = 0;
   std::vector<int> rows_, birth_, death_, touched_, alive_;
-  std::unordered_map<std::vector<std::uint64_t>, int, Hash> ids_;
-  std::vector<std::vector<std::uint64_t>> keys_;
+  std::unordered_map<Key, int, Hash> ids_;
+  std::vector<Key> keys_;
 };
 
 /// Column by column, differences from the row above, their bytes sorted by weight: what compresses well.
@@ -114,7 +115,7 @@ class FrameEncoder {
   StoredSurface obstacles_;                  ///< of the first frame
   std::vector<FieldName> vertex_fields_, cell_fields_;
   std::vector<double> largest_;
-  double largest_u_ = 0;
+  double largest_u_ = 0, gap_limit_ = 0;
   std::array<double, 2> volume_ratios_{INFINITY, -INFINITY}, longest_edges_{INFINITY, -INFINITY};
   std::vector<EncodedFrame> frames_;
   std::vector<EncodedChunk> chunks_;

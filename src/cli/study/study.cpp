@@ -223,7 +223,8 @@ class Study {
       if (!(file << content).flush())
         throw InputError({(directory_ / name).string(), "", "not written", "a folder with space"});
     }
-    fmt::print("{}\nThis page, study.csv, study.json and study.svg are in {}\n", text, directory_.string());
+    fmt::print("{0}\nThis page, study.csv, study.json and study.svg are in {1}; `itr report {1}` shows them in a browser\n",
+               text, directory_.string());
   }
 
   const Options& options_;

@@ -3,7 +3,11 @@
 'use strict';
 
 const NEVER = 1 << 30;
-const KIND = {vertex: 0, node: 1, obstacle: 2};
+const KIND = {
+  vertex: 0,
+  node: 1,
+  obstacle: 2
+};
 // Codes of magnitudes: 512 an octave, 0 is zero.
 const MAGNITUDES = Float32Array.from({length: 65536}, (_, code) => code ? 2 ** (code / 512 - 70) : 0);
 
@@ -24,19 +28,24 @@ class Reader {
   }
   words(n) {  // of four bytes, the lowest bytes of all words first
     const out = new Uint32Array(n), b = this.bytes, at = this.at;
-    for (let i = 0; i < n; ++i)
-      out[i] = b[at + i] | b[at + n + i] << 8 | b[at + 2 * n + i] << 16 | b[at + 3 * n + i] << 24;
+    for (let i = 0; i < n; ++i) out[i] = b[at + i] | b[at + n + i] << 8 | b[at + 2 * n + i] << 16 | b[at + 3 * n + i] << 24;
     this.at += 4 * n;
     return out;
   }
-  floats(n) { return new Float32Array(this.words(n).buffer); }
+  floats(n) {
+    return new Float32Array(this.words(n).buffer);
+  }
   column(n) {
     const words = this.words(n), out = new Int32Array(n);
     for (let i = 0, above = 0; i < n; ++i) out[i] = above = (above + ((words[i] >>> 1) ^ -(words[i] & 1))) | 0;
     return out;
   }
-  columns(rows, n) { return Array.from({length: n}, () => this.column(rows)); }
-  living(rows, n) { return {columns: this.columns(rows, n), birth: this.column(rows), death: this.column(rows)}; }
+  columns(rows, n) {
+    return Array.from({length: n}, () => this.column(rows));
+  }
+  living(rows, n) {
+    return {columns: this.columns(rows, n), birth: this.column(rows), death: this.column(rows)};
+  }
   codes(n) {
     const out = new Uint16Array(n), b = this.bytes, at = this.at;
     for (let i = 0; i < n; ++i) {
@@ -110,8 +119,13 @@ class Run {
     const number = this.frames[frame].mesh;
     let mesh = this.meshes.get(number);
     if (mesh) return mesh;
-    mesh = {number, vertices: alive(this.vertices, frame), cells: alive(this.cells, frame), facets: alive(this.facets, frame),
-            curved: null};
+    mesh = {
+      number,
+      vertices: alive(this.vertices, frame),
+      cells: alive(this.cells, frame),
+      facets: alive(this.facets, frame),
+      curved: null
+    };
     if (this.meta.counts.curved) {
       mesh.curved = new Map();
       const [a, b, node] = this.curved.columns;
@@ -121,9 +135,13 @@ class Run {
     this.meshes.set(number, mesh);
     return mesh;
   }
-  edgeKey(a, b) { return a < b ? a * this.meta.counts.vertices + b : b * this.meta.counts.vertices + a; }
+  edgeKey(a, b) {
+    return a < b ? a * this.meta.counts.vertices + b : b * this.meta.counts.vertices + a;
+  }
 
-  chunkOf(frame) { return this.chunks.findIndex(c => frame < c.first + c.count); }
+  chunkOf(frame) {
+    return this.chunks.findIndex(c => frame < c.first + c.count);
+  }
 
   decode(k) {
     const chunk = this.chunks[k];
@@ -144,8 +162,11 @@ class Run {
         predictor.restore(ids, rows.birth, chunk.first, f, codes);
         return codes;
       };
-      frames.push({u: u.map(restore(mesh.vertices, this.vertices)), vertex: v.map(restore(mesh.vertices, this.vertices)),
-                   cell: c.map(restore(mesh.cells, this.cells))});
+      frames.push({
+        u: u.map(restore(mesh.vertices, this.vertices)),
+        vertex: v.map(restore(mesh.vertices, this.vertices)),
+        cell: c.map(restore(mesh.cells, this.cells))
+      });
     }
     return frames;
   }
@@ -232,7 +253,9 @@ function edgeSquares(x, corners, c) {
   return out;
 }
 
-function longestEdge(x, corners, c) { return Math.sqrt(Math.max(...edgeSquares(x, corners, c))); }
+function longestEdge(x, corners, c) {
+  return Math.sqrt(Math.max(...edgeSquares(x, corners, c)));
+}
 
 // Volume by the mean square of edges, 1 for the regular simplex.
 function quality(dim, x, corners, c) {

@@ -65,23 +65,35 @@ class Triangles {
   add(p, i, j, k, a, b, c, cell, mask, nodes) {
     if (this.count === this.capacity) this.grow(2 * this.capacity);
     const t = this.count++, q = this.place, at = 9 * t;
-    q[at] = p[3 * i]; q[at + 1] = p[3 * i + 1]; q[at + 2] = p[3 * i + 2];
-    q[at + 3] = p[3 * j]; q[at + 4] = p[3 * j + 1]; q[at + 5] = p[3 * j + 2];
-    q[at + 6] = p[3 * k]; q[at + 7] = p[3 * k + 1]; q[at + 8] = p[3 * k + 2];
+    q[at] = p[3 * i];
+    q[at + 1] = p[3 * i + 1];
+    q[at + 2] = p[3 * i + 2];
+    q[at + 3] = p[3 * j];
+    q[at + 4] = p[3 * j + 1];
+    q[at + 5] = p[3 * j + 2];
+    q[at + 6] = p[3 * k];
+    q[at + 7] = p[3 * k + 1];
+    q[at + 8] = p[3 * k + 2];
     const ax = q[at + 3] - q[at], ay = q[at + 4] - q[at + 1], az = q[at + 5] - q[at + 2];
     const bx = q[at + 6] - q[at], by = q[at + 7] - q[at + 1], bz = q[at + 8] - q[at + 2], m = this.normal;
     m[at] = m[at + 3] = m[at + 6] = ay * bz - az * by;
     m[at + 1] = m[at + 4] = m[at + 7] = az * bx - ax * bz;
     m[at + 2] = m[at + 5] = m[at + 8] = ax * by - ay * bx;
-    this.share[3 * t] = a; this.share[3 * t + 1] = b; this.share[3 * t + 2] = c;
+    this.share[3 * t] = a;
+    this.share[3 * t + 1] = b;
+    this.share[3 * t + 2] = c;
     const w = this.corner, o = 12 * t;
     for (let e = 0; e < 3; ++e) {
       const hidden = mask >> e & 1 ? 0 : 255;
-      w[o + e] = hidden; w[o + 4 + e] = hidden; w[o + 8 + e] = hidden;
+      w[o + e] = hidden;
+      w[o + 4 + e] = hidden;
+      w[o + 8 + e] = hidden;
       w[o + 4 * e + e] = 255;
     }
     this.cell[t] = cell;
-    this.nodes[3 * t] = nodes ? nodes[0] : i; this.nodes[3 * t + 1] = nodes ? nodes[1] : j; this.nodes[3 * t + 2] = nodes ? nodes[2] : k;
+    this.nodes[3 * t] = nodes ? nodes[0] : i;
+    this.nodes[3 * t + 1] = nodes ? nodes[1] : j;
+    this.nodes[3 * t + 2] = nodes ? nodes[2] : k;
   }
 }
 
@@ -159,21 +171,27 @@ function triangles(out, frame, x, field, share, cut) {
   if (cut && !inPlane) addSection(out, frame, x, field, share, cut);
 }
 
-// What a plane cuts of the cells: their sections, moved a little towards the eye's side of the plane by nothing.
+// What a plane cuts of the cells, taken as straight: their sections, a hair within what is shown.
 function addSection(out, frame, x, field, share, cut) {
   const {run, mesh} = frame, corners = run.cells.columns, byCell = field.of === 'cell', p = new Float32Array(12);
-  const height = id => cut[0] * x[3 * id] + cut[1] * x[3 * id + 1] + cut[2] * x[3 * id + 2] - cut[3];
+  const heights = new Float32Array(run.meta.counts.vertices), [c0, c1, c2, c3] = corners;
+  for (const id of mesh.vertices)
+    heights[id] = cut[0] * x[3 * id] + cut[1] * x[3 * id + 1] + cut[2] * x[3 * id + 2] - cut[3];
   for (const cell of mesh.cells) {
-    const v = [corners[0][cell], corners[1][cell], corners[2][cell], corners[3][cell]], h = v.map(height);
+    const isAbove = heights[c0[cell]] > 0;
+    if (isAbove === heights[c1[cell]] > 0 && isAbove === heights[c2[cell]] > 0 && isAbove === heights[c3[cell]] > 0)
+      continue;
+    const v = [c0[cell], c1[cell], c2[cell], c3[cell]], h = v.map(id => heights[id]);
     const above = [], below = [];
     for (let i = 0; i < 4; ++i) (h[i] > 0 ? above : below).push(i);
-    if (!above.length || !below.length) continue;
-    const pairs = above.length === 2
-      ? [[above[0], below[0]], [above[0], below[1]], [above[1], below[1]], [above[1], below[0]]]
-      : above.length === 1 ? below.map(i => [above[0], i]) : above.map(i => [below[0], i]);
+    const pairs = above.length === 2 ?
+        [[above[0], below[0]], [above[0], below[1]], [above[1], below[1]], [above[1], below[0]]] :
+        above.length === 1 ? below.map(i => [above[0], i]) :
+                             above.map(i => [below[0], i]);
     const s = pairs.map(([i, j], n) => {
       const t = h[i] / (h[i] - h[j]);
-      for (let k = 0; k < 3; ++k) p[3 * n + k] = x[3 * v[i] + k] + t * (x[3 * v[j] + k] - x[3 * v[i] + k]) - 1e-6 * cut[k] * cut[4];
+      for (let k = 0; k < 3; ++k)
+        p[3 * n + k] = x[3 * v[i] + k] + t * (x[3 * v[j] + k] - x[3 * v[i] + k]) - 1e-6 * cut[k] * cut[4];
       return byCell ? share(field.values[cell]) : share(field.values[v[i]] * (1 - t) + field.values[v[j]] * t);
     });
     const near = pairs.map(([i, j]) => Math.abs(h[i]) < Math.abs(h[j]) ? v[i] : v[j]);
@@ -188,7 +206,7 @@ function enclosedVolume({place: p, count}) {
   let sum = 0;
   for (let i = 0; i < 9 * count; i += 9) {
     sum += p[i] * (p[i + 4] * p[i + 8] - p[i + 5] * p[i + 7]) - p[i + 1] * (p[i + 3] * p[i + 8] - p[i + 5] * p[i + 6]) +
-      p[i + 2] * (p[i + 3] * p[i + 7] - p[i + 4] * p[i + 6]);
+        p[i + 2] * (p[i + 3] * p[i + 7] - p[i + 4] * p[i + 6]);
   }
   return sum;
 }
@@ -213,8 +231,10 @@ class Painter {
     const pixels = new Uint8Array(1024 * 4);
     for (let i = 0; i < 1024; ++i) pixels.set([...colourAt(colours, i / 1023), 255], 4 * i);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 1024, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE],
-                                 [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]]) gl.texParameteri(gl.TEXTURE_2D, name, value);
+    for (const [name, value] of [
+             [gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE],
+             [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]])
+      gl.texParameteri(gl.TEXTURE_2D, name, value);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
   }
@@ -222,7 +242,8 @@ class Painter {
   program(...words) {
     const key = words.filter(Boolean).join(' '), known = this.programs.get(key);
     if (known) return known;
-    const {gl} = this, program = gl.createProgram(), head = '#version 300 es\n' + key.split(' ').map(word => word && `#define ${word}\n`).join('');
+    const {gl} = this, program = gl.createProgram(),
+          head = '#version 300 es\n' + key.split(' ').map(word => word && `#define ${word}\n`).join('');
     for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {
       const shader = gl.createShader(kind);
       gl.shaderSource(shader, head + text);
@@ -233,7 +254,8 @@ class Painter {
     ATTRIBUTES.forEach(([name], i) => gl.bindAttribLocation(program, i, name));
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-    const at = Object.fromEntries(['toClip', 'cut', 'flatColour', 'light', 'edges'].map(n => [n, gl.getUniformLocation(program, n)]));
+    const at = Object.fromEntries(
+        ['toClip', 'cut', 'flatColour', 'light', 'edges'].map(n => [n, gl.getUniformLocation(program, n)]));
     this.programs.set(key, {program, at});
     return this.programs.get(key);
   }
@@ -293,11 +315,13 @@ function colourAt(colours, share) {
 // Parallel projection: the eye at angles [degree] about y from z and above the plane; pixels a metre; what is at the middle.
 class Camera {
   constructor(dim, azimuth, elevation) {
-    Object.assign(this, {dim, azimuth: dim === 2 ? 0 : azimuth, elevation: dim === 2 ? 0 : elevation, zoom: 1, target: [0, 0, 0]});
+    Object.assign(
+        this, {dim, azimuth: dim === 2 ? 0 : azimuth, elevation: dim === 2 ? 0 : elevation, zoom: 1, target: [0, 0, 0]});
   }
   axes() {
     const a = this.azimuth * Math.PI / 180, e = this.elevation * Math.PI / 180;
-    const forward = [Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e)], right = [Math.cos(a), 0, -Math.sin(a)];
+    const forward = [Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e)],
+          right = [Math.cos(a), 0, -Math.sin(a)];
     const up = [0, 1, 2].map(k => forward[(k + 1) % 3] * right[(k + 2) % 3] - forward[(k + 2) % 3] * right[(k + 1) % 3]);
     return {right, up, forward};
   }

@@ -4,8 +4,10 @@
 
 function describe(run) {
   const {meta} = run, last = run.steps[run.steps.length - 1], s = meta.summary, parts = [];
-  if (s) parts.push(`${s.scene}: ${s.outcome}`, `solver ${s.solver}`);
-  else parts.push('not finished');
+  if (s)
+    parts.push(`${s.scene}: ${s.outcome}`, `solver ${s.solver}`);
+  else
+    parts.push('not finished');
   if (last) parts.push(`${last.step} steps to t = ${shortNumber(last.t)} s`);
   if (s) parts.push(`${shortNumber(s.seconds.total)} s`);
   return parts.join(' · ');
@@ -15,7 +17,9 @@ function showCertificate({certificate}) {
   if (!certificate) return;
   const good = !certificate.count, head = `${certificate.frames} stored frames, each by itself: `;
   const text = good ? 'no intersection, nothing inside of a body, no inversion' : `${certificate.count} violations`;
-  const element = html('details', {className: good ? 'certificate' : 'certificate failed'}, html('summary', {}, head + text), ...certificate.violations.map(v => html('div', {}, v)));
+  const element = html(
+      'details', {className: good ? 'certificate' : 'certificate failed'}, html('summary', {}, head + text),
+      ...certificate.violations.map(v => html('div', {}, v)));
   document.querySelector('header').append(element);
 }
 
@@ -35,9 +39,11 @@ async function openPage() {
   const run = await new Run().load();
   document.getElementById('said').textContent = describe(run);
   showCertificate(run.meta);
-  document.getElementById('foot').textContent = [...run.meta.notes, `ITR ${run.meta.version}`, 'drag: turn (shift: move), wheel: zoom; keys: space, comma, dot, arrows, + − f e l']
-    .join(' · ');
-  let view = null, pending = 0;
+  document.getElementById('foot').textContent = [
+    ...run.meta.notes, `ITR ${run.meta.version}`,
+    'drag: turn (shift: move), wheel: zoom; keys: space, comma, dot, arrows, + − f e l'
+  ].join(' · ');
+  let view = null, pending = 0, shown = 0;
   const report = {run, plots: [], view: null};
   const showTime = () => report.plots.forEach(p => p.show(run.frames[view ? view.state.frame : run.frames.length - 1].t));
   report.plots = showPlots(run, t => {
@@ -54,10 +60,13 @@ async function openPage() {
       } catch {  // some browsers do not allow that for files
       }
     };
-    view = report.view = new View(run, {onChange: () => {
-      showTime();
-      if (!pending) pending = setTimeout(remember, 300);
-    }});
+    view = report.view = new View(run, {
+      onChange: () => {
+        const now = performance.now();
+        if (!view?.playing || now - shown > 100) showTime(), shown = now;  // text takes as long as a frame
+        if (!pending) pending = setTimeout(remember, 300);
+      }
+    });
     document.getElementById('main').append(view.root);
     document.body.classList.add('with-view');
     view.resize();
@@ -72,4 +81,5 @@ async function openPage() {
   return report;
 }
 
-window.itrReport = (document.getElementById('study') ? openStudy() : openPage()).catch(error => (stayWithPictures(error), {failed: error}));
+window.itrReport =
+    (document.getElementById('study') ? openStudy() : openPage()).catch(error => (stayWithPictures(error), {failed: error}));

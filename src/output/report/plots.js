@@ -2,7 +2,14 @@
 // Plots of steps over time, as SVG; all have one cursor.
 'use strict';
 
-const PLOT = {width: 380, height: 170, left: 58, right: 10, top: 8, bottom: 22};
+const PLOT = {
+  width: 380,
+  height: 170,
+  left: 58,
+  right: 10,
+  top: 8,
+  bottom: 22
+};
 const LINE_COLOURS = ['#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#1d2530'];
 
 function svg(name, attributes = {}, ...children) {
@@ -14,7 +21,8 @@ function svg(name, attributes = {}, ...children) {
 
 function html(name, attributes = {}, ...children) {
   const element = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) key in element && key !== 'list' ? element[key] = value : element.setAttribute(key, value);
+  for (const [key, value] of Object.entries(attributes))
+    key in element && key !== 'list' ? element[key] = value : element.setAttribute(key, value);
   element.append(...children);
   return element;
 }
@@ -29,13 +37,22 @@ function shortNumber(value) {
 function ticksOf(low, high, log) {
   const found = [];
   if (log) {
-    const decades = Math.log10(high / low), every = Math.max(1, Math.ceil(decades / 5));
-    for (let e = Math.ceil(Math.log10(low) - 1e-9); e <= Math.log10(high) + 1e-9; e += every) found.push(10 ** e);
-    return found.length > 1 ? found : [low, high];
+    const found = roundBetween(low, high);
+    if (found.length > 1) return found;
   }
   if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)))) return [low];
-  const raw = (high - low) / 4, power = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].find(m => m * power >= raw) * power;
+  const raw = (high - low) / 4, power = 10 ** Math.floor(Math.log10(raw)),
+        step = [1, 2, 5, 10].find(m => m * power >= raw) * power;
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) found.push(k * step);
+  return found;
+}
+
+// 1, 2 and 5 times powers of ten, or where they are many these powers.
+function roundBetween(low, high) {
+  const found = [], decades = Math.log10(high / low), every = Math.max(1, Math.ceil(decades / 6));
+  for (let e = Math.floor(Math.log10(low)); e <= Math.log10(high); e += every)
+    for (const m of decades < 2.2 ? [1, 2, 5] : [1])
+      if (m * 10 ** e >= 0.9999 * low && m * 10 ** e <= 1.0001 * high) found.push(m * 10 ** e);
   return found;
 }
 
@@ -49,20 +66,28 @@ function plotsOf(run) {
   const names = ['inertia', 'elastic', 'body', 'contact', 'friction', 'damping', 'total'];
   add('Energy of the step by term', 'J', names.map(name => ({name, values: take(s => s.energy?.[name])})));
   add('Vertices', '', [{name: '', values: take(s => s.vertices)}]);
-  add('Seconds a step', 's', ['total', 'remesh', 'linear_solve', 'assembly', 'ccd'].map(name => ({name: name.replace('_', ' '), values: take(s => s.seconds?.[name])})));
+  add('Seconds a step', 's', [
+    'total', 'remesh', 'linear_solve', 'assembly', 'ccd'
+  ].map(name => ({name: name.replace('_', ' '), values: take(s => s.seconds?.[name])})));
   add('Newton iterations a step', '', [{name: '', values: take(s => s.newton_iterations)}]);
-  add('Operations of remeshing that were accepted', '', ['splits', 'collapses', 'swaps', 'smooths', 'raises', 'lowers']
-    .map(name => ({name, values: take(s => s[name]?.accepted)})));
+  add('Operations of remeshing that were accepted', '', [
+    'splits', 'collapses', 'swaps', 'smooths', 'raises', 'lowers'
+  ].map(name => ({name, values: take(s => s[name]?.accepted)})));
   add('Energy that remeshing gained', 'J', [{name: '', values: take(gainOf)}]);
   add('Least distance in contact', 'm', [{name: '', values: take(s => s.min_distance)}], true);
   add('Least volume ratio', '', [{name: '', values: take(s => s.min_volume_ratio)}]);
   for (const force of Object.keys(run.frames[0].forces ?? {}))
-    add(`Resultant, ${force.replace('_', ' ')}`, 'N', ['x', 'y', 'z'].slice(0, run.dim)
-      .map((name, k) => ({name, values: run.frames.map(f => f.forces[force]?.[k] ?? NaN)})), false, run.frames.map(f => f.t));
+    add(`Resultant, ${force.replace('_', ' ')}`, 'N',
+        ['x', 'y', 'z']
+            .slice(0, run.dim)
+            .map((name, k) => ({name, values: run.frames.map(f => f.forces[force]?.[k] ?? NaN)})),
+        false, run.frames.map(f => f.t));
   return list;
 }
 
-function gainOf(step) { return step.step > 0 ? step.energy_before_remesh - step.energy.total - step.history_loss : 0; }
+function gainOf(step) {
+  return step.step > 0 ? step.energy_before_remesh - step.energy.total - step.history_loss : 0;
+}
 
 class Plot {
   constructor(plot, onTime) {
@@ -71,7 +96,8 @@ class Plot {
     const used = this.series.flatMap(s => s.values).filter(v => Number.isFinite(v) && (!this.log || v > 0));
     let low = used.reduce((a, b) => Math.min(a, b), Infinity), high = used.reduce((a, b) => Math.max(a, b), -Infinity);
     if (!this.log && low > 0 && low < 0.6 * high) low = 0;
-    if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)))) [low, high] = this.log ? [low / 2, high * 2] : [low - (Math.abs(low) || 1) / 2, high + (Math.abs(high) || 1) / 2];
+    if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high))))
+      [low, high] = this.log ? [low / 2, high * 2] : [low - (Math.abs(low) || 1) / 2, high + (Math.abs(high) || 1) / 2];
     const [t0, t1] = [this.times[0], this.times[this.times.length - 1]];
     this.x = t => left + (t - t0) / (t1 - t0) * (width - left - right);
     const share = this.log ? v => Math.log(v / low) / Math.log(high / low) : v => (v - low) / (high - low);
@@ -83,12 +109,15 @@ class Plot {
     }
     for (const tick of ticksOf(t0, t1, false))
       this.drawing.append(svg('text', {x: this.x(tick), y: height - 7, 'text-anchor': 'middle'}, shortNumber(tick)));
-    this.series.forEach((s, k) => this.drawing.append(svg('path', {d: this.path(s.values), fill: 'none', stroke: LINE_COLOURS[k], 'stroke-width': 1.4})));
+    this.series.forEach(
+        (s, k) => this.drawing.append(
+            svg('path', {d: this.path(s.values), fill: 'none', stroke: LINE_COLOURS[k], 'stroke-width': 1.4})));
     this.cursor = svg('line', {y1: top, y2: height - bottom, stroke: '#1d2530', 'stroke-dasharray': '3 2'});
     this.drawing.append(this.cursor);
     this.values = this.series.map((s, k) => html('span', {style: `color:${LINE_COLOURS[k]}`}));
     const unit = this.unit ? ` [${this.unit}]` : '';
-    this.figure = html('figure', {className: 'plot'}, html('figcaption', {}, this.title + unit, ...this.values), this.drawing);
+    this.figure =
+        html('figure', {className: 'plot'}, html('figcaption', {}, this.title + unit, ...this.values), this.drawing);
     const move = event => {
       const box = this.drawing.getBoundingClientRect(), at = (event.clientX - box.left) / box.width * width;
       onTime(t0 + Math.min(Math.max((at - left) / (width - left - right), 0), 1) * (t1 - t0));
@@ -109,7 +138,9 @@ class Plot {
     const i = nearest(this.times, t), x = this.x(this.times[i]);
     this.cursor.setAttribute('x1', x);
     this.cursor.setAttribute('x2', x);
-    this.series.forEach((s, k) => this.values[k].textContent = `${s.name} ${Number.isFinite(s.values[i]) ? shortNumber(s.values[i]) : '–'}`.trim());
+    this.series.forEach(
+        (s, k) => this.values[k].textContent =
+            `${s.name} ${Number.isFinite(s.values[i]) ? shortNumber(s.values[i]) : '–'}`.trim());
   }
 }
 

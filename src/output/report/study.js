@@ -2,36 +2,55 @@
 // What a study found: diagrams of error against cost, answers, commands, and two runs side by side.
 'use strict';
 
-const MEASURES = [['l2', 'L2 error of the displacement, relative'], ['h1', 'H1 error of the displacement, relative'],
-                  ['surface', 'distance of the surfaces [m]'], ['energy', 'error of the energy [J]'], ['momentum', 'error of the momentum [kg m/s]']];
-const COSTS = [['processor_seconds', 'processor seconds'], ['unknowns', 'unknowns, mean over the steps'], ['memory_mb', 'memory [MB]']];
+const MEASURES = [
+  ['l2', 'L2 error of the displacement, relative'], ['h1', 'H1 error of the displacement, relative'],
+  ['surface', 'distance of the surfaces [m]'], ['energy', 'error of the energy [J]'],
+  ['momentum', 'error of the momentum [kg m/s]']
+];
+const COSTS = [
+  ['processor_seconds', 'processor seconds'], ['unknowns', 'unknowns, mean over the steps'], ['memory_mb', 'memory [MB]']
+];
 
 // Logarithmic in both directions, a line for each series; points tell of their run and choose it.
 class Diagram {
   constructor(study, [measure, label], [cost, costLabel], {onPoint, colourOf}) {
     const {width, left, right, top} = PLOT, height = 250, bottom = 38;
-    this.points = study.runs.filter(r => r.errors?.[measure] > 0 && r[cost] > 0).map(run => ({run, x: run[cost], y: run.errors[measure]}));
+    this.points = study.runs.filter(r => r.errors?.[measure] > 0 && r[cost] > 0)
+                      .map(run => ({run, x: run[cost], y: run.errors[measure]}));
     if (!this.points.length) return;
     const range = values => {
       const [low, high] = [Math.min(...values), Math.max(...values)];
       return [low / 1.25, high * 1.25];
     };
-    const [x0, x1] = range(this.points.map(p => p.x)), [y0, y1] = range(this.points.map(p => p.y)), log = (v, a, b) => Math.log(v / a) / Math.log(b / a);
-    const x = v => left + log(v, x0, x1) * (width - left - right), y = v => height - bottom - log(v, y0, y1) * (height - top - bottom);
-    const drawing = svg('svg', {viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `${label} against ${costLabel}`});
-    for (const tick of ticksBetween(x0, x1))
-      drawing.append(svg('line', {x1: x(tick), x2: x(tick), y1: top, y2: height - bottom, stroke: '#e3e5e9'}),
-                     svg('text', {x: x(tick), y: height - bottom + 14, 'text-anchor': 'middle'}, shortNumber(tick)));
-    for (const tick of ticksBetween(y0, y1))
-      drawing.append(svg('line', {x1: left, x2: width - right, y1: y(tick), y2: y(tick), stroke: '#e3e5e9'}),
-                     svg('text', {x: left - 5, y: y(tick) + 3.5, 'text-anchor': 'end'}, shortNumber(tick)));
+    const [x0, x1] = range(this.points.map(p => p.x)), [y0, y1] = range(this.points.map(p => p.y)),
+               log = (v, a, b) => Math.log(v / a) / Math.log(b / a);
+    const x = v => left + log(v, x0, x1) * (width - left - right),
+          y = v => height - bottom - log(v, y0, y1) * (height - top - bottom);
+    const drawing =
+        svg('svg', {viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `${label} against ${costLabel}`});
+    for (const tick of ticksOf(x0, x1, true))
+      drawing.append(
+          svg('line', {x1: x(tick), x2: x(tick), y1: top, y2: height - bottom, stroke: '#e3e5e9'}),
+          svg('text', {x: x(tick), y: height - bottom + 14, 'text-anchor': 'middle'}, shortNumber(tick)));
+    for (const tick of ticksOf(y0, y1, true))
+      drawing.append(
+          svg('line', {x1: left, x2: width - right, y1: y(tick), y2: y(tick), stroke: '#e3e5e9'}),
+          svg('text', {x: left - 5, y: y(tick) + 3.5, 'text-anchor': 'end'}, shortNumber(tick)));
     drawing.append(svg('text', {x: (left + width - right) / 2, y: height - 6, 'text-anchor': 'middle'}, costLabel));
     for (const series of new Set(this.points.map(p => p.run.series))) {
       const own = this.points.filter(p => p.run.series === series).sort((a, b) => b.y - a.y);
-      drawing.append(svg('polyline', {points: own.map(p => `${x(p.x).toFixed(1)},${y(p.y).toFixed(1)}`).join(' '), fill: 'none', stroke: colourOf(series), 'stroke-width': 1.3}));
+      drawing.append(svg('polyline', {
+        points: own.map(p => `${x(p.x).toFixed(1)},${y(p.y).toFixed(1)}`).join(' '),
+        fill: 'none',
+        stroke: colourOf(series),
+        'stroke-width': 1.3
+      }));
       for (const p of own) {
-        const dot = svg('circle', {cx: x(p.x), cy: y(p.y), r: 4.5, fill: colourOf(series), tabindex: 0, 'data-run': p.run.run},
-          svg('title', {}, `${p.run.run}: ${p.run.label}\n${label} ${shortNumber(p.y)}\n${costLabel} ${shortNumber(p.x)}\n${p.run.vertices} vertices at the end`));
+        const dot =
+            svg('circle', {cx: x(p.x), cy: y(p.y), r: 4.5, fill: colourOf(series), tabindex: 0, 'data-run': p.run.run},
+                svg('title', {},
+                    `${p.run.run}: ${p.run.label}\n${label} ${shortNumber(p.y)}\n${costLabel} ${shortNumber(p.x)}\n${
+                        p.run.vertices} vertices at the end`));
         dot.addEventListener('pointerenter', () => onPoint(p.run, false));
         dot.addEventListener('click', () => onPoint(p.run, true));
         drawing.append(dot);
@@ -40,16 +59,9 @@ class Diagram {
     this.figure = html('figure', {className: 'plot'}, html('figcaption', {}, label), drawing);
   }
   mark(name) {
-    for (const dot of this.figure?.querySelectorAll('circle') ?? []) dot.setAttribute('stroke', dot.dataset.run === name ? '#1d2530' : 'none');
+    for (const dot of this.figure?.querySelectorAll('circle') ?? [])
+      dot.setAttribute('stroke', dot.dataset.run === name ? '#1d2530' : 'none');
   }
-}
-
-function ticksBetween(low, high) {
-  const found = [], isShort = high / low < 150;
-  for (let e = Math.floor(Math.log10(low)); e <= Math.log10(high); ++e)
-    for (const m of isShort ? [1, 2, 5] : [1])
-      if (m * 10 ** e >= low && m * 10 ** e <= high) found.push(m * 10 ** e);
-  return found;
 }
 
 // Cells of a rest mesh by place.
@@ -68,13 +80,16 @@ class Locator {
       return box;
     });
     this.step = 1.5 * size / Math.max(1, dim * mesh.cells.length) || 1;
-    mesh.cells.forEach((c, i) => this.visit(this.boxes[i], key => this.cells.has(key) ? this.cells.get(key).push(c) : this.cells.set(key, [c])));
+    mesh.cells.forEach(
+        (c, i) =>
+            this.visit(this.boxes[i], key => this.cells.has(key) ? this.cells.get(key).push(c) : this.cells.set(key, [c])));
   }
   visit(box, act) {
     const index = v => Math.floor(v / this.step);
     for (let i = index(box[0]); i <= index(box[1]); ++i)
       for (let j = index(box[2]); j <= index(box[3]); ++j)
-        for (let k = this.dim === 3 ? index(box[4]) : 0; k <= (this.dim === 3 ? index(box[5]) : 0); ++k) act(`${i},${j},${k}`);
+        for (let k = this.dim === 3 ? index(box[4]) : 0; k <= (this.dim === 3 ? index(box[5]) : 0); ++k)
+          act(`${i},${j},${k}`);
   }
   // Displacement at a rest position, of the cell that has it, or the one that nearly has it; null: there is none.
   displacement(p) {
@@ -87,27 +102,33 @@ class Locator {
       }
     });
     if (!found) return null;
-    const [c, w] = found, u = frame.u.map(column => w.reduce((sum, share, i) => sum + share * column[corners[i][c]], 0)), {curved} = frame.mesh;
+    const [c, w] = found, u = frame.u.map(column => w.reduce((sum, share, i) => sum + share * column[corners[i][c]], 0)),
+              {curved} = frame.mesh;
     if (curved)
       for (let i = 0; i <= dim; ++i)
         for (let j = 0; j < i; ++j) {
           const [a, b] = [corners[i][c], corners[j][c]], node = curved.get(run.edgeKey(a, b));
-          if (node !== undefined) frame.u.forEach((column, k) => u[k] += 2 * w[i] * w[j] * (2 * column[node] - column[a] - column[b]));
+          if (node !== undefined)
+            frame.u.forEach((column, k) => u[k] += 2 * w[i] * w[j] * (2 * column[node] - column[a] - column[b]));
         }
     return u;
   }
   weights(c, p) {
-    const {dim, run, corners} = this, v = corners.map(column => p.map((_, k) => run.rest[k][column[c]])), m = (a, b) => a.map((x, k) => x - b[k]);
-    const det = dim === 2 ? (a, b) => a[0] * b[1] - a[1] * b[0]
-      : (a, b, d) => a[0] * (b[1] * d[2] - b[2] * d[1]) - a[1] * (b[0] * d[2] - b[2] * d[0]) + a[2] * (b[0] * d[1] - b[1] * d[0]);
-    const sides = v.slice(1).map(q => m(q, v[0])), whole = det(...sides), to = m(p, v[0]), w = sides.map((_, i) => det(...sides.map((s, j) => i === j ? to : s)) / whole);
+    const {dim, run, corners} = this, v = corners.map(column => p.map((_, k) => run.rest[k][column[c]])),
+                     m = (a, b) => a.map((x, k) => x - b[k]);
+    const det = dim === 2 ? (a, b) => a[0] * b[1] - a[1] * b[0] :
+                            (a, b, d) => a[0] * (b[1] * d[2] - b[2] * d[1]) - a[1] * (b[0] * d[2] - b[2] * d[0]) +
+            a[2] * (b[0] * d[1] - b[1] * d[0]);
+    const sides = v.slice(1).map(q => m(q, v[0])), whole = det(...sides), to = m(p, v[0]),
+          w = sides.map((_, i) => det(...sides.map((s, j) => i === j ? to : s)) / whole);
     return [1 - w.reduce((a, b) => a + b, 0), ...w];
   }
 }
 
 // |u - u of the other run| by vertex.
 async function differenceOf(run, other) {
-  const last = r => r.frame(r.frames.length - 1), [own, theirs] = await Promise.all([last(run), last(other)]), locator = new Locator(theirs);
+  const last = r => r.frame(r.frames.length - 1), [own, theirs] = await Promise.all([last(run), last(other)]),
+        locator = new Locator(theirs);
   const values = new Float32Array(run.meta.counts.vertices);
   let largest = 0;
   for (const id of own.mesh.vertices) {
@@ -118,27 +139,47 @@ async function differenceOf(run, other) {
   return {of: 'vertex', values, largest};
 }
 
-const quoted = text => /^[\w./=:-]+$/.test(text) ? text : `'${text.replaceAll("'", `'\\''`)}'`;
+const quoted = text => /^[\w./=:-]+$/.test(text) ? text : `'${text.replaceAll('\'', `'\\''`)}'`;
 
 function commandOf(study, run) {
-  return ['itr run', quoted(study.scene), '-o', quoted(run.run), ...(run.solver ? ['--solver', run.solver] : []), ...run.set.flatMap(s => ['--set', quoted(s)])].join(' ');
+  return [
+    'itr run', quoted(study.scene), '-o', quoted(run.run), ...(run.solver ? ['--solver', run.solver] : []),
+    ...run.set.flatMap(s => ['--set', quoted(s)])
+  ].join(' ');
 }
 
 async function openStudy() {
-  const parse = id => JSON.parse(document.getElementById(id).textContent), study = parse('study'), {runs: names, notes, colours} = parse('study-runs');
-  const said = document.getElementById('said'), main = document.getElementById('main'), plots = document.getElementById('plots'), foot = document.getElementById('foot');
+  const parse = id => JSON.parse(document.getElementById(id).textContent), study = parse('study'),
+        {runs: names, notes, colours} = parse('study-runs');
+  const said = document.getElementById('said'), main = document.getElementById('main'),
+        plots = document.getElementById('plots'), foot = document.getElementById('foot');
   said.textContent = `Speed against error: ${study.scene} · errors against ${study.reference}`;
   foot.textContent = [...notes, `ITR ${study.version}`].join(' · ');
-  const series = [...new Set(study.runs.map(r => r.series))], colourOf = name => LINE_COLOURS[series.indexOf(name) % LINE_COLOURS.length];
+  const series = [...new Set(study.runs.map(r => r.series))],
+        colourOf = name => LINE_COLOURS[series.indexOf(name) % LINE_COLOURS.length];
   const report = {study, diagrams: [], views: [null, null], shown: ['', '']};
 
-  const about = html('pre', {className: 'pick'}), command = html('code'), copy = html('button', {onclick: async () => {
-    await navigator.clipboard?.writeText(command.textContent).catch(() => getSelection().selectAllChildren(command));
-  }}, 'copy');
+  const about = html('pre', {className: 'pick'}), command = html('code'),
+        copy = html(
+            'button', {
+              onclick: async () => {
+                await navigator.clipboard?.writeText(command.textContent)
+                    .catch(() => getSelection().selectAllChildren(command));
+              }
+            },
+            'copy');
   const tell = run => {
-    about.textContent = [`${run.run}: ${run.label}`, ...(run.status === 'failed' ? [`failed: ${run.reason}`] : [
-      `${run.vertices} vertices, ${shortNumber(run.processor_seconds)} processor seconds, ${shortNumber(run.memory_mb)} MB`,
-      ...MEASURES.filter(([m]) => run.errors?.[m] > 0).map(([m, label]) => `${label}: ${shortNumber(run.errors[m])}`)])].join('\n');
+    about.textContent = [
+      `${run.run}: ${run.label}`,
+      ...(run.status === 'failed' ?
+              [`failed: ${run.reason}`] :
+              [
+                `${run.vertices} vertices, ${shortNumber(run.processor_seconds)} processor seconds, ${
+                    shortNumber(run.memory_mb)} MB`,
+                ...MEASURES.filter(([m]) => run.errors?.[m] > 0).map(([m,
+                                                                       label]) => `${label}: ${shortNumber(run.errors[m])}`)
+              ])
+    ].join('\n');
     command.textContent = commandOf(study, run);
     report.diagrams.forEach(d => d.mark(run.run));
   };
@@ -151,11 +192,22 @@ async function openStudy() {
       const diagram = new Diagram(study, measure, cost, {onPoint, colourOf});
       if (diagram.figure) report.diagrams.push(diagram), plots.append(diagram.figure);
     }
-  const legend = html('p', {className: 'series'}, ...series.map(name => html('span', {}, html('i', {style: `background:${colourOf(name)}`}), name)));
-  const table = html('table', {}, html('tr', {}, ...['run', '', 'status', 'vertices', 'processor s', 'L2', 'H1'].map(t => html('th', {}, t))),
-    ...study.runs.map(run => html('tr', {onclick: () => onPoint(run, true)}, ...[run.run, run.label, run.status, run.vertices ?? '', run.processor_seconds === undefined ? '' : shortNumber(run.processor_seconds),
-      run.errors ? shortNumber(run.errors.l2) : '', run.errors ? shortNumber(run.errors.h1) : ''].map(t => html('td', {}, String(t))))));
-  const words = html('section', {className: 'words'}, html('ul', {}, ...study.answers.map(a => html('li', {}, a))), legend, about, html('p', {}, command, ' ', copy), table);
+  const legend = html(
+      'p', {className: 'series'},
+      ...series.map(name => html('span', {}, html('i', {style: `background:${colourOf(name)}`}), name)));
+  const table = html(
+      'table', {},
+      html('tr', {}, ...['run', '', 'status', 'vertices', 'processor s', 'L2', 'H1'].map(t => html('th', {}, t))),
+      ...study.runs.map(
+          run => html(
+              'tr', {onclick: () => onPoint(run, true)},
+              ...[run.run, run.label, run.status, run.vertices ?? '',
+                  run.processor_seconds === undefined ? '' : shortNumber(run.processor_seconds),
+                  run.errors ? shortNumber(run.errors.l2) : '', run.errors ? shortNumber(run.errors.h1) : '']
+                  .map(t => html('td', {}, String(t))))));
+  const words = html(
+      'section', {className: 'words'}, html('ul', {}, ...study.answers.map(a => html('li', {}, a))), legend, about,
+      html('p', {}, command, ' ', copy), table);
   plots.before(words);
   if (study.runs.length) tell(study.runs.find(r => r.status === 'finished') ?? study.runs[0]);
   if (!names.length) return report;
@@ -163,7 +215,8 @@ async function openStudy() {
   try {
     if (new URLSearchParams(location.search).has('pictures')) throw new Error('pictures asked for');
     const loaded = new Map(), metas = names.map(name => parse(`run-${name}-meta`)), origin = metas[0].origin;
-    const least = (key, pick) => origin.map((_, k) => pick(...metas.map(m => m[key][k]))), low = least('low', Math.min), high = least('high', Math.max);
+    const least = (key, pick) => origin.map((_, k) => pick(...metas.map(m => m[key][k]))), low = least('low', Math.min),
+          high = least('high', Math.max);
     const load = name => {
       if (!loaded.has(name)) loaded.set(name, unpack(name));
       return loaded.get(name);
@@ -174,17 +227,25 @@ async function openStudy() {
       Object.assign(run.meta, {origin, low, high});
       return run;
     };
-    const camera = new Camera(origin.length, metas[0].azimuth, metas[0].elevation), slots = [0, 1].map(() => html('div', {className: 'slot'}));
-    const selects = [0, 1].map(i => html('select', {onchange: () => report.show(i, selects[i].value)}, ...names.map(name => html('option', {value: name}, name))));
+    const camera = new Camera(origin.length, metas[0].azimuth, metas[0].elevation),
+          slots = [0, 1].map(() => html('div', {className: 'slot'}));
+    const selects = [0, 1].map(
+        i => html(
+            'select', {onchange: () => report.show(i, selects[i].value)},
+            ...names.map(name => html('option', {value: name}, name))));
     main.append(html('div', {className: 'pair'}, ...slots));
     document.body.classList.add('with-view', 'with-study');
     const follow = i => view => {  // the other view has the same camera and settings
-      const other = report.views[1 - i], keys = ['field', 'log', 'least', 'most', 'factor', 'edges', 'obstacles', 'axis', 'cut', 'flip'];
+      const other = report.views[1 - i],
+            keys = ['field', 'log', 'least', 'most', 'factor', 'edges', 'obstacles', 'axis', 'cut', 'flip'];
       if (!other || report.isFollowing) return;
       report.isFollowing = true;
-      const changes = Object.fromEntries(keys.filter(key => other.state[key] !== view.state[key]).map(key => [key, view.state[key]]));
-      if (Object.keys(changes).length) other.set(changes);
-      else other.draw();
+      const changes =
+          Object.fromEntries(keys.filter(key => other.state[key] !== view.state[key]).map(key => [key, view.state[key]]));
+      if (Object.keys(changes).length)
+        other.set(changes);
+      else
+        other.draw();
       report.isFollowing = false;
     };
     let turn = Promise.resolve();
@@ -196,11 +257,17 @@ async function openStudy() {
         const same = runs[1].stored.find(f => f.name === field.name);
         if (same) runs.forEach(r => r.stored.find(f => f.name === field.name).shown = Math.max(field.largest, same.largest));
       }
-      const largestU = Math.max(...runs.map(r => r.meta.largest_u)), differences = await Promise.all([differenceOf(...runs), differenceOf(runs[1], runs[0])]);
+      const largestU = Math.max(...runs.map(r => r.meta.largest_u)),
+            differences = await Promise.all([differenceOf(...runs), differenceOf(runs[1], runs[0])]);
       const largest = Math.max(...differences.map(d => d.largest));
       report.views.forEach(view => view?.close());
-      report.views = runs.map((run, k) => new View(run, {onChange: follow(k), camera, largestU,
-        extras: {difference: {label: `difference of displacements`, unit: 'm', values: {...differences[k], largest}}}}));
+      report.views = runs.map(
+          (run, k) => new View(run, {
+            onChange: follow(k),
+            camera,
+            largestU,
+            extras: {difference: {label: `difference of displacements`, unit: 'm', values: {...differences[k], largest}}}
+          }));
       report.shown = chosen;
       report.views.forEach((view, k) => {
         selects[k].value = chosen[k];
@@ -210,7 +277,8 @@ async function openStudy() {
       const {field = 'difference', log = false, edges = true, axis = '', cut = 0.5, flip = false} = state;
       await Promise.all(report.views.map(view => view.set({field, log, edges, axis, cut, flip})));
     });
-    const finished = study.runs.filter(r => names.includes(r.run)), best = finished.filter(r => r.errors).sort((a, b) => a.errors.l2 - b.errors.l2)[0];
+    const finished = study.runs.filter(r => names.includes(r.run)),
+          best = finished.filter(r => r.errors).sort((a, b) => a.errors.l2 - b.errors.l2)[0];
     const left = best?.run ?? names[0], others = names.filter(name => name !== left);
     report.shown = [left, others.includes('reference') ? 'reference' : others.pop() ?? left];
     await report.show(0, report.shown[0]);

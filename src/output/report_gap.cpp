@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include "report_gap.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "itr/geometry/bvh.hpp"
+#include "itr/geometry/distance.hpp"
+
+namespace itr::output {
+
+namespace {
+
+/// For each vertex the lowest one that cells connect it with.
+std::vector<int> components(const StoredFrame& frame, int nodes) {
+  std::vector<int> parent(nodes);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  const int corners = frame.dim + 1;
+  for (std::size_t i = 0; i < frame.simplices.size(); ++i) {
+    const int a = root(static_cast<int>(frame.simplices[i])), b = root(static_cast<int>(frame.simplices[i - i % corners]));
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  const int num_curved = static_cast<int>(frame.curved_edges.size()) / 2;
+  for (int e = 0; e < num_curved; ++e) parent[nodes - num_curved + e] = root(static_cast<int>(frame.curved_edges[2 * e]));
+  for (int i = 0; i < nodes; ++i) parent[i] = root(i);
+  return parent;
+}
+
+template <int Dim>
+struct Primitive {
+  std::array<Vec<Dim>, 3> corners;
+  int count = 0;
+  int component = -1;  ///< -1: of an obstacle
+};
+
+template <int Dim>
+double squared_distance(const Vec<Dim>& p, const Primitive<Dim>& to) {
+  const auto& [a, b, c] = to.corners;
+  if (to.count == 1) return (p - a).squaredNorm();
+  if constexpr (Dim == 3)
+    if (to.count == 3) return point_triangle_distance_squared(p, a, b, c);
+  return point_edge_distance_squared<Dim>(p, a, b);
+}
+
+template <int Dim>
+Vec<Dim> point(const std::vector<double>& x, std::int64_t i) {
+  return Eigen::Map<const Vec<Dim>>(&x[static_cast<std::size_t>(i) * Dim]);
+}
+
+template <int Dim>
+std::vector<double> gaps_in(const StoredFrame& frame, double most) {
+  const int nodes = static_cast<int>(frame.x.size()) / Dim;
+  const std::vector<int> component = components(frame, nodes);
+  std::vector<Primitive<Dim>> primitives;
+  const auto add = [&](const std::vector<double>& x, const std::vector<std::int64_t>& ids, int count, bool is_obstacle) {
+    for (std::size_t i = 0; i + count <= ids.size(); i += count) {
+      Primitive<Dim>& one = primitives.emplace_back();
+      one.count = count;
+      if (!is_obstacle) one.component = component[ids[i]];
+      for (int k = 0; k < count; ++k) one.corners[k] = point<Dim>(x, ids[i + k]);
+    }
+  };
+  add(frame.x, frame.surface, Dim, false);
+  const auto& obstacles = frame.obstacles;
+  add(obstacles.x, obstacles.faces, 3, true);
+  add(obstacles.x, obstacles.edges, 2, true);
+  std::vector<std::int64_t> points(obstacles.x.size() / Dim);
+  std::iota(points.begin(), points.end(), 0);
+  if (obstacles.faces.empty() && obstacles.edges.empty()) add(obstacles.x, points, 1, true);
+  const bool is_alone = std::all_of(primitives.begin(), primitives.end(), [&](const auto& one) {
+    return one.component >= 0 && one.component == primitives.front().component;
+  });
+  if (is_alone) return {};
+
+  std::vector<Box<Dim>> boxes(primitives.size());
+  for (std::size_t i = 0; i < primitives.size(); ++i)
+    for (int k = 0; k < primitives[i].count; ++k) boxes[i].include(primitives[i].corners[k]);
+  const Bvh<Dim> tree(boxes);
+  std::vector<char> is_outside(nodes, 0);
+  for (const std::int64_t v : frame.surface) is_outside[v] = 1;
+  const int num_curved = static_cast<int>(frame.curved_edges.size()) / 2;
+  for (int e = 0; e < num_curved; ++e)
+    is_outside[nodes - num_curved + e] = is_outside[frame.curved_edges[2 * e]] && is_outside[frame.curved_edges[2 * e + 1]];
+  std::vector<double> found(nodes, most);
+  std::vector<int> hits;
+  for (int i = 0; i < nodes; ++i) {
+    if (!is_outside[i]) continue;
+    const Vec<Dim> p = point<Dim>(frame.x, i);
+    Box<Dim> box;
+    box.include(p);
+    hits.clear();
+    tree.query(box.inflated(most), hits);
+    double least = most * most;
+    for (const int hit : hits) {
+      const Primitive<Dim>& one = primitives[hit];
+      if (one.component != component[i]) least = std::min(least, squared_distance<Dim>(p, one));
+    }
+    found[i] = std::sqrt(least);
+  }
+  return found;
+}
+
+}  // namespace
+
+std::vector<double> gaps(const StoredFrame& frame, double most) {
+  return frame.dim == 2 ? gaps_in<2>(frame, most) : gaps_in<3>(frame, most);
+}
+
+}  // namespace itr::output
