@@ -138,6 +138,12 @@ TEST(Prospect, NothingIsStirredInFreeFlight) {
     const RemeshReport report = remesh<3>(scene.mesh, scene.fields, scene.context, options, memory, strata);
     EXPECT_EQ(report.swaps.tried + report.smooths.tried > 0, !flies);
     EXPECT_EQ(strata.empty(), flies);
+    strata = {};
+    RemeshOptions coarse = options;  // one split has to gain more than there is
+    coarse.split.acceptance_tolerance =
+        2 * available_energy(scene.mesh, scene.fields, scene.context) / scene.context.scaling + 1e-9;
+    EXPECT_FALSE((remesh<3>(scene.mesh, scene.fields, scene.context, coarse, memory, strata).changed()));
+    EXPECT_TRUE(strata.empty());
   }
 }
 

@@ -11,13 +11,13 @@ template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
   const bool by_size = options.sizing_field.enabled, may_stir = options.swap.enabled || options.smooth.enabled;
-  const bool asks_what_is_available = (options.split.enabled && !by_size) || may_stir;
-  const double available = asks_what_is_available ? available_energy(mesh, fields, context) : 0;
-  const bool may_split =
-      options.split.enabled && !by_size && available >= context.scaling * options.split.acceptance_tolerance.value();
+  const bool asks_what_is_available = (options.split.enabled && !by_size) || (may_stir && screens(options));
+  // Where less is there than what one split has to gain, shapes do not matter either: a body in flight.
+  const bool is_enough_there = !asks_what_is_available || available_energy(mesh, fields, context) >=
+                                                              context.scaling * options.split.acceptance_tolerance.value();
+  const bool may_split = options.split.enabled && !by_size && is_enough_there;
+  const bool has_to_stir = may_stir && (is_enough_there || !screens(options));
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
-  // Where less is there than what a swap or a move has to gain, shapes do not matter either: a body in flight.
-  const bool has_to_stir = may_stir && available >= context.scaling * least_worthwhile(options);
   if (!may_split && !may_collapse && !has_to_stir && !by_size) return {};
   RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();

@@ -14,9 +14,6 @@ CASES = {}
 LIKE = {}
 # Cases that fail, and why; one that passes is to be taken off.
 KNOWN = {
-    "coplanar_faces":
-        "the two ends are mirror images of one norm to twelve digits: nothing but round-off says on which side the upper cube turns; with "
-        "/solver/linear/reuse_factors false the solvers take the same",
     "twist_10_turns_remeshed":
         "after two whole turns the held ends are where they were, so the straight bar and the twisted one are both at rest, and which "
         "of them a solve without inertia reaches from a mesh of 23 vertices is decided in a path of a thousand iterations; the fixed mesh, "

@@ -4,9 +4,9 @@
 
 python3 verification/stability/run.py [--case PART-OF-NAME]... [--build build/release] [--runs DIR] [--results DIR]
 
-A case passes where its run finishes, is certified, its energy is bounded, forces and momentum balance, another solver comes to the
-same end, and two threads to the same bits. The exit status is 1 if one fails that is not
-among the KNOWN of hard_cases.py, or one of these passes.
+A case passes where its run finishes, is certified, drops no remeshing, its energy is bounded, forces and momentum balance, another
+solver comes to the same end, and two threads to the same bits. The exit status is 1 if one fails that is not among the KNOWN of
+hard_cases.py, or one of these passes.
 """
 import argparse
 import dataclasses

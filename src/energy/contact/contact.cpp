@@ -24,12 +24,12 @@ constexpr std::size_t kBatch = 1024;  ///< local Hessians that are held at a tim
 
 /// Share of the way from p to q that is free of contact, by conservative CCD.
 template <int Dim>
-double free_share(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q) {
+double free_share(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q, const CcdOptions& options = {}) {
   if (!ways_overlap<Dim>(kind, p, q)) return 1;
-  if constexpr (Dim == 2) return point_edge_ccd<2>(p[0], p[1], p[2], q[0], q[1], q[2]);
+  if constexpr (Dim == 2) return point_edge_ccd<2>(p[0], p[1], p[2], q[0], q[1], q[2], options);
   if constexpr (Dim == 3)
-    return kind == PairKind::edge_edge ? edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3])
-                                       : point_triangle_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3]);
+    return kind == PairKind::edge_edge ? edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], options)
+                                       : point_triangle_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], options);
 }
 
 const char* name_of(PairKind kind) {
@@ -364,12 +364,13 @@ StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, 
   const VectorX end = x + dx;
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
   candidates.update(*surface_, x, &dx, dhat_);
+  constexpr CcdOptions kNear{.passing_ratio = 1};  // what comes near is told too: it is what holds back
   StepLimit least;
   for (const auto& [kind, pairs] : candidates.all())
     for (const auto& pair : *pairs) {
       const auto vertices = vertices_of(*surface_, kind, pair);
       const int size = pair_size(kind);
-      const double t = free_share<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, end));
+      const double t = free_share<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, end), kNear);
       if (t < least.step) least = {t, name_of(kind), {vertices.begin(), vertices.begin() + size}};
     }
   return least;
