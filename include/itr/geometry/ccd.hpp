@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Conservative continuous collision detection of linear motions by additive advancement (Li et al. 2021, "Codimensional
 // Incremental Potential Contact", section 5): time moves forward by a lower bound of the time that the primitives need to
-// come within a fraction of their initial distance. It may stop early, never late.
+// come within a fraction of their initial distance, or over an interval in which the lines or planes of the primitives stay
+// apart (by the Bernstein coefficients of their area or volume). It may stop early, never late.
 #pragma once
 
 #include "itr/core/types.hpp"
