@@ -42,6 +42,8 @@ class ContactEnergy final : public Energy {
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// By planar bounds of each pair (`planar_shares`).
   bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
+  bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+                     Workspace& workspace) const override;
   /// Looks for pairs where a solve that begins at x is expected to go by dx, so that one search serves its start and its
   /// first step. It always looks: what is found then does not depend on earlier solves.
   void foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;
