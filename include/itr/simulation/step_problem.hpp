@@ -48,6 +48,9 @@ class StepProblem {
   /// way there is free and the energy lower.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected = {});
 
+  /// Why the last solve took as many iterations as its summary says.
+  std::string describe_effort(const NewtonSummary& summary);
+
   /// With friction lagged at x, so that numbers compare between meshes and with other codes; else as in the last solve.
   EnergyReport report(const VectorX& x);
   double min_distance(const VectorX& x);
@@ -95,6 +98,7 @@ class StepProblem {
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
   Lagged lagged_;         ///< of the last solve
   SparseSystem& system_;
+  int rounds_ = 0;  ///< of the last solve
 };
 
 /// The least det F over the elements; of a curved one a lower bound.
