@@ -14,6 +14,7 @@ STORED = {
     "verification/report/results.json": CODE,
     "verification/paper/results.csv": CODE,
     "verification/newton/results.csv": ("src/newton", "include/itr/newton"),
+    "verification/newton/squeeze.csv": ("src/newton", "include/itr/newton", "src/energy", "include/itr/energy", "src/geometry"),
     "verification/scaling/results.csv": LINEAR,
     "verification/solvers/results.csv": LINEAR,
     "verification/solvers/end_to_end.csv": LINEAR,
