@@ -181,7 +181,7 @@ template <int Dim, typename Scene>
 std::array<double, 2> turn_by_bounds(const Scene& scene, unsigned seed) {
   const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, 0.05);
+  std::normal_distribution<double> normal(0, 0.1);
   VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
   Workspace workspace;
   const double before = contact.max_step(scene.x, dx, workspace);
@@ -209,7 +209,7 @@ TEST_P(Contact, BoundsOnBlockingPairsFreeTheWay) {
     count(turn_by_bounds<2>(ContactScene(seed, GetParam()), seed));
     count(turn_by_bounds<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed));
   }
-  EXPECT_GT(blocked, 20);
+  EXPECT_GT(blocked, 15);
   EXPECT_GT(freed, 0.8 * blocked);
 }
 
