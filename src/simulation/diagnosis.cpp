@@ -45,12 +45,13 @@ class Diagnosis {
   Diagnosis(const SolveScope<Dim>& scope, const VectorX& x, Workspace& workspace)
       : scope_(scope), x_(x), on_surface_(scope.surface.positions(x)), workspace_(workspace) {}
 
-  void name_limit_of(const VectorX& step);
+  void name_limit_of(const VectorX& step, std::string_view which = "the last");
   /// "by the vertex-edge pair 3 4 5 near (0.1, 0.2)"; empty where the step is free.
   std::string limit_of(const VectorX& step, double& share);
   void name_residual_at(int vertex, const EnergySum& sum);
   void name_worst_cell_at(int vertex);
   void name_nearest_pair_at(int vertex);
+  void append(const std::string& text) { text_ << text; }
   std::string text() const { return text_.str(); }
 
  private:
@@ -93,10 +94,10 @@ std::string Diagnosis<Dim>::limit_of(const VectorX& step, double& share) {
 }
 
 template <int Dim>
-void Diagnosis<Dim>::name_limit_of(const VectorX& step) {
+void Diagnosis<Dim>::name_limit_of(const VectorX& step, std::string_view which) {
   double share = 1;
   const std::string limit = limit_of(step, share);
-  if (!limit.empty()) text_ << "; " << share << " of the last Newton step is free, limited " << limit;
+  if (!limit.empty()) text_ << "; " << share << " of " << which << " Newton step is free, limited " << limit;
 }
 
 template <int Dim>
@@ -169,6 +170,11 @@ std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary
   Diagnosis<Dim> result(scope, x, workspace);
   const VectorX& step = summary.failed_step;
   if (step.size() == x.size() && step.allFinite()) result.name_limit_of(step);
+  if (result.text().empty() && summary.blocked_step.size() == x.size()) {
+    Diagnosis<Dim> earlier(scope, summary.blocked_from, workspace);  // the last step may be free, and lead nowhere
+    earlier.name_limit_of(summary.blocked_step, "an earlier");
+    result.append(earlier.text());
+  }
   if (summary.worst_dof != kNone) {
     const int vertex = summary.worst_dof / Dim;
     result.name_residual_at(vertex, sum);
