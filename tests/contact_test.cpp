@@ -175,6 +175,44 @@ int expect_free_single_ways(const Scene& scene, unsigned seed) {
   return further;
 }
 
+/// Turns a motion by the bounds of what stops it, each met in turn by the shortest change; returns the shares of it that
+/// were free before and are after.
+template <int Dim, typename Scene>
+std::array<double, 2> turn_by_bounds(const Scene& scene, unsigned seed) {
+  const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, 0.1);
+  VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
+  Workspace workspace;
+  const double before = contact.max_step(scene.x, dx, workspace);
+  BlockingPairs blocking;
+  for (int round = 0; round < 200; ++round) {
+    EXPECT_TRUE(contact.find_blocking(scene.x, dx, 1, blocking, workspace));
+    EXPECT_EQ(blocking.bounds.size(), blocking.pairs.size());
+    for (const auto& bound : blocking.bounds) {
+      double squared = 0, change = 0;
+      for (int k = 0; k < bound.size; ++k) squared += bound.coefficients[k] * bound.coefficients[k];
+      change = std::max(0.0, bound.missing) / squared;
+      for (int k = 0; k < bound.size; ++k) dx[bound.dofs[k]] += 0.5 * change * bound.coefficients[k];
+    }
+  }
+  return {before, contact.max_step(scene.x, dx, workspace)};
+}
+
+TEST_P(Contact, BoundsOnBlockingPairsFreeTheWay) {
+  int blocked = 0, freed = 0;
+  const auto count = [&](const std::array<double, 2>& shares) {
+    blocked += shares[0] < 1;
+    freed += shares[0] < 1 && shares[1] == 1;
+  };
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    count(turn_by_bounds<2>(ContactScene(seed, GetParam()), seed));
+    count(turn_by_bounds<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed));
+  }
+  EXPECT_GT(blocked, 15);
+  EXPECT_GT(freed, 0.8 * blocked);
+}
+
 /// A term of energy 0 that lets a step go so far.
 struct Limit final : Energy {
   explicit Limit(double step) : step(step) {}

@@ -444,6 +444,22 @@ TEST(Ccd, StopsAtAFastThinObstacleAndLetsSlidingPass) {
   EXPECT_EQ((point_edge_ccd<2>({0, 1e-3}, a, b, {500, 1e-3}, Vec<2>(499, 0), Vec<2>(501, 0))), 1);  // moving together
 }
 
+TEST(Ccd, LetsPairsTurnAndSlideAtATinyGap) {
+  constexpr double kGap = 1e-8;
+  EXPECT_EQ((point_edge_ccd<2>({0, kGap}, {-1, 0}, {1, 0}, {0, kGap}, {-0.7, -0.5}, {1.3, 0.2})), 1);
+  const Vec<3> point(0, 0, kGap);
+  const auto triangle_turned = [&](double angle) {  // about an axis through the point, and moved in its own plane
+    const Vec<3> along(std::cos(angle), 0, std::sin(angle)), across(0, 1, 0);
+    return std::array<Vec<3>, 3>{1.3 * along - across, -0.7 * along - across, 0.3 * along + 2 * across};
+  };
+  const auto from = triangle_turned(0), to = triangle_turned(0.3);
+  const Vec<3> away(0, 0, -1e-3);
+  EXPECT_EQ(point_triangle_ccd(point, from[0], from[1], from[2], point, to[0] + away, to[1] + away, to[2] + away), 1);
+  EXPECT_LT(point_triangle_ccd(point, from[0], from[1], from[2], point, to[0] - away, to[1] - away, to[2] - away), 1e-2);
+  const Vec<3> c(0, -1, kGap), d(0, 1, kGap);
+  EXPECT_EQ(edge_edge_ccd({-1, 0, 0}, {1, 0, 0}, c, d, {-0.7, 0, -0.5}, {1.3, 0, 0.2}, c, d), 1);
+}
+
 TYPED_TEST(Geometry, OverlapIntegralsAreExact) {
   constexpr int Dim = TypeParam::value;
   std::mt19937 random(5);

@@ -238,6 +238,13 @@ TEST(Advice, SaysWhatWillHappenAndWhatLooksWrong) {
   EXPECT_TRUE(has(find_suspicious(Simulation<2>(setup, registry)), "rhs pushes in the negative direction"));
   setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -9.81); };
   EXPECT_TRUE(find_suspicious(Simulation<2>(setup, registry)).empty());
+  const ContactOptions contact = setup.contact;
+  setup.contact.enabled = setup.contact.convergent = true;
+  for (const auto& [stiffness, is_odd] : {std::pair(1e3, false), std::pair(1e6, true), std::pair(1e1, true)}) {
+    setup.contact.barrier_stiffness = stiffness;  // `auto` takes E / 10
+    EXPECT_EQ(has(find_suspicious(Simulation<2>(setup, registry)), "barrier stiffness"), is_odd) << stiffness;
+  }
+  setup.contact = contact;
   setup.materials[1].density = 1.1;
   EXPECT_TRUE(has(find_suspicious(Simulation<2>(setup, registry)), "are densities in kg/m^3?"));
   setup.time.quasistatic = true;

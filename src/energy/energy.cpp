@@ -22,6 +22,8 @@ double Energy::max_step(ConstVectorView, ConstVectorView, Workspace&) const { re
 
 bool Energy::get_single_ways(ConstVectorView, ConstVectorView, VectorView, Workspace&) const { return false; }
 
+bool Energy::find_blocking(ConstVectorView, ConstVectorView, double, BlockingPairs&, Workspace&) const { return false; }
+
 double EnergySum::value(ConstVectorView x, Workspace& workspace) const {
   double sum = 0;
   for (const auto& term : terms_) {
@@ -63,6 +65,12 @@ bool EnergySum::get_single_ways(ConstVectorView x, ConstVectorView dx, VectorVie
     has_told = true;
   }
   return has_told;
+}
+
+bool EnergySum::find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+                              Workspace& workspace) const {
+  return std::any_of(terms_.begin(), terms_.end(),
+                     [&](const auto& term) { return term->find_blocking(x, dx, share, blocking, workspace); });
 }
 
 }  // namespace itr

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "blocked_step.hpp"
 #include "curvature.hpp"
 #include "itr/core/timer.hpp"
 #include "norms.hpp"
@@ -30,6 +31,8 @@ constexpr double kLeastPenalty = 1e-8;  ///< force by length and stiffness: abov
 constexpr double kStraight = 0.8;       ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostDoublings = 12;
 constexpr double kSingleWaysBelow = 0.25, kMuchMore = 2;  ///< see try_single_ways
+constexpr double kBlockedBelow = 0.5;                     ///< share of a step below which what is in the way is looked at
+constexpr int kLong = 20;                                 ///< iterations from which on what blocks steps is kept
 constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 /// What a solve is kept in.
@@ -463,10 +466,13 @@ class Minimizer {
     {
       const ScopedTimer timer(summary_.ccd_seconds);
       step = energy_.max_step(x_, step_, workspace_);
+      if (step < kBlockedBelow && !advancing && may_turn())
+        step = turn_blocked_step({energy_, x_, dofs_, gradient_, system_, workspace_}, step_, step);
       if (step < kSingleWaysBelow && !advancing && options_.indefinite == IndefiniteHessian::project)
         has_single_ways = energy_.get_single_ways(x_, step_, buffers_.ways.resize(x_.size()), workspace_);
     }
     if (advancing && step < kRelaxBelow) relax_next_ = true;
+    if (step < kBlockedBelow) note_blocked();
     const double slope = gradient_.dot(step_);
     // Large enough for the step to lower the merit function of the quadratic model by half of what the penalty gives up.
     if (advancing)
@@ -491,6 +497,16 @@ class Minimizer {
       return true;
     }
     return false;
+  }
+
+  /// Patches end after so many iterations anyway, and PolyFEM's way is taken as it is.
+  bool may_turn() const { return !extras_.is_brief && options_.indefinite == IndefiniteHessian::project; }
+
+  void note_blocked() {
+    ++summary_.blocked;
+    if (extras_.is_brief || summary_.iterations < kLong) return;
+    summary_.blocked_from = x_;
+    summary_.blocked_step = step_;
   }
 
   /// Moves the candidate to where each vertex goes as far as it can alone (asked where the whole step is cut to less than

@@ -34,6 +34,11 @@ const char* to_string(Termination termination) {
 void NewtonSummary::add_effort(const NewtonSummary& other) {
   iterations += other.iterations;
   indefinite += other.indefinite;
+  blocked += other.blocked;
+  if (blocked_step.size() == 0) {
+    blocked_from = other.blocked_from;
+    blocked_step = other.blocked_step;
+  }
   assembly_seconds += other.assembly_seconds;
   linear_seconds += other.linear_seconds;
   line_search_seconds += other.line_search_seconds;

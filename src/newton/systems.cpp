@@ -7,6 +7,13 @@
 
 namespace itr {
 
+bool NewtonSystem::solve_columns(const MatrixX& B, MatrixX& X) {
+  X.resize(B.rows(), B.cols());
+  for (Eigen::Index j = 0; j < B.cols(); ++j)
+    if (solve(B.col(j), X.col(j)).outcome != linear::Outcome::ok) return false;
+  return X.allFinite();
+}
+
 void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                            PrescribedMotion& motion, Workspace& workspace) {
   order_ = dofs.num_unknowns;
@@ -96,6 +103,14 @@ linear::Outcome SparseSystem::prepare(double shift, ConstVectorView rhs, double 
 linear::SolveReport SparseSystem::solve(ConstVectorView rhs, VectorView solution) {
   return solver_.solve({rhs.data(), static_cast<std::size_t>(rhs.size())},
                        {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kTightResidual);
+}
+
+bool SparseSystem::solve_columns(const MatrixX& B, MatrixX& X) {
+  constexpr double kRough = 1e-4;  // directions are only turned by it
+  X.resize(B.rows(), B.cols());
+  const auto report = solver_.solve({B.data(), static_cast<std::size_t>(B.size())},
+                                    {X.data(), static_cast<std::size_t>(X.size())}, static_cast<int>(B.cols()), kRough);
+  return report.outcome == linear::Outcome::ok && X.allFinite();
 }
 
 std::string SparseSystem::message() const { return std::string(solver_.name()) + ": " + solver_.message(); }

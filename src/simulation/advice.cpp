@@ -10,6 +10,7 @@
 #include <numbers>
 #include <set>
 
+#include "barrier_stiffness.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/simulation/step_problem.hpp"
 
@@ -23,6 +24,7 @@ constexpr double kLargeRatio = 1e3;              ///< of stiffnesses or of eleme
 constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
 constexpr double kUsualModulus[] = {1e3, 1e13};  ///< [Pa]
+constexpr double kStiffnessRange = 20;           ///< of the barrier's, either way; a hundredfold costs 3 to 9 times
 constexpr double kGravity[] = {9.7, 9.9};        ///< [m/s^2]
 
 bool is_outside(double value, const double (&range)[2]) { return value < range[0] || value > range[1]; }
@@ -102,6 +104,26 @@ void find_hard_meshes(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, 
     found.push_back(fmt::format("stiffness ratio {:.2g} between bodies", stiffest / softest));
   if (figures.longest > kLargeRatio * figures.shortest)
     found.push_back(fmt::format("edges differ in length by a factor of {:.2g}", figures.longest / figures.shortest));
+}
+
+/// Newton takes the fewest iterations where the barrier is about as stiff as the bodies (verification/newton).
+template <int Dim>
+void find_odd_stiffness(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  const ContactOptions& contact = setup.contact;
+  if (!contact.enabled || contact.adaptive_stiffness || !(contact.barrier_stiffness > 0)) return;
+  double softest = kInfinity, stiffest = 0;
+  for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
+    softest = std::min(softest, setup.materials.at(body).youngs_modulus);
+    stiffest = std::max(stiffest, setup.materials.at(body).youngs_modulus);
+  }
+  const double low = barrier_stiffness_for(setup, contact, softest), high = barrier_stiffness_for(setup, contact, stiffest);
+  if (contact.barrier_stiffness >= low / kStiffnessRange && contact.barrier_stiffness <= kStiffnessRange * high) return;
+  const bool is_stiff = contact.barrier_stiffness > high;
+  found.push_back(
+      fmt::format("barrier stiffness {:.3g} is {:.2g} times what suits the {} body, {:.3g}: Newton may take many "
+                  "times the iterations{}",
+                  contact.barrier_stiffness, contact.barrier_stiffness / (is_stiff ? high : low),
+                  is_stiff ? "stiffest" : "softest", is_stiff ? high : low, is_stiff ? "" : ", and gaps are narrow"));
 }
 
 template <int Dim>
@@ -222,6 +244,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_hard_meshes(setup, figures, found);
   find_wrong_gravity(setup, figures, found);
   find_held(setup, found);
+  find_odd_stiffness(setup, found);
   find_loose_bodies(setup, found);
   find_near_surfaces(simulation, found);
   return found;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "barrier_stiffness.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/simulation/step_problem.hpp"
 
@@ -74,6 +75,20 @@ double available_energy(const Setup<Dim>& setup) {
   return energy;
 }
 
+}  // namespace
+
+template <int Dim>
+double barrier_stiffness_for(const Setup<Dim>& setup, const ContactOptions& contact, double modulus) {
+  if (contact.convergent) return kSoftness * modulus;
+  // A vertex's surface presses by 2 pairs of weight 1, not by its area over dhat^3.
+  return kSoftness * modulus * mean_vertex_area(setup.mesh) / (2 * std::pow(contact.activation_distance, 3));
+}
+
+template double barrier_stiffness_for(const Setup<2>&, const ContactOptions&, double);
+template double barrier_stiffness_for(const Setup<3>&, const ContactOptions&, double);
+
+namespace {
+
 template <int Dim>
 std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
   if (!setup.remesh.enabled) {
@@ -83,9 +98,7 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
   }
   double stiffest = 0;
   for (const auto& [body, material] : setup.materials) stiffest = std::max(stiffest, material.youngs_modulus);
-  contact.barrier_stiffness = kSoftness * stiffest;
-  if (!contact.convergent)  // a vertex's surface presses by 2 pairs of weight 1, not by its area over dhat^3
-    contact.barrier_stiffness *= mean_vertex_area(setup.mesh) / (2 * std::pow(contact.activation_distance, 3));
+  contact.barrier_stiffness = barrier_stiffness_for(setup, contact, stiffest);
   return fmt::format(
       "barrier stiffness {:.3g}: a tenth of the stiffest modulus, {:.3g} Pa; "
       "/solver/contact/barrier_stiffness sets another",

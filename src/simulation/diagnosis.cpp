@@ -47,10 +47,13 @@ class Diagnosis {
   Diagnosis(const SolveScope<Dim>& scope, const VectorX& x, Workspace& workspace)
       : scope_(scope), x_(x), on_surface_(scope.surface.positions(x)), workspace_(workspace) {}
 
-  void name_limit_of(const VectorX& step);
+  void name_limit_of(const VectorX& step, std::string_view which = "the last");
+  /// "by the vertex-edge pair 3 4 5 near (0.1, 0.2)"; empty where the step is free.
+  std::string limit_of(const VectorX& step, double& share);
   void name_residual_at(int vertex, const EnergySum& sum);
   void name_worst_cell_at(int vertex);
   void name_nearest_pair_at(int vertex);
+  void append(const std::string& text) { text_ << text; }
   std::string text() const { return text_.str(); }
 
  private:
@@ -80,15 +83,23 @@ class Diagnosis {
 };
 
 template <int Dim>
-void Diagnosis<Dim>::name_limit_of(const VectorX& step) {
+std::string Diagnosis<Dim>::limit_of(const VectorX& step, double& share) {
   const StepLimit cell = scope_.potential.elastic()->step_limit(x_, step);
   StepLimit pair;
   if (contact()) pair = contact()->step_limit(on_surface_, scope_.surface.motion(step), workspace_);
   const bool is_pair = pair.step < cell.step;
   const StepLimit& limit = is_pair ? pair : cell;
-  if (limit.step >= 1) return;
-  text_ << "; " << limit.step << " of the last Newton step is free, limited by the " << limit.kind << ' '
-        << (is_pair ? named_pair(kind_of_pair(limit), limit.vertices) : named_cell(limit.vertices));
+  share = limit.step;
+  if (limit.step >= 1) return {};
+  return std::string("by the ") + std::string(limit.kind) + ' ' +
+         (is_pair ? named_pair(kind_of_pair(limit), limit.vertices) : named_cell(limit.vertices));
+}
+
+template <int Dim>
+void Diagnosis<Dim>::name_limit_of(const VectorX& step, std::string_view which) {
+  double share = 1;
+  const std::string limit = limit_of(step, share);
+  if (!limit.empty()) text_ << "; " << share << " of " << which << " Newton step is free, limited " << limit;
 }
 
 template <int Dim>
@@ -171,6 +182,11 @@ std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary
   Diagnosis<Dim> result(scope, x, workspace);
   const VectorX& step = summary.failed_step;
   if (step.size() == x.size() && step.allFinite()) result.name_limit_of(step);
+  if (result.text().empty() && summary.blocked_step.size() == x.size()) {
+    Diagnosis<Dim> earlier(scope, summary.blocked_from, workspace);  // the last step may be free, and lead nowhere
+    earlier.name_limit_of(summary.blocked_step, "an earlier");
+    result.append(earlier.text());
+  }
   if (summary.worst_dof != kNone) {
     const int vertex = summary.worst_dof / Dim;
     result.name_residual_at(vertex, sum);
@@ -180,6 +196,25 @@ std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary
   return result.text();
 }
 
+template <int Dim>
+std::string describe_effort(const SolveScope<Dim>& scope, const NewtonSummary& summary, int rounds, Workspace& workspace) {
+  std::ostringstream blocked, indefinite, text;
+  blocked << summary.blocked << " went less than half of their step";
+  if (summary.blocked_step.size() == summary.blocked_from.size() && summary.blocked_step.size() > 0) {
+    double share = 1;
+    const std::string limit = Diagnosis<Dim>(scope, summary.blocked_from, workspace).limit_of(summary.blocked_step, share);
+    if (!limit.empty()) blocked << ", the last " << share << " of it, stopped " << limit;
+  }
+  indefinite << summary.indefinite << " met an indefinite Hessian";
+  text << summary.iterations << " Newton iterations: "
+       << (summary.blocked >= summary.indefinite ? blocked.str() + "; " + indefinite.str()
+                                                 : indefinite.str() + "; " + blocked.str());
+  if (rounds > 1) text << "; friction and what else is lagged took " << rounds << " solves";
+  return text.str();
+}
+
+template std::string describe_effort<2>(const SolveScope<2>&, const NewtonSummary&, int, Workspace&);
+template std::string describe_effort<3>(const SolveScope<3>&, const NewtonSummary&, int, Workspace&);
 template std::string diagnosis<2>(const SolveScope<2>&, const NewtonSummary&, const EnergySum&, const VectorX&, Workspace&);
 template std::string diagnosis<3>(const SolveScope<3>&, const NewtonSummary&, const EnergySum&, const VectorX&, Workspace&);
 

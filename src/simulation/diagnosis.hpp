@@ -26,4 +26,8 @@ template <int Dim>
 std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary, const EnergySum& sum, const VectorX& x,
                       Workspace& workspace);
 
+/// Why a solve took many iterations, the most frequent reason first; `rounds` of lagging were solved in it.
+template <int Dim>
+std::string describe_effort(const SolveScope<Dim>& scope, const NewtonSummary& summary, int rounds, Workspace& workspace);
+
 }  // namespace itr

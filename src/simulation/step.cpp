@@ -30,6 +30,7 @@ EdgeLengths edge_lengths(const Mesh<Dim>& mesh) {
 
 namespace {
 
+constexpr int kManyIterations = 100;    ///< of a solve, from which on the reason is told
 constexpr double kPoorResidual = 1e-6;  ///< of a linear solve, relative: a hundred times what Newton asks for
 
 void add_solves(const linear::SolveCounts& from, const linear::SolveCounts& to, StepReport& report) {
@@ -122,6 +123,7 @@ class StepAttempt {
     report_.newton_iterations += summary.iterations;
     report_.indefinite += summary.indefinite;
     if (summary.converged() && !summary.message.empty()) warn(summary.message);
+    if (summary.iterations > kManyIterations) warn(problem_->describe_effort(summary));
     if (summary.linear_residual > kPoorResidual)
       warn(fmt::format(
           "linear solves by {} reached a relative residual of {:.1e} only; another solver, or a `fallback`, may do better",

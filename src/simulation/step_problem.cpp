@@ -232,6 +232,13 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
   return summary;
 }
 
+template <int Dim>
+std::string StepProblem<Dim>::describe_effort(const NewtonSummary& summary) {
+  const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
+  return itr::describe_effort<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling}, summary, rounds_,
+                                   workspace_);
+}
+
 /// One solve with `lagged_`. Adaptive stiffness balances the terms before held dofs move: so it is in the
 /// regression values of peers' scenes.
 template <int Dim>
@@ -372,6 +379,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     }
   }
   NewtonSummary summary = minimize_lagged(x, std::move(way_to_start));
+  rounds_ = 1;
   summary.assembly_seconds += lagging_seconds;
   const int rounds = most_rounds();
   const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
@@ -418,6 +426,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     previous.push_back(x);
     lagged_ = std::move(next_lagged);
     NewtonSummary next = minimize_lagged(x);
+    ++rounds_;
     const bool is_fixed_point = next.converged() && next.iterations == 0;
     next.add_effort(summary);
     summary = next;

@@ -17,6 +17,7 @@ STORED = {
     "verification/report/results.json": CODE,
     "verification/paper/results.csv": CODE,
     "verification/newton/results.csv": ("src/newton", "include/itr/newton"),
+    "verification/newton/squeeze.csv": ("src/newton", "include/itr/newton", "src/energy", "include/itr/energy", "src/geometry"),
     "verification/scaling/results.csv": LINEAR,
     "verification/scaling/million.csv": CODE,
     "verification/scaling/ranks.csv": LINEAR,

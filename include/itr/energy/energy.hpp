@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "itr/core/types.hpp"
+#include "itr/energy/blocking.hpp"
 #include "itr/fem/hessian_sink.hpp"
 
 namespace itr {
@@ -50,6 +51,10 @@ class Energy {
   /// The motion dx with each vertex' way as long as it is feasible whatever stops others, for where max_step cuts dx short
   /// as a whole. False where the term cannot tell; `ways` is as long as dx, and undefined then.
   virtual bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const;
+  /// Adds the pairs that stop dx before `share` of it, and bounds the gaps of all pairs in `blocking` at its end. False
+  /// where the term cannot tell.
+  virtual bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+                             Workspace& workspace) const;
 };
 
 /// A sum that does not own its terms' data but shares the terms.
@@ -65,6 +70,9 @@ class EnergySum final : public Energy {
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Those of the one term that can tell; false where another cuts dx short.
   bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
+  /// Of the first term that can tell.
+  bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+                     Workspace& workspace) const override;
 
  private:
   std::vector<std::shared_ptr<const Energy>> terms_;

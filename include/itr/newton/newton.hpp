@@ -32,6 +32,9 @@ class NewtonSystem {
   virtual linear::Outcome prepare(double shift, ConstVectorView rhs, double asked) = 0;
   /// `solution` has the length of `rhs`.
   virtual linear::SolveReport solve(ConstVectorView rhs, VectorView solution) = 0;
+  /// Solves for every column of B with the matrix that was factorised last, each on its own unless a system knows better.
+  /// False where one fails.
+  virtual bool solve_columns(const MatrixX& B, MatrixX& X);
   /// Whether factorize, solve or negative_pivots tells of every matrix that is not positive definite.
   virtual bool tells_definiteness() const { return true; }
   /// Of the last factorisation: as many as negative eigenvalues of the matrix; 0 where the solver does not count them.
@@ -72,6 +75,7 @@ class SparseSystem final : public NewtonSystem {
   linear::Outcome factorize(double shift) override;
   linear::Outcome prepare(double shift, ConstVectorView rhs, double asked) override;
   linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override;
+  bool solve_columns(const MatrixX& B, MatrixX& X) override;
   bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
   int negative_pivots() const override { return solver_.statistics().negative_pivots; }
   std::string message() const override;
@@ -111,11 +115,14 @@ struct NewtonSummary {
   bool converged() const { return termination <= Termination::round_off; }
   int iterations = 0;
   int indefinite = 0;          ///< factorised Hessians with negative eigenvalues, where the solver tells
+  int blocked = 0;             ///< iterations that went less than half of their step, for what is in the way
   double energy = 0;           ///< at the end
   double gradient_norm = 0;    ///< over the unknowns, at the last evaluation, in the options' norm
   double step_norm = 0;        ///< of the last full step, in the options' norm
   double linear_residual = 0;  ///< worst relative residual of the linear solves
   double assembly_seconds = 0, linear_seconds = 0, line_search_seconds = 0, ccd_seconds = 0;
+  /// Positions and step [m] of the last one blocked in a long solve, else empty: whoever explains it finds the pair or cell.
+  VectorX blocked_from, blocked_step;
   VectorX failed_step;    ///< full step of the last iteration where it did not converge, [m]; else empty
   int worst_dof = kNone;  ///< unknown with the largest residual where it did not converge
   std::string message;    ///< what stopped it where it did not converge; what is to be known where it did

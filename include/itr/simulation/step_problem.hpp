@@ -48,6 +48,9 @@ class StepProblem {
   /// way there is free and the energy lower.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected = {});
 
+  /// Why the last solve took as many iterations as its summary says.
+  std::string describe_effort(const NewtonSummary& summary);
+
   /// With friction lagged at x, so that numbers compare between meshes and with other codes; else as in the last solve.
   EnergyReport report(const VectorX& x);
   double min_distance(const VectorX& x);
@@ -102,6 +105,7 @@ class StepProblem {
   Lagged lagged_;         ///< of the last solve
   ProblemCache<Dim>& cache_;
   unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this
+  int rounds_ = 0;          ///< of the last solve
 };
 
 /// The least det F over the elements; of a curved one a lower bound.

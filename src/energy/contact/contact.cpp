@@ -2,6 +2,7 @@
 #include "itr/energy/contact/contact.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -107,6 +108,58 @@ struct SpreadDistance {
         hessian.block<3, 3>(3 * s.closest.local[i], 3 * s.closest.local[j]) = H.block<3, 3>(3 * i, 3 * j);
   }
 };
+
+/// Normal of a pair's line or plane, not of unit length.
+template <int Dim>
+Vec<Dim> span_normal(PairKind kind, const Positions<Dim>& p) {
+  if constexpr (Dim == 2) {
+    const Vec<2> edge = p[2] - p[1];
+    return {-edge[1], edge[0]};
+  } else {
+    return kind == PairKind::face_vertex ? (p[2] - p[1]).cross(p[3] - p[1]) : (p[1] - p[0]).cross(p[3] - p[2]);
+  }
+}
+
+/// The signed gap of a pair at the end of its way, of which `share` is free, linearised there: over the line or plane of
+/// its primitives where their insides meet, else along the direction in which their closest features meet.
+template <int Dim>
+BlockingPairs::Bound bound_gap(PairKind kind, const std::array<int, 4>& vertices, const Positions<Dim>& p,
+                               const Positions<Dim>& way, double share, double dhat) {
+  constexpr double kDegenerate = 1e-3, kKept = 0.5, kKeptOfWide = 0.3;  // the last is above what CCD keeps
+  const int size = pair_size(kind);
+  Positions<Dim> hit, end;
+  for (int k = 0; k < size; ++k) {
+    hit[k] = p[k] + share * way[k];
+    end[k] = p[k] + way[k];
+  }
+  const ClosestFeatures features = closest_features<Dim>(kind, hit.data());
+  Positions<Dim> closest;
+  for (int k = 0; k < pair_size(features.kind); ++k) closest[k] = hit[features.local[k]];
+  const PairDistance<Dim> distance = pair_distance<Dim>(features.kind, closest.data());
+  Vec<Dim> normal = distance.separation.normalized();
+  Vec<4> weights = Vec<4>::Zero();
+  for (int k = 0; k < pair_size(features.kind); ++k) weights[features.local[k]] = distance.coefficients[k];
+  if (features.kind == kind) {
+    const Vec<Dim> before = span_normal<Dim>(kind, hit), after = span_normal<Dim>(kind, end);
+    if (after.norm() > kDegenerate * before.norm()) {
+      normal = (before.dot(normal) < 0 ? -1 : 1) * after.normalized();
+      weights = pair_distance<Dim>(kind, end.data()).coefficients;
+    }
+  }
+  BlockingPairs::Bound bound;
+  bound.size = Dim * size;
+  double gap = 0;
+  for (int k = 0; k < size; ++k) {
+    gap += weights[k] * normal.dot(end[k]);
+    for (int c = 0; c < Dim; ++c) {
+      bound.dofs[Dim * k + c] = Dim * vertices[k] + c;
+      bound.coefficients[Dim * k + c] = weights[k] * normal[c];
+    }
+  }
+  const double start = std::sqrt(pair_distance_squared<Dim>(kind, p.data()));
+  bound.missing = std::max(kKeptOfWide * start, kKept * std::min(start, dhat)) - gap;
+  return bound;
+}
 
 /// By vertex, the share of its way that is free.
 struct Shares {
@@ -349,6 +402,46 @@ bool ContactEnergy<Dim>::get_single_ways(ConstVectorView x, ConstVectorView dx, 
   }
   ways = dx;
   for (const int v : surface_->vertices) ways.segment<Dim>(Dim * v) *= share[v];
+  return true;
+}
+
+template <int Dim>
+bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+                                       Workspace& workspace) const {
+  auto& candidates = workspace.get<ContactCandidates<Dim>>();
+  candidates.update(*surface_, x, &dx, dhat_);
+  struct Way {
+    std::array<int, 4> vertices;
+    Positions<Dim> from, way;
+    double free_share_of(PairKind kind, double part) const {
+      Positions<Dim> to;
+      for (int k = 0; k < pair_size(kind); ++k) to[k] = from[k] + part * way[k];
+      return free_share<Dim>(kind, from, to);
+    }
+  };
+  const auto way_of = [&](PairKind kind, const std::array<int, 2>& pair) {
+    const auto vertices = vertices_of(*surface_, kind, pair);
+    const int size = pair_size(kind);
+    return Way{vertices, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, dx)};
+  };
+  for (const auto& [kind, list] : candidates.all()) {
+    const auto& pairs = *list;
+    const auto is_stopped = [&, kind = kind](std::size_t i) {
+      return way_of(kind, pairs[i]).free_share_of(kind, share) < 1;
+    };
+    const auto note = [&, kind = kind](std::size_t i, bool stopped) {
+      const std::array<int, 3> pair{static_cast<int>(kind), pairs[i][0], pairs[i][1]};
+      if (stopped && std::find(blocking.pairs.begin(), blocking.pairs.end(), pair) == blocking.pairs.end())
+        blocking.pairs.push_back(pair);
+    };
+    parallel_then_ordered<char>(pairs.size(), kBlock, is_stopped, note);
+  }
+  blocking.bounds.clear();
+  for (const auto& [kind_index, first, second] : blocking.pairs) {
+    const auto kind = static_cast<PairKind>(kind_index);
+    const Way way = way_of(kind, {first, second});
+    blocking.bounds.push_back(bound_gap<Dim>(kind, way.vertices, way.from, way.way, way.free_share_of(kind, 1), dhat_));
+  }
   return true;
 }
 

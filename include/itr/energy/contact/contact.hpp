@@ -42,6 +42,9 @@ class ContactEnergy final : public Energy {
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Shares of dx by vertex, from planar bounds of each pair (`planar_shares`).
   bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
+  /// The pairs that block a step along dx after `share` of it.
+  bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+                     Workspace& workspace) const override;
   /// Finds candidate pairs for a solve that begins at x and is expected to move by dx. One search then serves its start and
   /// its first step. The search is always made, so that its result does not depend on earlier solves.
   void foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;

@@ -1,0 +1,142 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""Hard-squeeze set: counts Newton iterations, factorisations and the worst step of bodies that are squeezed in contact.
+
+python3 verification/newton/squeeze.py [--check] [--dry] [--large] [--itr PATH] [--shared ../shared] [--case PART-OF-NAME]...
+                                       [--set /KEY=VALUE]... [--jobs N]
+
+Writes squeeze.csv and prints the table of README.md; each run is certified. With --check it stores nothing and compares with
+squeeze.csv: the exit status is 1 if a case does not end, is not certified, or takes more than the stored counts allow
+(MARGIN). Counts depend neither on how busy the machine is nor on the number of threads. --large adds the scenes that
+take minutes, --set changes a key in all of them (a variant), and nothing is stored then, nor with --dry.
+"""
+import argparse
+import concurrent.futures
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent))
+from harness import stored  # noqa: E402
+
+BALL = "unused/ball-obstacle/2D-noremesh.json"
+MASTICATOR = "masticator/3D-noremesh-nref0.json"
+
+# Name, scene, what is set, whether it takes minutes.
+CASES = [
+    ("ball on obstacle, n_refs 0", BALL, [], False),
+    ("ball on obstacle, n_refs 1", BALL, ["/geometry/0/n_refs=1"], False),
+    ("ball on obstacle, n_refs 2, to t = 0.4", BALL, ["/geometry/0/n_refs=2", "/time/tend=0.4"], False),
+    ("masticator 2D, h = 0.1", "masticator/h=0.1-noremesh.json", [], False),
+    ("masticator 2D, h = 0.05", "masticator/h=0.05.json", [], False),
+    ("masticator 3D, to t = 5", MASTICATOR, ["/time/tend=5"], False),
+    ("twisting beam", "twisting-beam/twisting-beam-noremesh-nref0.json", [], False),
+    ("spikes 2D", "spikes2d/spikes2d-noremesh.json", [], False),
+    ("ball on wall 3D, to t = 0.0024", "ball-wall/3D-noremesh-nref0.json", ["/time/tend=0.0024"], False),
+    ("ball on obstacle, n_refs 2", BALL, ["/geometry/0/n_refs=2"], True),
+    ("ball on obstacle, n_refs 3, to t = 0.3", BALL, ["/geometry/0/n_refs=3", "/time/tend=0.3"], True),
+    ("ball on obstacle, remeshed", "unused/ball-obstacle/2D.json", [], True),
+    ("masticator 3D", MASTICATOR, [], True),
+    ("rollers, to t = 0.3", "rollers/monkey-soft-hard-noremesh-nref0.json", ["/time/tend=0.3"], True),
+    ("ball on spikes, to t = 0.45", "spikes3d/drop-ball-noremesh-nref0.json", ["/time/tend=0.45"], True),
+]
+
+# Of stored counts. Round-off of another compiler sends a squeezed body another way: the bound is no tighter than that.
+MARGIN = {"iterations": 1.15, "factorizations": 1.15, "worst": 1.5}
+
+
+def run(case, options):
+    name, scene, sets, is_large = case
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = pathlib.Path(scratch) / "out"
+        command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--threads", "1"]
+        for assignment in sets + options.set:
+            command += ["--set", assignment]
+        status = subprocess.run(command, capture_output=True).returncode
+        certified = subprocess.run([str(options.itr), "certify", str(folder)], capture_output=True).returncode == 0
+        steps = [json.loads(line) for line in open(folder / "steps.jsonl")][1:]
+    total = lambda key: sum(step[key] for step in steps)  # noqa: E731
+    return {"case": name, "large": is_large, "ended": status == 0, "certified": certified, "steps": len(steps),
+            "iterations": total("newton_iterations"), "worst": max(step["newton_iterations"] for step in steps),
+            "over_100": sum(step["newton_iterations"] > 100 for step in steps), "factorizations": total("factorizations"),
+            "indefinite": total("indefinite"), "processor_seconds": total("processor_seconds"),
+            "energy": steps[-1]["energy"]["total"], "commit": stored.commit()}
+
+
+def typed(row):
+    texts = ("case", "commit")
+    return {key: value if key in texts else value == "True" if value in ("True", "False") else
+            float(value) if "." in value or "e" in value else int(value) for key, value in row.items()}
+
+
+def read(path=HERE / "squeeze.csv"):
+    with open(path, newline="") as file:
+        return [typed(row) for row in csv.DictReader(file)]
+
+
+def misses(row, bar):
+    """What a row does not reach of the stored one, in words."""
+    found = [] if row["ended"] and row["certified"] else ["did not end certified"]
+    return found + [f"{row[key]} {key}, stored {bar[key]}" for key, margin in MARGIN.items() if row[key] > margin * bar[key]]
+
+
+def table(rows):
+    lines = ["| scene | steps | iterations | worst step | steps over 100 | factorisations | indefinite | energy, last step [J] |",
+             "|---|---|---|---|---|---|---|---|"]
+    for row in rows:
+        end = "" if row["ended"] else ", stopped"
+        end += "" if row["certified"] else ", NOT CERTIFIED"
+        lines.append(f"| {row['case']} | {row['steps']}{end} | {row['iterations']} | {row['worst']} | {row['over_100']} "
+                     f"| {row['factorizations']} | {row['indefinite']} | {row['energy']:.6g} |")
+    return "\n".join(lines)
+
+
+def run_all(cases, options):
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        return list(pool.map(lambda case: run(case, options), cases))
+
+
+def check(itr, shared, large=False, jobs=1):
+    """Runs the cases; of each its row and what it misses."""
+    options = argparse.Namespace(itr=itr, shared=shared, set=[], jobs=jobs)
+    bars = {row["case"]: row for row in read()}
+    rows = run_all([case for case in CASES if case[0] in bars and (large or not case[3])], options)
+    return [(row, misses(row, bars[row["case"]])) for row in rows]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--dry", action="store_true")
+    parser.add_argument("--large", action="store_true")
+    parser.add_argument("--case", action="append")
+    parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--itr", type=pathlib.Path, default=ROOT / "build/release/bin/itr")
+    parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared")
+    options = parser.parse_args()
+    if options.check:
+        found = check(options.itr, options.shared, options.large, options.jobs)
+        for row, missing in found:
+            print(f"{row['case']}: {'; '.join(missing) or 'as stored or fewer'}")
+        sys.exit(any(missing for _, missing in found))
+    cases = [case for case in CASES if (options.large or not case[3]) and (not options.case or any(part in case[0] for part in options.case))]
+    rows = run_all(cases, options)
+    print(table(rows))
+    if options.set or options.dry:
+        return
+    kept = {row["case"]: row for row in read()} if (HERE / "squeeze.csv").exists() else {}
+    kept.update({row["case"]: row for row in rows})
+    with open(HERE / "squeeze.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(kept[case[0]] for case in CASES if case[0] in kept)
+
+
+if __name__ == "__main__":
+    main()
