@@ -211,7 +211,11 @@ typedef enum itr_force { ITR_CONTACT = 0, ITR_FRICTION = 1, ITR_REACTION = 2, IT
 ITR_C_API itr_status itr_watch_forces(itr_simulation* simulation, int watched);
 /** num_vertices * dimension [N]. */
 ITR_C_API const double* itr_forces(const itr_simulation* simulation, itr_force kind);
-/** On a boundary, of all kinds: force (dimension numbers) and moment about a point (2D: one number, 3D: three). */
+/** Of the present state, num_cells numbers [Pa]. */
+ITR_C_API itr_status itr_get_von_mises(itr_simulation* simulation, double* von_mises);
+/** Cauchy's, num_cells * dimension * dimension numbers, row by row [Pa]. */
+ITR_C_API itr_status itr_get_stress(itr_simulation* simulation, double* stress);
+/** On a boundary or an obstacle, of all kinds: force (dimension numbers) and moment about a point (2D: one number, 3D: three). */
 ITR_C_API itr_status itr_resultant(itr_simulation* simulation, const char* boundary, const double* about, double* force,
                                    double* moment);
 

@@ -13,6 +13,7 @@
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
+#include "output/force_file.hpp"
 #include "ranks.hpp"
 #include "run.hpp"
 #include "scene/node.hpp"
@@ -63,6 +64,12 @@ int certify(const std::string& directory) {
   fmt::print("{} frames, each by itself: {}\n", certificate.frames,
              certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
   return certificate.passed() ? cli::done : cli::certificate_failed;
+}
+
+int forces(const std::string& directory) {
+  const int frames = output::rewrite_forces(directory);
+  fmt::print("{}/{}: the forces of {} frames\n", directory, output::kForceFile, frames);
+  return cli::done;
 }
 
 /// What `run` and `explain` are told of a scene.
@@ -140,6 +147,8 @@ int dispatch(int argc, char** argv) {
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
+  auto* curves = app.add_subcommand("forces", "forces.csv again, from the frames of a run with /output/forces");
+  curves->add_option("directory", directory, "result folder")->required();
   auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   study::Options study_options;
   add_study_options(*study, study_options, sets);
@@ -156,6 +165,7 @@ int dispatch(int argc, char** argv) {
     throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
+  if (*curves) return forces(directory);
   if (*schema) {
     fmt::print("{}{}", as_page ? scene::reference_page() : scene::json_schema(), as_page ? "" : "\n");
     return cli::done;

@@ -47,10 +47,11 @@ template <int Dim>
 struct ObstacleGeometry {
   Obstacles<Dim> obstacles;  ///< without motions
   std::vector<int> id;       ///< per vertex: `surface_selection`, which conditions refer to; kNoTag if there is none
+  std::vector<int> part{};   ///< per vertex: which of Geometries::obstacles; empty where a program brings them
 };
 
 template <int Dim>
-ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files);
+ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings);
 
 /// The surface of the file that `holder` names as `mesh`, moved by the transformation of `geometry`. All points of the file
 /// are its vertices, in their order.

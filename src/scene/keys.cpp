@@ -33,6 +33,7 @@ constexpr Key kKeys[] = {
      "mesh file: .msh (Gmsh 2.2 or 4.1), .obj or .ply; relative to the scene's folder; required"},
     {"/geometry/*/type", read, "mesh|mesh_array|plane|ground|mesh_sequence", "\"mesh\"", "",
      "mesh_array makes copies; plane, ground and mesh_sequence are not supported yet"},
+    {"/geometry/*/name", read, "string", "", "", "for /output/forces"},
     {"/geometry/*/enabled", read, "boolean", "true", "", "false: as if the entry were not there, its file is not opened"},
     {"/geometry/*/is_obstacle", read, "boolean", "false", "",
      "only collides: it has no material and no unknowns, stands still or moves as prescribed"},
@@ -152,14 +153,17 @@ constexpr Key kKeys[] = {
     {"/time/integrator/energy_growth_limit", read, "positive", "0.05", "",
      "of Newmark: a step that would create more than this part of the energy is taken by implicit Euler"},
     {"/time/quasistatic", read, "boolean", "false", "", "no inertia: each step is an equilibrium"},
+    {"/time/allow_jumps", read, "boolean", "false", "",
+     "without inertia: a body may move by more than the scene is wide in a step; else the run stops there"},
     {"/time/step_cuts", read, "natural", "0", "",
      "a step whose solve fails is cut in half, so many times over, at most 20; 0: the run stops"},
 
     {"/contact/enabled", read, "boolean", "false", "",
      "contact between all surfaces, of one body too; without it bodies pass through each other"},
-    {"/contact/dhat", read, "positive", "0.001", "m",
+    {"/contact/dhat", read, "positive or auto", "0.001", "m",
      "distance below which surfaces push each other; unless given, at most dhat_percentage of the shortest surface edge; "
-     "smaller: nearer to hard contact, more Newton iterations"},
+     "smaller: nearer to hard contact, more Newton iterations; auto: small beside thicknesses, edges and gaps, as "
+     "`itr explain` says"},
     {"/contact/dhat_percentage", read, "positive", "0.8", "", "see dhat"},
     {"/contact/epsv", read, "positive", "0.001", "m/s", "sliding slower than this is smoothed to sticking"},
     {"/contact/friction_coefficient", read, "non_negative", "0", "", "Coulomb's, of all pairs; 0: no friction is computed"},
@@ -192,10 +196,11 @@ constexpr Key kKeys[] = {
     {"/solver/linear/{precond,enable_overwrite_solver,max_iter,tolerance,Eigen,AMGCL,Hypre,Pardiso,MUMPS}", ignored, "", "",
      "", "options of PolyFEM's solvers"},
 
-    {"/solver/contact/barrier_stiffness", read, "positive or adaptive", "\"adaptive\"", "",
-     "kappa: [Pa] with use_convergent_formulation; adaptive: follows the forces, as PolyFEM does; with remeshing a number, "
-     "by default from the stiffest body and dhat, see CONVENTIONS.md; larger: wider gaps, fewer iterations"},
-    {"/solver/contact/initial_barrier_stiffness", read, "positive", "1", "", "where adaptive stiffness begins"},
+    {"/solver/contact/barrier_stiffness", read, "positive or adaptive", "(from the stiffest body and dhat)", "",
+     "kappa: [Pa] with use_convergent_formulation; adaptive: follows the forces, as PolyFEM does unless a number is given; "
+     "larger: wider gaps, fewer iterations; CONVENTIONS.md has the default, `itr run` and `itr explain` print it"},
+    {"/solver/contact/initial_barrier_stiffness", read, "positive", "1", "",
+     "where adaptive stiffness begins; given without barrier_stiffness it asks for it"},
     {"/solver/contact/friction_iterations", read, "integer", "1", "",
      "solves a step, each with friction's normal forces of the one before; negative: until they agree; 0: no friction"},
     {"/solver/contact/friction_convergence_tol", read, "non_negative", "0.01", "", "when they agree, times dt"},
@@ -281,8 +286,8 @@ constexpr Key kKeys[] = {
     {"/space/remesh/history", read, "function|interpolated", "\"function\"", "",
      "what an operation is charged for forgetting of the past: what the new mesh cannot represent, or nothing (the paper)"},
     {"/space/remesh/relative_tolerance", read, "positive", "1e-4", "",
-     "chooses split and collapse tolerances where split/acceptance_tolerance is not given: this part of the energy that the "
-     "scene can store (CONVENTIONS.md); `itr run` and `itr explain` print them"},
+     "chooses split and collapse tolerances where split/acceptance_tolerance is not given: this part of the energy that is "
+     "stored so far, or that the scene has (CONVENTIONS.md); `itr run` and `itr explain` print them"},
     {"/space/remesh/split/enabled", read, "boolean", "true", "", ""},
     {"/space/remesh/split/acceptance_tolerance", read, "positive", "(relative_tolerance chooses)", "J",
      "least decrease of energy by a split, 2D: for a thickness of 1 m; smaller: more vertices, smaller error; time goes "
@@ -321,6 +326,16 @@ constexpr Key kKeys[] = {
     {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/<name of the scene>"},
     {"/output/checkpoint_period", read, "non_negative", "30", "s",
      "between states that --resume can go on from; 0: all frames"},
+    {"/output/forces", read, "list", "[]", "",
+     "curves of forces: forces.csv gets, by step, force and moment of contact, friction, reactions and all of them"},
+    {"/output/forces/*", read, "", "", "", "one curve: of all vertices that it names, each once"},
+    {"/output/forces/*/name", read, "string", "", "", "required"},
+    {"/output/forces/*/surfaces", read, "id or ids", "", "", "ids of surface_selection: what acts on these surfaces"},
+    {"/output/forces/*/bodies", read, "ids or names", "", "",
+     "ids of volume_selection, or names: what acts on these bodies"},
+    {"/output/forces/*/obstacles", read, "ids or names", "", "",
+     "ids of surface_selection, or names: what bodies do to these obstacles"},
+    {"/output/forces/*/about", read, "numbers", "(the origin)", "m", "what moments are about"},
     {"/output/paraview/skip_frame", read, "count", "1", "", "store every n-th step"},
     {"/output/paraview/options/contact_forces", read, "boolean", "false", "N", "frames get /fields/contact_force"},
     {"/output/paraview/options/friction_forces", read, "boolean", "false", "N", "/fields/friction_force"},

@@ -181,9 +181,20 @@ void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<
 }  // namespace
 
 template <int Dim>
-ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files) {
+ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
   ObstacleGeometry<Dim> all;
-  for (const Node& geometry : geometries.obstacles) read_obstacle<Dim>(geometry, files.get(geometry), all);
+  std::map<int, std::string> pointers;  // of ids
+  for (const Node& geometry : geometries.obstacles) {
+    const int part = all.part.empty() ? 0 : all.part.back() + 1;
+    read_obstacle<Dim>(geometry, files.get(geometry), all);
+    all.part.resize(all.obstacles.rest.size(), part);
+    const Node node = geometry["surface_selection"];
+    if (!node.exists()) continue;
+    const auto [first, is_new] = pointers.try_emplace(read_obstacle_id(node), geometry.pointer());
+    if (!is_new)
+      warnings.push_back(node.pointer() + ": " + first->second + " has the id " + std::to_string(first->first) +
+                         " too: what names it acts on both obstacles");
+  }
   return all;
 }
 
@@ -201,7 +212,7 @@ Obstacles<Dim> read_surface(const Node& holder, const Node& geometry, MeshFiles&
 
 template Obstacles<2> read_surface(const Node&, const Node&, MeshFiles&);
 template Obstacles<3> read_surface(const Node&, const Node&, MeshFiles&);
-template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&);
-template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&);
+template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&, std::vector<std::string>&);
 
 }  // namespace itr::scene

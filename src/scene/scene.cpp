@@ -8,6 +8,7 @@
 #include "check_keys.hpp"
 #include "collision_mesh.hpp"
 #include "conditions.hpp"
+#include "forces.hpp"
 #include "geometry.hpp"
 #include "materials.hpp"
 #include "merge.hpp"
@@ -70,6 +71,7 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, std::move(obstacles), setup, warnings);
+  warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }
 
 template <int Dim>
@@ -79,8 +81,11 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
     for (const Node& geometry : *list)
       for (const char* key : {"translation", "dimensions", "scale"})
-        warn_of_components(geometry["transformation"][key], Dim, warnings);
-  read_model<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
+        warn_of_components(geometry["transformation"][key], Dim, warnings, true);
+  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, warnings);
+  std::vector<ForceTarget> curves = read_forces<Dim>(root, geometries, obstacles, setup.mesh);
+  read_model<Dim>(root, std::move(obstacles), setup, warnings);
+  setup.fields.curves = std::move(curves);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;

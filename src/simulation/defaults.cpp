@@ -5,15 +5,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "itr/simulation/remesh_step.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/simulation/step_problem.hpp"
+#include "sizes.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr double kSoftness = 0.1;         ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
+constexpr double kSoftness = 0.1;          ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
+constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, little beside usual deformations
+constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
+constexpr double kLeastDhat = 0.01;       ///< of that without the gap: what nearly touches presses a little at the start
 constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest
 constexpr double kUsualStrain2 = 0.01;    ///< square of the strain at which bodies are expected to store energy
 
@@ -72,11 +78,6 @@ double available_energy(const Setup<Dim>& setup) {
 
 template <int Dim>
 std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
-  if (!setup.remesh.enabled) {
-    contact.adaptive_stiffness = true;
-    contact.barrier_stiffness = 1;
-    return {};
-  }
   double stiffest = 0;
   for (const auto& [body, material] : setup.materials) stiffest = std::max(stiffest, material.youngs_modulus);
   contact.barrier_stiffness = kSoftness * stiffest;
@@ -88,20 +89,61 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
       contact.barrier_stiffness, stiffest);
 }
 
+/// A thousandth of the thinnest body, a tenth of the shortest surface edge, and less than the gap at the start.
 template <int Dim>
-std::string choose_tolerances(const Setup<Dim>& setup, RemeshOptions& remesh) {
+std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& contact) {
+  double thinnest = std::numeric_limits<double>::infinity(), shortest = thinnest;
+  for (const auto& [body, size] : body_sizes(setup.mesh)) thinnest = std::min(thinnest, size.thickness);
+  const ContactSurface<Dim> surface = contact_surface(setup, setup.mesh);
+  VectorX start = held_dofs(setup, setup.mesh, setup.time.t0).target;
+  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v) start.template segment<Dim>(Dim * v) = setup.mesh.rest(v);
+  for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f)
+    for (int i = 0; i < Dim; ++i)
+      for (int j = 0; j < i; ++j)
+        shortest =
+            std::min(shortest, (setup.mesh.rest(setup.mesh.facet(f)[i]) - setup.mesh.rest(setup.mesh.facet(f)[j])).norm());
+  double& dhat = contact.activation_distance;
+  dhat = std::min(kDhatByThickness * thinnest, kDhatByEdge * shortest);
+  double gap = std::numeric_limits<double>::infinity();
+  if (!setup.proxy) {
+    Workspace workspace;
+    gap = ContactEnergy<Dim>(surface.surface, contact, 1, 1).min_distance(start, workspace);
+    if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
+  }
+  return fmt::format(
+      "d-hat {:.4g} m: a thousandth of the thinnest body ({:.4g} m), a tenth of the shortest surface edge "
+      "({:.4g} m){}; /contact/dhat sets another",
+      dhat, thinnest, shortest, std::isfinite(gap) ? fmt::format(", less than the gap, {:.4g} m", gap) : "");
+}
+
+template <int Dim>
+std::string choose_tolerances(Setup<Dim>& setup, RemeshOptions& remesh) {
   double energy = 0;
   for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
     if (setup.mesh.is_cell_alive(c))
       energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
-  if (const double available = available_energy(setup); available > 0) energy = std::min(energy, available);
-  remesh.split.acceptance_tolerance = remesh.relative_tolerance * energy;
-  if (remesh.collapse.acceptance_tolerance == CollapseOptions{}.acceptance_tolerance)
+  const double available = available_energy(setup);
+  if (available > 0) energy = std::min(energy, available);
+  setup.split_follows = available == 0;
+  const double relative = setup.split_follows ? kStoredShare * remesh.relative_tolerance : remesh.relative_tolerance;
+  remesh.split.acceptance_tolerance = relative * energy;
+  if (remesh.collapse.acceptance_tolerance == CollapseOptions{}.acceptance_tolerance) {
     remesh.collapse.acceptance_tolerance = kCollapseShare * remesh.split.acceptance_tolerance;
+    setup.collapse_follows = setup.split_follows;
+  }
+  const std::string split =
+      setup.split_follows
+          ? fmt::format(
+                "split tolerance: {:g} of the energy that is stored so far, at most {:.3g} J (strains of a tenth "
+                "everywhere)",
+                relative, remesh.split.acceptance_tolerance)
+          : fmt::format("split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J",
+                        remesh.split.acceptance_tolerance, relative, energy);
+  const std::string collapse = setup.collapse_follows ? fmt::format("{:g} of that", -kCollapseShare)
+                                                      : fmt::format("{:.2g} J", -remesh.collapse.acceptance_tolerance);
   return fmt::format(
-      "split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J; collapses may cost {:.2g} J; "
-      "/space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
-      remesh.split.acceptance_tolerance, remesh.relative_tolerance, energy, -remesh.collapse.acceptance_tolerance);
+      "{}; collapses may cost {}; /space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
+      split, collapse);
 }
 
 }  // namespace
@@ -112,8 +154,8 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   ContactOptions& contact = this->contact;
   RemeshOptions& remesh = this->remesh;
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
-  if (contact.enabled && contact.barrier_stiffness == 0)
-    if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
+  if (contact.enabled && contact.activation_distance == 0) words.push_back(choose_activation_distance(*this, contact));
+  if (contact.enabled && contact.barrier_stiffness == 0) words.push_back(choose_stiffness(*this, contact));
   if (double& length = remesh.split.min_edge_length; length < 0) length = kLeastSplitEdge * rest_diagonal(mesh);
   if (remesh.enabled && remesh.split.acceptance_tolerance == 0) words.push_back(choose_tolerances(*this, remesh));
   return words;

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "itr/core/timer.hpp"
 #include "itr/energy/point_forces.hpp"
 #include "itr/geometry/bvh.hpp"
@@ -73,6 +75,19 @@ RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const State<Dim>& sta
   return fields;
 }
 
+/// The tolerances that follow the energy stored so far.
+template <int Dim>
+RemeshOptions options_of_step(const StepSetup<Dim>& setup, double stored_energy) {
+  constexpr double kLeast = 1e-6;  // of the tolerance for strains of a tenth: those of 1e-4
+  RemeshOptions options = setup.remesh;
+  if (!setup.split_follows) return options;
+  double& split = options.split.acceptance_tolerance;
+  const double share = std::clamp(kStoredShare * options.relative_tolerance * stored_energy / split, kLeast, 1.0);
+  split *= share;
+  if (setup.collapse_follows) options.collapse.acceptance_tolerance *= share;
+  return options;
+}
+
 /// Mass of the bodies times the diameter of where they are [kg m].
 template <int Dim>
 double mass_moment(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
@@ -106,11 +121,15 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   const StepSetup<Dim>& setup = tools.setup;
   const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
   RemeshFields<Dim> fields = make_fields(setup, before, x);
+  const RemeshOptions options =
+      options_of_step(setup, std::max(before.stored_energy, report.energy.elastic + report.energy.contact));
   RemeshReport remeshed;
   {
     const ScopedTimer timer(report.seconds.remesh);
-    remeshed = remesh(state.mesh, fields, context, setup.remesh, state.remesh_memory, state.strata);
+    remeshed = remesh(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
+  report.split_tolerance = options.split.acceptance_tolerance;
+  report.best_refused_split = remeshed.best_refused_gain / problem.scaling();
   report.splits = remeshed.splits;
   report.collapses = remeshed.collapses;
   report.swaps = remeshed.swaps;

@@ -7,12 +7,15 @@
 #include <string>
 #include <utility>
 
+#include "cell_stress.hpp"
 #include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/process.hpp"
 #include "itr/linear/choice.hpp"
 #include "itr/mesh/validate.hpp"
+#include "itr/simulation/resultant.hpp"
 #include "itr/simulation/step.hpp"
+#include "watch.hpp"
 
 namespace itr {
 
@@ -138,6 +141,7 @@ struct Simulation<Dim>::Impl {
   double first_dt = 1;  ///< what the setup's tolerances are for [s]
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
+  Watch<Dim> watch;
 
   StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger}; }
 
@@ -249,6 +253,7 @@ StepResult Simulation<Dim>::advance() {
   StepResult result = take_step_in_parts(impl_->tools(), *impl_->state);
   if (!result.ok) return result;
   impl_->forces = result.forces;
+  impl_->watch.look(impl_->setup, *impl_->state, result.report, impl_->logger);
   if (before && !result.renumbering.empty())
     impl_->on_mesh_change(describe_change(before->mesh, impl_->state->mesh, result.renumbering), before->mesh);
   return result;
@@ -404,6 +409,17 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data() const {
 
 namespace {
 
+template <int Dim>
+ForceCurvePoint curve_point(const ForceSums<Dim>& sums, const std::string& name) {
+  ForceCurvePoint point{name, {}};
+  const std::array<const Resultant<Dim>*, 4> kinds{&sums.contact, &sums.friction, &sums.reaction, &sums.all};
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    point.kinds[k].assign(kinds[k]->force.begin(), kinds[k]->force.end());
+    point.kinds[k].insert(point.kinds[k].end(), kinds[k]->moment.begin(), kinds[k]->moment.end());
+  }
+  return point;
+}
+
 /// Of the stress in space: zero out of the plane in plane stress, what F_zz = 1 gives in plane strain.
 template <int Dim>
 double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
@@ -427,24 +443,45 @@ double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Ve
 }  // namespace
 
 template <int Dim>
+CellStress cell_stress(const Simulation<Dim>& simulation) {
+  const State<Dim>& state = simulation.state();
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+  const VectorX x = state.history.x[0].head(Dim * num_nodes(state.mesh, state.space));
+  CellStress stress;
+  for_each_cell_in_order<Dim>(
+      cells, x, simulation.setup(), [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+        Mat<Dim> cauchy = Mat<Dim>::Zero();
+        double equivalent = 0;
+        for (const auto& [F, X, share] : points) {
+          const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
+          cauchy += share * here;
+          equivalent += share * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
+        }
+        stress.von_mises.push_back(equivalent);
+        for (int i = 0; i < Dim; ++i)
+          for (int j = 0; j < Dim; ++j) stress.cauchy.push_back(cauchy(i, j));
+      });
+  return stress;
+}
+
+template CellStress cell_stress(const Simulation<2>&);
+template CellStress cell_stress(const Simulation<3>&);
+
+template <int Dim>
 void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, FrameData& data) const {
   const FieldOptions& options = impl_->setup.fields;
   AskedFields& asked = data.asked;
-  asked.forces = impl_->forces;
-  if (options.von_mises || options.stress)
-    for_each_cell_in_order<Dim>(
-        cells, data.x, impl_->setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {
-          Mat<Dim> cauchy = Mat<Dim>::Zero();
-          double equivalent = 0;
-          for (const auto& [F, X, share] : points) {
-            const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
-            cauchy += share * here;
-            equivalent += share * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
-          }
-          if (options.von_mises) asked.von_mises.push_back(equivalent);
-          for (int i = 0; options.stress && i < Dim; ++i)
-            for (int j = 0; j < Dim; ++j) asked.stress.push_back(cauchy(i, j));
-        });
+  if (options.contact_forces) asked.forces.contact = impl_->forces.contact;
+  if (options.friction_forces) asked.forces.friction = impl_->forces.friction;
+  if (options.reaction_forces) asked.forces.reaction = impl_->forces.reaction;
+  if (options.applied_forces) asked.forces.applied = impl_->forces.applied;
+  for (const ForceTarget& target : options.curves)
+    asked.curves.push_back(curve_point(force_sums(*this, target), target.name));
+  if (options.von_mises || options.stress) {
+    CellStress stress = cell_stress(*this);
+    if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
+    if (options.stress) asked.stress = std::move(stress.cauchy);
+  }
   if (!options.kinetic_energy && !options.momentum) return;
   VectorX product = VectorX::Zero(data.v.size());
   InertiaEnergy<Dim>(cells, impl_->setup.materials, impl_->setup.lump_mass ? MassKind::lumped : MassKind::consistent,

@@ -3,6 +3,8 @@
 
 #include <span>
 
+#include <array>
+
 #include "itr/simulation/simulation.hpp"
 
 namespace itr {
@@ -20,5 +22,14 @@ struct Resultant {
 /// Throws InputError where the setup does not ask for the four kinds of forces.
 template <int Dim>
 Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about);
+
+/// On the vertices of a target, by kind.
+template <int Dim>
+struct ForceSums {
+  Resultant<Dim> contact, friction, reaction, all;  ///< all: with tractions, pressures and the program's forces
+};
+/// Of obstacles there are contact and friction: what the bodies do to them. Throws as above.
+template <int Dim>
+ForceSums<Dim> force_sums(const Simulation<Dim>& simulation, const ForceTarget& target);
 
 }  // namespace itr

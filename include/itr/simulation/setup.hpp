@@ -77,13 +77,25 @@ struct InitialCondition {
   SpaceTimeFunction<Dim> value;  ///< evaluated at t = 0
 };
 
+/// Vertices whose forces are summed: on surfaces, of bodies, or of obstacles. Each counts once.
+struct ForceTarget {
+  std::string name;
+  std::vector<int> surfaces;           ///< tags of boundary facets
+  std::vector<int> bodies;             ///< ids
+  std::vector<int> obstacle_vertices;  ///< indices into Obstacles::rest
+  std::array<double, 3> about{};       ///< what moments are about [m]
+};
+
 /// What observers are shown beside positions, velocities and elastic density. What is not asked for is not computed.
 struct FieldOptions {
   bool contact_forces = false, friction_forces = false, reaction_forces = false;
   bool von_mises = false, stress = false;
   bool kinetic_energy = false, momentum = false;
   bool applied_forces = false;
-  bool any_forces() const { return contact_forces || friction_forces || reaction_forces || applied_forces; }
+  std::vector<ForceTarget> curves;  ///< summed forces
+  bool any_forces() const {
+    return contact_forces || friction_forces || reaction_forces || applied_forces || !curves.empty();
+  }
 };
 
 /// What acts in a step, whatever mesh it begins on.
@@ -101,6 +113,9 @@ struct StepSetup {
   ContactOptions contact;
   NewtonOptions newton;
   RemeshOptions remesh;
+  /// Tolerances of splits and of collapses are at most those of `remesh`, and by RemeshOptions::relative_tolerance of the
+  /// energy that the bodies have stored so far: Setup::choose_defaults sets it where neither is given.
+  bool split_follows = false, collapse_follows = false;
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   FieldOptions fields;
   bool lump_mass = false;
@@ -126,11 +141,12 @@ struct Setup : StepSetup<Dim> {
   bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
   LinearOptions linear;
 
-  /// Fills in what is left open, and says what with, a sentence each. Barrier stiffness 0: adaptive; with remeshing a tenth
-  /// of the stiffest body's modulus [Pa], or what that is in the other form. Split tolerance 0: relative_tolerance times an
-  /// energy of the scene, the lesser of 1 % of sum(E V), which bodies have at strains of a tenth, and, where nothing
-  /// prescribed feeds it, of what it has at the start and gravity gives; collapses then may cost a hundredth of that. Least
-  /// edge to split below 0: 1e-6 of the bodies' diagonal. A Simulation calls it.
+  /// Fills in what is left open, and says what with, a sentence each. Activation distance 0: a thousandth of the thinnest
+  /// body, less where edges are short or gaps narrow. Barrier stiffness 0, unless adaptive: a tenth of the stiffest body's
+  /// modulus [Pa], or what that is in the other form. Split tolerance 0: relative_tolerance times an energy of the scene,
+  /// where nothing prescribed feeds it what it has at the start and gravity gives, else what is stored so far; at most 1 %
+  /// of sum(E V), which bodies have at strains of a tenth; collapses then may cost a hundredth of that. Least edge to split
+  /// below 0: 1e-6 of the bodies' diagonal. A Simulation calls it.
   std::vector<std::string> choose_defaults();
   /// That of all, what belongs to the mesh included. A Simulation calls it.
   void validate() const;

@@ -37,6 +37,7 @@ struct State {
   Strata<Dim> strata;           ///< of the mesh, once remeshing in 3D has found them
   linear::FactorRecord factor;  ///< that may serve the next step
   VectorX deviation;            ///< x less x-hat of the last step, with which the next one begins; empty: there was none [m]
+  double stored_energy = 0;     ///< most elastic and contact energy that a step has ended with [J]
   double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 

@@ -344,6 +344,16 @@ class Simulation:
         """(m,): of rest volume [J/m^d]"""
         return self._simulation.elastic_density
 
+    @property
+    def von_mises(self) -> Array:
+        """(m,) [Pa]"""
+        return self._simulation.von_mises
+
+    @property
+    def stress(self) -> Array:
+        """(m, d * d): Cauchy's, row by row [Pa]"""
+        return self._simulation.stress
+
     def watch_forces(self, watched: bool = True) -> None:
         """Asks for forces, which are there after the next step."""
         self._simulation.watch_forces(watched)
@@ -357,7 +367,7 @@ class Simulation:
     def resultant(
         self, boundaries: Union[str, Iterable[str]], about: Optional[Sequence[float]] = None
     ) -> tuple[Array, Array]:
-        """Force [N] and moment [N m] of all kinds on one or more boundaries. Forces have to be watched."""
+        """Force [N] and moment [N m] of all kinds on boundaries, and of bodies on obstacles. Forces have to be watched."""
         names = [boundaries] if isinstance(boundaries, str) else list(boundaries)
         return self._simulation.resultant(names, np.zeros(self.dimension) if about is None else about)
 

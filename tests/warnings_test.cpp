@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// What `itr run` says of a run that it distrusts: in words, in steps.jsonl and in summary.json, over --resume too.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "output/warnings.hpp"
+
+namespace itr {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+struct Said {
+  int status = 0;
+  std::string text;
+  bool has(const std::string& words) const { return text.find(words) != std::string::npos; }
+};
+
+class WarningsTest : public ::testing::Test {
+ protected:
+  WarningsTest() : folder_(fs::path(::testing::TempDir()) / ("itr_warnings_" + std::to_string(::getpid()))) {
+    fs::create_directories(folder_);
+  }
+  ~WarningsTest() override { fs::remove_all(folder_); }
+
+  Said itr(const std::string& arguments) const {
+    FILE* pipe = popen((std::string(ITR_BINARY_DIR) + "/bin/itr " + arguments + " 2>&1").c_str(), "r");
+    Said said;
+    for (std::array<char, 4096> buffer; std::fgets(buffer.data(), buffer.size(), pipe);) said.text += buffer.data();
+    said.status = pclose(pipe);
+    return said;
+  }
+  Said run(const std::string& scene, const std::string& more = "") const {
+    return itr("run " ITR_SOURCE_DIR "/examples/" + scene + " -o " + (folder_ / "out").string() + " " + more);
+  }
+  Json summary() const { return Json::parse(std::ifstream(folder_ / "out" / "summary.json")); }
+
+  fs::path folder_;
+};
+
+TEST(WarningList, CountsKinds) {
+  EXPECT_EQ(output::kind_of_warning("step 12: 3.5e-07 J, (-1, 2) of body 3"), "step #: # J, (-#, #) of body #");
+  EXPECT_EQ(output::kind_of_warning("step 12: 1e+20 J of -0.5e3m"), output::kind_of_warning("step 3: 7 J of -2m"));
+  output::WarningList list;
+  list.add("step 1: off by 2 m");
+  list.add("step 2: off by 3.5 m");
+  list.add("odd");
+  EXPECT_EQ(list.count(), 3);
+  const Json summary = Json::parse("{" + list.summary_members() + "}");
+  EXPECT_EQ(summary["warning_count"], 3);
+  EXPECT_EQ(summary["warnings"][0], (Json{{"text", "step 1: off by 2 m"}, {"count", 2}}));
+  EXPECT_EQ(Json::parse(list.take_new()).size(), 3u);
+  EXPECT_EQ(list.take_new(), "");
+}
+
+TEST_F(WarningsTest, AreSaidCountedAndStored) {
+  const std::string steps = "--set /time/tend=0.25 --set /time/dt=0.1 --set /contact/friction_coefficient=0.5";
+  const Said said = run("cantilever.json", steps);
+  EXPECT_EQ(said.status, 0) << said.text;
+  EXPECT_TRUE(said.has("warning: /time/tend: 0.25 s is no whole number of steps")) << said.text;
+  EXPECT_TRUE(said.has("2 warnings: see above, or summary.json")) << said.text;
+  const Json before = summary();
+  EXPECT_EQ(before["warning_count"], 2);
+  ASSERT_EQ(before["warnings"].size(), 2u);
+  EXPECT_NE(before["warnings"][0]["text"].get<std::string>().find("/time/tend"), std::string::npos);
+
+  // What was there before is not lost, nor counted twice.
+  const Said resumed = run("cantilever.json", steps + " --set /time/tend=0.35 --resume");
+  EXPECT_EQ(resumed.status, 0) << resumed.text;
+  EXPECT_EQ(summary()["warning_count"], 3) << summary()["warnings"];
+}
+
+TEST_F(WarningsTest, AreNotThereWhereNothingIsWrong) {
+  const Said said = run("cantilever.json", "--set /time/tend=0.2 --set /time/dt=0.1");
+  EXPECT_FALSE(said.has("warning:")) << said.text;
+  EXPECT_EQ(summary()["warning_count"], 0);
+}
+
+}  // namespace
+}  // namespace itr
