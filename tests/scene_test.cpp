@@ -514,6 +514,32 @@ TEST_F(SceneTest, ConditionsAndMotions) {
   EXPECT_NE(scene.warnings[0].find("/boundary_conditions/dirichlet_boundary/3"), std::string::npos);
 }
 
+/// Flat obstacles need no file, and reach far beyond the bodies.
+TEST_F(SceneTest, PlanesAndGround) {
+  json scene = square({{"contact", {{"enabled", true}}}});
+  scene["geometry"].push_back({{"type", "ground"}, {"height", -0.5}, {"surface_selection", 3}});
+  scene["geometry"].push_back({{"type", "plane"}, {"point", {2, 0}}, {"normal", {-2, 0}}});
+  const itr::Setup<2> setup = read2(scene);
+  ASSERT_EQ(setup.obstacles.rest.size(), 4u);
+  ASSERT_EQ(setup.obstacles.edges.size(), 2u);
+  for (int v : {0, 1}) EXPECT_DOUBLE_EQ(setup.obstacles.rest[v].y(), -0.5);
+  EXPECT_GT((setup.obstacles.rest[1] - setup.obstacles.rest[0]).norm(), 20);
+  for (int v : {2, 3}) EXPECT_DOUBLE_EQ(setup.obstacles.rest[v].x(), 2);
+
+  json solid = square({{"geometry", {{"mesh", "tet.msh"}, {"volume_selection", 1}}}, {"contact", {{"enabled", true}}}});
+  solid["geometry"] = json::array({solid["geometry"], {{"type", "plane"}, {"point", {0, 0, -1}}, {"normal", {1, 2, 3}}}});
+  const auto in_space = std::get<itr::Setup<3>>(read_scene(solid).setup);
+  ASSERT_EQ(in_space.obstacles.triangles.size(), 2u);
+  for (const Vec<3>& p : in_space.obstacles.rest) EXPECT_NEAR((p - Vec<3>(0, 0, -1)).dot(Vec<3>(1, 2, 3)), 0, 1e-12);
+
+  scene["geometry"][1] = {{"type", "plane"}, {"point", {0, 0}}};
+  EXPECT_EQ(failure(scene).place, "/geometry/1/normal");
+  scene["geometry"][1] = {{"type", "ground"}, {"normal", {0, 1}}};
+  EXPECT_EQ(failure(scene).place, "/geometry/1/normal");
+  scene["geometry"][1] = {{"type", "ground"}, {"mesh", "line.obj"}};
+  EXPECT_EQ(failure(scene).place, "/geometry/1/mesh");
+}
+
 /// What is given, but cannot do what it says, is said.
 TEST_F(SceneTest, NothingIsAcceptedSilently) {
   const json base = square(json::parse(R"json({"geometry": [
@@ -542,7 +568,7 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
   };
   EXPECT_EQ(conditions("dirichlet_boundary", 5, "[0, 0]"), "/boundary_conditions/dirichlet_boundary/0/id");
   EXPECT_EQ(conditions("neumann_boundary", 5, "[0, 1]"), "/boundary_conditions/neumann_boundary/0/id");
-  EXPECT_EQ(conditions("obstacle_displacements", 3, "[0, 1]"), "/boundary_conditions/obstacle_displacements/0/id");
+  EXPECT_EQ(conditions("obstacle_displacements", 5, "[0, 1]"), "/boundary_conditions/obstacle_displacements/0/id");
   EXPECT_EQ(conditions("neumann_boundary", 8, "[0, 1]"), "/boundary_conditions/neumann_boundary/0/id");  // an obstacle
   EXPECT_EQ(conditions("pressure_boundary", 9, "1"), "/boundary_conditions/pressure_boundary/0/id");     // points
   EXPECT_EQ(refused(R"({"initial_conditions": {"velocity": [{"id": 4, "value": [1, 0]}]}})"),
@@ -551,7 +577,9 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
                 .expected.find("1, 2, 3, 4"),
             std::string::npos);
 
-  const std::array<std::pair<const char*, const char*>, 13> warnings = {{
+  const std::array<std::pair<const char*, const char*>, 14> warnings = {{
+      {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 3, "value": [0, 1]}]}})",
+       "3 is a surface of a body, which this does not move"},
       {R"({"contact": {"enabled": false}})", "/contact/enabled: not true"},
       {R"({"contact": null})", "bodies pass through the obstacles"},
       {R"({"space": {"remesh": {"sweeps": 2}}})", "/space/remesh: without \"enabled\": true"},

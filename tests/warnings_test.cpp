@@ -83,5 +83,64 @@ TEST_F(WarningsTest, AreNotThereWhereNothingIsWrong) {
   EXPECT_EQ(summary()["warning_count"], 0);
 }
 
+TEST_F(WarningsTest, LinearElasticityThatTurns) {
+  const Said said =
+      run("cantilever.json", "--set '/materials/0/type=\"LinearElasticity\"' --set /time/tend=0.3 --overwrite");
+  EXPECT_TRUE(said.has(": body 1 is linear elastic and turns by")) << said.text;
+  EXPECT_EQ(summary()["warning_count"], 1);
+}
+
+TEST_F(WarningsTest, ToleranceThatStarvesRemeshing) {
+  const std::string loose = "tasks/press.json --set '/solver/nonlinear={\"x_delta\": 1e-2}' --set /time/tend=0.2";
+  EXPECT_TRUE(itr("explain " ITR_SOURCE_DIR "/examples/" + loose).has("warning: Newton ends at steps of"));
+  const Said said = run(loose);
+  EXPECT_TRUE(said.has("Newton ended where one more iteration would gain")) << said.text;
+  EXPECT_TRUE(said.has("refinement sees the residual")) << said.text;
+  EXPECT_FALSE(run("tasks/press.json", "--set /time/tend=0.2 --overwrite").has("warning:"));
+}
+
+/// Without remeshing forces are what is off.
+TEST_F(WarningsTest, ToleranceThatLeavesForcesOff) {
+  const std::string fixed =
+      "--set /space/remesh/enabled=false --set /time/tend=0.4 --set /time/quasistatic=true --overwrite ";
+  const Said said = run("tasks/press.json", fixed + "--set '/solver/nonlinear={\"x_delta\": 3e-2}'");
+  EXPECT_TRUE(said.has("forces may be off by about")) << said.text;
+  EXPECT_FALSE(run("tasks/press.json", fixed).has("forces may be off")) << said.text;
+}
+
+TEST_F(WarningsTest, DistanceThatIsNotSmall) {
+  const std::string press = "explain " ITR_SOURCE_DIR "/examples/tasks/press.json ";
+  const Said said = itr(press + "--set /contact/dhat=0.001");
+  EXPECT_TRUE(said.has("of the thickness of body 1")) << said.text;
+  EXPECT_FALSE(itr(press).has("of the thickness of body")) << said.text;
+}
+
+TEST_F(WarningsTest, LockingElements) {
+  const std::string twist = "explain " ITR_SOURCE_DIR "/examples/tasks/twist.json --set /space/remesh/enabled=false ";
+  EXPECT_TRUE(itr(twist + "--set /materials/0/nu=0.499").has("they lock, forces are too large")) << itr(twist).text;
+  EXPECT_TRUE(itr(twist).has("where it bends they are too stiff")) << itr(twist).text;
+  EXPECT_FALSE(itr(twist + "--set /space/discr_order=2 --set /materials/0/nu=0.499").has("lock"));
+}
+
+/// Without a floor, inertia or anything that holds it.
+TEST_F(WarningsTest, BodyThatFliesAwayStopsTheRun) {
+  const std::string fly =
+      "--set /geometry/1/enabled=false --set /contact/enabled=false --set /time/quasistatic=true "
+      "--set '/time/integrator=\"ImplicitEuler\"' --set /time/tend=0.01 --overwrite "
+      "--set /solver/nonlinear/max_iterations=100 ";
+  EXPECT_TRUE(itr("explain " ITR_SOURCE_DIR "/examples/tasks/drop.json " + fly).has("nothing keeps them in place"));
+  const Said said = run("tasks/drop.json", fly);
+  EXPECT_NE(said.status, 0) << said.text;
+  EXPECT_TRUE(said.has("neither inertia nor a held vertex nor contact holds it")) << said.text;
+  EXPECT_FALSE(run("tasks/drop.json", fly + "--set /time/allow_jumps=true").has("jumps by"));
+}
+
+TEST_F(WarningsTest, RemeshingSaysWhatItDid) {
+  EXPECT_TRUE(run("cantilever.json", "--set /time/tend=0.2").has("remeshing: 81 vertices at the start"));
+  const Said idle =
+      run("cantilever.json", "--set /time/tend=0.2 --set /space/remesh/split/acceptance_tolerance=1e9 --overwrite");
+  EXPECT_TRUE(idle.has("accepted nothing, because no")) << idle.text;
+}
+
 }  // namespace
 }  // namespace itr

@@ -79,8 +79,10 @@ std::string common_members(const StepReport& r) {
 }  // namespace
 
 std::string step_json(const StepReport& report) {
-  return fmt::format(R"({{"step":{},"t":{},{},"trial_seconds":{}}})", report.step, number(report.t), common_members(report),
-                     number(report.trial_seconds));
+  return fmt::format(
+      R"({{"step":{},"t":{},{},"residual_worth":{},"split_tolerance":{},"best_refused_split":{},"trial_seconds":{}}})",
+      report.step, number(report.t), common_members(report), number(report.residual_worth), number(report.split_tolerance),
+      number(report.best_refused_split), number(report.trial_seconds));
 }
 
 void Totals::add(const StepReport& report) {

@@ -14,6 +14,7 @@
 #include "itr/core/timer.hpp"
 #include "report_json.hpp"
 #include "time_series.hpp"
+#include "vtu_file.hpp"
 #include "warnings.hpp"
 
 namespace itr::output {
@@ -114,6 +115,7 @@ struct Writer::Impl {
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
     const bool is_quadratic = frame.space && is_all_curved(frame.mesh, *frame.space);
+    if (options.vtu) write_vtu(directory, frame, step);
     series.add({frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, std::move(asked)});
   }
 
@@ -192,6 +194,7 @@ const StepReport& Writer::totals() const { return impl_->totals.report(); }
 
 void Writer::finish(const std::string& outcome, const std::string& solver) {
   impl_->series.write();
+  if (impl_->options.vtu) write_vtu_series(impl_->directory);
   const std::string& used = solver.empty() ? impl_->info.backend : solver;
   write_file(impl_->directory / "summary.json",
              impl_->totals.summary_json(impl_->info, outcome, used, impl_->norms, impl_->warnings.summary_members()));

@@ -125,8 +125,13 @@ class ConditionReader {
     std::vector<Node> entries = boundary_["obstacle_displacements"].items();
     for (const Node& node : entries) warn_of_components(node["value"], Dim, warnings_);
     for (const Node& node : entries)
-      if (!is_all(node["id"]) && !obstacle_ids_.contains(read_condition_id(node["id"])))
-        refuse_unused(node["id"], "an obstacle's id: " + id_list(obstacle_ids_));
+      if (!is_all(node["id"]) && !obstacle_ids_.contains(read_condition_id(node["id"]))) {
+        const int id = read_condition_id(node["id"]);
+        if (!facet_tags_.contains(id) && !point_tags_.contains(id))
+          refuse_unused(node["id"], "an obstacle's id: " + id_list(obstacle_ids_));
+        warnings_.push_back(node["id"].pointer() + ": " + std::to_string(id) +
+                            " is a surface of a body, which this does not move; obstacles: " + id_list(obstacle_ids_));
+      }
     for (const Node& node : boundary_["dirichlet_boundary"].items()) entries.push_back(node);
     Obstacles<Dim>& obstacles = geometry.obstacles;
     std::vector<char> is_taken(obstacles.rest.size(), false);

@@ -316,6 +316,7 @@ OutputOptions read_output(const Node& root) {
   const Node output = root["output"];
   OutputOptions options;
   options.skip_frames = output["paraview"]["skip_frame"].integer_at_least(1, options.skip_frames);
+  options.vtu = output["paraview"]["vtu"].boolean(false);
   options.checkpoint_period = output["checkpoint_period"].non_negative(options.checkpoint_period);
   return options;
 }

@@ -82,7 +82,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
     for (const Node& geometry : *list)
       for (const char* key : {"translation", "dimensions", "scale"})
         warn_of_components(geometry["transformation"][key], Dim, warnings, true);
-  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, warnings);
+  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, warnings);
   std::vector<ForceTarget> curves = read_forces<Dim>(root, geometries, obstacles, setup.mesh);
   read_model<Dim>(root, std::move(obstacles), setup, warnings);
   setup.fields.curves = std::move(curves);
@@ -98,7 +98,8 @@ std::string make_identity(const Node& root, const Geometries& geometries, MeshFi
   if (identity.contains("solver") && identity["solver"].is_object()) identity["solver"].erase("max_threads");
   Json hashes = Json::object();
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
-    for (const Node& geometry : *list) hashes[geometry["mesh"].pointer()] = files.hash(geometry["mesh"], MeshFiles::kMesh);
+    for (const Node& geometry : *list)
+      if (!is_flat_obstacle(geometry)) hashes[geometry["mesh"].pointer()] = files.hash(geometry["mesh"], MeshFiles::kMesh);
   if (has_collision_mesh(root)) {
     const Node node = root["contact"]["collision_mesh"];
     hashes[node["mesh"].pointer()] = files.hash(node["mesh"], MeshFiles::kMesh);

@@ -193,6 +193,24 @@ void find_wrong_gravity(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
                     " m/s^2: a scene's rhs pushes in the negative direction, gravity down y is [0, 9.81]");
 }
 
+/// Before a run: what Newton steps of the length where it ends are worth in the stiffest body, against a split.
+template <int Dim>
+void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
+  constexpr double kShare = 0.01;
+  const Setup<Dim>& setup = simulation.setup();
+  if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled || setup.newton.norm != NewtonNorm::euclidean) return;
+  double stiffness = 0;
+  for (const auto& [body, size] : body_sizes(setup.mesh))
+    stiffness = std::max(stiffness, setup.materials.at(body).youngs_modulus * std::pow(size.mean_edge, Dim - 2));
+  const double step = setup.newton.step_tolerance, worth = stiffness * step * step / 2;
+  const double split = setup.remesh.split.acceptance_tolerance;
+  if (worth > kShare * split)
+    found.push_back(fmt::format(
+        "Newton ends at steps of {:.2g} m, which are worth about {:.2g} J; a split is made for {:.2g} J{}: refinement "
+        "may see the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
+        step, worth, split, setup.split_follows ? " at most" : ""));
+}
+
 template <int Dim>
 void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
   const Setup<Dim>& setup = simulation.setup();
@@ -308,6 +326,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_held(setup, found);
   find_loose_bodies(setup, found);
   find_locking(setup, found);
+  find_loose_tolerance(simulation, found);
   find_near_surfaces(simulation, found);
   return found;
 }

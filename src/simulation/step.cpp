@@ -82,11 +82,10 @@ class StepAttempt {
     }
     make_problem();
     NewtonSummary summary = solve(expected());
-    if (!summary.converged()) return failed(summary);
+    const std::string jump = jumped();
+    if (!summary.converged()) return failed(summary, jump);
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
-    if (!has_inertia() && !setup_.time.allow_jumps)
-      if (std::string jump = find_jump(setup_, next_.mesh, next_.space, before_.history.x[0], x_); !jump.empty())
-        return failed(jump);
+    if (!jump.empty()) return failed(jump);
     if (setup_.remesh.enabled) {
       if (const auto cancelled = remesh()) return failed(*cancelled);
       if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();  // as it ends
@@ -207,8 +206,14 @@ class StepAttempt {
     return result;
   }
 
-  StepResult failed(const NewtonSummary& summary) {
-    StepResult result = failed(reason_of(summary));
+  /// What flew away without inertia; empty: nothing.
+  std::string jumped() const {
+    if (has_inertia() || setup_.time.allow_jumps) return {};
+    return find_jump(setup_, next_.mesh, next_.space, before_.history.x[0], x_);
+  }
+
+  StepResult failed(const NewtonSummary& summary, const std::string& jump = {}) {
+    StepResult result = failed(jump.empty() ? reason_of(summary) : jump + "; " + reason_of(summary));
     result.cancelled = summary.termination == Termination::cancelled;
     return result;
   }

@@ -16,6 +16,8 @@ namespace itr {
 namespace {
 
 constexpr double kMostRotation = 5;     ///< of linear elasticity [degrees]: strains are off by 4e-3 there
+constexpr double kForceError = 0.01;    ///< relative, from which it is said
+constexpr int kLooseSteps = 3;          ///< in a row
 constexpr double kResidualShare = 0.1;  ///< of the split tolerance, from which a residual hides what splits gain
 
 /// Of the rotation that is nearest to F [degrees].
@@ -33,7 +35,8 @@ double rotation_angle(const Mat<3>& F) {
 template <int Dim>
 void Watch<Dim>::look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger) {
   if (!has_said_rotation_) find_rotation(setup, state, logger);
-  if (!has_said_tolerance_) find_loose_tolerance(setup, report, logger);
+  if (!has_said_remeshing_) find_starved_remeshing(setup, report, logger);
+  if (!has_said_forces_) find_loose_forces(setup, state, report, logger);
 }
 
 template <int Dim>
@@ -58,15 +61,30 @@ void Watch<Dim>::find_rotation(const Setup<Dim>& setup, const State<Dim>& state,
 }
 
 template <int Dim>
-void Watch<Dim>::find_loose_tolerance(const Setup<Dim>& setup, const StepReport& report, const Logger& logger) {
+void Watch<Dim>::find_starved_remeshing(const Setup<Dim>& setup, const StepReport& report, const Logger& logger) {
   if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled) return;
   if (!(report.residual_worth > kResidualShare * report.split_tolerance)) return;
-  has_said_tolerance_ = true;
+  has_said_remeshing_ = true;
   logger.warning(
       fmt::format("step {}: Newton ended where one more iteration would gain {:.2g} J, and a split is made for {:.2g} J: "
                   "refinement sees the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these "
                   "tolerances",
                   report.step, report.residual_worth, report.split_tolerance));
+}
+
+/// A residual that is worth a part e of the energy stands for forces off by about sqrt(e). A first touch is passed over.
+template <int Dim>
+void Watch<Dim>::find_loose_forces(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report,
+                                   const Logger& logger) {
+  const double energy = std::max(state.stored_energy, report.energy.inertia);
+  const double error = std::sqrt(report.residual_worth / energy);
+  loose_steps_ = energy > 0 && error > kForceError ? loose_steps_ + 1 : 0;
+  if (loose_steps_ < kLooseSteps && !(loose_steps_ > 0 && state.step >= setup.time.steps)) return;
+  has_said_forces_ = true;
+  logger.warning(fmt::format(
+      "step {}: Newton ended where one more iteration would gain {:.2g} J of {:.2g} J: forces may be off by about "
+      "{:.2g} %; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
+      report.step, report.residual_worth, energy, 100 * error));
 }
 
 template <int Dim>

@@ -13,9 +13,11 @@ class Watch {
 
  private:
   void find_rotation(const Setup<Dim>& setup, const State<Dim>& state, const Logger& logger);
-  void find_loose_tolerance(const Setup<Dim>& setup, const StepReport& report, const Logger& logger);
+  void find_starved_remeshing(const Setup<Dim>& setup, const StepReport& report, const Logger& logger);
+  void find_loose_forces(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger);
 
-  bool has_said_rotation_ = false, has_said_tolerance_ = false;
+  bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false;
+  int loose_steps_ = 0;  ///< in a row
 };
 
 /// What moves in a step from `before` to `x` by more than the scene and all that is prescribed: where, and how far. Empty:
