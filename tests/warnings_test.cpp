@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "output/warnings.hpp"
 
@@ -97,6 +98,32 @@ TEST_F(WarningsTest, ToleranceThatStarvesRemeshing) {
   EXPECT_TRUE(said.has("Newton ended where one more iteration would gain")) << said.text;
   EXPECT_TRUE(said.has("refinement sees the residual")) << said.text;
   EXPECT_FALSE(run("tasks/press.json", "--set /time/tend=0.2 --overwrite").has("warning:"));
+}
+
+/// Against a tenth of the split tolerance; what is off by more than 2 % is said.
+TEST_F(WarningsTest, SmallerTolerancesGiveNoLargerErrors) {
+  const std::string press = "--set /time/tend=0.3 --set /time/quasistatic=true --overwrite ";
+  const auto force = [&] {
+    std::ifstream file(folder_ / "out/forces.csv");
+    std::string line, last;
+    while (std::getline(file, line)) last = line;
+    std::istringstream cells(last);
+    for (int i = 0; i < 14; ++i) std::getline(cells, line, ',');
+    return std::stod(line);  // all_y
+  };
+  ASSERT_EQ(run("tasks/press.json", press + "--set /space/remesh/relative_tolerance=1e-5").status, 0);
+  const double reference = force();
+  double larger = 1e300;
+  for (const char* tolerance : {"1e-2", "1e-3", "1e-4", "1e-5", "1e-6", ""}) {
+    const std::string set = *tolerance ? std::string("--set '/solver/nonlinear={\"x_delta\": ") + tolerance + "}'" : "";
+    const Said said = run("tasks/press.json", press + set);
+    ASSERT_EQ(said.status, 0) << said.text;
+    const double error = std::abs(force() / reference - 1);
+    EXPECT_LE(error, larger + 2e-3) << tolerance;
+    if (error > 0.02) EXPECT_TRUE(said.has("Newton ended where one more iteration would gain")) << tolerance << said.text;
+    larger = error;
+  }
+  EXPECT_LT(larger, 0.02);
 }
 
 /// Without remeshing forces are what is off.
