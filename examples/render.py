@@ -3,14 +3,17 @@
 """Draws what `itr run` left in a folder: the deformed mesh, cells coloured by a field, obstacles in grey.
 
 usage: render.py RESULTS [-o out.png] [--frames i,j,k] [--animation out.gif] [--field NAME] [--view x,y,z] [--zoom S]
-                 [--cut x,y,z,d]
+                 [--cut x,y,z,d] [--range low,high]
+       render.py RESULTS --forces [NAME,...] [-o out.png]
 
 Without --frames: the first stored step, the one with the largest elastic energy, and the last. NAME is any dataset of the
 frames' /fields: of vectors and tensors the magnitude counts, of fields on vertices the mean of a cell's. Default:
-elastic_density, on a logarithmic scale. Solid bodies are drawn by VTK (solid_images.py).
+elastic_density, on a logarithmic scale; other colours span the 1st to the 99th percentile, or --range. Solid bodies are drawn
+by VTK (solid_images.py), obstacles translucent. --forces plots forces.csv over time, of all curves or of those that are named.
 """
 
 import argparse
+import csv
 import json
 import pathlib
 
@@ -113,10 +116,14 @@ def choose_frames(folder, paths, asked):
     return sorted({steps[0], *during, steps[-1]})
 
 
-def common_norm(frames, is_logarithmic):
-    largest = max((frame.values.max(initial=0) for frame in frames), default=0) or 1
+def common_norm(frames, is_logarithmic, given=None):
+    """Colours of all frames: `given`, or what leaves out the hundredth of the cells at either end."""
+    values = np.concatenate([frame.values for frame in frames]) if frames else np.zeros(1)
+    if given:
+        return (LogNorm if is_logarithmic and given[0] > 0 else Normalize)(*given, clip=True)
     if not is_logarithmic:
-        return Normalize(min(frame.values.min(initial=0) for frame in frames), largest)
+        return Normalize(*np.percentile(values, [1, 99]), clip=True)
+    largest = values.max(initial=0) or 1
     return LogNorm(largest / 10**DECADES, largest, clip=True)
 
 
@@ -166,7 +173,7 @@ class SolidDrawing:
 
 
 def make_drawing(frames, options):
-    box, norm = common_box(frames), common_norm(frames, is_logarithmic(options.field))
+    box, norm = common_box(frames), common_norm(frames, is_logarithmic(options.field), options.range)
     return PlaneDrawing(box, norm) if frames[0].dim == 2 else SolidDrawing(box, norm, options)
 
 
@@ -224,6 +231,50 @@ def render_animation(frames, path, options):
     plt.close(figure)
 
 
+FORCE_KINDS = ("contact", "friction", "reaction", "all")
+
+
+def read_forces(folder):
+    """Name -> column -> values over time, of forces.csv."""
+    path = folder / "forces.csv"
+    if not path.exists():
+        raise SystemExit(f"{path}: not there; expected a run of a scene with /output/forces (SCENES.md)")
+    curves = {}
+    with open(path, newline="") as file:
+        for row in csv.DictReader(file):
+            curve = curves.setdefault(row.pop("name"), {})
+            for column, value in row.items():
+                curve.setdefault(column, []).append(float(value))
+    return curves
+
+
+def render_forces(folder, names, path):
+    """A panel a curve and direction: each kind of force over time."""
+    curves = read_forces(folder)
+    absent = [name for name in names if name not in curves]
+    if absent:
+        raise SystemExit(f"--forces: no curve {absent[0]} in {folder}; there are {', '.join(curves)}")
+    names = names or list(curves)
+    directions = [c.removeprefix("all_") for c in curves[names[0]] if c in ("all_x", "all_y", "all_z")]
+    figure, axes = plt.subplots(len(names), len(directions), figsize=(4.2 * len(directions), 2.8 * len(names)),
+                                squeeze=False, constrained_layout=True)
+    for row, name in zip(axes, names):
+        for panel, direction in zip(row, directions):
+            for kind in FORCE_KINDS:
+                values = np.array(curves[name][f"{kind}_{direction}"])
+                if kind == "all" or values.any():
+                    style = {"color": "black", "linewidth": 1.6} if kind == "all" else {"linewidth": 1, "linestyle": "--"}
+                    panel.plot(curves[name]["t"], values, label=kind, **style)
+            panel.set_title(f"{name}, {direction}", fontsize=9)
+            panel.set_xlabel("t [s]", fontsize=8)
+            panel.set_ylabel("force [N]", fontsize=8)
+            panel.grid(alpha=0.3)
+            panel.legend(fontsize=7)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
 def numbers(count):
     def parse(text):
         values = [float(part) for part in text.split(",")]
@@ -241,6 +292,8 @@ def main():
     parser.add_argument("--frames", help="steps to show, as i,j,k")
     parser.add_argument("--animation", type=pathlib.Path, help="a .gif of all stored steps")
     parser.add_argument("--field", default="elastic_density", help="dataset of /fields that colours cells")
+    parser.add_argument("--range", type=numbers(2), metavar="LOW,HIGH", help="of the colours; default: percentiles 1 and 99")
+    parser.add_argument("--forces", nargs="?", const="", metavar="NAME,...", help="plots forces.csv instead")
     parser.add_argument("--fps", type=int, default=15, help="of the animation")
     parser.add_argument("--view", type=numbers(3), default=[0.55, 0.35, 1], metavar="X,Y,Z",
                         help="3D: from the bodies to the camera")
@@ -249,6 +302,10 @@ def main():
                         help="3D: leaves out cells whose middle at rest, p, has (X,Y,Z).p > D")
     options = parser.parse_args()
 
+    if options.forces is not None:
+        output = options.output or options.results / "forces.png"
+        render_forces(options.results, [name for name in options.forces.split(",") if name], output)
+        return print(output)
     paths = frame_paths(options.results)
     if Frame(next(iter(paths.values())), options.field).dim == 3:
         ensure_display()

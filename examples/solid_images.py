@@ -133,6 +133,7 @@ class SolidImages:
         if len(frame.obstacle_faces):
             look = add(poly_data(frame.obstacle_x, frame.obstacle_faces))
             look.SetColor(0.8, 0.83, 0.88)
+            look.SetOpacity(0.35)
             look.SetEdgeVisibility(True)
             look.SetEdgeColor(0.5, 0.53, 0.58)
             look.SetInterpolationToFlat()

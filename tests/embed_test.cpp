@@ -158,7 +158,20 @@ TEST(Facade, MovesObstaclesByArraysAndFunctions) {
     EXPECT_NEAR(simulation.obstacle_positions()[3], 1, 1e-15);
     EXPECT_EQ(simulation.obstacle_positions()[4], 9);
   }
-  EXPECT_GT(simulation.resultant("left").force[0], 1);                 // it is squeezed
+  EXPECT_GT(simulation.resultant("left").force[0], 1);  // it is squeezed
+  const VectorX& contact = simulation.forces().contact;
+  double pushed = 0;
+  for (Eigen::Index i = 0; i < contact.size(); i += 2) pushed += contact[i];
+  EXPECT_NEAR(simulation.resultant("wall").force[0], -pushed, 1e-9 * std::abs(pushed));
+  EXPECT_EQ(simulation.resultant("far").force[0], 0);
+  const std::vector<double> stress = simulation.stress(), von_mises = simulation.von_mises();
+  ASSERT_EQ(von_mises.size(), static_cast<std::size_t>(simulation.num_cells()));
+  ASSERT_EQ(stress.size(), 4 * von_mises.size());
+  for (std::size_t c = 0; c < von_mises.size(); ++c) {  // of plane stress
+    const double xx = stress[4 * c], xy = stress[4 * c + 1], yy = stress[4 * c + 3];
+    EXPECT_NEAR(von_mises[c], std::sqrt(xx * xx - xx * yy + yy * yy + 3 * xy * xy), 1e-9 * von_mises[c]);
+    EXPECT_LT(xx, 0);
+  }
   EXPECT_LE(simulation.as<2>().setup().obstacles.motions.size(), 3u);  // places are used again
 }
 

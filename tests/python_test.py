@@ -214,6 +214,8 @@ class Conditions(unittest.TestCase):
         simulation.step()
         force, moment = simulation.resultant(["left", "right"])
         self.assertEqual((force.shape, moment.shape), ((2,), (1,)))
+        self.assertEqual(simulation.von_mises.shape, (18,))
+        self.assertEqual(simulation.stress.shape, (18, 4))
         np.testing.assert_allclose(simulation.forces("applied").sum(0), [0, 16])
         self.assertGreater(simulation.velocities[:, 1].min(), 0)
         self.assertEqual(simulation.forces("reaction").shape, (16, 2))

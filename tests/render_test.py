@@ -64,7 +64,9 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
         command = [itr, "run", examples / "ball_wall.json", "-o", folder / "run", "--threads", "1"]
-        for text in ("/time/tend=0.0002", "/output/paraview/options/scalar_values=true"):
+        for text in ("/time/tend=0.0002", "/output/paraview/options/scalar_values=true",
+                     '/geometry/1/name="wall"',
+                     '/output/forces=[{"name": "wall", "obstacles": "wall"}, {"name": "ball", "bodies": 1}]'):
             command += ["--set", text]
         subprocess.run(command, check=True, capture_output=True)
         stored = sorted((folder / "run/frames").glob("*.h5"))
@@ -79,7 +81,13 @@ def main():
             assert done.returncode == status, done.stderr
             return done.stderr
 
-        render("-o", folder / "speed.png", "--field", "v")
+        render("-o", folder / "speed.png", "--field", "v", "--range", "0,40")
+        render("--forces")
+        render("--forces", "ball", "-o", folder / "ball.png")
+        for name in ("run/forces.png", "ball.png"):
+            with Image.open(folder / name) as picture:
+                assert len(picture.convert("RGB").getcolors(maxcolors=1 << 24)) > 10, "an empty plot"
+        assert "no curve door" in render("--forces", "door", status=1)
         with Image.open(folder / "speed.png") as picture:
             assert len(picture.convert("RGB").getcolors(maxcolors=1 << 24)) > 100, "an empty picture"
         render("--animation", folder / "all.gif")

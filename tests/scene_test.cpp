@@ -350,7 +350,11 @@ TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {
   EXPECT_NEAR(read2(square(absent)).contact.activation_distance, 0.8e-4, 1e-12);
   EXPECT_EQ(read2(square(given)).contact.activation_distance, 1e-3);
   EXPECT_EQ(read_scene(square(given)).warnings.size(), 1u);
+  EXPECT_FALSE(read2(square(given)).contact.adaptive_stiffness);
+  given["solver"] = {{"contact", {{"barrier_stiffness", "adaptive"}}}};
   EXPECT_TRUE(read2(square(given)).contact.adaptive_stiffness);
+  given["contact"]["dhat"] = "auto";
+  EXPECT_EQ(read2(square(given)).contact.activation_distance, 0);
 }
 
 /// In kilometres a body of 0.1 mm has an extent of 1e-7.
@@ -506,8 +510,105 @@ TEST_F(SceneTest, ConditionsAndMotions) {
   EXPECT_TRUE(setup.consistent_initial_acceleration);
   ASSERT_EQ(setup.initial_velocity.size(), 1u);
   EXPECT_DOUBLE_EQ(setup.initial_velocity[0].value({0, 1}, 0)[0], -std::numbers::pi);
-  ASSERT_EQ(scene.warnings.size(), 1u) << scene.warnings[0];
+  ASSERT_EQ(scene.warnings.size(), 3u) << scene.warnings[0];  // of contact and of the acceleration, too
   EXPECT_NE(scene.warnings[0].find("/boundary_conditions/dirichlet_boundary/3"), std::string::npos);
+}
+
+/// Flat obstacles need no file, and reach far beyond the bodies.
+TEST_F(SceneTest, PlanesAndGround) {
+  json scene = square({{"contact", {{"enabled", true}}}});
+  scene["geometry"].push_back({{"type", "ground"}, {"height", -0.5}, {"surface_selection", 3}});
+  scene["geometry"].push_back({{"type", "plane"}, {"point", {2, 0}}, {"normal", {-2, 0}}});
+  const itr::Setup<2> setup = read2(scene);
+  ASSERT_EQ(setup.obstacles.rest.size(), 4u);
+  ASSERT_EQ(setup.obstacles.edges.size(), 2u);
+  for (int v : {0, 1}) EXPECT_DOUBLE_EQ(setup.obstacles.rest[v].y(), -0.5);
+  EXPECT_GT((setup.obstacles.rest[1] - setup.obstacles.rest[0]).norm(), 20);
+  for (int v : {2, 3}) EXPECT_DOUBLE_EQ(setup.obstacles.rest[v].x(), 2);
+
+  json solid = square({{"geometry", {{"mesh", "tet.msh"}, {"volume_selection", 1}}}, {"contact", {{"enabled", true}}}});
+  solid["geometry"] = json::array({solid["geometry"], {{"type", "plane"}, {"point", {0, 0, -1}}, {"normal", {1, 2, 3}}}});
+  const auto in_space = std::get<itr::Setup<3>>(read_scene(solid).setup);
+  ASSERT_EQ(in_space.obstacles.triangles.size(), 2u);
+  for (const Vec<3>& p : in_space.obstacles.rest) EXPECT_NEAR((p - Vec<3>(0, 0, -1)).dot(Vec<3>(1, 2, 3)), 0, 1e-12);
+
+  scene["geometry"][1] = {{"type", "plane"}, {"point", {0, 0}}};
+  EXPECT_EQ(failure(scene).place, "/geometry/1/normal");
+  scene["geometry"][1] = {{"type", "ground"}, {"normal", {0, 1}}};
+  EXPECT_EQ(failure(scene).place, "/geometry/1/normal");
+  scene["geometry"][1] = {{"type", "ground"}, {"mesh", "line.obj"}};
+  EXPECT_EQ(failure(scene).place, "/geometry/1/mesh");
+}
+
+/// What is given, but cannot do what it says, is said.
+TEST_F(SceneTest, NothingIsAcceptedSilently) {
+  const json base = square(json::parse(R"json({"geometry": [
+      {"mesh": "square.obj", "volume_selection": 1, "surface_selection": {"threshold": 1e-3},
+       "point_selection": [{"id": 9, "box": [[0.5, 0.5], [2, 2]]}]},
+      {"mesh": "line.obj", "is_obstacle": true, "surface_selection": 8, "transformation": {"translation": [0, -1]}}],
+    "contact": {"enabled": true, "dhat": 1e-3}})json"));
+  const auto with = [&](const char* changes) {
+    json scene = base;
+    scene.merge_patch(json::parse(changes));
+    return scene;
+  };
+  const auto refused = [&](const char* changes) { return failure(with(changes)).place; };
+  const auto warned = [&](const char* changes) {
+    std::string text;
+    for (const std::string& warning : read_scene(with(changes)).warnings) text += warning + "\n";
+    return text;
+  };
+  EXPECT_EQ(warned("{}"), "");
+
+  const char* condition = R"({"boundary_conditions": {"%s": [{"id": %d, "value": %s}]}})";
+  const auto conditions = [&](const char* kind, int id, const char* value) {
+    std::array<char, 200> text;
+    std::snprintf(text.data(), text.size(), condition, kind, id, value);
+    return refused(text.data());
+  };
+  EXPECT_EQ(conditions("dirichlet_boundary", 5, "[0, 0]"), "/boundary_conditions/dirichlet_boundary/0/id");
+  EXPECT_EQ(conditions("neumann_boundary", 5, "[0, 1]"), "/boundary_conditions/neumann_boundary/0/id");
+  EXPECT_EQ(conditions("obstacle_displacements", 5, "[0, 1]"), "/boundary_conditions/obstacle_displacements/0/id");
+  EXPECT_EQ(conditions("neumann_boundary", 8, "[0, 1]"), "/boundary_conditions/neumann_boundary/0/id");  // an obstacle
+  EXPECT_EQ(conditions("pressure_boundary", 9, "1"), "/boundary_conditions/pressure_boundary/0/id");     // points
+  EXPECT_EQ(refused(R"({"initial_conditions": {"velocity": [{"id": 4, "value": [1, 0]}]}})"),
+            "/initial_conditions/velocity/0/id");
+  EXPECT_NE(failure(with(R"({"boundary_conditions": {"neumann_boundary": [{"id": 5, "value": [0, 1]}]}})"))
+                .expected.find("1, 2, 3, 4"),
+            std::string::npos);
+
+  const std::array<std::pair<const char*, const char*>, 14> warnings = {{
+      {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 3, "value": [0, 1]}]}})",
+       "3 is a surface of a body, which this does not move"},
+      {R"({"contact": {"enabled": false}})", "/contact/enabled: not true"},
+      {R"({"contact": null})", "bodies pass through the obstacles"},
+      {R"({"space": {"remesh": {"sweeps": 2}}})", "/space/remesh: without \"enabled\": true"},
+      {R"({"space": {"remesh": {"enabled": true, "collapse": {"acceptance_tolerance": 1e-3}}}})",
+       "/space/remesh/collapse/acceptance_tolerance: positive"},
+      {R"({"boundary_conditions": {"rhs": [0, 9.81, 0]}})", "/boundary_conditions/rhs: [0,9.81,0] has more components"},
+      {R"({"boundary_conditions": {"dirichlet_boundary": [{"id": 1, "value": [0, 0], "dimension": [true, true, true]}]}})",
+       "dimension: [true,true,true] has more components"},
+      {R"({"boundary_conditions": {"dirichlet_boundary": [{"id": 1, "value": [0, 0]}],
+                                   "neumann_boundary": [{"id": 1, "value": [0, 1]}]}})",
+       "neumann_boundary/0: all vertices of the surface 1 are held"},
+      {R"({"time": {"quasistatic": true}, "initial_conditions": {"velocity": [{"id": 1, "value": [1, 0]}]}})",
+       "/initial_conditions/velocity: without inertia"},
+      {R"({"initial_conditions": {"acceleration": "consistent"}})", "only ImplicitNewmark begins with an acceleration"},
+      {R"({"time": {"dt": 0.3}})", "/time/tend: 1 s is no whole number of steps: the run ends at 1.2 s"},
+      {R"({"time": {"dt": 3}})", "the run ends at 3 s"},
+      {R"({"contact": {"dhat": 1.5}})", "1.5 m is longer than the shortest edge of the surfaces, 1 m"},
+      {R"({"time": null, "initial_conditions": {"velocity": [{"id": 1, "value": [1, 0]}]}})", "without inertia"},
+  }};
+  for (const auto& [changes, text] : warnings) EXPECT_NE(warned(changes).find(text), std::string::npos) << warned(changes);
+
+  json twins = base;
+  twins["geometry"].push_back(twins["geometry"][1]);
+  const std::vector<std::string> of_twins = read_scene(twins).warnings;
+  ASSERT_EQ(of_twins.size(), 1u);
+  EXPECT_NE(of_twins[0].find("/geometry/2/surface_selection: /geometry/1 has the id 8 too"), std::string::npos);
+  const json solid = {{"geometry", {{"mesh", "tet.msh"}, {"volume_selection", 1}}},
+                      {"materials", {{"type", "NeoHookean"}, {"E", 1}, {"nu", 0.3}, {"plane_strain", true}}}};
+  EXPECT_EQ(wrong_place(solid), "/materials/plane_strain");
 }
 
 TEST_F(SceneTest, SelectedPointsAreHeld) {

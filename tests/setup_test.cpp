@@ -44,7 +44,7 @@ const std::vector<Mistake> kMistakes = {
     {"dt of 0", [](auto& s) { s.time.dt = 0; }, "/time/dt", "0", "> 0"},
     {"no steps", [](auto& s) { s.time.steps = 0; }, "/time/time_steps", "0", ">= 1"},
     {"BDF7", [](auto& s) { s.time.bdf_order = 7; }, "/time/integrator/steps", "7", "1 to 6"},
-    {"d-hat of 0", [](auto& s) { s.contact.activation_distance = 0; }, "/contact/dhat", "0", "> 0"},
+    {"d-hat of -1", [](auto& s) { s.contact.activation_distance = -1; }, "/contact/dhat", "-1", ">= 0"},
     {"negative friction", [](auto& s) { s.contact.friction_coefficient = -1; }, "/contact/friction_coefficient", "-1",
      ">= 0"},
     {"motion out of range", [](auto& s) { s.obstacles.motion[1] = 3; }, "obstacles.motion[1]", "3", "kNone"},
@@ -99,25 +99,30 @@ INSTANTIATE_TEST_SUITE_P(All, Mistakes, ::testing::ValuesIn(kMistakes), [](const
   return name;
 });
 
-TEST(SetupDefaults, StiffnessIsAdaptiveAndWithRemeshingFromTheModulus) {
+TEST(SetupDefaults, StiffnessIsFromTheModulusWithRemeshingAndWithout) {
   linear::Registry registry;
   itr::Setup<2> setup = good_setup();
+  setup.contact.convergent = true;
+  EXPECT_FALSE(Simulation<2>(setup, registry).setup().contact.adaptive_stiffness);
+  EXPECT_DOUBLE_EQ(Simulation<2>(setup, registry).setup().contact.barrier_stiffness, 1e3);
+  setup.contact.adaptive_stiffness = true;
   EXPECT_TRUE(Simulation<2>(setup, registry).setup().contact.adaptive_stiffness);
+  setup.contact.adaptive_stiffness = false;
 
   setup.remesh.enabled = true;
-  setup.contact.convergent = true;
   std::vector<std::string> said;
   const Logger logger([&](LogLevel, std::string_view text) { said.emplace_back(text); });
   const Simulation<2> simulation(setup, registry, logger);
   const auto& chosen = simulation.setup();
   EXPECT_FALSE(chosen.contact.adaptive_stiffness);
   EXPECT_DOUBLE_EQ(chosen.contact.barrier_stiffness, 1e3);
-  // 1 % of E V, times 1e-4: nothing else is known of this scene, as it has neither gravity nor velocity.
-  EXPECT_DOUBLE_EQ(*chosen.remesh.split.acceptance_tolerance, 1e-6 * 1e4 * 0.04);
+  // 1 % of E V, times 1e-5: the most that what follows the stored energy may be.
+  EXPECT_TRUE(chosen.follows_stored_energy.split && chosen.follows_stored_energy.collapse);
+  EXPECT_DOUBLE_EQ(*chosen.remesh.split.acceptance_tolerance, 1e-7 * 1e4 * 0.04);
   EXPECT_DOUBLE_EQ(*chosen.remesh.collapse.acceptance_tolerance, -0.01 * *chosen.remesh.split.acceptance_tolerance);
   ASSERT_EQ(said.size(), 2u);
   EXPECT_NE(said[0].find("barrier stiffness 1e+03"), std::string::npos) << said[0];
-  EXPECT_NE(said[1].find("split tolerance 0.0004 J"), std::string::npos) << said[1];
+  EXPECT_NE(said[1].find("of the energy that is stored so far, at most 4e-05 J"), std::string::npos) << said[1];
 
   setup.contact.convergent = false;  // the same pressure at the same gap
   const double area = 0.8 / 12;      // of a vertex on the boundary

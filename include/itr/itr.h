@@ -244,8 +244,12 @@ typedef enum itr_force { ITR_CONTACT = 0, ITR_FRICTION = 1, ITR_REACTION = 2, IT
 ITR_C_API itr_status itr_watch_forces(itr_simulation* simulation, int watched);
 /** Forces of one kind, num_nodes * dimension [N]; NULL before the first step in which they are watched. */
 ITR_C_API const double* itr_forces(const itr_simulation* simulation, itr_force kind);
-/** Sum of all kinds of forces on a boundary: force [N], `dimension` numbers, and moment about a point [N m], one number in
- * 2D and three in 3D. */
+/** Copies von Mises' equivalent stress, num_cells numbers [Pa]. */
+ITR_C_API itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* von_mises);
+/** Copies Cauchy's stress, num_cells * dimension * dimension numbers, row by row [Pa]. */
+ITR_C_API itr_status itr_get_stress(itr_simulation* simulation, size_t length, double* stress);
+/** Sum of all kinds of forces on a boundary, or of bodies on an obstacle: force [N], `dimension` numbers, and moment about a
+ * point [N m], one number in 2D and three in 3D. */
 ITR_C_API itr_status itr_resultant(itr_simulation* simulation, const char* boundary, const double* about, double* force,
                                    double* moment);
 

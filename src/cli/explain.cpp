@@ -93,7 +93,7 @@ class Explanation {
     if (setup_.contact.enabled) contact();
     fmt::print("warnings\n");
     if (warnings_.empty()) fmt::print("  none\n");
-    for (const auto& warning : warnings_) fmt::print("  {}\n", warning);
+    for (const auto& warning : warnings_) fmt::print("  warning: {}\n", warning);
   }
 
  private:

@@ -14,6 +14,7 @@
 #include "itr/linear/registry.hpp"
 #include "itr/output/certify.hpp"
 #include "itr_commit.hpp"
+#include "output/force_file.hpp"
 #include "ranks.hpp"
 #include "report.hpp"
 #include "run.hpp"
@@ -65,6 +66,12 @@ int certify(const std::string& directory) {
   fmt::print("{} frames, each by itself: {}\n", certificate.frames,
              certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
   return certificate.passed() ? cli::done : cli::certificate_failed;
+}
+
+int forces(const std::string& directory) {
+  const int frames = output::rewrite_forces(directory);
+  fmt::print("{}/{}: the forces of {} frames\n", directory, output::kForceFile, frames);
+  return cli::done;
 }
 
 /// What `run` and `explain` are told of a scene.
@@ -159,6 +166,8 @@ int dispatch(int argc, char** argv) {
   report_command
       ->add_option("--max-mb", report_options.max_mb, "of the file (default: 30): leaves out cells inside, then frames")
       ->check(CLI::PositiveNumber);
+  auto* curves = app.add_subcommand("forces", "forces.csv again, from the frames of a run with /output/forces");
+  curves->add_option("directory", directory, "result folder")->required();
   auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   study::Options study_options;
   add_study_options(*study, study_options, sets);
@@ -176,6 +185,7 @@ int dispatch(int argc, char** argv) {
   if (*solvers) return list_solvers();
   if (*check) return certify(directory);
   if (*report_command) return cli::report(directory, report_file, report_options);
+  if (*curves) return forces(directory);
   if (*schema) {
     fmt::print("{}{}", as_page ? scene::reference_page() : scene::json_schema(), as_page ? "" : "\n");
     return cli::done;

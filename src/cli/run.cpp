@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -24,6 +25,7 @@
 #include "ranks.hpp"
 #include "report.hpp"
 #include "solver_choice.hpp"
+#include "warnings.hpp"
 
 namespace itr::cli {
 
@@ -57,8 +59,8 @@ void on_interrupt(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
-Logger make_logger() {
-  return Logger([](LogLevel level, std::string_view message) {
+Logger make_logger(Warnings& warnings) {
+  return Logger([&warnings](LogLevel level, std::string_view message) {
     switch (level) {
       case LogLevel::debug:
         spdlog::debug("{}", message);
@@ -67,22 +69,53 @@ Logger make_logger() {
         spdlog::info("{}", message);
         break;
       case LogLevel::warning:
-        spdlog::warn("warning: {}", message);
+        warnings.add(message);
         break;
     }
   });
 }
 
-void show_progress(const StepReport& report, int steps) {
+std::string describe_seconds(double seconds) {
+  if (seconds < 60) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 3600) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+/// `left`: time that the steps to come take if they take as long as those so far [s].
+void show_progress(const StepReport& report, int steps, double left) {
   const std::string line =
-      fmt::format("step {}/{}  t = {:.6g} s  {} vertices  {} Newton iterations  total {:.6g} J  {:.3g} s", report.step,
-                  steps, report.t, report.vertices, report.newton_iterations, report.energy.total, report.seconds.total);
+      fmt::format("step {}/{}  t = {:.6g} s  {} vertices  {} Newton iterations  total {:.6g} J  {:.3g} s  {} left",
+                  report.step, steps, report.t, report.vertices, report.newton_iterations, report.energy.total,
+                  report.seconds.total, describe_seconds(left));
   if (isatty(STDOUT_FILENO)) {
     fmt::print("\r\033[K{}", line);
     std::fflush(stdout);
   } else {
     spdlog::info("{}", line);
   }
+}
+
+/// What remeshing did, and where it did nothing why.
+std::string describe_remeshing(const StepReport& totals, int vertices_before, double split_tolerance, double best_refused) {
+  const auto count = [](const OperationCount& c, const char* name) {
+    return c.tried > 0 ? fmt::format(", {} of {} {}", c.accepted, c.tried, name) : std::string();
+  };
+  const std::string done =
+      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}", vertices_before,
+                  totals.vertices, totals.splits.accepted, totals.splits.tried, count(totals.collapses, "collapses"),
+                  count(totals.swaps, "swaps"), count(totals.smooths, "moves"));
+  const int accepted = totals.splits.accepted + totals.collapses.accepted + totals.swaps.accepted + totals.smooths.accepted;
+  if (accepted > 0) return done;
+  const std::string bound = totals.bound_by_dhat > 0
+                                ? fmt::format("; d-hat kept {} surface edges from being split", totals.bound_by_dhat)
+                                : std::string();
+  if (totals.splits.tried == 0 && best_refused == 0)
+    return done + fmt::format("; accepted nothing, because no body ever stored the {:.2g} J that a split has to gain{}",
+                              split_tolerance, bound);
+  return done + fmt::format(
+                    "; accepted nothing, because no split promised more than {:.2g} J and it has to gain {:.2g} J{}; "
+                    "a smaller /space/remesh/split/acceptance_tolerance refines more",
+                    best_refused, split_tolerance, bound);
 }
 
 std::string describe_solves(const StepReport& totals) {
@@ -153,18 +186,20 @@ template <int Dim>
 class Run {
  public:
   Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
-      linear::Registry& registry)
+      linear::Registry& registry, Warnings& warnings)
       : directory_(std::move(directory)),
         with_report_(options.report),
-        simulation_(std::move(setup), registry, make_logger()) {
-    for (const auto& warning : find_suspicious(simulation_)) spdlog::warn("warning: {}", warning);
+        simulation_(std::move(setup), registry, make_logger(warnings)) {
+    for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
     const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
     if (const auto saved = find_resumable(directory_, options)) {
       writer_ = std::make_unique<output::Writer>(directory_, scene.output, info, restore(*saved, scene, options));
+      warnings.set_writer(writer_.get());
       is_saved_ = true;
       spdlog::info("going on after step {}", simulation_.state().step);
     } else {
       writer_ = std::make_unique<output::Writer>(directory_, scene.output, info);
+      warnings.set_writer(writer_.get());
       write(simulation_.report());
     }
   }
@@ -188,9 +223,8 @@ class Run {
     const bool is_finished = outcome == kFinished;
     if (is_finished)
       fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
-    if (const int reverted = writer_->totals().reverted_remeshes; is_finished && reverted > 0)
-      spdlog::warn("{} times all of a step's remeshing was dropped, as the state on the new mesh failed: see the warnings",
-                   reverted);
+    if (is_finished) tell_remeshing();
+    count_warnings();
     if (with_report_) write_report();
     if (is_finished) return done;
     fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
@@ -198,6 +232,16 @@ class Run {
   }
 
  private:
+  void tell_remeshing() const {
+    const Setup<Dim>& setup = simulation_.setup();
+    if (setup.remesh.enabled)
+      fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.mesh.num_vertices(), split_tolerance_, best_refused_));
+  }
+  void count_warnings() const {
+    if (const int count = writer_->warnings(); count > 0)
+      spdlog::warn("{} warning{}: see above, or summary.json in {}", count, count == 1 ? "" : "s", directory_);
+  }
+
   static constexpr const char* kFinished = "finished";
   static constexpr std::chrono::milliseconds kLook{100};  ///< between looks at what a signal said
   static constexpr double kGrace = 5;                     ///< for a step that is to be dropped [s]
@@ -276,7 +320,10 @@ class Run {
                            simulation_.state().t + simulation_.setup().time.dt, result.reason);
       }
       write(result.report);
-      show_progress(result.report, steps);
+      best_refused_ = std::max(best_refused_, result.report.best_refused_split);
+      split_tolerance_ = result.report.split_tolerance;
+      ++steps_done_;
+      show_progress(result.report, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
     }
     return kFinished;
@@ -309,16 +356,20 @@ class Run {
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
   double output_seconds_ = 0;
-  bool is_saved_ = false;  ///< whether the present state is
-  std::mutex output_;      ///< of the writer and of what is below
-  Snapshot<Dim> before_;   ///< the state that the step begins with
+  double start_ = seconds_now();
+  int steps_done_ = 0;
+  double best_refused_ = 0, split_tolerance_ = 0;  ///< over the steps since start or --resume; of the last step [J]
+  bool is_saved_ = false;                          ///< whether the present state is
+  std::mutex output_;                              ///< of the writer and of what is below
+  Snapshot<Dim> before_;                           ///< the state that the step begins with
 };
 
 }  // namespace
 
 int run(const RunOptions& options) {
   scene::Scene scene = scene::read(options.scene, options.overrides);
-  for (const auto& warning : scene.warnings) spdlog::warn("warning: {}", warning);
+  Warnings warnings;
+  for (const auto& warning : scene.warnings) warnings.add(warning);
   std::string directory = options.directory.empty() ? scene.directory : options.directory;
   if (directory.empty()) directory = (std::filesystem::path("results") / options.scene.stem()).string();
   const int threads = options.threads >= 0 ? options.threads : scene.max_threads;
@@ -332,9 +383,9 @@ int run(const RunOptions& options) {
         setup.newton.cancel = &stop_now;
         const SolverChoice solver = choose_solver(setup.linear, options, registry);
         if (this_launch().rank > 0) return serve(registry, solver.name);
-        for (const auto& warning : solver.warnings) spdlog::warn("warning: {}", warning);
+        for (const auto& warning : solver.warnings) warnings.add(warning);
         const RankSession session(registry, solver.name);
-        return Run(std::move(setup), scene, directory, options, num_threads(), registry).run();
+        return Run(std::move(setup), scene, directory, options, num_threads(), registry, warnings).run();
       },
       scene.setup);
 }

@@ -13,6 +13,7 @@
 #include "itr/energy/point_forces.hpp"
 #include "itr/fem/locator.hpp"
 #include "itr/simulation/resultant.hpp"
+#include "simulation/cell_stress.hpp"
 
 namespace itr {
 
@@ -474,12 +475,19 @@ const NodalForces& AnySimulation::forces() const {
 
 AnySimulation::Resultants AnySimulation::resultant(std::span<const std::string> boundaries,
                                                    std::span<const double> about) const {
-  std::vector<int> tags;
-  for (const std::string& name : boundaries) tags.push_back(impl_->tag(name));
   return impl_->visit([&]<int Dim>(const Impl::Of<Dim>& d) {
     check_array("about", about, Dim);
+    ForceTarget target;
+    std::copy(about.begin(), about.end(), target.about.begin());
+    for (const std::string& name : boundaries) {
+      const auto obstacle = d.obstacle_vertices.find(name);
+      if (obstacle == d.obstacle_vertices.end())
+        target.surfaces.push_back(impl_->tag(name));
+      else
+        target.obstacle_vertices.insert(target.obstacle_vertices.end(), obstacle->second.begin(), obstacle->second.end());
+    }
     if (forces().contact.size() == 0) refuse("forces", "none", "forces that are watched, and a step since");
-    const auto sum = itr::resultant<Dim>(d.simulation, tags, Vec<Dim>(about.data()));
+    const auto sum = force_sums<Dim>(d.simulation.state(), d.simulation.forces(), target).all;
     return Resultants{{sum.force.begin(), sum.force.end()}, {sum.moment.begin(), sum.moment.end()}};
   });
 }
@@ -491,6 +499,16 @@ AnySimulation::Resultants AnySimulation::resultant(const std::string& boundary) 
 std::vector<double> AnySimulation::elastic_density() const {
   std::vector<double> values;
   impl_->visit([&](const auto& d) { d.simulation.observe([&](const auto& frame) { values = frame.elastic_density; }); });
+  return values;
+}
+std::vector<double> AnySimulation::von_mises() const {
+  std::vector<double> values;
+  impl_->visit([&](const auto& d) { values = cell_stress(d.simulation).von_mises; });
+  return values;
+}
+std::vector<double> AnySimulation::stress() const {
+  std::vector<double> values;
+  impl_->visit([&](const auto& d) { values = cell_stress(d.simulation).cauchy; });
   return values;
 }
 AnySimulation::Saved AnySimulation::save() const {

@@ -366,6 +366,12 @@ const double* itr_forces(const itr_simulation* simulation, itr_force kind) {
   if (kind < ITR_CONTACT || kind > ITR_APPLIED || kinds[kind]->size() == 0) return nullptr;
   return kinds[kind]->data();
 }
+itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* von_mises) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.von_mises(), "von_mises", length, von_mises); });
+}
+itr_status itr_get_stress(itr_simulation* simulation, size_t length, double* stress) {
+  return with(simulation, [&](itr::AnySimulation& s) { copy(s.stress(), "stress", length, stress); });
+}
 itr_status itr_resultant(itr_simulation* simulation, const char* boundary, const double* about, double* force,
                          double* moment) {
   return with(simulation, [&](itr::AnySimulation& s) {

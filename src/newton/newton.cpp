@@ -69,10 +69,12 @@ class Minimizer {
       if (is_stuck()) return stop(Termination::no_descent, describe_way_left());
       if (!moving_ && has_small_gradient()) {
         if (can_leave_saddle()) continue;
+        foresee_decrement();
         return finish(Termination::gradient);
       }
       if (!compute_direction())
         return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
+      note_decrement();
       if (is_loose_ && is_near_end() && !tighten())
         return stop(Termination::no_descent, "the Newton system has no descent direction" + failure_);
       if (const bool by_step = has_small_step(); by_step || (!moving_ && decrement() < options_.decrement_tolerance)) {
@@ -206,6 +208,17 @@ class Minimizer {
 
   /// What the full step promises.
   double decrement() const { return -0.5 * free_dot(step_, gradient_); }
+
+  void note_decrement() {
+    summary_.decrement = decrement();
+    gradient_of_decrement_ = summary_.gradient_norm;
+  }
+  /// Without a direction: it goes with the square of the gradient.
+  void foresee_decrement() {
+    if (!(gradient_of_decrement_ > 0)) return;
+    const double ratio = summary_.gradient_norm / gradient_of_decrement_;
+    summary_.decrement *= std::min(1.0, ratio * ratio);
+  }
 
   bool is_unresolved() const { return decrement() < kUnresolved * std::abs(value_) || is_below_spacing(); }
 
@@ -573,7 +586,7 @@ class Minimizer {
   NewtonSummary summary_;
   linear::Outcome outcome_ = linear::Outcome::ok;  ///< of the last linear solve
   std::string failure_;                            ///< why the last one failed that did
-  double value_ = 0, first_value_ = 0;
+  double value_ = 0, first_value_ = 0, gradient_of_decrement_ = 0;
   const Norms norms_;
   Buffers& buffers_;
   VectorView gradient_, step_, candidate_, other_;

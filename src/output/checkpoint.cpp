@@ -250,7 +250,8 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   const BarrierStiffness& stiffness = state.stiffness;
   file.write("/checkpoint/barrier_stiffness",
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
-  file.write("/checkpoint/energy_guard", std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0}, 0);
+  file.write("/checkpoint/energy_guard",
+             std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0, state.stored_energy}, 0);
   write_memory(file, state.remesh_memory);
   if constexpr (Dim == 3) write_strata(file, state.strata);
   write_factor(file, state.factor);
@@ -320,10 +321,11 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
         {saved.file.string(), "/checkpoint/barrier_stiffness", std::to_string(stiffness.size()) + " numbers", "3"});
   state.stiffness = {stiffness[0], stiffness[1], stiffness[2]};
   const std::vector<double> guard = file.read_doubles("/checkpoint/energy_guard").values;
-  if (guard.size() != 2)
-    throw InputError({saved.file.string(), "/checkpoint/energy_guard", std::to_string(guard.size()) + " numbers", "2"});
+  if (guard.size() != 3)
+    throw InputError({saved.file.string(), "/checkpoint/energy_guard", std::to_string(guard.size()) + " numbers", "3"});
   state.created_energy = guard[0];
   state.history.damp_next = guard[1] != 0;
+  state.stored_energy = guard[2];
   state.remesh_memory = read_memory(saved.file, file, state.mesh.vertex_slots());
   if constexpr (Dim == 3) state.strata = read_strata(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <sstream>
 #include <string>
 
 #include "itr/core/check.hpp"
@@ -16,6 +17,8 @@ namespace {
 using Integers = std::vector<std::int64_t>;
 
 const Space kLinear;
+/// Four rows a curve: contact, friction, reaction, all.
+const std::string kForceSums = "/totals/forces";
 
 std::span<const double> as_span(ConstVectorView v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 
@@ -149,6 +152,16 @@ void write_asked(hdf5::File& file, const AskedFields& asked) {
   write("/fields/stress", asked.stress, Dim * Dim, "Pa");
   write("/totals/kinetic_energy", asked.kinetic_energy, 0, "J");
   write("/totals/momentum", asked.momentum, 0, "kg m/s");
+  if (asked.curves.empty()) return;
+  std::vector<double> sums;
+  std::string names;
+  for (const ForceCurvePoint& curve : asked.curves) {
+    names += (names.empty() ? "" : ",") + curve.name;
+    for (const auto& kind : curve.kinds) sums.insert(sums.end(), kind.begin(), kind.end());
+  }
+  const bool is_new = !file.has_written(kForceSums);
+  file.write(kForceSums, sums, static_cast<int>(asked.curves.front().kinds.front().size()));
+  if (is_new) file.write_attribute(kForceSums, "names", names);
 }
 
 Integers read_indices(const std::filesystem::path& path, const hdf5::File& file, const std::string& name, int columns,
@@ -224,7 +237,8 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
   if (frame.asked) {
     const AskedFields& asked = *frame.asked;
     shape.insert(shape.end(), {size(asked.forces.contact), size(asked.forces.friction), size(asked.forces.reaction),
-                               size(asked.von_mises), size(asked.stress), size(asked.kinetic_energy), size(asked.momentum)});
+                               size(asked.von_mises), size(asked.stress), size(asked.kinetic_energy), size(asked.momentum),
+                               size(asked.curves)});
   }
   return shape;
 }
@@ -313,6 +327,27 @@ FrameTotals read_frame_totals(const std::filesystem::path& path) {
 std::vector<std::string> find_damage(const std::filesystem::path& path) {
   const hdf5::Session session;
   return hdf5::File::open(path).find_damage();
+}
+
+StoredForces read_frame_forces(const std::filesystem::path& path) {
+  const hdf5::Session session;
+  const hdf5::File file = hdf5::File::open(path);
+  StoredForces forces{step_of_frame(path), file.read_double_attribute("t"), {}};
+  if (!file.contains(kForceSums)) return forces;
+  const hdf5::Table<double> sums = file.read_doubles(kForceSums);
+  std::istringstream names(file.read_text_attribute(kForceSums, "names"));
+  auto next = sums.values.begin();
+  for (std::string name; std::getline(names, name, ',');) {
+    ForceCurvePoint curve{name, {}};
+    for (auto& kind : curve.kinds) {
+      if (sums.values.end() - next < sums.columns)
+        throw InputError({path.string(), kForceSums, std::to_string(sums.rows()) + " rows", "four a name"});
+      kind.assign(next, next + sums.columns);
+      next += sums.columns;
+    }
+    forces.curves.push_back(std::move(curve));
+  }
+  return forces;
 }
 
 StoredFrame read_frame(const std::filesystem::path& path) {

@@ -62,6 +62,14 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path);
 
 FrameTotals read_frame_totals(const std::filesystem::path& path);
 
+/// The sums of forces that a frame has, if any.
+struct StoredForces {
+  int step = 0;
+  double t = 0;  ///< [s]
+  std::vector<ForceCurvePoint> curves;
+};
+StoredForces read_frame_forces(const std::filesystem::path& path);
+
 /// A surface of a stored frame.
 struct StoredSurface {
   std::vector<double> x;            ///< k x dim, row-major [m]

@@ -13,10 +13,6 @@
 
 namespace itr::output {
 
-namespace {
-
-std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
-
 std::string json_string(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -31,6 +27,10 @@ std::string json_string(std::string_view text) {
   }
   return out + '"';
 }
+
+namespace {
+
+std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
 
 std::string energy_json(const EnergyReport& e) {
   const std::string damping = e.damping == 0 ? "" : fmt::format(R"("damping":{},)", number(e.damping));
@@ -80,8 +80,10 @@ std::string common_members(const StepReport& r) {
 }  // namespace
 
 std::string step_json(const StepReport& report) {
-  return fmt::format(R"({{"step":{},"t":{},{},"trial_seconds":{}}})", report.step, number(report.t), common_members(report),
-                     number(report.trial_seconds));
+  return fmt::format(
+      R"({{"step":{},"t":{},{},"residual_worth":{},"split_tolerance":{},"best_refused_split":{},"trial_seconds":{}}})",
+      report.step, number(report.t), common_members(report), number(report.residual_worth), number(report.split_tolerance),
+      number(report.best_refused_split), number(report.trial_seconds));
 }
 
 void Totals::add(const StepReport& report) {
@@ -138,13 +140,13 @@ void Totals::restore(const std::vector<double>& values) {
 }
 
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,
-                                 const DisplacementNorms& norms) const {
+                                 const DisplacementNorms& norms, const std::string& members) const {
   return fmt::format(
       R"({{"scene":{},"outcome":{},"backend":{},"solver":{},"threads":{},"versions":{},"steps":{},"cut_steps":{},"t":{},{},)"
-      R"("energy_decrease_by_remeshing":{},"norms":{}}})"
+      R"("energy_decrease_by_remeshing":{},{},"norms":{}}})"
       "\n",
       json_string(info.scene), json_string(outcome), json_string(info.backend), json_string(solver), info.threads,
-      versions_json(), total_.step, total_.cut_steps, number(total_.t), common_members(total_), number(gain_),
+      versions_json(), total_.step, total_.cut_steps, number(total_.t), common_members(total_), number(gain_), members,
       norms_json(norms));
 }
 

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "itr/output/writer.hpp"
 
 namespace itr::output {
 
+std::string json_string(std::string_view text);
 /// One line of steps.jsonl, without the line end. Numbers read back with the same bits; what JSON cannot say is null.
 std::string step_json(const StepReport& report);
 
@@ -20,9 +22,9 @@ class Totals {
   std::vector<double> save() const;
   void restore(const std::vector<double>& values);
   const StepReport& report() const { return total_; }
-  /// The text of summary.json.
+  /// The text of summary.json; `members` are more of them.
   std::string summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,
-                           const DisplacementNorms& norms) const;
+                           const DisplacementNorms& norms, const std::string& members) const;
 
  private:
   StepReport total_;

@@ -26,28 +26,15 @@ std::string attribute(const std::string& name, const char* type, const char* cen
                      center, data);
 }
 
-/// Column `k` of a table as a scalar: readers of XDMF expect vectors and tensors of space, ours of the plane have fewer.
-std::string column(const FrameEntry& entry, const std::string& name, const std::string& set, int k, int columns,
-                   bool on_cells) {
-  const int rows = on_cells ? entry.cells : entry.vertices;
-  const std::string slab = fmt::format(
-      "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0}\"><DataItem Dimensions=\"3 2\" Format=\"XML\">0 {1} 1 1 {0} 1"
-      "</DataItem>{2}</DataItem>",
-      rows, k, data_item(entry, set, fmt::format("{} {}", rows, columns), "Float"));
-  return attribute(name, "Scalar", on_cells ? "Cell" : "Node", slab);
-}
-
+/// In the plane a matrix of 2 columns: readers take vectors of XDMF for those of space.
 std::string vector_field(const FrameEntry& entry, const std::string& name, const std::string& set) {
   const std::string shape = fmt::format("{} {}", entry.vertices, entry.dim);
-  if (entry.dim == 3) return attribute(name, "Vector", "Node", data_item(entry, set, shape, "Float"));
-  return column(entry, name + "_x", set, 0, 2, false) + column(entry, name + "_y", set, 1, 2, false);
+  return attribute(name, entry.dim == 3 ? "Vector" : "Matrix", "Node", data_item(entry, set, shape, "Float"));
 }
 
 std::string tensor_field(const FrameEntry& entry, const std::string& name, const std::string& set) {
-  if (entry.dim == 3)
-    return attribute(name, "Tensor", "Cell", data_item(entry, set, fmt::format("{} 9", entry.cells), "Float"));
-  return column(entry, name + "_xx", set, 0, 4, true) + column(entry, name + "_xy", set, 1, 4, true) +
-         column(entry, name + "_yy", set, 3, 4, true);
+  const std::string shape = fmt::format("{} {}", entry.cells, entry.dim * entry.dim);
+  return attribute(name, entry.dim == 3 ? "Tensor" : "Matrix", "Cell", data_item(entry, set, shape, "Float"));
 }
 
 std::string asked_field(const FrameEntry& entry, const std::string& name) {

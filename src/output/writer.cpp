@@ -8,11 +8,14 @@
 
 #include "checkpoint.hpp"
 #include "files.hpp"
+#include "force_file.hpp"
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/timer.hpp"
 #include "report_json.hpp"
 #include "time_series.hpp"
+#include "vtu_file.hpp"
+#include "warnings.hpp"
 
 namespace itr::output {
 
@@ -55,7 +58,8 @@ struct Writer::Impl {
         options(output_options),
         info(std::move(run_info)),
         series(directory),
-        steps(directory / "steps.jsonl", log_bytes) {
+        steps(directory / "steps.jsonl", log_bytes),
+        forces(directory, last_step) {
     for (const fs::path& path : stored_frames(directory)) {
       const FrameSizes sizes = read_frame_sizes(path);
       last_stored = step_of_frame(path);
@@ -63,6 +67,7 @@ struct Writer::Impl {
                      sizes.drawn_nodes, sizes.asked});
     }
     last_checkpoint = seconds_now();
+    if (last_step >= 0) warnings.restore(directory / "steps.jsonl");
   }
 
   static std::string frame_name(int step) { return fmt::format("frames/{:06}.h5", step); }
@@ -109,6 +114,7 @@ struct Writer::Impl {
       if (!frame.asked->stress.empty()) asked.push_back("stress");
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
+    if (options.vtu) write_vtu(directory, frame, step);
     const bool is_quadratic = frame.space && !frame.space->is_linear();
     series.add(
         {frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, drawn_nodes(frame), std::move(asked)});
@@ -126,9 +132,11 @@ struct Writer::Impl {
   RunInfo info;
   TimeSeries series;
   LineFile steps;
+  ForceFile forces;
   FrameFiles frames;
   Totals totals;
   DisplacementNorms norms;
+  WarningList warnings;
   std::vector<std::string> unsynced;
   int last_stored = kNone;
   double last_checkpoint = 0;
@@ -155,7 +163,11 @@ bool Writer::is_checkpoint_due(int step) const {
 template <int Dim>
 void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const State<Dim>* checkpoint) {
   const std::size_t length = impl_->steps.size();
-  impl_->steps.append(step_json(report));
+  std::string line = step_json(report);
+  if (const std::string warnings = impl_->warnings.take_new(); !warnings.empty())
+    line.insert(line.size() - 1, ",\"warnings\":" + warnings);
+  impl_->steps.append(std::move(line));
+  if (frame.asked) impl_->forces.add(report.step, report.t, frame.asked->curves);
   impl_->totals.add(report);
   impl_->norms = displacement_norms(frame.mesh, frame.x, frame.space ? *frame.space : Space());
   if (!checkpoint && !impl_->is_due(report.step)) return;
@@ -163,6 +175,7 @@ void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const 
     impl_->store(frame, report.step, report.t, checkpoint);
   } catch (const InputError&) {
     impl_->steps.shorten(length);  // a step whose frame is not there was not done
+    if (frame.asked && !frame.asked->curves.empty()) impl_->forces.drop_last();
     throw;
   }
   impl_->index(frame, report.step, report.t);
@@ -174,12 +187,18 @@ void Writer::save(const FrameView<Dim>& frame, const State<Dim>& state) {
   impl_->index(frame, state.step, state.t);
 }
 
+void Writer::warn(const std::string& text) { impl_->warnings.add(text); }
+
+int Writer::warnings() const { return impl_->warnings.count(); }
+
 const StepReport& Writer::totals() const { return impl_->totals.report(); }
 
 void Writer::finish(const std::string& outcome, const std::string& solver) {
   impl_->series.write();
+  if (impl_->options.vtu) write_vtu_series(impl_->directory);
   const std::string& used = solver.empty() ? impl_->info.backend : solver;
-  write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, outcome, used, impl_->norms));
+  write_file(impl_->directory / "summary.json",
+             impl_->totals.summary_json(impl_->info, outcome, used, impl_->norms, impl_->warnings.summary_members()));
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                     \

@@ -322,6 +322,9 @@ void add_simulation(py::module_& m) {
       .def_property_readonly("obstacle_positions",
                              [](const AnySimulation& s) { return copied(s.obstacle_positions(), s.dimension()); })
       .def_property_readonly("elastic_density", [](const AnySimulation& s) { return copied(s.elastic_density(), 1); })
+      .def_property_readonly("von_mises", [](const AnySimulation& s) { return copied(s.von_mises(), 1); })
+      .def_property_readonly("stress",
+                             [](const AnySimulation& s) { return copied(s.stress(), s.dimension() * s.dimension()); })
       .def("watch_forces", &AnySimulation::watch_forces)
       .def("forces",
            [](const AnySimulation& s, int kind) -> py::object {

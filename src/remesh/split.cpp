@@ -47,8 +47,11 @@ class Splitter {
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
     session_.report().bound_by_activation_distance += trial.is_bound_by_dhat;
-    if (!trial.is_asked) return;
-    if (!session_.commit(trial, session_.report().splits)) return remember(trial);
+    if (!trial.is_asked) return note_refused(trial.signal);
+    if (!session_.commit(trial, session_.report().splits)) {
+      note_refused(trial.verdict.gain);
+      return remember(trial);
+    }
     const VertexId created = session_.mesh().vertex_slots() - 1;
     inherit(trial.edge(), created);
     const auto near = session_.edges_of(session_.mesh().cells_of(created));
@@ -61,11 +64,16 @@ class Splitter {
       bool is_bound_by_dhat = false;
       session_.may_be_split(entry.edge, is_bound_by_dhat);
       session_.report().bound_by_activation_distance += is_bound_by_dhat;
+      note_refused(entry.priority);
     }
   }
 
  private:
   bool is_culled() const { return session_.options().screening == Screening::energy_percentile; }
+  void note_refused(double gain) {
+    double& best = session_.report().best_refused_gain;
+    if (gain > best) best = gain;
+  }
   bool is_hopeless(std::span<const CellId> cells, double gain) const {
     return session_.is_hopeless(cells, gain, tolerance_);
   }

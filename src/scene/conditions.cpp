@@ -5,6 +5,7 @@
 #include <set>
 
 #include "function.hpp"
+#include "itr/simulation/step_problem.hpp"
 #include "selection.hpp"
 
 namespace itr::scene {
@@ -17,16 +18,19 @@ class ConditionReader {
   ConditionReader(const Node& root, Setup<Dim>& setup, std::vector<std::string>& warnings)
       : boundary_(root["boundary_conditions"]), initial_(root["initial_conditions"]), setup_(setup), warnings_(warnings) {
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) facet_tags_.insert(setup_.mesh.vertex_tag(v));
+    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) point_tags_.insert(setup_.mesh.vertex_tag(v));
+    for (auto* tags : {&facet_tags_, &point_tags_}) tags->erase(kNoTag);
     for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c) bodies_.insert(setup_.mesh.body(c));
   }
 
   void read(ObstacleGeometry<Dim> geometry) {
     obstacle_ids_.insert(geometry.id.begin(), geometry.id.end());
+    obstacle_ids_.erase(kNoTag);
     read_body_acceleration();
     read_dirichlet();
     read_neumann();
     read_pressure();
+    warn_of_held_loads();
     read_motions(geometry);
     setup_.obstacles = std::move(geometry.obstacles);
     setup_.initial_displacement = read_initial("solution");
@@ -59,6 +63,7 @@ class ConditionReader {
     for (const Node& node : boundary_["dirichlet_boundary"].items()) {
       warn_of_components(node["value"], Dim, warnings_);
       const Function function = read_value(node);
+      warn_of_components(node["dimension"], Dim, warnings_);
       const std::array<bool, Dim> components = read_components(node["dimension"]);
       const bool is_free = std::none_of(components.begin(), components.end(), [](bool b) { return b; });
       for (const int tag : tags_of(node, seen)) {
@@ -73,9 +78,11 @@ class ConditionReader {
     for (const Node& node : boundary_["neumann_boundary"].items()) {
       warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
-      for (const int tag : tags_of(node, seen)) {
+      for (const int tag : loaded_tags(node, seen)) {
         check_defined<Dim>(value.function, vertices_with(tag), times(), node["value"]);
-        if (!value.is_zero) setup_.neumann.push_back({tag, value.function});
+        if (value.is_zero) continue;
+        setup_.neumann.push_back({tag, value.function});
+        loads_.emplace_back(tag, node);
       }
     }
   }
@@ -87,10 +94,29 @@ class ConditionReader {
       const Function as_vector = [f = value.function](const Vec<Dim>& X, double t) {
         return Vec<Dim>::Constant(f(X, t)).eval();
       };
-      for (const int tag : tags_of(node, seen)) {
+      for (const int tag : loaded_tags(node, seen)) {
         check_defined<Dim>(as_vector, vertices_with(tag), times(), node["value"]);
-        if (!value.is_zero) setup_.pressure.push_back({tag, value.function});
+        if (value.is_zero) continue;
+        setup_.pressure.push_back({tag, value.function});
+        loads_.emplace_back(tag, node);
       }
+    }
+  }
+
+  /// A load on vertices that are held in all directions changes their reactions only.
+  void warn_of_held_loads() {
+    if (setup_.dirichlet.empty()) return;
+    const Mesh<Dim>& mesh = setup_.mesh;
+    const std::vector<char> held = held_dofs(setup_, mesh, setup_.time.t0 + setup_.time.dt).held;
+    for (const auto& [tag, node] : loads_) {
+      bool is_free = false;
+      for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+        if (mesh.facet_tag(f) == tag)
+          for (const int v : mesh.facet(f))
+            for (int c = 0; c < Dim; ++c) is_free = is_free || !held[Dim * v + c];
+      if (!is_free)
+        warnings_.push_back(node.pointer() + ": all vertices of the surface " + std::to_string(tag) +
+                            " are held: the load moves nothing");
     }
   }
 
@@ -99,7 +125,13 @@ class ConditionReader {
     std::vector<Node> entries = boundary_["obstacle_displacements"].items();
     for (const Node& node : entries) warn_of_components(node["value"], Dim, warnings_);
     for (const Node& node : entries)
-      if (!is_all(node["id"]) && !obstacle_ids_.contains(read_condition_id(node["id"]))) warn_unused(node);
+      if (!is_all(node["id"]) && !obstacle_ids_.contains(read_condition_id(node["id"]))) {
+        const int id = read_condition_id(node["id"]);
+        if (!facet_tags_.contains(id) && !point_tags_.contains(id))
+          refuse_unused(node["id"], "an obstacle's id: " + id_list(obstacle_ids_));
+        warnings_.push_back(node["id"].pointer() + ": " + std::to_string(id) +
+                            " is a surface of a body, which this does not move; obstacles: " + id_list(obstacle_ids_));
+      }
     for (const Node& node : boundary_["dirichlet_boundary"].items()) entries.push_back(node);
     Obstacles<Dim>& obstacles = geometry.obstacles;
     std::vector<char> is_taken(obstacles.rest.size(), false);
@@ -129,7 +161,7 @@ class ConditionReader {
       const int body = read_id(node["id"], 0);
       warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"]);
-      if (!bodies_.contains(body)) warn_unused(node);
+      if (!bodies_.contains(body)) refuse_unused(node["id"], "the id of a body: " + id_list(bodies_));
       if (!seen.insert(body).second) {
         warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
         continue;
@@ -158,26 +190,48 @@ class ConditionReader {
     return read_id(node, 0);
   }
 
-  /// Tags of facets that a condition acts on, without those that an entry before it has taken.
+  /// Tags of facets and points that a condition acts on, without those that an entry before it has taken.
   std::vector<int> tags_of(const Node& node, std::set<int>& seen) {
-    std::vector<int> tags;
+    std::set<int> tags = facet_tags_;
+    tags.insert(point_tags_.begin(), point_tags_.end());
+    return tags_of(node, tags, seen);
+  }
+  /// Those of facets: points and obstacles bear no loads.
+  std::vector<int> loaded_tags(const Node& node, std::set<int>& seen) {
+    const Node id = node["id"];
+    if (!is_all(id) && !facet_tags_.contains(read_condition_id(id))) {
+      const std::string surfaces = "the id of a surface of a body: " + id_list(facet_tags_);
+      const int tag = read_condition_id(id);
+      if (point_tags_.contains(tag)) id.fail(abbreviate(id.json()) + ", an id of points, which have no area", surfaces);
+      if (obstacle_ids_.contains(tag)) id.fail(abbreviate(id.json()) + ", an obstacle, which bears no loads", surfaces);
+      refuse_unused(id, surfaces);
+    }
+    return tags_of(node, facet_tags_, seen);
+  }
+  std::vector<int> tags_of(const Node& node, const std::set<int>& tags, std::set<int>& seen) {
+    std::vector<int> taken;
     if (is_all(node["id"])) {
-      for (const int tag : facet_tags_)
-        if (tag > 0 && seen.insert(tag).second) tags.push_back(tag);
-      return tags;
+      for (const int tag : tags)
+        if (tag > 0 && seen.insert(tag).second) taken.push_back(tag);
+      return taken;
     }
     const int tag = read_condition_id(node["id"]);
-    const bool is_on_facets = tag > 0 && facet_tags_.contains(tag);
-    if (!is_on_facets && !obstacle_ids_.contains(tag)) warn_unused(node);
+    const bool is_of_bodies = tag > 0 && tags.contains(tag);
+    if (!is_of_bodies && !obstacle_ids_.contains(tag))
+      refuse_unused(node["id"], "the id of a surface, above 0: " + id_list(tags) +
+                                    (obstacle_ids_.empty() ? "" : "; or of an obstacle: " + id_list(obstacle_ids_)));
     if (!seen.insert(tag).second)
       warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
-    else if (is_on_facets)
-      tags.push_back(tag);
-    return tags;
+    else if (is_of_bodies)
+      taken.push_back(tag);
+    return taken;
   }
 
-  void warn_unused(const Node& node) {
-    warnings_.push_back(node["id"].pointer() + ": nothing has the id " + abbreviate(node["id"].json()));
+  static std::string id_list(const std::set<int>& ids) {
+    return ids.empty() ? "there is none" : list_ids(std::vector<int>(ids.begin(), ids.end()));
+  }
+  [[noreturn]] static void refuse_unused(const Node& id, const std::string& expected) {
+    id.fail(abbreviate(id.json()) + ", which nothing has", expected);
   }
 
   /// Where functions of time are tried before anything is computed: both ends, after the first step, in the middle.
@@ -221,8 +275,8 @@ class ConditionReader {
   Node boundary_, initial_;
   Setup<Dim>& setup_;
   std::vector<std::string>& warnings_;
-  std::set<int> facet_tags_;  ///< and those of points
-  std::set<int> bodies_, obstacle_ids_;
+  std::set<int> facet_tags_, point_tags_, bodies_, obstacle_ids_;
+  std::vector<std::pair<int, Node>> loads_;  ///< by tag
 };
 
 }  // namespace

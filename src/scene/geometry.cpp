@@ -204,8 +204,12 @@ std::filesystem::path MeshFiles::find(const Node& name, const char* what) {
   if (!name.exists()) name.fail(what);
   std::filesystem::path path = name.document().resolve(name.string(""));
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored))
-    name.fail(abbreviate(name.json()) + ", but there is no file '" + path.string() + "'", what);
+  if (!std::filesystem::is_regular_file(path, ignored)) {
+    const auto here = std::filesystem::current_path(ignored) / name.string("");
+    name.fail(abbreviate(name.json()) + ", but there is no file '" + path.string() + "'" +
+                  (here == path ? "" : ", nor '" + here.lexically_normal().string() + "'"),
+              what);
+  }
   return path;
 }
 
@@ -230,16 +234,28 @@ std::string MeshFiles::hash(const Node& name, const char* what) {
   return text = out.str();
 }
 
+bool is_flat_obstacle(const Node& geometry) {
+  const std::string type = geometry["type"].string("mesh");
+  return type == "plane" || type == "ground";
+}
+
 Geometries list_geometries(const Node& root) {
   if (!root.has("geometry")) root["geometry"].fail("the geometries of the scene");
   Geometries geometries;
   for (const Node& geometry : root["geometry"].items()) {
     if (!geometry["enabled"].boolean(true)) continue;
     const int type = geometry["type"].choice({"mesh", "mesh_array", "plane", "ground", "mesh_sequence"}, 0);
-    if (type > 1) geometry["type"].fail("\"mesh\" or \"mesh_array\": the others are not supported yet");
+    if (type > 3) geometry["type"].fail("\"mesh\", \"mesh_array\", \"plane\" or \"ground\": it is not supported yet");
+    const bool is_flat_obstacle = type > 1;
+    for (const char* key : {"point", "normal", "height"})
+      if (geometry.has(key) && (type != 2 + (key == std::string("height"))))
+        geometry[key].fail("it beside this type", "point and normal with \"plane\", height with \"ground\"");
+    if (is_flat_obstacle)
+      for (const char* key : {"mesh", "transformation", "n_refs", "extract", "array"})
+        if (geometry.has(key)) geometry[key].fail("it beside a plane or ground", "no such key");
     const bool is_array = type == 1;
     if (is_array != geometry.has("array")) geometry["array"].fail("an array if and only if type is \"mesh_array\"");
-    const bool is_obstacle = geometry["is_obstacle"].boolean(false);
+    const bool is_obstacle = is_flat_obstacle || geometry["is_obstacle"].boolean(false);
     if (!is_obstacle && geometry["extract"].string("volume") != "volume")
       geometry["extract"].fail("\"volume\" for what is no obstacle");
     (is_obstacle ? geometries.obstacles : geometries.bodies).push_back(geometry);

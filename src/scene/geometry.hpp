@@ -32,6 +32,8 @@ struct Geometries {
   std::vector<Node> bodies, obstacles;
 };
 Geometries list_geometries(const Node& root);
+/// Whether it is a plane or a ground, which no file describes.
+bool is_flat_obstacle(const Node& geometry);
 
 /// Whether all vertices are at one z: a mesh or surface of a 2D scene.
 bool is_flat(const MeshFile& file);
@@ -47,10 +49,12 @@ template <int Dim>
 struct ObstacleGeometry {
   Obstacles<Dim> obstacles;  ///< without motions
   std::vector<int> id;       ///< per vertex: `surface_selection`, which conditions refer to; kNoTag if there is none
+  std::vector<int> part{};   ///< per vertex: which of Geometries::obstacles; empty where a program brings them
 };
 
 template <int Dim>
-ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files);
+ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
+                                     std::vector<std::string>& warnings);
 
 /// The surface of the file that `holder` names as `mesh`, moved by the transformation of `geometry`. All points of the file
 /// are its vertices, in their order.

@@ -26,6 +26,12 @@ void check_stiffness(const Node& node) {
   node.positive(1);
 }
 
+void check_distance(const Node& node) {
+  if (node.json() == "auto") return;
+  if (!node.json().is_number()) node.fail("a number > 0, or \"auto\"");
+  node.positive(1);
+}
+
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> kinds = {
       {"number", [](const Node& node) { node.number(0); }, number_schema(), "number"},
@@ -52,9 +58,13 @@ const std::vector<Kind>& kinds() {
       {"axis", nullptr, {{"type", {"integer", "string"}}}, "integer or string"},
       {"id", nullptr, id_schema(), "integer >= 0"},
       {"id or ids", nullptr, any_of(id_schema(), list_of(id_schema())), "integer or list of integers"},
+      {"ids or names", nullptr, any_of({{"type", {"integer", "string"}}}, list_of({{"type", {"integer", "string"}}})),
+       "integer, name or list of these"},
       {"id or all", nullptr, any_of(id_schema(), {{"const", "all"}}), "integer or \"all\""},
       {"positive or adaptive", check_stiffness,
        any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "adaptive"}}), "number > 0 or \"adaptive\""},
+      {"positive or auto", check_distance, any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "auto"}}),
+       "number > 0 or \"auto\""},
       {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }, {{"const", "consistent"}}, "\"consistent\""},
       {"order", nullptr, any_of({{"enum", {1, 2}}}, {{"type", {"array", "object"}}}), "1, 2 or a list"},
       {"list", nullptr, Json::object(), "list"},  // of what its rows with `*` say

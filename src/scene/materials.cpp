@@ -121,6 +121,7 @@ class MaterialReader {
     material_.youngs_modulus_at = E.function;
     material_.poisson_ratio_at = nu.function;
     material_.plane_strain = node_["plane_strain"].boolean(false);
+    if (material_.plane_strain && dimension_ == 3) node_["plane_strain"].fail("true in a 3D scene", "it in 2D only");
     require("E", E, is_positive, "a number > 0");
     require("nu", nu, is_poisson_ratio, "a number of (-1, 0.5)");
   }

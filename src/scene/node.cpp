@@ -173,7 +173,7 @@ void Node::fail(const std::string& found, const std::string& expected) const {
   throw InputError({document_->file.string(), pointer_.empty() ? "/" : pointer_, found, expected});
 }
 
-void warn_of_components(const Node& vector, int dimension, std::vector<std::string>& warnings) {
+void warn_of_components(const Node& vector, int dimension, std::vector<std::string>& warnings, bool if_not_zero) {
   if (!vector.exists() || !vector.json().is_array() || vector.json().empty()) return;
   const Json& values = vector.json();
   const std::string scene = std::to_string(dimension) + "D scene";
@@ -181,9 +181,9 @@ void warn_of_components(const Node& vector, int dimension, std::vector<std::stri
     warnings.push_back(vector.pointer() + ": " + abbreviate(values) + " has too few components for a " + scene +
                        ": the others are 0");
   for (std::size_t c = dimension; c < values.size(); ++c)
-    if (values[c] != 0) {
-      warnings.push_back(vector.pointer() + ": " + abbreviate(values) + " has more components than a " + scene +
-                         ": they are passed over");
+    if (!if_not_zero || values[c] != 0) {
+      warnings.push_back(vector.pointer() + ": " + abbreviate(values) + " has more components than a " + scene + " has, " +
+                         std::to_string(dimension) + ": the others are passed over");
       return;
     }
 }

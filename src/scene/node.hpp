@@ -80,7 +80,7 @@ class Node {
   std::string pointer_;
 };
 
-/// Warns of the components of a vector beyond `dimension` that are not 0, and of missing ones.
-void warn_of_components(const Node& vector, int dimension, std::vector<std::string>& warnings);
+/// Warns of the components of a list beyond `dimension`, and of missing ones; `if_not_zero`: a 0 beyond it is no mistake.
+void warn_of_components(const Node& vector, int dimension, std::vector<std::string>& warnings, bool if_not_zero = false);
 
 }  // namespace itr::scene

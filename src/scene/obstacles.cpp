@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Obstacles: collision-only surfaces out of mesh files (CONVENTIONS.md, "Meshes").
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -178,12 +179,73 @@ void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
 }
 
+template <int Dim>
+Box<Dim> box_of(const Mesh<Dim>& mesh) {
+  Box<Dim> box;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) box.extend(mesh.rest(v));
+  return box;
+}
+
+/// Reaches ten times as far as the bodies do, seen from above their middle.
+template <int Dim>
+void read_flat(const Node& geometry, const Box<Dim>& bodies, ObstacleGeometry<Dim>& out) {
+  constexpr double kReach = 10;
+  Vec<Dim> point = Vec<Dim>::Zero(), normal = Vec<Dim>::Unit(1);
+  const auto read_point = [](const Node& node, Vec<Dim>& result) {
+    const std::vector<double> values = node.numbers();
+    if (values.size() != Dim) node.fail(std::to_string(Dim) + " numbers");
+    result = Eigen::Map<const Vec<Dim>>(values.data());
+  };
+  if (geometry["type"].string("") == "ground") {
+    point[1] = geometry["height"].number(0);
+  } else {
+    if (const Node node = geometry["point"]; node.exists()) read_point(node, point);
+    if (!geometry.has("normal")) geometry["normal"].fail("the direction in which the plane faces");
+    read_point(geometry["normal"], normal);
+    if (!(normal.norm() > 0)) geometry["normal"].fail("a direction");
+    normal.normalize();
+  }
+  const Vec<Dim> middle = bodies.center() - normal.dot(bodies.center() - point) * normal;
+  const double reach = kReach * std::max(bodies.diagonal().norm(), (bodies.center() - middle).norm());
+  Surface surface;
+  std::vector<Vec<Dim>> points;
+  if constexpr (Dim == 2) {
+    const Vec<2> along(-normal[1], normal[0]);
+    points = {middle - reach * along, middle + reach * along};
+    surface.edges = {{0, 1}};
+  } else {
+    Eigen::Index least = 0;
+    normal.cwiseAbs().minCoeff(&least);
+    const Vec<3> a = reach * normal.cross(Vec<3>(Vec<3>::Unit(least))).normalized(), b = normal.cross(a);
+    points = {middle - a - b, middle + a - b, middle + a + b, middle - a + b};
+    surface.edges = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 2}};
+    surface.triangles = {{0, 1, 2}, {0, 2, 3}};
+  }
+  surface.is_used.assign(points.size(), true);
+  append<Dim>(surface, points, Vec<Dim>::Zero(), read_obstacle_id(geometry["surface_selection"]), out);
+}
+
 }  // namespace
 
 template <int Dim>
-ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files) {
+ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
+                                     std::vector<std::string>& warnings) {
   ObstacleGeometry<Dim> all;
-  for (const Node& geometry : geometries.obstacles) read_obstacle<Dim>(geometry, files.get(geometry), all);
+  std::map<int, std::string> pointers;  // of ids
+  for (const Node& geometry : geometries.obstacles) {
+    const int part = all.part.empty() ? 0 : all.part.back() + 1;
+    if (is_flat_obstacle(geometry))
+      read_flat<Dim>(geometry, box_of(bodies), all);
+    else
+      read_obstacle<Dim>(geometry, files.get(geometry), all);
+    all.part.resize(all.obstacles.rest.size(), part);
+    const Node node = geometry["surface_selection"];
+    if (!node.exists()) continue;
+    const auto [first, is_new] = pointers.try_emplace(read_obstacle_id(node), geometry.pointer());
+    if (!is_new)
+      warnings.push_back(node.pointer() + ": " + first->second + " has the id " + std::to_string(first->first) +
+                         " too: what names it acts on both obstacles");
+  }
   return all;
 }
 
@@ -201,7 +263,7 @@ Obstacles<Dim> read_surface(const Node& holder, const Node& geometry, MeshFiles&
 
 template Obstacles<2> read_surface(const Node&, const Node&, MeshFiles&);
 template Obstacles<3> read_surface(const Node&, const Node&, MeshFiles&);
-template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&);
-template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&);
+template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&, const Mesh<2>&, std::vector<std::string>&);
+template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&, const Mesh<3>&, std::vector<std::string>&);
 
 }  // namespace itr::scene

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "options.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -55,10 +57,11 @@ void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>
   }
   const double ratio = duration / options.dt, nearest = std::round(ratio);
   // Of decimal fractions: 0.07 / 0.01 is a little more than 7.
-  const double count = std::abs(ratio - nearest) <= 1e-9 * nearest ? nearest : std::ceil(ratio);
+  const bool is_whole = std::abs(ratio - nearest) <= 1e-9 * nearest;
+  const double count = is_whole ? nearest : std::ceil(ratio);
   if (count > kMostSteps) dt.fail("at most 1e9 steps");
   options.steps = static_cast<int>(count);
-  if (count == nearest) return;
+  if (is_whole) return;
   std::ostringstream end;
   end << tend.pointer() << ": " << tend.number(0) << " s is no whole number of steps: the run ends at "
       << options.t0 + count * options.dt << " s";
@@ -87,11 +90,33 @@ TimeOptions read_time(const Node& root, std::vector<std::string>& warnings) {
   }
   options.t0 = time["t0"].number(0);
   options.quasistatic = time["quasistatic"].boolean(false);
+  options.allow_jumps = time["allow_jumps"].boolean(false);
   options.step_cuts = time["step_cuts"].integer_at_least(0, 0);
   if (options.step_cuts > kMostCuts) time["step_cuts"].fail("at most " + std::to_string(kMostCuts));
   read_steps(time, options, warnings);
   read_integrator(time["integrator"], options);
   return options;
+}
+
+void warn_of_idle_keys(const Node& root, const TimeOptions& time, bool has_obstacles, std::vector<std::string>& warnings) {
+  const auto warn = [&](const Node& node, const char* text) { warnings.push_back(node.pointer() + ": " + text); };
+  const Node contact = root["contact"], remesh = root["space"]["remesh"], initial = root["initial_conditions"];
+  if (contact.exists() && !contact.has("enabled") && !contact.json().empty())
+    warn(contact, "without \"enabled\": true nothing collides");
+  else if (!contact["enabled"].boolean(false) && has_obstacles)
+    warn(contact["enabled"], "not true, so nothing collides: bodies pass through the obstacles");
+  else if (!contact["enabled"].boolean(false) && contact["friction_coefficient"].number(0) > 0)
+    warn(contact["friction_coefficient"], "without /contact/enabled = true there is no friction");
+  if (remesh.exists() && !remesh.has("enabled") && !remesh.json().empty())
+    warn(remesh, "without \"enabled\": true the mesh stays as it is");
+  for (const char* operation : {"collapse", "swap", "smooth"})
+    if (const Node tolerance = remesh[operation]["acceptance_tolerance"]; tolerance.number(0) > 0)
+      warn(tolerance,
+           "positive: only what lowers the energy by so much is done, and hardly anything is; -1e-8 allows a rise");
+  if ((time.is_static || time.quasistatic) && !initial["velocity"].items().empty())
+    warn(initial["velocity"], "without inertia (a static or quasistatic scene) a velocity has no effect");
+  if (initial["acceleration"].exists() && (time.is_static || time.quasistatic || time.integrator != Integrator::newmark))
+    warn(initial["acceleration"], "only ImplicitNewmark begins with an acceleration");
 }
 
 double characteristic_length(const Node& root, const TimeOptions& time) {
@@ -102,23 +127,22 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   const Node contact = root["contact"], solver = root["solver"]["contact"];
   ContactOptions options;
   options.enabled = contact["enabled"].boolean(false);
-  if (contact.exists() && !contact.has("enabled") && !contact.json().empty())
-    warnings.push_back(contact.pointer() + ": without \"enabled\": true nothing collides");
-  options.activation_distance = contact["dhat"].positive(1e-3);
+  const bool is_auto = contact.has("dhat") && contact["dhat"].json() == "auto";
+  options.activation_distance = is_auto ? 0 : contact["dhat"].positive(1e-3);
   const double share = contact["dhat_percentage"].positive(0.8);
   if (options.enabled && options.activation_distance > shortest_edge) {
     if (!contact.has("dhat"))
       options.activation_distance = share * shortest_edge;
     else
-      warnings.push_back(contact["dhat"].pointer() + ": longer than the shortest edge of the surfaces, " +
-                         std::to_string(shortest_edge));
+      warnings.push_back(fmt::format("{}: {:.6g} m is longer than the shortest edge of the surfaces, {:.6g} m",
+                                     contact["dhat"].pointer(), options.activation_distance, shortest_edge));
   }
   options.convergent = contact["use_convergent_formulation"].boolean(false);
   options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
   options.friction_velocity = contact["epsv"].positive(1e-3);
   const Node stiffness = solver["barrier_stiffness"];
-  const bool is_remeshed = root["space"]["remesh"]["enabled"].boolean(false);
-  options.adaptive_stiffness = stiffness.exists() ? stiffness.json() == "adaptive" : !is_remeshed;
+  const bool is_adaptive_in_peers = solver.has("initial_barrier_stiffness");  // says where adaptive stiffness begins
+  options.adaptive_stiffness = stiffness.exists() ? stiffness.json() == "adaptive" : is_adaptive_in_peers;
   if (options.adaptive_stiffness) options.barrier_stiffness = solver["initial_barrier_stiffness"].positive(1);
   if (stiffness.exists() && !options.adaptive_stiffness) options.barrier_stiffness = stiffness.positive(1);
   options.friction_iterations = solver["friction_iterations"].integer(1);
@@ -290,6 +314,7 @@ OutputOptions read_output(const Node& root) {
   const Node output = root["output"];
   OutputOptions options;
   options.skip_frames = output["paraview"]["skip_frame"].integer_at_least(1, options.skip_frames);
+  options.vtu = output["paraview"]["vtu"].boolean(false);
   options.checkpoint_period = output["checkpoint_period"].non_negative(options.checkpoint_period);
   return options;
 }

@@ -8,6 +8,7 @@
 #include "check_keys.hpp"
 #include "collision_mesh.hpp"
 #include "conditions.hpp"
+#include "forces.hpp"
 #include "geometry.hpp"
 #include "materials.hpp"
 #include "merge.hpp"
@@ -71,6 +72,7 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, std::move(obstacles), setup, warnings);
+  warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }
 
 template <int Dim>
@@ -80,8 +82,11 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
     for (const Node& geometry : *list)
       for (const char* key : {"translation", "dimensions", "scale"})
-        warn_of_components(geometry["transformation"][key], Dim, warnings);
-  read_model<Dim>(root, read_obstacles<Dim>(geometries, files), setup, warnings);
+        warn_of_components(geometry["transformation"][key], Dim, warnings, true);
+  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, warnings);
+  std::vector<ForceTarget> curves = read_forces<Dim>(root, geometries, obstacles, setup.mesh);
+  read_model<Dim>(root, std::move(obstacles), setup, warnings);
+  setup.fields.curves = std::move(curves);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;
@@ -94,7 +99,8 @@ std::string make_identity(const Node& root, const Geometries& geometries, MeshFi
   if (identity.contains("solver") && identity["solver"].is_object()) identity["solver"].erase("max_threads");
   Json hashes = Json::object();
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
-    for (const Node& geometry : *list) hashes[geometry["mesh"].pointer()] = files.hash(geometry["mesh"], MeshFiles::kMesh);
+    for (const Node& geometry : *list)
+      if (!is_flat_obstacle(geometry)) hashes[geometry["mesh"].pointer()] = files.hash(geometry["mesh"], MeshFiles::kMesh);
   if (has_collision_mesh(root)) {
     const Node node = root["contact"]["collision_mesh"];
     hashes[node["mesh"].pointer()] = files.hash(node["mesh"], MeshFiles::kMesh);

@@ -13,6 +13,7 @@
 #include "barrier_stiffness.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/simulation/step_problem.hpp"
+#include "sizes.hpp"
 
 namespace itr {
 
@@ -22,6 +23,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSliver = 0.1;                  ///< quality below which an element is one
 constexpr double kLargeRatio = 1e3;              ///< of stiffnesses or of element sizes, from which systems are hard
 constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
+constexpr double kLargePart = 5;                 ///< of what touches or falls [m]: above it lengths may be millimetres
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
 constexpr double kUsualModulus[] = {1e3, 1e13};  ///< [Pa]
 constexpr double kStiffnessRange = 20;           ///< of the barrier's, either way; a hundredfold costs 3 to 9 times
@@ -77,8 +79,12 @@ std::map<int, double> volumes_by_body(const Mesh<Dim>& mesh) {
 
 template <int Dim>
 void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& found) {
-  if (is_outside(figures.size, kUsualLength))
-    found.push_back(fmt::format("the bodies span {:.3g} m: are lengths in metres?", figures.size));
+  const bool is_large = figures.size > kLargePart && (setup.contact.enabled || setup.body_acceleration);
+  if (is_large || is_outside(figures.size, kUsualLength))
+    found.push_back(
+        fmt::format("the bodies span {:.4g} m: are lengths in metres? (for a mesh in millimetres /geometry/*/transformation/"
+                    "scale is 0.001)",
+                    figures.size));
   const bool has_mass = (!setup.time.is_static && !setup.time.quasistatic) || setup.body_acceleration;
   for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
     const Material& material = setup.materials.at(body);
@@ -134,9 +140,9 @@ void find_held(const Setup<Dim>& setup, std::vector<std::string>& found) {
     found.emplace_back("every vertex is held: there is nothing to solve for");
 }
 
-/// Connected parts of the mesh without a held vertex.
+/// Bodies that have a connected part without a held vertex, and how many such parts there are.
 template <int Dim>
-int count_loose_parts(const Setup<Dim>& setup) {
+std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   const Mesh<Dim>& mesh = setup.mesh;
   const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
   std::vector<int> part(mesh.vertex_slots());
@@ -146,23 +152,58 @@ int count_loose_parts(const Setup<Dim>& setup) {
     return v;
   };
   for (const auto& [a, b] : mesh.edges()) part[find(a)] = find(b);
-  std::set<int> parts, fixed;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
-    if (!mesh.is_vertex_alive(v)) continue;
-    parts.insert(find(v));
+  std::set<int> fixed, loose, bodies;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
     for (int c = 0; c < Dim; ++c)
-      if (held[Dim * v + c]) fixed.insert(find(v));
+      if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(find(v));
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c) || fixed.contains(find(mesh.cell(c)[0]))) continue;
+    loose.insert(find(mesh.cell(c)[0]));
+    bodies.insert(mesh.body(c));
   }
-  return static_cast<int>(parts.size() - fixed.size());
+  return {bodies, static_cast<int>(loose.size())};
 }
 
 template <int Dim>
 void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found) {
   if (!setup.time.is_static && !setup.time.quasistatic) return;
-  if (const int loose = count_loose_parts(setup); loose > 0)
-    found.push_back(
-        fmt::format("{} of the bodies' parts have neither inertia nor a held vertex: {}", loose,
-                    setup.contact.enabled ? "only contact can keep them in place" : "nothing keeps them in place"));
+  const auto [bodies, parts] = find_loose_parts(setup);
+  if (parts == 0) return;
+  std::string names;
+  for (const int body : bodies) names += (names.empty() ? "" : ", ") + std::to_string(body);
+  const bool has_friction = setup.contact.friction_coefficient > 0 && setup.contact.friction_iterations != 0;
+  found.push_back(fmt::format("{} of the bodies' parts have neither inertia nor a held vertex (id {}): {}", parts, names,
+                              !setup.contact.enabled ? "nothing keeps them in place"
+                              : has_friction         ? "only contact and friction can keep them in place"
+                                                     : "only contact can keep them in place, and without friction it does "
+                                                       "not keep them from sliding off"));
+}
+
+/// Linear elements that are too stiff: nearly incompressible bodies, and thin ones with few cells through the thickness.
+template <int Dim>
+void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  constexpr double kIncompressible = 0.485, kSlender = 0.15, kFewLayers = 3;
+  if (setup.remesh.enabled) return;
+  for (const auto& [body, size] : body_sizes(setup.mesh)) {
+    const Material& material = setup.materials.at(body);
+    const auto order = setup.order.find(body);
+    if (order != setup.order.end() && order->second == 2) continue;
+    const double layers = size.thickness / size.mean_edge;
+    const char* help =
+        "quadratic elements (/space/discr_order: 2), remeshing (/space/remesh/enabled) or a finer mesh (n_refs) help: "
+        "compare";
+    const bool keeps_volume = Dim == 3 || material.plane_strain;
+    if (keeps_volume && material.poisson_ratio >= kIncompressible)
+      found.push_back(
+          fmt::format("body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
+                      "lock, forces are too large, often several times; {}",
+                      body, material.poisson_ratio, layers, help));
+    else if (size.thickness < kSlender * size.diagonal && layers < kFewLayers)
+      found.push_back(
+          fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends they "
+                      "are too stiff; {}",
+                      body, layers, help));
+  }
 }
 
 template <int Dim>
@@ -173,6 +214,24 @@ void find_wrong_gravity(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
   if (most == a.norm() && !is_outside(most, kGravity))
     found.push_back("bodies fall along " + vector_text<Dim>(a) +
                     " m/s^2: a scene's rhs pushes in the negative direction, gravity down y is [0, 9.81]");
+}
+
+/// Before a run: what Newton steps of the length where it ends are worth in the stiffest body, against a split.
+template <int Dim>
+void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
+  constexpr double kShare = 0.01;
+  const Setup<Dim>& setup = simulation.setup();
+  if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled || setup.newton.norm != NewtonNorm::euclidean) return;
+  double stiffness = 0;
+  for (const auto& [body, size] : body_sizes(setup.mesh))
+    stiffness = std::max(stiffness, setup.materials.at(body).youngs_modulus * std::pow(size.mean_edge, Dim - 2));
+  const double step = setup.newton.step_tolerance, worth = stiffness * step * step / 2;
+  const double split = *setup.remesh.split.acceptance_tolerance;
+  if (worth > kShare * split)
+    found.push_back(fmt::format(
+        "Newton ends at steps of {:.2g} m, which are worth about {:.2g} J; a split is made for {:.2g} J{}: refinement "
+        "may see the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
+        step, worth, split, setup.follows_stored_energy.split ? " at most" : ""));
 }
 
 template <int Dim>
@@ -187,14 +246,21 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
   const double gap = energy.min_distance(contact.positions(simulation.state().history.x[0]), workspace);
   if (gap < dhat)
     found.push_back(fmt::format(
-        "gap {:.3g} m at the start is below d-hat = {:.3g} m: surfaces push each other from the start", gap, dhat));
+        "gap {:.6g} m at the start is below d-hat = {:.6g} m: surfaces push each other from the start", gap, dhat));
+  constexpr double kSmall = 0.02;
+  for (const auto& [body, size] : body_sizes(setup.mesh))
+    if (dhat > kSmall * size.thickness)
+      found.push_back(fmt::format(
+          "d-hat = {:.4g} m is {:.2g} % of the thickness of body {}, {:.4g} m: surfaces stand off by up to that, "
+          "as if what presses were thicker; /contact/dhat = \"auto\" takes a thousandth",
+          dhat, 100 * dhat / size.thickness, body, size.thickness));
   double shortest = kInfinity;
   const std::vector<Vec<Dim>> rest =
       setup.proxy ? setup.proxy->rest : node_rest_positions(simulation.state().mesh, simulation.state().space);
   for (const auto& [a, b] : surface.edges)
     if (surface.counts[a]) shortest = std::min(shortest, (rest[a] - rest[b]).norm());
   if (dhat > shortest)
-    found.push_back(fmt::format("d-hat = {:.3g} m is above the shortest surface edge, {:.3g} m: surfaces feel themselves",
+    found.push_back(fmt::format("d-hat = {:.6g} m is above the shortest surface edge, {:.6g} m: surfaces feel themselves",
                                 dhat, shortest));
 }
 
@@ -206,6 +272,43 @@ double damping_of(const TimeOptions& time, double phase) {
   return std::abs((2.0 + std::sqrt(1.0 + 2.0 * i * phase)) / (3.0 - 2.0 * i * phase));  // the root of BDF2
 }
 
+/// Fastest that anything is driven [m/s]: at the start, by gravity over the size of the scene, by what is prescribed.
+template <int Dim>
+double driven_speed(const Setup<Dim>& setup, const MeshFigures<Dim>& figures) {
+  const TimeOptions& time = setup.time;
+  double speed = 0;
+  for (const auto& condition : setup.initial_velocity) speed = std::max(speed, condition.value(figures.center, 0).norm());
+  if (setup.body_acceleration) {
+    const double a = setup.body_acceleration(figures.center, time.t0).norm(), duration = time.dt * time.steps;
+    speed = std::max(speed, std::min(a * duration, std::sqrt(2 * a * figures.size)));
+  }
+  constexpr int kSamples = 20;
+  VectorX before = held_dofs(setup, setup.mesh, time.t0).target;
+  for (int i = 1; i <= kSamples; ++i) {
+    const VectorX after = held_dofs(setup, setup.mesh, time.t0 + time.dt * time.steps * i / kSamples).target;
+    const VectorX way = after - before;
+    for (Eigen::Index k = 0; k + Dim <= way.size(); k += Dim)
+      speed = std::max(speed, way.template segment<Dim>(k).norm() * kSamples / (time.dt * time.steps));
+    before = after;
+  }
+  return speed;
+}
+
+/// Whether impacts or loads are strong enough for waves: by the strain that they make, a speed over that of waves.
+template <int Dim>
+bool has_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, double wave_speed) {
+  constexpr double kStrain = 1e-3;
+  if (driven_speed(setup, figures) > kStrain * wave_speed) return true;
+  double softest = kInfinity;
+  for (const auto& [body, volume] : volumes_by_body(setup.mesh))
+    softest = std::min(softest, setup.materials.at(body).youngs_modulus);
+  const double t = setup.time.t0 + setup.time.dt;  // what is there at once
+  return std::any_of(setup.neumann.begin(), setup.neumann.end(),
+                     [&](const auto& c) { return c.traction(figures.center, t).norm() > kStrain * softest; }) ||
+         std::any_of(setup.pressure.begin(), setup.pressure.end(),
+                     [&](const auto& c) { return std::abs(c.pressure(figures.center, t)) > kStrain * softest; });
+}
+
 template <int Dim>
 void foretell_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& words) {
   double speed = 0;
@@ -213,6 +316,7 @@ void foretell_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
     const Material& m = setup.materials.at(body);
     speed = std::max(speed, std::sqrt((m.lame_lambda(Dim) + 2 * m.lame_mu()) / m.density));
   }
+  if (!has_waves(setup, figures, speed)) return;
   const double dt = setup.time.dt;
   words.push_back(
       fmt::format("waves run at up to {:.4g} m/s: through the shortest edge ({:.3g} m) in {:.2g} s, through the bodies "
@@ -246,6 +350,8 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_held(setup, found);
   find_odd_stiffness(setup, found);
   find_loose_bodies(setup, found);
+  find_locking(setup, found);
+  find_loose_tolerance(simulation, found);
   find_near_surfaces(simulation, found);
   return found;
 }

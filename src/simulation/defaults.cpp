@@ -5,16 +5,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "barrier_stiffness.hpp"
+#include "itr/simulation/remesh_step.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/simulation/step_problem.hpp"
+#include "sizes.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr double kSoftness = 0.1;         ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
+constexpr double kSoftness = 0.1;          ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
+constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, little beside usual deformations
+constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
+constexpr double kLeastDhat = 0.01;       ///< of that without the gap: what nearly touches presses a little at the start
 constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest
 /// What operations may cost, in split tolerances. Collapses: with less, what contact has left behind stays fine.
 constexpr double kCollapseShare = 0.01;
@@ -91,11 +97,6 @@ namespace {
 
 template <int Dim>
 std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
-  if (!setup.remesh.enabled) {
-    contact.adaptive_stiffness = true;
-    contact.barrier_stiffness = 1;
-    return {};
-  }
   double stiffest = 0;
   for (const auto& [body, material] : setup.materials) stiffest = std::max(stiffest, material.youngs_modulus);
   contact.barrier_stiffness = barrier_stiffness_for(setup, contact, stiffest);
@@ -105,32 +106,72 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
       contact.barrier_stiffness, stiffest);
 }
 
+/// A thousandth of the thinnest body, a tenth of the shortest surface edge, and less than the gap at the start.
+template <int Dim>
+std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& contact) {
+  double thinnest = std::numeric_limits<double>::infinity(), shortest = thinnest;
+  for (const auto& [body, size] : body_sizes(setup.mesh)) thinnest = std::min(thinnest, size.thickness);
+  const ContactSurface<Dim> surface = contact_surface(setup, setup.mesh);
+  VectorX start = held_dofs(setup, setup.mesh, setup.time.t0).target;
+  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v) start.template segment<Dim>(Dim * v) = setup.mesh.rest(v);
+  for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f)
+    for (int i = 0; i < Dim; ++i)
+      for (int j = 0; j < i; ++j)
+        shortest =
+            std::min(shortest, (setup.mesh.rest(setup.mesh.facet(f)[i]) - setup.mesh.rest(setup.mesh.facet(f)[j])).norm());
+  double& dhat = contact.activation_distance;
+  dhat = std::min(kDhatByThickness * thinnest, kDhatByEdge * shortest);
+  double gap = std::numeric_limits<double>::infinity();
+  if (!setup.proxy) {
+    Workspace workspace;
+    gap = ContactEnergy<Dim>(surface.surface, contact, 1, 1).min_distance(start, workspace);
+    if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
+  }
+  return fmt::format(
+      "d-hat {:.4g} m: a thousandth of the thinnest body ({:.4g} m), a tenth of the shortest surface edge "
+      "({:.4g} m){}; /contact/dhat sets another",
+      dhat, thinnest, shortest, std::isfinite(gap) ? fmt::format(", less than the gap, {:.4g} m", gap) : "");
+}
+
 /// Chooses the split tolerance [J], and says so.
 template <int Dim>
-std::string choose_split_tolerance(const Setup<Dim>& setup, RemeshOptions& remesh) {
+std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
   double energy = 0;
   for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
     if (setup.mesh.is_cell_alive(c))
       energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
-  if (const double available = available_energy(setup); available > 0) energy = std::min(energy, available);
-  const double tolerance = remesh.relative_tolerance * energy;
+  const double available = available_energy(setup);
+  if (available > 0) energy = std::min(energy, available);
+  setup.follows_stored_energy.split = available == 0;
+  const double relative = available == 0 ? kStoredShare * remesh.relative_tolerance : remesh.relative_tolerance;
+  const double tolerance = relative * energy;
   remesh.split.acceptance_tolerance = tolerance;
+  const std::string split =
+      available == 0
+          ? fmt::format(
+                "split tolerance: {:g} of the energy that is stored so far, at most {:.3g} J (strains of a tenth "
+                "everywhere)",
+                relative, tolerance)
+          : fmt::format("split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J", tolerance, relative, energy);
+  const std::string collapse = remesh.collapse.acceptance_tolerance
+                                   ? fmt::format("{:.2g} J", -*remesh.collapse.acceptance_tolerance)
+                               : available == 0 ? fmt::format("{:g} of that", kCollapseShare)
+                                                : fmt::format("{:.2g} J", kCollapseShare * tolerance);
   return fmt::format(
-      "split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J; collapses may cost {:.2g} J; "
-      "/space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
-      tolerance, remesh.relative_tolerance, energy,
-      -remesh.collapse.acceptance_tolerance.value_or(-kCollapseShare * tolerance));
+      "{}; collapses may cost {}; /space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
+      split, collapse);
 }
 
 /// Of operations beside splits, from the split's.
-void choose_other_tolerances(RemeshOptions& remesh) {
+void choose_other_tolerances(RemeshOptions& remesh, FollowsStoredEnergy& follows) {
   const double split = *remesh.split.acceptance_tolerance;
-  const auto choose = [&](std::optional<double>& tolerance, double share) {
+  const auto choose = [&](std::optional<double>& tolerance, double share, bool& follows_too) {
+    follows_too = follows.split && !tolerance;
     tolerance = tolerance.value_or(-share * split);
   };
-  choose(remesh.collapse.acceptance_tolerance, kCollapseShare);
-  choose(remesh.swap.acceptance_tolerance, kShapeShare);
-  choose(remesh.smooth.acceptance_tolerance, kShapeShare);
+  choose(remesh.collapse.acceptance_tolerance, kCollapseShare, follows.collapse);
+  choose(remesh.swap.acceptance_tolerance, kShapeShare, follows.swap);
+  choose(remesh.smooth.acceptance_tolerance, kShapeShare, follows.smooth);
 }
 
 }  // namespace
@@ -141,12 +182,13 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   ContactOptions& contact = this->contact;
   RemeshOptions& remesh = this->remesh;
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
+  if (contact.enabled && contact.activation_distance == 0) words.push_back(choose_activation_distance(*this, contact));
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
   if (!remesh.enabled) return words;
   if (!remesh.split.min_edge_length) remesh.split.min_edge_length = kLeastSplitEdge * rest_diagonal(mesh);
   if (!remesh.split.acceptance_tolerance) words.push_back(choose_split_tolerance(*this, remesh));
-  choose_other_tolerances(remesh);
+  choose_other_tolerances(remesh, follows_stored_energy);
   return words;
 }
 

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "itr/core/timer.hpp"
 #include "itr/energy/point_forces.hpp"
 #include "itr/geometry/bvh.hpp"
@@ -75,6 +77,25 @@ RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const State<Dim>& sta
   return fields;
 }
 
+/// The tolerances that follow the energy stored so far.
+template <int Dim>
+RemeshOptions options_of_step(const StepSetup<Dim>& setup, double stored_energy) {
+  constexpr double kLeast = 1e-6;  // of the tolerance for strains of a tenth: those of 1e-4
+  RemeshOptions options = setup.remesh;
+  const FollowsStoredEnergy& follows = setup.follows_stored_energy;
+  if (!follows.split) return options;
+  const double split = *options.split.acceptance_tolerance;
+  const double share = std::clamp(kStoredShare * options.relative_tolerance * stored_energy / split, kLeast, 1.0);
+  options.split.acceptance_tolerance = share * split;
+  const auto scale = [share](std::optional<double>& tolerance, bool follows_too) {
+    if (follows_too) tolerance = share * *tolerance;
+  };
+  scale(options.collapse.acceptance_tolerance, follows.collapse);
+  scale(options.swap.acceptance_tolerance, follows.swap);
+  scale(options.smooth.acceptance_tolerance, follows.smooth);
+  return options;
+}
+
 /// Mass of the bodies times the diameter of where they are [kg m].
 template <int Dim>
 double mass_moment(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x) {
@@ -108,11 +129,15 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   const StepSetup<Dim>& setup = tools.setup;
   const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
   RemeshFields<Dim> fields = make_fields(setup, before, x);
+  const RemeshOptions options =
+      options_of_step(setup, std::max(before.stored_energy, report.energy.elastic + report.energy.contact));
   RemeshReport remeshed;
   {
     const ScopedTimer timer(report.seconds.remesh);
-    remeshed = remesh(state.mesh, fields, context, setup.remesh, state.remesh_memory, state.strata);
+    remeshed = remesh(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
+  report.split_tolerance = *options.split.acceptance_tolerance;
+  report.best_refused_split = remeshed.best_refused_gain / problem.scaling();
   report.splits = remeshed.splits;
   report.collapses = remeshed.collapses;
   report.swaps = remeshed.swaps;

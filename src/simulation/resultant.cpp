@@ -10,42 +10,86 @@
 namespace itr {
 
 namespace {
+
 Vec<1> moment(const Vec<2>& arm, const Vec<2>& f) { return Vec<1>(arm[0] * f[1] - arm[1] * f[0]); }
 Vec<3> moment(const Vec<3>& arm, const Vec<3>& f) { return arm.cross(f); }
+
+template <int Dim>
+void add_force(const Vec<Dim>& f, const Vec<Dim>& arm, Resultant<Dim>& sum) {
+  sum.force += f;
+  sum.moment += moment(arm, f);
+}
+
+/// Which nodes, those on curved edges included, the target has.
+template <int Dim>
+std::vector<char> nodes_of(const State<Dim>& state, std::span<const int> surfaces, std::span<const int> bodies) {
+  const Mesh<Dim>& mesh = state.mesh;
+  std::vector<char> is_on(num_nodes(mesh, state.space), 0);
+  const auto has = [](std::span<const int> list, int id) { return std::find(list.begin(), list.end(), id) != list.end(); };
+  const auto take = [&]<std::size_t N>(const std::array<int, N>& simplex) {
+    for (const int v : simplex) is_on[v] = 1;
+    for_each_edge<static_cast<int>(N) - 1>([&](int, int i, int j) {
+      if (const int edge = state.space.find(simplex[i], simplex[j]); edge != kNone) is_on[mesh.vertex_slots() + edge] = 1;
+    });
+  };
+  if (!surfaces.empty())
+    for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+      if (mesh.is_facet_alive(f) && has(surfaces, mesh.facet_tag(f))) take(mesh.facet(f));
+  if (!bodies.empty())
+    for (CellId c = 0; c < mesh.cell_slots(); ++c)
+      if (mesh.is_cell_alive(c) && has(bodies, mesh.body(c))) take(mesh.cell(c));
+  return is_on;
+}
+
 }  // namespace
 
 template <int Dim>
-Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about) {
-  const Mesh<Dim>& mesh = simulation.state().mesh;
-  const Space& space = simulation.state().space;
-  const int nodes = num_nodes(mesh, space);
-  const NodalForces& forces = simulation.forces();
+ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
   const std::array<const VectorX*, 4> kinds{&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
+  const int bodies = num_nodes(state.mesh, state.space);
   for (const VectorX* kind : kinds)
-    if (kind->size() != Eigen::Index{Dim} * nodes)
+    if (kind->size() != Eigen::Index{Dim} * bodies)
       throw InputError({"", "fields", "not all kinds of forces",
                         "contact_forces, friction_forces, reaction_forces and applied_forces for a resultant"});
-  std::vector<char> is_on(nodes, 0);
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (std::find(tags.begin(), tags.end(), mesh.facet_tag(f)) == tags.end()) continue;
-    const auto& facet = mesh.facet(f);
-    for (const int v : facet) is_on[v] = 1;
-    for_each_edge<Dim - 1>([&](int, int i, int j) {
-      if (const int curved = space.find(facet[i], facet[j]); curved != kNone) is_on[mesh.vertex_slots() + curved] = 1;
-    });
-  }
-  Resultant<Dim> sum;
-  for (int v = 0; v < nodes; ++v) {
+  const VectorX& x = state.history.x[0];
+  const Vec<Dim> about(target.about.data());
+  const std::vector<char> is_on = nodes_of(state, target.surfaces, target.bodies);
+  ForceSums<Dim> sums;
+  for (int v = 0; v < bodies; ++v) {
     if (!is_on[v]) continue;
-    Vec<Dim> f = Vec<Dim>::Zero();
-    for (const VectorX* kind : kinds) f += kind->template segment<Dim>(Dim * v);
-    sum.force += f;
-    sum.moment += moment(Vec<Dim>(simulation.state().history.x[0].template segment<Dim>(Dim * v) - about), f);
+    const Vec<Dim> arm = x.template segment<Dim>(Dim * v) - about;
+    const auto of = [&](const VectorX& kind) { return Vec<Dim>(kind.template segment<Dim>(Dim * v)); };
+    add_force<Dim>(of(forces.contact), arm, sums.contact);
+    add_force<Dim>(of(forces.friction), arm, sums.friction);
+    add_force<Dim>(of(forces.reaction), arm, sums.reaction);
+    Vec<Dim> all = Vec<Dim>::Zero();
+    for (const VectorX* kind : kinds) all += of(*kind);
+    add_force<Dim>(all, arm, sums.all);
   }
-  return sum;
+  for (const int o : target.obstacle_vertices) {
+    const Vec<Dim> arm = x.template segment<Dim>(Dim * (bodies + o)) - about;
+    const Vec<Dim> contact = forces.obstacle_contact.template segment<Dim>(Dim * o);
+    const Vec<Dim> friction = forces.obstacle_friction.template segment<Dim>(Dim * o);
+    add_force<Dim>(contact, arm, sums.contact);
+    add_force<Dim>(friction, arm, sums.friction);
+    add_force<Dim>(contact + friction, arm, sums.all);
+  }
+  return sums;
 }
 
-template Resultant<2> resultant<2>(const Simulation<2>&, std::span<const int>, const Vec<2>&);
-template Resultant<3> resultant<3>(const Simulation<3>&, std::span<const int>, const Vec<3>&);
+template <int Dim>
+Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about) {
+  ForceTarget target;
+  target.surfaces.assign(tags.begin(), tags.end());
+  std::copy(about.begin(), about.end(), target.about.begin());
+  return force_sums(simulation.state(), simulation.forces(), target).all;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                             \
+  template Resultant<Dim> resultant<Dim>(const Simulation<Dim>&, std::span<const int>, const Vec<Dim>&); \
+  template ForceSums<Dim> force_sums<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr

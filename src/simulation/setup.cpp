@@ -46,7 +46,7 @@ void check_time(const TimeOptions& time) {
 
 void check_contact(const ContactOptions& contact) {
   if (!contact.enabled) return;
-  require_positive("/contact/dhat", contact.activation_distance);
+  require_not_negative("/contact/dhat", contact.activation_distance);
   require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
   require_not_negative("/contact/friction_coefficient", contact.friction_coefficient);
   require_positive("/contact/epsv", contact.friction_velocity);

@@ -9,14 +9,17 @@
 #include <string>
 #include <utility>
 
+#include "cell_stress.hpp"
 #include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/process.hpp"
 #include "itr/linear/choice.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/simulation/invariants.hpp"
+#include "itr/simulation/resultant.hpp"
 #include "itr/simulation/step.hpp"
 #include "unsupported.hpp"
+#include "watch.hpp"
 
 namespace itr {
 
@@ -192,6 +195,7 @@ struct Simulation<Dim>::Impl {
   double first_dt = 1;                       ///< what the setup's tolerances are for [s]
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
+  Watch<Dim> watch;
 
   StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger}; }
 
@@ -390,6 +394,7 @@ StepResult Simulation<Dim>::advance() {
   }
   impl_->forces = result.forces;
   impl_->report = result.report;
+  impl_->watch.look(impl_->setup, *impl_->state, result.report, impl_->logger);
   if (!result.renumbering.empty()) ++impl_->mesh_revision;
   impl_->tell(*before, result);
   return result;
@@ -529,7 +534,7 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>
                                 data.elastic_density.push_back(mean);
                               });
   data.asked.forces = forces;
-  add_asked(cells, data);
+  add_asked(cells, state, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   if (impl_->setup.proxy) {
@@ -541,6 +546,17 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>
 }
 
 namespace {
+
+template <int Dim>
+ForceCurvePoint curve_point(const ForceSums<Dim>& sums, const std::string& name) {
+  ForceCurvePoint point{name, {}};
+  const std::array<const Resultant<Dim>*, 4> kinds{&sums.contact, &sums.friction, &sums.reaction, &sums.all};
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    point.kinds[k].assign(kinds[k]->force.begin(), kinds[k]->force.end());
+    point.kinds[k].insert(point.kinds[k].end(), kinds[k]->moment.begin(), kinds[k]->moment.end());
+  }
+  return point;
+}
 
 /// Of the stress in space: zero out of the plane in plane stress, what F_zz = 1 gives in plane strain.
 template <int Dim>
@@ -564,24 +580,54 @@ double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Ve
 
 }  // namespace
 
+namespace {
+
 template <int Dim>
-void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, FrameData& data) const {
+CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Setup<Dim>& setup) {
+  CellStress stress;
+  for_each_cell_in_order<Dim>(cells, x, setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+    Mat<Dim> cauchy = Mat<Dim>::Zero();
+    double equivalent = 0;
+    for (const auto& [F, X, share] : points) {
+      const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
+      cauchy += share * here;
+      equivalent += share * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
+    }
+    stress.von_mises.push_back(equivalent);
+    for (int i = 0; i < Dim; ++i)
+      for (int j = 0; j < Dim; ++j) stress.cauchy.push_back(cauchy(i, j));
+  });
+  return stress;
+}
+
+}  // namespace
+
+template <int Dim>
+CellStress cell_stress(const Simulation<Dim>& simulation) {
+  const State<Dim>& state = simulation.state();
+  const VectorX x = state.history.x[0].head(Dim * num_nodes(state.mesh, state.space));
+  return stress_of<Dim>(whole_mesh(state.mesh, {}, state.space), x, simulation.setup());
+}
+
+template CellStress cell_stress(const Simulation<2>&);
+template CellStress cell_stress(const Simulation<3>&);
+
+template <int Dim>
+void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, const State<Dim>& state, FrameData& data) const {
   const FieldOptions& options = impl_->setup.fields;
   AskedFields& asked = data.asked;
-  if (options.von_mises || options.stress)
-    for_each_cell_in_order<Dim>(
-        cells, data.x, impl_->setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {
-          Mat<Dim> cauchy = Mat<Dim>::Zero();
-          double equivalent = 0;
-          for (const auto& [F, X, share] : points) {
-            const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
-            cauchy += share * here;
-            equivalent += share * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
-          }
-          if (options.von_mises) asked.von_mises.push_back(equivalent);
-          for (int i = 0; options.stress && i < Dim; ++i)
-            for (int j = 0; j < Dim; ++j) asked.stress.push_back(cauchy(i, j));
-        });
+  const NodalForces all = std::exchange(asked.forces, {});
+  if (options.contact_forces) asked.forces.contact = all.contact;
+  if (options.friction_forces) asked.forces.friction = all.friction;
+  if (options.reaction_forces) asked.forces.reaction = all.reaction;
+  if (options.applied_forces) asked.forces.applied = all.applied;
+  for (const ForceTarget& target : options.curves)
+    asked.curves.push_back(curve_point(force_sums(state, all, target), target.name));
+  if (options.von_mises || options.stress) {
+    CellStress stress = stress_of<Dim>(cells, data.x, impl_->setup);
+    if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
+    if (options.stress) asked.stress = std::move(stress.cauchy);
+  }
   if (!options.kinetic_energy && !options.momentum) return;
   VectorX product = VectorX::Zero(data.v.size());
   InertiaEnergy<Dim>(cells, impl_->setup.materials, impl_->setup.lump_mass ? MassKind::lumped : MassKind::consistent,

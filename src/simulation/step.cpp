@@ -14,6 +14,7 @@
 #include "itr/simulation/energy_guard.hpp"
 #include "itr/simulation/invariants.hpp"
 #include "itr/simulation/remesh_step.hpp"
+#include "watch.hpp"
 
 namespace itr {
 
@@ -82,8 +83,10 @@ class StepAttempt {
     }
     make_problem();
     NewtonSummary summary = solve(expected());
-    if (!summary.converged()) return failed(summary);
+    const std::string jump = jumped();
+    if (!summary.converged()) return failed(summary, jump);
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
+    if (!jump.empty()) return failed(jump);
     if (setup_.remesh.enabled) {
       if (const auto cancelled = remesh()) return failed(*cancelled);
       if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();  // as it ends
@@ -121,13 +124,17 @@ class StepAttempt {
     NewtonSummary summary = problem_->solve(x_, VectorX(x_), expected);
     add_seconds(summary, report_.seconds);
     report_.newton_iterations += summary.iterations;
+    report_.residual_worth = std::max(report_.residual_worth, summary.decrement / problem_->scaling());
     report_.indefinite += summary.indefinite;
     if (summary.converged() && !summary.message.empty()) warn(summary.message);
     if (summary.iterations > kManyIterations) warn(problem_->describe_effort(summary));
     if (summary.linear_residual > kPoorResidual)
-      warn(fmt::format(
-          "linear solves by {} reached a relative residual of {:.1e} only; another solver, or a `fallback`, may do better",
-          tools_.cache.system.solver().name(), summary.linear_residual));
+      warn(fmt::format("linear solves by {} reached a relative residual of {:.1e} only: {}",
+                       tools_.cache.system.solver().name(), summary.linear_residual,
+                       tools_.cache.system.solver().capabilities().iterative
+                           ? "a direct solver, or a `fallback`, may do better"
+                           : "the system is nearly singular, and other solvers will hardly do better; what makes it so are "
+                             "bodies that little holds, slivers, a nu near 0.5 or moduli far apart"));
     return summary;
   }
 
@@ -175,6 +182,7 @@ class StepAttempt {
       report_.min_volume_ratio = min_volume_ratio(problem_->cells(), x_);
       if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
     }
+    next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
     next_.factor = tools_.solver.record();
     next_.stiffness = problem_->stiffness();
     next_.quadrature = problem_->quadrature_levels();
@@ -187,6 +195,7 @@ class StepAttempt {
       start->stiffness = before_.stiffness;
       start->quadrature = before_.quadrature;
       start->created_energy = before_.created_energy;
+      start->stored_energy = before_.stored_energy;
       start->history.damp_next = before_.history.damp_next;
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
@@ -200,8 +209,14 @@ class StepAttempt {
     return result;
   }
 
-  StepResult failed(const NewtonSummary& summary) {
-    StepResult result = failed(reason_of(summary));
+  /// What flew away without inertia; empty: nothing.
+  std::string jumped() const {
+    if (has_inertia() || setup_.time.allow_jumps) return {};
+    return find_jump(setup_, next_.mesh, next_.space, before_.history.x[0], x_);
+  }
+
+  StepResult failed(const NewtonSummary& summary, const std::string& jump = {}) {
+    StepResult result = failed(jump.empty() ? reason_of(summary) : jump + "; " + reason_of(summary));
     result.cancelled = summary.termination == Termination::cancelled;
     return result;
   }

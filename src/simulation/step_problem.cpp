@@ -467,9 +467,16 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   };
   NodalForces forces;
   const FieldOptions& asked = setup_.fields;
-  if (asked.contact_forces) forces.contact = force(potential_.contact_of_cells().get());
-  if (asked.friction_forces) forces.friction = force(lagged_.friction.get());
-  if (asked.applied_forces) {
+  const bool all = !asked.curves.empty();
+  const auto split = [&](const Energy* term, VectorX& of_bodies, VectorX& of_obstacles) {
+    VectorX gradient = VectorX::Zero(x.size());
+    if (term) term->add_gradient(x, gradient, workspace_);
+    of_bodies = -gradient.head(bodies) / terms_.scaling;
+    of_obstacles = -gradient.tail(x.size() - bodies) / terms_.scaling;
+  };
+  if (asked.contact_forces || all) split(potential_.contact_of_cells().get(), forces.contact, forces.obstacle_contact);
+  if (asked.friction_forces || all) split(lagged_.friction.get(), forces.friction, forces.obstacle_friction);
+  if (asked.applied_forces || all) {
     const Loads<Dim> tractions{{}, terms_.loads.tractions, {}};
     EnergySum applied;
     applied.add(std::make_shared<LoadEnergy<Dim>>(cells_, setup_.materials, tractions, terms_.scaling));
@@ -478,9 +485,9 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
     if (lagged_.follower) applied.add(lagged_.follower);
     forces.applied = force(&applied);
   }
-  if (!asked.reaction_forces) return forces;
-  const EnergySum all = potential_.sum(lagged_);
-  forces.reaction = -force(&all);
+  if (!asked.reaction_forces && !all) return forces;
+  const EnergySum sum = potential_.sum(lagged_);
+  forces.reaction = -force(&sum);
   for (Eigen::Index i = 0; i < bodies; ++i)
     if (dofs_.unknown[i] != kNone) forces.reaction[i] = 0;
   return forces;

@@ -142,10 +142,13 @@ class AnySimulation {
   struct Resultants {
     std::vector<double> force, moment;  ///< dimension numbers; one in 2D, three in 3D
   };
-  /// The resultant on several boundaries together.
+  /// The resultant on several boundaries and obstacles together: of what acts on boundaries, and of what bodies do to
+  /// obstacles.
   Resultants resultant(std::span<const std::string> boundaries, std::span<const double> about) const;
   Resultants resultant(const std::string& boundary) const;  ///< about the origin
   std::vector<double> elastic_density() const;              ///< by cell, of rest volume [J/m^Dim]
+  std::vector<double> von_mises() const;                    ///< by cell [Pa]
+  std::vector<double> stress() const;                       ///< Cauchy's by cell, dimension^2 numbers, row by row [Pa]
 
   /// A saved state, see Snapshot.
   using Saved = std::variant<Snapshot<2>, Snapshot<3>>;

@@ -43,7 +43,8 @@ struct NewtonOptions {
   double relative_step_tolerance = 0;       ///< of the norm of the solve's first full step
   double relative_gradient_tolerance = 0;   ///< of the norm of the solve's first gradient
   double decrement_tolerance = 0;           ///< stop when the Newton decrement -p.g / 2 is below it [J s^2]
-  double energy_tolerance = 0;              ///< stop after `energy_steps` steps in a row that change less [J s^2]
+  double split_share = 0;       ///< with remeshing: stop when the decrement is below this part of the split tolerance
+  double energy_tolerance = 0;  ///< stop after `energy_steps` steps in a row that change less [J s^2]
   int energy_steps = 100;
   LineSearch line_search = LineSearch::robust_armijo;
   IndefiniteHessian indefinite = IndefiniteHessian::project;

@@ -48,6 +48,9 @@ class Writer {
   /// Saves the state after the step that was written last.
   template <int Dim>
   void save(const FrameView<Dim>& frame, const State<Dim>& state);
+  /// Goes into the line of the next step and into summary.json, which counts those of one kind.
+  void warn(const std::string& text);
+  int warnings() const;  ///< how many there were, before --resume too
   /// Sums over the run as in summary.json, steps before --resume included.
   const StepReport& totals() const;
   /// `outcome` is "finished" or the reason why the simulation stopped, `solver` who solved at the end (empty: the backend).

@@ -18,6 +18,7 @@ struct OperationCount {
 struct RemeshReport {
   OperationCount splits, collapses, swaps, smooths;
   double trial_seconds = 0;              ///< median over the trials; 0 where there were none
+  double best_refused_gain = 0;          ///< most that a split which was refused would have gained [J s^2]
   int bound_by_activation_distance = 0;  ///< surface edges not split because they are shorter than 2 dhat
 
   int accepted() const { return splits.accepted + collapses.accepted + swaps.accepted + smooths.accepted; }

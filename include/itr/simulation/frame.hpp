@@ -41,14 +41,17 @@ struct StepReport {
   /// gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
   double history_loss = 0;
   OperationCount splits, collapses, swaps, smooths;
-  int bound_by_dhat = 0;        ///< surface edges that were not split because the halves would be below dhat
-  int reverted_remeshes = 0;    ///< all of a step's operations were dropped, as the state on the new mesh failed
-  double trial_seconds = 0;     ///< median over the trials of these operations; 0 where there were none
-  int refined_quadrature = 0;   ///< cells with curved edges whose elastic energy has a finer quadrature
-  int cut_steps = 0;            ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
-  int damped_steps = 0;         ///< Newmark only: 1 if taken by implicit Euler, to keep energy from growing
-  double min_distance = 0;      ///< over contact pairs nearer than dhat; infinity where there are none [m]
-  double min_volume_ratio = 1;  ///< smallest J = det F over the cells
+  int bound_by_dhat = 0;          ///< surface edges that were not split because the halves would be below dhat
+  int reverted_remeshes = 0;      ///< all of a step's operations were dropped, as the state on the new mesh failed
+  double split_tolerance = 0;     ///< of this step [J]; 0: no remeshing
+  double best_refused_split = 0;  ///< largest gain of a refused split, where its patch was relaxed [J]
+  double residual_worth = 0;      ///< gain of one more Newton iteration at the end, by the quadratic model [J]
+  double trial_seconds = 0;       ///< median over the trials of these operations; 0 where there were none
+  int refined_quadrature = 0;     ///< cells with curved edges whose elastic energy has a finer quadrature
+  int cut_steps = 0;              ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
+  int damped_steps = 0;           ///< Newmark only: 1 if taken by implicit Euler, to keep energy from growing
+  double min_distance = 0;        ///< over contact pairs nearer than dhat; infinity where there are none [m]
+  double min_volume_ratio = 1;    ///< smallest J = det F over the cells
   StepSeconds seconds;
   double processor_seconds = 0;  ///< of the whole process, all threads, from begin to end of the step, without output
   double peak_rss_mb = 0;
@@ -66,6 +69,14 @@ struct NodalForces {
   VectorX contact, friction;
   VectorX reaction;  ///< of what holds a vertex in its prescribed directions; 0 elsewhere, and before the first step
   VectorX applied;   ///< of tractions, pressures and what the program adds; not of body forces
+  VectorX obstacle_contact, obstacle_friction;  ///< on the obstacles' vertices
+};
+
+/// What acts on a ForceTarget: on each line force (Dim numbers) [N] and moment (1 in 2D, 3 in 3D) [N m], of contact,
+/// friction, reactions, and all (with tractions, pressures and what the program adds).
+struct ForceCurvePoint {
+  std::string name;
+  std::array<std::vector<double>, 4> kinds;
 };
 
 /// Fields that a scene may ask for (FieldOptions); empty where it does not.
@@ -75,6 +86,7 @@ struct AskedFields {
   std::vector<double> stress;          ///< Cauchy stress, Dim x Dim a cell, row-major [Pa]
   std::vector<double> kinetic_energy;  ///< of all bodies, one number [J]
   std::vector<double> momentum;        ///< of all bodies, Dim numbers [kg m/s]
+  std::vector<ForceCurvePoint> curves;
 };
 
 /// The surface that touches in place of the bodies' boundary, see CollisionProxy. Null: there is none.

@@ -3,6 +3,8 @@
 
 #include <span>
 
+#include <array>
+
 #include "itr/simulation/simulation.hpp"
 
 namespace itr {
@@ -20,5 +22,14 @@ struct Resultant {
 /// momentum. Throws InputError if the setup does not ask for the four kinds of forces.
 template <int Dim>
 Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about);
+
+/// Sums of forces on the vertices of a target, by kind.
+template <int Dim>
+struct ForceSums {
+  Resultant<Dim> contact, friction, reaction, all;  ///< all: with tractions, pressures and the program's forces
+};
+/// Obstacles have contact and friction only: the forces of the bodies on them. Throws InputError as above.
+template <int Dim>
+ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target);
 
 }  // namespace itr

@@ -77,13 +77,31 @@ struct InitialCondition {
   SpaceTimeFunction<Dim> value;  ///< evaluated at t = 0
 };
 
+/// Vertices whose forces are summed: on surfaces, of bodies, or of obstacles. Each counts once.
+struct ForceTarget {
+  std::string name;
+  std::vector<int> surfaces;           ///< tags of boundary facets
+  std::vector<int> bodies;             ///< ids
+  std::vector<int> obstacle_vertices;  ///< indices into Obstacles::rest
+  std::array<double, 3> about{};       ///< point of moments [m]
+};
+
 /// Fields that observers get beside positions, velocities and elastic density. Others are not computed.
 struct FieldOptions {
   bool contact_forces = false, friction_forces = false, reaction_forces = false;
   bool von_mises = false, stress = false;
   bool kinetic_energy = false, momentum = false;
   bool applied_forces = false;
-  bool any_forces() const { return contact_forces || friction_forces || reaction_forces || applied_forces; }
+  std::vector<ForceTarget> curves;  ///< summed forces
+  bool any_forces() const {
+    return contact_forces || friction_forces || reaction_forces || applied_forces || !curves.empty();
+  }
+};
+
+/// Tolerances of remeshing that follow the energy stored so far, times RemeshOptions::relative_tolerance. The numbers of
+/// `remesh` are their upper bounds. Setup::choose_defaults sets it.
+struct FollowsStoredEnergy {
+  bool split = false, collapse = false, swap = false, smooth = false;
 };
 
 /// The part of a setup that does not depend on the mesh: materials, conditions, options.
@@ -101,6 +119,7 @@ struct StepSetup {
   ContactOptions contact;
   NewtonOptions newton;
   RemeshOptions remesh;
+  FollowsStoredEnergy follows_stored_energy;
   std::vector<DampingOptions> damping;  ///< Rayleigh damping; without effect in statics
   FieldOptions fields;
   bool lump_mass = false;
@@ -130,8 +149,9 @@ struct Setup : StepSetup<Dim> {
   LinearOptions linear;
 
   /// Fills in values that are left open and returns a sentence on each. A Simulation calls it.
-  /// - Barrier stiffness 0 becomes adaptive. With remeshing it becomes a tenth of the stiffest body's modulus [Pa] in the
-  ///   convergent form, and its equivalent in the plain form.
+  /// - Activation distance 0 becomes a thousandth of the thinnest body, less where edges are short or gaps narrow.
+  /// - Barrier stiffness 0 becomes a tenth of the stiffest body's modulus [Pa] in the convergent form, and its equivalent in
+  ///   the plain form, unless it is adaptive.
   /// - An open split tolerance becomes relative_tolerance times an energy of the scene (REMESHING.md).
   /// - Whoever chose the split tolerance, collapses may cost a hundredth of it, and swaps and moves that improve the shape a
   ///   millionth.

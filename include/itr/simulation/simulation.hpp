@@ -39,6 +39,7 @@ struct State {
   Strata<Dim> strata;           ///< of the mesh, once remeshing in 3D has found them
   linear::FactorRecord factor;  ///< factor that may serve the next step
   VectorX deviation;            ///< x - x-hat of the last step, where the next one begins [m]; empty before the first
+  double stored_energy = 0;     ///< largest elastic and contact energy at the end of a step so far [J]
   double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };
 
@@ -138,7 +139,7 @@ class Simulation {
     AskedFields asked;
   };
   FrameData frame_data(const State<Dim>& state, const NodalForces& forces) const;
-  void add_asked(const CellSet<Dim>& cells, FrameData& data) const;
+  void add_asked(const CellSet<Dim>& cells, const State<Dim>& state, FrameData& data) const;
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

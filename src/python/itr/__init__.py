@@ -366,6 +366,16 @@ class Simulation:
         """Elastic energy by rest volume of each cell (m,) [J/m^d]."""
         return self._simulation.elastic_density
 
+    @property
+    def von_mises(self) -> Array:
+        """(m,) [Pa]"""
+        return self._simulation.von_mises
+
+    @property
+    def stress(self) -> Array:
+        """(m, d * d): Cauchy's, row by row [Pa]"""
+        return self._simulation.stress
+
     def watch_forces(self, watched: bool = True) -> None:
         """Turns the computation of forces on or off, from the next step."""
         self._simulation.watch_forces(watched)
@@ -379,7 +389,7 @@ class Simulation:
     def resultant(
         self, boundaries: Union[str, Iterable[str]], about: Optional[Sequence[float]] = None
     ) -> tuple[Array, Array]:
-        """Sum of all kinds of forces [N] on one or more boundaries, and its moment [N m]. Forces must be watched."""
+        """Force [N] and moment [N m] of all kinds on boundaries, and of bodies on obstacles. Forces must be watched."""
         names = [boundaries] if isinstance(boundaries, str) else list(boundaries)
         return self._simulation.resultant(names, np.zeros(self.dimension) if about is None else about)
 

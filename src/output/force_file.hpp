@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// forces.csv: the sums that /output/forces asks for, a line a step and name.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "files.hpp"
+#include "itr/simulation/frame.hpp"
+
+namespace itr::output {
+
+constexpr const char* kForceFile = "forces.csv";
+
+class ForceFile {
+ public:
+  /// Keeps the lines of steps up to `last_step`; -1: none, and no file.
+  ForceFile(std::filesystem::path directory, int last_step);
+  /// Without curves: nothing, and no file.
+  void add(int step, double t, const std::vector<ForceCurvePoint>& curves);
+  /// Takes back the lines of the last step.
+  void drop_last();
+
+ private:
+  std::filesystem::path path_;
+  std::optional<LineFile> file_;
+  std::size_t size_before_ = 0;
+};
+
+/// forces.csv of a folder again, from what its frames have. Returns how many frames had forces. Throws InputError where none
+/// has.
+int rewrite_forces(const std::filesystem::path& directory);
+
+}  // namespace itr::output

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+#include "vtu_file.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "files.hpp"
+#include "frame_file.hpp"
+#include "itr/core/error.hpp"
+#include "itr/fem/quadratic.hpp"
+
+namespace itr::output {
+
+namespace {
+
+std::string base64(std::span<const unsigned char> bytes) {
+  constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    for (std::size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0u);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+template <typename T>
+std::string array(const char* name, const char* type, const std::vector<T>& values, int components) {
+  std::vector<unsigned char> bytes(sizeof(std::uint64_t) + values.size() * sizeof(T));
+  const std::uint64_t size = values.size() * sizeof(T);
+  std::memcpy(bytes.data(), &size, sizeof(size));
+  if (size > 0) std::memcpy(bytes.data() + sizeof(size), values.data(), size);
+  return fmt::format("<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"binary\">{}</DataArray>\n", type,
+                     name, components, base64(bytes));
+}
+
+/// Rows of Dim numbers as rows of 3.
+template <int Dim>
+std::vector<double> in_space(ConstVectorView values) {
+  std::vector<double> result;
+  result.reserve(values.size() / Dim * 3);
+  for (Eigen::Index i = 0; i < values.size(); i += Dim)
+    for (int c = 0; c < 3; ++c) result.push_back(c < Dim ? values[i + c] : 0);
+  return result;
+}
+
+std::vector<double> tensors_in_space(const std::vector<double>& values, int dim) {
+  std::vector<double> result;
+  for (std::size_t i = 0; i < values.size(); i += dim * dim)
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) result.push_back(r < dim && c < dim ? values[i + r * dim + c] : 0);
+  return result;
+}
+
+template <int Dim>
+std::string cells_text(const FrameView<Dim>& frame) {
+  constexpr int kTriangle = 5, kTetrahedron = 10, kCurvedTriangle = 22, kCurvedTetrahedron = 24;
+  const Mesh<Dim>& mesh = frame.mesh;
+  const bool is_quadratic = frame.space && is_all_curved(mesh, *frame.space);
+  const auto edges = [] {  // of a simplex, in VTK's order
+    if constexpr (Dim == 2)
+      return std::array<std::array<int, 2>, 3>{{{0, 1}, {1, 2}, {0, 2}}};
+    else
+      return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
+  }();
+  std::vector<std::int64_t> nodes, ends;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    const auto& cell = mesh.cell(c);
+    nodes.insert(nodes.end(), cell.begin(), cell.end());
+    if (is_quadratic)
+      for (const auto& [i, j] : edges) nodes.push_back(mesh.vertex_slots() + frame.space->find(cell[i], cell[j]));
+    ends.push_back(static_cast<std::int64_t>(nodes.size()));
+  }
+  const int linear = Dim == 2 ? kTriangle : kTetrahedron, curved = Dim == 2 ? kCurvedTriangle : kCurvedTetrahedron;
+  const std::vector<std::uint8_t> types(mesh.cell_slots(), static_cast<std::uint8_t>(is_quadratic ? curved : linear));
+  return "<Cells>\n" + array("connectivity", "Int64", nodes, 1) + array("offsets", "Int64", ends, 1) +
+         array("types", "UInt8", types, 1) + "</Cells>\n";
+}
+
+template <int Dim>
+VectorX displacement(const FrameView<Dim>& frame) {
+  const std::vector<Vec<Dim>> rest = node_rest_positions(frame.mesh, frame.space ? *frame.space : Space());
+  VectorX u = frame.x;
+  for (std::size_t v = 0; v < rest.size(); ++v) u.template segment<Dim>(Dim * static_cast<Eigen::Index>(v)) -= rest[v];
+  return u;
+}
+
+}  // namespace
+
+template <int Dim>
+void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step) {
+  const Mesh<Dim>& mesh = frame.mesh;
+  std::string points, cells;
+  const auto vectors = [&](const char* name, ConstVectorView values) {
+    if (values.size() > 0) points += array(name, "Float64", in_space<Dim>(values), 3);
+  };
+  vectors("u", displacement(frame));
+  vectors("v", frame.v);
+  std::vector<std::int64_t> body;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) body.push_back(mesh.body(c));
+  cells += array("body", "Int64", body, 1) + array("elastic_density", "Float64", frame.elastic_density, 1);
+  if (frame.asked) {
+    vectors("contact_force", frame.asked->forces.contact);
+    vectors("friction_force", frame.asked->forces.friction);
+    vectors("reaction_force", frame.asked->forces.reaction);
+    if (!frame.asked->von_mises.empty()) cells += array("von_mises", "Float64", frame.asked->von_mises, 1);
+    if (!frame.asked->stress.empty()) cells += array("stress", "Float64", tensors_in_space(frame.asked->stress, Dim), 9);
+  }
+  const std::string text = fmt::format(
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" "
+      "NumberOfCells=\"{}\">\n<Points>\n{}</Points>\n"
+      "{}<PointData>\n{}</PointData>\n<CellData>\n{}</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+      frame.x.size() / Dim, mesh.cell_slots(), array("Points", "Float64", in_space<Dim>(frame.x), 3), cells_text(frame),
+      points, cells);
+  std::error_code error;
+  std::filesystem::create_directories(directory / "vtu", error);
+  if (error)
+    throw InputError({(directory / "vtu").string(), "output folder", error.message(), "a folder that can be written"});
+  write_file(directory / "vtu" / fmt::format("{:06}.vtu", step), text);
+}
+
+void write_vtu_series(const std::filesystem::path& directory) {
+  std::string text = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n";
+  for (const auto& frame : stored_frames(directory)) {
+    const std::string name = fmt::format("vtu/{:06}.vtu", step_of_frame(frame));
+    if (std::filesystem::exists(directory / name))
+      text += fmt::format("<DataSet timestep=\"{}\" file=\"{}\"/>\n", read_frame_sizes(frame).t, name);
+  }
+  write_file(directory / "sim.pvd", text + "</Collection>\n</VTKFile>\n");
+}
+
+template void write_vtu(const std::filesystem::path&, const FrameView<2>&, int);
+template void write_vtu(const std::filesystem::path&, const FrameView<3>&, int);
+
+}  // namespace itr::output

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// The warnings of a run: in the line of the step that they belong to, so that --resume keeps them, and counted in
+// summary.json.
+#pragma once
+
+#include <filesystem>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace itr::output {
+
+/// The text without its numbers: what two warnings of one kind have in common.
+std::string kind_of_warning(std::string_view text);
+
+class WarningList {
+ public:
+  /// Passes over what was there before --resume.
+  void add(const std::string& text);
+  /// Those that the lines of a steps.jsonl have, into an empty list.
+  void restore(const std::filesystem::path& log);
+  int count() const { return count_; }
+  /// What has come since the last call, as a JSON list; empty: nothing.
+  std::string take_new();
+  /// `"warning_count":3,"warnings":[{"text":"the first of its kind","count":3}]`
+  std::string summary_members() const;
+
+ private:
+  struct Kind {
+    std::string kind, text;
+    int count = 0;
+  };
+  void count(const std::string& text);
+
+  std::vector<Kind> kinds_;
+  std::vector<std::string> new_;
+  std::set<std::string> stored_;
+  int count_ = 0;
+};
+
+}  // namespace itr::output

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include "itr/simulation/simulation.hpp"
+
+namespace itr {
+
+struct CellStress {
+  std::vector<double> von_mises;  ///< a cell [Pa]; in 2D of the plane stress, or strain, that the material says
+  std::vector<double> cauchy;     ///< Dim x Dim a cell, row-major [Pa]
+};
+
+/// Of the present state.
+template <int Dim>
+CellStress cell_stress(const Simulation<Dim>& simulation);
+
+extern template CellStress cell_stress(const Simulation<2>&);
+extern template CellStress cell_stress(const Simulation<3>&);
+
+}  // namespace itr

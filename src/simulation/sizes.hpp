@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// How large and how thick bodies are, and how finely they are cut.
+#pragma once
+
+#include <map>
+
+#include "itr/mesh/mesh.hpp"
+
+namespace itr {
+
+struct BodySize {
+  double volume = 0, surface = 0;  ///< [m^Dim], [m^(Dim-1)]
+  double thickness = 0;            ///< 2 volume / surface: of a plate that, of a ball a third of its diameter [m]
+  double diagonal = 0;             ///< of its box [m]
+  double mean_edge = 0;            ///< of a cell of mean volume [m]
+};
+
+/// By id, at rest.
+template <int Dim>
+std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh);
+
+}  // namespace itr

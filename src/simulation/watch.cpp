@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+#include "watch.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "itr/geometry/bvh.hpp"
+#include "itr/simulation/step_problem.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kMostRotation = 5;     ///< of linear elasticity [degrees]: strains are off by 4e-3 there
+constexpr double kForceError = 0.01;    ///< relative, from which it is said
+constexpr int kLooseSteps = 3;          ///< in a row
+constexpr double kResidualShare = 0.1;  ///< of the split tolerance, from which a residual hides what splits gain
+
+/// Of the rotation that is nearest to F [degrees].
+double rotation_angle(const Mat<2>& F) {
+  return std::abs(std::atan2(F(1, 0) - F(0, 1), F(0, 0) + F(1, 1))) * 180 / std::numbers::pi;
+}
+double rotation_angle(const Mat<3>& F) {
+  const Eigen::JacobiSVD<Mat<3>> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double cosine = ((svd.matrixU() * svd.matrixV().transpose()).trace() - 1) / 2;
+  return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+}  // namespace
+
+template <int Dim>
+void Watch<Dim>::look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger) {
+  if (!has_said_rotation_) find_rotation(setup, state, logger);
+  if (!has_said_remeshing_) find_starved_remeshing(setup, report, logger);
+  if (!has_said_forces_) find_loose_forces(setup, state, report, logger);
+}
+
+template <int Dim>
+void Watch<Dim>::find_rotation(const Setup<Dim>& setup, const State<Dim>& state, const Logger& logger) {
+  const auto is_linear = [](const auto& entry) { return entry.second.law == MaterialLaw::linear; };
+  if (std::none_of(setup.materials.begin(), setup.materials.end(), is_linear)) return;
+  const Mesh<Dim>& mesh = state.mesh;
+  double most = 0;
+  int body = 0;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c) || setup.materials.at(mesh.body(c)).law != MaterialLaw::linear) continue;
+    const typename CellSet<Dim>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
+    const double angle = rotation_angle(deformation_gradient<Dim>(element, state.history.x[0]));
+    if (angle > most) most = angle, body = mesh.body(c);
+  }
+  if (most <= kMostRotation) return;
+  has_said_rotation_ = true;
+  logger.warning(
+      fmt::format("step {}: body {} is linear elastic and turns by {:.3g} degrees: rotations stretch it; NeoHookean or "
+                  "SaintVenant do not mind them",
+                  state.step, body, most));
+}
+
+template <int Dim>
+void Watch<Dim>::find_starved_remeshing(const Setup<Dim>& setup, const StepReport& report, const Logger& logger) {
+  if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled) return;
+  if (!(report.residual_worth > kResidualShare * report.split_tolerance)) return;
+  has_said_remeshing_ = true;
+  logger.warning(
+      fmt::format("step {}: Newton ended where one more iteration would gain {:.2g} J, and a split is made for {:.2g} J: "
+                  "refinement sees the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these "
+                  "tolerances",
+                  report.step, report.residual_worth, report.split_tolerance));
+}
+
+/// A residual that is worth a part e of the energy stands for forces off by about sqrt(e). A first touch is passed over.
+template <int Dim>
+void Watch<Dim>::find_loose_forces(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report,
+                                   const Logger& logger) {
+  const double energy = std::max(state.stored_energy, report.energy.inertia);
+  const double error = std::sqrt(report.residual_worth / energy);
+  loose_steps_ = energy > 0 && error > kForceError ? loose_steps_ + 1 : 0;
+  if (loose_steps_ < kLooseSteps && !(loose_steps_ > 0 && state.step >= setup.time.steps)) return;
+  has_said_forces_ = true;
+  logger.warning(fmt::format(
+      "step {}: Newton ended where one more iteration would gain {:.2g} J of {:.2g} J: forces may be off by about "
+      "{:.2g} %; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
+      report.step, report.residual_worth, energy, 100 * error));
+}
+
+template <int Dim>
+std::string find_jump(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const VectorX& before,
+                      const VectorX& x) {
+  Box<Dim> box;
+  for (Eigen::Index i = 0; i + Dim <= before.size(); i += Dim) box.include(Vec<Dim>(before.template segment<Dim>(i)));
+  const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
+  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0, space).held;
+  double limit = (box.max - box.min).norm(), most = 0;
+  Eigen::Index where = 0;
+  for (Eigen::Index i = 0; i + Dim <= x.size(); i += Dim) {
+    const double way = (x.template segment<Dim>(i) - before.template segment<Dim>(i)).norm();
+    const bool is_held = i >= bodies || (i < static_cast<Eigen::Index>(held.size()) && held[i]);
+    if (is_held) limit = std::max(limit, way);
+    if (way > most) most = way, where = i;
+  }
+  if (!(most > limit)) return {};
+  std::string place;
+  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.3g}", c ? ", " : "", before[where + c]);
+  return fmt::format(
+      "the body at ({}) jumps by {:.3g} m, further than the scene is wide ({:.3g} m): neither inertia nor a "
+      "held vertex nor contact holds it; hold it, add friction or leave /time/quasistatic out "
+      "(/time/allow_jumps = true lets it go)",
+      place, most, limit);
+}
+
+#define ITR_INSTANTIATE(Dim) \
+  template class Watch<Dim>; \
+  template std::string find_jump<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const VectorX&, const VectorX&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// What the end of a step says against the model or its tolerances. Each is said once.
+#pragma once
+
+#include "itr/simulation/simulation.hpp"
+
+namespace itr {
+
+template <int Dim>
+class Watch {
+ public:
+  void look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger);
+
+ private:
+  void find_rotation(const Setup<Dim>& setup, const State<Dim>& state, const Logger& logger);
+  void find_starved_remeshing(const Setup<Dim>& setup, const StepReport& report, const Logger& logger);
+  void find_loose_forces(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger);
+
+  bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false;
+  int loose_steps_ = 0;  ///< in a row
+};
+
+/// What moves in a step from `before` to `x` by more than the scene and all that is prescribed: where, and how far. Empty:
+/// nothing does.
+template <int Dim>
+std::string find_jump(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const VectorX& before,
+                      const VectorX& x);
+
+}  // namespace itr
