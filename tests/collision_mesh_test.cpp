@@ -106,6 +106,7 @@ VectorX after_steps(Setup<Dim> setup, int steps) {
 template <int Dim>
 void expect_boundary_is_its_proxy() {
   Setup<Dim> plain = sliding_block<Dim>(3);
+  plain.newton.step_tolerance /= 1000;  // pairs come in another order, and so may Newton's way
   Setup<Dim> damped = plain;
   damped.damping.push_back({DampingOptions::Term::contact, 1e-3, 2});
   Setup<Dim> adaptive = plain;

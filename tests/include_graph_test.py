@@ -46,7 +46,7 @@ SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp"}
 
 # Third-party header -> the modules that may know it.
 WALLS = {
-    r"nlohmann/": {"scene", "cli", "embed"},
+    r"nlohmann/": {"scene", "output", "cli", "embed"},
     r"CGAL/": {"geometry"},
     r"(oneapi/)?tbb/": {"core"},
     r"hdf5\.h|H5": {"core"},

@@ -186,6 +186,9 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
                                                      "seconds",
                                                      "processor_seconds",
                                                      "peak_rss_mb",
+                                                     "residual_worth",
+                                                     "split_tolerance",
+                                                     "best_refused_split",
                                                      "trial_seconds"}));
   EXPECT_EQ(keys_of(line["energy"]),
             (std::vector<std::string>{"inertia", "elastic", "body", "contact", "friction", "total"}));

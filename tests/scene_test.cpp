@@ -577,7 +577,7 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
                 .expected.find("1, 2, 3, 4"),
             std::string::npos);
 
-  const std::array<std::pair<const char*, const char*>, 14> warnings = {{
+  const std::array<std::pair<const char*, const char*>, 13> warnings = {{
       {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 3, "value": [0, 1]}]}})",
        "3 is a surface of a body, which this does not move"},
       {R"({"contact": {"enabled": false}})", "/contact/enabled: not true"},
@@ -588,9 +588,6 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
       {R"({"boundary_conditions": {"rhs": [0, 9.81, 0]}})", "/boundary_conditions/rhs: [0,9.81,0] has more components"},
       {R"({"boundary_conditions": {"dirichlet_boundary": [{"id": 1, "value": [0, 0], "dimension": [true, true, true]}]}})",
        "dimension: [true,true,true] has more components"},
-      {R"({"boundary_conditions": {"dirichlet_boundary": [{"id": 1, "value": [0, 0]}],
-                                   "neumann_boundary": [{"id": 1, "value": [0, 1]}]}})",
-       "neumann_boundary/0: all vertices of the surface 1 are held"},
       {R"({"time": {"quasistatic": true}, "initial_conditions": {"velocity": [{"id": 1, "value": [1, 0]}]}})",
        "/initial_conditions/velocity: without inertia"},
       {R"({"initial_conditions": {"acceleration": "consistent"}})", "only ImplicitNewmark begins with an acceleration"},

@@ -120,10 +120,22 @@ TEST_F(WarningsTest, SmallerTolerancesGiveNoLargerErrors) {
     ASSERT_EQ(said.status, 0) << said.text;
     const double error = std::abs(force() / reference - 1);
     EXPECT_LE(error, larger + 2e-3) << tolerance;
-    if (error > 0.02) EXPECT_TRUE(said.has("Newton ended where one more iteration would gain")) << tolerance << said.text;
+    if (error > 0.02) {
+      EXPECT_TRUE(said.has("Newton ended where one more iteration would gain")) << tolerance << said.text;
+    }
     larger = error;
   }
   EXPECT_LT(larger, 0.02);
+}
+
+TEST_F(WarningsTest, LoadOnWhatIsHeld) {
+  const std::string both =
+      "--set '/boundary_conditions/dirichlet_boundary=[{\"id\": 1, \"value\": [0, 0]}]' "
+      "--set '/boundary_conditions/neumann_boundary=[{\"id\": 1, \"value\": [0, 1]}]'";
+  const std::string scene = "explain " ITR_SOURCE_DIR "/examples/cantilever.json ";
+  EXPECT_TRUE(itr(scene + both).has("a load acts on the surface 1, of which all vertices are held"))
+      << itr(scene + both).text;
+  EXPECT_FALSE(itr(scene).has("a load acts on"));
 }
 
 /// Without remeshing forces are what is off.

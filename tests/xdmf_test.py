@@ -114,11 +114,14 @@ def check_vtu(directory, frames):
         mesh = meshio.read(directory / entry.get("file"))
         with h5py.File(frame) as file:
             assert float(entry.get("timestep")) == file.attrs["t"]
-            x = file["fields/x"][()]
+            drawn = file["drawn" if "drawn" in file else "fields"]
+            x = drawn["x"][()]
             dim = x.shape[1]
             assert numpy.array_equal(mesh.points[:, :dim], x) and not mesh.points[:, dim:].any()
-            assert numpy.array_equal(mesh.cells_dict[CELLS[dim]], file["mesh/simplices"][()])
-            assert numpy.array_equal(mesh.point_data["u"][:, :dim], file["fields/u"][()])
+            kind = QUADRATIC[dim] if "curved_edges" in file["mesh"] else CELLS[dim]
+            cells = file["mesh/quadratic_cells" if "curved_edges" in file["mesh"] else "mesh/simplices"][()]
+            assert numpy.array_equal(mesh.cells_dict[kind], cells)
+            assert numpy.array_equal(mesh.point_data["u"][:, :dim], drawn["u"][()])
             assert numpy.array_equal(mesh.cell_data["von_mises"][0].ravel(), file["fields/von_mises"][()])
             stress = mesh.cell_data["stress"][0].reshape(-1, 3, 3)[:, :dim, :dim]
             assert numpy.array_equal(stress.ravel(), file["fields/stress"][()].ravel())

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "itr/geometry/ccd.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,7 +17,9 @@ constexpr double kCloseEnough = 0.1;     ///< of the gap: nearer to it than this
 constexpr double kSafe = 0.9;            ///< part of what is safe that a step covers
 constexpr int kPassingIterations = 100;  ///< what takes longer to pass by counts as a collision
 constexpr double kLeastPassing = 1e-14;  ///< of the largest coordinate: nearer than this, round-off could decide
+constexpr int kMostHalvings = 6;         ///< of the time left, when pairs are asked whether they stay apart over it
 constexpr double kRoundOff = 1e-15;      ///< of places by the largest coordinate, of rates by the speed
+constexpr double kProductRoundOff = 64 * std::numeric_limits<double>::epsilon();  ///< of areas and volumes
 
 /// Two convex primitives that move: of `first` vertices and the rest.
 template <int Dim>
@@ -82,14 +85,71 @@ AlongDirection along(const MovingPair<Dim>& pair, const std::array<Vec<Dim>, 4>&
   return result;
 }
 
+/// A vector between two points of a pair.
+template <int Dim>
+struct MovingVector {
+  MovingVector(const MovingPair<Dim>& pair, int from, int to)
+      : start(pair.start[to] - pair.start[from]),
+        motion(pair.motion[to] - pair.motion[from]),
+        longest(start.norm() + motion.norm()) {}
+  Vec<Dim> operator()(double t) const { return start + t * motion; }
+  Vec<Dim> start, motion;
+  double longest;  ///< bound of its length, which its round-off is relative to
+};
+
+/// Whether all coefficients of a polynomial in Bernstein's form, and so its values, are beyond `least` on one side of 0.
+template <std::size_t N>
+bool keeps_sign(const std::array<double, N>& coefficients, double least) {
+  const auto [low, high] = std::minmax_element(coefficients.begin(), coefficients.end());
+  return *low > least || *high < -least;
+}
+
+/// Whether the line through the edge stays `gap` from the vertex over [t, s], by the area that they span.
+bool stays_apart(const MovingPair<2>& pair, double t, double s, double gap) {
+  const auto cross = [](const Vec<2>& a, const Vec<2>& b) { return a[0] * b[1] - a[1] * b[0]; };
+  const MovingVector<2> e(pair, 1, 2), r(pair, 1, 0);
+  const Vec<2> e0 = e(t), e1 = e(s), r0 = r(t), r1 = r(s);
+  const std::array<double, 3> area{cross(e0, r0), (cross(e0, r1) + cross(e1, r0)) / 2, cross(e1, r1)};
+  const double length = std::sqrt(std::max(e0.squaredNorm(), e1.squaredNorm()));
+  return keeps_sign(area, length * gap + kProductRoundOff * e.longest * r.longest);
+}
+
+/// Whether the plane through the face stays `gap` from the vertex over [t, s], or that along one edge from the other edge,
+/// by the volume (u x v) . w that they span.
+bool stays_apart(const MovingPair<3>& pair, double t, double s, double gap) {
+  if (pair.kind == PairKind::edge_vertex) return false;
+  const bool is_face = pair.kind == PairKind::face_vertex;
+  const MovingVector<3> u = is_face ? MovingVector<3>(pair, 1, 2) : MovingVector<3>(pair, 0, 1);
+  const MovingVector<3> v = is_face ? MovingVector<3>(pair, 1, 3) : MovingVector<3>(pair, 2, 3);
+  const MovingVector<3> w = is_face ? MovingVector<3>(pair, 1, 0) : MovingVector<3>(pair, 0, 2);
+  const Vec<3> u0 = u(t), u1 = u(s), v0 = v(t), v1 = v(s), w0 = w(t), w1 = w(s);
+  const std::array<Vec<3>, 3> normal{u0.cross(v0), (u0.cross(v1) + u1.cross(v0)) / 2, u1.cross(v1)};
+  const std::array<double, 4> volume{normal[0].dot(w0), (normal[0].dot(w1) + 2 * normal[1].dot(w0)) / 3,
+                                     (2 * normal[1].dot(w1) + normal[2].dot(w0)) / 3, normal[2].dot(w1)};
+  const double area = std::sqrt(std::max({normal[0].squaredNorm(), normal[1].squaredNorm(), normal[2].squaredNorm()}));
+  return keeps_sign(volume, area * gap + kProductRoundOff * u.longest * v.longest * w.longest);
+}
+
+/// The longest of the intervals [t, 1], [t, (1 + t) / 2], ... over which the pair stays apart by its lines or planes; 0
+/// where they are no longer than `least`.
+template <int Dim>
+double time_apart(const MovingPair<Dim>& pair, double gap, double t, double& reach, double least) {
+  double interval = std::min(1 - t, reach), found = 0;
+  for (int k = 0; k < kMostHalvings && found == 0 && interval > least; ++k, interval /= 2)
+    if (stays_apart(pair, t, t + interval, gap)) found = interval;
+  reach = 8 * interval;
+  return found;
+}
+
 /// Conservative advancement: each step covers nine tenths of the time for which the primitives stay apart along the
 /// direction in which they are nearest (Mirtich 1996), and, `by_speed`, no less of what their speed allows. What they are
 /// apart along a line is never more than their distance, whatever the line: without `by_speed` round-off in distances, which
 /// is large where primitives are slivers, misses nothing. `t` goes on from where the distance is above `gap` to where it
-/// hardly is, or to 1 where it stays above.
+/// hardly is, or to 1 where it stays above. By speed, pairs that slide and turn at a small gap would creep: there a longer
+/// step is one over which their lines or planes stay apart.
 template <int Dim>
 double advance(const MovingPair<Dim>& pair, const Sizes& sizes, double gap, bool by_speed, double t, int iterations) {
-  double step = 0;
+  double step = 0, reach = 1;
   for (int i = 0; i < iterations; ++i) {
     const auto x = pair.at(t);
     const Vec<Dim> separation = pair.separation(x);
@@ -99,6 +159,8 @@ double advance(const MovingPair<Dim>& pair, const Sizes& sizes, double gap, bool
     const AlongDirection free = along<Dim>(pair, x, separation / now, gap, sizes);
     if (!(free.apart > gap) && !by_speed) return t;
     step = kSafe * std::max(by_speed ? (now - gap) / sizes.speed : 0.0, free.apart > gap ? free.safe_time : 0.0);
+    if (t + step >= 1) return 1;
+    if (by_speed) step = std::max(step, time_apart(pair, gap + kRoundOff * sizes.farthest, t, reach, 2 * step));
     t += step;
     if (t >= 1) return 1;
   }

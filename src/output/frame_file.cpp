@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string>
 
+#include "drawn_cells.hpp"
 #include "itr/core/check.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
@@ -60,41 +61,6 @@ void write_index_rows(hdf5::File& file, const std::string& name, const std::vect
   file.write(name, flat, N);
 }
 
-/// Edges of a simplex as XDMF and VTK order the nodes on them.
-template <int Dim>
-constexpr auto drawn_edges() {
-  if constexpr (Dim == 2)
-    return std::array<std::array<int, 2>, 3>{{{0, 1}, {1, 2}, {0, 2}}};
-  else
-    return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
-}
-
-/// Cells as XDMF draws them, each with a node at each of its edges: where only some edges are curved the straight ones get
-/// nodes too, that only the drawing has.
-template <int Dim>
-struct DrawnCells {
-  std::vector<EdgeKey> straight_edges;
-  Integers cells;  ///< rows of nodes
-};
-
-template <int Dim>
-DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh, const Space& space) {
-  DrawnCells<Dim> drawn;
-  for (const EdgeKey& edge : mesh.edges())
-    if (space.find(edge[0], edge[1]) == kNone) drawn.straight_edges.push_back(edge);
-  const Space straight(drawn.straight_edges);
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    const auto& cell = mesh.cell(c);
-    drawn.cells.insert(drawn.cells.end(), cell.begin(), cell.end());
-    for (const auto& [i, j] : drawn_edges<Dim>()) {
-      const int curved = space.find(cell[i], cell[j]);
-      drawn.cells.push_back(curved != kNone ? mesh.vertex_slots() + curved
-                                            : num_nodes(mesh, space) + straight.find(cell[i], cell[j]));
-    }
-  }
-  return drawn;
-}
-
 /// The curved edges, and the cells as XDMF draws them; where only some edges are curved with nodal fields of their own,
 /// since those of /fields have no rows for straight edges.
 template <int Dim>
@@ -105,12 +71,7 @@ void write_space(hdf5::File& file, const FrameView<Dim>& frame, const Space& spa
   file.write("/mesh/quadratic_cells", drawn.cells, kQuadraticNodes<Dim>);
   if (drawn.straight_edges.empty()) return;
   const auto write = [&](const char* name, ConstVectorView field, const char* unit) {
-    VectorX values(field.size() + Dim * static_cast<Eigen::Index>(drawn.straight_edges.size()));
-    values.head(field.size()) = field;
-    for (Eigen::Index i = field.size(); const auto& [a, b] : drawn.straight_edges) {
-      values.segment<Dim>(i) = (field.segment<Dim>(Dim * a) + field.segment<Dim>(Dim * b)) / 2;
-      i += Dim;
-    }
+    const VectorX values = drawn.at_nodes(field);
     write_values(file, name, as_span(values), Dim, unit);
   };
   write("/drawn/x", frame.x, "m");

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <span>
 
+#include "drawn_cells.hpp"
 #include "files.hpp"
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
@@ -59,26 +60,16 @@ std::vector<double> tensors_in_space(const std::vector<double>& values, int dim)
 }
 
 template <int Dim>
-std::string cells_text(const FrameView<Dim>& frame) {
+std::string cells_text(const Mesh<Dim>& mesh, const DrawnCells<Dim>* drawn) {
   constexpr int kTriangle = 5, kTetrahedron = 10, kCurvedTriangle = 22, kCurvedTetrahedron = 24;
-  const Mesh<Dim>& mesh = frame.mesh;
-  const bool is_quadratic = frame.space && is_all_curved(mesh, *frame.space);
-  const auto edges = [] {  // of a simplex, in VTK's order
-    if constexpr (Dim == 2)
-      return std::array<std::array<int, 2>, 3>{{{0, 1}, {1, 2}, {0, 2}}};
-    else
-      return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
-  }();
-  std::vector<std::int64_t> nodes, ends;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    const auto& cell = mesh.cell(c);
-    nodes.insert(nodes.end(), cell.begin(), cell.end());
-    if (is_quadratic)
-      for (const auto& [i, j] : edges) nodes.push_back(mesh.vertex_slots() + frame.space->find(cell[i], cell[j]));
-    ends.push_back(static_cast<std::int64_t>(nodes.size()));
-  }
   const int linear = Dim == 2 ? kTriangle : kTetrahedron, curved = Dim == 2 ? kCurvedTriangle : kCurvedTetrahedron;
-  const std::vector<std::uint8_t> types(mesh.cell_slots(), static_cast<std::uint8_t>(is_quadratic ? curved : linear));
+  std::vector<std::int64_t> nodes, ends;
+  if (drawn) nodes = drawn->cells;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!drawn) nodes.insert(nodes.end(), mesh.cell(c).begin(), mesh.cell(c).end());
+    ends.push_back(drawn ? kQuadraticNodes<Dim> * (c + 1) : static_cast<std::int64_t>(nodes.size()));
+  }
+  const std::vector<std::uint8_t> types(mesh.cell_slots(), static_cast<std::uint8_t>(drawn ? curved : linear));
   return "<Cells>\n" + array("connectivity", "Int64", nodes, 1) + array("offsets", "Int64", ends, 1) +
          array("types", "UInt8", types, 1) + "</Cells>\n";
 }
@@ -97,8 +88,18 @@ template <int Dim>
 void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step) {
   const Mesh<Dim>& mesh = frame.mesh;
   std::string points, cells;
+  const bool is_curved = frame.space && !frame.space->is_linear();
+  const DrawnCells<Dim> drawn = is_curved ? draw_cells(mesh, *frame.space) : DrawnCells<Dim>();
+  const VectorX x = drawn.at_nodes(frame.x);
   const auto vectors = [&](const char* name, ConstVectorView values) {
-    if (values.size() > 0) points += array(name, "Float64", in_space<Dim>(values), 3);
+    if (values.size() > 0) points += array(name, "Float64", in_space<Dim>(drawn.at_nodes(values)), 3);
+  };
+  /// Forces belong to nodes: there are none on straight edges.
+  const auto forces = [&](const char* name, ConstVectorView values) {
+    if (values.size() == 0) return;
+    VectorX all = VectorX::Zero(x.size());
+    all.head(values.size()) = values;
+    points += array(name, "Float64", in_space<Dim>(all), 3);
   };
   vectors("u", displacement(frame));
   vectors("v", frame.v);
@@ -106,9 +107,9 @@ void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& fra
   for (CellId c = 0; c < mesh.cell_slots(); ++c) body.push_back(mesh.body(c));
   cells += array("body", "Int64", body, 1) + array("elastic_density", "Float64", frame.elastic_density, 1);
   if (frame.asked) {
-    vectors("contact_force", frame.asked->forces.contact);
-    vectors("friction_force", frame.asked->forces.friction);
-    vectors("reaction_force", frame.asked->forces.reaction);
+    forces("contact_force", frame.asked->forces.contact);
+    forces("friction_force", frame.asked->forces.friction);
+    forces("reaction_force", frame.asked->forces.reaction);
     if (!frame.asked->von_mises.empty()) cells += array("von_mises", "Float64", frame.asked->von_mises, 1);
     if (!frame.asked->stress.empty()) cells += array("stress", "Float64", tensors_in_space(frame.asked->stress, Dim), 9);
   }
@@ -117,8 +118,8 @@ void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& fra
       "header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" "
       "NumberOfCells=\"{}\">\n<Points>\n{}</Points>\n"
       "{}<PointData>\n{}</PointData>\n<CellData>\n{}</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
-      frame.x.size() / Dim, mesh.cell_slots(), array("Points", "Float64", in_space<Dim>(frame.x), 3), cells_text(frame),
-      points, cells);
+      x.size() / Dim, mesh.cell_slots(), array("Points", "Float64", in_space<Dim>(x), 3),
+      cells_text(mesh, is_curved ? &drawn : nullptr), points, cells);
   std::error_code error;
   std::filesystem::create_directories(directory / "vtu", error);
   if (error)

@@ -2,6 +2,7 @@
 #include "warnings.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -63,10 +64,10 @@ void WarningList::restore(const std::filesystem::path& log) {
 }
 
 std::string WarningList::take_new() {
-  std::string list;
-  for (const std::string& text : new_) list += (list.empty() ? "" : ",") + json_string(text);
+  std::vector<std::string> strings;
+  for (const std::string& text : new_) strings.push_back(json_string(text));
   new_.clear();
-  return list.empty() ? "" : "[" + list + "]";
+  return strings.empty() ? std::string() : fmt::format("[{}]", fmt::join(strings, ","));
 }
 
 std::string WarningList::summary_members() const {

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "function.hpp"
-#include "itr/simulation/step_problem.hpp"
 #include "selection.hpp"
 
 namespace itr::scene {
@@ -30,7 +29,6 @@ class ConditionReader {
     read_dirichlet();
     read_neumann();
     read_pressure();
-    warn_of_held_loads();
     read_motions(geometry);
     setup_.obstacles = std::move(geometry.obstacles);
     setup_.initial_displacement = read_initial("solution");
@@ -82,7 +80,6 @@ class ConditionReader {
         check_defined<Dim>(value.function, vertices_with(tag), times(), node["value"]);
         if (value.is_zero) continue;
         setup_.neumann.push_back({tag, value.function});
-        loads_.emplace_back(tag, node);
       }
     }
   }
@@ -98,25 +95,7 @@ class ConditionReader {
         check_defined<Dim>(as_vector, vertices_with(tag), times(), node["value"]);
         if (value.is_zero) continue;
         setup_.pressure.push_back({tag, value.function});
-        loads_.emplace_back(tag, node);
       }
-    }
-  }
-
-  /// A load on vertices that are held in all directions changes their reactions only.
-  void warn_of_held_loads() {
-    if (setup_.dirichlet.empty()) return;
-    const Mesh<Dim>& mesh = setup_.mesh;
-    const std::vector<char> held = held_dofs(setup_, mesh, setup_.time.t0 + setup_.time.dt).held;
-    for (const auto& [tag, node] : loads_) {
-      bool is_free = false;
-      for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-        if (mesh.facet_tag(f) == tag)
-          for (const int v : mesh.facet(f))
-            for (int c = 0; c < Dim; ++c) is_free = is_free || !held[Dim * v + c];
-      if (!is_free)
-        warnings_.push_back(node.pointer() + ": all vertices of the surface " + std::to_string(tag) +
-                            " are held: the load moves nothing");
     }
   }
 
@@ -276,7 +255,6 @@ class ConditionReader {
   Setup<Dim>& setup_;
   std::vector<std::string>& warnings_;
   std::set<int> facet_tags_, point_tags_, bodies_, obstacle_ids_;
-  std::vector<std::pair<int, Node>> loads_;  ///< by tag
 };
 
 }  // namespace

@@ -164,6 +164,25 @@ std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   return {bodies, static_cast<int>(loose.size())};
 }
 
+/// A load on vertices that are held in all directions changes their reactions only.
+template <int Dim>
+void find_held_loads(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  std::set<int> tags;
+  for (const auto& load : setup.neumann) tags.insert(load.tag);
+  for (const auto& load : setup.pressure) tags.insert(load.tag);
+  if (tags.empty() || setup.dirichlet.empty()) return;
+  std::set<int> free_tags;
+  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    for (const int v : mesh.facet(f))
+      for (int c = 0; c < Dim; ++c)
+        if (!held[Dim * v + c]) free_tags.insert(mesh.facet_tag(f));
+  for (const int tag : tags)
+    if (!free_tags.contains(tag))
+      found.push_back(fmt::format("a load acts on the surface {}, of which all vertices are held: it moves nothing", tag));
+}
+
 template <int Dim>
 void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found) {
   if (!setup.time.is_static && !setup.time.quasistatic) return;
@@ -348,6 +367,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_hard_meshes(setup, figures, found);
   find_wrong_gravity(setup, figures, found);
   find_held(setup, found);
+  find_held_loads(setup, found);
   find_odd_stiffness(setup, found);
   find_loose_bodies(setup, found);
   find_locking(setup, found);

@@ -188,7 +188,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   if (!remesh.enabled) return words;
   if (!remesh.split.min_edge_length) remesh.split.min_edge_length = kLeastSplitEdge * rest_diagonal(mesh);
   if (!remesh.split.acceptance_tolerance) words.push_back(choose_split_tolerance(*this, remesh));
-  choose_other_tolerances(remesh, follows_stored_energy);
+  choose_other_tolerances(remesh, this->follows_stored_energy);
   return words;
 }
 

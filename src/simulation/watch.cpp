@@ -18,7 +18,17 @@ namespace {
 constexpr double kMostRotation = 5;     ///< of linear elasticity [degrees]: strains are off by 4e-3 there
 constexpr double kForceError = 0.01;    ///< relative, from which it is said
 constexpr int kLooseSteps = 3;          ///< in a row
+constexpr double kNoStrain = 1e-6;      ///< below it the energy of bodies is taken for none
 constexpr double kResidualShare = 0.1;  ///< of the split tolerance, from which a residual hides what splits gain
+
+/// Energy of the bodies by the square of a strain that is everywhere, sum(E V) [J].
+template <int Dim>
+double stiffness(const Setup<Dim>& setup) {
+  double sum = 0;
+  for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
+    if (setup.mesh.is_cell_alive(c)) sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
+  return sum;
+}
 
 /// Of the rotation that is nearest to F [degrees].
 double rotation_angle(const Mat<2>& F) {
@@ -72,13 +82,14 @@ void Watch<Dim>::find_starved_remeshing(const Setup<Dim>& setup, const StepRepor
                   report.step, report.residual_worth, report.split_tolerance));
 }
 
-/// A residual that is worth a part e of the energy stands for forces off by about sqrt(e). A first touch is passed over.
+/// A residual that is worth a part e of the energy stands for forces off by about sqrt(e). A first touch is passed over, and
+/// energies that are nothing beside those of strains of a millionth.
 template <int Dim>
 void Watch<Dim>::find_loose_forces(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report,
                                    const Logger& logger) {
   const double energy = std::max(state.stored_energy, report.energy.inertia);
   const double error = std::sqrt(report.residual_worth / energy);
-  loose_steps_ = energy > 0 && error > kForceError ? loose_steps_ + 1 : 0;
+  loose_steps_ = energy > kNoStrain * kNoStrain * stiffness(setup) && error > kForceError ? loose_steps_ + 1 : 0;
   if (loose_steps_ < kLooseSteps && !(loose_steps_ > 0 && state.step >= setup.time.steps)) return;
   has_said_forces_ = true;
   logger.warning(fmt::format(

@@ -92,7 +92,7 @@ struct FieldOptions {
   bool von_mises = false, stress = false;
   bool kinetic_energy = false, momentum = false;
   bool applied_forces = false;
-  std::vector<ForceTarget> curves;  ///< summed forces
+  std::vector<ForceTarget> curves{};  ///< summed forces
   bool any_forces() const {
     return contact_forces || friction_forces || reaction_forces || applied_forces || !curves.empty();
   }

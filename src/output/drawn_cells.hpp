@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// Cells with curved edges as XDMF and VTK draw them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "itr/fem/space.hpp"
+#include "itr/mesh/mesh.hpp"
+
+namespace itr::output {
+
+/// Edges of a simplex as XDMF and VTK order the nodes on them.
+template <int Dim>
+constexpr auto drawn_edges() {
+  if constexpr (Dim == 2)
+    return std::array<std::array<int, 2>, 3>{{{0, 1}, {1, 2}, {0, 2}}};
+  else
+    return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
+}
+
+/// Cells as XDMF and VTK draw them, each with a node at each of its edges: where only some edges are curved the straight ones get
+/// nodes too, that only the drawing has.
+template <int Dim>
+struct DrawnCells {
+  std::vector<EdgeKey> straight_edges;
+  std::vector<std::int64_t> cells;  ///< rows of nodes
+
+  /// A field with its values on the straight edges.
+  VectorX at_nodes(ConstVectorView field) const {
+    VectorX values(field.size() + Dim * static_cast<Eigen::Index>(straight_edges.size()));
+    values.head(field.size()) = field;
+    for (Eigen::Index i = field.size(); const auto& [a, b] : straight_edges) {
+      values.template segment<Dim>(i) = (field.template segment<Dim>(Dim * a) + field.template segment<Dim>(Dim * b)) / 2;
+      i += Dim;
+    }
+    return values;
+  }
+};
+
+template <int Dim>
+DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh, const Space& space) {
+  DrawnCells<Dim> drawn;
+  for (const EdgeKey& edge : mesh.edges())
+    if (space.find(edge[0], edge[1]) == kNone) drawn.straight_edges.push_back(edge);
+  const Space straight(drawn.straight_edges);
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    const auto& cell = mesh.cell(c);
+    drawn.cells.insert(drawn.cells.end(), cell.begin(), cell.end());
+    for (const auto& [i, j] : drawn_edges<Dim>()) {
+      const int curved = space.find(cell[i], cell[j]);
+      drawn.cells.push_back(curved != kNone ? mesh.vertex_slots() + curved
+                                            : num_nodes(mesh, space) + straight.find(cell[i], cell[j]));
+    }
+  }
+  return drawn;
+}
+
+}  // namespace itr::output
