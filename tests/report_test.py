@@ -351,9 +351,9 @@ class Report(unittest.TestCase):
 
     def test_curved_edges_are_drawn_curved(self):
         folder = self.folder / "curved"
-        rest = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]
-        x = [[0, 0], [1, 0], [0, 1], [0.5, -0.2], [0.5, 0.5], [0, 0.5]]
-        write_frame(folder, 0, 0, rest, x, [[0, 1, 2]], [5], curved=[[0, 1], [1, 2], [0, 2]])
+        rest = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0, 0.5], [0.5, 0.5]]
+        x = [[0, 0], [1, 0], [0, 1], [0.5, -0.2], [0, 0.5], [0.5, 0.5]]
+        write_frame(folder, 0, 0, rest, x, [[0, 1, 2]], [5], curved=[[0, 1], [0, 2], [1, 2]])
         write_steps(folder, [0])
         self.report(folder)
         self.open(folder / "report.html", "#edges=0")

@@ -13,7 +13,7 @@ TOLERANCE = "all of these, but for what hard_cases.py says to fail and why"
 NEEDS = ("meshio", "h5py")
 
 NAMES = ("nu_0_4999", "coplanar_faces", "coplanar_faces_remeshed", "stiff_on_soft_1e8", "heavy_on_light_1e4", "slivers_1e4_remeshed", "gap_1e_10", "collinear_edges",
-         "dt_1_remeshed", "compressed_95", "far_1e6_remeshed", "points_2d", "storm_2d")
+         "dt_1_remeshed", "compressed_95", "far_1e6_remeshed", "points_2d", "storm_2d", "twist_10_turns_remeshed")
 
 
 def results(context):
