@@ -20,8 +20,8 @@ constexpr auto drawn_edges() {
     return std::array<std::array<int, 2>, 6>{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 }
 
-/// Cells as XDMF and VTK draw them, each with a node at each of its edges: where only some edges are curved the straight ones get
-/// nodes too, that only the drawing has.
+/// Cells as XDMF and VTK draw them, each with a node at each of its edges: where only some edges are curved the straight
+/// ones get nodes too, that only the drawing has.
 template <int Dim>
 struct DrawnCells {
   std::vector<EdgeKey> straight_edges;
