@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 
@@ -48,6 +50,41 @@ NewtonOptions until_steps_below(double tolerance) {
   return options;
 }
 
+/// A large constant and, by the first dof, a valley whose slope is linear in pieces: beyond the short one in the middle
+/// Newton's full step leads from -0.2 to 1 and back, and hardly changes the energy.
+class LopsidedValley final : public Energy {
+ public:
+  std::string_view name() const override { return "lopsided valley"; }
+  double value(ConstVectorView x, Workspace&) const override {
+    double sum = kConstant + x[1] * x[1] / 2;
+    const double t = x[0], from = -1;
+    for (const Piece& piece : kPieces) {
+      const double a = std::clamp(piece.from, from, t), b = std::clamp(piece.to, from, t);
+      sum += (b - a) * (slope(piece, a) + slope(piece, b)) / 2;
+    }
+    return sum;
+  }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
+    gradient[0] += slope(piece_at(x[0]), x[0]);
+    gradient[1] += x[1];
+  }
+  void add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const override {
+    Mat<2> block = Mat<2>::Identity();
+    block(0, 0) = piece_at(x[0]).second;
+    sink.add<2>(std::array{0}, block.data());
+  }
+
+ private:
+  struct Piece {
+    double from, to, root, second;
+  };
+  static constexpr double kConstant = 5e8, kLeft = -1.19, kRight = 0.0625, kMiddle = (kRight - kLeft) / 0.14;
+  static constexpr std::array<Piece, 3> kPieces{
+      {{-1, -0.19, 1, 1}, {-0.19, -0.05, -0.05 - kRight / kMiddle, kMiddle}, {-0.05, 9, -0.2, 1 / 2.4}}};
+  static double slope(const Piece& piece, double x) { return piece.second * (x - piece.root); }
+  static const Piece& piece_at(double x) { return x < -0.19 ? kPieces[0] : x < -0.05 ? kPieces[1] : kPieces[2]; }
+};
+
 /// Over all dofs of `x`, with a solver's own system.
 NewtonSummary minimize_by(linear::Solver& solver, const Energy& energy, VectorX& x, const NewtonOptions& options) {
   SparseSystem system(solver);
@@ -69,6 +106,19 @@ TEST(Newton, LeavesASaddleInFewSteps) {
   EXPECT_TRUE(summary.converged()) << summary.message;
   EXPECT_LT(summary.iterations, 60);  // growing by a hundredth a step it would be a thousand
   EXPECT_LE((x.array() - std::sqrt(c)).abs().maxCoeff(), 1e-9);
+}
+
+TEST(Newton, GoesNotToAndFroWhereTheEnergyHardlyChanges) {
+  VectorX x = Vec<2>(-0.2, 0);
+  const DofMap dofs = DofMap::from_held(std::vector<char>(2, 0));
+  DenseSystem system;
+  NewtonOptions options = until_steps_below(1e-4);
+  options.max_iterations = 200;
+  Workspace workspace;
+  const NewtonSummary summary = minimize(LopsidedValley(), x, dofs, VectorX(), system, options, workspace);
+  EXPECT_TRUE(summary.converged()) << summary.message << " at " << x.transpose();
+  EXPECT_GT(x[0], -0.19);
+  EXPECT_LT(x[0], -0.05);
 }
 
 /// The second dof's descent outweighs that the first one goes up, to the saddle.

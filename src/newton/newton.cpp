@@ -567,11 +567,12 @@ class Minimizer {
     if (advancing || options_.line_search == LineSearch::armijo) return false;
     // PolyFEM's "RobustArmijo" (CONVENTIONS.md, "Tolerances"; Hager & Zhang): where the energy changes little, in either
     // direction, a slope that still falls at the end will do. That refuses full steps to the minimum of a quadratic: where
-    // energies say nothing at all, a slope that shrinks to half is enough.
+    // energies can say nothing of what the slope promises, a slope that shrinks to half is enough.
     const double change_of_energy = std::abs(value - value_);
     if (change_of_energy > 0.1 * std::abs(value_)) return false;
     const double after = slope_at_candidate();
-    return after <= kArmijo * slope || (change_of_energy <= kRoundOff * std::abs(value_) && after <= -0.5 * slope);
+    const double resolved = kRoundOff * std::abs(value_);
+    return after <= kArmijo * slope || (change_of_energy <= resolved && -step * slope <= resolved && after <= -0.5 * slope);
   }
 
   const Energy& energy_;
