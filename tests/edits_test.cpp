@@ -15,7 +15,7 @@ namespace {
 /// edge.
 TEST(Edits3D, KeepBodiesTagsPatchesFeaturesAndTopology) {
   std::map<Operation, int> done;
-  std::map<Operation, RefusalCounts> refused;
+  std::map<Operation, std::map<Refusal, long>> refused;
   int slivers = 0;
   for (unsigned seed = 0; seed < 30; ++seed) {
     std::mt19937 random(seed);
@@ -162,7 +162,7 @@ TEST(Edits3D, HaveTheSameRulesInTwoDimensions) {
                              : kind == 1
                                  ? propose_collapse<2>(mesh, strata, edge)
                                  : propose_move<2>(mesh, strata, edge[0], best_shaped_position<2>(mesh, strata, edge[0], 3));
-      if (kind == 3) proposal = {.edit = make_swap(mesh, edge)};
+      if (kind == 3) proposal = propose_diagonal_swap(mesh, strata, edge);
       if (!proposal) continue;
       ++done[proposal.edit->kind];
       strata.follow(*proposal.edit, mesh.apply(*proposal.edit));

@@ -78,7 +78,7 @@ struct Scene {
     for (int i = 0; collapses > 0 && i < 10000; ++i) {
       const EdgeKey edge = edges[random() % edges.size()];
       if (mesh.rest(edge[0])[0] > 1.5 || !may(edge) || mesh.cells_of_edge(edge).empty()) continue;
-      const auto edit = make_collapse(mesh, edge);
+      const auto edit = propose_collapse(mesh, Strata<2>(mesh), edge).edit;
       if (!edit) continue;
       RemeshFields<2> next = fields;
       Mesh<2> changed = mesh;

@@ -48,6 +48,7 @@ SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp"}
 WALLS = {
     r"nlohmann/": {"scene", "output", "cli", "embed"},
     r"CGAL/": {"geometry"},
+    r"boost/": {"remesh"},
     r"(oneapi/)?tbb/": {"core"},
     r"hdf5\.h|H5": {"core"},
     r"zlib\.h": {"output"},

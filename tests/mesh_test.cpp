@@ -276,12 +276,14 @@ TEST(Edits, AreMadeWithoutTouchingTheMeshAndCommitWhatTheyPreview) {
         EXPECT_EQ(mesh.volume(c), start.volume(c));
       }
   };
+  const Strata<2> strata(start);
   for (const EdgeKey& edge : start.edges()) {
     check(make_split(start, edge));
-    check(make_collapse(start, edge));
-    check(make_swap(start, edge));
+    check(propose_collapse(start, strata, edge).edit);
+    check(propose_diagonal_swap(start, strata, edge).edit);
   }
-  for (int v = 0; v < start.num_vertices(); ++v) check(make_move(start, v, best_shaped_position(start, v, 5)));
+  for (int v = 0; v < start.num_vertices(); ++v)
+    check(propose_move(start, strata, v, best_shaped_position(start, strata, v, 5)).edit);
   EXPECT_TRUE(image == Image<2>(start));
   EXPECT_EQ(made.size(), 4u);
   for (const auto& [kind, count] : made) EXPECT_GE(count, 4);
@@ -293,7 +295,8 @@ TEST(Mesh, CompactionRenumbersAndKeepsOrder) {
   for (int i = 0; i < 80; ++i) {
     const auto edges = mesh.edges();
     const EdgeKey edge = edges[random() % edges.size()];
-    const auto edit = i % 3 == 0 ? std::optional(make_split(mesh, edge)) : make_collapse(mesh, edge);
+    const auto edit =
+        i % 3 == 0 ? std::optional(make_split(mesh, edge)) : propose_collapse(mesh, Strata<2>(mesh), edge).edit;
     if (edit) mesh.apply(*edit);
   }
   ASSERT_GT(mesh.vertex_slots(), mesh.num_vertices());

@@ -261,7 +261,7 @@ TEST(Transfer, PatchComesNearTheWholeMeshRingByRing) {
   const int middle = 15 * 31 + 12;
   std::optional<Edit<2>> edit;
   for (const VertexId to : {middle + 1, middle + 31, middle - 1, middle - 31})
-    if (!edit) edit = make_collapse(before, {std::min(middle, to), std::max(middle, to)});
+    if (!edit) edit = propose_collapse(before, Strata<2>(before), {std::min(middle, to), std::max(middle, to)}).edit;
   ASSERT_TRUE(edit);
   Mesh<2> mesh = before;
   RemeshFields<2> fields;

@@ -55,11 +55,13 @@ inline std::optional<Edit<2>> edit_at(const Mesh<2>& mesh, unsigned kind, unsign
     case 0:
       return make_split(mesh, edge);
     case 1:
-      return make_collapse(mesh, edge);
+      return propose_collapse(mesh, Strata<2>(mesh), edge).edit;
     case 2:
-      return make_swap(mesh, edge);
-    default:
-      return make_move(mesh, edge[0], best_shaped_position(mesh, edge[0], 3));
+      return propose_diagonal_swap(mesh, Strata<2>(mesh), edge).edit;
+    default: {
+      const Strata<2> strata(mesh);
+      return propose_move(mesh, strata, edge[0], best_shaped_position(mesh, strata, edge[0], 3)).edit;
+    }
   }
 }
 

@@ -51,11 +51,6 @@ namespace {
 Mesh<2> make_mesh(std::mt19937& random, Mesh<2>*) { return random_mesh(8, random); }
 Mesh<3> make_mesh(std::mt19937& random, Mesh<3>*) { return random_tets(3, random, false); }
 
-std::optional<Edit<2>> collapse_of(const Mesh<2>& mesh, const EdgeKey& edge) { return make_collapse(mesh, edge); }
-std::optional<Edit<3>> collapse_of(const Mesh<3>& mesh, const EdgeKey& edge) {
-  return propose_collapse(mesh, Strata<3>(mesh), edge).edit;
-}
-
 /// A body with inertia and weight, partly held and a little out of shape.
 template <int Dim>
 struct Body {
@@ -140,7 +135,7 @@ class WarmTrial : public ::testing::Test {
   std::vector<Edit<kDim>> collapses() const {
     std::vector<Edit<kDim>> edits;
     for (const EdgeKey& edge : edges())
-      if (auto edit = collapse_of(body_.mesh, edge)) edits.push_back(*edit);
+      if (auto edit = propose_collapse(body_.mesh, Strata<kDim>(body_.mesh), edge).edit) edits.push_back(*edit);
     return edits;
   }
 

@@ -137,7 +137,7 @@ TEST(Gate, RefusesCollapsesThatSweepOverAnObstaclePoint) {
   for (const bool blocked : {true, false}) {
     const BulgeScene scene(blocked ? Vec<2>(1, -0.2) : Vec<2>(1, 0.2));
     const Gate<2> gate(scene.mesh, scene.fields, scene.context);
-    const auto edit = make_collapse(scene.mesh, {1, 2});
+    const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), {1, 2}).edit;
     ASSERT_TRUE(edit.has_value());
     GateScratch<2> scratch;
     EXPECT_EQ(gate.passes(*edit, scratch), !blocked);

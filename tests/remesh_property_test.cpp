@@ -266,16 +266,18 @@ std::optional<Edit<2>> find_edit(const Mesh<2>& before, const Mesh<2>& after, Ki
     changed.apply(*edit);
     return same_mesh(changed, after);
   };
+  const Strata<2> strata(before);
   if (kind == Kind::smooth) {
     for (int v = 0; v < before.vertex_slots(); ++v)
-      if (const auto edit = make_move(before, v, after.rest(v)); after.rest(v) != before.rest(v) && leads_there(edit))
+      if (const auto edit = propose_move(before, strata, v, after.rest(v)).edit;
+          after.rest(v) != before.rest(v) && leads_there(edit))
         return edit;
     return std::nullopt;
   }
   for (const EdgeKey& edge : before.edges()) {
     const std::optional<Edit<2>> edit = kind == Kind::split      ? make_split(before, edge)
-                                        : kind == Kind::collapse ? make_collapse(before, edge)
-                                                                 : make_swap(before, edge);
+                                        : kind == Kind::collapse ? propose_collapse(before, strata, edge).edit
+                                                                 : propose_diagonal_swap(before, strata, edge).edit;
     if (leads_there(edit)) return edit;
   }
   return std::nullopt;

@@ -128,7 +128,7 @@ TEST(LocalProblem, HistoryAsAFunctionChargesTheIntegralOfWhatIsForgotten) {
     TrialScene scene(seed);
     scene.fields.x = scene.fields.predictor;  // at rest with respect to the history: all inertia is loss
     const auto edges = scene.mesh.edges();
-    const auto edit = make_collapse(scene.mesh, edges[scene.random() % edges.size()]);
+    const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), edges[scene.random() % edges.size()]).edit;
     if (!edit) continue;
     Marks marks;
     const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, edit->value->rest, 1, {}, marks);
@@ -178,7 +178,7 @@ TEST(LocalProblem, ForgottenHistoryUsesTheLumpedMass) {
     scene.context = context;
     scene.fields.x = scene.fields.predictor;
     const auto edges = scene.mesh.edges();
-    const auto edit = make_collapse(scene.mesh, edges[scene.random() % edges.size()]);
+    const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), edges[scene.random() % edges.size()]).edit;
     if (!edit || edit->value->num_parents != 1) continue;  // onto one of its ends: one vertex disappears
     Marks marks;
     const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, edit->value->rest, 1, {}, marks);
@@ -258,7 +258,7 @@ TEST(Prediction, CountsAShareOfTheHistoryThatACollapseForgets) {
     scene.fields.x = scene.fields.predictor;  // else the way from there to x counts too, which differs from cell to cell
     if (find_inverted<2>(scene.mesh, scene.fields.x) != kNone) continue;
     const auto edges = scene.mesh.edges();
-    const auto edit = make_collapse(scene.mesh, edges[scene.random() % edges.size()]);
+    const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), edges[scene.random() % edges.size()]).edit;
     if (!edit) continue;
     LocalView function(scene), interpolated(scene, HistoryRule::interpolated);
     const double all = function.problem(edit->removed_cells, *edit, true)->value() -

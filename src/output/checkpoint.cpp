@@ -130,28 +130,32 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
   return memory;
 }
 
-void write_strata(hdf5::File& file, const Strata<3>& strata) {
+template <int Dim>
+void write_strata(hdf5::File& file, const Strata<Dim>& strata) {
   if (strata.empty()) return;
   const auto record = strata.record();
   std::vector<std::int64_t> vertices, interfaces;
   for (const Stratum stratum : record.vertices) vertices.push_back(static_cast<std::int64_t>(stratum));
   for (const auto& row : record.interfaces) interfaces.insert(interfaces.end(), row.begin(), row.end());
   std::vector<double> planes;
-  for (const auto& [point, normal] : record.planes)
-    planes.insert(planes.end(), {point[0], point[1], point[2], normal[0], normal[1], normal[2]});
+  for (const auto& [point, normal] : record.planes) {
+    planes.insert(planes.end(), point.data(), point.data() + Dim);
+    planes.insert(planes.end(), normal.data(), normal.data() + Dim);
+  }
   file.write("/checkpoint/strata/vertices", vertices, 0);
   file.write("/checkpoint/strata/patches", std::vector<std::int64_t>(record.patches.begin(), record.patches.end()), 0);
-  if (!interfaces.empty()) file.write("/checkpoint/strata/interfaces", interfaces, 4);
-  file.write("/checkpoint/strata/planes", planes, 6);
+  if (!interfaces.empty()) file.write("/checkpoint/strata/interfaces", interfaces, Dim + 1);
+  file.write("/checkpoint/strata/planes", planes, 2 * Dim);
   file.write("/checkpoint/strata/tolerance", std::array{record.tolerance}, 0);
 }
 
-Strata<3> read_strata(const fs::path& path, const hdf5::File& file, const Mesh<3>& mesh) {
+template <int Dim>
+Strata<Dim> read_strata(const fs::path& path, const hdf5::File& file, const Mesh<Dim>& mesh) {
   if (!file.contains("/checkpoint/strata")) return {};  // none found yet, or by an older version
   const auto refuse = [&](const std::string& name, const std::string& found, const std::string& expected) {
     throw InputError({path.string(), "/checkpoint/strata" + name, found, expected});
   };
-  Strata<3>::Record record;
+  typename Strata<Dim>::Record record;
   for (const int stratum : read_ints(path, file, "/checkpoint/strata/vertices")) {
     if (stratum < 0 || stratum > static_cast<int>(Stratum::non_manifold))
       refuse("/vertices", "stratum " + std::to_string(stratum), "0 to 4");
@@ -159,23 +163,23 @@ Strata<3> read_strata(const fs::path& path, const hdf5::File& file, const Mesh<3
   }
   record.patches = read_ints(path, file, "/checkpoint/strata/patches");
   if (file.contains("/checkpoint/strata/interfaces"))
-    record.interfaces = read_rows<4>(path, file, "/checkpoint/strata/interfaces");
+    record.interfaces = read_rows<Dim + 1>(path, file, "/checkpoint/strata/interfaces");
   for (const auto& row : record.interfaces)
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < Dim; ++i)
       if (row[i] < 0 || row[i] >= mesh.vertex_slots())
         refuse("/interfaces", "vertex " + std::to_string(row[i]), "numbers below " + std::to_string(mesh.vertex_slots()));
   const auto planes = file.read_doubles("/checkpoint/strata/planes");
-  if (planes.columns != 6) refuse("/planes", std::to_string(planes.columns) + " columns", "6");
-  for (std::size_t i = 0; i < planes.values.size(); i += 6) {
+  if (planes.columns != 2 * Dim) refuse("/planes", std::to_string(planes.columns) + " columns", std::to_string(2 * Dim));
+  for (std::size_t i = 0; i < planes.values.size(); i += 2 * Dim) {
     const double* row = &planes.values[i];
-    record.planes.push_back({{row[0], row[1], row[2]}, {row[3], row[4], row[5]}});
+    record.planes.push_back({Vec<Dim>(row), Vec<Dim>(row + Dim)});
     const double length = record.planes.back().normal.norm();
     if (!(std::abs(length - 1) < 1e-9)) refuse("/planes", "a normal of length " + std::to_string(length), "1");
   }
   const auto tolerance = file.read_doubles("/checkpoint/strata/tolerance").values;
   if (tolerance.size() != 1) refuse("/tolerance", std::to_string(tolerance.size()) + " numbers", "1");
   record.tolerance = tolerance[0];
-  Strata<3> strata(record);
+  Strata<Dim> strata(record);
   if (const std::string misfit = strata.find_misfit(mesh); !misfit.empty()) refuse("", misfit, "strata of the frame's mesh");
   return strata;
 }
@@ -253,7 +257,7 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   file.write("/checkpoint/energy_guard",
              std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0, state.stored_energy}, 0);
   write_memory(file, state.remesh_memory);
-  if constexpr (Dim == 3) write_strata(file, state.strata);
+  write_strata(file, state.strata);
   write_factor(file, state.factor);
   file.write("/checkpoint/totals", progress.totals, 0);
   file.write_text("/checkpoint/scene", std::string(progress.scene));
@@ -327,7 +331,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.damp_next = guard[1] != 0;
   state.stored_energy = guard[2];
   state.remesh_memory = read_memory(saved.file, file, state.mesh.vertex_slots());
-  if constexpr (Dim == 3) state.strata = read_strata(saved.file, file, state.mesh);
+  state.strata = read_strata<Dim>(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);
   state.step = as_int(saved.file, "attribute step", file.read_integer_attribute("step"));
   state.t = file.read_double_attribute("t");

@@ -8,13 +8,6 @@
 
 namespace itr {
 
-std::optional<Edit<2>> collapse_of(const RemeshSession<2>& session, const EdgeKey& edge) {
-  return make_collapse(session.mesh(), edge);
-}
-std::optional<Edit<3>> collapse_of(const RemeshSession<3>& session, const EdgeKey& edge) {
-  return propose_collapse(session.mesh(), session.strata(), edge).edit;
-}
-
 namespace {
 
 constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
@@ -41,7 +34,7 @@ class Collapser {
     session_.find_contact(trial, scratch);
     if (session_.was_refused(RemeshMemory::collapse, edge, trial.signal, trial.in_contact)) return;
     trial.is_asked = true;
-    trial.edit = collapse_of(session_, edge);
+    trial.edit = propose_collapse(session_.mesh(), session_.strata(), edge).edit;
     if (!trial.edit) return;
     if (!trial.in_contact && session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), tolerance_)) {
       trial.verdict.decision = Decision::by_bound;

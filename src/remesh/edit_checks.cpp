@@ -11,20 +11,6 @@ std::string_view name(Refusal refusal) {
   return kNames[static_cast<int>(refusal)];
 }
 
-bool has_valid_rest_shape(const Mesh<2>& mesh, const Edit<2>& edit) {
-  constexpr double kLeastVolumeShare = 1e-4;  // of the mean area around
-  double removed = 0;
-  for (const CellId c : edit.removed_cells) removed += mesh.volume(c);
-  const double least = kLeastVolumeShare * removed / static_cast<double>(edit.removed_cells.size());
-  for (const auto& cell : edit.inserted_cells) {
-    std::array<Vec<2>, 3> p;
-    for (int k = 0; k < 3; ++k)
-      p[k] = edit.value && cell.vertices[k] == edit.value->vertex ? edit.value->rest : mesh.rest(cell.vertices[k]);
-    if (orientation(p[0], p[1], p[2]) <= 0 || simplex_volume<2>(p) < least) return false;
-  }
-  return true;
-}
-
 template <int Dim>
 bool extends_tags(const Mesh<Dim>& mesh, const Edit<Dim>& edit) {
   return std::any_of(edit.inserted_facets.begin(), edit.inserted_facets.end(), [&](const auto& facet) {
@@ -52,16 +38,9 @@ std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, s
   return found;
 }
 
-template <int Dim>
-bool is_on_interface(const Mesh<Dim>& mesh, VertexId vertex) {
-  return mesh.is_on_interface(vertex);
-}
-
 template bool extends_tags(const Mesh<2>&, const Edit<2>&);
 template bool extends_tags(const Mesh<3>&, const Edit<3>&);
 template std::vector<Mesh<2>::Facet> interfaces_among(const Mesh<2>&, std::span<const CellId>);
 template std::vector<Mesh<3>::Facet> interfaces_among(const Mesh<3>&, std::span<const CellId>);
-template bool is_on_interface<2>(const Mesh<2>&, VertexId);
-template bool is_on_interface<3>(const Mesh<3>&, VertexId);
 
 }  // namespace itr

@@ -32,9 +32,6 @@ bool has_tag(const Mesh<Dim>& mesh, const EdgeKey& edge) {
 template <int Dim>
 bool extends_tags(const Mesh<Dim>& mesh, const Edit<Dim>& edit);
 
-/// Whether every inserted triangle keeps a positive rest area that is not vanishing beside the removed ones.
-bool has_valid_rest_shape(const Mesh<2>& mesh, const Edit<2>& edit);
-
 /// Facets between two of these cells that are of different bodies, vertices ascending.
 template <int Dim>
 std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, std::span<const CellId> cells);

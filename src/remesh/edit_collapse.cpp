@@ -1,60 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <bit>
 
-#include "core/small_vector.hpp"
 #include "edit_checks.hpp"
 
 namespace itr {
 
 namespace {
-
-/// How many neighbours both vertices have in common.
-std::size_t num_common_neighbours(const Mesh<2>& mesh, VertexId a, VertexId b) {
-  using Ring = SmallVector<VertexId, 32>;
-  const auto ring = [&](VertexId v) {
-    Ring ids;
-    for (const CellId c : mesh.cells_of(v))
-      for (const int w : mesh.cell(c))
-        if (w != v) ids.push_back(w);
-    std::sort(ids.begin(), ids.end());
-    ids.shorten(static_cast<std::size_t>(std::unique(ids.begin(), ids.end()) - ids.begin()));
-    return ids;
-  };
-  const Ring ra = ring(a), rb = ring(b);
-  return static_cast<std::size_t>(
-      std::count_if(ra.begin(), ra.end(), [&](VertexId v) { return std::binary_search(rb.begin(), rb.end(), v); }));
-}
-
-/// Whether boundary vertex v can slide along the boundary edge v-w: its other boundary edge goes straight on with one tag.
-bool can_slide(const Mesh<2>& mesh, VertexId v, VertexId w, FacetId edge) {
-  const auto facets = mesh.facets_of(v);
-  if (facets.size() != 2 || is_on_interface(mesh, v) || mesh.vertex_tag(v) != kNoTag) return false;
-  const FacetId other = facets[0] == edge ? facets[1] : facets[0];
-  if (mesh.facet_tag(other) != mesh.facet_tag(edge)) return false;
-  const auto& f = mesh.facet(other);
-  const VertexId far = f[0] == v ? f[1] : f[0];
-  const Vec<2> a = (mesh.rest(w) - mesh.rest(v)).normalized(), b = (mesh.rest(far) - mesh.rest(v)).normalized();
-  constexpr double kStraight = 1 - 1e-10;
-  return -a.dot(b) > kStraight;
-}
-
-enum class End { first, second, middle };
-
-/// Where the vertex that is left may stand, or nothing.
-std::optional<End> collapse_target(const Mesh<2>& mesh, const EdgeKey& edge, FacetId facet) {
-  const auto [a, b] = edge;
-  if (facet != kNone) {
-    const bool slides_a = can_slide(mesh, a, b, facet), slides_b = can_slide(mesh, b, a, facet);
-    if (slides_a && slides_b) return End::middle;
-    if (slides_b) return End::first;
-    if (slides_a) return End::second;
-    return std::nullopt;
-  }
-  const bool fixed_a = mesh.is_boundary(a) || is_on_interface(mesh, a);
-  const bool fixed_b = mesh.is_boundary(b) || is_on_interface(mesh, b);
-  if (fixed_a && fixed_b) return std::nullopt;
-  return fixed_a ? End::first : fixed_b ? End::second : End::middle;
-}
 
 template <typename List>
 bool contains(const List& list, int item) {
@@ -225,47 +176,6 @@ Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata,
     return {.edit = std::move(edit)};
   }
   return refused<Dim>(Refusal::shape);
-}
-
-std::optional<Edit<2>> make_collapse(const Mesh<2>& mesh, const EdgeKey& edge) {
-  const auto [a, b] = edge;
-  Edit<2> edit{.kind = Edit<2>::Kind::collapse, .edge = edge};
-  const auto around_edge = mesh.cells_of_edge(edge);
-  if (around_edge.empty() || num_common_neighbours(mesh, a, b) != around_edge.size()) return std::nullopt;
-  const FacetId facet = mesh.find_facet({a, b});
-  const auto target = collapse_target(mesh, edge, facet);
-  if (!target) return std::nullopt;
-
-  const VertexId kept = *target == End::second ? b : a, gone = kept == a ? b : a;
-  Edit<2>::Value value{kept, *target == End::middle ? Vec<2>(0.5 * (mesh.rest(a) + mesh.rest(b))) : mesh.rest(kept)};
-  value.parents = {kept, gone, kNone};
-  value.weights = *target == End::middle ? std::array{0.5, 0.5, 0.0} : std::array{1.0, 0.0, 0.0};
-  value.num_parents = *target == End::middle ? 2 : 1;
-  edit.value = value;
-  edit.removed_vertex = gone;
-
-  auto& around = edit.removed_cells;
-  around.assign(mesh.cells_of(gone).begin(), mesh.cells_of(gone).end());
-  if (*target == End::middle)
-    for (const CellId c : mesh.cells_of(kept))
-      if (!contains(around_edge, c)) around.push_back(c);
-  std::sort(around.begin(), around.end());
-  for (const CellId c : around) {
-    const auto& cell = mesh.cell(c);
-    if (!(holds(cell, a) && holds(cell, b))) edit.inserted_cells.push_back({replaced(cell, gone, kept), mesh.body(c)});
-  }
-  for (const FacetId f : mesh.facets_of(gone)) {
-    edit.removed_facets.push_back(f);
-    if (f != facet) edit.inserted_facets.push_back({replaced(mesh.facet(f), gone, kept), mesh.facet_tag(f), f});
-  }
-  if (facet != kNone && *target == End::middle)  // the kept vertex moves, so its other edge changes its length
-    for (const FacetId f : mesh.facets_of(kept)) {
-      if (f == facet) continue;
-      edit.removed_facets.push_back(f);
-      edit.inserted_facets.push_back({mesh.facet(f), mesh.facet_tag(f), f});
-    }
-  if (edit.inserted_cells.empty() || extends_tags(mesh, edit) || !has_valid_rest_shape(mesh, edit)) return std::nullopt;
-  return edit;
 }
 
 template Proposal<2> propose_collapse<2>(const Mesh<2>&, const Strata<2>&, const EdgeKey&, const QualityRule&);

@@ -170,31 +170,6 @@ Vec<Dim> best_shaped_position(const Mesh<Dim>& mesh, const Strata<Dim>& strata, 
   return minimise<Dim>(StarShape<Dim>(mesh, vertex), mesh.rest(vertex), &projector, max_iterations);
 }
 
-std::optional<Edit<2>> make_move(const Mesh<2>& mesh, VertexId vertex, const Vec<2>& target) {
-  if (mesh.is_boundary(vertex) || is_on_interface(mesh, vertex)) return std::nullopt;
-  Edit<2> edit{.kind = Edit<2>::Kind::smooth, .edge = {vertex, kNone}};
-  Edit<2>::Value value{vertex, target};
-  for (const CellId c : mesh.cells_of(vertex)) {
-    edit.removed_cells.push_back(c);
-    edit.inserted_cells.push_back({mesh.cell(c), mesh.body(c)});
-    const auto& cell = mesh.cell(c);
-    const Vec<2> weights = mesh.inverse_rest_edges(c) * (target - mesh.rest(cell[0]));
-    const std::array<double, 3> barycentric{1 - weights.sum(), weights[0], weights[1]};
-    if (value.num_parents == 0 && std::all_of(barycentric.begin(), barycentric.end(), [](double w) { return w >= 0; })) {
-      value.parents = cell;
-      value.weights = barycentric;
-      value.num_parents = 3;
-    }
-  }
-  edit.value = value;
-  if (value.num_parents == 0 || !has_valid_rest_shape(mesh, edit)) return std::nullopt;
-  return edit;
-}
-
-Vec<2> best_shaped_position(const Mesh<2>& mesh, VertexId vertex, int max_iterations) {
-  return minimise<2>(StarShape<2>(mesh, vertex), mesh.rest(vertex), nullptr, max_iterations);
-}
-
 template Proposal<2> propose_move<2>(const Mesh<2>&, const Strata<2>&, VertexId, const Vec<2>&, const QualityRule&);
 template Proposal<3> propose_move<3>(const Mesh<3>&, const Strata<3>&, VertexId, const Vec<3>&, const QualityRule&);
 template Vec<2> best_shaped_position<2>(const Mesh<2>&, const Strata<2>&, VertexId, int);

@@ -193,26 +193,26 @@ Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet
   return {.edit = std::move(edit)};
 }
 
-std::optional<Edit<2>> make_swap(const Mesh<2>& mesh, const EdgeKey& edge) {
+Proposal<2> propose_diagonal_swap(const Mesh<2>& mesh, const Strata<2>& strata, const EdgeKey& edge,
+                                  const QualityRule& rule) {
   const auto cells = mesh.cells_of_edge(edge);
-  if (cells.size() != 2 || mesh.body(cells[0]) != mesh.body(cells[1])) return std::nullopt;
+  if (cells.empty()) return refused<2>(Refusal::gone);
+  if (strata.edge(mesh, edge) != Stratum::volume) return refused<2>(Refusal::held);
   std::array<VertexId, 2> opposite;
   for (int i = 0; i < 2; ++i)
     for (const int v : mesh.cell(cells[i]))
       if (v != edge[0] && v != edge[1]) opposite[i] = v;
-  if (mesh.are_joined(opposite[0], opposite[1])) return std::nullopt;
-  Edit<2> edit{.kind = Edit<2>::Kind::swap, .edge = edge};
-  edit.removed_cells = cells;
-  constexpr double kLeastSwapShare = 0.1;  // of the pair's area, for each triangle
-  const double area = mesh.volume(cells[0]) + mesh.volume(cells[1]);
+  if (mesh.are_joined(opposite[0], opposite[1])) return refused<2>(Refusal::exists);
+  Edit<2> edit{.kind = Edit<2>::Kind::swap, .edge = edge, .removed_cells = cells};
+  const double least = rule.least(worst_quality<2>(mesh, cells));
   // In each triangle one end of the edge gives way to the other triangle's far vertex; that keeps the orientation.
-  edit.inserted_cells.push_back({replaced(mesh.cell(cells[0]), edge[0], opposite[1]), mesh.body(cells[0])});
-  edit.inserted_cells.push_back({replaced(mesh.cell(cells[0]), edge[1], opposite[1]), mesh.body(cells[0])});
-  for (const auto& cell : edit.inserted_cells) {
-    const std::array<Vec<2>, 3> p{mesh.rest(cell.vertices[0]), mesh.rest(cell.vertices[1]), mesh.rest(cell.vertices[2])};
-    if (orientation(p[0], p[1], p[2]) <= 0 || simplex_volume<2>(p) < kLeastSwapShare * area) return std::nullopt;
+  for (const VertexId end : edge) {
+    const auto cell = replaced(mesh.cell(cells[0]), end, opposite[1]);
+    const double quality = quality_with<2>(mesh, cell, kNone, Vec<2>::Zero());
+    if (!(quality > 0 && quality >= least)) return refused<2>(Refusal::shape);
+    edit.inserted_cells.push_back({cell, mesh.body(cells[0])});
   }
-  return edit;
+  return {.edit = std::move(edit)};
 }
 
 }  // namespace itr

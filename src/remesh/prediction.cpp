@@ -10,7 +10,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/small_vector.hpp"
+#include <boost/container/small_vector.hpp>
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
@@ -320,11 +320,12 @@ class MovingModels {
 template <int Dim>
 double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   constexpr double kShareOfRelaxation = 0.25;
-  SmallVector<VertexId, 64> vertices;  // ascending
-  for (const auto& cell : edit.inserted_cells) vertices.append(cell.vertices.begin(), cell.vertices.end());
+  boost::container::small_vector<VertexId, 64> vertices;  // ascending
+  for (const auto& cell : edit.inserted_cells) vertices.insert(vertices.end(), cell.vertices.begin(), cell.vertices.end());
   std::sort(vertices.begin(), vertices.end());
-  vertices.shorten(static_cast<std::size_t>(std::unique(vertices.begin(), vertices.end()) - vertices.begin()));
-  MovingModels<Dim> before(state, vertices), after(state, vertices);
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  const std::span<const VertexId> moving(vertices.data(), vertices.size());
+  MovingModels<Dim> before(state, moving), after(state, moving);
   for (const CellId c : edit.removed_cells) before.add_cell(state.mesh.cell(c), state.mesh.body(c));
   for (const auto& cell : edit.inserted_cells) after.add_cell(cell.vertices, cell.body);
   if (!state.context.loads.tractions.empty()) {

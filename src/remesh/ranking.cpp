@@ -92,11 +92,6 @@ template <int Dim>
 EdgeRanks rank_edges(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                      const RemeshOptions& options) {
   const auto edges = mesh.edges();
-  if (options.screening == Screening::none) {  // every edge may be split and collapsed
-    EdgeRanks ranks;
-    for (const EdgeKey& edge : edges) ranks[edge] = Rank::top;
-    return ranks;
-  }
   const auto of_cells = cell_energies(mesh, fields, context);
   const auto of_vertices = vertex_contact_energies(mesh, fields, context);
   std::vector<double> elastic, contact;

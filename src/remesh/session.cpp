@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/small_vector.hpp"
+#include <boost/container/small_vector.hpp>
 #include "itr/core/check.hpp"
 #include "itr/core/timer.hpp"
 #include "itr/mesh/validate.hpp"
@@ -26,8 +26,8 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
       lanes_(context.host.empty() ? num_threads() : 1),  // terms of the program may not be for several threads
       refusals_(memory),
       changed_at_(mesh.vertex_slots(), 0) {
-  if (Dim == 3 && strata.empty()) strata = Strata<Dim>(mesh);
-  ITR_AUDIT(Dim == 2 || strata.find_defect(mesh).empty(), strata.find_defect(mesh));
+  if (strata.empty()) strata = Strata<Dim>(mesh);
+  ITR_AUDIT(strata.find_defect(mesh).empty(), strata.find_defect(mesh));
 }
 
 template <int Dim>
@@ -127,7 +127,8 @@ std::vector<EdgeKey> RemeshSession<Dim>::edges_of(std::span<const CellId> cells)
 
 template <int Dim>
 double RemeshSession<Dim>::roughness(const EdgeKey& edge) const {
-  SmallVector<CellId, Dim == 2 ? 16 : 64> around(mesh_.cells_of(edge[0]));
+  const auto& at_first = mesh_.cells_of(edge[0]);
+  boost::container::small_vector<CellId, Dim == 2 ? 16 : 64> around(at_first.begin(), at_first.end());
   if (edge[1] != kNone)
     for (const CellId c : mesh_.cells_of(edge[1]))
       if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around.push_back(c);
@@ -249,7 +250,7 @@ void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
   fields_.make_room(mesh_.vertex_slots());
   fields_.follow(edit, created);
   gate_.follow(edit, first_facet);
-  if constexpr (Dim == 3) strata_.follow(edit, created);
+  strata_.follow(edit, created);
   changed_at_.resize(mesh_.vertex_slots(), 0);
   for (const auto& [v, x] : verdict.positions) {
     const VertexId vertex = v == kNewVertex ? created : v;

@@ -59,7 +59,7 @@ class RemeshSession {
   const Mesh<Dim>& mesh() const { return mesh_; }
   const RemeshFields<Dim>& fields() const { return fields_; }
   const StepContext<Dim>& context() const { return context_; }
-  const Strata<Dim>& strata() const { return strata_; }  ///< in 3D only; 2D edits look at the mesh
+  const Strata<Dim>& strata() const { return strata_; }
   const RemeshOptions& options() const { return options_; }
   RemeshReport& report() { return report_; }
   bool has_contact() const { return context_.contact.enabled; }
@@ -221,9 +221,5 @@ void smooth_vertices(RemeshSession<Dim>& session);
 /// The baseline: splits and collapses by a sizing field instead of energies.
 template <int Dim>
 void follow_sizing_field(RemeshSession<Dim>& session);
-
-/// The collapse of an edge, where one is possible.
-std::optional<Edit<2>> collapse_of(const RemeshSession<2>& session, const EdgeKey& edge);
-std::optional<Edit<3>> collapse_of(const RemeshSession<3>& session, const EdgeKey& edge);
 
 }  // namespace itr

@@ -50,10 +50,11 @@ class SizingField {
       if (session_.is_cancelled()) return;
       if (!session_.may_be_collapsed(edge)) continue;
       ++session_.report().collapses.tried;
-      const auto edit = collapse_of(session_, edge);
-      if (!edit || makes_large_edges(*edit) || !session_.apply_if_valid(*edit)) continue;
+      const auto proposal = propose_collapse(session_.mesh(), session_.strata(), edge);
+      if (!proposal || makes_large_edges(*proposal.edit) || !session_.apply_if_valid(*proposal.edit)) continue;
       ++session_.report().collapses.accepted;
-      for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(edit->value->vertex))) push_collapse(near);
+      for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(proposal.edit->value->vertex)))
+        push_collapse(near);
     }
   }
 

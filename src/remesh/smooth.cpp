@@ -19,7 +19,8 @@ constexpr double kStep = 0.2;        ///< length of a move, in shortest edges at
 constexpr double kBadShape = 1.4;    ///< one over the quality of the worst cell from which shapes are bettered
 constexpr double kLeastMove = 0.1;   ///< for that, in shortest edges at the vertex
 constexpr double kSameShape = 1.05;  ///< the same of the worst shape around a vertex
-constexpr double kSameForce = 1.5;   ///< change of the force by which a refused move is tried again
+constexpr int kShapeIterations = 10;
+constexpr double kSameForce = 1.5;  ///< change of the force by which a refused move is tried again
 
 /// How badly the worst cell at a vertex is shaped: 1 where all are regular.
 template <int Dim>
@@ -31,21 +32,6 @@ double worst_shape(const Mesh<Dim>& mesh, VertexId vertex) {
     worst = std::max(worst, 1 / simplex_quality<Dim>(p));
   }
   return worst;
-}
-
-std::optional<Edit<2>> move_of(const RemeshSession<2>& session, VertexId vertex, const Vec<2>& target) {
-  return make_move(session.mesh(), vertex, target);
-}
-std::optional<Edit<3>> move_of(const RemeshSession<3>& session, VertexId vertex, const Vec<3>& target) {
-  return propose_move<3>(session.mesh(), session.strata(), vertex, target).edit;
-}
-
-constexpr int kShapeIterations = 10;
-Vec<2> best_shape(const RemeshSession<2>& session, VertexId vertex) {
-  return best_shaped_position(session.mesh(), vertex, kShapeIterations);
-}
-Vec<3> best_shape(const RemeshSession<3>& session, VertexId vertex) {
-  return best_shaped_position<3>(session.mesh(), session.strata(), vertex, kShapeIterations);
 }
 
 template <int Dim>
@@ -96,7 +82,7 @@ class Mover {
  protected:
   bool may_move(VertexId v) const { return mesh_.is_vertex_alive(v) && !mesh_.is_boundary(v); }
   void judge(Trial<Dim>& trial, const Vec<Dim>& target, double tolerance, LocalScratch<Dim>& scratch) const {
-    trial.edit = move_of(session_, trial.edge()[0], target);
+    trial.edit = propose_move<Dim>(session_.mesh(), session_.strata(), trial.edge()[0], target).edit;
     if (trial.edit && !session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), tolerance))
       session_.judge(trial, target, tolerance, one_ring_, scratch);
   }
@@ -167,7 +153,7 @@ class ShapeBetterer : Mover<Dim> {
     if (trial.signal < kBadShape || this->session_.was_refused(RemeshMemory::reshape, trial.edge(), trial.signal, false))
       return;
     trial.is_asked = true;
-    const Vec<Dim> target = best_shape(this->session_, v);
+    const Vec<Dim> target = best_shaped_position<Dim>(this->mesh_, this->session_.strata(), v, kShapeIterations);
     if ((target - this->mesh_.rest(v)).norm() > kLeastMove * shortest_edge(this->mesh_, v))
       this->judge(trial, target, this->tolerance_, scratch);
   }

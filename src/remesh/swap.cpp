@@ -56,7 +56,9 @@ struct DiagonalSwap {
   const RemeshSession<2>& session;
   bool may_go(const EdgeKey& edge) const { return !session.is_surface(edge); }
   double priority(const EdgeKey& edge) const { return valence_gain(session.mesh(), edge); }
-  std::optional<Edit<2>> edit(const EdgeKey& edge) const { return make_swap(session.mesh(), edge); }
+  std::optional<Edit<2>> edit(const EdgeKey& edge) const {
+    return propose_diagonal_swap(session.mesh(), session.strata(), edge).edit;
+  }
   bool betters_shape(const EdgeKey& edge, const Edit<2>&) const { return valence_gain(session.mesh(), edge) > 0; }
   /// Edges to be asked again after a swap, from all around or where cells are new.
   static constexpr bool kAsksAllAround = true;

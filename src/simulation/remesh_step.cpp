@@ -151,7 +151,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   for (int c = 0; c < before.mesh.cell_slots(); ++c)
     if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
   auto map = state.mesh.compact();
-  if constexpr (Dim == 3) state.strata.compact(map);
+  state.strata.compact(map);
   MeshRenumbering renumbering{std::move(map.vertex), std::move(map.cell), std::move(map.facet)};
   state.remesh_memory.renumber(renumbering.vertex);
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)

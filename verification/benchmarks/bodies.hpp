@@ -30,7 +30,7 @@ template <>
 struct Body<2> {
   std::mt19937 random{1};
   Mesh<2> mesh;
-  Strata<2> strata;  ///< edits of the plane look at the mesh
+  Strata<2> strata;
   VectorX x;
 
   explicit Body(int n) {
@@ -44,6 +44,7 @@ struct Body<2> {
     Grid grid = make_grid(n, place, [&](int, int) { return random() % 2 == 0; });
     std::vector<int> body(grid.cells.size(), 1);
     mesh = Mesh<2>(std::move(grid.rest), std::move(grid.cells), std::move(body));
+    strata = Strata<2>(mesh);
     x = strained(mesh, 0.2 / n, random);
   }
 };

@@ -94,18 +94,13 @@ double trial(Step<Dim>& step, const EdgeKey& edge) {
   return step.verdict.gain;
 }
 
-std::optional<Edit<2>> collapse_of(const Body<2>& body, const EdgeKey& edge) { return make_collapse(body.mesh, edge); }
-std::optional<Edit<3>> collapse_of(const Body<3>& body, const EdgeKey& edge) {
-  return propose_collapse<3>(body.mesh, body.strata, edge).edit;
-}
-
 /// Whether a collapse keeps all stored configurations valid; what is asked are those that there are.
 template <int Dim>
 void check_collapse(benchmark::State& state, bool has_contact) {
   Step<Dim> step(static_cast<int>(state.range(0)), has_contact);
   std::vector<Edit<Dim>> edits;
   for (const EdgeKey& edge : step.edges())
-    if (auto edit = collapse_of(step.body, edge)) edits.push_back(*edit);
+    if (auto edit = propose_collapse(step.body.mesh, step.body.strata, edge).edit) edits.push_back(*edit);
   std::size_t i = 0;
   for (auto _ : state) benchmark::DoNotOptimize(step.gate.passes(edits[i++ % edits.size()], step.scratch.gate));
   state.SetItemsProcessed(state.iterations());
@@ -155,7 +150,7 @@ void accept(Step<Dim>& step, const EdgeKey& edge, Marks& moved) {
   step.fields.make_room(mesh.vertex_slots());
   step.fields.follow(edit, created);
   step.gate.follow(edit, first_facet);
-  if constexpr (Dim == 3) step.body.strata.follow(edit, created);
+  step.body.strata.follow(edit, created);
   step.gate.move(created);
   for (const CellId c : mesh.cells_of(created))
     for (const VertexId v : mesh.cell(c))

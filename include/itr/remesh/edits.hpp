@@ -30,13 +30,6 @@ enum class Refusal {
 inline constexpr int kRefusals = 10;
 std::string_view name(Refusal refusal);
 
-/// How often each refusal was seen.
-struct RefusalCounts {
-  std::array<long, kRefusals> count{};
-  long& operator[](Refusal refusal) { return count[static_cast<int>(refusal)]; }
-  long operator[](Refusal refusal) const { return count[static_cast<int>(refusal)]; }
-};
-
 /// An edit, or why there is none.
 template <int Dim>
 struct Proposal {
@@ -80,6 +73,10 @@ using CellCost = std::function<double(const MeshTypes<3>::Cell& vertices, int bo
 /// The longest ring whose triangulations are searched.
 inline constexpr int kLongestRing = 7;
 
+/// Swaps the diagonal of the two triangles at an edge inside a body.
+Proposal<2> propose_diagonal_swap(const Mesh<2>& mesh, const Strata<2>& strata, const EdgeKey& edge,
+                                  const QualityRule& rule = {});
+
 /// Removes an edge: the ring around it is triangulated such that the sum of the new cells' costs is least (Klincsek 1980;
 /// the 3-2 and 4-4 swaps are rings of 3 and 4), each of them by the rule. Also within a patch of the surface (2-2 and on) or
 /// of an interface, where the facets at the edge swap in their plane.
@@ -99,26 +96,5 @@ Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, Ver
 /// AMIPS measure tr(J^T J) / det(J)^(2/Dim)), by damped Newton.
 template <int Dim>
 Vec<Dim> best_shaped_position(const Mesh<Dim>& mesh, const Strata<Dim>& strata, VertexId vertex, int max_iterations);
-
-/// Collapses an edge of a triangle mesh where that keeps the domain, its tags and material interfaces: an edge with one end
-/// on the boundary or an interface goes to that end, an interior edge to its midpoint, a boundary edge only along straight
-/// stretches of one tag. Empty where the topology or the rest shape forbids it.
-std::optional<Edit<2>> make_collapse(const Mesh<2>& mesh, const EdgeKey& edge);
-
-/// Swaps the diagonal of the two triangles at an interior edge of one body; empty where a new triangle has less than a tenth
-/// of their area.
-std::optional<Edit<2>> make_swap(const Mesh<2>& mesh, const EdgeKey& edge);
-
-/// Moves an interior vertex of one body to `target`; empty where a cell of its ring would lose its orientation or `target`
-/// lies outside the ring.
-std::optional<Edit<2>> make_move(const Mesh<2>& mesh, VertexId vertex, const Vec<2>& target);
-
-/// The rest position that makes the triangles around an interior vertex as equilateral as possible (least sum of the AMIPS
-/// measure tr(J^T J) / det J), by damped Newton.
-Vec<2> best_shaped_position(const Mesh<2>& mesh, VertexId vertex, int max_iterations);
-
-/// Whether an interior vertex lies on the interface of two bodies.
-template <int Dim>
-bool is_on_interface(const Mesh<Dim>& mesh, VertexId vertex);
 
 }  // namespace itr

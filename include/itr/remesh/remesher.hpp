@@ -13,7 +13,7 @@ namespace itr {
 /// Remeshes in place. On entry x is the solution on the mesh. On return x is feasible, and its energy exceeds that on entry
 /// by at most the tolerances of the accepted operations. Patches relax x; all other fields are interpolated at the vertices
 /// that edits set. A living cell whose id is below the entry's cell_slots() was not touched. `memory` holds earlier refusals
-/// and is updated. So are the `strata` of the mesh, which are found first if they are empty (3D only).
+/// and is updated. So are the `strata` of the mesh, which are found first if they are empty.
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata);

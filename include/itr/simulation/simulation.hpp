@@ -36,7 +36,7 @@ struct State {
   BarrierStiffness stiffness;   ///< where it is adaptive
   QuadratureLevels quadrature;  ///< of the elastic energy, by cell with curved edges
   RemeshMemory remesh_memory;   ///< operations that remeshing refused and need not try again
-  Strata<Dim> strata;           ///< of the mesh, once remeshing in 3D has found them
+  Strata<Dim> strata;           ///< of the mesh, once remeshing has found them
   linear::FactorRecord factor;  ///< factor that may serve the next step
   VectorX deviation;            ///< x - x-hat of the last step, where the next one begins [m]; empty before the first
   double stored_energy = 0;     ///< largest elastic and contact energy at the end of a step so far [J]
