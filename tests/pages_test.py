@@ -5,6 +5,7 @@
 usage: pages_test.py SOURCE_DIR [UNITTEST_ARGUMENT]...
 """
 
+import ast
 import csv
 import json
 import pathlib
@@ -16,6 +17,8 @@ import unittest
 SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
 README_WORDS = 700
 PICTURE_BYTES = 150_000
+MODULES = next(ast.literal_eval(node.value) for node in ast.parse((SOURCE / "tests/include_graph_test.py").read_text()).body
+               if isinstance(node, ast.Assign) and node.targets[0].id == "MAY_USE")
 
 
 def pages():
@@ -99,6 +102,33 @@ class Readme(unittest.TestCase):
         for language in ["cpp", "python"]:
             [block] = blocks("README.md", language)
             self.assertLessEqual(len(block.splitlines()), 10, language)
+
+
+class Architecture(unittest.TestCase):
+    """ARCHITECTURE.md names files, tests and modules that are there."""
+
+    text = (SOURCE / "ARCHITECTURE.md").read_text()
+
+    def test_files_and_tests_exist(self):
+        for name in re.findall(r"`((?:src|tests|backends|examples|verification|include)/[\w./*-]+)`", self.text):
+            self.assertTrue(list(SOURCE.glob(name)), name)
+        for name in re.findall(r"`(\w+_test)`", self.text):
+            self.assertTrue((SOURCE / f"tests/{name}.cpp").is_file(), name)
+
+    def test_names_are_those_of_the_code(self):
+        code = "\n".join(path.read_text() for folder in ["include", "src"] for path in (SOURCE / folder).rglob("*.[ch]pp"))
+        words = set(re.findall(r"\w+", code))
+        for quoted in re.findall(r"`([A-Za-z_:]+(?:\(\))?)`", self.text):
+            for name in re.findall(r"\w+", quoted):
+                self.assertTrue(name in words or (SOURCE / "tests" / f"{name}.cpp").is_file() or name in MODULES, quoted)
+
+    def test_table_of_modules_is_the_tested_one(self):
+        rows = dict(re.findall(r"^\| `(\w+)` \|[^|]*\|([^|]*)\|$", self.text, re.MULTILINE))
+        for module, uses in rows.items():
+            if module not in MODULES or "all above" in uses or "headers" in uses:
+                continue
+            self.assertEqual(uses.split(), MODULES[module].split(), module)
+        self.assertEqual(set(MODULES) - set(rows), set())
 
 
 class Quotes(unittest.TestCase):
