@@ -105,6 +105,12 @@ class Study(unittest.TestCase):
               self.folder / "runs/second-reference", levels=1)
         worth = json.loads((self.folder / "two/study.json").read_text())["worth"]
         self.assertAlmostEqual(worth["h1"], content["worth"]["h1"], delta=1e-9)
+        # A run of the study may be its reference: it is not held against itself.
+        study(self.folder / "own", "--series", "uniform", levels=1)
+        study(self.folder / "own", "--series", "uniform", "--reference", self.folder / "own/runs/uniform-1", levels=1)
+        errors = {run["run"]: run.get("errors") for run in json.loads((self.folder / "own/study.json").read_text())["runs"]}
+        self.assertIsNone(errors["uniform-1"])
+        self.assertGreater(errors["uniform-0"]["h1"], 0)
 
     def test_a_reference_that_splits_nothing_is_refused(self):
         done = study(self.folder, "--series", "uniform", "--reference-tolerance", "1e9", levels=1, status=2)

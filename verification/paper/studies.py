@@ -67,6 +67,8 @@ STUDIES = {
                 ["--set", "/time/tend=0.1", "--tolerances", "0.01,0.001", "--reference-tolerance", "2.5e-4", "--levels", "1", "--frames", "2",
                  "--series", "uniform,itr", "--time-limit", "900"], "to t = 0.1: the rollers turn, first contact"),
 }
+# Runs of the study itself that are nearer to the limit than a linear mesh that remeshing has split on.
+REFERENCES = {"twisting-beam-3d": "uniform-p2-1", "masticator-3d": "uniform-p2-1"}
 FILES = ("study.md", "study.csv", "study.json", "study.svg")
 MEASURES = {"l2": "L2", "h1": "H1", "energy": "energy"}
 SERIES = ("itr", "swaps", "smoothing")
@@ -80,6 +82,10 @@ def run(name, options):
     # Relative, since reasons of failures name files and are stored.
     done = subprocess.run([str(options.itr), "study", path, "-o", os.path.relpath(folder, ROOT), *arguments], cwd=ROOT,
                           stdout=subprocess.DEVNULL)
+    if done.returncode == 0 and name in REFERENCES:
+        reference = os.path.relpath(folder / "runs" / REFERENCES[name], ROOT)
+        done = subprocess.run([str(options.itr), "study", path, "-o", os.path.relpath(folder, ROOT), *arguments, "--reference", reference],
+                              cwd=ROOT, stdout=subprocess.DEVNULL)
     if done.returncode != 0:
         print(f"{name}: exit status {done.returncode}", file=sys.stderr)
         return False

@@ -157,7 +157,10 @@ class Study {
       const bool is_there = finished(row.run.reference);
       return is_there && row.run.reference != row.run.name ? folder_of(row.run.reference) : fs::path();
     }
-    if (!options_.reference.empty()) return options_.reference;
+    if (!options_.reference.empty()) {
+      const bool is_itself = fs::exists(options_.reference) && fs::equivalent(options_.reference, folder_of(row.run.name));
+      return is_itself ? fs::path() : options_.reference;
+    }
     if (finished(reference_)) return folder_of(reference_);
     return finished(plan_.finest) && row.run.name != plan_.finest ? folder_of(plan_.finest) : fs::path();
   }
