@@ -312,14 +312,18 @@ TEST_F(InterruptTest, ResultsAreNotErasedUnasked) {
 }
 
 /// A step that remeshes for many seconds: patches of thousands of cells.
+Case slow_remeshing() {
+  return {"slow",
+          "masticator.json",
+          5,
+          R"("dt":0.05)",
+          {"/geometry/0/n_refs=2", "/space/remesh/screening=\"none\"",
+           R"(/space/remesh/local_relaxation={"local_mesh_n_ring":9,"local_mesh_max_cells":2000})",
+           R"j(/initial_conditions/velocity=[{"id":0,"value":["sin(7*x)",0]}])j"}};
+}
+
 TEST_F(InterruptTest, TheSecondSignalIsHeardWithinRemeshing) {
-  const Case slow{"slow",
-                  "masticator.json",
-                  5,
-                  R"("dt":0.05)",
-                  {"/geometry/0/n_refs=2", "/space/remesh/screening=\"none\"",
-                   R"(/space/remesh/local_relaxation={"local_mesh_n_ring":9,"local_mesh_max_cells":2000})",
-                   R"j(/initial_conditions/velocity=[{"id":0,"value":["sin(7*x)",0]}])j"}};
+  const Case slow = slow_remeshing();
   const fs::path run = folder / "run";
   const Command command = start(arguments(slow, run, 0));
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -342,13 +346,7 @@ TEST_F(InterruptTest, TheSecondSignalIsHeardWithinRemeshing) {
 
 /// Time that batch systems give after it: seconds.
 TEST_F(InterruptTest, ATerminatedRunSavesTheLastWholeStep) {
-  const Case slow{"slow",
-                  "masticator.json",
-                  5,
-                  R"("dt":0.05)",
-                  {"/geometry/0/n_refs=2", "/space/remesh/screening=\"none\"",
-                   R"(/space/remesh/local_relaxation={"local_mesh_n_ring":9,"local_mesh_max_cells":2000})",
-                   R"j(/initial_conditions/velocity=[{"id":0,"value":["sin(7*x)",0]}])j"}};
+  const Case slow = slow_remeshing();
   const fs::path run = folder / "run";
   const Command command = start(arguments(slow, run, 30));
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);

@@ -28,24 +28,13 @@ constexpr double kCollapseShare = 0.01;
 constexpr double kShapeShare = 1e-6;
 constexpr double kUsualStrain2 = 0.01;  ///< square of the strain at which bodies are expected to store energy
 
-template <int Dim>
-double facet_measure(const Mesh<Dim>& mesh, FacetId f) {
-  const auto& facet = mesh.facet(f);
-  const Vec<Dim> a = mesh.rest(facet[1]) - mesh.rest(facet[0]);
-  if constexpr (Dim == 2) {
-    return a.norm();
-  } else {
-    return a.cross(Vec<Dim>(mesh.rest(facet[2]) - mesh.rest(facet[0]))).norm() / 2;
-  }
-}
-
 /// Mean surface of a vertex on the boundary [m], [m^2].
 template <int Dim>
 double mean_vertex_area(const Mesh<Dim>& mesh) {
   double area = 0;
   int vertices = 0;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) area += facet_measure<Dim>(mesh, f);
+    if (mesh.is_facet_alive(f)) area += facet_measure(mesh, f);
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
   return area / std::max(1, vertices);
 }

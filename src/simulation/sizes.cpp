@@ -11,16 +11,6 @@ namespace itr {
 namespace {
 
 template <int Dim>
-double measure(const Mesh<Dim>& mesh, const typename Mesh<Dim>::Facet& facet) {
-  const Vec<Dim> a = mesh.rest(facet[1]) - mesh.rest(facet[0]);
-  if constexpr (Dim == 2) {
-    return a.norm();
-  } else {
-    return a.cross(Vec<Dim>(mesh.rest(facet[2]) - mesh.rest(facet[0]))).norm() / 2;
-  }
-}
-
-template <int Dim>
 int body_at(const Mesh<Dim>& mesh, const typename Mesh<Dim>::Facet& facet) {
   for (const CellId c : mesh.cells_of(facet[0])) {
     const auto& cell = mesh.cell(c);
@@ -31,6 +21,17 @@ int body_at(const Mesh<Dim>& mesh, const typename Mesh<Dim>::Facet& facet) {
 }
 
 }  // namespace
+
+template <int Dim>
+double facet_measure(const Mesh<Dim>& mesh, FacetId f) {
+  const auto& facet = mesh.facet(f);
+  const Vec<Dim> a = mesh.rest(facet[1]) - mesh.rest(facet[0]);
+  if constexpr (Dim == 2) {
+    return a.norm();
+  } else {
+    return a.cross(Vec<Dim>(mesh.rest(facet[2]) - mesh.rest(facet[0]))).norm() / 2;
+  }
+}
 
 template <int Dim>
 std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
@@ -44,7 +45,7 @@ std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
     for (const int v : mesh.cell(c)) boxes[mesh.body(c)].extend(mesh.rest(v));
   }
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) sizes[body_at<Dim>(mesh, mesh.facet(f))].surface += measure<Dim>(mesh, mesh.facet(f));
+    if (mesh.is_facet_alive(f)) sizes[body_at<Dim>(mesh, mesh.facet(f))].surface += facet_measure(mesh, f);
   for (auto& [body, size] : sizes) {
     size.diagonal = boxes[body].diagonal().norm();
     size.thickness = size.surface > 0 ? 2 * size.volume / size.surface : size.diagonal;
@@ -54,6 +55,8 @@ std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
   return sizes;
 }
 
+template double facet_measure(const Mesh<2>&, FacetId);
+template double facet_measure(const Mesh<3>&, FacetId);
 template std::map<int, BodySize> body_sizes(const Mesh<2>&);
 template std::map<int, BodySize> body_sizes(const Mesh<3>&);
 

@@ -15,6 +15,10 @@ struct BodySize {
   double mean_edge = 0;            ///< of a cell of mean volume [m]
 };
 
+/// Length or area of a boundary facet at rest [m], [m^2].
+template <int Dim>
+double facet_measure(const Mesh<Dim>& mesh, FacetId f);
+
 /// By id, at rest.
 template <int Dim>
 std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh);
