@@ -120,7 +120,7 @@ def write_frame(folder, step, t, rest, x, cells, density, curved=(), obstacle=No
     facets = {}
     for cell in cells:
         for k in range(dim + 1):
-            facet = [int(c) for c in numpy.delete(cell, k)]
+            facet = [int(c) for c in numpy.delete(cell, k)][::-1 if k % 2 else 1]  # outward
             facets.setdefault(tuple(sorted(facet)), []).append(facet)
     surface = [facet[0] for facet in facets.values() if len(facet) == 1]
     (folder / "frames").mkdir(parents=True, exist_ok=True)
@@ -232,7 +232,7 @@ class Report(unittest.TestCase):
         self.browser.run("await v.set({log: false, least: 0, most: 200})")
         self.assert_drawn(((2.25, 0.25), 0.5))
         self.assertIn("200", self.browser.run("return v.legend.textContent"))
-        self.assertIn("elastic energy density [J/m^2]", self.browser.run("return v.legend.textContent"))
+        self.assertIn("elastic energy density [J/m²]", self.browser.run("return v.legend.textContent"))
         self.assertEqual(self.browser.run("await v.set({field: 'J', least: null, most: null}); return r.run.meta.ranges.J"), [1, 1])
         self.assertAlmostEqual(self.browser.run("await v.set({frame: 0, field: 'size'}); return r.run.meta.ranges.size[0]"), 1)
         self.assertEqual(self.browser.errors(), [])
@@ -273,7 +273,7 @@ class Report(unittest.TestCase):
         self.browser.click(*self.browser.place(1.9, 0.2))
         text = self.browser.run("return v.pickText.textContent")
         for part in ("vertex 1", "rest  1, 0 m", "now   2, 0 m", "displacement |u|  1 m", "velocity |v|  2 m/s", "cell 0",
-                     "vertices  0 1 2", "elastic energy density  50 J/m^2", "volume ratio J  1"):
+                     "vertices  0 1 2", "elastic energy density  50 J/m²", "volume ratio J  1"):
             self.assertIn(part, text)
         self.browser.click(*self.browser.place(0.5, 0.5))
         self.assertNotIn("vertex", self.browser.run("return v.pickText.textContent"))
@@ -312,7 +312,7 @@ class Report(unittest.TestCase):
         self.assert_colour(picture, below, light * numpy.array(colour(share(40))), 9)
         self.browser.click(*below)
         self.assertIn("cell 1\n", self.browser.run("return v.pickText.textContent"))
-        self.assertIn("elastic energy density  40 J/m^2", self.browser.run("return v.pickText.textContent"))
+        self.assertIn("elastic energy density  40 J/m²", self.browser.run("return v.pickText.textContent"))
         # What is before the plane is gone: its normal looks at us.
         self.assertTrue(self.browser.run("return v.pickAt(...v.project([0.05, 0.02, 0])) === null || v.cutPlane[2] === 1"))
         self.assertEqual(self.browser.errors(), [])
@@ -366,13 +366,104 @@ class Report(unittest.TestCase):
         self.report(self.plane)
         self.open(self.plane / "report.html", "#t=0")
         titles = self.browser.run("return [...document.querySelectorAll('#plots figcaption')].map(e => e.textContent)")
-        for title in ("Energy of the step by term [J]elastic 1total 2", "Vertices4", "Operations of remeshing that were acceptedsplits 0"):
+        for title in ("Energy of the step by term [J]elastic –total –", "Vertices4", "Operations of remeshing that were acceptedsplits 0"):
             self.assertIn(title, titles)
         self.browser.run("const d = document.querySelector('#plots svg'); d.scrollIntoView(); const b = d.getBoundingClientRect();"
                          "d.dispatchEvent(new PointerEvent('pointermove', {clientX: b.left + 0.4 * b.width, clientY: b.top + 9}))")
         self.assertEqual(self.browser.run("return v.state.frame"), 1)
         self.assertIn("elastic 2", self.browser.run("return document.querySelector('#plots figcaption').textContent"))
         self.assertEqual(self.browser.errors(), [])
+
+    def test_stored_forces_are_plotted_by_name(self):
+        folder = self.folder / "forces"
+        write_plane(folder)
+        sums = lambda f: [[f, 2 * f, 0.5], [0.1 * f, 0, 0], [0, 0, 0], [1.1 * f, 2 * f, 0.5]]  # contact, friction, reaction, all
+        for step in range(3):
+            with h5py.File(folder / f"frames/{step:06}.h5", "a") as file:
+                file["/totals/forces"] = numpy.array(sums(10 * step) + sums(-step), float)
+                file["/totals/forces"].attrs["names"] = "plate,left jaw"
+        titles = lambda: self.browser.run("return Object.fromEntries(r.plots.map(p => [p.title, p.series.map(s => [s.name, ...s.values])]))")
+        self.report(folder)
+        self.open(folder / "report.html")
+        found = titles()
+        self.assertEqual(found["Force on plate"], [["x", 0, 11, 22], ["y", 0, 20, 40]])
+        self.assertEqual(found["Force on left jaw"], [["x", 0, -1.1, -2.2], ["y", 0, -2, -4]])
+        self.assertEqual(found["Friction force on plate"], [["x", 0, 1, 2]])
+        self.assertEqual(found["Moment on plate"], [["", 0.5, 0.5, 0.5]])
+        self.assertNotIn("Reaction force on plate", found)
+        self.assertIn("Force on plate [N]x 22y 40", self.browser.run("return document.getElementById('plots').textContent"))
+        # forces.csv also has the steps that no frame has; its last line is being written.
+        (folder / "forces.csv").write_text("step,t,name,contact_x,contact_y,contact_moment,friction_x,friction_y,friction_moment,reaction_x,reaction_y,"
+                                           "reaction_moment,all_x,all_y,all_moment\n0,0,plate" + ",0" * 12 + "\n1,0.05,plate" + ",3" * 12
+                                           + "\n2,0.1,plate" + ",4" * 12 + "\n3,0.3,pl")
+        self.report(folder)
+        self.open(folder / "report.html")
+        self.assertEqual(titles()["Reaction force on plate"], [["x", 0, 3, 4], ["y", 0, 3, 4]])
+        self.assertEqual(self.browser.run("return r.plots.find(p => p.title === 'Force on plate').times"), [0, 0.05, 0.1])
+        self.assertEqual(self.browser.errors(), [])
+
+    def test_warnings_are_listed_by_kind_with_their_steps(self):
+        folder = self.folder / "warned"
+        write_plane(folder)
+        lines = [json.loads(line) for line in (folder / "steps.jsonl").read_text().splitlines()[:3]]
+        lines[0]["warnings"] = ["/a <b>: is not written"]
+        lines[1]["warnings"] = ["step 1: distance 1.5e-7 m"]
+        lines[2]["warnings"] = ["step 2: distance 2e-12 m"]
+        (folder / "steps.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+        summary = {"scene": "s.json", "outcome": "finished", "solver": "eigen", "seconds": {"total": 1},
+                   "warnings": [{"text": "/a <b>: is not written", "count": 1}, {"text": "step 1: distance 1.5e-7 m", "count": 2},
+                                {"text": "at the end", "count": 2}]}
+        (folder / "summary.json").write_text(json.dumps(summary))
+        self.report(folder)
+        self.open(folder / "report.html")
+        found = self.browser.run("return [...document.querySelectorAll('.warnings summary, .warnings div')].map(e => e.textContent)")
+        self.assertEqual(found, ["5 warnings", "start /a <b>: is not written", "step 1 to 2 step 1: distance 1.5e-7 m (2 times)",
+                                 "at the end (2 times)"])
+        self.browser.run("document.querySelectorAll('.warnings button')[1].click()")
+        self.assertEqual(self.browser.run("return v.state.frame"), 1)
+        self.report(self.plane)
+        self.open(self.plane / "report.html")
+        self.assertIsNone(self.browser.run("return document.querySelector('.warnings')"))
+        self.assertEqual(self.browser.errors(), [])
+
+    def test_bodies_are_seen_through_obstacles(self):
+        folder = self.folder / "behind"
+        rest = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1]]
+        write_frame(folder, 0, 0, rest, rest, [[0, 2, 1, 3]], [10])
+        with h5py.File(folder / "frames/000000.h5", "a") as file:
+            for name in ("x", "faces"):
+                del file["/obstacles/" + name]
+            file["/obstacles/x"] = numpy.array([[0, 0, 0.5], [1, 0, 0.5], [1, 1, 0.5], [0, 1, 0.5]], float)
+            file["/obstacles/faces"] = numpy.array([[0, 1, 2], [0, 2, 3]])
+        write_steps(folder, [0])
+        self.report(folder)
+        self.open(folder / "report.html", "#edges=0&view=0,0,1,0.5,0.5,0")
+        inside, beside = self.browser.place(0.2, 0.3, 0), self.browser.place(0.8, 0.6, 0.5)
+        picture, light = self.browser.picture(), 0.55 + 0.45 * 0.86
+        wall, body = light * 255 * numpy.array([0.95, 0.955, 0.97]), light * numpy.array(colour(1))
+        self.assert_colour(picture, beside, wall, 9)
+        self.assert_colour(picture, inside, 0.75 * body + 0.25 * wall, 9)
+        self.browser.run("await v.look({azimuth: 180})")  # the wall is behind
+        picture = self.browser.picture()
+        self.assertGreater(numpy.abs(picture[self.browser.place(0.1, 0.1, 0)[::-1]] - wall).max(), 40)
+        self.browser.run("await v.look({azimuth: 0}); await v.set({obstacles: false})")
+        picture = self.browser.picture()
+        self.assert_colour(picture, inside, body, 9)
+        self.assert_colour(picture, beside, [255] * 3)
+        self.assertEqual(self.browser.errors(), [])
+
+    def test_a_peak_does_not_take_all_colours(self):
+        folder, n = self.folder / "peak", 100
+        rest = numpy.array([[i // 2, i % 2] for i in range(n + 2)], float)
+        cells = [[i, i + 2, i + 1] if i % 2 == 0 else [i, i + 1, i + 2] for i in range(n)]
+        write_frame(folder, 0, 0, rest, rest, cells, [1e6] + list(range(1, n)))
+        write_steps(folder, [0])
+        self.report(folder)
+        self.open(folder / "report.html")
+        self.assertAlmostEqual(self.browser.run("return v.range[1]"), 98)
+        self.assertIn("≥ 98", self.browser.run("return v.legend.textContent"))
+        self.browser.run("await v.set({most: 1e6})")
+        self.assertNotIn("≥", self.browser.run("return v.legend.textContent"))
 
     def test_it_plays_and_obeys_keys(self):
         self.report(self.plane)

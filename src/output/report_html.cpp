@@ -7,6 +7,7 @@
 
 #include "deflate.hpp"
 #include "files.hpp"
+#include "force_file.hpp"
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
 #include "itr/output/report.hpp"
@@ -136,12 +137,13 @@ std::string meta(const FrameEncoder& encoder, const std::string& title, const st
   for (const std::string& note : notes) said.push_back(json_string(note));
   return fmt::format(
       R"({{"title":{},"version":{},"dim":{},"origin":{},"low":{},"high":{},"counts":{},"inside":{},"azimuth":{},)"
-      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"largest_u":{},"ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},"certificate":{},)"
+      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"shown":[{}],"largest_u":{},)"
+      R"("ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},"certificate":{},)"
       R"("colours":[{}],"chunks":[{}],"frames":[{}]}})",
       json_string(title), json_string(ITR_VERSION), dim, json_list(encoder.origin(), dim), json_list(encoder.low(), dim),
       json_list(encoder.high(), dim), counts, has_inside, kAzimuth, kElevation, json_fields(encoder.vertex_fields()),
-      json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), encoder.largest_u(),
-      json_range(encoder.volume_ratios()), json_range(encoder.longest_edges()), fmt::join(said, ","),
+      json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), fmt::join(encoder.shown(), ","),
+      encoder.largest_u(), json_range(encoder.volume_ratios()), json_range(encoder.longest_edges()), fmt::join(said, ","),
       summary.empty() ? "null" : summary, certificate.empty() ? "null" : certificate, colours(), fmt::join(chunks, ","),
       fmt::join(frames, ","));
 }
@@ -178,6 +180,7 @@ std::string run_blocks(const std::string& prefix, const std::string& name, const
   std::string data =
       block(prefix + "meta", in_script(meta(encoder, name, counts, has_inside, summary, notes, certificate)), true);
   data += block(prefix + "steps", base64(deflate(step_lines(directory)))) + block(prefix + "topology", base64(topology));
+  data += block(prefix + "forces", base64(deflate(stored_forces(directory))));
   for (std::size_t i = 0; i < encoder.chunks().size(); ++i)
     data += block(fmt::format("{}chunk{}", prefix, i), base64(encoder.chunks()[i].bytes));
   return data;

@@ -92,12 +92,13 @@ class Run {
     this.meshes = new Map();
     const known = (list, where) => list.map((f, i) => ({...f, where, i}));
     this.stored = [...known(this.meta.vertex_fields, 'vertex'), ...known(this.meta.cell_fields, 'cell')];
-    this.stored.forEach((f, i) => f.largest = this.meta.largest[i]);
+    this.stored.forEach((f, i) => (f.largest = this.meta.largest[i], f.shown = this.meta.shown[i]));
   }
 
   async load() {
     const n = this.meta.counts, dim = this.dim;
-    const [topology, steps] = await Promise.all([inflate(this.prefix + 'topology'), inflate(this.prefix + 'steps')]);
+    const [topology, steps, forces] =
+        await Promise.all(['topology', 'steps', 'forces'].map(id => inflate(this.prefix + id)));
     const r = new Reader(topology);
     const rest = r.floats(dim * n.vertices);
     this.rest = Array.from({length: dim}, (_, k) => rest.subarray(k * n.vertices, (k + 1) * n.vertices));
@@ -110,7 +111,9 @@ class Run {
     const ids = this.obstacleIds = alive(this.vertices, 0).filter(v => this.kind[v] === KIND.obstacle);
     this.obstacleEdges = r.columns(n.obstacle_edges, 2).map(column => column.map(i => ids[i]));
     this.obstacleFaces = r.columns(n.obstacle_faces, 3).map(column => column.map(i => ids[i]));
-    this.steps = new TextDecoder().decode(steps).split('\n').filter(Boolean).map(line => JSON.parse(line));
+    const linesOf = bytes => new TextDecoder().decode(bytes).split('\n').filter(Boolean);
+    this.steps = linesOf(steps).map(line => JSON.parse(line));
+    this.curves = curvesOf(linesOf(forces));
     return this;
   }
 
@@ -233,6 +236,18 @@ class Frame {
     for (const c of mesh.cells) values[c] = measure(c);
     return {of: 'cell', values};
   }
+}
+
+// Of lines of forces.csv: by name, times and the values of each column after it.
+function curvesOf([header, ...lines]) {
+  const curves = new Map(), columns = (header ?? '').split(',').slice(3);
+  for (const line of lines) {
+    const [, t, name, ...values] = line.split(',');
+    if (!curves.has(name)) curves.set(name, {times: [], ...Object.fromEntries(columns.map(c => [c, []]))});
+    curves.get(name).times.push(Number(t));
+    columns.forEach((c, k) => curves.get(name)[c].push(Number(values[k])));
+  }
+  return curves;
 }
 
 function volume(run, c, at) {

@@ -23,6 +23,7 @@ in float value; in vec3 weights; in float beyond; flat in float shine;
 uniform sampler2D colours;
 uniform vec3 flatColour;
 uniform float edges;   // how dark
+uniform float opacity;
 out vec4 colour;
 void main() {
 #ifdef CUT
@@ -38,7 +39,7 @@ void main() {
   float fade = clamp(0.22 / max(max(width.x, width.y), width.z), 0.15, 1.0);
   base *= 1.0 - edges * fade * (1.0 - smoothstep(0.35, 1.25, min(min(far.x, far.y), far.z)));
 #endif
-  colour = vec4(base, 1.0);
+  colour = vec4(base, opacity);
 }`;
 
 // Corners of triangles: places (3 numbers), share of the colours, weights (4 bytes, 0 on the edge that is drawn).
@@ -224,7 +225,7 @@ function isSoftware() {
 class Painter {
   // Throws where there is no WebGL2.
   constructor(canvas, colours) {
-    const gl = this.gl = canvas.getContext('webgl2', {antialias: !isSoftware(), alpha: false});
+    const gl = this.gl = canvas.getContext('webgl2', {antialias: !isSoftware(), alpha: false, stencil: true});
     if (!gl) throw new Error('no WebGL2');
     this.programs = new Map();
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
@@ -237,6 +238,7 @@ class Painter {
       gl.texParameteri(gl.TEXTURE_2D, name, value);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE);
   }
 
   program(...words) {
@@ -255,7 +257,7 @@ class Painter {
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
     const at = Object.fromEntries(
-        ['toClip', 'cut', 'flatColour', 'light', 'edges'].map(n => [n, gl.getUniformLocation(program, n)]));
+        ['toClip', 'cut', 'flatColour', 'light', 'edges', 'opacity'].map(n => [n, gl.getUniformLocation(program, n)]));
     this.programs.set(key, {program, at});
     return this.programs.get(key);
   }
@@ -285,13 +287,17 @@ class Painter {
   begin(width, height, toClip, light) {
     const {gl} = this;
     Object.assign(this, {toClip, light});
+    gl.depthMask(true);  // what is not written is not cleared
     gl.viewport(0, 0, width, height);
     gl.clearColor(1, 1, 1, 1);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
   }
 
-  // isClosed: the triangles enclose bodies, their fronts outside.
-  draw(what, {cut = null, flat = null, edges = 0, lines = false, isClosed = false} = {}) {
+  // isClosed: the triangles enclose bodies, their fronts outside. mark: later drawing knows the pixels, and is only over the
+  // 'marked' ones, or over the 'rest'.
+  draw(
+      what,
+      {cut = null, flat = null, edges = 0, lines = false, isClosed = false, mark = false, over = null, opacity = 1} = {}) {
     const {gl} = this;
     if (!what.count) return;
     isClosed ? gl.enable(gl.CULL_FACE) : gl.disable(gl.CULL_FACE);
@@ -302,6 +308,12 @@ class Painter {
     if (cut) gl.uniform4f(at.cut, cut[0], cut[1], cut[2], cut[3]);
     if (flat) gl.uniform3fv(at.flatColour, flat);
     if (edges > 0) gl.uniform1f(at.edges, edges);
+    gl.uniform1f(at.opacity, opacity);
+    mark || over ? gl.enable(gl.STENCIL_TEST) : gl.disable(gl.STENCIL_TEST);
+    gl.stencilFunc(mark ? gl.ALWAYS : gl.EQUAL, over === 'rest' ? 0 : 1, 1);
+    gl.stencilOp(gl.KEEP, gl.KEEP, mark ? gl.REPLACE : gl.KEEP);
+    opacity < 1 ? gl.enable(gl.BLEND) : gl.disable(gl.BLEND);
+    gl.depthMask(opacity === 1);
     gl.bindVertexArray(what.array);
     gl.drawArrays(lines ? gl.LINES : gl.TRIANGLES, 0, what.count);
   }
