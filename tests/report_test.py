@@ -592,9 +592,11 @@ class Report(unittest.TestCase):
         run = lambda name, k: {"run": name, "series": "uniform", "label": f"n_refs {k}", "set": [f"/geometry/0/n_refs={k}", '/a="b c"'],
                                "solver": "", "status": "finished", "vertices": 4 + k, "unknowns": 10 * 4 ** k, "memory_mb": 20 + k,
                                "processor_seconds": 0.5 * 8 ** k, "against": "reference", "errors": {"l2": 0.1 / 4 ** k, "h1": 0.3 / 2 ** k}}
+        small = {**run("small", 2), "errors": {"l2": None, "h1": 0.05}}
         failed = {"run": "worse", "series": "itr", "label": "tolerance 1 J", "set": [], "solver": "", "status": "failed", "reason": "too <long>"}
         study = {"scene": "my scene.json", "settings": "", "version": "0", "reference": "`reference`", "times": 1, "verdicts": [], "orders": [],
-                 "answers": ["Refining pays by <b>4</b>."], "runs": [run("coarse", 0), run("fine", 1), failed]}
+                 "answers": ["Refining pays by <b>4</b>."], "runs": [run("coarse", 0), run("fine", 1), small, failed],
+                 "worth": {"l2": 0.01, "h1": 0.02}, "doubts": ["`small` is not told."]}
         (folder / "study.json").write_text(json.dumps(study))
         (folder / "study.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" id="stored" width="50" height="50"></svg>')
 
@@ -606,6 +608,10 @@ class Report(unittest.TestCase):
         browser = self.browser
         self.assertEqual(browser.run("await Promise.all(r.views.map(v => v.ready)); return [r.shown, r.diagrams.length, r.views.map(v => v.state.field)]"),
                          [["fine", "coarse"], 6, ["difference", "difference"]])
+        self.assertIn("small is not told.", browser.run("return document.querySelector('.doubts').textContent"))
+        rows = browser.run("return [...document.querySelectorAll('.words tr')].map(row => [...row.children].slice(-2).map(e => e.textContent))")
+        self.assertEqual(rows[1:], [["10 %", "30 %"], ["2.5 %", "15 %"], ["< 1 %", "5 %"], ["", ""]])
+        self.assertIn("what the reference is worth", browser.run("return r.diagrams[0].figure.textContent"))
         self.assertIn("Refining pays by <b>4</b>.", browser.run("return document.querySelector('.words').textContent"))
         # The difference is 0.1 x, from 0 on the left to 0.1 m on the right, in both.
         browser.run("await r.show(1, 'fine'); await r.show(1, 'coarse'); r.views.forEach(v => v.set({edges: false})); await Promise.all(r.views.map(v => v.ready))")
@@ -622,7 +628,7 @@ class Report(unittest.TestCase):
         # A point tells its run and the command; a click shows it.
         browser.run("document.querySelector('circle[data-run=coarse]').dispatchEvent(new MouseEvent('click')); await r.show(1, 'fine')")
         self.assertEqual(browser.run("return r.shown"), ["coarse", "fine"])
-        self.assertEqual(browser.run("return document.querySelector('.words code').textContent"),
+        self.assertEqual(browser.run("return document.querySelector('.words p > code').textContent"),
                          "itr run 'my scene.json' -o coarse --set /geometry/0/n_refs=0 --set '/a=\"b c\"'")
         browser.run("[...document.querySelectorAll('.words tr')].pop().click()")
         self.assertIn("failed: too <long>", browser.run("return document.querySelector('.words pre').textContent"))
