@@ -92,18 +92,24 @@ std::string step_lines(const fs::path& directory) {
   return text.substr(0, text.rfind('\n') + 1);
 }
 
+/// Where the colours of a field of cells end.
+double shown(const FrameEncoder& encoder, std::string_view name) {
+  for (std::size_t i = 0; i < encoder.cell_fields().size(); ++i)
+    if (encoder.cell_fields()[i].name == name) return encoder.shown()[encoder.vertex_fields().size() + i];
+  return 0;
+}
+
 std::string pictures(const std::vector<fs::path>& files, const FrameEncoder& encoder) {
   std::vector<fs::path> chosen = {files.front(), files[files.size() / 2], files.back()};
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   std::vector<StoredFrame> frames;
   std::vector<std::vector<double>> densities;
-  double largest = 0;
+  const double largest = shown(encoder, "elastic_density");
   for (const fs::path& path : chosen) {
     frames.push_back(read_frame(path));
     densities.emplace_back();
     for (StoredField& field : read_frame_fields(path))
       if (field.name == "elastic_density") densities.back() = std::move(field.values);
-    for (const double value : densities.back()) largest = std::max(largest, value);
   }
   std::string html;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -114,8 +120,8 @@ std::string pictures(const std::vector<fs::path>& files, const FrameEncoder& enc
         "</figure>\n",
         step_of_frame(chosen[i]), base64(png), read_frame_sizes(chosen[i]).t);
   }
-  return html +
-         fmt::format("<p>Colour: elastic energy density, 0 to {:.4g} J/m{}.</p>\n", largest, encoder.dim() == 2 ? "²" : "³");
+  return html + fmt::format("<p>Colour: elastic energy density, 0 to {:.4g} J/m{} and more.</p>\n", largest,
+                            encoder.dim() == 2 ? "²" : "³");
 }
 
 std::string colours() {

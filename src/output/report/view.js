@@ -134,7 +134,7 @@ class View {
     const link = html('button', {onclick: () => this.copyLink(link)}, 'copy link');
     this.side = html(
         'div', {className: 'side'}, labelled('colour', field), check('log', 'logarithmic'),
-        labelled('from, to', number('least', 'least'), number('most', 'most')), html('hr'), labelled('deformed ×', factor),
+        labelled('from, to', number('least', 'least'), number('most', 'most')), html('hr'), labelled('deform ×', factor),
         check('edges', 'edges of cells'), check('obstacles', 'obstacles'),
         ...(isPair ? [] : [check('edits', 'edits of remeshing')]),
         ...(this.dim === 3 ? [html('hr'), labelled('cut', axis), labelled('at', cut), check('flip', 'other side')] : []),
