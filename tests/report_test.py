@@ -439,6 +439,41 @@ class Report(Cases):
         self.assert_drawn(((0.4, 0.2), 1))
         self.assertEqual(self.browser.errors(), [])
 
+    def test_partly_curved_meshes_are_drawn_with_their_own_edges(self):
+        folder = self.folder / "partly"  # of a square's two cells one has a curved edge, at its bottom
+        rest = SQUARE + [[0.5, 0]]
+        write_frame(folder, 0, 0, rest, SQUARE + [[0.5, -0.2]], [[0, 1, 2], [0, 2, 3]], [5, 10], curved=[[0, 1]])
+        write_steps(folder, [0])
+        self.report(folder)
+        self.open(folder / "report.html", "#edges=0")
+        self.assert_drawn(((0.5, -0.18), 0.5), ((0.5, -0.22), None), ((0.1, -0.06), 0.5), ((0.1, -0.09), None), ((0.5, 0.98), 1),
+                          ((0.5, 1.02), None), ((0.98, 0.5), 0.5), ((1.02, 0.5), None))
+        self.browser.run("await v.set({field: 'order'})")
+        self.assert_drawn(((0.7, 0.3), 1 / 3), ((0.3, 0.7), 0))
+        self.assertEqual(self.browser.errors(), [])
+
+    def test_curved_solids_are_drawn_curved(self):
+        rest, cells = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1]], [[0, 2, 1, 3]]
+        edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+        light = 0.55 + 0.45 * 0.86
+        for name, curved in (("one", edges[:1]), ("all", edges)):
+            folder = self.folder / ("solid curved " + name)
+            nodes = [numpy.add(rest[a], rest[b]) / 2 for a, b in curved]
+            write_frame(folder, 0, 0, rest + nodes, rest + [nodes[0] - [0, 0.2, 0]] + nodes[1:], cells, [10], curved=curved)
+            write_steps(folder, [0])
+            self.report(folder)
+            self.open(folder / "report.html", "#edges=0&view=0,0,1,0.5,0.5,0")
+            inside = [self.browser.place(*p) for p in ((0.5, -0.17), (0.1, -0.05), (0.3, 0.3), (0.02, 0.5))]
+            outside = [self.browser.place(*p) for p in ((0.5, -0.23), (0.1, -0.1), (-0.03, 0.5), (0.53, 0.53))]
+            picture = self.browser.picture()
+            for place in inside:
+                self.assert_colour(picture, place, light * numpy.array(colour(1)), 9)
+            for place in outside:
+                self.assert_colour(picture, place, [255] * 3)
+            self.browser.click(*inside[0])
+            self.assertIn("cell 0", self.browser.run("return v.pickText.textContent"))
+        self.assertEqual(self.browser.errors(), [])
+
     def test_plots_move_the_time(self):
         self.report(self.plane)
         self.open(self.plane / "report.html", "#t=0")
