@@ -362,6 +362,23 @@ class Report(Cases):
         self.assertIn("vertex 6 is not in this frame", self.browser.run("return v.pickText.textContent"))
         self.assertEqual(self.browser.errors(), [])
 
+    def test_two_fingers_zoom_and_move(self):
+        self.report(self.plane)
+        self.open(self.plane / "report.html")
+        x, y = self.browser.place(1.75, 0.5)
+        finger = lambda name, at, to: {"type": "pointer", "id": name, "parameters": {"pointerType": "touch"}, "actions": [
+            {"type": "pointerMove", "x": at[0], "y": at[1]}, {"type": "pointerDown", "button": 0},
+            {"type": "pointerMove", "x": to[0], "y": to[1], "duration": 50}, {"type": "pointerUp", "button": 0}]}
+        before = self.browser.run("return v.project([1.75, 0.5, 0])")
+        fingers = [finger("a", (x - 50, y), (x - 100, y + 30)), finger("b", (x + 50, y), (x + 100, y + 30))]
+        self.browser.call("POST", self.browser.session + "/actions", {"actions": fingers})
+        self.assertAlmostEqual(self.browser.run("return v.camera.zoom"), 2, delta=0.1)
+        after = self.browser.run("return v.project([1.75, 0.5, 0])")
+        self.assertLess(abs(after[0] - before[0]) + abs(after[1] - before[1] - 30), 6)
+        self.assertEqual(self.browser.run("return v.state.pick"), None)
+        self.browser.call("DELETE", self.browser.session + "/actions")
+        self.assertEqual(self.browser.errors(), [])
+
     def test_a_link_opens_the_same_view(self):
         self.report(self.solid)
         self.open(self.solid / "report.html")
@@ -758,6 +775,11 @@ class Report(Cases):
         self.open(folder / "report.html")
         self.assertIn("stopped in step", self.browser.run("return document.getElementById('said').textContent"))
         self.assertGreater(self.browser.run("return r.run.frames.length"), 3)
+        self.assertEqual(self.browser.errors(), [])
+
+    def test_the_committed_one_opens(self):
+        self.open(EXAMPLES / "masticator.html")
+        self.assertEqual(self.browser.run("return r.run.frames[r.run.frames.length - 1].step"), 200)
         self.assertEqual(self.browser.errors(), [])
 
     def test_what_cannot_be_shown_is_said(self):

@@ -567,8 +567,8 @@ class View {
       travel += Math.abs(dx) + Math.abs(dy) + Math.abs(spread() - before);
       if (travel < 4) return;
       if (down.size > 1) {
+        this.pan(dx, dy);  // first, so that what is between the fingers stays there
         if (before) this.zoomAt(spread() / before, nx, ny);
-        this.pan(dx, dy);
       } else if (e.shiftKey || e.buttons & 6) {
         this.pan(dx, dy);
       } else {
