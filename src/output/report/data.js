@@ -152,13 +152,19 @@ class Run {
     return chunk.promise;
   }
 
-  unpack(chunk, bytes) {
+  // In parts between which the page can draw, unless a frame of the chunk is waited for.
+  async unpack(chunk, bytes) {
     const r = new Reader(bytes), {vertex_fields: ofVertices, cell_fields: ofCells, counts} = this.meta;
     const make = (n, size, byLine) => Array.from({length: n}, () => new Predictor(size, byLine));
     const u = make(this.dim, counts.vertices, true), v = make(ofVertices.length, counts.vertices, false);
     const c = make(ofCells.length, counts.cells, false);
     const frames = [];
+    let start = performance.now();
     for (let f = chunk.first; f < chunk.first + chunk.count; ++f) {
+      if (!chunk.isAwaited && performance.now() - start > 3) {
+        await new Promise(resolve => setTimeout(resolve));
+        start = performance.now();
+      }
       const mesh = this.mesh(f);
       const restore = (ids, rows) => predictor => {
         const codes = r.codes(ids.length);
@@ -176,7 +182,9 @@ class Run {
 
   // A frame's mesh, displacements by id of vertex [m], and values of fields.
   async frame(index) {
-    const k = this.chunkOf(index), chunk = this.chunks[k], frames = await this.decode(k);
+    const k = this.chunkOf(index), chunk = this.chunks[k];
+    chunk.isAwaited = true;
+    const frames = await this.decode(k);
     if (k + 1 < this.chunks.length) this.decode(k + 1);
     return new Frame(this, index, frames[index - chunk.first], chunk);
   }

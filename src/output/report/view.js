@@ -617,12 +617,13 @@ class View {
     const turn = this.playTurn = {};
     if (on && this.state.frame === this.run.frames.length - 1) await this.set({frame: 0});
     const pause = Math.max(1000 / 30, Math.min(200, 4000 / this.run.frames.length));
-    let taken = pause;
+    let taken = pause, due = performance.now();
     while (this.playing && turn === this.playTurn && this.state.frame + 1 < this.run.frames.length) {
       const start = performance.now();
       await this.set({frame: this.state.frame + 1});
+      due = Math.max(due + pause, start);  // a late frame is made up for by the next one
       do await new Promise(requestAnimationFrame);
-      while (performance.now() - start < pause - 5);
+      while (performance.now() < due - 5);
       // Where drawing is slow, pixels are larger while it plays.
       taken += 0.2 * (performance.now() - start - taken);
       if (taken > 1.3 * pause && this.sharpness > 0.5) this.sharpen(this.sharpness - 0.25), taken = pause;
