@@ -722,9 +722,10 @@ class Report(Cases):
                                "solver": "", "status": "finished", "vertices": 4 + k, "unknowns": 10 * 4 ** k, "memory_mb": 20 + k,
                                "processor_seconds": 0.5 * 8 ** k, "against": "reference", "errors": {"l2": 0.1 / 4 ** k, "h1": 0.3 / 2 ** k}}
         small = {**run("small", 2), "errors": {"l2": None, "h1": 0.05}}
+        time = {**run("time-1", 0), "series": "time", "against": "time-4"}
         failed = {"run": "worse", "series": "itr", "label": "tolerance 1 J", "set": [], "solver": "", "status": "failed", "reason": "too <long>"}
         study = {"scene": "my scene.json", "settings": "", "version": "0", "reference": "`reference`", "times": 1, "verdicts": [], "orders": [],
-                 "answers": ["Refining pays by <b>4</b>."], "runs": [run("coarse", 0), run("fine", 1), small, failed],
+                 "answers": ["Refining pays by <b>4</b>."], "runs": [run("coarse", 0), run("fine", 1), small, time, failed],
                  "worth": {"l2": 0.01, "h1": 0.02}, "doubts": ["`small` is not told."]}
         (folder / "study.json").write_text(json.dumps(study))
         (folder / "study.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" id="stored" width="50" height="50"></svg>')
@@ -739,9 +740,10 @@ class Report(Cases):
                          [["fine", "coarse"], 6, ["difference", "difference"]])
         self.assertIn("small is not told.", browser.run("return document.querySelector('.doubts').textContent"))
         rows = browser.run("return [...document.querySelectorAll('.words tr')].map(row => [...row.children].slice(-2).map(e => e.textContent))")
-        self.assertEqual(rows[1:], [["10 %", "30 %"], ["2.5 %", "15 %"], ["< 1 %", "5 %"], ["", ""]])
+        self.assertEqual(rows[1:], [["10 %", "30 %"], ["2.5 %", "15 %"], ["< 1 %", "5 %"], ["10 %", "30 %"], ["", ""]])
+        self.assertEqual(browser.run("return [...r.diagrams[0].figure.querySelectorAll('circle')].map(dot => dot.dataset.run)"), ["coarse", "fine"])
         self.assertIn("what the reference is worth", browser.run("return r.diagrams[0].figure.textContent"))
-        self.assertIn("Refining pays by <b>4</b>.", browser.run("return document.querySelector('.words').textContent"))
+        self.assertIn("Refining pays by <b>4</b>.", browser.run("return document.querySelector('.words:not(.point)').textContent"))
         # The difference is 0.1 x, from 0 on the left to 0.1 m on the right, in both.
         browser.run("await r.show(1, 'fine'); await r.show(1, 'coarse'); r.views.forEach(v => v.set({edges: false})); await Promise.all(r.views.map(v => v.ready))")
         self.assertIn("0.1", browser.run("return r.views[0].legend.textContent"))
@@ -764,7 +766,7 @@ class Report(Cases):
         self.assertEqual(browser.errors(), [])
         self.assertIn("the mesh of fine is left out", self.report(folder, "--max-mb", "0.0001").stdout)
         self.open(folder / "report.html", "?pictures")
-        self.assertEqual(browser.run("return [!!document.getElementById('stored'), r.diagrams.length]"), [True, 6])
+        self.assertEqual(browser.run("return [document.getElementById('stored').getBoundingClientRect().width, r.diagrams.length]"), [0, 6])
         self.assertEqual(browser.errors(), [])
 
     def test_a_run_that_stops_is_shown_as_far_as_it_came(self):

@@ -10,7 +10,8 @@ const PLOT = {
   top: 8,
   bottom: 22
 };
-const LINE_COLOURS = ['#0072b2', '#d55e00', '#009e73', '#cc79a7', '#b07400', '#3a9bd0', '#1d2530'];
+const LINE_COLOURS =
+    ['#0072b2', '#d55e00', '#009e73', '#cc79a7', '#b07400', '#3a9bd0', '#1d2530', '#7a3e9d', '#8c4a2f', '#7f7f00'];
 
 function svg(name, attributes = {}, ...children) {
   const element = document.createElementNS('http://www.w3.org/2000/svg', name);

@@ -19,6 +19,10 @@ function errorText(study, run, measure) {
   return value === null ? `< ${write(study.worth?.[measure] ?? 0)}` : write(value);
 }
 
+// Runs that diagrams compare: those on other meshes, not with other solvers or time steps; without what tells the worth.
+const shownIn = study =>
+    study.runs.filter(r => !['solvers', 'time', ...(study.worth ? ['reference'] : [])].includes(r.series));
+
 // Text with `names` as code.
 const withCode = text => text.split('`').map((part, i) => i % 2 ? html('code', {}, part) : part);
 
@@ -27,8 +31,7 @@ class Diagram {
   constructor(study, [measure, label], [cost, costLabel], {onPoint, colourOf}) {
     const {width, left, right, top} = PLOT, height = 250, bottom = 38;
     const worth = study.worth?.[measure] ?? 0, isPoint = r => r.errors?.[measure] > 0 && r[cost] > 0;
-    this.points = study.runs.filter(r => isPoint(r) && !(worth && r.series === 'reference'))
-                      .map(run => ({run, x: run[cost], y: run.errors[measure]}));
+    this.points = shownIn(study).filter(isPoint).map(run => ({run, x: run[cost], y: run.errors[measure]}));
     if (!this.points.length) return;
     const range = values => {
       const [low, high] = [Math.min(...values), Math.max(...values)];
@@ -173,7 +176,7 @@ async function openStudy() {
         plots = document.getElementById('plots'), foot = document.getElementById('foot');
   said.append(...withCode(`Speed against error: ${study.scene} · errors against ${study.reference}`));
   foot.textContent = [...notes, `ITR ${study.version}`].join(' · ');
-  const series = [...new Set(study.runs.map(r => r.series))],
+  const series = [...new Set(shownIn(study).map(r => r.series))],
         colourOf = name => LINE_COLOURS[series.indexOf(name) % LINE_COLOURS.length];
   const report = {study, diagrams: [], views: [null, null], shown: ['', '']};
 
@@ -222,13 +225,18 @@ async function openStudy() {
                   run.processor_seconds === undefined ? '' : shortNumber(run.processor_seconds), errorText(study, run, 'l2'),
                   errorText(study, run, 'h1')]
                   .map(t => html('td', {}, String(t))))));
-  const words = html(
+  const point = html('section', {className: 'words point'}, legend, about, html('p', {}, command, ' ', copy));
+  const answers = html(
       'section', {className: 'words'}, html('ul', {}, ...study.answers.map(a => html('li', {}, ...withCode(a)))),
-      html('ul', {className: 'doubts'}, ...(study.doubts ?? []).map(d => html('li', {}, ...withCode(d)))), legend, about,
-      html('p', {}, command, ' ', copy), table);
-  plots.before(words);
+      html('ul', {className: 'doubts'}, ...(study.doubts ?? []).map(d => html('li', {}, ...withCode(d)))), table);
+  plots.before(point);
+  plots.after(answers);
+  if (report.diagrams.length) document.body.classList.add('with-diagrams');  // then the stored one is not needed
   if (study.runs.length) tell(study.runs.find(r => r.status === 'finished') ?? study.runs[0]);
-  if (!names.length) return report;
+  if (!names.length) {
+    document.getElementById('why').textContent = 'No run of this study has stored frames: no meshes are shown.';
+    return report;
+  }
 
   try {
     if (new URLSearchParams(location.search).has('pictures')) throw new Error('pictures asked for');
