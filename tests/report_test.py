@@ -489,6 +489,12 @@ class Report(Cases):
                 self.assert_colour(picture, place, [255] * 3)
             self.browser.click(*inside[0])
             self.assertIn("cell 0", self.browser.run("return v.pickText.textContent"))
+            # What is behind z = -0.05 is cut flat, also where the curved edge is: at x = 0.45 down to y = -0.14.
+            self.browser.run("await v.set({axis: 'z', cut: 0.95})")
+            sections = [self.browser.place(0.45, y, -0.05) for y in (-0.02, -0.1, -0.15)]
+            picture = self.browser.picture()
+            for place in sections:
+                self.assert_colour(picture, place, light * numpy.array(colour(1)), 9)
         self.assertEqual(self.browser.errors(), [])
 
     def test_plots_move_the_time(self):
