@@ -85,7 +85,7 @@ std::string stored_forces(const std::filesystem::path& directory) {
   if (!text.empty()) return text;
   for (const auto& path : stored_frames(directory)) {
     const StoredForces forces = read_frame_forces(path);
-    if (forces.curves.empty()) continue;
+    if (forces.curves.empty()) break;  // all frames of a run have them, or none: the others need not be opened
     if (text.empty()) text = header(forces.curves.front().kinds.front().size()) + '\n';
     for (const std::string& line : lines_of(forces.step, forces.t, forces.curves)) text += line + '\n';
   }
