@@ -41,7 +41,7 @@ def anchors(path):
 
 
 def links(text):
-    return re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'<img src="([^"]+)"', text)
+    return re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'<(?:img src|a href)="([^"]+)"', text)
 
 
 def blocks(page, language):

@@ -23,6 +23,17 @@ std::string header(std::size_t columns) {
   return text;
 }
 
+/// A line for each curve.
+std::vector<std::string> lines_of(int step, double t, const std::vector<ForceCurvePoint>& curves) {
+  std::vector<std::string> lines;
+  for (const ForceCurvePoint& curve : curves) {
+    std::string& line = lines.emplace_back(fmt::format("{},{},{}", step, t, curve.name));
+    for (const auto& kind : curve.kinds)
+      for (const double value : kind) line += fmt::format(",{}", value == 0 ? 0.0 : value);
+  }
+  return lines;
+}
+
 /// Bytes of the lines up to a step.
 std::size_t length_until(const std::filesystem::path& path, int last_step) {
   std::ifstream file(path, std::ios::binary);
@@ -49,12 +60,7 @@ void ForceFile::add(int step, double t, const std::vector<ForceCurvePoint>& curv
     file_->append(header(curves.front().kinds.front().size()));
   }
   size_before_ = file_->size();
-  for (const ForceCurvePoint& curve : curves) {
-    std::string line = fmt::format("{},{},{}", step, t, curve.name);
-    for (const auto& kind : curve.kinds)
-      for (const double value : kind) line += fmt::format(",{}", value == 0 ? 0.0 : value);
-    file_->append(std::move(line));
-  }
+  for (std::string& line : lines_of(step, t, curves)) file_->append(std::move(line));
 }
 
 void ForceFile::drop_last() {
@@ -70,6 +76,20 @@ int rewrite_forces(const std::filesystem::path& directory) {
   ForceFile file(directory, -1);
   for (const StoredForces& forces : stored) file.add(forces.step, forces.t, forces.curves);
   return static_cast<int>(stored.size());
+}
+
+std::string stored_forces(const std::filesystem::path& directory) {
+  std::ifstream file(directory / kForceFile, std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  text.resize(text.rfind('\n') + 1);  // a run that goes on may be writing the next line
+  if (!text.empty()) return text;
+  for (const auto& path : stored_frames(directory)) {
+    const StoredForces forces = read_frame_forces(path);
+    if (forces.curves.empty()) break;  // all frames of a run have them, or none: the others need not be opened
+    if (text.empty()) text = header(forces.curves.front().kinds.front().size()) + '\n';
+    for (const std::string& line : lines_of(forces.step, forces.t, forces.curves)) text += line + '\n';
+  }
+  return text;
 }
 
 }  // namespace itr::output

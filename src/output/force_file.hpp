@@ -33,4 +33,8 @@ class ForceFile {
 /// has.
 int rewrite_forces(const std::filesystem::path& directory);
 
+/// Text as forces.csv has it: of that file, its whole lines, or where there is none of the frames. Empty: no forces are
+/// stored.
+std::string stored_forces(const std::filesystem::path& directory);
+
 }  // namespace itr::output

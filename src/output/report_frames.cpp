@@ -15,10 +15,11 @@ namespace itr::output {
 
 namespace {
 
-constexpr int kFramesOfChunk = 16;  // decoded together: the more, the smaller; the fewer, the sooner the first is seen
-constexpr int kNever = 1 << 30;     // a frame that there is not
-constexpr double kGapShare = 0.02;  // of the bodies' diagonal: gaps beyond are not told apart
-constexpr double kNothing = 1e-9;   // times the largest value: is shown as zero, as its digits are round-off
+constexpr int kFramesOfChunk = 16;    // decoded together: the more, the smaller; the fewer, the sooner the first is seen
+constexpr int kNever = 1 << 30;       // a frame that there is not
+constexpr double kGapShare = 0.02;    // of the bodies' diagonal: gaps beyond are not told apart
+constexpr double kNothing = 1e-9;     // times the largest value: is shown as zero, as its digits are round-off
+constexpr double kShownShare = 0.98;  // of the values of a frame that have colours of their own
 
 enum Kind { vertex_kind, node_kind, obstacle_kind };
 
@@ -167,6 +168,7 @@ void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField
       cell_fields_.push_back({field.name, field.unit});
   }
   largest_.assign(vertex_fields_.size() + cell_fields_.size(), 0);
+  shown_ = largest_;
 }
 
 /// Logarithmic, 512 codes an octave: three digits of all between 10^-21 and 10^17. 0 is zero.
@@ -175,6 +177,15 @@ std::uint16_t FrameEncoder::code(std::size_t field, double value) {
   largest_[field] = std::max(largest_[field], value);
   if (value < kNothing * largest_[field]) return 0;
   return static_cast<std::uint16_t>(std::clamp(std::round(512 * (std::log2(value) + 70)), 0.0, 65535.0));
+}
+
+/// Values that are not zero: forces and stresses are zero at most places.
+void FrameEncoder::include_shown(std::size_t field, std::vector<double> values) {
+  std::erase_if(values, [](double value) { return !(value > 0) || !std::isfinite(value); });
+  if (values.empty()) return;
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(kShownShare * static_cast<double>(values.size()))) - 1;
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  shown_[field] = std::max(shown_[field], values[rank]);
 }
 
 namespace {
@@ -340,10 +351,12 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     const auto field = find(vertex_fields_[i].name);
     const int columns = field != fields.end() ? field->columns : 0;
     const bool is_there = columns > 0 && field->values.size() == static_cast<std::size_t>(nodes) * columns;
-    for (const auto& [id, node] : order) {
-      const bool has_value = is_there && node < nodes;
-      codes.push_back(has_value ? code(i, magnitude(&field->values[static_cast<std::size_t>(node) * columns], columns)) : 0);
-    }
+    std::vector<double> magnitudes(order.size(), 0);
+    for (std::size_t k = 0; k < order.size(); ++k)
+      if (const int node = order[k].second; is_there && node < nodes)
+        magnitudes[k] = magnitude(&field->values[static_cast<std::size_t>(node) * columns], columns);
+    for (const double value : magnitudes) codes.push_back(code(i, value));
+    include_shown(i, std::move(magnitudes));
     if (!is_there || field->unit != "N") continue;
     std::array<double, 3>& sum = entry.forces[field->name];
     for (std::size_t k = 0; k < field->values.size(); ++k) sum[k % dim] += field->values[k];
@@ -354,6 +367,7 @@ void FrameEncoder::add(const std::filesystem::path& path) {
     const bool is_there = field != fields.end() && field->values.size() == static_cast<std::size_t>(cells);
     for (const auto& [id, cell] : cell_order)
       codes.push_back(is_there ? code(vertex_fields_.size() + i, field->values[cell]) : 0);
+    if (is_there) include_shown(vertex_fields_.size() + i, field->values);
   }
   frames_.push_back(std::move(entry));
   pending_.push_back(std::move(pending));

@@ -90,6 +90,8 @@ class FrameEncoder {
   /// Bytes of all meshes, compressed; `counts` are the lengths of its tables, as JSON.
   std::string topology(std::string& counts) const;
   const std::vector<double>& largest() const { return largest_; }  ///< by field, those of vertices first
+  /// By field: what few values of each frame exceed, for colours that a single peak does not take.
+  const std::vector<double>& shown() const { return shown_; }
   double largest_u() const { return largest_u_; }
   /// Over all cells and frames, least and most.
   const std::array<double, 2>& volume_ratios() const { return volume_ratios_; }
@@ -104,6 +106,7 @@ class FrameEncoder {
   };
   void start(const StoredFrame& frame, const std::vector<StoredField>& fields);
   std::uint16_t code(std::size_t field, double value);
+  void include_shown(std::size_t field, std::vector<double> values);
   void measure(const StoredFrame& frame, int cell);
   void flush();
 
@@ -114,7 +117,7 @@ class FrameEncoder {
   std::vector<std::array<double, 3>> rest_;  ///< by id of vertices_
   StoredSurface obstacles_;                  ///< of the first frame
   std::vector<FieldName> vertex_fields_, cell_fields_;
-  std::vector<double> largest_;
+  std::vector<double> largest_, shown_;
   double largest_u_ = 0, gap_limit_ = 0;
   std::array<double, 2> volume_ratios_{INFINITY, -INFINITY}, longest_edges_{INFINITY, -INFINITY};
   std::vector<EncodedFrame> frames_;

@@ -7,6 +7,7 @@
 
 #include "deflate.hpp"
 #include "files.hpp"
+#include "force_file.hpp"
 #include "itr/core/error.hpp"
 #include "itr/output/certify.hpp"
 #include "itr/output/report.hpp"
@@ -91,18 +92,24 @@ std::string step_lines(const fs::path& directory) {
   return text.substr(0, text.rfind('\n') + 1);
 }
 
+/// Where the colours of a field of cells end.
+double shown(const FrameEncoder& encoder, std::string_view name) {
+  for (std::size_t i = 0; i < encoder.cell_fields().size(); ++i)
+    if (encoder.cell_fields()[i].name == name) return encoder.shown()[encoder.vertex_fields().size() + i];
+  return 0;
+}
+
 std::string pictures(const std::vector<fs::path>& files, const FrameEncoder& encoder) {
   std::vector<fs::path> chosen = {files.front(), files[files.size() / 2], files.back()};
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   std::vector<StoredFrame> frames;
   std::vector<std::vector<double>> densities;
-  double largest = 0;
+  const double largest = shown(encoder, "elastic_density");
   for (const fs::path& path : chosen) {
     frames.push_back(read_frame(path));
     densities.emplace_back();
     for (StoredField& field : read_frame_fields(path))
       if (field.name == "elastic_density") densities.back() = std::move(field.values);
-    for (const double value : densities.back()) largest = std::max(largest, value);
   }
   std::string html;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -113,8 +120,8 @@ std::string pictures(const std::vector<fs::path>& files, const FrameEncoder& enc
         "</figure>\n",
         step_of_frame(chosen[i]), base64(png), read_frame_sizes(chosen[i]).t);
   }
-  return html +
-         fmt::format("<p>Colour: elastic energy density, 0 to {:.4g} J/m{}.</p>\n", largest, encoder.dim() == 2 ? "²" : "³");
+  return html + fmt::format("<p>Colour: elastic energy density, 0 to {:.4g} J/m{} and more.</p>\n", largest,
+                            encoder.dim() == 2 ? "²" : "³");
 }
 
 std::string colours() {
@@ -136,12 +143,13 @@ std::string meta(const FrameEncoder& encoder, const std::string& title, const st
   for (const std::string& note : notes) said.push_back(json_string(note));
   return fmt::format(
       R"({{"title":{},"version":{},"dim":{},"origin":{},"low":{},"high":{},"counts":{},"inside":{},"azimuth":{},)"
-      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"largest_u":{},"ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},"certificate":{},)"
+      R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"shown":[{}],"largest_u":{},)"
+      R"("ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},"certificate":{},)"
       R"("colours":[{}],"chunks":[{}],"frames":[{}]}})",
       json_string(title), json_string(ITR_VERSION), dim, json_list(encoder.origin(), dim), json_list(encoder.low(), dim),
       json_list(encoder.high(), dim), counts, has_inside, kAzimuth, kElevation, json_fields(encoder.vertex_fields()),
-      json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), encoder.largest_u(),
-      json_range(encoder.volume_ratios()), json_range(encoder.longest_edges()), fmt::join(said, ","),
+      json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), fmt::join(encoder.shown(), ","),
+      encoder.largest_u(), json_range(encoder.volume_ratios()), json_range(encoder.longest_edges()), fmt::join(said, ","),
       summary.empty() ? "null" : summary, certificate.empty() ? "null" : certificate, colours(), fmt::join(chunks, ","),
       fmt::join(frames, ","));
 }
@@ -178,6 +186,7 @@ std::string run_blocks(const std::string& prefix, const std::string& name, const
   std::string data =
       block(prefix + "meta", in_script(meta(encoder, name, counts, has_inside, summary, notes, certificate)), true);
   data += block(prefix + "steps", base64(deflate(step_lines(directory)))) + block(prefix + "topology", base64(topology));
+  data += block(prefix + "forces", base64(deflate(stored_forces(directory))));
   for (std::size_t i = 0; i < encoder.chunks().size(); ++i)
     data += block(fmt::format("{}chunk{}", prefix, i), base64(encoder.chunks()[i].bytes));
   return data;

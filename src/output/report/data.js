@@ -92,12 +92,13 @@ class Run {
     this.meshes = new Map();
     const known = (list, where) => list.map((f, i) => ({...f, where, i}));
     this.stored = [...known(this.meta.vertex_fields, 'vertex'), ...known(this.meta.cell_fields, 'cell')];
-    this.stored.forEach((f, i) => f.largest = this.meta.largest[i]);
+    this.stored.forEach((f, i) => (f.largest = this.meta.largest[i], f.shown = this.meta.shown[i]));
   }
 
   async load() {
     const n = this.meta.counts, dim = this.dim;
-    const [topology, steps] = await Promise.all([inflate(this.prefix + 'topology'), inflate(this.prefix + 'steps')]);
+    const [topology, steps, forces] =
+        await Promise.all(['topology', 'steps', 'forces'].map(id => inflate(this.prefix + id)));
     const r = new Reader(topology);
     const rest = r.floats(dim * n.vertices);
     this.rest = Array.from({length: dim}, (_, k) => rest.subarray(k * n.vertices, (k + 1) * n.vertices));
@@ -110,7 +111,9 @@ class Run {
     const ids = this.obstacleIds = alive(this.vertices, 0).filter(v => this.kind[v] === KIND.obstacle);
     this.obstacleEdges = r.columns(n.obstacle_edges, 2).map(column => column.map(i => ids[i]));
     this.obstacleFaces = r.columns(n.obstacle_faces, 3).map(column => column.map(i => ids[i]));
-    this.steps = new TextDecoder().decode(steps).split('\n').filter(Boolean).map(line => JSON.parse(line));
+    const linesOf = bytes => new TextDecoder().decode(bytes).split('\n').filter(Boolean);
+    this.steps = linesOf(steps).map(line => JSON.parse(line));
+    this.curves = curvesOf(linesOf(forces));
     return this;
   }
 
@@ -149,13 +152,19 @@ class Run {
     return chunk.promise;
   }
 
-  unpack(chunk, bytes) {
+  // In parts between which the page can draw, unless a frame of the chunk is waited for.
+  async unpack(chunk, bytes) {
     const r = new Reader(bytes), {vertex_fields: ofVertices, cell_fields: ofCells, counts} = this.meta;
     const make = (n, size, byLine) => Array.from({length: n}, () => new Predictor(size, byLine));
     const u = make(this.dim, counts.vertices, true), v = make(ofVertices.length, counts.vertices, false);
     const c = make(ofCells.length, counts.cells, false);
     const frames = [];
+    let start = performance.now();
     for (let f = chunk.first; f < chunk.first + chunk.count; ++f) {
+      if (!chunk.isAwaited && performance.now() - start > 3) {
+        await new Promise(resolve => setTimeout(resolve));
+        start = performance.now();
+      }
       const mesh = this.mesh(f);
       const restore = (ids, rows) => predictor => {
         const codes = r.codes(ids.length);
@@ -173,7 +182,9 @@ class Run {
 
   // A frame's mesh, displacements by id of vertex [m], and values of fields.
   async frame(index) {
-    const k = this.chunkOf(index), chunk = this.chunks[k], frames = await this.decode(k);
+    const k = this.chunkOf(index), chunk = this.chunks[k];
+    chunk.isAwaited = true;
+    const frames = await this.decode(k);
     if (k + 1 < this.chunks.length) this.decode(k + 1);
     return new Frame(this, index, frames[index - chunk.first], chunk);
   }
@@ -233,6 +244,18 @@ class Frame {
     for (const c of mesh.cells) values[c] = measure(c);
     return {of: 'cell', values};
   }
+}
+
+// Of lines of forces.csv: by name, times and the values of each column after it.
+function curvesOf([header, ...lines]) {
+  const curves = new Map(), columns = (header ?? '').split(',').slice(3);
+  for (const line of lines) {
+    const [, t, name, ...values] = line.split(',');
+    if (!curves.has(name)) curves.set(name, {times: [], ...Object.fromEntries(columns.map(c => [c, []]))});
+    curves.get(name).times.push(Number(t));
+    columns.forEach((c, k) => curves.get(name)[c].push(Number(values[k])));
+  }
+  return curves;
 }
 
 function volume(run, c, at) {

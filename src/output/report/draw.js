@@ -23,6 +23,7 @@ in float value; in vec3 weights; in float beyond; flat in float shine;
 uniform sampler2D colours;
 uniform vec3 flatColour;
 uniform float edges;   // how dark
+uniform float opacity;
 out vec4 colour;
 void main() {
 #ifdef CUT
@@ -38,7 +39,7 @@ void main() {
   float fade = clamp(0.22 / max(max(width.x, width.y), width.z), 0.15, 1.0);
   base *= 1.0 - edges * fade * (1.0 - smoothstep(0.35, 1.25, min(min(far.x, far.y), far.z)));
 #endif
-  colour = vec4(base, 1.0);
+  colour = vec4(base, opacity);
 }`;
 
 // Corners of triangles: places (3 numbers), share of the colours, weights (4 bytes, 0 on the edge that is drawn).
@@ -171,34 +172,86 @@ function triangles(out, frame, x, field, share, cut) {
   if (cut && !inPlane) addSection(out, frame, x, field, share, cut);
 }
 
-// What a plane cuts of the cells, taken as straight: their sections, a hair within what is shown.
+// What a plane cuts of the cells: their sections, a hair within what is shown.
 function addSection(out, frame, x, field, share, cut) {
-  const {run, mesh} = frame, corners = run.cells.columns, byCell = field.of === 'cell', p = new Float32Array(12);
-  const heights = new Float32Array(run.meta.counts.vertices), [c0, c1, c2, c3] = corners;
+  const {run, mesh} = frame, corners = run.cells.columns.slice(0, 4), byCell = field.of === 'cell';
+  const heights = new Float32Array(run.meta.counts.vertices);
   for (const id of mesh.vertices)
     heights[id] = cut[0] * x[3 * id] + cut[1] * x[3 * id + 1] + cut[2] * x[3 * id + 2] - cut[3];
+  const isCut = h => {
+    const isAbove = h[0] > 0;
+    return h.some(value => value > 0 !== isAbove);
+  };
+  const isOuter = () => true, valueOf = id => byCell ? 0 : field.values[id];
   for (const cell of mesh.cells) {
-    const isAbove = heights[c0[cell]] > 0;
-    if (isAbove === heights[c1[cell]] > 0 && isAbove === heights[c2[cell]] > 0 && isAbove === heights[c3[cell]] > 0)
+    const v = corners.map(column => column[cell]), paint = byCell ? () => share(field.values[cell]) : share;
+    const edges = mesh.curved ? curvedEdgesOf(run, mesh, v) : [];
+    const h = v.map(id => heights[id]);
+    if (!edges.length) {
+      if (isCut(h))
+        addTetrahedron(out, v.map(id => x.subarray(3 * id, 3 * id + 3)), h, v.map(valueOf), v, paint, cell, cut, isOuter);
       continue;
-    const v = [c0[cell], c1[cell], c2[cell], c3[cell]], h = v.map(id => heights[id]);
-    const above = [], below = [];
-    for (let i = 0; i < 4; ++i) (h[i] > 0 ? above : below).push(i);
-    const pairs = above.length === 2 ?
-        [[above[0], below[0]], [above[0], below[1]], [above[1], below[1]], [above[1], below[0]]] :
-        above.length === 1 ? below.map(i => [above[0], i]) :
-                             above.map(i => [below[0], i]);
-    const s = pairs.map(([i, j], n) => {
-      const t = h[i] / (h[i] - h[j]);
-      for (let k = 0; k < 3; ++k)
-        p[3 * n + k] = x[3 * v[i] + k] + t * (x[3 * v[j] + k] - x[3 * v[i] + k]) - 1e-6 * cut[k] * cut[4];
-      return byCell ? share(field.values[cell]) : share(field.values[v[i]] * (1 - t) + field.values[v[j]] * t);
-    });
-    const near = pairs.map(([i, j]) => Math.abs(h[i]) < Math.abs(h[j]) ? v[i] : v[j]);
-    const last = pairs.length === 4;
-    out.add(p, 0, 1, 2, s[0], s[1], s[2], cell, last ? 5 : 7, near);
-    if (last) out.add(p, 0, 2, 3, s[0], s[2], s[3], cell, 3, [near[0], near[2], near[3]]);
+    }
+    // All of a curved cell is within its Bézier points.
+    if (!isCut([...h, ...edges.map(([i, j, node]) => 2 * heights[node] - (h[i] + h[j]) / 2)])) continue;
+    const at = (l, of) => v.reduce((sum, id, i) => sum + l[i] * of(id), 0) +
+        edges.reduce((sum, [i, j, node]) => sum + 2 * l[i] * l[j] * (2 * of(node) - of(v[i]) - of(v[j])), 0);
+    for (const part of PARTS_OF_CURVED) {
+      const ph = part.map(l => at(l, id => heights[id]));
+      if (!isCut(ph)) continue;
+      const points = part.map(l => [0, 1, 2].map(k => at(l, id => x[3 * id + k])));
+      const near = part.map(l => v[l.indexOf(Math.max(...l))]);
+      // Lines where the part's face is on a face of the cell.
+      const isLine = face => [0, 1, 2, 3].some(m => face.every(i => part[i][m] === 0));
+      addTetrahedron(out, points, ph, part.map(l => at(l, valueOf)), near, paint, cell, cut, isLine);
+    }
   }
+}
+
+// [corner, corner, node], corners 0 to 3.
+function curvedEdgesOf(run, mesh, v) {
+  const found = [];
+  for (let i = 0; i < v.length; ++i)
+    for (let j = 0; j < i; ++j) {
+      const node = mesh.curved.get(run.edgeKey(v[i], v[j]));
+      if (node !== undefined) found.push([i, j, node]);
+    }
+  return found;
+}
+
+// The 64 tetrahedra that halving all edges twice makes, by barycentric coordinates.
+const PARTS_OF_CURVED = (() => {
+  const middle = (a, b) => a.map((value, k) => (value + b[k]) / 2);
+  const halved = ([a, b, c, d]) => {
+    const [ab, ac, ad, bc, bd, cd] = [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]].map(([p, q]) => middle(p, q));
+    return [
+      [a, ab, ac, ad], [ab, b, bc, bd], [ac, bc, c, cd], [ad, bd, cd, d], [ab, ac, ad, bd], [ab, ac, bc, bd],
+      [ac, ad, bd, cd], [ac, bc, bd, cd]
+    ];
+  };
+  return halved([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).flatMap(halved);
+})();
+
+// The section of a straight tetrahedron with heights h above the plane; isLine: of a face, by three of its corners.
+function addTetrahedron(out, points, h, values, ids, paint, cell, cut, isLine) {
+  const above = [], below = [], p = new Float32Array(12);
+  for (let i = 0; i < 4; ++i) (h[i] > 0 ? above : below).push(i);
+  const pairs = above.length === 2 ?
+      [[above[0], below[0]], [above[0], below[1]], [above[1], below[1]], [above[1], below[0]]] :
+      above.length === 1 ? below.map(i => [above[0], i]) :
+                           above.map(i => [below[0], i]);
+  const s = pairs.map(([i, j], n) => {
+    const t = h[i] / (h[i] - h[j]);
+    for (let k = 0; k < 3; ++k) p[3 * n + k] = points[i][k] + t * (points[j][k] - points[i][k]) - 1e-6 * cut[k] * cut[4];
+    return paint(values[i] * (1 - t) + values[j] * t);
+  });
+  const near = pairs.map(([i, j]) => Math.abs(h[i]) < Math.abs(h[j]) ? ids[i] : ids[j]), n = pairs.length;
+  const drawn =
+      pairs.map((pair, k) => isLine([...new Set([...pair, ...pairs[(k + 1) % n]])]));  // from each point to the next
+  const bits = (...list) => list.reduce((sum, is, k) => sum + (is ? 1 << k : 0), 0);
+  if (n === 3) return out.add(p, 0, 1, 2, s[0], s[1], s[2], cell, bits(drawn[1], drawn[2], drawn[0]), near);
+  out.add(p, 0, 1, 2, s[0], s[1], s[2], cell, bits(drawn[1], false, drawn[0]), near);
+  out.add(p, 0, 2, 3, s[0], s[2], s[3], cell, bits(drawn[2], drawn[3], false), [near[0], near[2], near[3]]);
 }
 
 // Six times the volume within closed surfaces.
@@ -224,7 +277,7 @@ function isSoftware() {
 class Painter {
   // Throws where there is no WebGL2.
   constructor(canvas, colours) {
-    const gl = this.gl = canvas.getContext('webgl2', {antialias: !isSoftware(), alpha: false});
+    const gl = this.gl = canvas.getContext('webgl2', {antialias: !isSoftware(), alpha: false, stencil: true});
     if (!gl) throw new Error('no WebGL2');
     this.programs = new Map();
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
@@ -237,6 +290,7 @@ class Painter {
       gl.texParameteri(gl.TEXTURE_2D, name, value);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE);
   }
 
   program(...words) {
@@ -255,7 +309,7 @@ class Painter {
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
     const at = Object.fromEntries(
-        ['toClip', 'cut', 'flatColour', 'light', 'edges'].map(n => [n, gl.getUniformLocation(program, n)]));
+        ['toClip', 'cut', 'flatColour', 'light', 'edges', 'opacity'].map(n => [n, gl.getUniformLocation(program, n)]));
     this.programs.set(key, {program, at});
     return this.programs.get(key);
   }
@@ -285,13 +339,17 @@ class Painter {
   begin(width, height, toClip, light) {
     const {gl} = this;
     Object.assign(this, {toClip, light});
+    gl.depthMask(true);  // what is not written is not cleared
     gl.viewport(0, 0, width, height);
     gl.clearColor(1, 1, 1, 1);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
   }
 
-  // isClosed: the triangles enclose bodies, their fronts outside.
-  draw(what, {cut = null, flat = null, edges = 0, lines = false, isClosed = false} = {}) {
+  // isClosed: the triangles enclose bodies, their fronts outside. mark: later drawing knows the pixels, and is only over the
+  // 'marked' ones, or over the 'rest'.
+  draw(
+      what,
+      {cut = null, flat = null, edges = 0, lines = false, isClosed = false, mark = false, over = null, opacity = 1} = {}) {
     const {gl} = this;
     if (!what.count) return;
     isClosed ? gl.enable(gl.CULL_FACE) : gl.disable(gl.CULL_FACE);
@@ -302,6 +360,12 @@ class Painter {
     if (cut) gl.uniform4f(at.cut, cut[0], cut[1], cut[2], cut[3]);
     if (flat) gl.uniform3fv(at.flatColour, flat);
     if (edges > 0) gl.uniform1f(at.edges, edges);
+    gl.uniform1f(at.opacity, opacity);
+    mark || over ? gl.enable(gl.STENCIL_TEST) : gl.disable(gl.STENCIL_TEST);
+    gl.stencilFunc(mark ? gl.ALWAYS : gl.EQUAL, over === 'rest' ? 0 : 1, 1);
+    gl.stencilOp(gl.KEEP, gl.KEEP, mark ? gl.REPLACE : gl.KEEP);
+    opacity < 1 ? gl.enable(gl.BLEND) : gl.disable(gl.BLEND);
+    gl.depthMask(opacity === 1);
     gl.bindVertexArray(what.array);
     gl.drawArrays(lines ? gl.LINES : gl.TRIANGLES, 0, what.count);
   }

@@ -9,7 +9,7 @@ function describe(run) {
   else
     parts.push('not finished');
   if (last) parts.push(`${last.step} steps to t = ${shortNumber(last.t)} s`);
-  if (s) parts.push(`${shortNumber(s.seconds.total)} s`);
+  if (s) parts.push(`computed in ${shortNumber(s.seconds.total)} s`);
   return parts.join(' · ');
 }
 
@@ -21,6 +21,31 @@ function showCertificate({certificate}) {
       'details', {className: good ? 'certificate' : 'certificate failed'}, html('summary', {}, head + text),
       ...certificate.violations.map(v => html('div', {}, v)));
   document.querySelector('header').append(element);
+}
+
+// Those of one kind, which differ in their numbers, as one; a step of the first leads to its time.
+function showWarnings(run, onTime) {
+  const kinds = new Map();
+  const add = (text, count, step) => {
+    const kind = text.replace(/\d+(\.\d+)?(e[+-]?\d+)?/g, '#'), known = kinds.get(kind);
+    if (known) return step && (known.count += count, known.last = step);
+    kinds.set(kind, {text, count, first: step, last: step});
+  };
+  for (const step of run.steps)
+    for (const text of step.warnings ?? []) add(text, 1, step);
+  for (const {text, count} of run.meta.summary?.warnings ?? []) add(text, count);  // also what no step has
+  if (!kinds.size) return;
+  const list = [...kinds.values()], count = list.reduce((sum, w) => sum + w.count, 0);
+  const lineOf = ({text, count, first, last}) => {
+    const line = html('div', {}, count > 1 ? `${text} (${count} times)` : text);
+    if (!first) return line;
+    const from = first.step ? `step ${first.step}` : 'start', where = first === last ? from : `${from} to ${last.step}`;
+    line.prepend(html('button', {onclick: () => onTime(first.t), title: 'show this time'}, where), ' ');
+    return line;
+  };
+  document.querySelector('header').append(html(
+      'details', {className: 'warnings'}, html('summary', {}, `${count} warning${count > 1 ? 's' : ''}`),
+      ...list.map(lineOf)));
 }
 
 function showPlots(run, onTime) {
@@ -40,17 +65,19 @@ async function openPage() {
   document.getElementById('said').textContent = describe(run);
   showCertificate(run.meta);
   document.getElementById('foot').textContent = [
-    ...run.meta.notes, `ITR ${run.meta.version}`,
-    'drag: turn (shift: move), wheel: zoom; keys: space, comma, dot, arrows, + − f e l'
+    ...run.meta.notes, `ITR ${run.meta.version}`, 'drag: turn, with shift: move; wheel: zoom',
+    'keys: space plays, comma and dot step, arrows turn, + and − zoom, f fits, e edits, l logarithmic'
   ].join(' · ');
   let view = null, pending = 0, shown = 0;
   const report = {run, plots: [], view: null};
   const showTime = () => report.plots.forEach(p => p.show(run.frames[view ? view.state.frame : run.frames.length - 1].t));
-  report.plots = showPlots(run, t => {
+  const onTime = t => {
     if (!view) return report.plots.forEach(p => p.show(t));
     const frame = nearest(run.frames.map(f => f.t), t);
     if (frame !== view.state.frame) view.set({frame});
-  });
+  };
+  showWarnings(run, onTime);
+  report.plots = showPlots(run, onTime);
   try {
     if (new URLSearchParams(location.search).has('pictures')) throw new Error('pictures asked for');
     const remember = () => {

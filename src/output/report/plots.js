@@ -10,7 +10,8 @@ const PLOT = {
   top: 8,
   bottom: 22
 };
-const LINE_COLOURS = ['#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#1d2530'];
+const LINE_COLOURS =
+    ['#0072b2', '#d55e00', '#009e73', '#cc79a7', '#b07400', '#3a9bd0', '#1d2530', '#7a3e9d', '#8c4a2f', '#7f7f00'];
 
 function svg(name, attributes = {}, ...children) {
   const element = document.createElementNS('http://www.w3.org/2000/svg', name);
@@ -34,6 +35,14 @@ function shortNumber(value) {
   return String(Number(value.toPrecision(4)));
 }
 
+// Numbers of one scale, all written alike.
+function marksOf(values) {
+  const size = Math.max(...values.map(Math.abs)), isShort = size < 1e5 && size >= 0.01;
+  return isShort && values.every(v => v === 0 || Math.abs(v) >= 0.01 * size) ?
+      values.map(shortNumber) :
+      values.map(v => v === 0 ? '0' : v.toExponential(1).replace('e+', 'e'));
+}
+
 function ticksOf(low, high, log) {
   const found = [];
   if (log) {
@@ -41,7 +50,7 @@ function ticksOf(low, high, log) {
     if (found.length > 1) return found;
   }
   if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)))) return [low];
-  const raw = (high - low) / 4, power = 10 ** Math.floor(Math.log10(raw)),
+  const raw = (high - low) / 5, power = 10 ** Math.floor(Math.log10(raw)),
         step = [1, 2, 5, 10].find(m => m * power >= raw) * power;
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) found.push(k * step);
   return found;
@@ -63,8 +72,10 @@ function plotsOf(run) {
     const shown = series.filter(s => s.values.some(v => Number.isFinite(v) && v !== 0));
     if (shown.length && at.length > 1) list.push({title, unit, log, times: at, series: shown});
   };
-  const names = ['inertia', 'elastic', 'body', 'contact', 'friction', 'damping', 'total'];
-  add('Energy of the step by term', 'J', names.map(name => ({name, values: take(s => s.energy?.[name])})));
+  const names = ['inertia', 'elastic', 'body', 'contact', 'friction', 'damping'];
+  add('Energy of the step by term', 'J', [
+    ...names.map((name, k) => ({name, colour: LINE_COLOURS[k]})), {name: 'total', colour: '#1d2530', dashes: '4 3'}
+  ].map(s => ({...s, values: take(step => step.step > 0 ? step.energy?.[s.name] : NaN)})));  // no step has made step 0
   add('Vertices', '', [{name: '', values: take(s => s.vertices)}]);
   add('Seconds a step', 's', [
     'total', 'remesh', 'linear_solve', 'assembly', 'ccd'
@@ -76,14 +87,26 @@ function plotsOf(run) {
   add('Energy that remeshing gained', 'J', [{name: '', values: take(gainOf)}]);
   add('Least distance in contact', 'm', [{name: '', values: take(s => s.min_distance)}], true);
   add('Least volume ratio', '', [{name: '', values: take(s => s.min_volume_ratio)}]);
+  const axes = ['x', 'y', 'z'].slice(0, run.dim),
+        along = (axis, values) => ({name: axis, values, colour: LINE_COLOURS[Math.max(axes.indexOf(axis), 0)]});
+  for (const [name, curve] of run.curves) {
+    const part = kind => axes.map(axis => along(axis, curve[`${kind}_${axis}`]));
+    const isThere = kind => part(kind).some(s => s.values.some(v => v !== 0)),
+          kinds = ['contact', 'friction', 'reaction'].filter(isThere);
+    add(`Force on ${name}`, 'N', part('all'), false, curve.times);
+    for (const kind of kinds.length > 1 ? kinds : [])
+      add(`${titleCase(kind)} force on ${name}`, 'N', part(kind), false, curve.times);
+    const moments = run.dim === 2 ? [['', 'all_moment']] : axes.map(axis => [axis, `all_m${axis}`]);
+    add(`Moment on ${name}`, 'N m', moments.map(([axis, column]) => along(axis, curve[column])), false, curve.times);
+  }
   for (const force of Object.keys(run.frames[0].forces ?? {}))
-    add(`Resultant, ${force.replace('_', ' ')}`, 'N',
-        ['x', 'y', 'z']
-            .slice(0, run.dim)
-            .map((name, k) => ({name, values: run.frames.map(f => f.forces[force]?.[k] ?? NaN)})),
-        false, run.frames.map(f => f.t));
+    add(`Sum over all bodies, ${force.replace('_', ' ')}`, 'N',
+        axes.map((axis, k) => along(axis, run.frames.map(f => f.forces[force]?.[k] ?? NaN))), false,
+        run.frames.map(f => f.t));
   return list;
 }
+
+const titleCase = text => text[0].toUpperCase() + text.slice(1);
 
 function gainOf(step) {
   return step.step > 0 ? step.energy_before_remesh - step.energy.total - step.history_loss : 0;
@@ -109,12 +132,18 @@ class Plot {
     }
     for (const tick of ticksOf(t0, t1, false))
       this.drawing.append(svg('text', {x: this.x(tick), y: height - 7, 'text-anchor': 'middle'}, shortNumber(tick)));
-    this.series.forEach(
-        (s, k) => this.drawing.append(
-            svg('path', {d: this.path(s.values), fill: 'none', stroke: LINE_COLOURS[k], 'stroke-width': 1.4})));
+    this.drawing.append(svg('text', {x: left - 16, y: height - 7, 'text-anchor': 'end'}, 't [s]'));
+    const colourOf = (s, k) => s.colour ?? LINE_COLOURS[k % LINE_COLOURS.length];
+    this.series.forEach((s, k) => this.drawing.append(svg('path', {
+      d: this.path(s.values),
+      fill: 'none',
+      stroke: colourOf(s, k),
+      'stroke-width': 1.4,
+      'stroke-dasharray': s.dashes ?? 'none'
+    })));
     this.cursor = svg('line', {y1: top, y2: height - bottom, stroke: '#1d2530', 'stroke-dasharray': '3 2'});
     this.drawing.append(this.cursor);
-    this.values = this.series.map((s, k) => html('span', {style: `color:${LINE_COLOURS[k]}`}));
+    this.values = this.series.map((s, k) => html('span', {style: `color:${colourOf(s, k)}`}));
     const unit = this.unit ? ` [${this.unit}]` : '';
     this.figure =
         html('figure', {className: 'plot'}, html('figcaption', {}, this.title + unit, ...this.values), this.drawing);

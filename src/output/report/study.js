@@ -11,18 +11,34 @@ const COSTS = [
   ['processor_seconds', 'processor seconds'], ['unknowns', 'unknowns, mean over the steps'], ['memory_mb', 'memory [MB]']
 ];
 
+// null: smaller than what the reference is worth, so not told; empty: not compared.
+function errorText(study, run, measure) {
+  const value = run.errors?.[measure],
+        write = v => ['l2', 'h1'].includes(measure) ? `${shortNumber(100 * v)} %` : shortNumber(v);
+  if (value === undefined) return '';
+  return value === null ? `< ${write(study.worth?.[measure] ?? 0)}` : write(value);
+}
+
+// Runs that diagrams compare: those on other meshes, not with other solvers or time steps; without what tells the worth.
+const shownIn = study =>
+    study.runs.filter(r => !['solvers', 'time', ...(study.worth ? ['reference'] : [])].includes(r.series));
+
+// Text with `names` as code.
+const withCode = text => text.split('`').map((part, i) => i % 2 ? html('code', {}, part) : part);
+
 // Logarithmic in both directions, a line for each series; points tell of their run and choose it.
 class Diagram {
   constructor(study, [measure, label], [cost, costLabel], {onPoint, colourOf}) {
     const {width, left, right, top} = PLOT, height = 250, bottom = 38;
-    this.points = study.runs.filter(r => r.errors?.[measure] > 0 && r[cost] > 0)
-                      .map(run => ({run, x: run[cost], y: run.errors[measure]}));
+    const worth = study.worth?.[measure] ?? 0, isPoint = r => r.errors?.[measure] > 0 && r[cost] > 0;
+    this.points = shownIn(study).filter(isPoint).map(run => ({run, x: run[cost], y: run.errors[measure]}));
     if (!this.points.length) return;
     const range = values => {
       const [low, high] = [Math.min(...values), Math.max(...values)];
       return [low / 1.25, high * 1.25];
     };
-    const [x0, x1] = range(this.points.map(p => p.x)), [y0, y1] = range(this.points.map(p => p.y)),
+    const [x0, x1] = range(this.points.map(p => p.x)),
+               [y0, y1] = range([...this.points.map(p => p.y), ...(worth > 0 ? [worth] : [])]),
                log = (v, a, b) => Math.log(v / a) / Math.log(b / a);
     const x = v => left + log(v, x0, x1) * (width - left - right),
           y = v => height - bottom - log(v, y0, y1) * (height - top - bottom);
@@ -36,6 +52,11 @@ class Diagram {
       drawing.append(
           svg('line', {x1: left, x2: width - right, y1: y(tick), y2: y(tick), stroke: '#e3e5e9'}),
           svg('text', {x: left - 5, y: y(tick) + 3.5, 'text-anchor': 'end'}, shortNumber(tick)));
+    if (worth > 0)
+      drawing.append(
+          svg('line',
+              {x1: left, x2: width - right, y1: y(worth), y2: y(worth), stroke: '#8a4b00', 'stroke-dasharray': '4 3'}),
+          svg('text', {x: left + 4, y: y(worth) - 4}, 'what the reference is worth'));
     drawing.append(svg('text', {x: (left + width - right) / 2, y: height - 6, 'text-anchor': 'middle'}, costLabel));
     for (const series of new Set(this.points.map(p => p.run.series))) {
       const own = this.points.filter(p => p.run.series === series).sort((a, b) => b.y - a.y);
@@ -153,9 +174,9 @@ async function openStudy() {
         {runs: names, notes, colours} = parse('study-runs');
   const said = document.getElementById('said'), main = document.getElementById('main'),
         plots = document.getElementById('plots'), foot = document.getElementById('foot');
-  said.textContent = `Speed against error: ${study.scene} · errors against ${study.reference}`;
+  said.append(...withCode(`Speed against error: ${study.scene} · errors against ${study.reference}`));
   foot.textContent = [...notes, `ITR ${study.version}`].join(' · ');
-  const series = [...new Set(study.runs.map(r => r.series))],
+  const series = [...new Set(shownIn(study).map(r => r.series))],
         colourOf = name => LINE_COLOURS[series.indexOf(name) % LINE_COLOURS.length];
   const report = {study, diagrams: [], views: [null, null], shown: ['', '']};
 
@@ -171,14 +192,13 @@ async function openStudy() {
   const tell = run => {
     about.textContent = [
       `${run.run}: ${run.label}`,
-      ...(run.status === 'failed' ?
-              [`failed: ${run.reason}`] :
-              [
-                `${run.vertices} vertices, ${shortNumber(run.processor_seconds)} processor seconds, ${
-                    shortNumber(run.memory_mb)} MB`,
-                ...MEASURES.filter(([m]) => run.errors?.[m] > 0).map(([m,
-                                                                       label]) => `${label}: ${shortNumber(run.errors[m])}`)
-              ])
+      ...(run.status === 'failed' ? [`failed: ${run.reason}`] :
+                                    [
+                                      `${run.vertices} vertices, ${shortNumber(run.processor_seconds)} processor seconds, ${
+                                          shortNumber(run.memory_mb)} MB`,
+                                      ...MEASURES.filter(([m]) => run.errors?.[m] !== undefined && run.errors[m] !== 0)
+                                          .map(([m, label]) => `${label}: ${errorText(study, run, m)}`)
+                                    ])
     ].join('\n');
     command.textContent = commandOf(study, run);
     report.diagrams.forEach(d => d.mark(run.run));
@@ -202,15 +222,21 @@ async function openStudy() {
           run => html(
               'tr', {onclick: () => onPoint(run, true)},
               ...[run.run, run.label, run.status, run.vertices ?? '',
-                  run.processor_seconds === undefined ? '' : shortNumber(run.processor_seconds),
-                  run.errors ? shortNumber(run.errors.l2) : '', run.errors ? shortNumber(run.errors.h1) : '']
+                  run.processor_seconds === undefined ? '' : shortNumber(run.processor_seconds), errorText(study, run, 'l2'),
+                  errorText(study, run, 'h1')]
                   .map(t => html('td', {}, String(t))))));
-  const words = html(
-      'section', {className: 'words'}, html('ul', {}, ...study.answers.map(a => html('li', {}, a))), legend, about,
-      html('p', {}, command, ' ', copy), table);
-  plots.before(words);
+  const point = html('section', {className: 'words point'}, legend, about, html('p', {}, command, ' ', copy));
+  const answers = html(
+      'section', {className: 'words'}, html('ul', {}, ...study.answers.map(a => html('li', {}, ...withCode(a)))),
+      html('ul', {className: 'doubts'}, ...(study.doubts ?? []).map(d => html('li', {}, ...withCode(d)))), table);
+  plots.before(point);
+  plots.after(answers);
+  if (report.diagrams.length) document.body.classList.add('with-diagrams');  // then the stored one is not needed
   if (study.runs.length) tell(study.runs.find(r => r.status === 'finished') ?? study.runs[0]);
-  if (!names.length) return report;
+  if (!names.length) {
+    document.getElementById('why').textContent = 'No run of this study has stored frames: no meshes are shown.';
+    return report;
+  }
 
   try {
     if (new URLSearchParams(location.search).has('pictures')) throw new Error('pictures asked for');

@@ -88,7 +88,8 @@ class View {
     return this.extras[name]?.values ?? this.frame.field(name);
   }
   unit(name) {
-    return this.extras[name]?.unit ?? {u: 'm', size: 'm'}[name] ?? this.run.stored.find(f => f.name === name)?.unit ?? '';
+    const unit = this.extras[name]?.unit ?? {u: 'm', size: 'm'}[name] ?? this.run.stored.find(f => f.name === name)?.unit;
+    return (unit ?? '').replace('^2', '²').replace('^3', '³');
   }
 
   build() {
@@ -133,7 +134,7 @@ class View {
     const link = html('button', {onclick: () => this.copyLink(link)}, 'copy link');
     this.side = html(
         'div', {className: 'side'}, labelled('colour', field), check('log', 'logarithmic'),
-        labelled('from, to', number('least', 'least'), number('most', 'most')), html('hr'), labelled('deformed ×', factor),
+        labelled('from, to', number('least', 'least'), number('most', 'most')), html('hr'), labelled('deform ×', factor),
         check('edges', 'edges of cells'), check('obstacles', 'obstacles'),
         ...(isPair ? [] : [check('edits', 'edits of remeshing')]),
         ...(this.dim === 3 ? [html('hr'), labelled('cut', axis), labelled('at', cut), check('flip', 'other side')] : []),
@@ -237,7 +238,7 @@ class View {
   // Fixed over time: of all frames where the file says it, else of those seen so far.
   rangeOf(field) {
     const {state, run} = this, name = state.field, stored = run.stored.find(f => f.name === name);
-    let range = stored              ? [0, stored.shown ?? stored.largest] :
+    let range = stored              ? [0, stored.shown || stored.largest] :
         field.largest !== undefined ? [0, field.largest] :
                                       {u: [0, this.largestU], quality: [0, 1], order: [1, 2], ...run.meta.ranges}[name];
     if (!range) {
@@ -261,6 +262,11 @@ class View {
     n[k] = sign;
     const at = this.low[k] - room + this.state.cut * (this.high[k] - this.low[k] + 2 * room);
     return [...n, sign * at, Math.hypot(...this.high.map((h, i) => h - this.low[i]))];
+  }
+
+  isCutAway(p) {
+    const cut = this.cutPlane;
+    return cut && cut[0] * p[0] + cut[1] * p[1] + cut[2] * p[2] > cut[3] + 1e-6 * cut[4];
   }
 
   // What was born and what died between the stored frame before and this one.
@@ -350,11 +356,13 @@ class View {
       for (let k = 0; k < 3; ++k) light[k] = 0.25 * right[k] + 0.45 * up[k] + 0.86 * forward[k];
     this.matrix = camera.matrix(this.scale(), this.width, this.height, 2 * factor * this.radius + away);
     painter.begin(canvas.width, canvas.height, this.matrix, light);
+    painter.draw(this.buffer, {cut, edges: state.edges ? 0.6 : 0, isClosed: this.isOutward && !cut, mark: true});
     if (state.obstacles) {
-      painter.draw(this.obstacleBuffer, {flat: [0.95, 0.955, 0.97], edges: state.edges ? 0.25 : 0});
+      const obstacle = {flat: [0.95, 0.955, 0.97], edges: state.edges ? 0.25 : 0};
+      painter.draw(this.obstacleBuffer, {...obstacle, over: 'rest'});
+      painter.draw(this.obstacleBuffer, {...obstacle, over: 'marked', opacity: 0.25});
       if (this.dim === 3) painter.draw(this.lineBuffer, {flat: [0.2, 0.22, 0.26], lines: true});
     }
-    painter.draw(this.buffer, {cut, edges: state.edges ? 0.6 : 0, isClosed: this.isOutward && !cut});
     this.drawOver();
   }
 
@@ -380,7 +388,8 @@ class View {
     };
     if (this.edits)
       for (const [kind, colour] of EDITS)
-        for (const p of this.edits[kind]) dot(p, 3, colour);
+        for (const p of this.edits[kind])
+          if (!this.isCutAway(p)) dot(p, 3, colour);
     if (this.dim === 2 && this.state.obstacles) {
       const [from, to] = this.run.obstacleEdges;
       context.strokeStyle = '#33383f';
@@ -418,11 +427,17 @@ class View {
   showLegend() {
     const {state, range, meta} = this, unit = this.unit(state.field), name = this.label(state.field);
     const [low, high] = range, at = s => state.log ? low * (high / low) ** s : low + s * (high - low);
+    const stored = this.run.stored.find(f => f.name === state.field),
+          isExceeded = state.most === null && stored && high < stored.largest, shares = [1, 0.75, 0.5, 0.25, 0];
+    const marks = marksOf(shares.map(at));
+    if (isExceeded) marks[0] = '≥ ' + marks[0];
     const stops = meta.colours.map(c => `rgb(${c})`).join(',');
     this.legend.replaceChildren(
         html('b', {}, unit ? `${name} [${unit}]` : name),
         html('div', {className: 'bar', style: `background:linear-gradient(to top,${stops})`}),
-        html('div', {className: 'marks'}, ...[1, 0.75, 0.5, 0.25, 0].map(s => html('span', {}, shortNumber(at(s))))));
+        html(
+            'div', {className: 'marks', title: isExceeded ? `the largest is ${shortNumber(stored.largest)}` : ''},
+            ...marks.map(mark => html('span', {}, mark))));
     this.made.hidden = !this.edits;
     if (!this.edits) return;
     const [now, before] = [this.run.frames[state.frame], this.run.frames[state.frame - 1]];
@@ -552,8 +567,8 @@ class View {
       travel += Math.abs(dx) + Math.abs(dy) + Math.abs(spread() - before);
       if (travel < 4) return;
       if (down.size > 1) {
+        this.pan(dx, dy);  // first, so that what is between the fingers stays there
         if (before) this.zoomAt(spread() / before, nx, ny);
-        this.pan(dx, dy);
       } else if (e.shiftKey || e.buttons & 6) {
         this.pan(dx, dy);
       } else {
@@ -602,12 +617,13 @@ class View {
     const turn = this.playTurn = {};
     if (on && this.state.frame === this.run.frames.length - 1) await this.set({frame: 0});
     const pause = Math.max(1000 / 30, Math.min(200, 4000 / this.run.frames.length));
-    let taken = pause;
+    let taken = pause, due = performance.now();
     while (this.playing && turn === this.playTurn && this.state.frame + 1 < this.run.frames.length) {
       const start = performance.now();
       await this.set({frame: this.state.frame + 1});
+      due = Math.max(due + pause, start);  // a late frame is made up for by the next one
       do await new Promise(requestAnimationFrame);
-      while (performance.now() - start < pause - 5);
+      while (performance.now() < due - 5);
       // Where drawing is slow, pixels are larger while it plays.
       taken += 0.2 * (performance.now() - start - taken);
       if (taken > 1.3 * pause && this.sharpness > 0.5) this.sharpen(this.sharpness - 0.25), taken = pause;
