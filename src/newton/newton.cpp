@@ -572,7 +572,8 @@ class Minimizer {
     if (change_of_energy > 0.1 * std::abs(value_)) return false;
     const double after = slope_at_candidate();
     const double resolved = kRoundOff * std::abs(value_);
-    return after <= kArmijo * slope || (change_of_energy <= resolved && -step * slope <= resolved && after <= -0.5 * slope);
+    return after <= kArmijo * slope ||
+           (change_of_energy <= resolved && (value <= value_ || -step * slope <= resolved) && after <= -0.5 * slope);
   }
 
   const Energy& energy_;

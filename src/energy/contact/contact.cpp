@@ -179,6 +179,7 @@ void ContactEnergy<Dim>::renew(const CollisionSurface& surface, const ContactOpt
                                double scale) {
   surface_ = &surface;
   dhat_ = options.activation_distance;
+  passing_ratio_ = options.adaptive_stiffness ? 1 : CcdOptions{}.passing_ratio;
   convergent_ = options.convergent;
   stiffness_ = stiffness;
   scale_ = scale;
@@ -371,7 +372,7 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
         const auto p = gather<Dim>(vertices, pair_size(kind), x);
         auto q = gather<Dim>(vertices, pair_size(kind), dx);
         for (int k = 0; k < pair_size(kind); ++k) q[k] = p[k] + step * q[k];
-        step *= free_share<Dim>(kind, p, q);
+        step *= free_share<Dim>(kind, p, q, {.passing_ratio = passing_ratio_});
       }
       return step;
     };

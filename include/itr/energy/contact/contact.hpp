@@ -78,6 +78,7 @@ class ContactEnergy final : public Energy {
 
   const CollisionSurface* surface_;
   double dhat_;
+  double passing_ratio_;  ///< of CcdOptions: adaptive stiffness depends on the way to a solution, and so do peers' values
   bool convergent_;
   double stiffness_;
   double scale_;
