@@ -70,6 +70,16 @@ Json overlapping() {
 }
 
 const std::vector<Refusal> kRefusals = {
+    {"selection of nothing",
+     {{"geometry",
+       {{{"mesh", "square.obj"}, {"volume_selection", 1}, {"surface_selection", {{{"id", 3}, {"box", {{5, 5}, {6, 6}}}}}}}}},
+      {"boundary_conditions", {{"dirichlet_boundary", {{{"id", 3}, {"value", {0, 0}}}}}}}},
+     "scene.json",
+     "/boundary_conditions/dirichlet_boundary/0/id",
+     "3, which nothing has (/geometry/0/surface_selection/0: selects nothing: no barycentre of a boundary facet is in it, "
+     "or "
+     "rules before it took them; the mesh spans (0, 0) to (1, 1) m)",
+     "there is none"},
     {"missing mesh", geometry("none.obj"), "scene.json", "/geometry/0/mesh", "none.obj", "the path of a mesh file"},
     {"a folder for a mesh", geometry("folder"), "scene.json", "/geometry/0/mesh", "folder", "the path of a mesh file"},
     {"truncated nodes", geometry("cut.msh"), "cut.msh", "line 7", "the end", "a number"},
