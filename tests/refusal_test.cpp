@@ -77,9 +77,16 @@ const std::vector<Refusal> kRefusals = {
      "scene.json",
      "/boundary_conditions/dirichlet_boundary/0/id",
      "3, which nothing has (/geometry/0/surface_selection/0: selects nothing: no barycentre of a boundary facet is in it, "
-     "or "
-     "rules before it took them; the mesh spans (0, 0) to (1, 1) m)",
+     "or rules before it took them; the mesh spans (0, 0) to (1, 1) m)",
      "there is none"},
+    {"part of a name",
+     {{"time", {{"dt", 0.1}, {"tend", nullptr}, {"steps", 10}}}},
+     "scene.json",
+     "/time/steps",
+     "an unknown key",
+     "\"time_steps\" perhaps"},
+    {"name of other programs", material("density", 1000), "scene.json", "/materials/0/density", "an unknown key",
+     "\"rho\" perhaps"},
     {"missing mesh", geometry("none.obj"), "scene.json", "/geometry/0/mesh", "none.obj", "the path of a mesh file"},
     {"a folder for a mesh", geometry("folder"), "scene.json", "/geometry/0/mesh", "folder", "the path of a mesh file"},
     {"truncated nodes", geometry("cut.msh"), "cut.msh", "line 7", "the end", "a number"},

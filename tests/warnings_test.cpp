@@ -156,6 +156,12 @@ TEST_F(WarningsTest, DistanceThatIsNotSmall) {
   EXPECT_FALSE(itr(press).has("of the thickness of body")) << said.text;
 }
 
+TEST_F(WarningsTest, FrictionInPercent) {
+  const std::string press = "explain " ITR_SOURCE_DIR "/examples/tasks/press.json ";
+  EXPECT_TRUE(itr(press + "--set /contact/friction_coefficient=30").has("friction coefficient 30 is unusual"));
+  EXPECT_FALSE(itr(press).has("friction coefficient"));
+}
+
 TEST_F(WarningsTest, SelectionOfNothing) {
   const std::string press = "explain " ITR_SOURCE_DIR "/examples/tasks/press.json --set '/geometry/0/surface_selection=[";
   const std::string all = R"({"id": 5, "box": [[-1, -1], [1, 1]]})", far = R"({"id": 6, "box": [[50, 50], [60, 60]]})";

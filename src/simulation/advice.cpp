@@ -97,6 +97,14 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
 }
 
 template <int Dim>
+void find_odd_friction(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  constexpr double kUsual = 2;
+  const double friction = setup.contact.friction_coefficient;
+  if (setup.contact.enabled && friction > kUsual)
+    found.push_back(fmt::format("friction coefficient {:.4g} is unusual: 0.3 is 30 %", friction));
+}
+
+template <int Dim>
 void find_hard_meshes(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& found) {
   if (figures.slivers > 0)
     found.push_back(fmt::format("{} slivers (quality below {}), the worst is element {} with {:.2g}", figures.slivers,
@@ -370,6 +378,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   const MeshFigures<Dim> figures(setup.mesh);
   std::vector<std::string> found;
   find_odd_units(setup, figures, found);
+  find_odd_friction(setup, found);
   find_hard_meshes(setup, figures, found);
   find_wrong_gravity(setup, figures, found);
   find_held(setup, found);
