@@ -79,6 +79,12 @@ const std::vector<Refusal> kRefusals = {
      "3, which nothing has (/geometry/0/surface_selection/0: selects nothing: no barycentre of a boundary facet is in it, "
      "or rules before it took them; the mesh spans (0, 0) to (1, 1) m)",
      "there is none"},
+    {"units of other systems",
+     {{"units", {{"length", "mm"}}}},
+     "scene.json",
+     "/units/length",
+     "\"mm\"",
+     "\"m\": others are not supported yet (all numbers are in SI units; /geometry/*/transformation/scale 0.001"},
     {"part of a name",
      {{"time", {{"dt", 0.1}, {"tend", nullptr}, {"steps", 10}}}},
      "scene.json",

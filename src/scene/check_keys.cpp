@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "check_keys.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <string_view>
@@ -83,7 +85,9 @@ class Checker {
       case Role::refused:
         node.fail(abbreviate(node.json()), "no such key: it is not supported yet");
       case Role::only:
-        if (node.json() != entry.fallback) node.fail(abbreviate(entry.fallback) + ": others are not supported yet");
+        if (node.json() != entry.fallback)
+          node.fail(fmt::format("{}: others are not supported yet{}", abbreviate(entry.fallback),
+                                *entry.key->meaning ? fmt::format(" ({})", entry.key->meaning) : ""));
         return;
       case Role::unwritten:
         if (node.json() != entry.fallback) warnings_.push_back(node.pointer() + ": is not written");
