@@ -151,7 +151,29 @@ TEST_F(WarningsTest, DistanceThatIsNotSmall) {
   const std::string press = "explain " ITR_SOURCE_DIR "/examples/tasks/press.json ";
   const Said said = itr(press + "--set /contact/dhat=0.001");
   EXPECT_TRUE(said.has("of the thickness of body 1")) << said.text;
+  EXPECT_TRUE(said.has("forces may be too large by some percent")) << said.text;
+  EXPECT_TRUE(itr(press + "--set /contact/dhat=0.01 --set /contact/dhat_percentage=10").has("by tens of percent"));
   EXPECT_FALSE(itr(press).has("of the thickness of body")) << said.text;
+}
+
+TEST_F(WarningsTest, FrictionInPercent) {
+  const std::string press = "explain " ITR_SOURCE_DIR "/examples/tasks/press.json ";
+  EXPECT_TRUE(itr(press + "--set /contact/friction_coefficient=30").has("friction coefficient 30 is unusual"));
+  EXPECT_FALSE(itr(press).has("friction coefficient"));
+}
+
+TEST_F(WarningsTest, SelectionOfNothing) {
+  const std::string press = "explain " ITR_SOURCE_DIR "/examples/tasks/press.json --set '/geometry/0/surface_selection=[";
+  const std::string all = R"({"id": 5, "box": [[-1, -1], [1, 1]]})", far = R"({"id": 6, "box": [[50, 50], [60, 60]]})";
+  EXPECT_TRUE(itr(press + all + "," + far + "]'").has("/geometry/0/surface_selection/1: selects nothing: no barycentre"));
+  EXPECT_FALSE(itr(press + all + "]'").has("selects nothing"));
+}
+
+/// Where the scene asks for no tolerance, the last digit of the energy is all that there is.
+TEST_F(WarningsTest, RoundOffIsNoneWhereAllDigitsAreThere) {
+  const Said said = run("tasks/press.json", "--set /materials/0/E=2e9 --set /time/quasistatic=true --set /time/tend=0.2");
+  EXPECT_EQ(said.status, 0) << said.text;
+  EXPECT_FALSE(said.has("round-off")) << said.text;
 }
 
 TEST_F(WarningsTest, LockingElements) {
@@ -159,6 +181,9 @@ TEST_F(WarningsTest, LockingElements) {
   EXPECT_TRUE(itr(twist + "--set /materials/0/nu=0.499").has("they lock, forces are too large")) << itr(twist).text;
   EXPECT_TRUE(itr(twist).has("where it bends they are too stiff")) << itr(twist).text;
   EXPECT_FALSE(itr(twist + "--set /space/discr_order=2 --set /materials/0/nu=0.499").has("lock"));
+  const std::string remeshed = "explain " ITR_SOURCE_DIR "/examples/tasks/twist.json ";
+  EXPECT_TRUE(itr(remeshed + "--set /materials/0/nu=0.49").has("remeshing takes most of that away"));
+  EXPECT_FALSE(itr(remeshed).has("lock")) << itr(remeshed).text;
 }
 
 /// Without a floor, inertia or anything that holds it.

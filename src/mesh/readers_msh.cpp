@@ -13,6 +13,16 @@ namespace itr {
 
 namespace {
 
+/// " (quadrilateral)" of types that other programs mesh with.
+std::string name_of(int type) {
+  constexpr std::pair<int, const char*> kNames[] = {{3, "quadrilateral"},  {5, "hexahedron"},     {6, "prism"},
+                                                    {7, "pyramid"},        {10, "quadrilateral"}, {12, "hexahedron"},
+                                                    {16, "quadrilateral"}, {17, "hexahedron"}};
+  for (const auto& [known, name] : kNames)
+    if (known == type) return std::string(" (") + name + ")";
+  return "";
+}
+
 class MshReader {
  public:
   MshReader(std::string_view bytes, const std::filesystem::path& file) : in_(bytes, file), file_(file) {}
@@ -175,7 +185,7 @@ class MshReader {
         mesh_.tetrahedron_body.push_back(body);
         return;
       default:
-        in_.fail("element " + std::to_string(number) + " of type " + std::to_string(type),
+        in_.fail("element " + std::to_string(number) + " of type " + std::to_string(type) + name_of(type),
                  "1 (line), 2 (triangle), 4 (tetrahedron), 15 (point), or 8, 9, 11 (the same of second order)");
     }
   }

@@ -12,6 +12,7 @@
 #include "curvature.hpp"
 #include "itr/core/timer.hpp"
 #include "norms.hpp"
+#include "round_off.hpp"
 
 namespace itr {
 
@@ -21,7 +22,6 @@ constexpr double kArmijo = 1e-4;
 constexpr double kRoundOff = 1e-9;     ///< relative change of energy below which slopes tell more
 constexpr double kUnresolved = 1e-14;  ///< relative change of energy that a sum of many terms does not resolve
 constexpr double kSpacing = 8 * std::numeric_limits<double>::epsilon();  ///< of the largest coordinate
-constexpr const char* kAtRoundOff = "converged to the round-off of energy and positions, above the tolerances asked for";
 constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
 constexpr double kLoosest = 1e-4;       ///< residual of a direction
 constexpr int kMostLoose = 8;           ///< iterations of a solve that may be loose

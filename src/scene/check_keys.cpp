@@ -1,17 +1,50 @@
 // SPDX-License-Identifier: MIT
 #include "check_keys.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+#include <utility>
+
 #include "key_table.hpp"
 
 namespace itr::scene {
 
 namespace {
 
+/// Names that other programs use, and where a scene says the same.
+constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
+    {"density", "\"rho\""},
+    {"young", "\"E\""},
+    {"youngs_modulus", "\"E\""},
+    {"poisson", "\"nu\""},
+    {"poisson_ratio", "\"nu\""},
+    {"poissons_ratio", "\"nu\""},
+    {"gravity", "/boundary_conditions/rhs, which pushes in the negative direction,"},
+};
+
+/// The shortest of the names that contain the key, as time_steps does for steps.
+std::string longer_name(const std::string& key, const std::vector<std::string>& names) {
+  constexpr std::size_t kTelling = 4;
+  std::string found;
+  for (const std::string& name : names)
+    if (key.size() >= kTelling && name.find(key) != name.npos && (found.empty() || name.size() < found.size())) found = name;
+  return found;
+}
+
 [[noreturn]] void refuse_unknown(const Node& parent, const std::string& key, const std::set<std::string>& known) {
   std::vector<std::string> names(known.begin(), known.end());
   std::string expected;
-  if (const std::string near = nearest_name(key, names); !near.empty())
+  const auto other =
+      std::find_if(std::begin(kOtherNames), std::end(kOtherNames), [&](const auto& o) { return o.first == key; });
+  if (other != std::end(kOtherNames))
+    expected = std::string(other->second) + " perhaps; ";
+  else if (const std::string near = nearest_name(key, names); !near.empty())
     expected = "\"" + near + "\" perhaps; ";
+  else if (const std::string longer = longer_name(key, names); !longer.empty())
+    expected = "\"" + longer + "\" perhaps; ";
   else if (const std::string place = key_table().place_of(key); !place.empty())
     expected = "it at " + place + " perhaps; ";
   expected += "known here:";
@@ -52,7 +85,9 @@ class Checker {
       case Role::refused:
         node.fail(abbreviate(node.json()), "no such key: it is not supported yet");
       case Role::only:
-        if (node.json() != entry.fallback) node.fail(abbreviate(entry.fallback) + ": others are not supported yet");
+        if (node.json() != entry.fallback)
+          node.fail(fmt::format("{}: others are not supported yet{}", abbreviate(entry.fallback),
+                                *entry.key->meaning ? fmt::format(" ({})", entry.key->meaning) : ""));
         return;
       case Role::unwritten:
         if (node.json() != entry.fallback) warnings_.push_back(node.pointer() + ": is not written");

@@ -15,7 +15,11 @@ template <int Dim>
 class ConditionReader {
  public:
   ConditionReader(const Node& root, Setup<Dim>& setup, std::vector<std::string>& warnings)
-      : boundary_(root["boundary_conditions"]), initial_(root["initial_conditions"]), setup_(setup), warnings_(warnings) {
+      : boundary_(root["boundary_conditions"]),
+        initial_(root["initial_conditions"]),
+        geometry_(root["geometry"]),
+        setup_(setup),
+        warnings_(warnings) {
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
     for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) point_tags_.insert(setup_.mesh.vertex_tag(v));
     for (auto* tags : {&facet_tags_, &point_tags_}) tags->erase(kNoTag);
@@ -183,7 +187,7 @@ class ConditionReader {
       const int tag = read_condition_id(id);
       if (point_tags_.contains(tag)) id.fail(abbreviate(id.json()) + ", an id of points, which have no area", surfaces);
       if (obstacle_ids_.contains(tag)) id.fail(abbreviate(id.json()) + ", an obstacle, which bears no loads", surfaces);
-      refuse_unused(id, surfaces);
+      refuse_unused(id, surfaces, why_unused(id));
     }
     return tags_of(node, facet_tags_, seen);
   }
@@ -197,8 +201,10 @@ class ConditionReader {
     const int tag = read_condition_id(node["id"]);
     const bool is_of_bodies = tag > 0 && tags.contains(tag);
     if (!is_of_bodies && !obstacle_ids_.contains(tag))
-      refuse_unused(node["id"], "the id of a surface, above 0: " + id_list(tags) +
-                                    (obstacle_ids_.empty() ? "" : "; or of an obstacle: " + id_list(obstacle_ids_)));
+      refuse_unused(node["id"],
+                    "the id of a surface, above 0: " + id_list(tags) +
+                        (obstacle_ids_.empty() ? "" : "; or of an obstacle: " + id_list(obstacle_ids_)),
+                    why_unused(node["id"]));
     if (!seen.insert(tag).second)
       warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
     else if (is_of_bodies)
@@ -209,8 +215,19 @@ class ConditionReader {
   static std::string id_list(const std::set<int>& ids) {
     return ids.empty() ? "there is none" : list_ids(std::vector<int>(ids.begin(), ids.end()));
   }
-  [[noreturn]] static void refuse_unused(const Node& id, const std::string& expected) {
-    id.fail(abbreviate(id.json()) + ", which nothing has", expected);
+  [[noreturn]] static void refuse_unused(const Node& id, const std::string& expected, const std::string& why = "") {
+    id.fail(abbreviate(id.json()) + ", which nothing has" + why, expected);
+  }
+
+  /// The warning that was given of a selection which would have this id if anything were in it.
+  std::string why_unused(const Node& id) const {
+    for (const Node& geometry : geometry_.items())
+      for (const char* selection : {"surface_selection", "point_selection"})
+        for (const Node& rule : geometry[selection].items())
+          if (rule.json().is_object() && rule.has("id") && rule["id"].json() == id.json())
+            for (const std::string& warning : warnings_)
+              if (warning.starts_with(rule.pointer() + ": ")) return " (" + warning + ")";
+    return "";
   }
 
   /// Where functions of time are tried before anything is computed: both ends, after the first step, in the middle.
@@ -251,7 +268,7 @@ class ConditionReader {
     return result;
   }
 
-  Node boundary_, initial_;
+  Node boundary_, initial_, geometry_;
   Setup<Dim>& setup_;
   std::vector<std::string>& warnings_;
   std::set<int> facet_tags_, point_tags_, bodies_, obstacle_ids_;

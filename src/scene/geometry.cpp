@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "geometry.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -31,6 +33,13 @@ struct Collected {
   std::vector<std::pair<typename Mesh<Dim>::Facet, int>> tagged;
   std::vector<int> point_tags;  ///< by vertex, inner ones included
 };
+
+template <int Dim>
+std::string corner_text(const Vec<Dim>& p) {
+  std::string text;
+  for (int c = 0; c < Dim; ++c) text += fmt::format("{}{:.4g}", c ? ", " : "", p[c]);
+  return "(" + text + ")";
+}
 
 const std::vector<std::array<int, 3>>& cells_of(const MeshFile& file, const Vec<2>&) { return file.triangles; }
 const std::vector<std::array<int, 4>>& cells_of(const MeshFile& file, const Vec<3>&) { return file.tetrahedra; }
@@ -140,7 +149,8 @@ Mesh<Dim> refine(Mesh<Dim> mesh, const Node& node) {
 
 /// Adds the mesh, with ids by the geometry's selections, and its copies.
 template <int Dim>
-void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, Collected<Dim>& all) {
+void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, Collected<Dim>& all,
+             std::vector<std::string>& warnings) {
   const auto barycenter = [&](const auto& vertices) {
     Vec<Dim> sum = Vec<Dim>::Zero();
     for (const int v : vertices) sum += mesh.rest(v);
@@ -168,6 +178,15 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, C
     for (FacetId f = 0; f < mesh.num_facets(); ++f)
       if (tag[f] != kNoTag) all.tagged.emplace_back(shifted(mesh.facet(f)), tag[f]);
   }
+  const auto note_empty = [&](const Selection<Dim>& selection, const char* what) {
+    for (const std::string& pointer : selection.unmatched())
+      warnings.push_back(
+          fmt::format("{}: selects nothing: no {} is in it, or rules before it took them; the mesh spans {} to {} m",
+                      pointer, what, corner_text<Dim>(box.min()), corner_text<Dim>(box.max())));
+  };
+  note_empty(volumes, "barycentre of a cell");
+  note_empty(surfaces, "barycentre of a boundary facet");
+  note_empty(points, "vertex");
 }
 
 template <int Dim>
@@ -181,7 +200,7 @@ void read_body(const Node& geometry, const MeshFile& file, Collected<Dim>& all, 
   if (const std::size_t unused = drop_unused<Dim>(points, cells); unused > 0)
     warnings.push_back(geometry["mesh"].pointer() + ": " + std::to_string(unused) + " vertices in no cell are left out");
   const Mesh<Dim> mesh = make_mesh<Dim>(geometry, std::move(points), std::move(cells), bodies_of(file, Vec<Dim>()));
-  collect<Dim>(geometry, refine<Dim>(mesh, geometry["n_refs"]), box, all);
+  collect<Dim>(geometry, refine<Dim>(mesh, geometry["n_refs"]), box, all, warnings);
 }
 
 int dimension_of(const Node& geometry, const MeshFile& file) {

@@ -20,9 +20,10 @@ constexpr const char* kUnwritten = "output of PolyFEM that is not written here";
 
 constexpr Key kKeys[] = {
     {"/tests", ignored, "", "", "", "PolyFEM's own regression values"},
-    {"/units/length", only, "", "\"m\"", "", "numbers of a scene are in SI units"},
-    {"/units/mass", only, "", "\"kg\"", "", "the same"},
-    {"/units/time", only, "", "\"s\"", "", "the same"},
+    {"/units/length", only, "", "\"m\"", "",
+     "all numbers are in SI units; /geometry/*/transformation/scale 0.001 for a mesh in mm"},
+    {"/units/mass", only, "", "\"kg\"", "", "all numbers are in SI units"},
+    {"/units/time", only, "", "\"s\"", "", "all numbers are in SI units"},
     {"/units/characteristic_length", read, "positive", "1", "m",
      "multiplies the tolerances x_delta, grad_norm, f_delta and friction_convergence_tol"},
     {"/input/data/state", only, "", "\"\"", "", "`itr run --resume` goes on from a folder's saved state"},

@@ -18,14 +18,30 @@ int read_id(const Node& node, int fallback) {
 
 template <int Dim>
 Selection<Dim>::Selection(const Node& node, const Box<Dim>& box) : box_(box) {
-  for (const Node& item : node.items()) rules_.push_back(read_rule(item));
+  for (const Node& item : node.items()) {
+    rules_.push_back(read_rule(item));
+    const bool has_region = item.json().is_object() && item.has("id") && item.json().size() > 1;
+    pointers_.push_back(has_region ? item.pointer() : "");
+  }
+  matched_.assign(rules_.size(), 0);
 }
 
 template <int Dim>
 std::optional<int> Selection<Dim>::operator()(const Vec<Dim>& p, int stored) const {
-  for (const Rule& rule : rules_)
-    if (const std::optional<int> id = rule(p, stored)) return id;
+  for (std::size_t i = 0; i < rules_.size(); ++i)
+    if (const std::optional<int> id = rules_[i](p, stored)) {
+      matched_[i] = 1;
+      return id;
+    }
   return std::nullopt;
+}
+
+template <int Dim>
+std::vector<std::string> Selection<Dim>::unmatched() const {
+  std::vector<std::string> pointers;
+  for (std::size_t i = 0; i < rules_.size(); ++i)
+    if (!matched_[i] && !pointers_[i].empty()) pointers.push_back(pointers_[i]);
+  return pointers;
 }
 
 template <int Dim>

@@ -4,6 +4,8 @@
 
 #include <functional>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "transformation.hpp"
 
@@ -17,6 +19,9 @@ class Selection {
 
   /// Id of the first rule that matches a barycenter; `stored` is the id that the mesh file gave it.
   std::optional<int> operator()(const Vec<Dim>& p, int stored = 0) const;
+
+  /// Pointers of the rules with a region that no call has matched so far.
+  std::vector<std::string> unmatched() const;
 
  private:
   using Test = std::function<bool(const Vec<Dim>&)>;
@@ -33,6 +38,8 @@ class Selection {
 
   Box<Dim> box_;
   std::vector<Rule> rules_;
+  std::vector<std::string> pointers_;  ///< of the rules; empty for those without a region
+  mutable std::vector<char> matched_;  ///< whether a call was answered by the rule
 };
 
 /// An id of a selection or condition: 0 to 2147483646.

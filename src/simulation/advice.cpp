@@ -97,6 +97,14 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
 }
 
 template <int Dim>
+void find_odd_friction(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  constexpr double kUsual = 2;
+  const double friction = setup.contact.friction_coefficient;
+  if (setup.contact.enabled && friction > kUsual)
+    found.push_back(fmt::format("friction coefficient {:.4g} is unusual: 0.3 is 30 %", friction));
+}
+
+template <int Dim>
 void find_hard_meshes(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& found) {
   if (figures.slivers > 0)
     found.push_back(fmt::format("{} slivers (quality below {}), the worst is element {} with {:.2g}", figures.slivers,
@@ -202,7 +210,6 @@ void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found)
 template <int Dim>
 void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
   constexpr double kIncompressible = 0.485, kSlender = 0.15, kFewLayers = 3;
-  if (setup.remesh.enabled) return;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     const auto order = setup.order.find(body);
@@ -212,7 +219,14 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
         "quadratic elements (/space/discr_order: 2), remeshing (/space/remesh/enabled) or a finer mesh (n_refs) help: "
         "compare";
     const bool keeps_volume = Dim == 3 || material.plane_strain;
-    if (keeps_volume && material.poisson_ratio >= kIncompressible)
+    if (setup.remesh.enabled) {
+      if (keeps_volume && material.poisson_ratio >= kIncompressible)
+        found.push_back(fmt::format(
+            "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes most of that away, but forces "
+            "may stay too large by some percent; compare with a quarter of /space/remesh/relative_tolerance, or "
+            "with quadratic elements on a fixed mesh (/space/discr_order: 2)",
+            body, material.poisson_ratio));
+    } else if (keeps_volume && material.poisson_ratio >= kIncompressible)
       found.push_back(
           fmt::format("body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
                       "lock, forces are too large, often several times; {}",
@@ -266,13 +280,13 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
   if (gap < dhat)
     found.push_back(fmt::format(
         "gap {:.6g} m at the start is below d-hat = {:.6g} m: surfaces push each other from the start", gap, dhat));
-  constexpr double kSmall = 0.02;
+  constexpr double kSmall = 0.02, kLarge = 0.1;
   for (const auto& [body, size] : body_sizes(setup.mesh))
     if (dhat > kSmall * size.thickness)
       found.push_back(fmt::format(
-          "d-hat = {:.4g} m is {:.2g} % of the thickness of body {}, {:.4g} m: surfaces stand off by up to that, "
-          "as if what presses were thicker; /contact/dhat = \"auto\" takes a thousandth",
-          dhat, 100 * dhat / size.thickness, body, size.thickness));
+          "d-hat = {:.4g} m is {:.2g} % of the thickness of body {}, {:.4g} m: surfaces stand off by up to that, as if what "
+          "presses were thicker: forces may be too large by {} percent; /contact/dhat = \"auto\" takes a thousandth",
+          dhat, 100 * dhat / size.thickness, body, size.thickness, dhat > kLarge * size.thickness ? "tens of" : "some"));
   double shortest = kInfinity;
   const std::vector<Vec<Dim>> rest =
       setup.proxy ? setup.proxy->rest : node_rest_positions(simulation.state().mesh, simulation.state().space);
@@ -364,6 +378,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   const MeshFigures<Dim> figures(setup.mesh);
   std::vector<std::string> found;
   find_odd_units(setup, figures, found);
+  find_odd_friction(setup, found);
   find_hard_meshes(setup, figures, found);
   find_wrong_gravity(setup, figures, found);
   find_held(setup, found);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -14,6 +15,7 @@
 #include "itr/simulation/energy_guard.hpp"
 #include "itr/simulation/invariants.hpp"
 #include "itr/simulation/remesh_step.hpp"
+#include "newton/round_off.hpp"
 #include "watch.hpp"
 
 namespace itr {
@@ -50,6 +52,12 @@ void add_seconds(const NewtonSummary& summary, StepSeconds& seconds) {
 
 std::string reason_of(const NewtonSummary& summary) {
   return std::string(to_string(summary.termination)) + ": " + summary.message;
+}
+
+/// Whether a solve has all digits that its energy has, and nothing else is to be said of it.
+bool is_exact(const NewtonSummary& summary) {
+  constexpr double kLastDigits = 1e-13;
+  return summary.message == kAtRoundOff && summary.decrement < kLastDigits * std::abs(summary.energy);
 }
 
 /// That of the present positions and of those that the history holds.
@@ -126,7 +134,12 @@ class StepAttempt {
     report_.newton_iterations += summary.iterations;
     report_.residual_worth = std::max(report_.residual_worth, summary.decrement / problem_->scaling());
     report_.indefinite += summary.indefinite;
-    if (summary.converged() && !summary.message.empty()) warn(summary.message);
+    if (summary.converged() && !summary.message.empty()) {
+      if (is_exact(summary))
+        tools_.logger.debug(fmt::format("step {}: {}", next_.step, summary.message));
+      else
+        warn(summary.message);
+    }
     if (summary.iterations > kManyIterations) warn(problem_->describe_effort(summary));
     if (summary.linear_residual > kPoorResidual)
       warn(fmt::format("linear solves by {} reached a relative residual of {:.1e} only: {}",
