@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// OpenBLAS picks its kernels when it is loaded, by the CPU's model. One that is newer than the library gets those of the
-// oldest CPU: OpenBLAS 0.3.21 factorises with SSE3 where there is AVX512, at half the speed.
+// When it is loaded, OpenBLAS chooses kernels by the CPU's model. For a CPU that is newer than the library it takes those of
+// the oldest CPU: OpenBLAS 0.3.21 factorises with SSE3 where there is AVX512, at half the speed.
 #pragma once
 
 #include <string>
@@ -12,8 +12,8 @@ namespace itr::linear {
 /// for models that it knows.
 const char* fitting_blas_kernels();
 
-/// While it lives, an OpenBLAS that is loaded takes the fitting kernels. Does nothing where OPENBLAS_CORETYPE is set, or
-/// OpenBLAS loaded, before. Changes the environment and puts it back: no other thread of the program should use that now.
+/// While it lives, an OpenBLAS that is loaded takes the fitting kernels. Does nothing if OPENBLAS_CORETYPE is set, or
+/// OpenBLAS was loaded before. Changes the environment and restores it: no other thread may use the environment meanwhile.
 class FittingBlasKernels {
  public:
   FittingBlasKernels();

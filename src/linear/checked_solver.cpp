@@ -45,7 +45,7 @@ double norm(std::span<const double> v) {
   double sum = 0;
   for (const double x : v) sum += x * x;
   if (sum > 1e-280 && std::isfinite(sum)) return std::sqrt(sum);
-  // The squares left the range of double: a residual over such a norm would be 0 or not a number, whatever the solution.
+  // The sum of squares is out of double's range: divided by such a norm, any residual would be 0 or not a number.
   double largest = 0;
   for (const double x : v) largest = std::isnan(x) ? x : std::max(largest, std::abs(x));
   if (largest == 0 || !std::isfinite(largest)) return largest;

@@ -148,7 +148,7 @@ class FallbackSolver final : public Forwarding {
     return take_over(first, [&] { return prepare_active(); });
   }
 
-  /// The best of poor answers counts, and its solver goes on.
+  /// If all answers are poor, the best one counts, and its solver stays in use.
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
     SolveReport best = solvers_[active_]->solve(B, X, columns, asked);
     std::size_t kept = active_;
@@ -165,7 +165,7 @@ class FallbackSolver final : public Forwarding {
       best = next;
       kept = active_;
     }
-    // Without any solution, what a factorisation found out about the matrix is the answer.
+    // If no solver has a solution, the outcome is what a factorisation found out about the matrix.
     if (std::isinf(best.relative_residual) && !is_solvers_fault(last)) {
       best.outcome = last;
       kept = active_;
@@ -186,7 +186,7 @@ class FallbackSolver final : public Forwarding {
                     "); falling back to " + std::string(solvers_[active_]->name()));
     return true;
   }
-  /// Others try until one copes or tells something of the matrix. Where none does, all stays with the first failure.
+  /// The next solvers try until one succeeds or finds out something about the matrix. Otherwise the first failure stays.
   template <typename F>
   Outcome take_over(Outcome first, F&& attempt) {
     const std::size_t start = active_;
@@ -219,7 +219,7 @@ class FallbackSolver final : public Forwarding {
 
 double estimate_factor_bytes(const MatrixTraits& traits) {
   const double n = traits.order, entries = 8;
-  // A cube's, the most that a body of its unknowns has: slender ones have a half, many small ones less.
+  // The entries of a cube, which has the most for its unknowns. Slender bodies have half of them, many small bodies fewer.
   if (traits.block_size == 3) return entries * std::max(double(traits.nonzeros), 20.0 * std::pow(n, 4.0 / 3));
   return entries * std::max(double(traits.nonzeros), 6.0 * n * std::log2(std::max(2.0, n)));
 }
@@ -259,7 +259,7 @@ std::string choose_name(const LinearOptions& options, Registry& registry) {
     std::string name = Registry::canonical_name(asked);
     if (!name.empty() && registry.find(name).available) return name;
   }
-  // Names of ours that are absent are errors, others' only mean the default.
+  // An absent solver under one of ITR's own names is an error. A name that ITR does not know only means the default.
   for (const auto& asked : options.solvers)
     if (!Registry::canonical_name(asked).empty()) registry.create(asked);
   return Registry::canonical_name("eigen");

@@ -11,9 +11,10 @@
 #include "eigen_engines.hpp"
 #include "itr/linear/iteration_options.hpp"
 
-// SparseLU's own growth of its factors (Eigen 3.4) frees them, and where memory is out goes on with what it freed. This one
-// keeps them, so that std::bad_alloc leaves a solver that can be destroyed; it also moves pages instead of copying factors.
-// For places of a type that nobody else takes: a program must have one version of a function, and others use SparseLU too.
+// Eigen 3.4's SparseLU frees its factors when they have to grow, and goes on with the freed memory if no more is left. This
+// specialisation keeps them, so that std::bad_alloc leaves a solver that can be destroyed, and moves pages instead of
+// copying factors. It has an index type of its own: others use SparseLU too, and a program must have one version of a
+// function.
 namespace Eigen::internal {
 template <>
 template <typename Vector>
@@ -78,8 +79,8 @@ class LowerTriangleEngine : public Engine {
   bool factorized_ = false;
 };
 
-/// Each pivot against its own row of the lower triangle `matrix`: against the largest pivot of all, a soft body beside a
-/// very stiff one would pass for singular although the factorisation is accurate.
+/// Compares each pivot with its own row of the lower triangle `matrix`. Compared with the largest of all pivots, a soft body
+/// beside a very stiff one would count as singular although its factorisation is accurate.
 Outcome check_pivots(const Sparse& matrix, const Eigen::SimplicialLDLT<Sparse>& factors) {
   Eigen::VectorXd row_scale = Eigen::VectorXd::Zero(matrix.rows());
   for (int j = 0; j < matrix.outerSize(); ++j)

@@ -5,7 +5,8 @@
 
 namespace itr::linear {
 
-/// A solver around others: what it is and says is what the one that answers now is and says.
+/// A solver that wraps others. It answers for its name in use, capabilities, statistics and message with those of the solver
+/// that is now active.
 class Forwarding : public Solver {
  public:
   std::string_view name_in_use() const override { return current().name_in_use(); }

@@ -102,8 +102,8 @@ struct Registry::Impl {
     }
   }
 
-  /// The row of a name of ours, searching for modules where it is not built in. Modules that are known to bring others only
-  /// stay unloaded while that can be: Trilinos and MUMPS take 40 MB.
+  /// Returns the row of one of ITR's own names, and searches for modules if it is not built in. A module that is known to
+  /// bring only other solvers stays unloaded as long as possible: Trilinos and MUMPS take 40 MB.
   Row* find_anywhere(const std::string& name) {
     if (Row* row = find(name)) return row;
     if (!searched)

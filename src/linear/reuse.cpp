@@ -14,8 +14,8 @@ namespace itr::linear {
 
 namespace {
 
-// What machines of today do in a second, on one core (verification/solvers): of a factorisation, of what its entries cost
-// beside their flops, of memory that a solve streams. Only their ratios matter.
+// Rates of present machines, a second on one core (verification/solvers): flops of a factorisation, its entries beside their
+// flops, and memory that a solve streams. Only their ratios matter.
 constexpr double kFlops = 3e10, kEntries = 1e8, kBytes = 2.5e10;
 
 constexpr double kWorthTrying = 0.7;  ///< share of a factorisation that iterations may cost
@@ -75,7 +75,7 @@ Outcome ReusingSolver::analyze(const SparsityPattern& pattern, const AnalyzeHint
   coordinates_.assign(hints.coordinates.begin(), hints.coordinates.end());
   may_keep_order_ = may_keep_order_ && hints.may_keep_order;
   is_analyzed_ = is_analyzed_ && is_same && (has_own_order_ || hints.may_keep_order) && !capabilities().iterative;
-  // With a factor that may do, the analysis waits: it would be the end of it.
+  // If the old factor may serve the new pattern, the analysis waits, because it would discard that factor.
   if (is_analyzed_ || (factor_.matrix && (reuses_ || is_same))) return Outcome::ok;
   return analyze_now();
 }
@@ -165,8 +165,8 @@ Statistics ReusingSolver::statistics() const {
   return statistics;
 }
 
-/// Whether iterations are tried. Over a factor that ages they take more and more; it is made anew when the next system would
-/// cost more than all those since it was made did on average, its making included: that is when the average is least.
+/// Whether to try iterations with the old factor. They grow in number as it ages. A new one is made when the next system
+/// would cost more than the mean of the systems since the last factorisation, its cost included: the mean is least then.
 bool ReusingSolver::is_worth_trying() {
   if (!reuses_ || !factor_.matrix || factor_.matrix->pattern->order != pattern_->order) return false;
   if (factor_.pause > 0) {
@@ -263,7 +263,7 @@ bool ReusingSolver::run(double target, int most) {
     for (std::size_t i = 0; i < n; ++i) p_[i] = z_[i] + share * p_[i];
     multiply(*pattern_, values_, p_, q_);
     const double curvature = dot(p_, q_);
-    // That is what a Cholesky factorisation would find; others are asked for one all the same.
+    // A Cholesky factorisation would find the same. With other engines the caller factorises all the same.
     is_refused_ = product > 0 && curvature < -kCertain * norm(p_) * norm(q_) && !capabilities().indefinite;
     if (!(product > 0) || !(curvature > 0)) return false;
     const double length = product / curvature;

@@ -13,7 +13,8 @@ constexpr Eigen::Index kMostPairs = 32;  ///< a back-solve each
 constexpr double kAhead = 4;             ///< pairs that stop the step within so many times its free share are bounded
 constexpr double kFreeEnough = 0.5;      ///< share of the step with which it is done
 
-/// The multipliers l >= 0 of bounds S l >= asked, each 0 where its bound holds without it: by Gauss-Seidel.
+/// Solves for the multipliers l >= 0 of the bounds S l >= asked by Gauss-Seidel. A multiplier is 0 if its bound holds
+/// without it.
 VectorX find_multipliers(const MatrixX& S, const VectorX& asked) {
   constexpr int kMostSweeps = 500;
   constexpr double kSettled = 1e-9;
@@ -32,19 +33,19 @@ VectorX find_multipliers(const MatrixX& S, const VectorX& asked) {
   return l;
 }
 
-/// A quadratic along a step: what the model changes by at a share of it.
+/// The quadratic model along a step; `change` is that of its energy at a share of the step.
 struct ModelAlong {
   double slope, curvature;
   double change(double share) const { return share * slope + 0.5 * share * share * curvature; }
 };
 
-/// Bounds on gaps, and the corrections of a step that forces along them make.
+/// Bounds on the gaps of pairs, and the corrections of a step by forces between these pairs.
 class BoundedGaps {
  public:
   BoundedGaps(const DofMap& dofs, NewtonSystem& system) : dofs_(dofs), system_(system) {}
 
-  /// Takes in the bounds as they are linearised now. A pair's force keeps the direction that it came with: its correction is
-  /// solved for once. False where there are none, too many, or a solve fails.
+  /// Takes over the bounds, linearised at the present step. A pair keeps the direction of force of its first round, so that
+  /// its correction is solved for only once. Returns false if there are no bounds, too many, or a solve fails.
   bool update(const std::vector<BlockingPairs::Bound>& bounds, const VectorX& correction) {
     const auto count = static_cast<Eigen::Index>(bounds.size()), known = forces_.cols();
     if (count == 0 || count > kMostPairs) return false;
@@ -67,7 +68,8 @@ class BoundedGaps {
     return true;
   }
 
-  /// The least correction, in the norm of the Hessian, that meets the bounds; false where nothing needs one.
+  /// Computes the least correction, in the norm of the Hessian, that meets the bounds. Returns false if they hold without
+  /// one.
   bool correct(VectorX& correction, double& curvature) const {
     const VectorX multipliers = find_multipliers(rows_.transpose() * corrections_, asked_);
     if (multipliers.isZero(0)) return false;
@@ -88,7 +90,7 @@ class BoundedGaps {
 double turn_blocked_step(const StepOrigin& origin, VectorView step, double share) {
   const auto& [energy, x, dofs, gradient, system, workspace] = origin;
   const VectorX first = step;
-  // Of the Newton step: its curvature is what its slope is, but for the sign.
+  // The curvature along a Newton step is minus its slope, because H step = -gradient.
   const double slope = gradient.dot(first);
   double least = ModelAlong{slope, -slope}.change(share), free = share, best_share = share;
   VectorX way = first, correction = VectorX::Zero(dofs.num_unknowns);

@@ -15,9 +15,9 @@ struct StepOrigin {
   Workspace& workspace;
 };
 
-/// Turns a Newton step of which only `share` is free, so that pairs that stop it keep a gap at its end: the minimum of the
-/// model under bounds on their linearised gaps (an active set, as in sequential quadratic programming). Returns the
-/// share of `step` that is free then; both stay as they are where the model gains no more along the turned step.
+/// Turns a Newton step of which only `share` is free, so that the pairs that stop it keep a gap at its end. The turned step
+/// is the minimum of the quadratic model under bounds on linearised gaps (an active set, as in sequential quadratic
+/// programming). Returns the free share of `step`; both stay unchanged if the model gains no more along the turned step.
 double turn_blocked_step(const StepOrigin& origin, VectorView step, double share);
 
 }  // namespace itr

@@ -35,7 +35,7 @@ constexpr double kBlockedBelow = 0.5;                     ///< share of a step b
 constexpr int kLong = 20;                                 ///< iterations from which on what blocks steps is kept
 constexpr double kRelaxBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
-/// What a solve is kept in.
+/// The vectors of a solve; the workspace keeps them for the next one.
 struct Buffers {
   KeptVector gradient, step, candidate, other, rhs, solution, ways;
 };
@@ -87,7 +87,7 @@ class Minimizer {
       }
       const double before = value_;
       if (!line_search() && !retry_tightly() && !retry_projected()) {
-        // What cancels, as in a body that has turned back to rest, has the round-off of what it was before.
+        // Terms that cancel, as in a body that has turned back to rest, keep the round-off of the energy at the start.
         const bool relaxed = is_unresolved() || decrement() < kUnresolved * std::abs(first_value_);
         if (moving_ && (!relaxing_ || relaxed)) {  // where held dofs are blocked, let the bodies give way first
           relax_next_ = !relaxing_;
@@ -117,7 +117,7 @@ class Minimizer {
   static constexpr int kMaxBlocked = 50;
   static constexpr double kLeastProgress = 0.99;
 
-  /// Whether held dofs have hardly come nearer to their targets in many iterations: something is in their way for good.
+  /// Whether held dofs have hardly come nearer to their targets in many iterations: something blocks their way for good.
   bool is_stuck() {
     if (!moving_ || summary_.iterations % kMaxBlocked != 0) return false;
     return remaining_l1_ > kLeastProgress * std::exchange(remaining_before_, remaining_l1_);
@@ -132,7 +132,7 @@ class Minimizer {
     return text.str();
   }
 
-  /// Where a solve would end: whether that is a saddle, and x is lower now.
+  /// Called before a solve ends: leaves x if it is a saddle. Returns whether x has moved to a lower energy.
   bool can_leave_saddle() { return is_at_saddle() && leave_saddle(); }
 
   NewtonSummary finish(Termination termination, std::string_view message = {}) {
@@ -206,14 +206,14 @@ class Minimizer {
            (summary_.iterations > 0 && summary_.step_norm < options_.relative_step_tolerance * first_step_);
   }
 
-  /// What the full step promises.
+  /// The decrease of energy that the quadratic model promises for the full step.
   double decrement() const { return -0.5 * free_dot(step_, gradient_); }
 
   void note_decrement() {
     summary_.decrement = decrement();
     gradient_of_decrement_ = summary_.gradient_norm;
   }
-  /// Without a direction: it goes with the square of the gradient.
+  /// Estimates the decrement if no direction was computed: it scales with the square of the gradient.
   void foresee_decrement() {
     if (!(gradient_of_decrement_ > 0)) return;
     const double ratio = summary_.gradient_norm / gradient_of_decrement_;
@@ -222,10 +222,11 @@ class Minimizer {
 
   bool is_unresolved() const { return decrement() < kUnresolved * std::abs(value_) || is_below_spacing(); }
 
-  /// Whether the step is one of the last bits of positions, which far from the origin are long.
+  /// Whether the step changes only the last bits of positions. Far from the origin these bits are long distances.
   bool is_below_spacing() const { return step_.lpNorm<Eigen::Infinity>() <= kSpacing * x_.lpNorm<Eigen::Infinity>(); }
 
-  /// Whether many steps in a row promised less than energy or positions resolve: the gradient is round-off, and stays.
+  /// Whether many steps in a row promised a decrease below the resolution of energy or positions. The gradient is then
+  /// round-off and does not shrink further.
   bool is_lost_in_round_off() {
     unresolved_ = !moving_ && is_unresolved() ? unresolved_ + 1 : 0;
     return unresolved_ >= kMostUnresolved;
@@ -237,7 +238,7 @@ class Minimizer {
     return stalled_ >= options_.energy_steps && options_.energy_tolerance > 0;
   }
 
-  /// What is left of the way of the held dofs.
+  /// Computes the way that the held dofs still have to their targets.
   void compute_remaining() {
     moving_ = false;
     relaxing_ = std::exchange(relax_next_, false);
@@ -252,8 +253,8 @@ class Minimizer {
     if (moving_ && !relaxing_) motion_.step = std::move(remaining);
   }
 
-  /// Puts held dofs at their targets where that is free. The last bit of the way, within the tolerance of positions, may
-  /// change energies by less than their round-off: no search could tell that it helps.
+  /// Puts held dofs at their targets if the way is free. No line search is made: the rest of the way is within the tolerance
+  /// of positions, and may change the energy by less than its round-off.
   bool finish_motion(const VectorX& remaining) {
     {
       const ScopedTimer timer(summary_.ccd_seconds);
@@ -272,11 +273,11 @@ class Minimizer {
       if (dofs_.unknown[i] == kNone) x[i] = target_[i];
   }
 
-  /// Residual to ask of a direction. A Newton step leaves of the gradient the square of what the last one left, at best:
-  /// more digits than that are wasted (Eisenstat & Walker 1996), but for those that tell whether x is a minimum.
+  /// Relative residual to which a direction is solved. The gradient after a Newton step is at best of second order in the
+  /// one before, so more digits are wasted (Eisenstat & Walker 1996). Only steps that may end the solve get all digits.
   double forcing() const {
     if (is_tight_ || moving_ || options_.indefinite == IndefiniteHessian::accept) return kTightResidual;
-    // Loose solves may overlook negative curvature, and then creep.
+    // Loose solves may overlook negative curvature; Newton then creeps.
     if (summary_.indefinite > 0 || summary_.iterations >= kMostLoose) return kTightResidual;
     const double left = previous_gradient_ > 0 ? summary_.gradient_norm / previous_gradient_ : 1;
     const double asked = std::clamp(0.1 * left * left, kTightResidual, kLoosest);
@@ -285,7 +286,7 @@ class Minimizer {
     return may_be_last ? kTightResidual : asked;
   }
 
-  /// Whether a step solved for loosely may be one to end with.
+  /// Whether a loosely solved step may be the last one of the solve.
   bool is_near_end() const {
     constexpr double kNear = 10;
     return summary_.step_norm < kNear * options_.step_tolerance ||
@@ -293,7 +294,7 @@ class Minimizer {
            decrement() < kNear * options_.decrement_tolerance || is_unresolved();
   }
 
-  /// Solves for the same step to all digits, from now on too: the end has to be sure.
+  /// Solves for the same step again with all digits, and for later ones too, so that convergence is certain.
   bool tighten() {
     is_tight_ = true;
     asked_ = kTightResidual;
@@ -335,15 +336,15 @@ class Minimizer {
     return found;
   }
 
-  /// Of the true Hessian at x, which was factorised last.
+  /// Records whether the true Hessian at x is indefinite. It has to be the last matrix that was factorised.
   void note_definiteness() {
     is_indefinite_ = outcome_ == linear::Outcome::not_positive_definite || system_.negative_pivots() > 0;
     is_known_here_ = true;
     summary_.indefinite += is_indefinite_;
   }
 
-  /// Whether a factorisation says that x is no minimum. Asked only where the last one of a true Hessian said so, or left
-  /// open.
+  /// Whether a factorisation of the true Hessian finds x no minimum. Factorises only if the last true Hessian was
+  /// indefinite, or if a loose solve left this open.
   bool is_at_saddle() {
     if (options_.indefinite == IndefiniteHessian::accept || dofs_.num_unknowns == 0) return false;
     if (!is_indefinite_ && !is_loose_) return false;
@@ -375,8 +376,8 @@ class Minimizer {
     step_.setZero();
     for (Eigen::Index i = 0; i < x_.size(); ++i)
       if (dofs_.unknown[i] != kNone) step_[i] = direction[dofs_.unknown[i]];
-    // From the shortest way that the energy resolves on. Down the slope, or where that is round-off, to the side that the
-    // eigenvector has with any linear solver: the other branch may be as low.
+    // Begins with the shortest step whose change of energy exceeds round-off, down the slope. If the slope is round-off, the
+    // sign of the eigenvector decides, which is the same for all linear solvers; the other branch may be as low.
     step_ *= std::max(options_.step_tolerance, std::sqrt(2 * kRoundOff * std::abs(value_) / -curvature));
     if (step_.dot(gradient_) > kRoundOff * std::abs(value_)) step_ = -step_;
     for (int k = 0; k < kMostDoublings; ++k, step_ *= 2) {
@@ -418,7 +419,8 @@ class Minimizer {
     VectorView solution = buffers_.solution.resize(rhs.size());
     outcome_ = system_.prepare(shift, rhs, asked_);
     if (outcome_ != linear::Outcome::ok) return give_reason();
-    // Not only Cholesky must see it: along eigenvectors of negative eigenvalues Newton's step goes up to a saddle.
+    // L D L^T factorises an indefinite Hessian, too. Its solution must not be used: along eigenvectors of negative
+    // eigenvalues, Newton's step goes up to a saddle.
     if (options_.indefinite == IndefiniteHessian::project && system_.negative_pivots() > 0) {
       outcome_ = linear::Outcome::not_positive_definite;
       failure_ = " (linear solve: " + std::to_string(system_.negative_pivots()) + " negative eigenvalues)";
@@ -443,7 +445,7 @@ class Minimizer {
     return true;
   }
 
-  /// That of the held dofs.
+  /// Sets the step to the prescribed motion of the held dofs, and to zero elsewhere.
   void begin_step() {
     has_step_ = true;
     if (motion_.step.size() > 0)
@@ -487,7 +489,8 @@ class Minimizer {
     if (advancing && step < kRelaxBelow) relax_next_ = true;
     if (step < kBlockedBelow) note_blocked();
     const double slope = gradient_.dot(step_);
-    // Large enough for the step to lower the merit function of the quadratic model by half of what the penalty gives up.
+    // The penalty is so large that the full step lowers the merit function of the quadratic model by at least half of the
+    // penalty.
     if (advancing)
       penalty_ = std::max({penalty_, kLeastPenalty * system_.diagonal_scale() * remaining_l1_,
                            2 * std::max(0.0, slope + 0.5 * std::max(0.0, model_curvature_)) / remaining_l1_});
@@ -500,7 +503,7 @@ class Minimizer {
       if (!std::isfinite(value)) continue;
       const double merit_change = value - value_ - (advancing ? penalty_ * step * remaining_l1_ : 0);
       if (!acceptable(merit_change, value, step, merit_slope, advancing)) continue;
-      // Also by its slope at the end: near round-off values alone say anything.
+      // The slope at the end has to confirm a straight fall: values alone are unreliable near round-off.
       const bool straight = options_.extend_steps && !advancing && step == 1 && value - value_ < kStraight * slope &&
                             slope_at_candidate() < kStraight / 2 * slope;
       if (advancing) blocked_ = step < 1e-6 ? blocked_ + 1 : 0;
@@ -512,7 +515,8 @@ class Minimizer {
     return false;
   }
 
-  /// Patches end after so many iterations anyway, and PolyFEM's way is taken as it is.
+  /// Whether blocked steps may be turned. Not in patches, which end after a few iterations in any case, and not with
+  /// PolyFEM's way, which is kept as it is.
   bool may_turn() const { return !extras_.is_brief && options_.indefinite == IndefiniteHessian::project; }
 
   void note_blocked() {
@@ -522,9 +526,9 @@ class Minimizer {
     summary_.blocked_step = step_;
   }
 
-  /// Moves the candidate to where each vertex goes as far as it can alone (asked where the whole step is cut to less than
-  /// `kSingleWaysBelow`), if the energy falls by much more there. Where
-  /// that inverts cells it leads into squeezed ones, which take more iterations than it saves.
+  /// Moves each vertex as far as it can go alone, if the energy falls by much more there. Called if the whole step is cut to
+  /// less than `kSingleWaysBelow`. Not if cells invert on the way: this leads to squeezed cells, which take more iterations
+  /// than it saves.
   void try_single_ways(ConstVectorView ways, double& value) {
     {
       const ScopedTimer timer(summary_.ccd_seconds);
@@ -543,9 +547,9 @@ class Minimizer {
     is_known_here_ = false;
   }
 
-  /// Where the energy fell in a straight line over a full step (the projected Hessian is much stiffer than the true one, as
-  /// near a saddle), steps of twice the length follow as long as they lower it: Newton would leave with hundreds of equal
-  /// ones.
+  /// After a full step over which the energy fell in a straight line, takes steps of twice the length as long as they lower
+  /// it. Near a saddle the projected Hessian is much stiffer than the true one, and Newton would need hundreds of equal
+  /// steps.
   void go_on() {
     other_ = step_;
     for (int k = 0; k < kMostDoublings; ++k) {
@@ -565,9 +569,9 @@ class Minimizer {
     if (options_.line_search == LineSearch::backtracking && !advancing) return change < 0;
     if (change <= kArmijo * step * slope) return true;
     if (advancing || options_.line_search == LineSearch::armijo) return false;
-    // PolyFEM's "RobustArmijo" (CONVENTIONS.md, "Tolerances"; Hager & Zhang): where the energy changes little, in either
-    // direction, a slope that still falls at the end will do. That refuses full steps to the minimum of a quadratic: where
-    // energies can say nothing of what the slope promises, a slope that shrinks to half is enough.
+    // PolyFEM's "RobustArmijo" (CONVENTIONS.md, "Tolerances"; Hager & Zhang): if the energy changes little, in either
+    // direction, a slope that still falls at the end suffices. This rule refuses full steps to the minimum of a quadratic.
+    // So, where the promised decrease is below round-off, a slope that shrinks to half suffices, too.
     const double change_of_energy = std::abs(value - value_);
     if (change_of_energy > 0.1 * std::abs(value_)) return false;
     const double after = slope_at_candidate();

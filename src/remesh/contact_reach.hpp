@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which parts of the surface can touch where an edit and the relaxation after it change it: most patches of a mesh touch
-// nothing, and need no contact.
+// Finds the parts of the surface that can touch where an edit and the relaxation after it change the surface. Most patches
+// of a mesh touch nothing and need no contact.
 #pragma once
 
 #include <vector>
@@ -45,13 +45,13 @@ class ContactReach {
  public:
   using Hits = typename SurfaceIndex<Dim>::Hits;
 
-  /// Forgets the last patch; the mesh has so many facets.
+  /// Forgets the last patch. `facet_slots`: facets of the mesh, gone ones included.
   void clear(int facet_slots);
-  /// A facet that is replaced or one of whose vertices is free: then it moves. `facet`: its id, kNone where the edit inserts
-  /// it.
+  /// Adds a facet of the patch. It `moves` if it is replaced or one of its vertices is free. `facet` is its id, or kNone if
+  /// the edit inserts it.
   void add(const SurfacePiece<Dim>& piece, FacetId facet, bool moves);
-  /// Looks for all that what was added could touch, among itself and elsewhere, but for facets that are gone
-  /// (`is_gone(facet)`), where no vertex moves further than room() from where it is. `dhat` [m].
+  /// Finds everything that the added facets could touch, also each other, as long as no vertex moves further than room().
+  /// Leaves out facets that are gone (`is_gone(facet)`). `dhat` [m].
   template <typename IsGone>
   void find(const SurfaceIndex<Dim>& surface, Neighbourhoods<Dim>& neighbourhoods, double dhat, Hits& hits,
             const IsGone& is_gone) {

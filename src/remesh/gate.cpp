@@ -87,8 +87,8 @@ bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex
   return !(positive && negative);
 }
 
-/// What lies between the surface before and after a swap: a quad that is flat at rest is not flat when deformed, and its two
-/// diagonals are edges of a tetrahedron. (Facets of the plane do not swap.)
+/// The corners of the tetrahedron between the surface before and after a swap. A quad that is flat at rest is not flat when
+/// deformed: its two diagonals are edges of a tetrahedron. (In 2D facets do not swap.)
 std::array<Vec<3>, 4> between_diagonals(const Mesh<3>& mesh, const SurfaceIndex<3>& surface, const Edit<3>& edit) {
   std::array<Vec<3>, 4> corners;
   const auto& facet = mesh.facet(edit.removed_facets[0]);
@@ -149,7 +149,7 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
     for (const VertexId v : mesh_.facet(f)) box.include(surface.at(v));
   surface.query(box, scratch.hits);
 
-  // What moves on the way to the new surface: the vertex that is set and the one that goes, both to the target.
+  // Two vertices move on the way to the new surface, both to the target: the one that is set and the one that disappears.
   scratch.swept.clear();
   if (edit.kind == Edit<Dim>::Kind::swap) scratch.swept.push_back(between_diagonals(mesh_, surface, edit));
   for (const FacetId f : edit.removed_facets) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The one gate for changes of connectivity: an edit passes where the state stays valid in every stored configuration, at
-// interpolated values. Energies are not asked.
+// The one gate for changes of connectivity: an edit passes if the state stays valid in every stored configuration, with
+// interpolated values at new vertices. The gate does not ask about energies.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct Configuration {
   SurfaceIndex<Dim> surface;
 };
 
-/// Memory of its questions, for the next one.
+/// Buffers of the gate's checks, which the next check uses again.
 template <int Dim>
 struct GateScratch {
   typename SurfaceIndex<Dim>::Hits hits;
@@ -28,15 +28,16 @@ struct GateScratch {
 template <int Dim>
 class Gate {
  public:
-  /// All configurations of `fields`, which (as the rest) must outlive this.
+  /// Takes all configurations of `fields`. The arguments must outlive the gate.
   Gate(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context);
 
-  /// Cells that the edit inserts keep their orientation; facets that it inserts touch no other ones (they may share
-  /// vertices), and on the way there sweep over no vertex of the surface and no obstacle point; swaps too. Decided exactly.
+  /// Whether an edit keeps the state valid, decided exactly. Inserted cells have to keep their orientation. Inserted facets
+  /// (of swaps, too) must touch no other ones, except at shared vertices, and sweep over no vertex of the surface and no
+  /// obstacle point on the way to their places.
   bool passes(const Edit<Dim>& edit, GateScratch<Dim>& scratch) const;
 
   const SurfaceIndex<Dim>& present() const { return configurations_.front().surface; }
-  /// After an edit was applied.
+  /// Takes over an edit that was applied.
   void follow(const Edit<Dim>& edit, FacetId first_new);
   /// After a vertex has moved in the present configuration.
   void move(VertexId v) { configurations_.front().surface.move(v); }

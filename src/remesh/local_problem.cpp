@@ -9,12 +9,12 @@
 
 namespace itr {
 
-/// Keeps vertices of the surface where the patch knows everything that they could touch, no further than `room` from where
-/// they started: an energy of value zero that only limits steps.
+/// Keeps vertices of the surface within `room` of their start, because the patch knows only what they could touch there. It
+/// is an energy of value zero that only limits steps.
 template <int Dim>
 class MotionBound final : public Energy {
  public:
-  /// From now on of no vertex, and to be told which.
+  /// Bounds no vertex until `add` names some.
   void reset(ConstVectorView start, double room) {
     bounded_.clear();
     start_ = start;
@@ -366,7 +366,7 @@ void LocalProblem<Dim>::add_terms() {
   potential.add_to(energy_, potential.lag(x, workspace_));
 }
 
-/// What of the predictor as a function on the old mesh the new one cannot represent.
+/// Adds the part of the predictor, a function on the old mesh, that the new mesh cannot represent.
 template <int Dim>
 void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) const {
   // Numbering of the removed cells' own: their vertices carry the functions as they were.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The step's energy on a patch of cells: the same terms as the whole mesh, all vertices outside held. Built for the mesh as
-// it is, or as an edit would make it. The patch may be a few rings, or just the cells of the edit: then what is free is
-// hardly more than the vertex that the edit sets.
+// The step's energy on a patch of cells: the same terms as on the whole mesh, with all vertices outside held. It is built
+// for the mesh as it is, or as an edit would make it. A patch is a few rings, or only the cells of the edit, where hardly
+// more than the vertex that the edit sets is free.
 #pragma once
 
 #include <memory>
@@ -78,8 +78,8 @@ struct LocalScratch {
 template <int Dim>
 class LocalProblem {
  public:
-  /// `patch` are alive cells, ascending, that hold all of the edit's removed cells; vertices whose cells are all in it are
-  /// free. The problem is that before the edit, or after it. What is handed in must outlive this.
+  /// `patch` has alive cells, ascending, all removed cells of the edit among them. A vertex is free if the patch has all of
+  /// its cells. `is_after` chooses the problem after the edit instead of the one before. The arguments must outlive this.
   LocalProblem(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, bool is_after,
                LocalScratch<Dim>& scratch);
   ~LocalProblem();
@@ -87,13 +87,13 @@ class LocalProblem {
   LocalProblem& operator=(const LocalProblem&) = delete;
 
   double value() { return energy_.value(x_.view(), workspace_); }
-  /// At most so many Newton iterations from where it stands.
+  /// Relaxes from the present positions by at most so many Newton iterations.
   NewtonSummary relax(int max_iterations);
   bool has_unknowns() const { return dofs_.num_unknowns > 0; }
   int num_unknowns() const { return dofs_.num_unknowns; }
   /// Whether anything that the patch changes could touch something.
   bool touches_contact() const { return touches_contact_; }
-  /// Holds all vertices of the surface, beside the patch's own, that could have made a difference; empty without contact.
+  /// A box with all surface vertices outside of the patch that could have changed the result; empty without contact.
   const Box<Dim>& surface_read() const { return surface_read_; }
 
   struct Position {

@@ -239,11 +239,12 @@ bool knows_all_terms(const StepContext<Dim>& context) {
 }
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
-/// Share of what is forgotten that no relaxation gets back (ball-wall 2D: all of it refuses a sixth more vertices).
+/// Share of the forgotten history that no relaxation regains (ball-wall 2D: a share of 1 refuses so many collapses that a
+/// sixth more vertices stay).
 constexpr double kLeastForgotten = 0.3;
 
-/// About what an edit forgets of the predictor (see add_unrepresented_history) where it takes a vertex away or moves it: the
-/// gap between both functions where that was, times its hat function on the old cells.
+/// Estimates the history that an edit forgets (see add_unrepresented_history) if it removes or moves a vertex: the gap
+/// between the old and the new predictor at the vertex's old place, times its hat function on the old cells.
 template <int Dim, typename At>
 double predict_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit, const At& at) {
   double forgotten = 0;
@@ -315,8 +316,8 @@ class MovingModels {
   std::vector<QuadraticModel<Dim>> moving_;
 };
 
-/// Nothing is set: each vertex gives way, by itself, to what the edit adds to its forces. Here the cells of the edit alone
-/// resist, in the mesh those around them too.
+/// A swap sets no vertex. Each vertex moves by itself under the forces that the edit adds. Only the edit's cells resist
+/// here; in the mesh the cells around them resist, too.
 template <int Dim>
 double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   constexpr double kShareOfRelaxation = 0.25;

@@ -7,15 +7,15 @@
 
 namespace itr {
 
-/// By what factor a relaxed patch is taken to gain more than the new vertex alone, without contact: in 2D nine of ten gain
-/// less, in 3D 19 of 20, and what is refused wrongly comes up again when its gain grows (verification/paper). Grows towards
-/// incompressibility.
+/// Factor by which a relaxed patch is taken to gain more than the new vertex alone, without contact. It grows towards
+/// incompressibility. In 2D nine of ten patches gain less, in 3D 19 of 20. A wrongly refused edit is examined again when its
+/// gain grows (verification/paper).
 template <int Dim>
 double patch_over_vertex(double poisson_ratio) {
   constexpr double kLeast = Dim == 2 ? 1.5 : 2, kGrowth = Dim == 2 ? 0.6 : 0.2;
   return std::max(kLeast, kGrowth / (1 - 2 * poisson_ratio));
 }
-/// The same where the surface changes in contact: the vertices beside the new one find room there.
+/// The same factor where the surface changes in contact: relaxing vertices beside the new one gain more there.
 template <int Dim>
 inline constexpr double kPatchOverVertexInContact = Dim == 2 ? 30 : 10;
 

@@ -12,7 +12,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
   const bool by_size = options.sizing_field.enabled, may_stir = options.swap.enabled || options.smooth.enabled;
   const bool asks_what_is_available = (options.split.enabled && !by_size) || (may_stir && screens(options));
-  // Where less is there than what one split has to gain, shapes do not matter either: a body in flight.
+  // If the available energy is less than the least gain of one split, shapes do not matter either: a body in flight.
   const bool is_enough_there = !asks_what_is_available || available_energy(mesh, fields, context) >=
                                                               context.scaling * options.split.acceptance_tolerance.value();
   const bool may_split = options.split.enabled && !by_size && is_enough_there;

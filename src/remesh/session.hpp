@@ -91,10 +91,10 @@ class RemeshSession {
   void set_depth(const EdgeKey& edge, int generation) { depth_[edge] = generation; }
   void forget_depths() { depth_.clear(); }
 
-  /// How much the deformation and the history vary over the cells around an edge (a vertex {v, kNone}): a field that is
-  /// linear there gives and takes nothing, whatever is done to the mesh. [J, times the scaling, up to a factor]
+  /// How much the deformation and the history vary over the cells around an edge (a vertex {v, kNone}). No edit gains or
+  /// loses energy where both are linear. [J, times the scaling, up to a factor]
   double roughness(const EdgeKey& edge) const;
-  /// Whether the same was refused before and what it depended on is as it was. Only where bounds decide.
+  /// Whether the same edit was refused before and its signal is still in the refusal's range. Only with screening by bounds.
   bool was_refused(RemeshMemory::Kind kind, const EdgeKey& edge, double signal, bool in_contact) const {
     return options_.screening == Screening::bounds && refusals_.holds(kind, edge, signal, in_contact);
   }
@@ -106,20 +106,20 @@ class RemeshSession {
   /// Whether predictions may leave out trials.
   bool screens() const { return itr::screens(options_); }
   double least_worthwhile() const { return itr::least_worthwhile(options_); }
-  /// What was done before is where something was gained: cells there may be badly shaped.
+  /// Marks the places of all commits so far as gains: cells there may be badly shaped.
   void mark_gains();
-  /// Whether cells at an edge (a vertex {v, kNone}) that are badly shaped do harm: where the fields vary by what is worth
-  /// something, where something was gained nearby, and where a shape is so bad that rules only let it become better.
-  /// Elsewhere swaps and moves that better shapes would be work for nothing.
+  /// Whether badly shaped cells at an edge (a vertex {v, kNone}) do harm. They do where the fields vary enough, where an
+  /// edit nearby gained energy, and where a shape is so bad that rules only allow it to improve. Elsewhere swaps and moves
+  /// for better shapes would be wasted work.
   bool shape_matters(const EdgeKey& e, double roughness) const;
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
   double predict_split(const EdgeKey& edge) const { return itr::predict_split<Dim>(state(), edge); }
-  /// Of a cell that may not be there yet, at present positions. [J, times the scaling]
+  /// Energy of a cell, which need not be in the mesh, at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body) const {
     return cell_energy<Dim>(state(), cell, body);
   }
-  /// Whether what is predicted of an edit of these cells says that a patch cannot gain the tolerance [J] either.
+  /// Whether the prediction of an edit of these cells tells that its patch cannot gain the tolerance [J] either.
   bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance) const {
     return screens() &&
            at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
@@ -149,9 +149,10 @@ class RemeshSession {
   /// Decides about the edit of a trial that has to gain `tolerance` [J].
   void judge(Trial<Dim>& trial, const Vec<Dim>& center, double tolerance, const LocalRelaxationOptions& local,
              LocalScratch<Dim>& scratch) const;
-  /// From here on the next two tell what commits change.
+  /// Begins a wave: the next two functions answer for commits after this call.
   void begin_wave();
-  /// Whether cells at an edge (a vertex {v, kNone}) are others, or their vertices elsewhere: all of its trials look there.
+  /// Whether a commit of this wave replaced cells at an edge (a vertex {v, kNone}) or moved their vertices. All trials of
+  /// the edge depend on these.
   bool has_changed_around(const EdgeKey& e) const { return changed_after(e, commits_before_wave_); }
   /// Whether something else that a trial of the wave read has changed.
   bool was_overtaken(const Trial<Dim>& trial) const;
@@ -159,7 +160,7 @@ class RemeshSession {
   /// whether it did.
   bool commit(Trial<Dim>& trial, OperationCount& count);
 
-  /// Commits an edit as it is, nothing relaxed, where the gate lets it pass. Returns whether it did.
+  /// Commits an edit without relaxing, if the gate lets it pass. Returns whether it did.
   bool apply_if_valid(const Edit<Dim>& edit);
 
   /// Facets and obstacles at present nearer than dhat to a facet of the surface, each also as it is at rest.

@@ -38,20 +38,20 @@ double shape_gain(const Mesh<3>& mesh, const Edit<3>& edit) {
   return after / worst_quality<3>(mesh, edit.removed_cells);
 }
 
-/// What a swap has to gain that is not for the sake of the shape [J].
+/// Least gain of a swap that does not improve the shape [J].
 template <int Dim>
 double least_gain(const RemeshSession<Dim>& session) {
   return std::max(session.least_worthwhile(), session.options().swap.acceptance_tolerance.value());
 }
 
-/// Whether the bulk terms say that an edit gains that [J].
+/// Whether the prediction from bulk terms reaches `least` [J].
 template <int Dim>
 bool is_promising(const RemeshSession<Dim>& session, const Edit<Dim>& edit, double least) {
   return !session.screens() || session.predict(edit) >= session.context().scaling * least;
 }
 
-/// What differs between the dimensions: which edges first, and what takes their place. A swap that betters the shape may
-/// cost a little energy, for the sake of the mesh: without that condition, edges swap to and fro.
+/// The differences between the dimensions: the order of edges, and what replaces an edge. Only a swap that improves the
+/// shape may cost a little energy: without that condition, edges swap to and fro.
 struct DiagonalSwap {
   const RemeshSession<2>& session;
   bool may_go(const EdgeKey& edge) const { return !session.is_surface(edge); }
@@ -65,7 +65,8 @@ struct DiagonalSwap {
   bool is_worth_asking_again(const EdgeKey& edge) const { return valence_gain(session.mesh(), edge) > 0; }
 };
 
-/// At frozen positions these energies are sums over tetrahedra: that of the new ones is least.
+/// Removes an edge such that the energy of the new tetrahedra is least. At frozen positions this energy is a sum over
+/// tetrahedra.
 struct EdgeRemoval {
   const RemeshSession<3>& session;
   bool may_go(const EdgeKey&) const { return true; }  // in the volume and within flat patches, as strata say
@@ -132,8 +133,8 @@ class Swapper {
   std::unordered_map<EdgeKey, int, EdgeKeyHash> tries_;
 };
 
-/// Facets between the cells that are there now, once each: for the energy alone, and not where an edge removal would come
-/// and undo it for the shape.
+/// Removes facets between present cells, each once, only for a gain of energy. Leaves out facets whose removal an edge
+/// removal would undo to improve the shape.
 void remove_facets(RemeshSession<3>& session) {
   const Mesh<3>& mesh = session.mesh();
   const double least = least_gain(session);

@@ -93,7 +93,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
       return at_most(bound.gain, surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex) <
              options.required;
     };
-    // What the new mesh cannot represent of the history takes the longest to find: first without.
+    // History that the new mesh cannot represent takes the longest to find, so the first check leaves it out.
     const bool is_nested = edit.kind == Edit<Dim>::Kind::split || state.history == HistoryRule::interpolated;
     if (is_refused_on_star(is_nested ? state.history : HistoryRule::interpolated)) return;
     if (!is_nested) {

@@ -43,17 +43,17 @@ struct TrialOptions {
   LocalRelaxationOptions local;
 };
 
-/// The decrease of the energy by the edit (REMESHING.md, "The rules", rules a-d; paper eq. 11): both sides have one
-/// support and get the same number of Newton iterations. First the cells of the edit alone, with hardly more than the vertex
-/// that it sets free: what that gains exists, so it accepts; where even `patch_over_vertex` times that is not enough, it
-/// refuses. A patch decides what lies between. Once scratch and verdict have served for similar edits, nothing is allocated
-/// but for the history that an edit forgets, and for damping, pressure and terms of the program.
+/// Computes the decrease of the energy by the edit (REMESHING.md, "The rules", rules a-d; paper eq. 11). Both sides have one
+/// support and get the same number of Newton iterations. First the cells of the edit alone relax, where hardly more than the
+/// vertex that the edit sets is free. Their gain is real, so it may accept the edit; if even `patch_over_vertex` times this
+/// gain is too little, it refuses. A trial on a patch decides the rest. Once scratch and verdict have served for similar
+/// edits, only the history that an edit forgets, damping, pressure and terms of the program allocate memory.
 template <int Dim>
 void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
              double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict);
 
-/// The lower bound alone: what the edit gains when only vertices move whose cells are all the edit's own or around the
-/// vertex that it sets. [J, times the scaling]
+/// Returns only the lower bound: the gain of the edit if the only vertices that move have all their cells among the edit's
+/// own or around the vertex that it sets. [J, times the scaling]
 template <int Dim>
 double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch);
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Candidates are looked at in waves: so many from the head of the queue, all on the mesh as it is, on all threads; then
-// settled one after another in the queue's order. What rests on something that an earlier one of its wave has changed goes
-// back. How many make a wave depends on what the one before found, never on threads, so neither do results.
+// A wave takes several candidates from the head of the queue. All threads preview them on the mesh as it is; then they are
+// settled one after another in the queue's order. A candidate goes back to the queue if an earlier one of its wave has
+// changed something that its preview read. The size of a wave depends on the results of the one before and never on threads,
+// so neither do results.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +14,8 @@
 
 namespace itr {
 
-/// Candidates of a wave: twice as many as in the one before where nothing of that was wasted, half as many where more than
-/// this share was. (verification/paper/README.md, "Waves")
+/// A wave has twice the candidates of the one before if no preview of that was wasted, and half of them if more than this
+/// share was (verification/paper/NOTEBOOK.md, "Waves").
 inline constexpr int kSmallestWave = 8, kLargestWave = 256;
 inline constexpr double kTolerableWaste = 0.1;
 
@@ -30,7 +31,7 @@ void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<Ed
   std::vector<std::optional<EdgeQueue::Entry>> ranked;
   std::vector<Trial<Dim>> wave(kLargestWave);
   int size = kSmallestWave;
-  // One thread alone looks at each when it is its turn, and not at what is lost by then: that finds the same.
+  // A single thread previews each candidate at its turn, and leaves out those that are lost by then. This finds the same.
   const bool is_alone = session.num_lanes() == 1;
   const auto look = [&](Trial<Dim>& trial, LocalScratch<Dim>& scratch) {
     trial.clear();
