@@ -15,7 +15,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROWS = [  # study, error, the scene in words, why
     ("masticator-2d", "L2", "beam between moving teeth, 2D", "bending and contact are local"),
     ("ball-wall-3d", "H1", "impact of a ball, 3D", "contact is local"),
-    ("masticator-3d", "L2", "beam between moving teeth, 3D", "bending wants another order of elements"),
+    ("masticator-3d", "L2", "beam between moving teeth, 3D", "bending is smooth"),
     ("cantilever", "L2", "Cook's membrane, 2D", "the solution is smooth but for one corner"),
     ("spikes2d", "L2", "bar dropped on spikes, 2D", "contact is local"),
     ("ball-wall-2d", "L2", "impact of a ball, 2D", "waves fill the whole body"),
