@@ -14,7 +14,7 @@ fi
 
 cmake --preset release
 cmake --build --preset release -- -j "${ITR_JOBS:-2}"
-ctest --test-dir build/release --output-on-failure --no-tests=error -LE long
+ctest --test-dir build/release --output-on-failure --no-tests=error -LE long -j "${ITR_JOBS:-2}"
 
 # A ball that hits a wall, with remeshing and friction: each edit and each step is checked.
 cmake --preset audit -D ITR_BUILD_TESTS=OFF
