@@ -101,10 +101,11 @@ std::string describe_remeshing(const StepReport& totals, int vertices_before, do
     return c.tried > 0 ? fmt::format(", {} of {} {}", c.accepted, c.tried, name) : std::string();
   };
   const std::string done =
-      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}", vertices_before,
-                  totals.vertices, totals.splits.accepted, totals.splits.tried, count(totals.collapses, "collapses"),
-                  count(totals.swaps, "swaps"), count(totals.smooths, "moves"));
-  const int accepted = totals.splits.accepted + totals.collapses.accepted + totals.swaps.accepted + totals.smooths.accepted;
+      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}{}", vertices_before,
+                  totals.vertices, totals.splits.accepted, totals.splits.tried, count(totals.curves, "curved edges"),
+                  count(totals.collapses, "collapses"), count(totals.swaps, "swaps"), count(totals.smooths, "moves"));
+  const int accepted = totals.splits.accepted + totals.curves.accepted + totals.collapses.accepted + totals.swaps.accepted +
+                       totals.smooths.accepted;
   if (accepted > 0) return done;
   const std::string bound = totals.bound_by_dhat > 0
                                 ? fmt::format("; d-hat kept {} surface edges from being split", totals.bound_by_dhat)

@@ -36,6 +36,16 @@ Space space_of_orders(const Mesh<Dim>& mesh, const std::map<int, int>& order) {
 }
 
 template <int Dim>
+bool has_curved_edge(const Mesh<Dim>& mesh, const Space& space, CellId c) {
+  if (space.is_linear()) return false;
+  const auto& cell = mesh.cell(c);
+  for (int i = 0; i <= Dim; ++i)
+    for (int j = i + 1; j <= Dim; ++j)
+      if (space.find(cell[i], cell[j]) != kNone) return true;
+  return false;
+}
+
+template <int Dim>
 bool is_all_curved(const Mesh<Dim>& mesh, const Space& space) {
   return !space.is_linear() && mesh.edges() == space.curved_edges();
 }
@@ -97,6 +107,8 @@ void add_chord_facets<3>(const MeshTypes<3>::Facet& facet, const Space& space, i
 
 template Space space_of_orders<2>(const Mesh<2>&, const std::map<int, int>&);
 template Space space_of_orders<3>(const Mesh<3>&, const std::map<int, int>&);
+template bool has_curved_edge<2>(const Mesh<2>&, const Space&, CellId);
+template bool has_curved_edge<3>(const Mesh<3>&, const Space&, CellId);
 template bool is_all_curved<2>(const Mesh<2>&, const Space&);
 template bool is_all_curved<3>(const Mesh<3>&, const Space&);
 template std::vector<Vec<2>> node_rest_positions<2>(const Mesh<2>&, const Space&);

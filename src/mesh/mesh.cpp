@@ -203,6 +203,37 @@ double Mesh<Dim>::total_volume() const {
 }
 
 template <int Dim>
+bool Mesh<Dim>::is_curved(CellId c) const {
+  if (!has_nodes()) return false;
+  const Cell& cell = cells_[c];
+  for (int i = 0; i <= Dim; ++i)
+    for (int j = i + 1; j <= Dim; ++j)
+      if (node_of(cell[i], cell[j]) != kNone) return true;
+  return false;
+}
+
+template <int Dim>
+VertexId Mesh<Dim>::add_node(const EdgeKey& edge) {
+  const VertexId node = vertex_slots();
+  const bool is_new = node_of_edge_.try_emplace(edge, node).second;
+  ITR_CHECK(is_new && edge[0] < edge[1], edge[0], edge[1]);
+  edge_of_node_[node] = edge;
+  rest_.push_back((rest_[edge[0]] + rest_[edge[1]]) / 2);
+  vertex_alive_.push_back(0);
+  vertex_tag_.push_back(kNoTag);
+  cells_of_.emplace_back();
+  facets_of_.emplace_back();
+  return node;
+}
+
+template <int Dim>
+std::vector<std::pair<EdgeKey, VertexId>> Mesh<Dim>::nodes() const {
+  std::vector<std::pair<EdgeKey, VertexId>> all(node_of_edge_.begin(), node_of_edge_.end());
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+template <int Dim>
 VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
   VertexId created = kNone;
   if (edit.value && edit.value->vertex == kNewVertex) {
@@ -233,6 +264,16 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
     ITR_CHECK(cells_of_[v].empty() && facets_of_[v].empty(), v);
     vertex_alive_[v] = 0;
     --num_vertices_;
+  }
+  for (const EdgeKey& curved : edit.removed_nodes) {
+    const auto it = node_of_edge_.find(curved);
+    ITR_CHECK(it != node_of_edge_.end(), curved[0], curved[1]);
+    edge_of_node_.erase(it->second);
+    node_of_edge_.erase(it);
+  }
+  for (const auto& node : edit.inserted_nodes) {
+    const EdgeKey ends = resolve(node.edge);
+    add_node({std::min(ends[0], ends[1]), std::max(ends[0], ends[1])});
   }
   return created;
 }
@@ -271,6 +312,8 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
     facet_tag_[to] = facet_tag_[f];
     for (const int v : facets_[to]) facets_of_[v].push_back(to);
   }
+  node_of_edge_.clear();
+  edge_of_node_.clear();
   rest_.resize(vertices);
   vertex_alive_.assign(vertices, 1);
   vertex_tag_.resize(vertices);
@@ -312,6 +355,12 @@ std::string Mesh<Dim>::find_defect() const {
     if (is_even(facets_[f]) != is_even(entry.second)) return "facet " + std::to_string(f) + " is oriented inward";
   }
   if (boundary != num_facets_) return "a facet that is not on the boundary";
+  if (node_of_edge_.size() != edge_of_node_.size()) return "wrong number of nodes";
+  for (const auto& [edge, node] : node_of_edge_) {
+    if (!vertex_alive_[edge[0]] || !vertex_alive_[edge[1]] || !are_joined(edge[0], edge[1]))
+      return "node " + std::to_string(node) + " of an edge that is gone";
+    if (vertex_alive_[node] || edge_of_node(node) != edge) return "node " + std::to_string(node) + " is of two edges";
+  }
   return {};
 }
 

@@ -395,6 +395,7 @@ void Strata<Dim>::follow(const Edit<Dim>& edit, VertexId created) {
     if (edit.value->tag != kNoTag && stratum != Stratum::non_manifold) stratum = Stratum::corner;
     vertices_.push_back(stratum);
   }
+  add_nodes(static_cast<int>(edit.inserted_nodes.size()));
   for (const auto& facet : edit.inserted_facets) {
     ITR_CHECK(facet.parent != kNone, patches_.size());
     patches_.push_back(patches_[facet.parent]);

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 7;
+constexpr std::int64_t kFormat = 8;
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -92,7 +92,7 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
   return mesh;
 }
 
-constexpr const char* kOperations[RemeshMemory::kKinds] = {"split", "collapse", "swap", "smooth", "reshape"};
+constexpr const char* kOperations[RemeshMemory::kKinds] = {"split", "collapse", "swap", "smooth", "reshape", "curve"};
 constexpr int kRefusalColumns = 5;  ///< two vertices, least and most signal, whether in contact
 
 std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }

@@ -67,11 +67,11 @@ std::string common_members(const StepReport& r) {
   return fmt::format(
       R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"factorizations":{},"linear_solves":{},)"
       R"("reused_factors":{},"linear_iterations":{},"energy":{},"energy_before_remesh":{},)"
-      R"("splits":{},"collapses":{},"swaps":{},"smooths":{},"bound_by_dhat":{},"reverted_remeshes":{},)"
+      R"("splits":{},"curves":{},"collapses":{},"swaps":{},"smooths":{},"bound_by_dhat":{},"reverted_remeshes":{},)"
       R"("min_distance":{},"min_volume_ratio":{},"history_loss":{},)"
       R"("indefinite":{},"damped_steps":{},"refined_quadrature":{},"seconds":{},"processor_seconds":{},"peak_rss_mb":{})",
       r.vertices, r.elements, r.unknowns, r.newton_iterations, r.factorizations, r.linear_solves, r.reused_factors,
-      r.linear_iterations, energy_json(r.energy), number(r.energy_before_remesh), count_json(r.splits),
+      r.linear_iterations, energy_json(r.energy), number(r.energy_before_remesh), count_json(r.splits), count_json(r.curves),
       count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), r.bound_by_dhat, r.reverted_remeshes,
       number(r.min_distance), number(r.min_volume_ratio), number(r.history_loss), r.indefinite, r.damped_steps,
       r.refined_quadrature, seconds_json(r.seconds), number(r.processor_seconds), number(r.peak_rss_mb));
@@ -107,7 +107,7 @@ void for_each_number(Report& r, Visit&& visit) {
                   &r.reused_factors, &r.linear_iterations, &r.indefinite, &r.bound_by_dhat, &r.reverted_remeshes,
                   &r.damped_steps, &r.refined_quadrature, &r.cut_steps})
     visit(*n);
-  for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths}) {
+  for (auto* count : {&r.splits, &r.curves, &r.collapses, &r.swaps, &r.smooths}) {
     visit(count->tried);
     visit(count->relaxed);
     visit(count->accepted);

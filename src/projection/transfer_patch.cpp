@@ -52,8 +52,8 @@ MatrixX TransferCells<Dim>::gather(const VectorX& field) const {
 }
 
 template <int Dim>
-TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched,
-                                       const std::map<int, Material>& materials, int rings) {
+TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const Space& space,
+                                       const TouchedCells& touched, const std::map<int, Material>& materials, int rings) {
   TransferPatch<Dim> patch;
   Numbering<Dim> old_numbering(old_mesh, materials, patch.old_cells), numbering(mesh, materials, patch.new_cells);
   for (const CellId c : touched.old_cells) old_numbering.add(c);
@@ -69,7 +69,7 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
     const std::size_t end = patch.new_cells.vertices.size();
     for (std::size_t i = std::exchange(first, end); i < end; ++i)
       for (const CellId c : mesh.cells_of(patch.new_cells.vertices[i]))
-        if (inside.insert(c).second) {
+        if (!has_curved_edge(mesh, space, c) && inside.insert(c).second) {
           ids.push_back(c);
           numbering.add(c);
         }
@@ -86,10 +86,10 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
   return patch;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                    \
-  template struct TransferCells<Dim>;                                                                           \
-  template TransferPatch<Dim> make_transfer_patch<Dim>(const Mesh<Dim>&, const Mesh<Dim>&, const TouchedCells&, \
-                                                       const std::map<int, Material>&, int);
+#define ITR_INSTANTIATE(Dim)                                                                             \
+  template struct TransferCells<Dim>;                                                                    \
+  template TransferPatch<Dim> make_transfer_patch<Dim>(const Mesh<Dim>&, const Mesh<Dim>&, const Space&, \
+                                                       const TouchedCells&, const std::map<int, Material>&, int);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -6,8 +6,8 @@
 namespace itr {
 
 std::string_view name(Refusal refusal) {
-  static constexpr std::string_view kNames[kRefusals] = {"none",   "gone",      "non-manifold", "held",    "link",
-                                                         "exists", "long ring", "shape",        "outside", "cost"};
+  static constexpr std::string_view kNames[kRefusals] = {"none",      "gone",  "non-manifold", "held", "link",  "exists",
+                                                         "long ring", "shape", "outside",      "cost", "curved"};
   return kNames[static_cast<int>(refusal)];
 }
 
@@ -38,6 +38,13 @@ std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, s
   return found;
 }
 
+template <int Dim>
+bool has_curved(const Mesh<Dim>& mesh, std::span<const CellId> cells) {
+  return mesh.has_nodes() && std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh.is_curved(c); });
+}
+
+template bool has_curved(const Mesh<2>&, std::span<const CellId>);
+template bool has_curved(const Mesh<3>&, std::span<const CellId>);
 template bool extends_tags(const Mesh<2>&, const Edit<2>&);
 template bool extends_tags(const Mesh<3>&, const Edit<3>&);
 template std::vector<Mesh<2>::Facet> interfaces_among(const Mesh<2>&, std::span<const CellId>);

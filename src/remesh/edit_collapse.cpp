@@ -169,13 +169,18 @@ Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata,
   if (at_a == along && at_b == along) merges.push_back({b, a, 0.5 * (mesh.rest(a) + mesh.rest(b)), true});
   if (at_b == along) merges.push_back({b, a, mesh.rest(a), false});
   if (at_a == along) merges.push_back({a, b, mesh.rest(b), false});
+  Refusal refusal = Refusal::shape;
   for (const Merge<Dim>& merge : merges) {
     if (!keeps_shape(mesh, merge, rule)) continue;
+    if (has_curved(mesh, mesh.cells_of(merge.gone)) || (merge.moves && has_curved(mesh, mesh.cells_of(merge.kept)))) {
+      refusal = Refusal::curved;
+      continue;
+    }
     Edit<Dim> edit = make_edit(mesh, edge, merge);
     if (extends_tags(mesh, edit)) return refused<Dim>(Refusal::held);
     return {.edit = std::move(edit)};
   }
-  return refused<Dim>(Refusal::shape);
+  return refused<Dim>(refusal);
 }
 
 template Proposal<2> propose_collapse<2>(const Mesh<2>&, const Strata<2>&, const EdgeKey&, const QualityRule&);

@@ -138,6 +138,7 @@ Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, Ver
   const Stratum stratum = strata.vertex(vertex);
   if (stratum == Stratum::non_manifold) return refused<Dim>(Refusal::non_manifold);
   if (stratum == Stratum::corner) return refused<Dim>(Refusal::held);
+  if (has_curved(mesh, mesh.cells_of(vertex))) return refused<Dim>(Refusal::curved);
   const Vec<Dim>& from = mesh.rest(vertex);
   const Vec<Dim> place =
       stratum == Stratum::volume ? target : Vec<Dim>(from + strata.tangent_projector(mesh, vertex) * (target - from));

@@ -1,7 +1,54 @@
 // SPDX-License-Identifier: MIT
 #include "edit_checks.hpp"
+#include "itr/fem/quadratic.hpp"
 
 namespace itr {
+
+namespace {
+
+EdgeKey key_of(VertexId a, VertexId b) { return {std::min(a, b), std::max(a, b)}; }
+
+/// The node of the edge from the midpoint of the edge ab to a vertex `c` of a cell there, if the old functions are quadratic
+/// along it; of the half of the edge at `c` where c is a or b. What it has is the functions' value at the edge's middle.
+template <int Dim>
+void add_node_from_middle(const Mesh<Dim>& mesh, VertexId a, VertexId b, VertexId c, Edit<Dim>& edit) {
+  typename Edit<Dim>::NewNode node{key_of(c, kNewVertex)};
+  const auto add = [&](const auto& ids, const auto& shapes) {
+    for (int k = 0; k < shapes.size(); ++k)
+      if (shapes[k] != 0) node.add_parent(ids[k], shapes[k]);
+  };
+  if (c == a || c == b) {
+    const VertexId middle = mesh.node_of(a, b), other = c == a ? b : a;
+    if (middle == kNone) return;
+    add(std::array{c, other, middle}, quadratic_shapes<1>(1, {0.75, 0.25}));
+  } else {
+    const std::array ids{a, b, c, mesh.node_of(a, b), mesh.node_of(a, c), mesh.node_of(b, c)};
+    CurvedEdges curved = 0;
+    for (int edge = 0; edge < 3; ++edge)
+      if (ids[3 + edge] != kNone) curved = static_cast<CurvedEdges>(curved | 1 << edge);
+    if (curved == 0) return;
+    add(ids, quadratic_shapes<2>(curved, {0.25, 0.25, 0.5}));
+  }
+  edit.inserted_nodes.push_back(node);
+}
+
+template <int Dim>
+void add_nodes_of_split(const Mesh<Dim>& mesh, Edit<Dim>& edit) {
+  const auto [a, b] = edit.edge;
+  if (const VertexId middle = mesh.node_of(a, b); middle != kNone) {
+    edit.removed_nodes.push_back(edit.edge);
+    edit.value->parents[0] = middle;
+    edit.value->weights[0] = 1;
+    edit.value->num_parents = 1;
+  }
+  std::vector<VertexId> around{a, b};  // vertices of the cells, in a fixed order
+  for (const CellId c : edit.removed_cells)
+    for (const VertexId v : mesh.cell(c))
+      if (std::find(around.begin(), around.end(), v) == around.end()) around.push_back(v);
+  for (const VertexId v : around) add_node_from_middle(mesh, a, b, v, edit);
+}
+
+}  // namespace
 
 template <int Dim>
 Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
@@ -28,6 +75,18 @@ Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   value.weights[0] = value.weights[1] = 0.5;
   if (!edit.removed_facets.empty() && has_tag(mesh, edge)) value.tag = mesh.vertex_tag(a);
   edit.value = value;
+  if (mesh.has_nodes()) add_nodes_of_split(mesh, edit);
+  return edit;
+}
+
+template <int Dim>
+Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge) {
+  Edit<Dim> edit{.kind = Edit<Dim>::Kind::curve, .edge = edge};
+  edit.removed_cells = mesh.cells_of_edge(edge);
+  for (const CellId c : edit.removed_cells) edit.inserted_cells.push_back({mesh.cell(c), mesh.body(c)});
+  typename Edit<Dim>::NewNode node{edge};
+  for (const VertexId end : edge) node.add_parent(end, 0.5);
+  edit.inserted_nodes.push_back(node);
   return edit;
 }
 
@@ -47,6 +106,8 @@ Proposal<Dim> propose_split(const Mesh<Dim>& mesh, const EdgeKey& edge, const Qu
 
 template Edit<2> make_split<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_split<3>(const Mesh<3>&, const EdgeKey&);
+template Edit<2> make_curve<2>(const Mesh<2>&, const EdgeKey&);
+template Edit<3> make_curve<3>(const Mesh<3>&, const EdgeKey&);
 template Proposal<2> propose_split<2>(const Mesh<2>&, const EdgeKey&, const QualityRule&);
 template Proposal<3> propose_split<3>(const Mesh<3>&, const EdgeKey&, const QualityRule&);
 

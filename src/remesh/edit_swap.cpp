@@ -145,6 +145,7 @@ Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, c
   if (!ring) return refused<3>(mesh.cells_of_edge(edge).empty() ? Refusal::gone : Refusal::non_manifold);
   const Stratum along = strata.edge(mesh, edge);
   if (along != Stratum::volume && along != Stratum::surface) return refused<3>(Refusal::held);
+  if (has_curved<3>(mesh, ring->cells)) return refused<3>(Refusal::curved);
   if (ring->vertices.size() > kLongestRing) return refused<3>(Refusal::long_ring);
   const double least = rule.least(worst_quality<3>(mesh, ring->cells));
 
@@ -176,6 +177,7 @@ Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet
     if (holds(mesh.cell(c), facet[1]) && holds(mesh.cell(c), facet[2])) cells.push_back(c);
   if (cells.empty()) return refused<3>(Refusal::gone);
   if (cells.size() == 1 || mesh.body(cells[0]) != mesh.body(cells[1])) return refused<3>(Refusal::held);
+  if (has_curved<3>(mesh, cells)) return refused<3>(Refusal::curved);
   const auto opposite = [&](CellId c) {
     const auto& cell = mesh.cell(c);
     return *std::find_if(cell.begin(), cell.end(), [&](int v) { return !holds(facet, v); });
@@ -198,6 +200,7 @@ Proposal<2> propose_diagonal_swap(const Mesh<2>& mesh, const Strata<2>& strata, 
   const auto cells = mesh.cells_of_edge(edge);
   if (cells.empty()) return refused<2>(Refusal::gone);
   if (strata.edge(mesh, edge) != Stratum::volume) return refused<2>(Refusal::held);
+  if (has_curved<2>(mesh, cells)) return refused<2>(Refusal::curved);
   std::array<VertexId, 2> opposite;
   for (int i = 0; i < 2; ++i)
     for (const int v : mesh.cell(cells[i]))

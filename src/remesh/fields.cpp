@@ -6,9 +6,13 @@
 namespace itr {
 
 template <int Dim>
-void RemeshFields<Dim>::follow(const Edit<Dim>& edit, VertexId created) {
-  if (!edit.value) return;
+void RemeshFields<Dim>::follow(const Edit<Dim>& edit, VertexId created, VertexId first_node) {
+  const int nodes = static_cast<int>(edit.inserted_nodes.size());
+  if (nodes > 0) make_room(first_node + nodes);
   for_each([&](VectorX& field) {
+    for (int i = 0; i < nodes; ++i)  // of values before the edit
+      field.template segment<Dim>(Dim * (first_node + i)) = interpolate(field, edit.inserted_nodes[i]);
+    if (!edit.value) return;
     const Vec<Dim> value = interpolate(field, *edit.value);
     const VertexId v = created == kNone ? edit.value->vertex : created;
     if (field.size() < Dim * (v + 1)) field.conservativeResize(Dim * (v + 1));

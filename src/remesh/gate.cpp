@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "contact_reach.hpp"
+#include "curved_cell.hpp"
 #include "itr/geometry/predicates.hpp"
 
 namespace itr {
@@ -128,7 +129,10 @@ bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const
     return edit.value && v == edit.value->vertex ? RemeshFields<Dim>::interpolate(x, *edit.value)
                                                  : Vec<Dim>(x.segment<Dim>(Dim * v));
   };
+  if (edit.kind == Edit<Dim>::Kind::curve) return true;  // the same functions
   return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
+    if (const auto curved = curved_cell_after(mesh_, edit, cell.vertices); curved.edges)
+      return is_positive_everywhere<Dim>(curved.values(x, edit));
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = at(cell.vertices[k]);
     return orientation_of<Dim>(p) > 0;

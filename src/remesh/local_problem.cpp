@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "curved_cell.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/projection/forgotten_history.hpp"
 
@@ -79,6 +80,8 @@ LocalProblem<Dim>::~LocalProblem() {
   cells_.rest.clear();
   cells_.elements.clear();
   cells_.facets.clear();
+  cells_.curved_elements.clear();
+  cells_.curved_facets.clear();
   vertices_.clear();
   changes_.clear();
   energy_.clear();
@@ -92,9 +95,29 @@ bool LocalProblem<Dim>::is_value_vertex(const LocalVertex& v) const {
   return is_after_ && v.kind != Kind::of_obstacle && edit_.value && edit_.value->vertex == v.id;
 }
 
+/// Of a node that the edit creates; null of others.
+template <int Dim>
+const typename Edit<Dim>::NewNode* LocalProblem<Dim>::created_node(const LocalVertex& v) const {
+  return v.kind == Kind::created && v.id != kNewVertex ? &edit_.inserted_nodes[kNewVertex - 1 - v.id] : nullptr;
+}
+
+/// The edge of which this is the node; {kNone, kNone} of a vertex.
+template <int Dim>
+EdgeKey LocalProblem<Dim>::edge_of(const LocalVertex& v) const {
+  if (v.kind == Kind::of_mesh) return mesh_.edge_of_node(v.id);
+  const auto* node = created_node(v);
+  return node ? node->edge : EdgeKey{kNone, kNone};
+}
+
 template <int Dim>
 Vec<Dim> LocalProblem<Dim>::rest_position(const LocalVertex& v) const {
   if (v.kind == Kind::of_obstacle) return state_.context.obstacles.rest[v.id];
+  if (const auto* node = created_node(v)) {
+    const auto of_end = [&](VertexId end) {
+      return rest_position({end == kNewVertex ? Kind::created : Kind::of_mesh, end});
+    };
+    return (of_end(node->edge[0]) + of_end(node->edge[1])) / 2;
+  }
   return is_value_vertex(v) ? edit_.value->rest : mesh_.rest(v.id);
 }
 
@@ -103,6 +126,7 @@ Vec<Dim> LocalProblem<Dim>::field_value(const VectorX& field, const std::vector<
                                         const LocalVertex& v) const {
   if (v.kind == Kind::of_obstacle) return obstacle_values.empty() ? Vec<Dim>(Vec<Dim>::Zero()) : obstacle_values[v.id];
   if (is_value_vertex(v)) return RemeshFields<Dim>::interpolate(field, *edit_.value);
+  if (const auto* node = created_node(v)) return RemeshFields<Dim>::interpolate(field, *node);
   return field.segment<Dim>(Dim * v.id);
 }
 
@@ -152,23 +176,55 @@ void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
     scratch_.cells.mark(c);
     if (is_after_ && std::find(edit_.removed_cells.begin(), edit_.removed_cells.end(), c) != edit_.removed_cells.end())
       continue;
-    std::array<int, Dim + 1> vertices;
-    for (int k = 0; k <= Dim; ++k) vertices[k] = local(mesh_.cell(c)[k]);
-    cells_.elements.push_back({vertices, mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c)});
+    add_cell(mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c), c);
   }
   if (!is_after_) return;
   for (const auto& cell : edit_.inserted_cells) {
-    typename CellSet<Dim>::Element element{{}, cell.body, 0, {}};
     std::array<Vec<Dim>, Dim + 1> p;
-    for (int k = 0; k <= Dim; ++k) {
-      element.vertices[k] = local(cell.vertices[k]);
-      p[k] = cells_.rest[element.vertices[k]];
-    }
+    for (int k = 0; k <= Dim; ++k) p[k] = cells_.rest[local(cell.vertices[k])];
     const Mat<Dim> edges = edge_matrix<Dim>(p);
-    element.volume = simplex_volume<Dim>(edges);
-    element.inverse_edges = edges.inverse();
-    cells_.elements.push_back(element);
+    add_cell(cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), kNone);
   }
+}
+
+/// Local ids of a simplex's nodes, and which of its edges are curved.
+template <int Dim>
+template <int SimplexDim>
+CurvedEdges LocalProblem<Dim>::find_nodes(const std::array<VertexId, SimplexDim + 1>& vertices,
+                                          std::array<int, kQuadraticNodes<SimplexDim>>& nodes) {
+  if (!mesh_.has_nodes() && (!is_after_ || edit_.inserted_nodes.empty())) return 0;
+  const CurvedCell<SimplexDim> found = curved_cell<SimplexDim>(
+      vertices, [&](VertexId a, VertexId b) { return is_after_ ? node_after(mesh_, edit_, a, b) : mesh_.node_of(a, b); });
+  if (found.edges)
+    for (std::size_t k = 0; k < nodes.size(); ++k) nodes[k] = local(found.nodes[k]);
+  return found.edges;
+}
+
+template <int Dim>
+void LocalProblem<Dim>::add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume,
+                                 const Mat<Dim>& inverse_edges, CellId c) {
+  typename CellSet<Dim>::CurvedElement curved{{}, 0, body, volume, inverse_edges, c};
+  curved.curved = find_nodes<Dim>(cell, curved.nodes);
+  if (curved.curved) {
+    cells_.curved_elements.push_back(curved);
+    return;
+  }
+  std::array<int, Dim + 1> vertices;
+  for (int k = 0; k <= Dim; ++k) vertices[k] = local(cell[k]);
+  cells_.elements.push_back({vertices, body, volume, inverse_edges});
+}
+
+template <int Dim>
+void LocalProblem<Dim>::add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag) {
+  typename CellSet<Dim>::CurvedFacet curved{{}, 0, tag};
+  curved.curved = find_nodes<Dim - 1>(facet, curved.nodes);
+  if (curved.curved) {
+    cells_.curved_facets.push_back(curved);
+    return;
+  }
+  typename CellSet<Dim>::BoundaryFacet loaded{{}, tag};
+  for (int k = 0; k < Dim; ++k) loaded.vertices[k] = local(facet[k]);
+  cells_.facets.push_back(loaded);
 }
 
 template <int Dim>
@@ -181,17 +237,29 @@ void LocalProblem<Dim>::add_loaded_facets() {
       const auto& facet = mesh_.facet(f);
       const auto is_known = [&](VertexId w) { return scratch_.known[w]; };
       if (facet[0] != v.id || !std::all_of(facet.begin() + 1, facet.end(), is_known) || is_removed(f)) continue;
-      typename CellSet<Dim>::BoundaryFacet loaded{{}, mesh_.facet_tag(f)};
-      for (int k = 0; k < Dim; ++k) loaded.vertices[k] = local(facet[k]);
-      cells_.facets.push_back(loaded);
+      add_loaded_facet(facet, mesh_.facet_tag(f));
     }
   }
   if (!is_after_) return;
-  for (const auto& facet : edit_.inserted_facets) {
-    typename CellSet<Dim>::BoundaryFacet loaded{{}, facet.tag};
-    for (int k = 0; k < Dim; ++k) loaded.vertices[k] = local(facet.vertices[k]);
-    cells_.facets.push_back(loaded);
-  }
+  for (const auto& facet : edit_.inserted_facets) add_loaded_facet(facet.vertices, facet.tag);
+}
+
+/// Holds the node of an edge as held_dofs() does: by the facets at the edge, after the edit those that it has then.
+template <int Dim>
+template <typename Hold>
+void LocalProblem<Dim>::hold_node(std::size_t i, const EdgeKey& edge, const Hold& hold_components) {
+  const auto holds = [](const auto& ids, const EdgeKey& ends) {
+    return std::all_of(ends.begin(), ends.end(), [&](int v) { return std::find(ids.begin(), ids.end(), v) != ids.end(); });
+  };
+  if (is_after_)
+    for (const auto& facet : edit_.inserted_facets)
+      if (holds(facet.vertices, edge)) hold_components(i, facet.tag);
+  if (edge[1] == kNewVertex) return;
+  const auto around = mesh_.cells_of_edge(edge);
+  if (!std::all_of(around.begin(), around.end(), [&](CellId c) { return scratch_.cells[c]; }))
+    std::fill_n(storage_->held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
+  for (const FacetId f : mesh_.facets_of_edge(edge))
+    if (!is_removed(f)) hold_components(i, mesh_.facet_tag(f));
 }
 
 template <int Dim>
@@ -206,6 +274,10 @@ void LocalProblem<Dim>::hold_vertices() {
   };
   for (std::size_t i = 0; i < vertices_.size(); ++i) {
     const LocalVertex v = vertices_[i];
+    if (const EdgeKey edge = edge_of(v); edge[0] != kNone) {
+      hold_node(i, edge, hold_components);
+      continue;
+    }
     if (v.kind == Kind::created) {
       for (const auto& facet : edit_.inserted_facets)
         if (std::find(facet.vertices.begin(), facet.vertices.end(), v.id) != facet.vertices.end())
@@ -351,7 +423,7 @@ void LocalProblem<Dim>::add_terms() {
     storage_->potential.emplace(context, cells_, history);
   IncrementalPotential<Dim>& potential = *storage_->potential;
   // With lumped mass a split changes how inertia is integrated.
-  const bool is_nested = !is_after_ || (edit_.kind == Edit<Dim>::Kind::split && context.mass == MassKind::consistent);
+  const bool is_nested = !is_after_ || (edit_.is_nested() && context.mass == MassKind::consistent);
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
     add_unrepresented_history(*potential.inertia());
   if (has_surface_) {

@@ -29,11 +29,11 @@ struct RemeshState {
   HistoryRule history;
 };
 
-/// A vertex of a local problem.
+/// A vertex of a local problem, or the node of a curved edge.
 struct LocalVertex {
   enum class Kind : char { of_mesh, created, of_obstacle };
   Kind kind = Kind::of_mesh;
-  int id = kNone;  ///< in the mesh or among the obstacles' vertices; kNewVertex where the edit creates it
+  int id = kNone;  ///< in the mesh or among the obstacles' vertices; kNewVertex or new_node(i) where the edit creates it
   bool operator==(const LocalVertex&) const = default;
 };
 
@@ -79,7 +79,8 @@ template <int Dim>
 class LocalProblem {
  public:
   /// `patch` has alive cells, ascending, all removed cells of the edit among them. A vertex is free if the patch has all of
-  /// its cells. `is_after` chooses the problem after the edit instead of the one before. The arguments must outlive this.
+  /// its cells, the node of an edge if it has all of the edge's. `is_after` chooses the problem after the edit instead of
+  /// the one before. The arguments must outlive this.
   LocalProblem(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, bool is_after,
                LocalScratch<Dim>& scratch);
   ~LocalProblem();
@@ -97,7 +98,7 @@ class LocalProblem {
   const Box<Dim>& surface_read() const { return surface_read_; }
 
   struct Position {
-    VertexId vertex;  ///< kNewVertex for the one that the edit creates
+    VertexId vertex;  ///< kNewVertex for the one that the edit creates, new_node(i) for its nodes
     Vec<Dim> x;
   };
   /// Where vertices are that have a free component.
@@ -106,10 +107,20 @@ class LocalProblem {
  private:
   using Kind = LocalVertex::Kind;
   int local(LocalVertex v);
-  int local(VertexId v) { return local({v == kNewVertex ? Kind::created : Kind::of_mesh, v}); }
+  int local(VertexId v) { return local({is_created(v) ? Kind::created : Kind::of_mesh, v}); }
+  bool is_created(VertexId v) const { return v > kNewVertex - 1 - static_cast<int>(edit_.inserted_nodes.size()); }
+  template <int SimplexDim>
+  CurvedEdges find_nodes(const std::array<VertexId, SimplexDim + 1>& vertices,
+                         std::array<int, kQuadraticNodes<SimplexDim>>& nodes);
+  void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume, const Mat<Dim>& inverse_edges, CellId c);
+  void add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag);
+  EdgeKey edge_of(const LocalVertex& node) const;
+  const typename Edit<Dim>::NewNode* created_node(const LocalVertex& v) const;
   void add_cells(std::span<const CellId> patch);
   void add_loaded_facets();
   void hold_vertices();
+  template <typename Hold>
+  void hold_node(std::size_t i, const EdgeKey& edge, const Hold& hold_components);
   void find_contacts();
   void add_surface();
   void find_what_changes();

@@ -155,6 +155,36 @@ class QuadraticModel {
     }
   }
 
+  /// What the bubble 4 l_a l_b of the edge from corner `a` to `b` feels in a cell of constant moduli. Its gradient is
+  /// linear, 4 (l_a g_b + l_b g_a), and F constant: all integrals are exact but that of a load that varies.
+  void add_curved_cell(const Mesh<Dim>& mesh, CellId c, const Corners& at, int a, int b) {
+    const Material& material = context_.materials.at(mesh.body(c));
+    const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
+    const Mat<Dim> F = edge_matrix<Dim>(at.x) * inverse;
+    const ElasticModuli moduli = elastic_moduli<Dim>(material, at.rest[0]);
+    const ElasticResponse<Dim> response(F, moduli);
+    const Vec<Dim> ga = shape_gradient<Dim>(inverse, a), gb = shape_gradient<Dim>(inverse, b);
+    const double sV = context_.scaling * mesh.volume(c), mass = material.density * mesh.volume(c);
+    constexpr double kFirst = 1.0 / (Dim + 1), kSecond = kFirst / (Dim + 2), kThird = kSecond / (Dim + 3),
+                     kFourth = kThird / (Dim + 4);  // integrals of products of different coordinates, by the volume
+    gradient_ += 4 * kFirst * sV * response.force(ga + gb);
+    hessian_ += 16 * kSecond * sV * (response.stiffness(ga) + response.stiffness(gb) + response.stiffness(ga + gb));
+    if (context_.has_inertia) {
+      Vec<Dim> total = at.x[a] - at.predictor[a] + at.x[b] - at.predictor[b];
+      for (int k = 0; k <= Dim; ++k) total += at.x[k] - at.predictor[k];
+      gradient_ += 4 * kThird * mass * total;
+      hessian_.diagonal().array() += 16 * 4 * kFourth * mass;
+    }
+    if (context_.loads.acceleration)
+      gradient_ -= context_.scaling * 4 * kSecond * mass * context_.loads.acceleration((at.rest[a] + at.rest[b]) / 2);
+  }
+  /// The same of a facet at the edge.
+  void add_curved_facet(const std::array<Vec<Dim>, Dim>& rest, const Vec<Dim>& middle, int tag) {
+    constexpr double kSecond = 1.0 / (Dim * (Dim + 1));
+    for (const auto& [loaded, traction] : context_.loads.tractions)
+      if (loaded == tag) gradient_ -= context_.scaling * 4 * kSecond * area(rest) * traction(middle);
+  }
+
   void add_facet(const std::array<Vec<Dim>, Dim>& rest, const std::array<Vec<Dim>, Dim>& x, int tag, int moving) {
     for (const auto& [loaded, traction] : context_.loads.tractions)
       if (loaded == tag) add_load(rest, x, context_.scaling * area(rest), traction, moving);
@@ -168,6 +198,17 @@ class QuadraticModel {
     const Eigen::LLT<Mat<Dim>> llt(hessian_);
     if (llt.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
     return energy_ - 0.5 * gradient_.dot(llt.solve(gradient_));
+  }
+  /// The same where some components are held.
+  double relaxed(const std::array<bool, Dim>& held) {
+    for (int c = 0; c < Dim; ++c)
+      if (held[c]) {
+        hessian_.row(c).setZero();
+        hessian_.col(c).setZero();
+        hessian_(c, c) = 1;
+        gradient_[c] = 0;
+      }
+    return relaxed();
   }
 
  private:
@@ -385,7 +426,7 @@ double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
     for (const auto& facet : edit.inserted_facets) add_facet(facet.vertices, facet.tag, true, after);
   }
   double gain = before.energy() - after.relaxed();
-  if (context.has_inertia && state.history == HistoryRule::function && edit.kind != Edit<Dim>::Kind::split)
+  if (context.has_inertia && state.history == HistoryRule::function && !edit.is_nested())
     gain -= kLeastForgotten * predict_forgotten<Dim>(state, edit, at);
   return gain;
 }
@@ -411,6 +452,35 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
 }
 
 template <int Dim>
+double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
+  constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
+  const StepContext<Dim>& context = state.context;
+  const Mesh<Dim>& mesh = state.mesh;
+  if (!knows_all_terms(context)) return kUnknown;
+  const auto around = mesh.cells_of_edge(edge);
+  const auto is_hard = [&](CellId c) {
+    return mesh.is_curved(c) || context.materials.at(mesh.body(c)).has_varying_moduli();
+  };
+  if (context.mass == MassKind::lumped || std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
+  QuadraticModel<Dim> model(context);
+  for (const CellId c : around) {
+    const auto& cell = mesh.cell(c);
+    const auto place = [&](VertexId v) { return static_cast<int>(std::find(cell.begin(), cell.end(), v) - cell.begin()); };
+    model.add_curved_cell(mesh, c, corners_of(state, cell), place(edge[0]), place(edge[1]));
+  }
+  const Vec<Dim> middle = (mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2;
+  std::array<bool, Dim> held{};
+  for (const FacetId f : mesh.facets_of_edge(edge)) {
+    std::array<Vec<Dim>, Dim> rest;
+    for (int k = 0; k < Dim; ++k) rest[k] = mesh.rest(mesh.facet(f)[k]);
+    model.add_curved_facet(rest, middle, mesh.facet_tag(f));
+    if (const auto it = context.held_components.find(mesh.facet_tag(f)); it != context.held_components.end())
+      for (int c = 0; c < Dim; ++c) held[c] = held[c] || it->second[c];
+  }
+  return -model.relaxed(held);
+}
+
+template <int Dim>
 double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body) {
   QuadraticModel<Dim> model(state.context);
   model.add_cell(corners_of(state, cell), body, kNone);
@@ -421,6 +491,8 @@ template double predict_gain(const RemeshState<2>&, const Edit<2>&);
 template double predict_gain(const RemeshState<3>&, const Edit<3>&);
 template double predict_split(const RemeshState<2>&, const EdgeKey&);
 template double predict_split(const RemeshState<3>&, const EdgeKey&);
+template double predict_curve(const RemeshState<2>&, const EdgeKey&);
+template double predict_curve(const RemeshState<3>&, const EdgeKey&);
 template double cell_energy<2>(const RemeshState<2>&, const MeshTypes<2>::Cell&, int);
 template double cell_energy<3>(const RemeshState<3>&, const MeshTypes<3>::Cell&, int);
 

@@ -65,7 +65,7 @@ bool is_bounded(const StepContext<Dim>& context) {
 template <int Dim>
 double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  if (!is_bounded(context) || !std::isfinite(context.coupling)) return kUnknown;
+  if (!is_bounded(context) || !std::isfinite(context.coupling) || mesh.has_nodes()) return kUnknown;
   const auto acceleration = uniform_acceleration(mesh, context.loads);
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;

@@ -8,15 +8,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/mesh/mesh.hpp"
 
 namespace itr {
-
-struct EdgeKeyHash {
-  std::size_t operator()(const EdgeKey& e) const {
-    return static_cast<std::size_t>(e[0]) * 0x9E3779B97F4A7C15ull ^ (static_cast<std::size_t>(e[1]) * 0xC2B2AE3D27D4EB4Full);
-  }
-};
 
 /// Edges (a vertex v is {v, kNone}) in order of descending priority, ties by key. One that is pushed again moves. Priorities
 /// count to four digits: those of mirror images differ by the round-off of a solve, which is not to decide what is done

@@ -1,24 +1,39 @@
 // SPDX-License-Identifier: MIT
 #include "itr/remesh/remesher.hpp"
 
+#include <algorithm>
+
 #include "prospect.hpp"
 #include "ranking.hpp"
 #include "session.hpp"
 
 namespace itr {
 
+namespace {
+
+/// Least tolerance of what adds unknowns [J].
+double least_gain_of_refining(const RemeshOptions& options) {
+  const double split = options.split.acceptance_tolerance.value();
+  if (!options.curve.enabled) return split;
+  const double curve = options.curve.acceptance_tolerance.value_or(split);
+  return options.split.enabled ? std::min(split, curve) : curve;
+}
+
+}  // namespace
+
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
   const bool by_size = options.sizing_field.enabled, may_stir = options.swap.enabled || options.smooth.enabled;
-  const bool asks_what_is_available = (options.split.enabled && !by_size) || (may_stir && screens(options));
+  const bool refines = options.split.enabled || options.curve.enabled;
+  const bool asks_what_is_available = (refines && !by_size) || (may_stir && screens(options));
   // If the available energy is less than the least gain of one split, shapes do not matter either: a body in flight.
-  const bool is_enough_there = !asks_what_is_available || available_energy(mesh, fields, context) >=
-                                                              context.scaling * options.split.acceptance_tolerance.value();
-  const bool may_split = options.split.enabled && !by_size && is_enough_there;
+  const bool is_enough_there = !asks_what_is_available ||
+                               available_energy(mesh, fields, context) >= context.scaling * least_gain_of_refining(options);
+  const bool may_refine = refines && !by_size && is_enough_there;
   const bool has_to_stir = may_stir && (is_enough_there || !screens(options));
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
-  if (!may_split && !may_collapse && !has_to_stir && !by_size) return {};
+  if (!may_refine && !may_collapse && !has_to_stir && !by_size) return {};
   RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();
   for (int sweep = 0; sweep < options.sweeps; ++sweep) {
@@ -28,7 +43,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
     if (by_size) {
       follow_sizing_field(session);
     } else {
-      if (may_split) split_edges(session, ranks);
+      if (may_refine) refine_edges(session, ranks);
       if (options.collapse.enabled) collapse_edges(session, ranks);
     }
     if (may_stir && (has_to_stir || report.accepted() > 0)) {

@@ -48,10 +48,35 @@ bool RemeshSession<Dim>::may_be_split(const EdgeKey& e, bool& is_bound_by_dhat) 
 }
 
 template <int Dim>
+bool RemeshSession<Dim>::may_be_curved(const EdgeKey& e) const {
+  if (!exists(e) || mesh_.node_of(e[0], e[1]) != kNone) return false;
+  if (has_contact() && is_surface(e)) return false;
+  const auto around = mesh_.cells_of_edge(e);
+  return std::all_of(around.begin(), around.end(), [&](CellId c) { return c < first_coarsened_; });
+}
+
+template <int Dim>
+double RemeshSession<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
+  if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
+  const auto around = mesh_.cells_of_edge(edge);
+  if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
+  return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch);
+}
+
+template <int Dim>
+double RemeshSession<Dim>::predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  const double gain = itr::predict_curve<Dim>(state(), edge);
+  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_curve(mesh_, edge), scratch) : gain;
+}
+
+template <int Dim>
 bool RemeshSession<Dim>::may_be_collapsed(const EdgeKey& e) const {
   const double longest = longest_collapse(options_.collapse, context_);
   if (!exists(e) || rest_length(e) > longest) return false;
   const auto around = mesh_.cells_of_edge(e);
+  if (mesh_.has_nodes() && std::any_of(around.begin(), around.end(), [&](CellId c) { return mesh_.is_curved(c); }))
+    return false;
   return std::any_of(around.begin(), around.end(), [&](CellId c) { return is_small(mesh_, c, longest); });
 }
 
@@ -190,7 +215,8 @@ void RemeshSession<Dim>::judge(Trial<Dim>& trial, const Vec<Dim>& center, double
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
   TrialOptions options{.required = context_.scaling * tolerance, .local = local};
-  if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth && edit.value)
+  if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth &&
+      (edit.value || !edit.inserted_nodes.empty()))
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, center, total_volume_, options, scratch, trial.verdict);
@@ -207,8 +233,8 @@ void RemeshSession<Dim>::begin_wave() {
 template <int Dim>
 bool RemeshSession<Dim>::was_overtaken(const Trial<Dim>& trial) const {
   if (commits_ == commits_before_wave_) return false;
-  const bool reads_past_surface = has_contact() && trial.edit && trial.edit->kind != Edit<Dim>::Kind::split &&
-                                  !trial.edit->inserted_facets.empty();  // see Gate
+  const bool reads_past_surface =
+      has_contact() && trial.edit && !trial.edit->is_nested() && !trial.edit->inserted_facets.empty();  // see Gate
   if (reads_past_surface && !surface_written_.empty()) return true;
   if (std::any_of(surface_written_.begin(), surface_written_.end(),
                   [&](const Box<Dim>& box) { return box.overlaps(trial.surface_read); }))
@@ -232,6 +258,7 @@ bool RemeshSession<Dim>::commit(Trial<Dim>& trial, OperationCount& count) {
 template <int Dim>
 void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
   ++commits_;
+  const VertexId first_slot = mesh_.vertex_slots();
   for (const CellId c : edit.removed_cells)
     for (const VertexId v : mesh_.cell(c)) mark_written(v);
   Box<Dim> surface;
@@ -242,21 +269,28 @@ void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
   if (has_contact()) {
     for (const FacetId f : edit.removed_facets) include_facets_at(mesh_.facet(f)[0]);
     for (const auto& [v, x] : verdict.positions)
-      if (v != kNewVertex) include_facets_at(v);
+      if (v < first_slot) include_facets_at(v);
   }
 
   const int first_cell = mesh_.cell_slots(), first_facet = mesh_.facet_slots();
   const VertexId created = mesh_.apply(edit);
+  if (!edit.is_nested()) first_coarsened_ = std::min(first_coarsened_, first_cell);
+  const VertexId first_node = mesh_.vertex_slots() - static_cast<int>(edit.inserted_nodes.size());
   fields_.make_room(mesh_.vertex_slots());
-  fields_.follow(edit, created);
+  fields_.follow(edit, created, first_node);
   gate_.follow(edit, first_facet);
   strata_.follow(edit, created);
   changed_at_.resize(mesh_.vertex_slots(), 0);
+  const auto slot_of = [&](VertexId v) {
+    return v < first_slot ? v : v == kNewVertex ? created : first_node + (kNewVertex - 1 - v);
+  };
   for (const auto& [v, x] : verdict.positions) {
-    const VertexId vertex = v == kNewVertex ? created : v;
+    const VertexId vertex = slot_of(v);
     fields_.x.template segment<Dim>(Dim * vertex) = x;
     if (has_contact()) gate_.move(vertex);
     mark_written(vertex);
+    if (const EdgeKey ends = mesh_.edge_of_node(vertex); ends[0] != kNone)
+      for (const VertexId end : ends) mark_written(end);
   }
   const std::size_t first = verdict.patch.size();
   for (int c = first_cell; c < mesh_.cell_slots(); ++c) {
@@ -264,13 +298,13 @@ void RemeshSession<Dim>::commit(const Edit<Dim>& edit, Verdict<Dim>& verdict) {
     for (const VertexId v : mesh_.cell(c)) mark_written(v);
   }
   if (has_contact()) {
-    for (const auto& [v, x] : verdict.positions) include_facets_at(v == kNewVertex ? created : v);
+    for (const auto& [v, x] : verdict.positions) include_facets_at(slot_of(v));
     for (FacetId f = first_facet; f < mesh_.facet_slots(); ++f) include_facets_at(mesh_.facet(f)[0]);
     if (surface.min[0] <= surface.max[0]) surface_written_.push_back(surface);
   }
   for (const EdgeKey& edge : edges_of(std::span(verdict.patch).subspan(first))) refusals_.forget(edge);
   ITR_AUDIT(mesh_.find_defect().empty(), mesh_.find_defect());
-  ITR_AUDIT(find_inverted<Dim>(mesh_, fields_.x) == kNone);
+  ITR_AUDIT(mesh_.has_nodes() || find_inverted<Dim>(mesh_, fields_.x) == kNone);
 }
 
 template <int Dim>

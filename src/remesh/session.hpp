@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <deque>
+#include <limits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -76,6 +77,9 @@ class RemeshSession {
   bool is_surface(const EdgeKey& e) const;
   /// Whether an edge is there and as long as it has to be for a split; if not, whether because of the activation distance.
   bool may_be_split(const EdgeKey& e, bool& is_bound_by_dhat) const;
+  /// Whether an edge is there, straight, and may be curved: the surface stays straight where contact is enabled, and cells
+  /// that coarsening has made in this step stay straight until the history is projected onto them.
+  bool may_be_curved(const EdgeKey& e) const;
   /// Whether an edge is there and short enough for a collapse.
   bool may_be_collapsed(const EdgeKey& e) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
@@ -114,7 +118,8 @@ class RemeshSession {
   bool shape_matters(const EdgeKey& e, double roughness) const;
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
-  double predict_split(const EdgeKey& edge) const { return itr::predict_split<Dim>(state(), edge); }
+  double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
+  double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
   /// Energy of a cell, which need not be in the mesh, at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body) const {
     return cell_energy<Dim>(state(), cell, body);
@@ -199,7 +204,8 @@ class RemeshSession {
   RemeshReport report_;
   std::vector<double> trial_seconds_;
   unsigned commits_ = 0, commits_before_wave_ = 0;
-  Marks gained_;                           ///< vertices of cells that splits and collapses changed
+  CellId first_coarsened_ = std::numeric_limits<CellId>::max();  ///< cells from here on were made after the first coarsening
+  Marks gained_;                                                 ///< vertices of cells that splits and collapses changed
   std::vector<unsigned> changed_at_;       ///< by vertex: the last commit that changed a cell around it or a vertex of one
   Marks written_;                          ///< vertices that commits of the wave moved or gave other cells
   std::vector<Box<Dim>> surface_written_;  ///< by the same, in the present configuration
@@ -208,10 +214,10 @@ class RemeshSession {
 /// Change of a signal by which a refusal no longer holds.
 inline constexpr double kSameSignal = 1.2;
 
-/// The operations, one file each. They count what they do in session.report(). `ranks` (of the paper's culling; empty where
-/// it is not asked for) are inherited by the edges that splits make.
+/// The operations, one file each; splits and curves share one queue. They count what they do in session.report(). `ranks`
+/// (of the paper's culling; empty where it is not asked for) are inherited by the edges that splits make.
 template <int Dim>
-void split_edges(RemeshSession<Dim>& session, EdgeRanks& ranks);
+void refine_edges(RemeshSession<Dim>& session, EdgeRanks& ranks);
 template <int Dim>
 void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks);
 /// In 3D: edges are removed such that the energy of the new cells is least, then facets (2-3 swaps).

@@ -94,7 +94,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
              options.required;
     };
     // History that the new mesh cannot represent takes the longest to find, so the first check leaves it out.
-    const bool is_nested = edit.kind == Edit<Dim>::Kind::split || state.history == HistoryRule::interpolated;
+    const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
     if (is_refused_on_star(is_nested ? state.history : HistoryRule::interpolated)) return;
     if (!is_nested) {
       is_enough = false;

@@ -283,7 +283,7 @@ constexpr Key kKeys[] = {
     {"/space/discr_order", read, "order", "1", "",
      "1: linear elements, 2: quadratic ones (curved edges); or a list by body, [{\"id\": 2, \"order\": 2}], bodies that are "
      "not "
-     "listed are linear. An edge has the least order of the cells at it; 2 not with remeshing yet",
+     "listed are linear. An edge has the least order of the cells at it; with remeshing 2 only where contact is off",
      basic},
     {"/space/advanced/quadrature_order", read, "integer", "-1", "",
      "degree of elasticity's quadrature on quadratic elements, 1 to 5; -1: 2, and the mass' is exact"},
@@ -317,6 +317,13 @@ constexpr Key kKeys[] = {
     {"/space/remesh/split/max_depth", read, "natural", "3", "", "generations of one edge a step"},
     {"/space/remesh/split/min_edge_length", read, "non_negative", "(1e-6 of the bodies' diagonal)", "m",
      "shorter edges are not split"},
+    {"/space/remesh/curve/enabled", read, "boolean", "false", "",
+     "edges become curved (quadratic elements, edge by edge) where that gains more for each new node than a split; the "
+     "surface "
+     "only where contact is off",
+     basic},
+    {"/space/remesh/curve/acceptance_tolerance", read, "positive", "(that of splits)", "J",
+     "least decrease of energy by making an edge curved"},
     {"/space/remesh/collapse/enabled", read, "boolean", "true", "", ""},
     {"/space/remesh/collapse/acceptance_tolerance", read, "number", "(-1/100 of the split tolerance)", "J",
      "negative: increase of energy that a collapse may cost; nearer to 0, what contact has left behind stays fine"},

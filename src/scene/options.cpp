@@ -290,6 +290,8 @@ RemeshOptions read_remesh(const Node& root) {
   options.split.max_depth = split["max_depth"].integer_at_least(0, options.split.max_depth);
   if (split.has("min_edge_length")) options.split.min_edge_length = split["min_edge_length"].non_negative(0);
 
+  read_acceptance(node["curve"], options.curve.enabled, options.curve.acceptance_tolerance);
+
   read_acceptance(collapse, options.collapse.enabled, options.collapse.acceptance_tolerance);
   options.collapse.culling_threshold = read_share(collapse["culling_threshold"], options.collapse.culling_threshold);
   options.collapse.max_depth = collapse["max_depth"].integer_at_least(0, options.collapse.max_depth);

@@ -23,6 +23,7 @@ void StepReport::add_effort(const StepReport& before) {
   linear_iterations += before.linear_iterations;
   indefinite += before.indefinite;
   splits += before.splits;
+  curves += before.curves;
   collapses += before.collapses;
   swaps += before.swaps;
   smooths += before.smooths;
@@ -36,7 +37,7 @@ void StepReport::add_effort(const StepReport& before) {
 }
 
 void StepReport::forget_operations() {
-  for (auto* operations : {&splits, &collapses, &swaps, &smooths}) operations->accepted = 0;
+  for (auto* operations : {&splits, &curves, &collapses, &swaps, &smooths}) operations->accepted = 0;
   history_loss = 0;
 }
 

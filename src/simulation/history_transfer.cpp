@@ -25,8 +25,11 @@ VectorX interleaved(const MatrixX& rows) {
 template <int Dim>
 class HistoryTransfer {
  public:
-  HistoryTransfer(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched)
-      : setup_(setup), mesh_(mesh), patch_(make_transfer_patch(old_mesh, mesh, touched, setup.materials, kRings<Dim>)) {
+  HistoryTransfer(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const Space& space,
+                  const TouchedCells& touched)
+      : setup_(setup),
+        mesh_(mesh),
+        patch_(make_transfer_patch(old_mesh, mesh, space, touched, setup.materials, kRings<Dim>)) {
     const auto n = patch_.new_cells.vertices.size();
     prescribed_.assign(Dim * n, 0);
     const auto hold = [&](std::size_t i, int tag) {
@@ -137,10 +140,14 @@ class HistoryTransfer {
 }  // namespace
 
 template <int Dim>
-HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
-                                       const Mesh<Dim>& mesh, const TouchedCells& touched, linear::Solver& solver,
-                                       History& history) {
-  HistoryTransfer<Dim> transfer(setup, old_mesh, mesh, touched);
+HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space,
+                                       const History& old_history, const Mesh<Dim>& mesh, const Space& space,
+                                       const TouchedCells& touched, linear::Solver& solver, History& history) {
+  TouchedCells straight = touched;
+  std::erase_if(straight.old_cells, [&](CellId c) { return has_curved_edge(old_mesh, old_space, c); });
+  std::erase_if(straight.new_cells, [&](CellId c) { return has_curved_edge(mesh, space, c); });
+  if (straight.new_cells.empty()) return {};
+  HistoryTransfer<Dim> transfer(setup, old_mesh, mesh, space, straight);
   std::vector<VectorX*> fields;
   const auto add = [&](const std::vector<VectorX>& old_fields, std::vector<VectorX>& new_fields) {
     for (std::size_t i = 0; i < new_fields.size(); ++i) {
@@ -159,9 +166,10 @@ HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<D
   return report;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                    \
-  template HistoryTransferReport transfer_history<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const History&, \
-                                                       const Mesh<Dim>&, const TouchedCells&, linear::Solver&, History&);
+#define ITR_INSTANTIATE(Dim)                                                                                                \
+  template HistoryTransferReport transfer_history<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&,               \
+                                                       const History&, const Mesh<Dim>&, const Space&, const TouchedCells&, \
+                                                       linear::Solver&, History&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -22,6 +22,34 @@ constexpr double kLossWorthTelling = 1e-12;
 /// The bodies' part of a field over bodies and obstacles.
 VectorX head_of(const VectorX& field, int dofs) { return field.head(dofs); }
 
+/// Gives the nodes of curved edges slots behind the vertices, in their order.
+template <int Dim>
+void add_nodes(State<Dim>& state) {
+  if (state.space.is_linear()) return;
+  if (state.strata.empty()) state.strata = Strata<Dim>(state.mesh);
+  for (const EdgeKey& edge : state.space.curved_edges()) state.mesh.add_node(edge);
+  state.strata.add_nodes(state.space.num_curved());
+  state.space = {};
+}
+
+/// Levels of quadrature by curved element of `space`, from those before a change: cells that are new begin at 0.
+template <int Dim>
+QuadratureLevels renumbered(const QuadratureLevels& levels, const Mesh<Dim>& old_mesh, const Space& old_space,
+                            const Mesh<Dim>& mesh, const Space& space, const std::vector<CellId>& number) {
+  if (levels.empty()) return {};
+  std::vector<std::uint8_t> of_cell(mesh.cell_slots(), 0);
+  std::size_t next = 0;
+  for (CellId c = 0; c < old_mesh.cell_slots(); ++c) {
+    if (!has_curved_edge(old_mesh, old_space, c)) continue;
+    if (number[c] != kNone) of_cell[number[c]] = levels[next];
+    ++next;
+  }
+  QuadratureLevels result;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (has_curved_edge(mesh, space, c)) result.push_back(of_cell[c]);
+  return result;
+}
+
 template <int Dim>
 std::vector<Vec<Dim>> as_points(const VectorX& field, int first) {
   std::vector<Vec<Dim>> points;
@@ -50,7 +78,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   // Of the convergent form corrections have negative weights: what acts in it may fall below 0.
   if (!setup.contact.convergent || energy.contact == 0)
     context.coupling = context.scaling * (energy.contact + energy.friction);
-  const int bodies = state.mesh.vertex_slots();
+  const int bodies = num_nodes(state.mesh, state.space);
   auto& obstacles = context.obstacles;
   obstacles.rest = setup.obstacles.rest;
   obstacles.edges = setup.obstacles.edges;
@@ -63,7 +91,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
 
 template <int Dim>
 RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
-  const int dofs = Dim * state.mesh.vertex_slots();
+  const int dofs = Dim * num_nodes(state.mesh, state.space);
   const TimeIntegrator integrator(setup.time);
   RemeshFields<Dim> fields;
   fields.x = head_of(x, dofs);
@@ -134,34 +162,52 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   RemeshReport remeshed;
   {
     const ScopedTimer timer(report.seconds.remesh);
+    add_nodes(state);
     remeshed = remesh(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
   report.split_tolerance = *options.split.acceptance_tolerance;
   report.best_refused_split = remeshed.best_refused_gain / problem.scaling();
   report.splits = remeshed.splits;
+  report.curves = remeshed.curves;
   report.collapses = remeshed.collapses;
   report.swaps = remeshed.swaps;
   report.smooths = remeshed.smooths;
   report.trial_seconds = remeshed.trial_seconds;
   report.bound_by_dhat = remeshed.bound_by_activation_distance;
-  if (!remeshed.changed()) return std::nullopt;
+  if (!remeshed.changed()) {
+    state.space = before.space;
+    if (!state.space.is_linear()) {
+      auto map = state.mesh.compact();
+      state.strata.compact(map);
+      state.remesh_memory.renumber(map.vertex);
+    }
+    return std::nullopt;
+  }
 
   const ScopedTimer timer(report.seconds.projection);
   TouchedCells touched;
   for (int c = 0; c < before.mesh.cell_slots(); ++c)
     if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
+  const auto nodes = state.mesh.nodes();
   auto map = state.mesh.compact();
   state.strata.compact(map);
   MeshRenumbering renumbering{std::move(map.vertex), std::move(map.cell), std::move(map.facet)};
   state.remesh_memory.renumber(renumbering.vertex);
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
+  std::vector<EdgeKey> curved;  // renumbering keeps their order
+  for (const auto& [edge, node] : nodes) curved.push_back({renumbering.vertex[edge[0]], renumbering.vertex[edge[1]]});
+  state.space = Space(std::move(curved));
+  state.quadrature = renumbered(before.quadrature, before.mesh, before.space, state.mesh, state.space, renumbering.cell);
   const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
-    VectorX field(Dim * state.mesh.vertex_slots() + obstacle_dofs);
+    VectorX field(Dim * num_nodes(state.mesh, state.space) + obstacle_dofs);
     for (std::size_t v = 0; v < renumbering.vertex.size(); ++v)
       if (renumbering.vertex[v] != kNone)
         field.segment<Dim>(Dim * renumbering.vertex[v]) = slots.segment<Dim>(Dim * static_cast<int>(v));
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      field.segment<Dim>(Dim * (state.mesh.vertex_slots() + static_cast<int>(i))) =
+          slots.segment<Dim>(Dim * nodes[i].second);
     field.tail(obstacle_dofs) = with_obstacles.tail(obstacle_dofs);
     return field;
   };
@@ -172,8 +218,8 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
   if (!remeshed.coarsened()) return renumbering;  // refinement alone: interpolation is exact
-  const HistoryTransferReport transfer =
-      transfer_history(setup, before.mesh, before.history, state.mesh, touched, tools.cache.system.solver(), state.history);
+  const HistoryTransferReport transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh,
+                                                          state.space, touched, tools.cache.system.solver(), state.history);
   report.history_loss = transfer.loss / problem.scaling();
   tell(transfer, mass_moment(setup, state.mesh, x), state.step, tools.logger);
   return renumbering;

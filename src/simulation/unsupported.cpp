@@ -15,6 +15,12 @@ bool is_quadratic(const Setup<Dim>& setup) {
   return std::any_of(setup.order.begin(), setup.order.end(), [](const auto& e) { return e.second == 2; });
 }
 
+/// Whether edges are curved now or may be later.
+template <int Dim>
+bool may_be_quadratic(const Setup<Dim>& setup) {
+  return is_quadratic(setup) || (setup.remesh.enabled && setup.remesh.curve.enabled);
+}
+
 template <int Dim>
 struct Check {
   UnsupportedCombination combination;
@@ -25,10 +31,16 @@ template <int Dim>
 constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup) { return setup.remesh.enabled && setup.proxy; }},
-    {{"/space/remesh/enabled", "remeshing of quadratic elements"},
-     [](const Setup<Dim>& setup) { return setup.remesh.enabled && is_quadratic(setup); }},
+    {{"/space/remesh/enabled", "remeshing of quadratic elements (discr_order 2) in a scene with contact"},
+     [](const Setup<Dim>& setup) { return setup.remesh.enabled && is_quadratic(setup) && setup.contact.enabled; }},
+    {{"/solver/advanced/lump_mass_matrix", "lumped mass where remeshing splits or makes curved edges"},
+     [](const Setup<Dim>& setup) { return setup.remesh.enabled && may_be_quadratic(setup) && setup.lump_mass; }},
+    {{"/space/remesh/curve/enabled", "curved edges with a sizing field"},
+     [](const Setup<Dim>& setup) {
+       return setup.remesh.enabled && setup.remesh.curve.enabled && setup.remesh.sizing_field.enabled;
+     }},
     {{"terms", "terms of a program's own on quadratic elements"},
-     [](const Setup<Dim>& setup) { return (!setup.terms.empty() || setup.follower.forces) && is_quadratic(setup); }},
+     [](const Setup<Dim>& setup) { return (!setup.terms.empty() || setup.follower.forces) && may_be_quadratic(setup); }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup) {
        return setup.remesh.enabled && std::any_of(setup.materials.begin(), setup.materials.end(),

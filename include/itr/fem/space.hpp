@@ -40,6 +40,10 @@ int num_nodes(const Mesh<Dim>& mesh, const Space& space) {
   return mesh.vertex_slots() + space.num_curved();
 }
 
+/// Whether an edge of the cell is curved.
+template <int Dim>
+bool has_curved_edge(const Mesh<Dim>& mesh, const Space& space, CellId c);
+
 /// Whether each edge of each cell of a mesh with cells is curved.
 template <int Dim>
 bool is_all_curved(const Mesh<Dim>& mesh, const Space& space);

@@ -4,6 +4,9 @@
 // Cells, boundary facets and vertices live in slots; an edit kills some and adds some, ids of the others stay. compact()
 // removes dead slots. Boundary facets are the facets with one incident cell; they, and single vertices, carry the tags that
 // boundary conditions refer to.
+//
+// While it is remeshed, the node of a curved edge has a slot among the vertices, so that fields have one numbering. Such a
+// slot is not alive and has no cells; compact() removes it, and a Space takes the nodes over.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +14,8 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "itr/core/types.hpp"
@@ -22,6 +27,14 @@ inline constexpr int kNoTag = std::numeric_limits<int>::max();
 
 /// Stands in an Edit for the vertex that the edit creates.
 inline constexpr VertexId kNewVertex = std::numeric_limits<int>::max();
+/// Stands for the i-th of the nodes that an edit creates.
+constexpr VertexId new_node(int i) { return kNewVertex - 1 - i; }
+
+struct EdgeKeyHash {
+  std::size_t operator()(const EdgeKey& e) const {
+    return static_cast<std::size_t>(e[0]) * 0x9E3779B97F4A7C15ull ^ (static_cast<std::size_t>(e[1]) * 0xC2B2AE3D27D4EB4Full);
+  }
+};
 
 template <int Dim>
 struct MeshTypes {
@@ -34,7 +47,7 @@ template <int Dim>
 struct Edit {
   using Cell = typename MeshTypes<Dim>::Cell;
   using Facet = typename MeshTypes<Dim>::Facet;
-  enum class Kind { split, collapse, swap, smooth };
+  enum class Kind { split, collapse, swap, smooth, curve };
 
   struct NewCell {
     Cell vertices;
@@ -59,6 +72,18 @@ struct Edit {
     int num_parents = 0;
     int tag = kNoTag;  ///< of a new vertex
   };
+  /// The node of an edge that the edit curves, with fields as those of a Value.
+  struct NewNode {
+    static constexpr int kMostParents = 6;  ///< the nodes of a triangle
+    EdgeKey edge;                           ///< smaller id first
+    std::array<VertexId, kMostParents> parents{};
+    std::array<double, kMostParents> weights{};
+    int num_parents = 0;
+    void add_parent(VertexId v, double weight) {
+      parents[num_parents] = v;
+      weights[num_parents++] = weight;
+    }
+  };
 
   Kind kind;
   EdgeKey edge{kNone, kNone};  ///< the edge; of a 2-3 swap the one it makes; for a smooth {vertex, kNone}
@@ -70,6 +95,17 @@ struct Edit {
   std::vector<NewInterface> inserted_interfaces{};
   std::optional<Value> value{};
   VertexId removed_vertex = kNone;
+  std::vector<NewNode> inserted_nodes{};
+  std::vector<EdgeKey> removed_nodes{};  ///< edges that are gone or straight after the edit
+
+  /// Whether the space after the edit contains the one before, so that every field stays the function that it was.
+  bool is_nested() const { return kind == Kind::split || kind == Kind::curve; }
+  /// The id of the node that this edge has after the edit if the edit creates it, or kNone.
+  VertexId inserted_node(const EdgeKey& e) const {
+    for (std::size_t i = 0; i < inserted_nodes.size(); ++i)
+      if (inserted_nodes[i].edge == e) return new_node(static_cast<int>(i));
+    return kNone;
+  }
 };
 
 /// The facet of a positively oriented cell opposite its vertex `k`, oriented outward.
@@ -142,8 +178,28 @@ class Mesh {
   std::vector<EdgeKey> edges() const;
   double total_volume() const;
 
+  /// Whether any edge is curved.
+  bool has_nodes() const { return !node_of_edge_.empty(); }
+  /// The slot of the edge's node; kNone where it is straight.
+  VertexId node_of(VertexId a, VertexId b) const {
+    if (node_of_edge_.empty()) return kNone;
+    const auto it = node_of_edge_.find({std::min(a, b), std::max(a, b)});
+    return it == node_of_edge_.end() ? kNone : it->second;
+  }
+  /// The edge of which the slot is the node; {kNone, kNone} of a vertex.
+  EdgeKey edge_of_node(VertexId node) const {
+    const auto it = edge_of_node_.find(node);
+    return it == edge_of_node_.end() ? EdgeKey{kNone, kNone} : it->second;
+  }
+  /// Whether an edge of the cell is curved.
+  bool is_curved(CellId c) const;
+  /// Curves an edge: its node takes the next slot.
+  VertexId add_node(const EdgeKey& edge);
+  /// The curved edges, ascending, and their nodes.
+  std::vector<std::pair<EdgeKey, VertexId>> nodes() const;
+
   /// Carries out an edit. Returns the id of the vertex that was created, or kNone. Ids of new cells are the next slots, in
-  /// the order of the edit. Fields are the caller's to extend (see Edit::Value).
+  /// the order of the edit; its nodes take the last slots of vertices. Fields are the caller's to extend (see Edit::Value).
   VertexId apply(const Edit<Dim>& edit);
 
   struct Renumbering {
@@ -151,7 +207,7 @@ class Mesh {
     std::vector<CellId> cell;
     std::vector<FacetId> facet;
   };
-  /// Removes dead slots, keeps the order of the others.
+  /// Removes dead slots and those of nodes, keeps the order of the others.
   Renumbering compact();
 
   /// First broken invariant in words (adjacency, orientation, facets against cells), or an empty string.
@@ -177,6 +233,8 @@ class Mesh {
   std::vector<int> facet_tag_;
   std::vector<std::vector<CellId>> cells_of_;
   std::vector<std::vector<FacetId>> facets_of_;
+  std::unordered_map<EdgeKey, VertexId, EdgeKeyHash> node_of_edge_;
+  std::unordered_map<VertexId, EdgeKey> edge_of_node_;
 };
 
 extern template class Mesh<2>;

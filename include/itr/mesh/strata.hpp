@@ -77,6 +77,8 @@ class Strata {
 
   /// Follows an edit that was just applied and created `created` (or kNone).
   void follow(const Edit<Dim>& edit, VertexId created);
+  /// Takes in that the mesh got so many nodes of curved edges.
+  void add_nodes(int count) { vertices_.insert(vertices_.end(), count, Stratum::volume); }
   void compact(const typename Mesh<Dim>::Renumbering& map);
   /// First disagreement with what the mesh consists of, in words: a vertex or facet too many or without a patch.
   std::string find_misfit(const Mesh<Dim>& mesh) const;

@@ -7,6 +7,7 @@
 
 #include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
+#include "itr/fem/space.hpp"
 #include "itr/projection/transfer.hpp"
 
 namespace itr {
@@ -33,10 +34,10 @@ struct TransferPatch {
   CellSet<Dim> cells;            ///< `new_cells` as energies see them
 };
 
-/// `touched` are cells of the two meshes, `mesh` is compact. Free to move are the vertices of touched cells and those up to
-/// `rings` edges away.
+/// `touched` are cells of the two meshes, which are compact, with straight edges alone. Free to move are the vertices of
+/// touched cells and those up to `rings` edges away, but for those of cells with edges that are curved in `space`.
 template <int Dim>
-TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched,
-                                       const std::map<int, Material>& materials, int rings);
+TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const Space& space,
+                                       const TouchedCells& touched, const std::map<int, Material>& materials, int rings);
 
 }  // namespace itr

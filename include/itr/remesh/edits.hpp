@@ -25,9 +25,10 @@ enum class Refusal {
   long_ring,  ///< an edge to be removed has too many cells around it
   shape,      ///< a cell would be inverted, flat, or much worse than the worst that is there now
   outside,    ///< the target of a move lies outside of the cells around
-  cost        ///< infinite cost of each triangulation of the ring
+  cost,       ///< infinite cost of each triangulation of the ring
+  curved      ///< an edge of the cells around it is curved, or the edge itself is already
 };
-inline constexpr int kRefusals = 10;
+inline constexpr int kRefusals = 11;
 std::string_view name(Refusal refusal);
 
 /// An edit, or why there is none.
@@ -51,18 +52,24 @@ struct QualityRule {
 /// A split halves volumes wherever it is wanted: only needles are kept from getting worse.
 inline constexpr QualityRule kSplitRule{.share = 0, .floor = 1e-4};
 
-/// Splits an edge at its midpoint: every incident cell and boundary facet becomes two. Fields of the new vertex are the
-/// means of the ends.
+/// Splits an edge at its midpoint: every incident cell and boundary facet becomes two. Fields keep their values everywhere:
+/// the new vertex takes the node of its edge or the mean of the ends, halves of a curved edge are curved, and so is an edge
+/// from the new vertex along which the old functions are quadratic.
 template <int Dim>
 Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
 /// The same where the edge is there and the new cells keep the rule.
 template <int Dim>
 Proposal<Dim> propose_split(const Mesh<Dim>& mesh, const EdgeKey& edge, const QualityRule& rule = kSplitRule);
 
-/// Collapses an edge where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev
-/// 1999 in the volume, on patches and along features) and the rest shape exactly: an end may go where the edge is of its own
-/// stratum (in the volume, within its patch, along its straight feature). Where both may, the midpoint is tried first, then
-/// either end.
+/// Makes an edge curved. Its node is at the mean of the ends at rest and in all fields. The cells at the edge are replaced
+/// by themselves, so that whoever looks for changed cells finds them.
+template <int Dim>
+Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge);
+
+/// Collapses an edge where no cell around it has a curved edge (the same holds for swaps, removals and moves below) and
+/// where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev 1999 in the volume,
+/// on patches and along features) and the rest shape exactly: an end may go where the edge is of its own stratum (in the
+/// volume, within its patch, along its straight feature). Where both may, the midpoint is tried first, then either end.
 template <int Dim>
 Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata, const EdgeKey& edge,
                                const QualityRule& rule = {});

@@ -30,14 +30,16 @@ struct RemeshFields {
     for (auto& field : past_positions) f(field);
     for (auto& field : past_rates) f(field);
   }
-  /// Interpolated value of a field at the vertex that an edit sets.
-  static Vec<Dim> interpolate(const VectorX& field, const typename Edit<Dim>::Value& value) {
+  /// Interpolated value of a field at the vertex that an edit sets, or at a node that it creates.
+  template <typename Parents>
+  static Vec<Dim> interpolate(const VectorX& field, const Parents& value) {
     Vec<Dim> sum = Vec<Dim>::Zero();
     for (int k = 0; k < value.num_parents; ++k) sum += value.weights[k] * field.segment<Dim>(Dim * value.parents[k]);
     return sum;
   }
-  /// Extends or updates all fields for an edit that was just applied and created `created` (or kNone).
-  void follow(const Edit<Dim>& edit, VertexId created);
+  /// Extends or updates all fields for an edit that was just applied and created `created` (or kNone); its
+  /// nodes have the slots from `first_node` on.
+  void follow(const Edit<Dim>& edit, VertexId created, VertexId first_node = kNone);
   /// Makes all fields as long as so many vertices need, and longer where they grow: edits then seldom copy them.
   void make_room(int vertices);
   /// Ends them behind so many vertices.

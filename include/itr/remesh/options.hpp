@@ -29,6 +29,11 @@ struct SplitOptions {
   std::optional<double> min_edge_length;  ///< shorter rest edges are not split [m]
 };
 
+struct CurveOptions {
+  bool enabled = false;
+  std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]; none: that of splits
+};
+
 struct CollapseOptions {
   bool enabled = true;
   std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]; negative: allowed increase
@@ -69,6 +74,7 @@ struct RemeshOptions {
   bool enabled = false;
   SizingFieldOptions sizing_field;
   SplitOptions split;
+  CurveOptions curve;
   CollapseOptions collapse;
   SwapOptions swap;
   SmoothOptions smooth;

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// Nodes of a cell of the mesh as an edit would make it, or as it is.
+#pragma once
+
+#include <algorithm>
+
+#include "itr/fem/quadratic.hpp"
+#include "itr/remesh/fields.hpp"
+
+namespace itr {
+
+/// The node of an edge after an edit, new_node(i) of one that the edit creates; kNone where the edge is straight.
+template <int Dim>
+VertexId node_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit, VertexId a, VertexId b) {
+  const EdgeKey edge{std::min(a, b), std::max(a, b)};
+  if (const VertexId created = edit.inserted_node(edge); created != kNone) return created;
+  if (std::find(edit.removed_nodes.begin(), edit.removed_nodes.end(), edge) != edit.removed_nodes.end()) return kNone;
+  return mesh.node_of(a, b);
+}
+
+/// Ids of the nodes of a simplex, and which of its edges are curved. A straight edge has its first vertex as a node.
+template <int Dim>
+struct CurvedCell {
+  std::array<VertexId, kQuadraticNodes<Dim>> nodes{};
+  CurvedEdges edges = 0;
+
+  /// Values of a field after the edit, at straight edges the mean of the ends.
+  QuadraticCell<Dim> values(const VectorX& field, const Edit<Dim>& edit) const {
+    QuadraticCell<Dim> all;
+    const auto at = [&](VertexId v) -> Vec<Dim> {
+      if (edit.value && v == edit.value->vertex) return RemeshFields<Dim>::interpolate(field, *edit.value);
+      const int node = kNewVertex - 1 - v;
+      if (node < static_cast<int>(edit.inserted_nodes.size()))
+        return RemeshFields<Dim>::interpolate(field, edit.inserted_nodes[node]);
+      return field.segment<Dim>(Dim * v);
+    };
+    for (int k = 0; k <= Dim; ++k) all.col(k) = at(nodes[k]);
+    for_each_edge<Dim>([&](int edge, int i, int j) {
+      const int k = Dim + 1 + edge;
+      all.col(k) = edges >> edge & 1 ? at(nodes[k]) : Vec<Dim>((all.col(i) + all.col(j)) / 2);
+    });
+    return all;
+  }
+};
+
+/// `node_of(a, b)`: the node of an edge or kNone.
+template <int Dim, typename NodeOf>
+CurvedCell<Dim> curved_cell(const std::array<VertexId, Dim + 1>& vertices, const NodeOf& node_of) {
+  CurvedCell<Dim> cell;
+  std::copy(vertices.begin(), vertices.end(), cell.nodes.begin());
+  for_each_edge<Dim>([&](int edge, int i, int j) {
+    const VertexId node = node_of(vertices[i], vertices[j]);
+    cell.nodes[Dim + 1 + edge] = node == kNone ? vertices[i] : node;
+    if (node != kNone) cell.edges = static_cast<CurvedEdges>(cell.edges | 1 << edge);
+  });
+  return cell;
+}
+
+template <int Dim>
+CurvedCell<Dim> curved_cell_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit,
+                                  const std::array<VertexId, Dim + 1>& vertices) {
+  if (!mesh.has_nodes() && edit.inserted_nodes.empty()) return {};
+  return curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); });
+}
+
+}  // namespace itr
