@@ -33,9 +33,12 @@ namespace {
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
 
 std::string energy_json(const EnergyReport& e) {
-  const std::string damping = e.damping == 0 ? "" : fmt::format(R"("damping":{},)", number(e.damping));
-  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},{}"total":{}}})", number(e.inertia),
-                     number(e.elastic), number(e.body), number(e.contact), number(e.friction), damping, number(e.total));
+  const auto where_there = [](const char* name, double energy) {
+    return energy == 0 ? "" : fmt::format(R"("{}":{},)", name, number(energy));
+  };
+  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},{}{}"total":{}}})",
+                     number(e.inertia), number(e.elastic), number(e.body), number(e.contact), number(e.friction),
+                     where_there("damping", e.damping), where_there("host", e.host), number(e.total));
 }
 
 std::string count_json(const OperationCount& count) {

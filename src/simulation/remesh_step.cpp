@@ -62,15 +62,14 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
 }
 
 template <int Dim>
-RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
+RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const PotentialTerms<Dim>& terms, const State<Dim>& state,
+                              const VectorX& x) {
   const int dofs = Dim * state.mesh.vertex_slots();
   const TimeIntegrator integrator(setup.time);
   RemeshFields<Dim> fields;
   fields.x = head_of(x, dofs);
-  if (!setup.time.quasistatic && !setup.time.is_static)
-    fields.predictor = head_of(integrator.predictor(state.history), dofs);
-  if (setup.contact.enabled || !setup.damping.empty())
-    fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
+  if (is_in(TermKind::inertia, terms)) fields.predictor = head_of(integrator.predictor(state.history), dofs);
+  if (needs_velocities(terms)) fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
   for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
   for (const auto& past : state.history.v) fields.past_rates.push_back(head_of(past, dofs));
   for (const auto& past : state.history.a) fields.past_rates.push_back(head_of(past, dofs));
@@ -128,7 +127,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
                                                   StepReport& report) {
   const StepSetup<Dim>& setup = tools.setup;
   const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
-  RemeshFields<Dim> fields = make_fields(setup, before, x);
+  RemeshFields<Dim> fields = make_fields<Dim>(setup, context, before, x);
   const RemeshOptions options =
       options_of_step(setup, std::max(before.stored_energy, report.energy.elastic + report.energy.contact));
   RemeshReport remeshed;
