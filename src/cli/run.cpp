@@ -95,15 +95,27 @@ void show_progress(const StepReport& report, int steps, double left) {
   }
 }
 
+/// How many candidates were refused, by reason.
+std::string describe_refusals(const OperationCount& count, const char* name) {
+  std::string text;
+  for (int i = 0; i < kRefusals; ++i)
+    if (count.refused[i] > 0)
+      text += fmt::format("{} {} {}", text.empty() ? fmt::format("; {} refused:", name) : ",", count.refused[i],
+                          itr::name(static_cast<Refusal>(i)));
+  return text;
+}
+
 /// What remeshing did, and where it did nothing why.
 std::string describe_remeshing(const StepReport& totals, int vertices_before, double split_tolerance, double best_refused) {
   const auto count = [](const OperationCount& c, const char* name) {
     return c.tried > 0 ? fmt::format(", {} of {} {}", c.accepted, c.tried, name) : std::string();
   };
   const std::string done =
-      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}", vertices_before,
+      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}{}{}{}{}", vertices_before,
                   totals.vertices, totals.splits.accepted, totals.splits.tried, count(totals.collapses, "collapses"),
-                  count(totals.swaps, "swaps"), count(totals.smooths, "moves"));
+                  count(totals.swaps, "swaps"), count(totals.smooths, "moves"), describe_refusals(totals.splits, "splits"),
+                  describe_refusals(totals.collapses, "collapses"), describe_refusals(totals.swaps, "swaps"),
+                  describe_refusals(totals.smooths, "moves"));
   const int accepted = totals.splits.accepted + totals.collapses.accepted + totals.swaps.accepted + totals.smooths.accepted;
   if (accepted > 0) return done;
   const std::string bound = totals.bound_by_dhat > 0

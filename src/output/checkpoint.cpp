@@ -101,9 +101,9 @@ void write_memory(hdf5::File& file, const RemeshMemory& memory) {
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     std::vector<double> rows;
     rows.reserve(kRefusalColumns * memory.refusals[kind].size());
-    for (const auto& [edge, refusal] : memory.refusals[kind])
-      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), refusal.least_signal, refusal.most_signal,
-                               refusal.in_contact ? 1.0 : 0.0});
+    for (const auto& [edge, range] : memory.refusals[kind])
+      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), range.least, range.most,
+                               range.in_contact ? 1.0 : 0.0});
     if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
   }
 }

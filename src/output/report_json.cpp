@@ -42,7 +42,12 @@ std::string energy_json(const EnergyReport& e) {
 }
 
 std::string count_json(const OperationCount& count) {
-  return fmt::format(R"({{"tried":{},"relaxed":{},"accepted":{}}})", count.tried, count.relaxed, count.accepted);
+  std::string refused;
+  for (int i = 0; i < kRefusals; ++i)
+    if (count.refused[i] > 0)
+      refused += fmt::format(R"({}"{}":{})", refused.empty() ? "" : ",", name(static_cast<Refusal>(i)), count.refused[i]);
+  return fmt::format(R"({{"tried":{},"relaxed":{},"accepted":{},"refused":{{{}}}}})", count.tried, count.relaxed,
+                     count.accepted, refused);
 }
 
 std::string seconds_json(const StepSeconds& s) {
@@ -123,6 +128,8 @@ void for_each_number(Report& r, Visit&& visit) {
   for (auto* x : {&r.t, &r.energy_before_remesh, &r.history_loss, &r.min_distance, &r.min_volume_ratio, &r.processor_seconds,
                   &r.peak_rss_mb})
     visit(*x);
+  for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths})  // last: 0.1.0 did not save them
+    for (auto& refused : count->refused) visit(refused);
 }
 
 }  // namespace
@@ -134,12 +141,15 @@ std::vector<double> Totals::save() const {
 }
 
 void Totals::restore(const std::vector<double>& values) {
-  if (const std::size_t expected = save().size(); values.size() != expected)
+  const std::size_t expected = save().size();
+  const bool is_without_refusals = values.size() == expected - 4 * kRefusals;
+  if (values.size() != expected && !is_without_refusals)
     throw InputError({"", "saved totals", std::to_string(values.size()) + " numbers", std::to_string(expected)});
   gain_ = values[0];
   std::size_t next = 1;
-  for_each_number(total_,
-                  [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]); });
+  for_each_number(total_, [&](auto& number) {
+    if (next < values.size()) number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]);
+  });
 }
 
 std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,

@@ -142,7 +142,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   report.swaps = remeshed.swaps;
   report.smooths = remeshed.smooths;
   report.trial_seconds = remeshed.trial_seconds;
-  report.bound_by_dhat = remeshed.bound_by_activation_distance;
+  report.bound_by_dhat = remeshed.splits.refused_by(Refusal::dhat);
   if (!remeshed.changed()) return std::nullopt;
 
   const ScopedTimer timer(report.seconds.projection);

@@ -6,29 +6,12 @@
 #include <array>
 #include <functional>
 #include <optional>
-#include <string_view>
 
 #include "itr/mesh/mesh.hpp"
 #include "itr/mesh/strata.hpp"
+#include "itr/remesh/refusal.hpp"
 
 namespace itr {
-
-/// Why an operation is not possible.
-enum class Refusal {
-  none,
-  gone,          ///< no such edge, facet or vertex in the mesh
-  non_manifold,  ///< the cells around it are neither a ball nor a half ball
-  held,       ///< whatever would have to go or move is on a feature, corner or patch that it may not leave: the shape would
-              ///< change
-  link,       ///< a collapse that would change the topology of the bodies, their surfaces or features (link condition)
-  exists,     ///< the edge that a swap makes is there already
-  long_ring,  ///< an edge to be removed has too many cells around it
-  shape,      ///< a cell would be inverted, flat, or much worse than the worst that is there now
-  outside,    ///< the target of a move lies outside of the cells around
-  cost        ///< infinite cost of each triangulation of the ring
-};
-inline constexpr int kRefusals = 10;
-std::string_view name(Refusal refusal);
 
 /// An edit, or why there is none.
 template <int Dim>

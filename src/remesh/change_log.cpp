@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#include "change_log.hpp"
+
+#include <numeric>
+
+namespace itr {
+
+template <int Dim>
+void ChangeLog<Dim>::write(VertexId v) {
+  touched_[v].written = now();
+  for (const CellId c : mesh_.cells_of(v))
+    for (const VertexId w : mesh_.cell(c)) {
+      touched_[w].last_around = now();
+      if (touched_[w].first_around == 0) touched_[w].first_around = now();
+    }
+}
+
+template <int Dim>
+void ChangeLog<Dim>::write_surface(VertexId v) {
+  for (const FacetId f : mesh_.facets_of(v))
+    for (const VertexId w : mesh_.facet(f)) surfaces_.back().include(x_.template segment<Dim>(Dim * w));
+}
+
+template <int Dim>
+Change<Dim> ChangeLog<Dim>::commit(const Edit<Dim>& edit, std::span<const Position> positions) {
+  surfaces_.emplace_back();
+  for (const CellId c : edit.removed_cells)
+    for (const VertexId v : mesh_.cell(c)) write(v);
+  if (logs_surface_) {
+    for (const FacetId f : edit.removed_facets) write_surface(mesh_.facet(f)[0]);
+    for (const auto& [v, x] : positions)
+      if (v != kNewVertex) write_surface(v);
+  }
+
+  const CellId first_cell = mesh_.cell_slots();
+  const FacetId first_facet = mesh_.facet_slots();
+  Change<Dim> change{.edit = edit, .created = mesh_.apply(edit), .first_facet = first_facet};
+  change.cells.resize(mesh_.cell_slots() - first_cell);
+  std::iota(change.cells.begin(), change.cells.end(), first_cell);
+  for (const auto& [v, x] : positions) change.positions.push_back({v == kNewVertex ? change.created : v, x});
+  touched_.resize(mesh_.vertex_slots());
+  for (const auto& follow : followers_) follow(change);
+
+  for (const auto& [v, x] : change.positions) write(v);
+  for (const CellId c : change.cells)
+    for (const VertexId v : mesh_.cell(c)) write(v);
+  if (logs_surface_) {
+    for (const auto& [v, x] : change.positions) write_surface(v);
+    for (FacetId f = first_facet; f < mesh_.facet_slots(); ++f) write_surface(mesh_.facet(f)[0]);
+  }
+  return change;
+}
+
+template class ChangeLog<2>;
+template class ChangeLog<3>;
+
+}  // namespace itr
