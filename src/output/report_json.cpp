@@ -10,6 +10,7 @@
 
 #include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
+#include "units.hpp"
 
 namespace itr::output {
 
@@ -152,15 +153,18 @@ void Totals::restore(const std::vector<double>& values) {
   });
 }
 
-std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,
-                                 const DisplacementNorms& norms, const std::string& members) const {
+std::string Totals::summary_json(const RunInfo& info, const Units& units, const std::string& outcome,
+                                 const std::string& solver, const DisplacementNorms& norms,
+                                 const std::string& members) const {
+  const StepReport total = in_units(total_, units);
   return fmt::format(
-      R"({{"scene":{},"outcome":{},"backend":{},"solver":{},"threads":{},"versions":{},"steps":{},"cut_steps":{},"t":{},{},)"
-      R"("energy_decrease_by_remeshing":{},{},"norms":{}}})"
+      R"({{"scene":{},"outcome":{},"backend":{},"solver":{},"threads":{},"versions":{},"units":{{"length":{},"mass":{},"time":{}}},)"
+      R"("steps":{},"cut_steps":{},"t":{},{},"energy_decrease_by_remeshing":{},{},"norms":{}}})"
       "\n",
       json_string(info.scene), json_string(outcome), json_string(info.backend), json_string(solver), info.threads,
-      versions_json(), total_.step, total_.cut_steps, number(total_.t), common_members(total_), number(gain_), members,
-      norms_json(norms));
+      versions_json(), json_string(units.length()), json_string(units.mass()), json_string(units.time()), total.step,
+      total.cut_steps, number(total.t), common_members(total), number(units.from_si(gain_, "J")), members,
+      norms_json(in_units(norms, units)));
 }
 
 }  // namespace itr::output
