@@ -48,7 +48,8 @@ class DistanceTest : public testing::Test {
     asked.kinetic_energy = {2.5};
     asked.momentum.assign(Dim, 0.5 * step);
     const fs::path path = folder / "frames" / (std::to_string(step) + ".h5");
-    write_frame<Dim>(path, {mesh, x, v, density, obstacles, edges, triangles, &asked, {}, &space}, step, 0.1 * step);
+    write_frame<Dim>(path, {mesh, x, v, density, obstacles, edges, triangles, &asked, {}, &space}, step, 0.1 * step,
+                     Units());
     return path;
   }
 

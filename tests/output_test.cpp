@@ -68,7 +68,9 @@ StepReport report_of(int step) {
   report.linear_solves = 3;
   report.reused_factors = 2;
   report.linear_iterations = 11;
-  report.splits = {10, 2};
+  report.splits = {.tried = 10, .accepted = 2};
+  for (const Refusal reason : {Refusal::energy, Refusal::long_ring, Refusal::energy, Refusal::none, Refusal::gone})
+    report.splits.note(reason);
   report.energy.total = 1.0 / 3;
   report.energy_before_remesh = 4.0 / 3;
   report.min_distance = 0.5 / (step + 1);
@@ -194,7 +196,9 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
             (std::vector<std::string>{"inertia", "elastic", "body", "contact", "friction", "total"}));
   EXPECT_EQ(keys_of(line["seconds"]), (std::vector<std::string>{"assembly", "linear_solve", "line_search", "ccd", "remesh",
                                                                 "projection", "output", "total"}));
-  EXPECT_EQ(keys_of(line["splits"]), (std::vector<std::string>{"tried", "relaxed", "accepted"}));
+  EXPECT_EQ(keys_of(line["splits"]), (std::vector<std::string>{"tried", "relaxed", "accepted", "refused"}));
+  EXPECT_EQ(line["splits"]["refused"], (Json{{"long_ring", 1}, {"energy", 2}}));
+  EXPECT_TRUE(line["collapses"]["refused"].empty());
   EXPECT_TRUE(line["min_distance"].is_null());
   EXPECT_EQ(line["energy"]["total"].get<double>(), 1.0 / 3);  // the same bits
 }
@@ -239,6 +243,7 @@ TEST_F(OutputTest, SummaryHasTotalsAndNorms) {
   EXPECT_EQ(summary["reused_factors"], 8);
   EXPECT_EQ(summary["linear_iterations"], 44);
   EXPECT_EQ(summary["splits"]["tried"], 40);
+  EXPECT_EQ(summary["splits"]["refused"]["energy"], 8);
   EXPECT_EQ(summary["seconds"]["total"], 1.0);
   EXPECT_EQ(summary["processor_seconds"], 2.0);
   EXPECT_EQ(summary["min_distance"], 0.125);

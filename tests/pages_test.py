@@ -122,6 +122,12 @@ class Architecture(unittest.TestCase):
             for name in re.findall(r"\w+", quoted):
                 self.assertTrue(name in words or (SOURCE / "tests" / f"{name}.cpp").is_file() or name in MODULES, quoted)
 
+    def test_reasons_of_refusals_are_on_their_page(self):
+        names = re.search(r"kNames\[\] = \{(.*?)\}", (SOURCE / "src/remesh/edit_checks.cpp").read_text(), re.DOTALL).group(1)
+        page = (SOURCE / "REMESHING.md").read_text().partition("## Why an operation was refused")[2]
+        for name in set(re.findall(r"\w+", names)) - {"none", "not_asked", "gone"}:  # these are not counted
+            self.assertIn(f"`{name}`", page)
+
     def test_table_of_modules_is_the_tested_one(self):
         rows = dict(re.findall(r"^\| `(\w+)` \|[^|]*\|([^|]*)\|$", self.text, re.MULTILINE))
         for module, uses in rows.items():

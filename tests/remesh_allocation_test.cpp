@@ -100,7 +100,7 @@ class WarmTrial : public ::testing::Test {
                         {.required = required, .patch_over_vertex = patch_over_vertex, .local = {}}, scratch, verdict);
           sum += verdict.gain;
           accepted += verdict.accepted();
-          bounded += verdict.decision == Decision::by_bound;
+          bounded += verdict.refusal == Refusal::bound;
           relaxed += verdict.was_relaxed;
           in_contact += verdict.touches_contact;
         }

@@ -2,6 +2,7 @@
 // What decides about edits: bounds, the memory of refusals, the gate, and where it finds the surface.
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <random>
 
 #include "itr/geometry/dynamic_tree.hpp"
@@ -87,6 +88,18 @@ TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
   Strata<2> strata;
   RemeshReport report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
   EXPECT_TRUE(report.changed());
+  for (const OperationCount& count : {report.splits, report.smooths}) {  // each refusal has one reason
+    int by_trials = 0;
+    for (const auto reason : {Refusal::invalid, Refusal::bound, Refusal::energy, Refusal::no_unknowns})
+      by_trials += count.refused_by(reason);
+    EXPECT_EQ(count.tried, count.accepted + by_trials);
+    EXPECT_GT(by_trials, 0);
+  }
+  EXPECT_EQ(
+      report.collapses.tried + report.collapses.refused_by(Refusal::length) + report.collapses.refused_by(Refusal::depth),
+      report.collapses.accepted + std::accumulate(report.collapses.refused.begin(), report.collapses.refused.end(), 0));
+  EXPECT_GT(report.splits.refused_by(Refusal::prediction), 0);
+  EXPECT_GT(report.swaps.refused_by(Refusal::shape), 0);
   for (int i = 0; i < 20 && report.changed(); ++i)
     report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
   ASSERT_FALSE(report.changed());
@@ -100,7 +113,7 @@ TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
 
 TEST(Memory, FollowsVerticesWhenAMeshIsCompacted) {
   RemeshMemory memory;
-  const RemeshMemory::Refusal refusal{1, 2, false};
+  const RemeshMemory::SignalRange refusal{1, 2, false};
   memory.refusals[RemeshMemory::split] = {{{0, 3}, refusal}, {{1, 2}, refusal}, {{2, 3}, refusal}};
   memory.refusals[RemeshMemory::smooth] = {{{1, kNone}, refusal}, {{3, kNone}, refusal}};
   const std::vector<VertexId> number{2, kNone, 0, 1};

@@ -60,13 +60,13 @@ std::vector<int> find_components(const CollisionSurface& surface, std::size_t nu
   return parent;
 }
 
-std::string describe(const TimeOptions& time) {
+std::string describe(const TimeOptions& time, const Units& units) {
   if (time.is_static) return "one static solve";
   const std::string scheme = time.integrator == Integrator::newmark          ? "Newmark"
                              : time.integrator == Integrator::implicit_euler ? "implicit Euler"
                                                                              : "BDF" + std::to_string(time.bdf_order);
-  return fmt::format("{}{}, {} steps of {} s from {} s", time.quasistatic ? "quasistatic, " : "", scheme, time.steps,
-                     time.dt, time.t0);
+  return fmt::format("{}{}, {} steps of {} from {}", time.quasistatic ? "quasistatic, " : "", scheme, time.steps,
+                     units.text(time.dt, "s", 8), units.text(time.t0, "s", 8));
 }
 
 template <int Dim>
@@ -82,8 +82,12 @@ class Explanation {
   }
 
   void print() {
+    if (const Units& units = setup_.units; !units.is_si())
+      fmt::print("units\n  {}, {}, {}: forces in {}, stresses in {}, energies in {}{}; results too\n", units.length(),
+                 units.mass(), units.time(), units.name("N"), units.name("Pa"), units.name("J"),
+                 Dim == 2 ? ", by " + units.length() + " of thickness" : "");
     bodies();
-    fmt::print("time\n  {}\n", describe(setup_.time));
+    fmt::print("time\n  {}\n", describe(setup_.time, setup_.units));
     fmt::print("in words\n");
     for (const auto& sentence : foretell(setup_)) fmt::print("  {}\n", sentence);
     for (const auto& sentence : chosen_) fmt::print("  {}\n", sentence);
@@ -123,17 +127,21 @@ class Explanation {
       shortest = std::min(shortest, length);
       longest = std::max(longest, length);
     }
+    const Units& units = setup_.units;
     fmt::print("bodies ({}D)\n", Dim);
     for (const auto& [id, sum] : sums) {
       const Material& material = setup_.materials.at(id);
       const auto order = setup_.order.find(id);
-      fmt::print("  id {}: {} {} elements, {} {:.4g} m^{}, {}, E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^{}, mass {:.4g} kg\n",
-                 id, sum.cells, order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear",
-                 Dim == 2 ? "area" : "volume", sum.volume, Dim, name_of(material.law), material.youngs_modulus,
-                 material.poisson_ratio, material.density, Dim, material.density * sum.volume);
+      fmt::print("  id {}: {} {} elements, {} {}, {}, E {}, nu {:.4g}, rho {:.4g} {}, mass {}\n", id, sum.cells,
+                 order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", Dim == 2 ? "area" : "volume",
+                 units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"), name_of(material.law),
+                 units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,
+                 units.from_si(material.density, "kg/m^3"), units.name(Dim == 2 ? "kg/m^2" : "kg/m^3"),
+                 units.text(material.density * sum.volume, "kg"));
     }
-    fmt::print("  {} vertices, {} elements, edges {:.4g} to {:.4g} m, worst quality {:.3g} (1: regular; element {})\n",
-               mesh.num_vertices(), mesh.num_cells(), shortest, longest, worst, worst_cell);
+    fmt::print("  {} vertices, {} elements, edges {:.4g} to {}, worst quality {:.3g} (1: regular; element {})\n",
+               mesh.num_vertices(), mesh.num_cells(), units.from_si(shortest, "m"), units.text(longest, "m"), worst,
+               worst_cell);
     if (const Space& space = simulation_.state().space; !space.is_linear())
       fmt::print(
           "  {} of {} edges are curved and carry a node: {} nodes in all; elasticity by {} points a cell with curved "
@@ -245,7 +253,8 @@ class Explanation {
     const double dhat = setup_.contact.activation_distance;
     Workspace workspace;
     const ContactEnergy<Dim> energy(surface, setup_.contact, 1, 1);
-    fmt::print("; d-hat {:.4g} m, {} pairs nearer than that at the start\n", dhat, energy.active(x, workspace).size());
+    fmt::print("; d-hat {}, {} pairs nearer than that at the start\n", setup_.units.text(dhat, "m"),
+               energy.active(x, workspace).size());
   }
 
   linear::Registry& registry_;

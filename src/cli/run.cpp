@@ -82,11 +82,11 @@ std::string describe_seconds(double seconds) {
 }
 
 /// `left`: time that the steps to come take if they take as long as those so far [s].
-void show_progress(const StepReport& report, int steps, double left) {
+void show_progress(const StepReport& report, const Units& units, int steps, double left) {
   const std::string line =
-      fmt::format("step {}/{}  t = {:.6g} s  {} vertices  {} Newton iterations  total {:.6g} J  {:.3g} s  {} left",
-                  report.step, steps, report.t, report.vertices, report.newton_iterations, report.energy.total,
-                  report.seconds.total, describe_seconds(left));
+      fmt::format("step {}/{}  t = {}  {} vertices  {} Newton iterations  total {}  {:.3g} s  {} left", report.step, steps,
+                  units.text(report.t, "s", 6), report.vertices, report.newton_iterations,
+                  units.text(report.energy.total, "J", 6), report.seconds.total, describe_seconds(left));
   if (isatty(STDOUT_FILENO)) {
     fmt::print("\r\033[K{}", line);
     std::fflush(stdout);
@@ -95,15 +95,29 @@ void show_progress(const StepReport& report, int steps, double left) {
   }
 }
 
+/// How many candidates were refused, by reason.
+std::string describe_refusals(const OperationCount& count, const char* name) {
+  std::string text;
+  for (int i = 0; i < kRefusals; ++i)
+    if (count.refused[i] > 0)
+      text += fmt::format("{} {} {}", text.empty() ? fmt::format("; {} refused:", name) : ",", count.refused[i],
+                          itr::name(static_cast<Refusal>(i)));
+  return text;
+}
+
 /// What remeshing did, and where it did nothing why.
-std::string describe_remeshing(const StepReport& totals, int vertices_before, double split_tolerance, double best_refused) {
+std::string describe_remeshing(const StepReport& totals, const Units& units, int vertices_before, double split_tolerance,
+                               double best_refused) {
   const auto count = [](const OperationCount& c, const char* name) {
     return c.tried > 0 ? fmt::format(", {} of {} {}", c.accepted, c.tried, name) : std::string();
   };
   const std::string done =
-      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}{}", vertices_before,
+      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}{}{}{}{}{}{}", vertices_before,
                   totals.vertices, totals.splits.accepted, totals.splits.tried, count(totals.curves, "curved edges"),
-                  count(totals.collapses, "collapses"), count(totals.swaps, "swaps"), count(totals.smooths, "moves"));
+                  count(totals.collapses, "collapses"), count(totals.swaps, "swaps"), count(totals.smooths, "moves"),
+                  describe_refusals(totals.splits, "splits"), describe_refusals(totals.curves, "curved edges"),
+                  describe_refusals(totals.collapses, "collapses"), describe_refusals(totals.swaps, "swaps"),
+                  describe_refusals(totals.smooths, "moves"));
   const int accepted = totals.splits.accepted + totals.curves.accepted + totals.collapses.accepted + totals.swaps.accepted +
                        totals.smooths.accepted;
   if (accepted > 0) return done;
@@ -111,12 +125,12 @@ std::string describe_remeshing(const StepReport& totals, int vertices_before, do
                                 ? fmt::format("; d-hat kept {} surface edges from being split", totals.bound_by_dhat)
                                 : std::string();
   if (totals.splits.tried == 0 && best_refused == 0)
-    return done + fmt::format("; accepted nothing, because no body ever stored the {:.2g} J that a split has to gain{}",
-                              split_tolerance, bound);
+    return done + fmt::format("; accepted nothing, because no body ever stored the {} that a split has to gain{}",
+                              units.text(split_tolerance, "J", 2), bound);
   return done + fmt::format(
-                    "; accepted nothing, because no split promised more than {:.2g} J and it has to gain {:.2g} J{}; "
+                    "; accepted nothing, because no split promised more than {} and it has to gain {}{}; "
                     "a smaller /space/remesh/split/acceptance_tolerance refines more",
-                    best_refused, split_tolerance, bound);
+                    units.text(best_refused, "J", 2), units.text(split_tolerance, "J", 2), bound);
 }
 
 std::string describe_solves(const StepReport& totals) {
@@ -236,7 +250,8 @@ class Run {
   void tell_remeshing() const {
     const Setup<Dim>& setup = simulation_.setup();
     if (setup.remesh.enabled)
-      fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.mesh.num_vertices(), split_tolerance_, best_refused_));
+      fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.units, setup.mesh.num_vertices(), split_tolerance_,
+                                            best_refused_));
   }
   void count_warnings() const {
     if (const int count = writer_->warnings(); count > 0)
@@ -303,6 +318,7 @@ class Run {
   /// output is not `at_output`.
   std::string advance(std::unique_lock<std::mutex>& at_output, std::string& advice) {
     const int steps = simulation_.setup().time.steps;
+    const Units& units = simulation_.setup().units;
     while (!simulation_.finished()) {
       before_ = simulation_.save();
       const StepResult result = [&] {
@@ -317,14 +333,14 @@ class Run {
             "--allow-changes and --set /time/step_cuts=4 (smaller steps where one fails), more "
             "/solver/nonlinear/max_iterations, or another tolerance or solver; a smaller /time/dt needs a new run",
             directory_);
-        return fmt::format("stopped in step {} (t = {:.6g} s): {}", simulation_.state().step + 1,
-                           simulation_.state().t + simulation_.setup().time.dt, result.reason);
+        return fmt::format("stopped in step {} (t = {}): {}", simulation_.state().step + 1,
+                           units.text(simulation_.state().t + simulation_.setup().time.dt, "s", 6), result.reason);
       }
       write(result.report);
       best_refused_ = std::max(best_refused_, result.report.best_refused_split);
       split_tolerance_ = result.report.split_tolerance;
       ++steps_done_;
-      show_progress(result.report, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
+      show_progress(result.report, units, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
     }
     return kFinished;

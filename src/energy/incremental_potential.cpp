@@ -39,9 +39,9 @@ template <int Dim>
 void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const PotentialHistory& history) {
   terms_ = &terms;
   velocity_reference_ = history.velocity_reference;
-  renew_term(inertia_, terms.has_inertia, cells_, terms.materials, terms.mass, history.predictor);
-  renew_term(elastic_, true, cells_, terms.materials, terms.scaling, terms.quadrature_degree);
-  renew_term(loads_, terms.loads.has_dead_loads(), cells_, terms.materials, terms.loads, terms.scaling);
+  renew_term(inertia_, is_in(TermKind::inertia, terms), cells_, terms.materials, terms.mass, history.predictor);
+  renew_term(elastic_, is_in(TermKind::elastic, terms), cells_, terms.materials, terms.scaling, terms.quadrature_degree);
+  renew_term(loads_, is_in(TermKind::loads, terms), cells_, terms.materials, terms.loads, terms.scaling);
   map_.reset();
   contact_of_cells_.reset();
   if (contact_) spare_contact_ = std::move(contact_);
@@ -72,7 +72,7 @@ std::shared_ptr<const Energy> IncrementalPotential<Dim>::of_cells(std::shared_pt
 
 template <int Dim>
 bool IncrementalPotential<Dim>::has_friction() const {
-  return contact_ && terms_->contact.friction_coefficient > 0 && terms_->contact.friction_iterations != 0;
+  return contact_ && is_in(TermKind::friction, *terms_);
 }
 
 template <int Dim>
@@ -94,7 +94,7 @@ template <int Dim>
 typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstVectorView x, Workspace& workspace) const {
   Lagged lagged;
   lagged.friction = lag_friction(x, workspace);
-  if (!terms_->loads.pressures.empty()) {
+  if (is_in(TermKind::pressure, *terms_)) {
     lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_->loads, x, terms_->scaling);
     if (lagged.pressure->empty()) lagged.pressure.reset();
   }
@@ -106,7 +106,7 @@ typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstV
       lagged.damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(*contact_, on_surface(x), options.coefficient,
                                                                              velocity_of_surface(), workspace)));
   }
-  if (terms_->follower) lagged.follower = terms_->follower(x);
+  if (is_in(TermKind::follower, *terms_)) lagged.follower = terms_->follower(x);
   return lagged;
 }
 
@@ -119,18 +119,7 @@ EnergySum IncrementalPotential<Dim>::sum(const Lagged& lagged) const {
 
 template <int Dim>
 void IncrementalPotential<Dim>::add_to(EnergySum& sum, const Lagged& lagged) const {
-  const auto add = [&](const auto& term) {
-    if (term) sum.add(term);
-  };
-  add(inertia_);
-  add(elastic_);
-  add(loads_);
-  for (const auto& term : host_) add(term);
-  add(lagged.follower);
-  add(contact_of_cells_);
-  add(lagged.friction);
-  add(lagged.pressure);
-  for (const auto& term : lagged.damping) add(term);
+  add_to(sum, lagged, [](const TermTraits<Dim>&) { return true; });
 }
 
 template class IncrementalPotential<2>;

@@ -25,6 +25,13 @@ class Norms {
   double of_step(ConstVectorView step) const {
     return norm(step, [&](double p, Eigen::Index i) { return kind_ == NewtonNorm::l2 ? p * std::sqrt(weights_[i]) : p; });
   }
+  /// Of two fields over the unknowns, whatever the norm.
+  double dot(ConstVectorView a, ConstVectorView b) const {
+    double sum = 0;
+    for (Eigen::Index i = 0; i < a.size(); ++i)
+      if (dofs_.unknown[i] != kNone) sum += a[i] * b[i];
+    return sum;
+  }
 
  private:
   template <typename Weighted>

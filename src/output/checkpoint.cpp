@@ -15,6 +15,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kFormat = 8;
+/// In SI units, where the frame is in others: of the vertices, and of the state.
+constexpr const char* kRest = "/checkpoint/rest";
+constexpr const char* kTime = "/checkpoint/t";
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -63,15 +66,18 @@ Space read_space(const fs::path& path, const hdf5::File& file) {
 /// `space`: its nodes come after the vertices.
 template <int Dim>
 Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& space) {
-  const auto rest = file.read_doubles("/mesh/rest");
+  const bool is_apart = file.contains(kRest);
+  const std::string name = is_apart ? kRest : "/mesh/rest";
+  const auto rest = file.read_doubles(name);
   if (rest.columns != Dim)
-    throw InputError({path.string(), "/mesh/rest", std::to_string(rest.columns) + " columns", std::to_string(Dim)});
+    throw InputError({path.string(), name, std::to_string(rest.columns) + " columns", std::to_string(Dim)});
   for (const double X : rest.values)
-    if (!std::isfinite(X)) throw InputError({path.string(), "/mesh/rest", std::to_string(X), "finite positions"});
-  if (rest.rows() < static_cast<std::size_t>(space.num_curved()))
-    throw InputError({path.string(), "/mesh/rest", std::to_string(rest.rows()) + " rows",
-                      "more than curved edges, " + std::to_string(space.num_curved())});
-  std::vector<Vec<Dim>> points(rest.rows() - space.num_curved());
+    if (!std::isfinite(X)) throw InputError({path.string(), name, std::to_string(X), "finite positions"});
+  const auto curved = static_cast<std::size_t>(is_apart ? 0 : space.num_curved());
+  if (rest.rows() < curved)
+    throw InputError(
+        {path.string(), name, std::to_string(rest.rows()) + " rows", "more than curved edges, " + std::to_string(curved)});
+  std::vector<Vec<Dim>> points(rest.rows() - curved);
   for (std::size_t v = 0; v < points.size(); ++v) points[v] = Eigen::Map<const Vec<Dim>>(rest.values.data() + Dim * v);
   auto cells = read_rows<Dim + 1>(path, file, "/mesh/simplices");
   auto body = read_ints(path, file, "/mesh/body");
@@ -101,9 +107,9 @@ void write_memory(hdf5::File& file, const RemeshMemory& memory) {
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     std::vector<double> rows;
     rows.reserve(kRefusalColumns * memory.refusals[kind].size());
-    for (const auto& [edge, refusal] : memory.refusals[kind])
-      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), refusal.least_signal, refusal.most_signal,
-                               refusal.in_contact ? 1.0 : 0.0});
+    for (const auto& [edge, range] : memory.refusals[kind])
+      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), range.least, range.most,
+                               range.in_contact ? 1.0 : 0.0});
     if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
   }
 }
@@ -231,7 +237,7 @@ bool has_results(const fs::path& directory) {
 }
 
 template <int Dim>
-void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress) {
+void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress, const Units& units) {
   std::vector<std::int64_t> tags;
   tags.reserve(state.mesh.facet_slots());
   for (FacetId f = 0; f < state.mesh.facet_slots(); ++f) tags.push_back(state.mesh.facet_tag(f));
@@ -240,6 +246,13 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   for (VertexId v = 0; v < state.mesh.vertex_slots(); ++v)
     if (state.mesh.vertex_tag(v) != kNoTag) points.insert(points.end(), {v, state.mesh.vertex_tag(v)});
   if (!points.empty()) file.write("/checkpoint/vertex_tag", points, 2);
+  if (!units.is_si()) {
+    std::vector<double> rest;
+    for (VertexId v = 0; v < state.mesh.vertex_slots(); ++v)
+      rest.insert(rest.end(), state.mesh.rest(v).begin(), state.mesh.rest(v).end());
+    file.write(kRest, rest, Dim);
+    file.write(kTime, std::array{state.t}, 0);
+  }
   const auto write_fields = [&](const char* kind, const std::vector<VectorX>& fields) {
     for (std::size_t age = 0; age < fields.size(); ++age)
       file.write(field_name(kind, age), std::span(fields[age].data(), static_cast<std::size_t>(fields[age].size())), 0);
@@ -334,7 +347,13 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.strata = read_strata<Dim>(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);
   state.step = as_int(saved.file, "attribute step", file.read_integer_attribute("step"));
-  state.t = file.read_double_attribute("t");
+  if (!file.contains(kTime)) {
+    state.t = file.read_double_attribute("t");
+  } else if (const auto t = file.read_doubles(kTime).values; t.size() == 1) {
+    state.t = t[0];
+  } else {
+    throw InputError({saved.file.string(), kTime, std::to_string(t.size()) + " numbers", "1"});
+  }
   checkpoint.totals = file.read_doubles("/checkpoint/totals").values;
   const std::int64_t log_bytes = file.read_integer_attribute("checkpoint_log_bytes");
   if (log_bytes < 0)
@@ -343,8 +362,8 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   return checkpoint;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                            \
-  template void write_checkpoint<Dim>(hdf5::File&, const State<Dim>&, const Progress&); \
+#define ITR_INSTANTIATE(Dim)                                                                          \
+  template void write_checkpoint<Dim>(hdf5::File&, const State<Dim>&, const Progress&, const Units&); \
   template Checkpoint<Dim> read_checkpoint<Dim>(const SavedState&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

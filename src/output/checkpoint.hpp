@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/hdf5.hpp"
+#include "itr/core/units.hpp"
 #include "itr/output/checkpoint.hpp"
 
 namespace itr::output {
@@ -18,8 +19,9 @@ struct Progress {
   std::size_t log_bytes;  ///< length of steps.jsonl, the line of this step included
 };
 
-/// Adds to a frame that has /mesh of `state` already.
+/// Adds to a frame that has /mesh of `state` already. All is in SI units, so where `units` are others rest positions and
+/// time are saved again.
 template <int Dim>
-void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress);
+void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress, const Units& units);
 
 }  // namespace itr::output

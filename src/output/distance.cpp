@@ -379,6 +379,9 @@ FrameDistance frame_distance(const std::filesystem::path& frame, const std::file
   if (a.dim != b.dim)
     throw InputError({frame.string(), "/fields/x", std::to_string(a.dim) + " columns",
                       std::to_string(b.dim) + ", as in " + reference.string()});
+  for (const char* unit : {"m", "kg", "s"})
+    if (a.units.name(unit) != b.units.name(unit))
+      throw InputError({frame.string(), "/units", a.units.name(unit), b.units.name(unit) + ", as in " + reference.string()});
   return a.dim == 2 ? distance_of<2>(a, b) : distance_of<3>(a, b);
 }
 

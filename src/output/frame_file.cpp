@@ -10,6 +10,7 @@
 #include "itr/core/check.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
+#include "units.hpp"
 
 namespace itr::output {
 
@@ -20,6 +21,8 @@ using Integers = std::vector<std::int64_t>;
 const Space kLinear;
 /// Four rows a curve: contact, friction, reaction, all.
 const std::string kForceSums = "/totals/forces";
+/// Names of length, mass and time; absent: SI units.
+const std::string kUnits = "/units";
 
 std::span<const double> as_span(ConstVectorView v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 
@@ -31,15 +34,25 @@ VectorX rest_positions(const Mesh<Dim>& mesh, const Space& space) {
   return rest;
 }
 
-/// A dataset with the attribute `unit`.
-void write_values(hdf5::File& file, const std::string& name, std::span<const double> values, int columns, const char* unit) {
-  const bool is_new = !file.has_written(name);
-  file.write(name, values, columns);
-  if (is_new) file.write_attribute(name, "unit", std::string(unit));
-}
+/// A file whose numbers are in a scene's units.
+struct Target {
+  hdf5::File& file;
+  const Units& units;
+
+  /// Numbers in SI units as a dataset with the attribute `unit`.
+  void write(const std::string& name, std::span<const double> values, int columns, const char* unit) const {
+    const bool is_new = !file.has_written(name);
+    if (units.is_si())
+      file.write(name, values, columns);
+    else
+      file.write(name, from_si(values, units, unit), columns);
+    if (is_new) file.write_attribute(name, "unit", units.name(unit));
+  }
+};
 
 template <int Dim>
-void write_mesh(hdf5::File& file, const Mesh<Dim>& mesh, ConstVectorView rest) {
+void write_mesh(const Target& target, const Mesh<Dim>& mesh, ConstVectorView rest) {
+  hdf5::File& file = target.file;
   Integers simplices, body, surface;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     simplices.insert(simplices.end(), mesh.cell(c).begin(), mesh.cell(c).end());
@@ -48,7 +61,7 @@ void write_mesh(hdf5::File& file, const Mesh<Dim>& mesh, ConstVectorView rest) {
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (mesh.is_facet_alive(f)) surface.insert(surface.end(), mesh.facet(f).begin(), mesh.facet(f).end());
   }
-  write_values(file, "/mesh/rest", as_span(rest), Dim, "m");
+  target.write("/mesh/rest", as_span(rest), Dim, "m");
   file.write("/mesh/simplices", simplices, Dim + 1);
   file.write("/mesh/body", body, 0);
   file.write("/mesh/surface", surface, Dim);
@@ -64,7 +77,8 @@ void write_index_rows(hdf5::File& file, const std::string& name, const std::vect
 /// The curved edges, and the cells as XDMF draws them; where only some edges are curved with nodal fields of their own,
 /// since those of /fields have no rows for straight edges.
 template <int Dim>
-void write_space(hdf5::File& file, const FrameView<Dim>& frame, const Space& space, ConstVectorView u) {
+void write_space(const Target& target, const FrameView<Dim>& frame, const Space& space, ConstVectorView u) {
+  hdf5::File& file = target.file;
   if (space.is_linear()) return;
   write_index_rows(file, "/mesh/curved_edges", space.curved_edges());
   const DrawnCells<Dim> drawn = draw_cells(frame.mesh, space);
@@ -72,7 +86,7 @@ void write_space(hdf5::File& file, const FrameView<Dim>& frame, const Space& spa
   if (drawn.straight_edges.empty()) return;
   const auto write = [&](const char* name, ConstVectorView field, const char* unit) {
     const VectorX values = drawn.at_nodes(field);
-    write_values(file, name, as_span(values), Dim, unit);
+    target.write(name, as_span(values), Dim, unit);
   };
   write("/drawn/x", frame.x, "m");
   write("/drawn/u", u, "m");
@@ -80,13 +94,13 @@ void write_space(hdf5::File& file, const FrameView<Dim>& frame, const Space& spa
 }
 
 template <int Dim>
-void write_surface(hdf5::File& file, const std::string& group, const std::vector<Vec<Dim>>& positions,
+void write_surface(const Target& target, const std::string& group, const std::vector<Vec<Dim>>& positions,
                    const std::vector<std::array<int, 2>>& edges, const std::vector<std::array<int, 3>>& triangles) {
   std::vector<double> x;
   for (const Vec<Dim>& p : positions) x.insert(x.end(), p.data(), p.data() + Dim);
-  write_values(file, group + "/x", x, Dim, "m");
-  write_index_rows(file, group + "/edges", edges);
-  write_index_rows(file, group + "/faces", triangles);
+  target.write(group + "/x", x, Dim, "m");
+  write_index_rows(target.file, group + "/edges", edges);
+  write_index_rows(target.file, group + "/faces", triangles);
 }
 
 void require_shape(const std::filesystem::path& path, const std::string& name, int columns, int expected) {
@@ -102,9 +116,9 @@ void require_range(const std::filesystem::path& path, const std::string& name, c
 }
 
 template <int Dim>
-void write_asked(hdf5::File& file, const AskedFields& asked) {
+void write_asked(const Target& target, const AskedFields& asked) {
   const auto write = [&](const char* name, std::span<const double> values, int columns, const char* unit) {
-    if (!values.empty()) write_values(file, name, values, columns, unit);
+    if (!values.empty()) target.write(name, values, columns, unit);
   };
   write("/fields/contact_force", as_span(asked.forces.contact), Dim, "N");
   write("/fields/friction_force", as_span(asked.forces.friction), Dim, "N");
@@ -116,7 +130,8 @@ void write_asked(hdf5::File& file, const AskedFields& asked) {
   if (asked.curves.empty()) return;
   std::vector<double> sums;
   std::string names;
-  for (const ForceCurvePoint& curve : asked.curves) {
+  hdf5::File& file = target.file;
+  for (const ForceCurvePoint& curve : in_units(asked.curves, target.units)) {
     names += (names.empty() ? "" : ",") + curve.name;
     for (const auto& kind : curve.kinds) sums.insert(sums.end(), kind.begin(), kind.end());
   }
@@ -144,7 +159,8 @@ StoredSurface read_surface(const std::filesystem::path& path, const hdf5::File& 
 }
 
 template <int Dim>
-void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t) {
+void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, const Units& units) {
+  const Target target{file, units};
   const Mesh<Dim>& mesh = frame.mesh;
   ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots() && mesh.num_cells() == mesh.cell_slots(), "mesh is not compact");
   const Space& space = frame.space ? *frame.space : kLinear;
@@ -152,16 +168,18 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t) {
   const VectorX rest = rest_positions(mesh, space);
   const VectorX u = frame.x - rest;
   file.write_attribute("step", static_cast<std::int64_t>(step));
-  file.write_attribute("t", t);
-  write_mesh(file, mesh, rest);
-  write_space<Dim>(file, frame, space, u);
-  write_values(file, "/fields/x", as_span(frame.x), Dim, "m");
-  write_values(file, "/fields/u", as_span(u), Dim, "m");
-  write_values(file, "/fields/v", as_span(frame.v), Dim, "m/s");
-  write_values(file, "/fields/elastic_density", frame.elastic_density, 0, Dim == 2 ? "J/m^2" : "J/m^3");
-  if (frame.asked) write_asked<Dim>(file, *frame.asked);
-  write_surface<Dim>(file, "/obstacles", frame.obstacle_x, frame.obstacle_edges, frame.obstacle_triangles);
-  if (frame.proxy.x) write_surface<Dim>(file, "/proxy", *frame.proxy.x, *frame.proxy.edges, *frame.proxy.triangles);
+  file.write_attribute("t", units.from_si(t, "s"));
+  if (!units.is_si() && !file.contains(kUnits))
+    file.write_text(kUnits, units.length() + " " + units.mass() + " " + units.time());
+  write_mesh(target, mesh, rest);
+  write_space<Dim>(target, frame, space, u);
+  target.write("/fields/x", as_span(frame.x), Dim, "m");
+  target.write("/fields/u", as_span(u), Dim, "m");
+  target.write("/fields/v", as_span(frame.v), Dim, "m/s");
+  target.write("/fields/elastic_density", frame.elastic_density, 0, Dim == 2 ? "J/m^2" : "J/m^3");
+  if (frame.asked) write_asked<Dim>(target, *frame.asked);
+  write_surface<Dim>(target, "/obstacles", frame.obstacle_x, frame.obstacle_edges, frame.obstacle_triangles);
+  if (frame.proxy.x) write_surface<Dim>(target, "/proxy", *frame.proxy.x, *frame.proxy.edges, *frame.proxy.triangles);
 }
 
 }  // namespace
@@ -207,11 +225,11 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
 }  // namespace
 
 template <int Dim>
-void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, Durability durability,
-                 const FrameExtra& extra) {
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, const Units& units,
+                 Durability durability, const FrameExtra& extra) {
   const hdf5::Session session;
   hdf5::File file = hdf5::File::create(path);
-  fill(file, frame, step, t);
+  fill(file, frame, step, t, units);
   if (extra) extra(file);
   write_file(path, file.image(), durability);
 }
@@ -222,7 +240,8 @@ FrameFiles::~FrameFiles() {
 }
 
 template <int Dim>
-void FrameFiles::write(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t) {
+void FrameFiles::write(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t,
+                       const Units& units) {
   constexpr std::size_t kSmall = 1 << 20;  // [bytes]
   const hdf5::Session session;
   std::vector<std::size_t> shape = shape_of(frame);
@@ -231,7 +250,7 @@ void FrameFiles::write(const std::filesystem::path& path, const FrameView<Dim>& 
   shape_ = std::move(shape);
   std::string image;
   try {
-    fill(*file_, frame, step, t);
+    fill(*file_, frame, step, t, units);
     image = file_->image();
   } catch (...) {
     file_.reset();
@@ -311,6 +330,24 @@ StoredForces read_frame_forces(const std::filesystem::path& path) {
   return forces;
 }
 
+namespace {
+
+Units read_units(const std::filesystem::path& path, const hdf5::File& file) {
+  if (!file.contains(kUnits)) return {};
+  const std::string text = file.read_text(kUnits);
+  std::istringstream names(text);
+  std::string length, mass, time;
+  names >> length >> mass >> time;
+  const auto has = [](const std::vector<std::string>& list, const std::string& name) {
+    return std::find(list.begin(), list.end(), name) != list.end();
+  };
+  if (!has(Units::length_names(), length) || !has(Units::mass_names(), mass) || !has(Units::time_names(), time))
+    throw InputError({path.string(), kUnits, "'" + text + "'", "units of length, mass and time, such as 'mm t s'"});
+  return {length, mass, time};
+}
+
+}  // namespace
+
 StoredFrame read_frame(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
@@ -318,6 +355,7 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   hdf5::Table<double> x = file.read_doubles("/fields/x");
   if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
   frame.dim = x.columns;
+  frame.units = read_units(path, file);
   frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
   frame.body = file.read_integers("/mesh/body").values;
   if (const std::size_t cells = frame.simplices.size() / (frame.dim + 1); frame.body.size() != cells)
@@ -364,11 +402,11 @@ std::vector<StoredField> read_frame_fields(const std::filesystem::path& path) {
   return fields;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                   \
-  template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, Durability, \
-                                 const FrameExtra&);                                                           \
-  template int drawn_nodes<Dim>(const FrameView<Dim>&);                                                        \
-  template void FrameFiles::write<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double);
+#define ITR_INSTANTIATE(Dim)                                                                                     \
+  template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, const Units&, \
+                                 Durability, const FrameExtra&);                                                 \
+  template int drawn_nodes<Dim>(const FrameView<Dim>&);                                                          \
+  template void FrameFiles::write<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, const Units&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

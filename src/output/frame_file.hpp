@@ -11,6 +11,7 @@
 
 #include "core/hdf5.hpp"
 #include "files.hpp"
+#include "itr/core/units.hpp"
 #include "itr/output/distance.hpp"
 #include "itr/simulation/frame.hpp"
 
@@ -20,7 +21,7 @@ namespace itr::output {
 using FrameExtra = std::function<void(hdf5::File&)>;
 
 template <int Dim>
-void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t,
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, const Units& units,
                  Durability durability = Durability::process, const FrameExtra& extra = {});
 
 /// Writes frames one after another. While they are small and of one shape they are made in one file in memory: to make it
@@ -32,7 +33,7 @@ class FrameFiles {
   FrameFiles(const FrameFiles&) = delete;
   FrameFiles& operator=(const FrameFiles&) = delete;
   template <int Dim>
-  void write(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t);
+  void write(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, const Units& units);
 
  private:
   std::optional<hdf5::File> file_;
@@ -80,6 +81,7 @@ struct StoredSurface {
 /// What a certificate or a comparison needs of a stored frame. Indices are checked: all within range.
 struct StoredFrame {
   int dim = 0;
+  Units units;                          ///< of all numbers here; below they are named as of SI units
   std::vector<double> rest;             ///< n x dim, row-major [m]: vertices, then nodes of curved edges
   std::vector<double> x;                ///< n x dim, row-major [m]
   std::vector<std::int64_t> simplices;  ///< m x (dim + 1)

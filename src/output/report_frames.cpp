@@ -154,6 +154,7 @@ std::string LivingRows::encode() const {
 
 void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField>& fields) {
   dim_ = frame.dim;
+  units_ = frame.units;
   for (int k = 0; k < dim_ && !frame.x.empty(); ++k) {
     origin_[k] = frame.rest[k];
     low_[k] = high_[k] = frame.x[k];
@@ -357,7 +358,7 @@ void FrameEncoder::add(const std::filesystem::path& path) {
         magnitudes[k] = magnitude(&field->values[static_cast<std::size_t>(node) * columns], columns);
     for (const double value : magnitudes) codes.push_back(code(i, value));
     include_shown(i, std::move(magnitudes));
-    if (!is_there || field->unit != "N") continue;
+    if (!is_there || !field->name.ends_with("_force")) continue;
     std::array<double, 3>& sum = entry.forces[field->name];
     for (std::size_t k = 0; k < field->values.size(); ++k) sum[k % dim] += field->values[k];
   }

@@ -79,6 +79,7 @@ class FrameEncoder {
   void finish() { flush(); }
 
   int dim() const { return dim_; }
+  const Units& units() const { return units_; }
   const std::array<double, 3>& origin() const { return origin_; }
   /// Box of the bodies over all frames [m].
   const std::array<double, 3>& low() const { return low_; }
@@ -112,6 +113,7 @@ class FrameEncoder {
 
   bool with_inside_;
   int dim_ = 0;
+  Units units_;
   std::array<double, 3> origin_{}, low_{}, high_{};
   LivingRows vertices_{1}, cells_{0}, facets_{0}, curved_{3};
   std::vector<std::array<double, 3>> rest_;  ///< by id of vertices_

@@ -68,6 +68,14 @@ std::string json_fields(const std::vector<FieldName>& fields) {
   return fmt::format("[{}]", fmt::join(items, ","));
 }
 
+/// The scene's names of units by those of SI.
+std::string json_units(const Units& units) {
+  std::vector<std::string> items;
+  for (const char* unit : {"m", "s", "J", "N", "N m"})
+    items.push_back(json_string(unit) + ":" + json_string(units.name(unit)));
+  return fmt::format("{{{}}}", fmt::join(items, ","));
+}
+
 std::string json_forces(const EncodedFrame& frame, int dim) {
   std::vector<std::string> items;
   for (const auto& [name, sum] : frame.forces) items.push_back(json_string(name) + ":" + json_list(sum, dim));
@@ -112,16 +120,17 @@ std::string pictures(const std::vector<fs::path>& files, const FrameEncoder& enc
       if (field.name == "elastic_density") densities.back() = std::move(field.values);
   }
   std::string html;
+  const Units& units = frames.front().units;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const std::string png =
         draw_frame(frames[i], densities[i], largest, cells_of_facets(frames[i]), encoder.low(), encoder.high(), 640, 420);
     html += fmt::format(
-        "<figure><img alt=\"step {0}\" src=\"data:image/png;base64,{1}\"><figcaption>step {0}, t = {2:.6g} s</figcaption>"
+        "<figure><img alt=\"step {0}\" src=\"data:image/png;base64,{1}\"><figcaption>step {0}, t = {2:.6g} {3}</figcaption>"
         "</figure>\n",
-        step_of_frame(chosen[i]), base64(png), read_frame_sizes(chosen[i]).t);
+        step_of_frame(chosen[i]), base64(png), read_frame_sizes(chosen[i]).t, units.name("s"));
   }
-  return html + fmt::format("<p>Colour: elastic energy density, 0 to {:.4g} J/m{} and more.</p>\n", largest,
-                            encoder.dim() == 2 ? "²" : "³");
+  return html + fmt::format("<p>Colour: elastic energy density, 0 to {:.4g} {}/{}{} and more.</p>\n", largest,
+                            units.name("J"), units.name("m"), encoder.dim() == 2 ? "²" : "³");
 }
 
 std::string colours() {
@@ -145,13 +154,13 @@ std::string meta(const FrameEncoder& encoder, const std::string& title, const st
       R"({{"title":{},"version":{},"dim":{},"origin":{},"low":{},"high":{},"counts":{},"inside":{},"azimuth":{},)"
       R"("elevation":{},"vertex_fields":{},"cell_fields":{},"largest":[{}],"shown":[{}],"largest_u":{},)"
       R"("ranges":{{"J":{},"size":{}}},"notes":[{}],"summary":{},"certificate":{},)"
-      R"("colours":[{}],"chunks":[{}],"frames":[{}]}})",
+      R"("units":{},"colours":[{}],"chunks":[{}],"frames":[{}]}})",
       json_string(title), json_string(ITR_VERSION), dim, json_list(encoder.origin(), dim), json_list(encoder.low(), dim),
       json_list(encoder.high(), dim), counts, has_inside, kAzimuth, kElevation, json_fields(encoder.vertex_fields()),
       json_fields(encoder.cell_fields()), fmt::join(encoder.largest(), ","), fmt::join(encoder.shown(), ","),
       encoder.largest_u(), json_range(encoder.volume_ratios()), json_range(encoder.longest_edges()), fmt::join(said, ","),
-      summary.empty() ? "null" : summary, certificate.empty() ? "null" : certificate, colours(), fmt::join(chunks, ","),
-      fmt::join(frames, ","));
+      summary.empty() ? "null" : summary, certificate.empty() ? "null" : certificate, json_units(encoder.units()), colours(),
+      fmt::join(chunks, ","), fmt::join(frames, ","));
 }
 
 std::string fill(std::string_view page, const std::vector<std::pair<std::string, std::string_view>>& parts) {

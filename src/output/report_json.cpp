@@ -10,6 +10,7 @@
 
 #include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
+#include "units.hpp"
 
 namespace itr::output {
 
@@ -33,13 +34,21 @@ namespace {
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
 
 std::string energy_json(const EnergyReport& e) {
-  const std::string damping = e.damping == 0 ? "" : fmt::format(R"("damping":{},)", number(e.damping));
-  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},{}"total":{}}})", number(e.inertia),
-                     number(e.elastic), number(e.body), number(e.contact), number(e.friction), damping, number(e.total));
+  const auto where_there = [](const char* name, double energy) {
+    return energy == 0 ? "" : fmt::format(R"("{}":{},)", name, number(energy));
+  };
+  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},{}{}"total":{}}})",
+                     number(e.inertia), number(e.elastic), number(e.body), number(e.contact), number(e.friction),
+                     where_there("damping", e.damping), where_there("host", e.host), number(e.total));
 }
 
 std::string count_json(const OperationCount& count) {
-  return fmt::format(R"({{"tried":{},"relaxed":{},"accepted":{}}})", count.tried, count.relaxed, count.accepted);
+  std::string refused;
+  for (int i = 0; i < kRefusals; ++i)
+    if (count.refused[i] > 0)
+      refused += fmt::format(R"({}"{}":{})", refused.empty() ? "" : ",", name(static_cast<Refusal>(i)), count.refused[i]);
+  return fmt::format(R"({{"tried":{},"relaxed":{},"accepted":{},"refused":{{{}}}}})", count.tried, count.relaxed,
+                     count.accepted, refused);
 }
 
 std::string seconds_json(const StepSeconds& s) {
@@ -120,6 +129,8 @@ void for_each_number(Report& r, Visit&& visit) {
   for (auto* x : {&r.t, &r.energy_before_remesh, &r.history_loss, &r.min_distance, &r.min_volume_ratio, &r.processor_seconds,
                   &r.peak_rss_mb})
     visit(*x);
+  for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths})  // last: 0.1.0 did not save them
+    for (auto& refused : count->refused) visit(refused);
 }
 
 }  // namespace
@@ -131,23 +142,29 @@ std::vector<double> Totals::save() const {
 }
 
 void Totals::restore(const std::vector<double>& values) {
-  if (const std::size_t expected = save().size(); values.size() != expected)
+  const std::size_t expected = save().size();
+  const bool is_without_refusals = values.size() == expected - 4 * kRefusals;
+  if (values.size() != expected && !is_without_refusals)
     throw InputError({"", "saved totals", std::to_string(values.size()) + " numbers", std::to_string(expected)});
   gain_ = values[0];
   std::size_t next = 1;
-  for_each_number(total_,
-                  [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]); });
+  for_each_number(total_, [&](auto& number) {
+    if (next < values.size()) number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]);
+  });
 }
 
-std::string Totals::summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,
-                                 const DisplacementNorms& norms, const std::string& members) const {
+std::string Totals::summary_json(const RunInfo& info, const Units& units, const std::string& outcome,
+                                 const std::string& solver, const DisplacementNorms& norms,
+                                 const std::string& members) const {
+  const StepReport total = in_units(total_, units);
   return fmt::format(
-      R"({{"scene":{},"outcome":{},"backend":{},"solver":{},"threads":{},"versions":{},"steps":{},"cut_steps":{},"t":{},{},)"
-      R"("energy_decrease_by_remeshing":{},{},"norms":{}}})"
+      R"({{"scene":{},"outcome":{},"backend":{},"solver":{},"threads":{},"versions":{},"units":{{"length":{},"mass":{},"time":{}}},)"
+      R"("steps":{},"cut_steps":{},"t":{},{},"energy_decrease_by_remeshing":{},{},"norms":{}}})"
       "\n",
       json_string(info.scene), json_string(outcome), json_string(info.backend), json_string(solver), info.threads,
-      versions_json(), total_.step, total_.cut_steps, number(total_.t), common_members(total_), number(gain_), members,
-      norms_json(norms));
+      versions_json(), json_string(units.length()), json_string(units.mass()), json_string(units.time()), total.step,
+      total.cut_steps, number(total.t), common_members(total), number(units.from_si(gain_, "J")), members,
+      norms_json(in_units(norms, units)));
 }
 
 }  // namespace itr::output

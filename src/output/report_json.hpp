@@ -22,8 +22,8 @@ class Totals {
   std::vector<double> save() const;
   void restore(const std::vector<double>& values);
   const StepReport& report() const { return total_; }
-  /// The text of summary.json; `members` are more of them.
-  std::string summary_json(const RunInfo& info, const std::string& outcome, const std::string& solver,
+  /// The text of summary.json, in `units`; `members` are more of them.
+  std::string summary_json(const RunInfo& info, const Units& units, const std::string& outcome, const std::string& solver,
                            const DisplacementNorms& norms, const std::string& members) const;
 
  private:

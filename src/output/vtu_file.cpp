@@ -13,6 +13,7 @@
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
+#include "units.hpp"
 
 namespace itr::output {
 
@@ -85,33 +86,37 @@ VectorX displacement(const FrameView<Dim>& frame) {
 }  // namespace
 
 template <int Dim>
-void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step) {
+void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step, const Units& units) {
   const Mesh<Dim>& mesh = frame.mesh;
   std::string points, cells;
   const bool is_curved = frame.space && !frame.space->is_linear();
   const DrawnCells<Dim> drawn = is_curved ? draw_cells(mesh, *frame.space) : DrawnCells<Dim>();
-  const VectorX x = drawn.at_nodes(frame.x);
-  const auto vectors = [&](const char* name, ConstVectorView values) {
-    if (values.size() > 0) points += array(name, "Float64", in_space<Dim>(drawn.at_nodes(values)), 3);
+  const double length = units.factor("m");
+  const VectorX x = drawn.at_nodes(frame.x) / length;
+  const auto vectors = [&](const char* name, ConstVectorView values, double unit) {
+    if (values.size() > 0) points += array(name, "Float64", in_space<Dim>(drawn.at_nodes(values) / unit), 3);
   };
   /// Forces belong to nodes: there are none on straight edges.
+  const double force = units.factor("N");
   const auto forces = [&](const char* name, ConstVectorView values) {
     if (values.size() == 0) return;
     VectorX all = VectorX::Zero(x.size());
-    all.head(values.size()) = values;
+    all.head(values.size()) = values / force;
     points += array(name, "Float64", in_space<Dim>(all), 3);
   };
-  vectors("u", displacement(frame));
-  vectors("v", frame.v);
+  vectors("u", displacement(frame), length);
+  vectors("v", frame.v, units.factor("m/s"));
+  const auto pressures = [&](const std::vector<double>& values) { return from_si(values, units, "Pa"); };
   std::vector<std::int64_t> body;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) body.push_back(mesh.body(c));
-  cells += array("body", "Int64", body, 1) + array("elastic_density", "Float64", frame.elastic_density, 1);
+  cells += array("body", "Int64", body, 1) + array("elastic_density", "Float64", pressures(frame.elastic_density), 1);
   if (frame.asked) {
     forces("contact_force", frame.asked->forces.contact);
     forces("friction_force", frame.asked->forces.friction);
     forces("reaction_force", frame.asked->forces.reaction);
-    if (!frame.asked->von_mises.empty()) cells += array("von_mises", "Float64", frame.asked->von_mises, 1);
-    if (!frame.asked->stress.empty()) cells += array("stress", "Float64", tensors_in_space(frame.asked->stress, Dim), 9);
+    if (!frame.asked->von_mises.empty()) cells += array("von_mises", "Float64", pressures(frame.asked->von_mises), 1);
+    if (!frame.asked->stress.empty())
+      cells += array("stress", "Float64", tensors_in_space(pressures(frame.asked->stress), Dim), 9);
   }
   const std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
@@ -137,7 +142,7 @@ void write_vtu_series(const std::filesystem::path& directory) {
   write_file(directory / "sim.pvd", text + "</Collection>\n</VTKFile>\n");
 }
 
-template void write_vtu(const std::filesystem::path&, const FrameView<2>&, int);
-template void write_vtu(const std::filesystem::path&, const FrameView<3>&, int);
+template void write_vtu(const std::filesystem::path&, const FrameView<2>&, int, const Units&);
+template void write_vtu(const std::filesystem::path&, const FrameView<3>&, int, const Units&);
 
 }  // namespace itr::output

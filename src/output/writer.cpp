@@ -14,6 +14,7 @@
 #include "itr/core/timer.hpp"
 #include "report_json.hpp"
 #include "time_series.hpp"
+#include "units.hpp"
 #include "vtu_file.hpp"
 #include "warnings.hpp"
 
@@ -88,12 +89,12 @@ struct Writer::Impl {
       sync_frames();
       const std::vector<double> saved_totals = totals.save();
       const Progress progress{info.scene_identity, info.backend, saved_totals, steps.size()};
-      write_frame(directory / name, frame, step, t, Durability::power,
-                  [&](hdf5::File& file) { write_checkpoint(file, *checkpoint, progress); });
+      write_frame(directory / name, frame, step, t, options.units, Durability::power,
+                  [&](hdf5::File& file) { write_checkpoint(file, *checkpoint, progress, options.units); });
       sync(directory / "frames");
       last_checkpoint = seconds_now();
     } else {
-      frames.write(directory / name, frame, step, t);
+      frames.write(directory / name, frame, step, t, options.units);
       unsynced.push_back(name);
     }
   }
@@ -114,10 +115,10 @@ struct Writer::Impl {
       if (!frame.asked->stress.empty()) asked.push_back("stress");
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
-    if (options.vtu) write_vtu(directory, frame, step);
+    if (options.vtu) write_vtu(directory, frame, step, options.units);
     const bool is_quadratic = frame.space && !frame.space->is_linear();
-    series.add(
-        {frame_name(step), t, Dim, nodes, frame.mesh.num_cells(), is_quadratic, drawn_nodes(frame), std::move(asked)});
+    series.add({frame_name(step), options.units.from_si(t, "s"), Dim, nodes, frame.mesh.num_cells(), is_quadratic,
+                drawn_nodes(frame), std::move(asked)});
   }
 
   /// What a checkpoint relies on has to be on the disk before it.
@@ -163,11 +164,12 @@ bool Writer::is_checkpoint_due(int step) const {
 template <int Dim>
 void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const State<Dim>* checkpoint) {
   const std::size_t length = impl_->steps.size();
-  std::string line = step_json(report);
+  const Units& units = impl_->options.units;
+  std::string line = step_json(in_units(report, units));
   if (const std::string warnings = impl_->warnings.take_new(); !warnings.empty())
     line.insert(line.size() - 1, ",\"warnings\":" + warnings);
   impl_->steps.append(std::move(line));
-  if (frame.asked) impl_->forces.add(report.step, report.t, frame.asked->curves);
+  if (frame.asked) impl_->forces.add(report.step, units.from_si(report.t, "s"), in_units(frame.asked->curves, units));
   impl_->totals.add(report);
   impl_->norms = displacement_norms(frame.mesh, frame.x, frame.space ? *frame.space : Space());
   if (!checkpoint && !impl_->is_due(report.step)) return;
@@ -197,8 +199,8 @@ void Writer::finish(const std::string& outcome, const std::string& solver) {
   impl_->series.write();
   if (impl_->options.vtu) write_vtu_series(impl_->directory);
   const std::string& used = solver.empty() ? impl_->info.backend : solver;
-  write_file(impl_->directory / "summary.json",
-             impl_->totals.summary_json(impl_->info, outcome, used, impl_->norms, impl_->warnings.summary_members()));
+  write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, impl_->options.units, outcome, used,
+                                                                           impl_->norms, impl_->warnings.summary_members()));
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                     \

@@ -17,60 +17,62 @@ class Collapser {
  public:
   Collapser(RemeshSession<Dim>& session, const EdgeRanks& ranks)
       : session_(session),
-        options_(session.options().collapse),
+        ask_(session.ask()),
+        options_(ask_.options().collapse),
         tolerance_(options_.acceptance_tolerance.value()),
         ranks_(ranks) {}
 
   /// Shortest first.
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
-    if (!is_candidate(edge) || !session_.may_be_collapsed(edge)) return std::nullopt;
-    return EdgeQueue::Entry{.edge = edge, .priority = -session_.rest_length(edge)};
+    if (!is_candidate(edge) || ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
+    return EdgeQueue::Entry{.edge = edge, .priority = -ask_.rest_length(edge)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey& edge = trial.edge();
-    if (!session_.may_be_collapsed(edge) || session_.depth(edge) >= options_.max_depth) return;
-    trial.signal = session_.roughness(edge);
-    session_.find_contact(trial, scratch);
-    if (session_.was_refused(RemeshMemory::collapse, edge, trial.signal, trial.in_contact)) return;
+    if (const Refusal refusal = ask_.refuse_collapse(edge); refusal != Refusal::none) return trial.refuse(refusal);
+    if (session_.memory().depth(edge) >= options_.max_depth) return trial.refuse(Refusal::depth);
+    trial.signal = ask_.roughness(edge);
+    ask_.find_contact(trial, scratch);
+    if (session_.memory().was_refused(RemeshMemory::collapse, edge, trial.signal, trial.in_contact)) return;
     trial.is_asked = true;
-    trial.edit = propose_collapse(session_.mesh(), session_.strata(), edge).edit;
-    if (!trial.edit) return;
-    if (!trial.in_contact && session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), tolerance_)) {
-      trial.verdict.decision = Decision::by_bound;
-      return;
-    }
-    session_.judge(trial, trial.edit->value->rest, tolerance_, session_.options().local, scratch);
+    if (!trial.take(propose_collapse(ask_.mesh(), ask_.strata(), edge))) return;
+    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, ask_.predict(*trial.edit), tolerance_))
+      return trial.refuse(Refusal::prediction);
+    ask_.judge(trial, trial.edit->value->rest, tolerance_, ask_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+    OperationCount& count = session_.report().collapses;
+    count.note(trial.verdict.refusal);
     if (!trial.is_asked) return;
-    const int generation = session_.depth(trial.edge()) + 1;
-    if (session_.commit(trial, session_.report().collapses)) {
+    const int generation = session_.memory().depth(trial.edge()) + 1;
+    if (session_.commits().commit(trial, count)) {
       const VertexId kept = trial.edit->value->vertex;
-      for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(kept))) {
-        if (near[0] == kept || near[1] == kept) session_.set_depth(near, generation);
+      for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(kept))) {
+        if (near[0] == kept || near[1] == kept) session_.memory().set_depth(near, generation);
         fresh.push_back(near);
       }
       return;
     }
-    const Decision decision = trial.verdict.decision;
-    if (decision != Decision::by_bound && decision != Decision::by_energy) return;
+    const Refusal refusal = trial.verdict.refusal;
+    if (refusal != Refusal::prediction && refusal != Refusal::bound && refusal != Refusal::energy) return;
     constexpr double kNever = std::numeric_limits<double>::infinity();  // a rougher field loses more
-    session_.remember(
+    session_.memory().remember(
         RemeshMemory::collapse, trial.edge(),
         {trial.signal / kSameSignal, trial.in_contact ? trial.signal * kSameSignal : kNever, trial.in_contact});
   }
 
  private:
   bool is_candidate(const EdgeKey& edge) const {
-    if (session_.options().screening != Screening::energy_percentile) return true;
+    if (ask_.options().screening != Screening::energy_percentile) return true;
     const auto it = ranks_.find(edge);
     return (it != ranks_.end() && it->second == Rank::bottom) ||
-           session_.rest_length(edge) < kTinyEdge * session_.context().shortest_edge;
+           ask_.rest_length(edge) < kTinyEdge * ask_.context().shortest_edge;
   }
 
   RemeshSession<Dim>& session_;
+  const RemeshQueries<Dim>& ask_;
   const CollapseOptions& options_;
   double tolerance_;  ///< [J]
   const EdgeRanks& ranks_;
@@ -81,8 +83,8 @@ class Collapser {
 template <int Dim>
 void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks) {
   Collapser<Dim> collapser(session, ranks);
-  run_waves(session, collapser, session.mesh().edges());
-  session.forget_depths();
+  run_waves(session, collapser, session.ask().mesh().edges());
+  session.memory().forget_depths();
 }
 
 template void collapse_edges(RemeshSession<2>&, const EdgeRanks&);

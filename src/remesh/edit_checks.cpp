@@ -6,8 +6,10 @@
 namespace itr {
 
 std::string_view name(Refusal refusal) {
-  static constexpr std::string_view kNames[kRefusals] = {"none",      "gone",  "non-manifold", "held", "link",  "exists",
-                                                         "long ring", "shape", "outside",      "cost", "curved"};
+  static constexpr std::string_view kNames[] = {
+      "none",   "not_asked", "depth", "length",  "dhat", "prediction", "gone",  "non_manifold", "held",        "link",
+      "exists", "long_ring", "shape", "outside", "cost", "invalid",    "bound", "energy",       "no_unknowns", "curved"};
+  static_assert(std::size(kNames) == kRefusals);
   return kNames[static_cast<int>(refusal)];
 }
 

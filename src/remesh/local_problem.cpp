@@ -68,8 +68,7 @@ LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const C
   if (static_cast<int>(scratch_.local_of.size()) < mesh_.vertex_slots()) scratch_.local_of.resize(2 * mesh_.vertex_slots());
   scratch_.local_of_obstacle.resize(state.context.obstacles.x.size());
   add_cells(patch);
-  const Loads<Dim>& loads = state.context.loads;
-  if (!loads.tractions.empty() || !loads.pressures.empty() || !state.context.host.empty()) add_loaded_facets();
+  if (needs_facets(state.context)) add_loaded_facets();
   hold_vertices();
   if (state.context.contact.enabled) add_surface();
   add_terms();
@@ -413,8 +412,7 @@ void LocalProblem<Dim>::add_terms() {
   storage_->predictor.resize(0);
   storage_->velocity_reference.resize(0);
   if (context.has_inertia) gather(state_.fields.predictor, {}, storage_->predictor);
-  const bool has_velocity = touches_contact_ || !context.damping.empty();  // friction or damping can act
-  if (has_velocity && state_.fields.velocity_reference.size() > 0)
+  if (needs_velocities(context, touches_contact_) && state_.fields.velocity_reference.size() > 0)
     gather(state_.fields.velocity_reference, context.obstacles.velocity_reference, storage_->velocity_reference);
   const PotentialHistory history{storage_->predictor.view(), storage_->velocity_reference.view()};
   if (storage_->potential)

@@ -274,11 +274,6 @@ typename QuadraticModel<Dim>::Corners corners_of(const RemeshState<Dim>& state, 
   return corners;
 }
 
-template <int Dim>
-bool knows_all_terms(const StepContext<Dim>& context) {
-  return context.loads.pressures.empty() && context.damping.empty() && context.host.empty();
-}
-
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 /// Share of the forgotten history that no relaxation regains (ball-wall 2D: a share of 1 refuses so many collapses that a
 /// sixth more vertices stay).
@@ -389,7 +384,7 @@ double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   const StepContext<Dim>& context = state.context;
-  if (!knows_all_terms(context)) return kUnknown;
+  if (!is_predictable(context)) return kUnknown;
   if (!edit.value) return predict_gain_of_swap(state, edit);
   const VertexId set = edit.value->vertex;
   const auto at = [&](const VectorX& field, VertexId v, bool after) {
@@ -437,7 +432,7 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const Mesh<Dim>& mesh = state.mesh;
   const auto around = mesh.cells_of(edge[0]);
   const auto varies = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
-  if (!knows_all_terms(context) || context.mass == MassKind::lumped || !context.loads.tractions.empty() ||
+  if (!is_predictable(context) || context.mass == MassKind::lumped || !context.loads.tractions.empty() ||
       std::any_of(around.begin(), around.end(), varies))
     return predict_gain<Dim>(state, make_split<Dim>(mesh, edge));
   QuadraticModel<Dim> model(context);
@@ -456,7 +451,7 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!knows_all_terms(context)) return kUnknown;
+  if (!is_predictable(context)) return kUnknown;
   const auto around = mesh.cells_of_edge(edge);
   const auto is_hard = [&](CellId c) {
     return mesh.is_curved(c) || context.materials.at(mesh.body(c)).has_varying_moduli();

@@ -43,29 +43,12 @@ double volume_of(double length) {
   return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
 }
 
-/// Whether W >= 0, with moduli and a density that are the same everywhere.
-template <int Dim>
-bool is_plain(const Material& material) {
-  return material.law != MaterialLaw::own && material.law != MaterialLaw::mooney_rivlin && !material.has_varying_moduli() &&
-         !material.density_at && material.lame_lambda(Dim) >= 0;
-}
-
-/// Whether all terms but loads are known to be never negative, and the loads are that of one acceleration.
-template <int Dim>
-bool is_bounded(const StepContext<Dim>& context) {
-  const Loads<Dim>& loads = context.loads;
-  return context.damping.empty() && context.host.empty() && !context.follower && loads.tractions.empty() &&
-         loads.pressures.empty() && (!loads.acceleration || context.has_inertia) &&
-         std::all_of(context.materials.begin(), context.materials.end(),
-                     [](const auto& entry) { return is_plain<Dim>(entry.second); });
-}
-
 }  // namespace
 
 template <int Dim>
 double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  if (!is_bounded(context) || !std::isfinite(context.coupling) || mesh.has_nodes()) return kUnknown;
+  if (!is_bounded<Dim>(context) || !std::isfinite(context.coupling) || mesh.has_nodes()) return kUnknown;
   const auto acceleration = uniform_acceleration(mesh, context.loads);
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;

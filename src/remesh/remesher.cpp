@@ -47,15 +47,15 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
       if (options.collapse.enabled) collapse_edges(session, ranks);
     }
     if (may_stir && (has_to_stir || report.accepted() > 0)) {
-      session.mark_gains();
+      session.memory().mark_gains();
       if (options.swap.enabled) swap_edges(session);
       if (options.smooth.enabled) smooth_vertices(session);
     }
     if (report.accepted() == before) break;
   }
   fields.trim(mesh.vertex_slots());
-  report.trial_seconds = session.median_trial_seconds();
-  memory = session.memory();
+  report.trial_seconds = session.commits().median_trial_seconds();
+  memory = session.memory().remembered(mesh);
   return report;
 }
 

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "edit_checks.hpp"
 #include "itr/geometry/distance.hpp"
-#include "itr/remesh/edits.hpp"
 #include "session.hpp"
 
 namespace itr {
@@ -22,38 +22,41 @@ constexpr double kNearerThanAtRest = 0.1;  ///< squared distances of pairs in co
 template <int Dim>
 class SizingField {
  public:
-  explicit SizingField(RemeshSession<Dim>& session) : session_(session) {}
+  explicit SizingField(RemeshSession<Dim>& session) : session_(session), ask_(session.ask()) {}
 
   void split() {
     const double least = least_length();
-    for (const EdgeKey& edge : session_.mesh().edges()) push_split(edge);
+    OperationCount& count = session_.report().splits;
+    for (const EdgeKey& edge : ask_.mesh().edges()) push_split(edge);
     while (const auto entry = queue_.pop()) {
       const EdgeKey& edge = entry->edge;
-      if (session_.is_cancelled()) return;
-      bool is_bound_by_dhat = false;
-      const bool may_be_split = session_.may_be_split(edge, is_bound_by_dhat);
-      session_.report().bound_by_activation_distance += is_bound_by_dhat;
-      if (!may_be_split || session_.rest_length(edge) < least) continue;
-      ++session_.report().splits.tried;
-      const auto edit = make_split(session_.mesh(), edge);
-      const VertexId created = session_.mesh().vertex_slots();
-      if (!session_.apply_if_valid(edit)) continue;
-      ++session_.report().splits.accepted;
-      for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(created))) push_split(near);
+      if (ask_.is_cancelled()) return;
+      Refusal refusal = ask_.refuse_split(edge);
+      if (refusal == Refusal::none && ask_.rest_length(edge) < least) refusal = Refusal::length;
+      count.note(refusal);
+      if (refusal != Refusal::none) continue;
+      ++count.tried;
+      const VertexId created = ask_.mesh().vertex_slots();
+      if (!session_.commits().commit_unjudged(make_split(ask_.mesh(), edge), session_.scratch().gate, count)) continue;
+      for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(created))) push_split(near);
     }
   }
 
   void collapse() {
-    for (const EdgeKey& edge : session_.mesh().edges()) push_collapse(edge);
+    OperationCount& count = session_.report().collapses;
+    for (const EdgeKey& edge : ask_.mesh().edges()) push_collapse(edge);
     while (const auto entry = queue_.pop()) {
       const EdgeKey& edge = entry->edge;
-      if (session_.is_cancelled()) return;
-      if (!session_.may_be_collapsed(edge)) continue;
-      ++session_.report().collapses.tried;
-      const auto proposal = propose_collapse(session_.mesh(), session_.strata(), edge);
-      if (!proposal || makes_large_edges(*proposal.edit) || !session_.apply_if_valid(*proposal.edit)) continue;
-      ++session_.report().collapses.accepted;
-      for (const EdgeKey& near : session_.edges_of(session_.mesh().cells_of(proposal.edit->value->vertex)))
+      if (ask_.is_cancelled()) return;
+      const Refusal refusal = ask_.refuse_collapse(edge);
+      count.note(refusal);
+      if (refusal != Refusal::none) continue;
+      ++count.tried;
+      auto proposal = propose_collapse(ask_.mesh(), ask_.strata(), edge);
+      if (proposal && makes_large_edges(*proposal.edit)) proposal = refused<Dim>(Refusal::length);
+      count.note(proposal.refusal);
+      if (!proposal || !session_.commits().commit_unjudged(*proposal.edit, session_.scratch().gate, count)) continue;
+      for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(proposal.edit->value->vertex)))
         push_collapse(near);
     }
   }
@@ -64,37 +67,37 @@ class SizingField {
     if (size > kSplitAbove) queue_.push({edge, size});
   }
   void push_collapse(const EdgeKey& edge) {
-    if (size_of(edge) <= kCollapseBelow) queue_.push({edge, -session_.rest_length(edge)});
+    if (size_of(edge) <= kCollapseBelow) queue_.push({edge, -ask_.rest_length(edge)});
   }
 
   /// No edge is split that is shorter [m].
   double least_length() const {
     Box<Dim> box;
-    for (VertexId v = 0; v < session_.mesh().vertex_slots(); ++v)
-      if (session_.mesh().is_vertex_alive(v)) box.include(session_.mesh().rest(v));
-    return session_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
+    for (VertexId v = 0; v < ask_.mesh().vertex_slots(); ++v)
+      if (ask_.mesh().is_vertex_alive(v)) box.include(ask_.mesh().rest(v));
+    return ask_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
   }
 
-  Vec<Dim> x(VertexId v) const { return session_.fields().x.template segment<Dim>(Dim * v); }
+  Vec<Dim> x(VertexId v) const { return ask_.fields().x.template segment<Dim>(Dim * v); }
 
   double size_of(const EdgeKey& edge) {
     const Vec<Dim> way = x(edge[1]) - x(edge[0]);
     return size_of(way, contact_squared(edge, way));
   }
   double size_of(const Vec<Dim>& way, double contact_squared) const {
-    const double longest = session_.context().longest_edge;
+    const double longest = ask_.context().longest_edge;
     return std::sqrt(way.squaredNorm() / (longest * longest) + contact_squared);
   }
 
   /// Mean over the facets at an edge, and over their vertices, of the squared share that the edge spans of the distance to
   /// what is in contact there.
   double contact_squared(const EdgeKey& edge, const Vec<Dim>& way) {
-    if (!session_.has_contact()) return 0;
+    if (!ask_.has_contact()) return 0;
     double sum = 0;
     int facets = 0;
-    for (const FacetId f : session_.mesh().facets_of_edge(edge)) {
+    for (const FacetId f : ask_.mesh().facets_of_edge(edge)) {
       ++facets;
-      for (const VertexId v : session_.mesh().facet(f)) {
+      for (const VertexId v : ask_.mesh().facet(f)) {
         const double share = way.dot(contact_at(v));
         sum += share * share / Dim;
       }
@@ -105,7 +108,7 @@ class SizingField {
   /// At a vertex of the surface: the unit direction to what is nearest of all that its facets are in contact with, over the
   /// distance [1/m]; zero without contact.
   Vec<Dim> contact_at(VertexId vertex) {
-    const double dhat = session_.context().contact.activation_distance;
+    const double dhat = ask_.context().contact.activation_distance;
     double least = dhat * dhat;
     Vec<Dim> direction = Vec<Dim>::Zero();
     const auto look_at = [&](const auto& point, int k, const auto& facet) {
@@ -125,10 +128,10 @@ class SizingField {
       least = squared;
       direction = pair_distance<Dim>(closest.kind, features.data()).separation / squared;
     };
-    for (const FacetId f : session_.mesh().facets_of(vertex)) {
-      const auto own = session_.piece(f);
+    for (const FacetId f : ask_.mesh().facets_of(vertex)) {
+      const auto own = piece(f);
       const auto at = static_cast<int>(std::find(own.now.id.begin(), own.now.id.end(), vertex) - own.now.id.begin());
-      for (const auto& other : session_.pieces_in_contact(f, session_.scratch())) {
+      for (const auto& other : pieces_in_contact(f)) {
         look_at(own, at, other);
         for (int k = 0; k < other.now.size; ++k) look_at(other, k, own);
       }
@@ -136,24 +139,53 @@ class SizingField {
     return direction;
   }
 
+  /// Part of the surface or of an obstacle, at present and at rest.
+  struct Piece {
+    SurfacePiece<Dim> now, rest;
+  };
+  Piece piece(FacetId f) const {
+    Piece piece{ask_.surface().piece(f), {}};
+    for (const int v : ask_.mesh().facet(f)) piece.rest.add(ask_.mesh().rest(v), v);
+    return piece;
+  }
+  /// What is at present nearer than dhat to a facet of the surface.
+  std::vector<Piece> pieces_in_contact(FacetId f) {
+    const SurfaceIndex<Dim>& surface = ask_.surface();
+    const double dhat = ask_.context().contact.activation_distance;
+    LocalScratch<Dim>& scratch = session_.scratch();
+    std::vector<Piece> pieces;
+    for (const auto& [other, distance] : scratch.neighbourhoods.near(surface, f, dhat, scratch.hits)) {
+      if (distance >= dhat) continue;
+      if (other >= 0) {
+        pieces.push_back(piece(other));
+        continue;
+      }
+      const int primitive = Neighbourhoods<Dim>::of_obstacle(other);
+      Piece& obstacle = pieces.emplace_back(Piece{surface.obstacle_piece(primitive), {}});
+      for (const int v : surface.primitives().all[primitive].ids())
+        obstacle.rest.add(ask_.context().obstacles.rest[v], SurfacePiece<Dim>::id_of_obstacle(v));
+    }
+    return pieces;
+  }
+
   /// Whether an edge at the vertex that a collapse keeps would be larger than edges that collapse may be.
   bool makes_large_edges(const Edit<Dim>& edit) {
     const auto& value = *edit.value;
-    const Vec<Dim> target = RemeshFields<Dim>::interpolate(session_.fields().x, value);
-    const Vec<Dim> contact = session_.mesh().is_boundary(value.vertex) && session_.has_contact()
-                                 ? contact_at(value.vertex)
-                                 : Vec<Dim>(Vec<Dim>::Zero());
+    const Vec<Dim> target = RemeshFields<Dim>::interpolate(ask_.fields().x, value);
+    const Vec<Dim> contact =
+        ask_.mesh().is_boundary(value.vertex) && ask_.has_contact() ? contact_at(value.vertex) : Vec<Dim>(Vec<Dim>::Zero());
     return std::any_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
       return std::any_of(cell.vertices.begin(), cell.vertices.end(), [&](VertexId v) {
         if (v == value.vertex) return false;
         const Vec<Dim> way = x(v) - target;
-        const double share = session_.mesh().is_boundary(v) ? way.dot(contact) : 0;
+        const double share = ask_.mesh().is_boundary(v) ? way.dot(contact) : 0;
         return size_of(way, share * share) > kCollapseBelow;
       });
     });
   }
 
   RemeshSession<Dim>& session_;
+  const RemeshQueries<Dim>& ask_;
   EdgeQueue queue_;
 };
 
@@ -162,8 +194,8 @@ class SizingField {
 template <int Dim>
 void follow_sizing_field(RemeshSession<Dim>& session) {
   SizingField<Dim> field(session);
-  if (session.options().split.enabled) field.split();
-  if (session.options().collapse.enabled) field.collapse();
+  if (session.ask().options().split.enabled) field.split();
+  if (session.ask().options().collapse.enabled) field.collapse();
 }
 
 template void follow_sizing_field(RemeshSession<2>&);

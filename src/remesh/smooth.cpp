@@ -46,8 +46,8 @@ double shortest_edge(const Mesh<Dim>& mesh, VertexId vertex) {
 /// Derivative of the elastic energy by the rest position of a vertex that takes the deformation along: sum over its cells
 /// of V (W I - F^T P) grad phi (Eshelby 1975), times the scaling.
 template <int Dim>
-Vec<Dim> configurational_gradient(const RemeshSession<Dim>& session, VertexId vertex) {
-  const Mesh<Dim>& mesh = session.mesh();
+Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& ask, VertexId vertex) {
+  const Mesh<Dim>& mesh = ask.mesh();
   Vec<Dim> sum = Vec<Dim>::Zero();
   for (const CellId c : mesh.cells_of(vertex)) {
     const auto& cell = mesh.cell(c);
@@ -57,9 +57,9 @@ Vec<Dim> configurational_gradient(const RemeshSession<Dim>& session, VertexId ve
                                      : Vec<Dim>(element.inverse_edges.row(k - 1).transpose());
     Vec<Dim> barycenter = Vec<Dim>::Zero();
     for (const int v : cell) barycenter += mesh.rest(v) / (Dim + 1);
-    const ElasticModuli moduli = elastic_moduli<Dim>(session.context().materials.at(mesh.body(c)), barycenter);
-    const Mat<Dim> F = deformation_gradient<Dim>(element, session.fields().x);
-    const double weight = session.context().scaling * element.volume;
+    const ElasticModuli moduli = elastic_moduli<Dim>(ask.context().materials.at(mesh.body(c)), barycenter);
+    const Mat<Dim> F = deformation_gradient<Dim>(element, ask.fields().x);
+    const double weight = ask.context().scaling * element.volume;
     sum +=
         weight * (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
   }
@@ -72,9 +72,10 @@ class Mover {
  public:
   explicit Mover(RemeshSession<Dim>& session)
       : session_(session),
-        mesh_(session.mesh()),
-        tolerance_(session.options().smooth.acceptance_tolerance.value()),
-        one_ring_(session.options().local) {
+        ask_(session.ask()),
+        mesh_(ask_.mesh()),
+        tolerance_(ask_.options().smooth.acceptance_tolerance.value()),
+        one_ring_(ask_.options().local) {
     one_ring_.rings = 1;
     one_ring_.relative_volume = 0;
   }
@@ -82,18 +83,21 @@ class Mover {
  protected:
   bool may_move(VertexId v) const { return mesh_.is_vertex_alive(v) && !mesh_.is_boundary(v); }
   void judge(Trial<Dim>& trial, const Vec<Dim>& target, double tolerance, LocalScratch<Dim>& scratch) const {
-    trial.edit = propose_move<Dim>(session_.mesh(), session_.strata(), trial.edge()[0], target).edit;
-    if (trial.edit && !session_.is_hopeless(*trial.edit, session_.predict(*trial.edit), tolerance))
-      session_.judge(trial, target, tolerance, one_ring_, scratch);
+    if (!trial.take(propose_move<Dim>(mesh_, ask_.strata(), trial.edge()[0], target))) return;
+    if (ask_.is_hopeless(trial.edit->removed_cells, ask_.predict(*trial.edit), tolerance))
+      return trial.refuse(Refusal::prediction);
+    ask_.judge(trial, target, tolerance, one_ring_, scratch);
   }
   /// `same`: the change of the signal by which it is asked again.
   void settle(Trial<Dim>& trial, RemeshMemory::Kind kind, double same) {
-    if (!trial.is_asked) return;
-    if (trial.was_previewed && session_.commit(trial, session_.report().smooths)) return;
-    session_.remember(kind, trial.edge(), {trial.signal / same, trial.signal * same, false});
+    OperationCount& count = session_.report().smooths;
+    count.note(trial.verdict.refusal);
+    if (!trial.is_asked || (trial.was_previewed && session_.commits().commit(trial, count))) return;
+    session_.memory().remember(kind, trial.edge(), {trial.signal / same, trial.signal * same, false});
   }
 
   RemeshSession<Dim>& session_;
+  const RemeshQueries<Dim>& ask_;
   const Mesh<Dim>& mesh_;
   double tolerance_;  ///< [J]
   LocalRelaxationOptions one_ring_;
@@ -105,21 +109,22 @@ class ForceFollower : Mover<Dim> {
  public:
   explicit ForceFollower(RemeshSession<Dim>& session)
       : Mover<Dim>(session),
-        worthwhile_(std::max(this->tolerance_, session.least_worthwhile())),
-        least_promise_(session.screens() ? session.context().scaling * worthwhile_ : 0) {}
+        worthwhile_(std::max(this->tolerance_, this->ask_.least_worthwhile())),
+        least_promise_(this->ask_.screens() ? this->ask_.context().scaling * worthwhile_ : 0) {}
 
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
     const VertexId v = vertex[0];
     if (!this->may_move(v)) return std::nullopt;
-    const double promise = configurational_gradient(this->session_, v).norm() * length(v);
+    const double promise = configurational_gradient(this->ask_, v).norm() * length(v);
     return promise > least_promise_ ? std::optional(EdgeQueue::Entry{.edge = vertex, .priority = promise}) : std::nullopt;
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const VertexId v = trial.edge()[0];
-    const Vec<Dim> gradient = configurational_gradient(this->session_, v);
+    const Vec<Dim> gradient = configurational_gradient(this->ask_, v);
     const double force = gradient.norm();
-    if (force * length(v) <= least_promise_ || this->session_.was_refused(RemeshMemory::smooth, trial.edge(), force, false))
+    if (force * length(v) <= least_promise_ ||
+        this->session_.memory().was_refused(RemeshMemory::smooth, trial.edge(), force, false))
       return;
     trial.signal = force;
     trial.is_asked = true;
@@ -143,18 +148,21 @@ class ShapeBetterer : Mover<Dim> {
 
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
     if (!this->may_move(vertex[0]) || worst_shape(this->mesh_, vertex[0]) < kBadShape) return std::nullopt;
-    if (!this->session_.shape_matters(vertex, this->session_.roughness(vertex))) return std::nullopt;
+    if (!this->session_.shape_matters(vertex, this->ask_.roughness(vertex))) return std::nullopt;
     return EdgeQueue::Entry{.edge = vertex, .priority = -static_cast<double>(vertex[0])};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const VertexId v = trial.edge()[0];
     trial.signal = worst_shape(this->mesh_, v);
-    if (trial.signal < kBadShape || this->session_.was_refused(RemeshMemory::reshape, trial.edge(), trial.signal, false))
+    if (trial.signal < kBadShape ||
+        this->session_.memory().was_refused(RemeshMemory::reshape, trial.edge(), trial.signal, false))
       return;
     trial.is_asked = true;
-    const Vec<Dim> target = best_shaped_position<Dim>(this->mesh_, this->session_.strata(), v, kShapeIterations);
-    if ((target - this->mesh_.rest(v)).norm() > kLeastMove * shortest_edge(this->mesh_, v))
+    const Vec<Dim> target = best_shaped_position<Dim>(this->mesh_, this->ask_.strata(), v, kShapeIterations);
+    if ((target - this->mesh_.rest(v)).norm() <= kLeastMove * shortest_edge(this->mesh_, v))
+      trial.refuse(Refusal::length);
+    else
       this->judge(trial, target, this->tolerance_, scratch);
   }
 
@@ -166,8 +174,8 @@ class ShapeBetterer : Mover<Dim> {
 template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session) {
   std::vector<EdgeKey> vertices;
-  for (VertexId v = 0; v < session.mesh().vertex_slots(); ++v) vertices.push_back({v, kNone});
-  for (int round = 0; round < session.options().smooth.max_iterations; ++round) {
+  for (VertexId v = 0; v < session.ask().mesh().vertex_slots(); ++v) vertices.push_back({v, kNone});
+  for (int round = 0; round < session.ask().options().smooth.max_iterations; ++round) {
     ForceFollower<Dim> follower(session);
     run_waves(session, follower, vertices);
     ShapeBetterer<Dim> betterer(session);

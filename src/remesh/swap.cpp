@@ -40,45 +40,40 @@ double shape_gain(const Mesh<3>& mesh, const Edit<3>& edit) {
 
 /// Least gain of a swap that does not improve the shape [J].
 template <int Dim>
-double least_gain(const RemeshSession<Dim>& session) {
-  return std::max(session.least_worthwhile(), session.options().swap.acceptance_tolerance.value());
+double least_gain(const RemeshQueries<Dim>& ask) {
+  return std::max(ask.least_worthwhile(), ask.options().swap.acceptance_tolerance.value());
 }
 
 /// Whether the prediction from bulk terms reaches `least` [J].
 template <int Dim>
-bool is_promising(const RemeshSession<Dim>& session, const Edit<Dim>& edit, double least) {
-  return !session.screens() || session.predict(edit) >= session.context().scaling * least;
+bool is_promising(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
+  return !ask.screens() || ask.predict(edit) >= ask.context().scaling * least;
 }
 
 /// The differences between the dimensions: the order of edges, and what replaces an edge. Only a swap that improves the
 /// shape may cost a little energy: without that condition, edges swap to and fro.
 struct DiagonalSwap {
-  const RemeshSession<2>& session;
-  bool may_go(const EdgeKey& edge) const { return !session.is_surface(edge); }
-  double priority(const EdgeKey& edge) const { return valence_gain(session.mesh(), edge); }
-  std::optional<Edit<2>> edit(const EdgeKey& edge) const {
-    return propose_diagonal_swap(session.mesh(), session.strata(), edge).edit;
-  }
-  bool betters_shape(const EdgeKey& edge, const Edit<2>&) const { return valence_gain(session.mesh(), edge) > 0; }
+  const RemeshQueries<2>& ask;
+  bool may_go(const EdgeKey& edge) const { return !ask.is_surface(edge); }
+  double priority(const EdgeKey& edge) const { return valence_gain(ask.mesh(), edge); }
+  Proposal<2> propose(const EdgeKey& edge) const { return propose_diagonal_swap(ask.mesh(), ask.strata(), edge); }
+  bool betters_shape(const EdgeKey& edge, const Edit<2>&) const { return valence_gain(ask.mesh(), edge) > 0; }
   /// Edges to be asked again after a swap, from all around or where cells are new.
   static constexpr bool kAsksAllAround = true;
-  bool is_worth_asking_again(const EdgeKey& edge) const { return valence_gain(session.mesh(), edge) > 0; }
+  bool is_worth_asking_again(const EdgeKey& edge) const { return valence_gain(ask.mesh(), edge) > 0; }
 };
 
 /// Removes an edge such that the energy of the new tetrahedra is least. At frozen positions this energy is a sum over
 /// tetrahedra.
 struct EdgeRemoval {
-  const RemeshSession<3>& session;
+  const RemeshQueries<3>& ask;
   bool may_go(const EdgeKey&) const { return true; }  // in the volume and within flat patches, as strata say
-  double priority(const EdgeKey& edge) const {
-    return -worst_quality<3>(session.mesh(), session.mesh().cells_of_edge(edge));
+  double priority(const EdgeKey& edge) const { return -worst_quality<3>(ask.mesh(), ask.mesh().cells_of_edge(edge)); }
+  Proposal<3> propose(const EdgeKey& edge) const {
+    return propose_edge_removal(ask.mesh(), ask.strata(), edge,
+                                [&](const auto& cell, int body) { return ask.energy_of(cell, body); });
   }
-  std::optional<Edit<3>> edit(const EdgeKey& edge) const {
-    return propose_edge_removal(session.mesh(), session.strata(), edge,
-                                [&](const auto& cell, int body) { return session.energy_of(cell, body); })
-        .edit;
-  }
-  bool betters_shape(const EdgeKey&, const Edit<3>& edit) const { return shape_gain(session.mesh(), edit) > kBetter; }
+  bool betters_shape(const EdgeKey&, const Edit<3>& edit) const { return shape_gain(ask.mesh(), edit) > kBetter; }
   static constexpr bool kAsksAllAround = false;
   bool is_worth_asking_again(const EdgeKey&) const { return true; }
 };
@@ -86,7 +81,8 @@ struct EdgeRemoval {
 template <int Dim, typename Policy>
 class Swapper {
  public:
-  explicit Swapper(RemeshSession<Dim>& session) : session_(session), options_(session.options().swap), policy_{session} {}
+  explicit Swapper(RemeshSession<Dim>& session)
+      : session_(session), ask_(session.ask()), options_(ask_.options().swap), policy_{ask_} {}
 
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
     if (!policy_.may_go(edge) || (has_begun_ && !policy_.is_worth_asking_again(edge))) return std::nullopt;
@@ -95,38 +91,42 @@ class Swapper {
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey& edge = trial.edge();
-    if (const auto it = tries_.find(edge); it != tries_.end() && it->second >= options_.max_depth) return;
-    if (!session_.exists(edge)) return;
-    trial.signal = session_.roughness(edge);
-    session_.find_contact(trial, scratch);
-    if (session_.was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
-    trial.edit = policy_.edit(edge);
-    if (!trial.edit) return;
+    if (const auto it = tries_.find(edge); it != tries_.end() && it->second >= options_.max_depth)
+      return trial.refuse(Refusal::depth);
+    if (!ask_.exists(edge)) return trial.refuse(Refusal::gone);
+    trial.signal = ask_.roughness(edge);
+    ask_.find_contact(trial, scratch);
+    if (session_.memory().was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
+    if (!trial.take(policy_.propose(edge))) return;
     const bool for_shape = policy_.betters_shape(edge, *trial.edit) && session_.shape_matters(edge, trial.signal);
-    const double least = for_shape ? *options_.acceptance_tolerance : least_gain(session_);
+    const double least = for_shape ? *options_.acceptance_tolerance : least_gain(ask_);
     trial.is_asked = true;
-    trial.verdict.decision = Decision::by_bound;
-    if (!trial.in_contact && !is_promising(session_, *trial.edit, least)) return;  // there trials tell
-    const Vec<Dim> center = 0.5 * (session_.mesh().rest(edge[0]) + session_.mesh().rest(edge[1]));
-    session_.judge(trial, center, least, session_.options().local, scratch);
+    if (!trial.in_contact && !is_promising(ask_, *trial.edit, least))  // there trials tell
+      return trial.refuse(Refusal::prediction);
+    const Vec<Dim> center = 0.5 * (ask_.mesh().rest(edge[0]) + ask_.mesh().rest(edge[1]));
+    ask_.judge(trial, center, least, ask_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
     has_begun_ = true;
+    OperationCount& count = session_.report().swaps;
+    count.note(trial.verdict.refusal);
     if (!trial.is_asked) return;
     if (trial.was_previewed) ++tries_[trial.edge()];
-    if (!trial.was_previewed || !session_.commit(trial, session_.report().swaps)) {
-      session_.remember(RemeshMemory::swap, trial.edge(),
-                        {trial.signal / kSameSignal, trial.signal * kSameSignal, trial.in_contact});
+    if (!trial.was_previewed || !session_.commits().commit(trial, count)) {
+      session_.memory().remember(RemeshMemory::swap, trial.edge(),
+                                 {trial.signal / kSameSignal, trial.signal * kSameSignal, trial.in_contact});
       return;
     }
     const std::span<const CellId> patch(trial.verdict.patch);
-    const auto near = session_.edges_of(Policy::kAsksAllAround ? patch : patch.last(trial.edit->inserted_cells.size()));
+    const auto near =
+        edges_of<Dim>(ask_.mesh(), Policy::kAsksAllAround ? patch : patch.last(trial.edit->inserted_cells.size()));
     fresh.insert(fresh.end(), near.begin(), near.end());
   }
 
  private:
   RemeshSession<Dim>& session_;
+  const RemeshQueries<Dim>& ask_;
   const SwapOptions& options_;
   Policy policy_;
   bool has_begun_ = false;
@@ -136,23 +136,25 @@ class Swapper {
 /// Removes facets between present cells, each once, only for a gain of energy. Leaves out facets whose removal an edge
 /// removal would undo to improve the shape.
 void remove_facets(RemeshSession<3>& session) {
-  const Mesh<3>& mesh = session.mesh();
-  const double least = least_gain(session);
+  const RemeshQueries<3>& ask = session.ask();
+  const Mesh<3>& mesh = ask.mesh();
+  const double least = least_gain(ask);
   const CellId end = mesh.cell_slots();
   for (CellId c = 0; c < end; ++c)
     for (int k = 0; k < 4 && mesh.is_cell_alive(c); ++k) {
-      if (session.is_cancelled()) return;
+      if (ask.is_cancelled()) return;
       const auto facet = opposite_facet<3>(mesh.cell(c), k);
       auto proposal = propose_facet_removal(mesh, facet);
       if (!proposal) continue;
       const auto& cells = proposal.edit->removed_cells;
       if (std::min(cells[0], cells[1]) != c || shape_gain(mesh, *proposal.edit) < 1 / kBetter) continue;
-      if (!is_promising(session, *proposal.edit, least)) continue;
+      if (!is_promising(ask, *proposal.edit, least)) continue;
       const Vec<3> center = (mesh.rest(facet[0]) + mesh.rest(facet[1]) + mesh.rest(facet[2])) / 3;
       Trial<3> trial{.candidate = {.edge = proposal.edit->edge, .priority = 0}, .edit = std::move(proposal.edit)};
-      session.begin_wave();
-      session.judge(trial, center, least, session.options().local, session.scratch());
-      session.commit(trial, session.report().swaps);
+      session.commits().begin_wave();
+      ask.judge(trial, center, least, ask.options().local, session.scratch());
+      session.report().swaps.note(trial.verdict.refusal);
+      session.commits().commit(trial, session.report().swaps);
     }
 }
 
@@ -160,12 +162,12 @@ void remove_facets(RemeshSession<3>& session) {
 
 void swap_edges(RemeshSession<2>& session) {
   Swapper<2, DiagonalSwap> swapper(session);
-  run_waves(session, swapper, session.mesh().edges());
+  run_waves(session, swapper, session.ask().mesh().edges());
 }
 
 void swap_edges(RemeshSession<3>& session) {
   Swapper<3, EdgeRemoval> swapper(session);
-  run_waves(session, swapper, session.mesh().edges());
+  run_waves(session, swapper, session.ask().mesh().edges());
   remove_facets(session);
 }
 

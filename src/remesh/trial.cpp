@@ -72,10 +72,11 @@ template <int Dim>
 void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
              double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
   verdict.clear();
+  verdict.refusal = Refusal::invalid;
   if (!gate.passes(edit, scratch.gate)) return;
   const auto finish = [&](LocalProblem<Dim>& after) {
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
-    verdict.decision = Decision::accepted;
+    verdict.refusal = Refusal::none;
     after.get_positions(verdict.positions);
   };
   bool is_enough = false;
@@ -86,7 +87,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
       const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, kBoundIterations,
                                       kBoundContactIterations, scratch, [&](auto&) { is_enough = true; });
       const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();
-      verdict.decision = Decision::by_bound;
+      verdict.refusal = Refusal::bound;
       verdict.gain = bound.gain;
       verdict.touches_contact = bound.touches_contact;
       verdict.surface_read.include(bound.surface_read);
@@ -115,7 +116,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   verdict.touches_contact = found.touches_contact;
   verdict.surface_read.include(found.surface_read);
   verdict.was_relaxed = true;
-  if (!verdict.accepted()) verdict.decision = found.has_unknowns ? Decision::by_energy : Decision::no_unknowns;
+  if (!verdict.accepted()) verdict.refusal = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                       \

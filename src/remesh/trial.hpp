@@ -2,38 +2,61 @@
 // Whether an edit lowers the energy by enough: previewed on a const mesh, so that nothing has to be taken back.
 #pragma once
 
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "gate.hpp"
+#include "itr/remesh/edits.hpp"
 #include "local_problem.hpp"
+#include "queue.hpp"
 
 namespace itr {
-
-enum class Decision : char {
-  accepted,
-  by_gate,     ///< some stored configuration would be invalid
-  by_bound,    ///< the energy cannot fall by enough: the new vertex alone tells
-  by_energy,   ///< a relaxed patch does not gain enough
-  no_unknowns  ///< nothing of the patch is free
-};
 
 /// What a preview found, and what there is to commit.
 template <int Dim>
 struct Verdict {
-  Decision decision = Decision::by_gate;
+  Refusal refusal = Refusal::not_asked;
   bool was_relaxed = false;  ///< whether it took the relaxation of a patch to decide
   double gain = 0;           ///< decrease of the energy that was found [J, times the scaling]; negative: increase
   bool touches_contact = false;
   Box<Dim> surface_read{};      ///< holds what was read of the surface as it is now, beside the patch's own vertices
   std::vector<CellId> patch{};  ///< that was read, where the star of the edit did not do
   std::vector<typename LocalProblem<Dim>::Position> positions{};  ///< where accepted
-  bool accepted() const { return decision == Decision::accepted; }
+  bool accepted() const { return refusal == Refusal::none; }
   /// Back to none; the memory of lists stays.
   void clear() {
     patch.clear();
     positions.clear();
     *this = Verdict{.patch = std::move(patch), .positions = std::move(positions)};
+  }
+};
+
+/// What was found about a candidate on the mesh as it was when its wave began.
+template <int Dim>
+struct Trial {
+  EdgeQueue::Entry candidate;
+  std::optional<Edit<Dim>> edit{};
+  double signal = 0;  ///< see RemeshMemory
+  bool in_contact = false;
+  bool is_asked = false;  ///< a refusal is to be remembered
+  bool was_previewed = false;
+  Box<Dim> surface_read{};  ///< of the present one
+  double seconds = 0;       ///< of the preview
+  Verdict<Dim> verdict{};
+
+  const EdgeKey& edge() const { return candidate.edge; }
+  void refuse(Refusal reason) { verdict.refusal = reason; }
+  /// Takes the edit of a proposal, or the reason why there is none. Returns whether there is one.
+  bool take(Proposal<Dim> proposal) {
+    edit = std::move(proposal.edit);
+    if (!edit) refuse(proposal.refusal);
+    return edit.has_value();
+  }
+  /// As before it was looked at; the memory of lists stays.
+  void clear() {
+    verdict.clear();
+    *this = Trial{.candidate = candidate, .verdict = std::move(verdict)};
   }
 };
 

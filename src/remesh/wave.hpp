@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <optional>
 #include <span>
 #include <vector>
@@ -19,14 +20,25 @@ namespace itr {
 inline constexpr int kSmallestWave = 8, kLargestWave = 256;
 inline constexpr double kTolerableWaste = 0.1;
 
-/// Settles candidates of an operation until there are none. The operation has (the last where it calls any hopeless)
-///   std::optional<EdgeQueue::Entry> rank(const EdgeKey&, LocalScratch<Dim>&) const;  // empty: no candidate
-///   void look(Trial<Dim>&, LocalScratch<Dim>&) const;                                // may preview
-///   void settle(Trial<Dim>&, std::vector<EdgeKey>& fresh);                           // may commit
-///   void pass_over(std::span<const EdgeQueue::Entry>);                               // all that there are, hopeless
-/// `fresh` are edges (a vertex v is {v, kNone}) to be ranked: at first these, each once.
-template <int Dim, typename Operation>
-void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<EdgeKey> fresh) {
+/// What waves are made for. `rank` gives a candidate its place in the queue, or leaves it out. `look` examines one and may
+/// preview an edit. `settle` may commit it, and adds edges to `fresh` that are to be ranked (again).
+template <typename T, int Dim>
+concept Operation = requires(const T& asked, T& settled, const EdgeKey& edge, Trial<Dim>& trial, LocalScratch<Dim>& scratch,
+                             std::vector<EdgeKey>& fresh) {
+  { asked.rank(edge, scratch) } -> std::same_as<std::optional<EdgeQueue::Entry>>;
+  { asked.look(trial, scratch) } -> std::same_as<void>;
+  { settled.settle(trial, fresh) } -> std::same_as<void>;
+};
+/// One that calls candidates hopeless also counts them where there are no others.
+template <typename T, int Dim>
+concept PassingOperation = Operation<T, Dim> && requires(T& operation, std::span<const EdgeQueue::Entry> hopeless) {
+  { operation.pass_over(hopeless) } -> std::same_as<void>;
+};
+
+/// Settles candidates of an operation until there are none. `fresh` are edges (a vertex v is {v, kNone}) to be ranked: at
+/// first these, each once.
+template <int Dim, Operation<Dim> T>
+void run_waves(RemeshSession<Dim>& session, T& operation, std::vector<EdgeKey> fresh) {
   EdgeQueue queue;
   std::vector<std::optional<EdgeQueue::Entry>> ranked;
   std::vector<Trial<Dim>> wave(kLargestWave);
@@ -37,7 +49,7 @@ void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<Ed
     trial.clear();
     operation.look(trial, scratch);
   };
-  while (!session.is_cancelled()) {
+  while (!session.ask().is_cancelled()) {
     int count = 0;
     for (; count < size; ++count) {
       const auto entry = queue.pop();
@@ -53,24 +65,24 @@ void run_waves(RemeshSession<Dim>& session, Operation& operation, std::vector<Ed
       if (task < looks) return look(wave[task], scratch);
       const std::size_t first = kChunk * (task - looks);
       for (std::size_t i = first; i < std::min(fresh.size(), first + kChunk); ++i)
-        if (session.exists(fresh[i])) ranked[i] = operation.rank(fresh[i], scratch);
+        if (session.ask().exists(fresh[i])) ranked[i] = operation.rank(fresh[i], scratch);
     });
     std::vector<EdgeQueue::Entry> entries;
     for (const auto& entry : ranked)
       if (entry) entries.push_back(session.stamped(*entry));
-    if constexpr (requires { operation.pass_over(entries); }) {
+    if constexpr (PassingOperation<T, Dim>) {
       const auto is_hopeless = [](const EdgeQueue::Entry& entry) { return entry.is_hopeless; };
       if (count == 0 && std::all_of(entries.begin(), entries.end(), is_hopeless)) return operation.pass_over(entries);
     }
     queue.push(std::move(entries));
     fresh.clear();
 
-    session.begin_wave();
+    session.commits().begin_wave();
     int wasted = 0;
     for (Trial<Dim>& trial : std::span(wave).first(count)) {
-      bool is_lost = session.has_changed_around(trial.edge());
+      bool is_lost = session.commits().has_changed_around(trial.edge());
       if (is_alone && !is_lost) look(trial, session.scratch());
-      is_lost = is_lost || session.was_overtaken(trial);
+      is_lost = is_lost || session.commits().was_overtaken(trial);
       if (is_lost)
         queue.push(trial.candidate);
       else

@@ -22,14 +22,26 @@ Expression parse_expression(const Node& node) {
   }
 }
 
+/// Place and time in the units of a scene, which its expressions are of.
+struct SceneUnits {
+  double length = 1, time = 1;  ///< in SI units
+  explicit SceneUnits(const Node& node)
+      : length(node.document().units.factor("m")), time(node.document().units.factor("s")) {}
+  template <int Dim>
+  Expression::Variables operator()(const Vec<Dim>& X, double t) const {
+    return {X[0] / length, X[1] / length, Dim == 3 ? X[Dim - 1] / length : 0, t / time};
+  }
+};
+
 /// One component: a number, or an expression where there are variables in it; times g(t).
 struct Component {
   double constant = 0;
+  double unit = 1;  ///< of the expression's values
   std::optional<Expression> expression;
   Interpolation scale;
 
   double operator()(const Expression::Variables& variables) const {
-    const double value = expression ? (*expression)(variables) : constant;
+    const double value = expression ? unit * (*expression)(variables) : constant;
     return scale.is_one() ? value : value * scale(variables.t);
   }
   bool is_constant() const { return !expression && (scale.is_one() || constant == 0); }
@@ -41,8 +53,9 @@ Component read_component(const Node& node) {
     component.constant = node.number(0);
   } else if (node.json().is_string()) {
     Expression expression = parse_expression(node);
+    component.unit = node.document().units.factor(node.unit());
     if (expression.is_constant())
-      component.constant = expression({});
+      component.constant = component.unit * expression({});
     else
       component.expression = std::move(expression);
   } else {
@@ -63,14 +76,14 @@ std::array<Component, Dim> read_components(const Node& value) {
 }
 
 template <int Dim>
-ValueFunction<Dim> combine(const std::array<Component, Dim>& components, double sign) {
+ValueFunction<Dim> combine(const std::array<Component, Dim>& components, const SceneUnits& units, double sign) {
   if (std::all_of(components.begin(), components.end(), [](const Component& c) { return c.is_constant(); })) {
     Vec<Dim> constant;
     for (int c = 0; c < Dim; ++c) constant[c] = sign * components[c].constant;
     return {[constant](const Vec<Dim>&, double) { return constant; }, constant.isZero(0)};
   }
-  return {[components, sign](const Vec<Dim>& X, double t) {
-            const Expression::Variables variables{X[0], X[1], Dim == 3 ? X[Dim - 1] : 0, t};
+  return {[components, units, sign](const Vec<Dim>& X, double t) {
+            const Expression::Variables variables = units.operator()<Dim>(X, t);
             Vec<Dim> result;
             for (int c = 0; c < Dim; ++c) result[c] = sign * components[c](variables);
             return result;
@@ -84,38 +97,43 @@ ScalarValue read_scalar(const Node& node, double fallback) {
   if (!node.exists() || !node.json().is_string()) return {node.number(fallback), {}};
   Expression expression = parse_expression(node);
   if (expression.uses_time()) node.fail(abbreviate(node.json()), "a value that does not change with time");
+  const double unit = node.document().units.factor(node.unit());
   if (!expression.is_constant())
-    return {0, [e = std::move(expression)](const Vec<3>& X) { return e({X[0], X[1], X[2], 0}); }};
-  const double value = expression({});
+    return {0, [e = std::move(expression), unit, units = SceneUnits(node)](const Vec<3>& X) {
+              return unit * e(units.operator()<3>(X, 0));
+            }};
+  const double value = unit * expression({});
   if (!std::isfinite(value)) node.fail("an expression with a finite value");
   return {value, {}};
 }
 
 template <int Dim>
 ValueFunction<Dim> read_function(const Node& value, double sign) {
-  return combine<Dim>(read_components<Dim>(value), sign);
+  return combine<Dim>(read_components<Dim>(value), SceneUnits(value), sign);
 }
 
 template <int Dim>
 ValueFunction<Dim> read_function(const Node& value, const Node& interpolation) {
   std::array<Component, Dim> components = read_components<Dim>(value);
-  const std::vector<Node> scales = interpolation.items();
-  if (scales.empty()) return combine<Dim>(components, 1);
+  const std::vector<Node> scales = interpolation.without_units().items();  // of the scene's time
+  if (scales.empty()) return combine<Dim>(components, SceneUnits(value), 1);
   if (scales.size() > 1 && scales.size() < Dim) interpolation.fail("one entry, or one a component");
   for (std::size_t c = 0; c < Dim; ++c) components[c].scale = Interpolation(scales.size() == 1 ? scales[0] : scales[c]);
-  return combine<Dim>(components, 1);
+  return combine<Dim>(components, SceneUnits(value), 1);
 }
 
 template <int Dim>
 ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpolation) {
   if (!value.exists()) value.fail("a number or an expression");
-  const std::vector<Node> scales = interpolation.items();
+  const std::vector<Node> scales = interpolation.without_units().items();  // of the scene's time
   if (scales.size() > 1) interpolation.fail("one entry: the value has one component");
   Component component = read_component(value);
   if (!scales.empty()) component.scale = Interpolation(scales[0]);
   if (component.is_constant())
     return {[constant = component.constant](const Vec<Dim>&, double) { return constant; }, component.constant == 0};
-  return {[component](const Vec<Dim>& X, double t) { return component({X[0], X[1], Dim == 3 ? X[Dim - 1] : 0, t}); }, false};
+  return {
+      [component, units = SceneUnits(value)](const Vec<Dim>& X, double t) { return component(units.operator()<Dim>(X, t)); },
+      false};
 }
 
 template <int Dim>
@@ -124,8 +142,10 @@ void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec
   for (const double t : times)
     for (const Vec<Dim>& X : points) {
       if (function(X, t).allFinite()) continue;
+      const Units& units = value.document().units;
       std::ostringstream place;
-      place << abbreviate(value.json()) << ", which has no finite value at X = (" << X.transpose() << "), t = " << t;
+      place << abbreviate(value.json()) << ", which has no finite value at X = (" << X.transpose() / units.factor("m")
+            << "), t = " << units.from_si(t, "s");
       value.fail(place.str(), "a value there");
     }
 }

@@ -178,11 +178,13 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, C
     for (FacetId f = 0; f < mesh.num_facets(); ++f)
       if (tag[f] != kNoTag) all.tagged.emplace_back(shifted(mesh.facet(f)), tag[f]);
   }
+  const Units& units = geometry.document().units;
+  const Vec<Dim> low = box.min() / units.factor("m"), high = box.max() / units.factor("m");
   const auto note_empty = [&](const Selection<Dim>& selection, const char* what) {
     for (const std::string& pointer : selection.unmatched())
       warnings.push_back(
-          fmt::format("{}: selects nothing: no {} is in it, or rules before it took them; the mesh spans {} to {} m",
-                      pointer, what, corner_text<Dim>(box.min()), corner_text<Dim>(box.max())));
+          fmt::format("{}: selects nothing: no {} is in it, or rules before it took them; the mesh spans {} to {} {}",
+                      pointer, what, corner_text<Dim>(low), corner_text<Dim>(high), units.name("m")));
   };
   note_empty(volumes, "barycentre of a cell");
   note_empty(surfaces, "barycentre of a boundary facet");
@@ -311,8 +313,9 @@ std::vector<Vec<Dim>> read_copies(const Node& geometry, const Vec<Dim>& extent) 
   const Node array = geometry["array"];
   if (!array.exists()) return shifts;
   if (!array.has("offset")) array["offset"].fail("the distance between copies");
-  const double offset = array["offset"].number(0);
-  const Vec<Dim> step = array["relative"].boolean(false) ? (offset * extent).eval() : Vec<Dim>::Constant(offset).eval();
+  const bool is_relative = array["relative"].boolean(false);
+  const double offset = (is_relative ? array["offset"].without_units() : array["offset"]).number(0);
+  const Vec<Dim> step = is_relative ? (offset * extent).eval() : Vec<Dim>::Constant(offset).eval();
   const std::vector<Node> sizes = array["size"].items();
   if (sizes.size() < Dim) array["size"].fail(std::to_string(Dim) + " integers");
   std::array<int, 3> size = {1, 1, 1};

@@ -124,6 +124,22 @@ const Entry* KeyTable::find(const std::string& pattern) const {
   return found == entries_.end() ? nullptr : &found->second;
 }
 
+const Entry* KeyTable::find_place(const std::string& pointer) const {
+  std::string pattern;
+  std::istringstream tokens(pointer.empty() ? "" : pointer.substr(1));
+  for (std::string token; std::getline(tokens, token, '/');) {
+    const std::set<std::string>* below = children(pattern);
+    if (below && below->contains("*")) {
+      pattern += "/*";
+      if (token.find_first_not_of("0123456789") == std::string::npos) continue;
+      below = children(pattern);  // one that stands for a list of one
+    }
+    if (!below || !below->contains(token)) break;
+    pattern += "/" + token;
+  }
+  return find(pattern);
+}
+
 const std::set<std::string>* KeyTable::children(const std::string& pattern) const {
   const auto found = children_.find(pattern);
   return found == children_.end() ? nullptr : &found->second;

@@ -32,7 +32,7 @@ struct Key {
   Role role;
   const char* kind;      ///< of its values: the name of a Kind, or "a|b|c" for one of these words; empty: an object
   const char* fallback;  ///< JSON of the default, or words in parentheses; empty: none
-  const char* unit;
+  const char* unit;      ///< SI's name of it, as Units takes it; empty: none, or not the same for all
   const char* meaning;
   Level level = Level::expert;
 };
@@ -66,6 +66,8 @@ class KeyTable {
   KeyTable();
   /// Null where there is no such pattern.
   const Entry* find(const std::string& pattern) const;
+  /// Of the value that a pointer of a scene names, or of the list that it is in; null where there is no such key.
+  const Entry* find_place(const std::string& pointer) const;
   /// Keys that may stand below a pattern, or null if none may.
   const std::set<std::string>* children(const std::string& pattern) const;
   /// A pointer elsewhere in the scene with this key, or nothing.

@@ -41,7 +41,9 @@ struct Requirement {
     if (std::isfinite(here) && is_met(here)) return;
     if (!value.function) node.fail(expected);
     std::ostringstream found;
-    found << abbreviate(node.json()) << ", which is " << here << " at X = (" << X.transpose() << ")";
+    const Units& units = node.document().units;
+    found << abbreviate(node.json()) << ", which is " << here / units.factor(node.unit()) << " at X = ("
+          << X.transpose() / units.factor("m") << ")";
     node.fail(found.str(), expected);
   }
 };

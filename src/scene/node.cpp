@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "key_table.hpp"
+
 namespace itr::scene {
 
 namespace fs = std::filesystem;
@@ -93,11 +95,11 @@ Node Node::operator[](std::string_view key) const {
     const auto found = json_->find(std::string(key));
     if (found != json_->end() && !found->is_null()) member = &*found;
   }
-  return Node(*document_, member, pointer_ + "/" + escape_token(key));
+  return Node(*document_, member, pointer_ + "/" + escape_token(key), has_units_);
 }
 
 Node Node::at(std::size_t index) const {
-  return Node(*document_, &json_->at(index), pointer_ + "/" + std::to_string(index));
+  return Node(*document_, &json_->at(index), pointer_ + "/" + std::to_string(index), has_units_);
 }
 
 std::vector<Node> Node::items() const {
@@ -108,10 +110,18 @@ std::vector<Node> Node::items() const {
   return nodes;
 }
 
+std::string Node::unit() const {
+  const Entry* entry = has_units_ ? key_table().find_place(pointer_) : nullptr;
+  return entry ? entry->key->unit : "";
+}
+
+Node Node::without_units() const { return Node(*document_, json_, pointer_, false); }
+
 double Node::number(double fallback) const {
   if (!json_) return fallback;
   if (!json_->is_number() || !std::isfinite(json_->get<double>())) fail("a number");
-  return json_->get<double>();
+  const double value = json_->get<double>();
+  return document_->units.is_si() ? value : document_->units.to_si(value, unit());
 }
 
 int Node::integer(int fallback) const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "itr/core/error.hpp"
+#include "itr/core/units.hpp"
 
 namespace itr::scene {
 
@@ -20,6 +21,7 @@ struct Document {
   std::filesystem::path file;  ///< the outermost scene file
   std::filesystem::path root;  ///< effective root_path
   Json json;
+  Units units{};  ///< of its numbers
 
   /// Absolute, else relative to `root`, else (if only there is such a file) to the working directory. Unlike in
   /// PolyFEM the root comes first: what a scene means must not depend on where the command is run.
@@ -55,7 +57,12 @@ class Node {
   /// The elements of a list; a single value that stands where a list is expected is a list of one; absent: none.
   std::vector<Node> items() const;
 
-  /// Values with a default for absent ones. InputError if the type is another.
+  /// The unit that the table of keys gives the value here, in SI's name; empty: none.
+  std::string unit() const;
+  /// The same place, whose numbers and those below are taken as they stand.
+  Node without_units() const;
+
+  /// Values with a default for absent ones, in SI units. InputError if the type is another.
   double number(double fallback) const;
   int integer(int fallback) const;
   bool boolean(bool fallback) const;
@@ -72,12 +79,13 @@ class Node {
   [[noreturn]] void fail(const std::string& found, const std::string& expected) const;
 
  private:
-  Node(const Document& document, const Json* json, std::string pointer)
-      : document_(&document), json_(json), pointer_(std::move(pointer)) {}
+  Node(const Document& document, const Json* json, std::string pointer, bool has_units = true)
+      : document_(&document), json_(json), pointer_(std::move(pointer)), has_units_(has_units) {}
 
   const Document* document_;
   const Json* json_;
   std::string pointer_;
+  bool has_units_ = true;
 };
 
 /// Warns of the components of a list beyond `dimension`, and of missing ones; `if_not_zero`: a 0 beyond it is no mistake.

@@ -44,8 +44,10 @@ void read_integrator(const Node& node, TimeOptions& options) {
 /// Two of tend, dt, time_steps; a third must agree with them.
 void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>& warnings) {
   const Node tend = time["tend"], dt = time["dt"], steps = time["time_steps"];
+  const Units& units = time.document().units;
   if (tend.exists() + dt.exists() + steps.exists() < 2) time.fail(abbreviate(time.json()), "two of tend, dt and time_steps");
-  if (tend.exists() && !(tend.number(0) > options.t0)) tend.fail("a time after t0 = " + std::to_string(options.t0));
+  if (tend.exists() && !(tend.number(0) > options.t0))
+    tend.fail("a time after t0 = " + std::to_string(units.from_si(options.t0, "s")));
   const double duration = tend.number(0) - options.t0;
   options.steps = steps.integer_at_least(1, 1);
   options.dt = dt.exists() ? dt.positive(1) : duration / options.steps;
@@ -63,8 +65,9 @@ void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>
   options.steps = static_cast<int>(count);
   if (is_whole) return;
   std::ostringstream end;
-  end << tend.pointer() << ": " << tend.number(0) << " s is no whole number of steps: the run ends at "
-      << options.t0 + count * options.dt << " s";
+  end << tend.pointer() << ": " << tend.without_units().number(0) << " " << units.time()
+      << " is no whole number of steps: the run ends at " << units.from_si(options.t0 + count * options.dt, "s") << " "
+      << units.time();
   warnings.push_back(end.str());
 }
 
@@ -80,6 +83,18 @@ double read_share(const Node& node, double fallback) {
 }
 
 }  // namespace
+
+Units read_units(const Node& root) {
+  const Node node = root["units"];
+  const auto choose = [&](const char* key, const std::vector<std::string>& names, const char* si) {
+    const int found = node[key].choice(names, -1);
+    return found < 0 ? std::string(si) : names[static_cast<std::size_t>(found)];
+  };
+  Units units(choose("length", Units::length_names(), "m"), choose("mass", Units::mass_names(), "kg"),
+              choose("time", Units::time_names(), "s"));
+  units.has_steps = root.has("time");
+  return units;
+}
 
 TimeOptions read_time(const Node& root, std::vector<std::string>& warnings) {
   TimeOptions options;
@@ -125,6 +140,7 @@ double characteristic_length(const Node& root, const TimeOptions& time) {
 
 ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<std::string>& warnings) {
   const Node contact = root["contact"], solver = root["solver"]["contact"];
+  const Units& units = root.document().units;
   ContactOptions options;
   options.enabled = contact["enabled"].boolean(false);
   const bool is_auto = contact.has("dhat") && contact["dhat"].json() == "auto";
@@ -134,8 +150,9 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
     if (!contact.has("dhat"))
       options.activation_distance = share * shortest_edge;
     else
-      warnings.push_back(fmt::format("{}: {:.6g} m is longer than the shortest edge of the surfaces, {:.6g} m",
-                                     contact["dhat"].pointer(), options.activation_distance, shortest_edge));
+      warnings.push_back(fmt::format("{}: {} is longer than the shortest edge of the surfaces, {}",
+                                     contact["dhat"].pointer(), units.text(options.activation_distance, "m", 6),
+                                     units.text(shortest_edge, "m", 6)));
   }
   options.convergent = contact["use_convergent_formulation"].boolean(false);
   options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
@@ -143,8 +160,11 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   const Node stiffness = solver["barrier_stiffness"];
   const bool is_adaptive_in_peers = solver.has("initial_barrier_stiffness");  // says where adaptive stiffness begins
   options.adaptive_stiffness = stiffness.exists() ? stiffness.json() == "adaptive" : is_adaptive_in_peers;
-  if (options.adaptive_stiffness) options.barrier_stiffness = solver["initial_barrier_stiffness"].positive(1);
-  if (stiffness.exists() && !options.adaptive_stiffness) options.barrier_stiffness = stiffness.positive(1);
+  const Node first = solver["initial_barrier_stiffness"];
+  // The plain form's barrier is in m^4, its stiffness an energy by that.
+  const double unit = options.convergent ? units.factor("Pa") : units.factor("J") / std::pow(units.factor("m"), 4);
+  if (options.adaptive_stiffness) options.barrier_stiffness = first.exists() ? unit * first.positive(1) : 1;
+  if (stiffness.exists() && !options.adaptive_stiffness) options.barrier_stiffness = unit * stiffness.positive(1);
   options.friction_iterations = solver["friction_iterations"].integer(1);
   options.friction_tolerance = solver["friction_convergence_tol"].non_negative(1e-2);
   return options;
@@ -173,9 +193,12 @@ Node first_gradient_node(const Node& nonlinear) {
 /// CONVENTIONS.md, "Tolerances": tolerances in the paper's sense, Euclidean norms times h.
 void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& options) {
   const Node advanced = nonlinear["advanced"];
+  const Units& units = nonlinear.document().units;
   options.step_tolerance = length * nonlinear["x_delta"].non_negative(0);
   options.gradient_tolerance = length * nonlinear["grad_norm"].non_negative(1e-8);
-  options.first_gradient_tolerance = length * first_gradient_node(nonlinear).non_negative(1e-10);
+  const Node first = first_gradient_node(nonlinear);
+  const double unit = units.factor("N s");
+  options.first_gradient_tolerance = length * (first.exists() ? unit * first.non_negative(0) : 1e-10);
   const Node energy = advanced.has("f_delta") ? advanced["f_delta"] : nonlinear["f_delta"];
   options.energy_tolerance = length * energy.non_negative(0);
   options.energy_steps = advanced["f_delta_step_tol"].integer_at_least(1, 100);
@@ -189,7 +212,14 @@ void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptio
   const double force = advanced["characteristic_force_density"].positive(1e4);
   options.norm = std::array{NewtonNorm::l2, NewtonNorm::linf,
                             NewtonNorm::euclidean}[nonlinear["norm_type"].choice({"L2", "Linf", "Euclidean"}, 0)];
+  const Units& units = root.document().units;
   double gradient_scale = 1, step_scale = 1;
+  // What the scales are multiplied with has the dimension that is missing: a gradient's has that of h^2.
+  double gradient_unit = units.factor("N s^2"), step_unit = units.factor("m");
+  if (options.norm != NewtonNorm::euclidean) gradient_unit = units.factor("s^2"), step_unit = 1;
+  const auto gradient = [&](const Node& node, double fallback) {
+    return gradient_scale * (node.exists() ? gradient_unit * node.non_negative(0) : fallback);
+  };
   if (options.norm == NewtonNorm::l2) {
     const double root_of_volume = std::pow(length, 0.5 * scale.dimension);
     gradient_scale = force * root_of_volume;
@@ -198,9 +228,9 @@ void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptio
     gradient_scale = force;
     step_scale = length;
   }
-  options.step_tolerance = step_scale * nonlinear["x_delta_tol"].non_negative(0);
-  options.gradient_tolerance = gradient_scale * nonlinear["grad_norm_tol"].non_negative(1e-10);
-  options.first_gradient_tolerance = gradient_scale * first_gradient_node(nonlinear).non_negative(1e-12);
+  options.step_tolerance = step_scale * step_unit * nonlinear["x_delta_tol"].non_negative(0);
+  options.gradient_tolerance = gradient(nonlinear["grad_norm_tol"], 1e-10);
+  options.first_gradient_tolerance = gradient(first_gradient_node(nonlinear), 1e-12);
   options.relative_gradient_tolerance = nonlinear["rel_grad_norm_tol"].non_negative(1e-10);
   options.relative_step_tolerance = nonlinear["rel_x_delta_tol"].non_negative(0);
   options.decrement_tolerance = nonlinear["newton_decrement_tol"].non_negative(0);
@@ -315,6 +345,7 @@ RemeshOptions read_remesh(const Node& root) {
 OutputOptions read_output(const Node& root) {
   const Node output = root["output"];
   OutputOptions options;
+  if (output["units"].choice({"scene", "SI"}, 0) == 0) options.units = root.document().units;
   options.skip_frames = output["paraview"]["skip_frame"].integer_at_least(1, options.skip_frames);
   options.vtu = output["paraview"]["vtu"].boolean(false);
   options.checkpoint_period = output["checkpoint_period"].non_negative(options.checkpoint_period);

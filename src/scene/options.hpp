@@ -9,6 +9,8 @@
 
 namespace itr::scene {
 
+/// Of three dimensions.
+Units read_units(const Node& root);
 TimeOptions read_time(const Node& root, std::vector<std::string>& warnings);
 /// What is given, but does nothing as other keys are.
 void warn_of_idle_keys(const Node& root, const TimeOptions& time, bool has_obstacles, std::vector<std::string>& warnings);

@@ -78,6 +78,7 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
 template <int Dim>
 Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
   Setup<Dim> setup;
+  setup.units = root.document().units;
   setup.mesh = read_bodies<Dim>(geometries, files, warnings);
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
     for (const Node& geometry : *list)
@@ -146,17 +147,19 @@ std::vector<Change> find_changes(const std::string& before, const std::string& n
 }
 
 Scene read(const std::filesystem::path& file, const std::vector<Override>& overrides) {
-  const Document document = load_document(file, overrides);
+  Document document = load_document(file, overrides);
   Scene scene;
-  check_keys(document, scene.warnings);
   const Node root(document);
+  document.units = read_units(root);
+  check_keys(document, scene.warnings);
   MeshFiles files;
   const Geometries geometries = list_geometries(root);
-  scene.output = read_output(root);
   scene.max_threads = root["solver"]["max_threads"].integer_at_least(0, 0);
   scene.directory = root["output"]["directory"].string("");
   scene.identity = make_identity(root, geometries, files);
-  if (find_dimension(geometries, files) == 2)
+  document.units.dim = find_dimension(geometries, files);
+  scene.output = read_output(root);
+  if (document.units.dim == 2)
     scene.setup = read_setup<2>(root, geometries, files, scene.warnings);
   else
     scene.setup = read_setup<3>(root, geometries, files, scene.warnings);
@@ -171,6 +174,7 @@ Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const 
   const Node root(document);
   for (const char* key : {"geometry", "output"})
     if (root.has(key)) root[key].fail("the key", "no such key: the program brings these itself");
+  if (!read_units(root).is_si()) root["units"].fail("SI units: a program brings its geometry in metres");
   Setup<Dim> setup;
   setup.mesh = std::move(geometry.mesh);
   geometry.obstacles.motion.assign(geometry.obstacles.rest.size(), kNone);

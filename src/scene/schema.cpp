@@ -140,6 +140,8 @@ checks scenes against. `itr schema` prints the same as JSON Schema, for editors.
 
 - `*` stands for the elements of a list. A list of one element may be written as that element alone.
 - `{a,b}` stands for either.
+- Units are those of SI. Where `/units` names others, they stand for the unit of the same kind: N/m^2 for MPa with mm, t, s
+  ([CONVENTIONS.md](CONVENTIONS.md#units)).
 - A key that is not on this page is an error. The message names the nearest key that exists.
 - An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^` and the functions that
   [CONVENTIONS.md](CONVENTIONS.md#expressions) lists.

@@ -98,10 +98,15 @@ typename Selection<Dim>::Rule Selection<Dim>::read_threshold(const Node& node) c
 
 template <int Dim>
 Vec<Dim> Selection<Dim>::read_point(const Node& list, bool is_relative) const {
-  const std::vector<double> values = list.numbers();
+  const std::vector<double> values = (is_relative ? list.without_units() : list).numbers();
   if (values.size() != Dim) list.fail(std::to_string(Dim) + " numbers");
   const Vec<Dim> point = Eigen::Map<const Vec<Dim>>(values.data());
   return is_relative ? (box_.min() + point.cwiseProduct(box_.sizes())).eval() : point;
+}
+
+template <int Dim>
+double Selection<Dim>::read_radius(const Node& node, bool is_relative) const {
+  return is_relative ? node.without_units().non_negative(0) * box_.diagonal().norm() : node.non_negative(0);
 }
 
 template <int Dim>
@@ -118,7 +123,7 @@ typename Selection<Dim>::Test Selection<Dim>::read_sphere(const Node& node) cons
   const bool is_relative = node["relative"].boolean(false);
   if (!node.has("radius")) node["radius"].fail("the radius of the sphere");
   const Vec<Dim> center = read_point(node["center"], is_relative);
-  const double radius = node["radius"].non_negative(0) * (is_relative ? box_.diagonal().norm() : 1);
+  const double radius = read_radius(node["radius"], is_relative);
   return [=](const Vec<Dim>& p) { return (p - center).norm() <= radius; };
 }
 
@@ -126,7 +131,7 @@ template <int Dim>
 typename Selection<Dim>::Test Selection<Dim>::read_cylinder(const Node& node) const {
   const bool is_relative = node["relative"].boolean(false);
   const Vec<Dim> begin = read_point(node["p1"], is_relative), end = read_point(node["p2"], is_relative);
-  const double radius = node["radius"].non_negative(0) * (is_relative ? box_.diagonal().norm() : 1);
+  const double radius = read_radius(node["radius"], is_relative);
   const double length = (end - begin).norm();
   if (!(length > 0)) node["p2"].fail("a point other than p1");
   const Vec<Dim> axis = (end - begin) / length;
@@ -152,9 +157,11 @@ typename Selection<Dim>::Test Selection<Dim>::read_axis(const Node& node) const 
   if (axis == 0 || std::abs(axis) > Dim)
     axis_node.fail(Dim == 2 ? "1, 2, -1, -2 or [+-]x, y" : "1 to 3, -1 to -3 or [+-]x, y, z");
   const int a = std::abs(axis) - 1;
-  double position = node["position"].number(0);
-  if (!node.has("position")) node["position"].fail("where on the axis the selection begins");
-  if (node["relative"].boolean(false)) position = box_.min()[a] + position * box_.sizes()[a];
+  const bool is_relative = node["relative"].boolean(false);
+  const Node place = node["position"];
+  if (!place.exists()) place.fail("where on the axis the selection begins");
+  double position = (is_relative ? place.without_units() : place).number(0);
+  if (is_relative) position = box_.min()[a] + position * box_.sizes()[a];
   return [=](const Vec<Dim>& p) { return axis > 0 ? p[a] >= position : p[a] <= position; };
 }
 

@@ -35,6 +35,7 @@ class Selection {
   Test read_axis(const Node& node) const;
   Test read_plane(const Node& node) const;
   Vec<Dim> read_point(const Node& list, bool is_relative) const;
+  double read_radius(const Node& node, bool is_relative) const;
 
   Box<Dim> box_;
   std::vector<Rule> rules_;

@@ -81,6 +81,12 @@ Mat<3> read_rotation(const Node& node, const Mat<3>&) {
   return Eigen::AngleAxisd(kRadians * vector.norm(), vector.normalized()).toRotationMatrix();
 }
 
+/// Of a mesh file [m].
+double unit_of_mesh(const Node& geometry) {
+  const Node unit = geometry["unit"];
+  return unit.exists() ? Units::length_in_metres(unit.string("")) : geometry.document().units.factor("m");
+}
+
 }  // namespace
 
 template <int Dim>
@@ -97,6 +103,8 @@ bool transform(std::vector<Vec<Dim>>& points, const Node& geometry) {
     const double extent = box.sizes().maxCoeff();
     for (Vec<Dim>& point : points) point = (point - box.min()) / (extent > 0 ? extent : 1);
   }
+  if (const double unit = unit_of_mesh(geometry); unit != 1)
+    for (Vec<Dim>& point : points) point *= unit;
   const Node node = geometry["transformation"];
   const Vec<Dim> scale = read_scale<Dim>(node, bounding_box<Dim>(points));
   const Mat<Dim> rotation = read_rotation(node, Mat<Dim>());

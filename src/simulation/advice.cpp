@@ -79,20 +79,25 @@ std::map<int, double> volumes_by_body(const Mesh<Dim>& mesh) {
 
 template <int Dim>
 void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& found) {
-  const bool is_large = figures.size > kLargePart && (setup.contact.enabled || setup.body_acceleration);
+  const bool has_named_units = !setup.units.is_si();
+  const bool is_large = !has_named_units && figures.size > kLargePart && (setup.contact.enabled || setup.body_acceleration);
   if (is_large || is_outside(figures.size, kUsualLength))
     found.push_back(
-        fmt::format("the bodies span {:.4g} m: are lengths in metres? (for a mesh in millimetres /geometry/*/transformation/"
-                    "scale is 0.001)",
-                    figures.size));
+        has_named_units
+            ? fmt::format("the bodies span {}: is /units/length right?", setup.units.text(figures.size, "m"))
+            : fmt::format("the bodies span {:.4g} m: are lengths in metres? (for a mesh in millimetres /geometry/*/unit is "
+                          "\"mm\", for a whole scene /units/length)",
+                          figures.size));
   const bool has_mass = (!setup.time.is_static && !setup.time.quasistatic) || setup.body_acceleration;
   for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (is_outside(material.youngs_modulus, kUsualModulus))
-      found.push_back(fmt::format("body {}: E = {:.3g} Pa is unusual: are moduli in Pa?", body, material.youngs_modulus));
+      found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", body,
+                                  setup.units.text(material.youngs_modulus, "Pa", 3), setup.units.name("Pa")));
     if (has_mass && is_outside(material.density, kUsualDensity))
-      found.push_back(
-          fmt::format("body {}: rho = {:.3g} kg/m^{} is unusual: are densities in kg/m^3?", body, material.density, Dim));
+      found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?", body,
+                                  setup.units.from_si(material.density, "kg/m^3"),
+                                  setup.units.name(Dim == 2 ? "kg/m^2" : "kg/m^3"), setup.units.name("kg/m^3")));
   }
 }
 
@@ -245,8 +250,9 @@ void find_wrong_gravity(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
   const Vec<Dim> a = setup.body_acceleration(figures.center, setup.time.t0);
   const double most = a.maxCoeff();
   if (most == a.norm() && !is_outside(most, kGravity))
-    found.push_back("bodies fall along " + vector_text<Dim>(a) +
-                    " m/s^2: a scene's rhs pushes in the negative direction, gravity down y is [0, 9.81]");
+    found.push_back("bodies fall along " + vector_text<Dim>(a / setup.units.factor("m/s^2")) + " " +
+                    setup.units.name("m/s^2") + ": a scene's rhs pushes in the negative direction, gravity down y is [0, " +
+                    fmt::format("{:.4g}", setup.units.from_si(9.81, "m/s^2")) + "]");
 }
 
 /// Before a run: what Newton steps of the length where it ends are worth in the stiffest body, against a split.
@@ -262,9 +268,10 @@ void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::st
   const double split = *setup.remesh.split.acceptance_tolerance;
   if (worth > kShare * split)
     found.push_back(fmt::format(
-        "Newton ends at steps of {:.2g} m, which are worth about {:.2g} J; a split is made for {:.2g} J{}: refinement "
+        "Newton ends at steps of {}, which are worth about {}; a split is made for {}{}: refinement "
         "may see the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
-        step, worth, split, setup.follows_stored_energy.split ? " at most" : ""));
+        setup.units.text(step, "m", 2), setup.units.text(worth, "J", 2), setup.units.text(split, "J", 2),
+        setup.follows_stored_energy.split ? " at most" : ""));
 }
 
 template <int Dim>
@@ -278,23 +285,24 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
   const ContactEnergy<Dim> energy(surface, setup.contact, 1, 1);
   const double gap = energy.min_distance(contact.positions(simulation.state().history.x[0]), workspace);
   if (gap < dhat)
-    found.push_back(fmt::format(
-        "gap {:.6g} m at the start is below d-hat = {:.6g} m: surfaces push each other from the start", gap, dhat));
+    found.push_back(fmt::format("gap {} at the start is below d-hat = {}: surfaces push each other from the start",
+                                setup.units.text(gap, "m", 6), setup.units.text(dhat, "m", 6)));
   constexpr double kSmall = 0.02, kLarge = 0.1;
   for (const auto& [body, size] : body_sizes(setup.mesh))
     if (dhat > kSmall * size.thickness)
       found.push_back(fmt::format(
-          "d-hat = {:.4g} m is {:.2g} % of the thickness of body {}, {:.4g} m: surfaces stand off by up to that, as if what "
+          "d-hat = {} is {:.2g} % of the thickness of body {}, {}: surfaces stand off by up to that, as if what "
           "presses were thicker: forces may be too large by {} percent; /contact/dhat = \"auto\" takes a thousandth",
-          dhat, 100 * dhat / size.thickness, body, size.thickness, dhat > kLarge * size.thickness ? "tens of" : "some"));
+          setup.units.text(dhat, "m"), 100 * dhat / size.thickness, body, setup.units.text(size.thickness, "m"),
+          dhat > kLarge * size.thickness ? "tens of" : "some"));
   double shortest = kInfinity;
   const std::vector<Vec<Dim>> rest =
       setup.proxy ? setup.proxy->rest : node_rest_positions(simulation.state().mesh, simulation.state().space);
   for (const auto& [a, b] : surface.edges)
     if (surface.counts[a]) shortest = std::min(shortest, (rest[a] - rest[b]).norm());
   if (dhat > shortest)
-    found.push_back(fmt::format("d-hat = {:.6g} m is above the shortest surface edge, {:.6g} m: surfaces feel themselves",
-                                dhat, shortest));
+    found.push_back(fmt::format("d-hat = {} is above the shortest surface edge, {}: surfaces feel themselves",
+                                setup.units.text(dhat, "m", 6), setup.units.text(shortest, "m", 6)));
 }
 
 /// Amplitude after a step of angle `phase` [rad] of a free oscillation, over that before it.
@@ -350,11 +358,12 @@ void foretell_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
     speed = std::max(speed, std::sqrt((m.lame_lambda(Dim) + 2 * m.lame_mu()) / m.density));
   }
   if (!has_waves(setup, figures, speed)) return;
+  const Units& units = setup.units;
   const double dt = setup.time.dt;
-  words.push_back(
-      fmt::format("waves run at up to {:.4g} m/s: through the shortest edge ({:.3g} m) in {:.2g} s, through the bodies "
-                  "({:.3g} m) in {:.2g} s; dt = {:g} s",
-                  speed, figures.shortest, figures.shortest / speed, figures.size, figures.size / speed, dt));
+  words.push_back(fmt::format(
+      "waves run at up to {}: through the shortest edge ({}) in {}, through the bodies ({}) in {}; dt = {}",
+      units.text(speed, "m/s"), units.text(figures.shortest, "m", 3), units.text(figures.shortest / speed, "s", 2),
+      units.text(figures.size, "m", 3), units.text(figures.size / speed, "s", 2), units.text(dt, "s", 6)));
   const double period = 2 * figures.size / speed, phase = 2 * std::numbers::pi * dt / period;
   const bool is_low_order = setup.time.integrator != Integrator::bdf || setup.time.bdf_order <= 2;
   if (!is_low_order) return;
@@ -362,9 +371,9 @@ void foretell_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
   TimeOptions bdf2;
   bdf2.integrator = Integrator::bdf;
   std::string text = fmt::format(
-      "the bodies' longest wave, of period {:.2g} s ({:.3g} steps), loses {:.2g} % of its "
+      "the bodies' longest wave, of period {} ({:.3g} steps), loses {:.2g} % of its "
       "amplitude a period by the integrator",
-      period, period / dt, lost(setup.time));
+      units.text(period, "s", 2), period / dt, lost(setup.time));
   if (setup.time.integrator == Integrator::implicit_euler)
     text += fmt::format(" (BDF2: {:.2g} %); shorter waves, as impacts make them, lose more", lost(bdf2));
   words.push_back(text);
@@ -394,6 +403,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
 template <int Dim>
 std::vector<std::string> foretell(const Setup<Dim>& setup) {
   const MeshFigures<Dim> figures(setup.mesh);
+  const Units& units = setup.units;
   std::vector<std::string> words;
   double mass = 0, softest = kInfinity, stiffest = 0;
   std::set<bool> plane_strain;
@@ -405,17 +415,20 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
     plane_strain.insert(material.plane_strain);
   }
   if (Dim == 2)
-    words.push_back(fmt::format("{}, for a thickness of 1 m", plane_strain.size() > 1
-                                                                  ? "plane stress and plane strain, by body"
-                                                              : *plane_strain.begin() ? "plane strain"
-                                                                                      : "plane stress"));
+    words.push_back(fmt::format("{}, for a thickness of 1 {}",
+                                plane_strain.size() > 1 ? "plane stress and plane strain, by body"
+                                : *plane_strain.begin() ? "plane strain"
+                                                        : "plane stress",
+                                setup.units.length()));
   Vec<Dim> acceleration = Vec<Dim>::Zero();
   if (setup.body_acceleration) acceleration = setup.body_acceleration(figures.center, setup.time.t0);
   words.push_back(setup.body_acceleration
-                      ? "bodies accelerate by " + vector_text<Dim>(acceleration) + " m/s^2 (at their centre, at the start)"
+                      ? "bodies accelerate by " + vector_text<Dim>(acceleration / units.factor("m/s^2")) + " " +
+                            units.name("m/s^2") + " (at their centre, at the start)"
                       : std::string("no gravity"));
-  words.push_back(fmt::format("total mass {:.4g} kg, weight {:.4g} N; moduli {:.4g} to {:.4g} Pa", mass,
-                              mass * acceleration.norm(), softest, stiffest));
+  words.push_back(fmt::format("total mass {}, weight {}; moduli {:.4g} to {}", units.text(mass, "kg"),
+                              units.text(mass * acceleration.norm(), "N"), units.from_si(softest, "Pa"),
+                              units.text(stiffest, "Pa")));
   if (!setup.time.is_static && !setup.time.quasistatic) foretell_waves(setup, figures, words);
   return words;
 }

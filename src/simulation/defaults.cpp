@@ -89,10 +89,12 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
   double stiffest = 0;
   for (const auto& [body, material] : setup.materials) stiffest = std::max(stiffest, material.youngs_modulus);
   contact.barrier_stiffness = barrier_stiffness_for(setup, contact, stiffest);
+  const Units& units = setup.units;
+  const double unit = contact.convergent ? units.factor("Pa") : units.factor("J") / std::pow(units.factor("m"), 4);
   return fmt::format(
-      "barrier stiffness {:.3g}: a tenth of the stiffest modulus, {:.3g} Pa; "
+      "barrier stiffness {:.3g}: a tenth of the stiffest modulus, {}; "
       "/solver/contact/barrier_stiffness sets another",
-      contact.barrier_stiffness, stiffest);
+      contact.barrier_stiffness / unit, units.text(stiffest, "Pa", 3));
 }
 
 /// A thousandth of the thinnest body, a tenth of the shortest surface edge, and less than the gap at the start.
@@ -108,6 +110,7 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
       for (int j = 0; j < i; ++j)
         shortest =
             std::min(shortest, (setup.mesh.rest(setup.mesh.facet(f)[i]) - setup.mesh.rest(setup.mesh.facet(f)[j])).norm());
+  const Units& units = setup.units;
   double& dhat = contact.activation_distance;
   dhat = std::min(kDhatByThickness * thinnest, kDhatByEdge * shortest);
   double gap = std::numeric_limits<double>::infinity();
@@ -117,9 +120,10 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
     if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
   }
   return fmt::format(
-      "d-hat {:.4g} m: a thousandth of the thinnest body ({:.4g} m), a tenth of the shortest surface edge "
-      "({:.4g} m){}; /contact/dhat sets another",
-      dhat, thinnest, shortest, std::isfinite(gap) ? fmt::format(", less than the gap, {:.4g} m", gap) : "");
+      "d-hat {}: a thousandth of the thinnest body ({}), a tenth of the shortest surface edge ({}){}; /contact/dhat sets "
+      "another",
+      units.text(dhat, "m"), units.text(thinnest, "m"), units.text(shortest, "m"),
+      std::isfinite(gap) ? ", less than the gap, " + units.text(gap, "m") : "");
 }
 
 /// Chooses the split tolerance [J], and says so.
@@ -135,17 +139,18 @@ std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
   const double relative = available == 0 ? kStoredShare * remesh.relative_tolerance : remesh.relative_tolerance;
   const double tolerance = relative * energy;
   remesh.split.acceptance_tolerance = tolerance;
+  const Units& units = setup.units;
   const std::string split =
-      available == 0
-          ? fmt::format(
-                "split tolerance: {:g} of the energy that is stored so far, at most {:.3g} J (strains of a tenth "
-                "everywhere)",
-                relative, tolerance)
-          : fmt::format("split tolerance {:.3g} J: {:g} of the scene's energy, about {:.3g} J", tolerance, relative, energy);
+      available == 0 ? fmt::format(
+                           "split tolerance: {:g} of the energy that is stored so far, at most {} (strains of a tenth "
+                           "everywhere)",
+                           relative, units.text(tolerance, "J", 3))
+                     : fmt::format("split tolerance {}: {:g} of the scene's energy, about {}", units.text(tolerance, "J", 3),
+                                   relative, units.text(energy, "J", 3));
   const std::string collapse = remesh.collapse.acceptance_tolerance
-                                   ? fmt::format("{:.2g} J", -*remesh.collapse.acceptance_tolerance)
+                                   ? units.text(-*remesh.collapse.acceptance_tolerance, "J", 2)
                                : available == 0 ? fmt::format("{:g} of that", kCollapseShare)
-                                                : fmt::format("{:.2g} J", kCollapseShare * tolerance);
+                                                : units.text(kCollapseShare * tolerance, "J", 2);
   return fmt::format(
       "{}; collapses may cost {}; /space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
       split, collapse);

@@ -90,15 +90,14 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
 }
 
 template <int Dim>
-RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
+RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const PotentialTerms<Dim>& terms, const State<Dim>& state,
+                              const VectorX& x) {
   const int dofs = Dim * num_nodes(state.mesh, state.space);
   const TimeIntegrator integrator(setup.time);
   RemeshFields<Dim> fields;
   fields.x = head_of(x, dofs);
-  if (!setup.time.quasistatic && !setup.time.is_static)
-    fields.predictor = head_of(integrator.predictor(state.history), dofs);
-  if (setup.contact.enabled || !setup.damping.empty())
-    fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
+  if (is_in(TermKind::inertia, terms)) fields.predictor = head_of(integrator.predictor(state.history), dofs);
+  if (needs_velocities(terms)) fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
   for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
   for (const auto& past : state.history.v) fields.past_rates.push_back(head_of(past, dofs));
   for (const auto& past : state.history.a) fields.past_rates.push_back(head_of(past, dofs));
@@ -156,7 +155,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
                                                   StepReport& report) {
   const StepSetup<Dim>& setup = tools.setup;
   const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
-  RemeshFields<Dim> fields = make_fields(setup, before, x);
+  RemeshFields<Dim> fields = make_fields<Dim>(setup, context, before, x);
   const RemeshOptions options =
       options_of_step(setup, std::max(before.stored_energy, report.energy.elastic + report.energy.contact));
   RemeshReport remeshed;
@@ -173,7 +172,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   report.swaps = remeshed.swaps;
   report.smooths = remeshed.smooths;
   report.trial_seconds = remeshed.trial_seconds;
-  report.bound_by_dhat = remeshed.bound_by_activation_distance;
+  report.bound_by_dhat = remeshed.splits.refused_by(Refusal::dhat);
   if (!remeshed.changed()) {
     state.space = before.space;
     if (!state.space.is_linear()) {

@@ -36,8 +36,8 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& bef
   if (whole.ok || whole.cancelled || setup.time.step_cuts == 0) return whole;
   const StepSetup<Dim> half = halved(setup, before);
   const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.cache, tools.solver, tools.logger};
-  tools.logger.warning("the step to t = " + std::to_string(whole.report.t) + " s failed (" + whole.reason +
-                       "), cutting it into two of " + std::to_string(half.time.dt) + " s");
+  tools.logger.warning("the step to t = " + setup.units.text(whole.report.t, "s", 6) + " failed (" + whole.reason +
+                       "), cutting it into two of " + setup.units.text(half.time.dt, "s", 6));
   State<Dim> part = before;
   part.step = 0;
   if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);

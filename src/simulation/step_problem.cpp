@@ -52,6 +52,12 @@ const char* to_string(RoundsEnd end) {
   }
 }
 
+double& entry_of(EnergyReport& report, EnergyEntry entry) {
+  const std::array<double*, kNumEnergyEntries> by_entry{&report.inertia,  &report.elastic, &report.body, &report.contact,
+                                                        &report.friction, &report.damping, &report.host};
+  return *by_entry[static_cast<std::size_t>(entry)];
+}
+
 /// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
 std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
                                       double diagonal) {
@@ -193,17 +199,14 @@ double StepProblem<Dim>::average_mass() const {
   return potential_.inertia() ? momentum(VectorX::Ones(rows)).sum() / static_cast<double>(rows) : 1;
 }
 
-/// Balances the barrier against the other terms at x. At obstacles the reference implementation's gradient is their
-/// prescribed displacement (CONVENTIONS.md, "Barrier stiffness"): it is part of its schedule.
+/// Balances the barrier against the other terms at x, dissipation aside. At obstacles the reference implementation's
+/// gradient is their prescribed displacement (CONVENTIONS.md, "Barrier stiffness"): it is part of its schedule.
 template <int Dim>
 void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   VectorX gradient = VectorX::Zero(x.size());
-  if (potential_.inertia()) potential_.inertia()->add_gradient(x, gradient, workspace_);
-  potential_.elastic()->add_gradient(x, gradient, workspace_);
-  if (potential_.loads()) potential_.loads()->add_gradient(x, gradient, workspace_);
-  if (lagged_.pressure) lagged_.pressure->add_gradient(x, gradient, workspace_);
-  for (const auto& term : potential_.host()) term->add_gradient(x, gradient, workspace_);
-  if (lagged_.follower) lagged_.follower->add_gradient(x, gradient, workspace_);
+  EnergySum others;
+  potential_.add_to(others, lagged_, [](const Traits& term) { return !term.is_between_bodies && !term.needs_velocities; });
+  others.add_gradient(x, gradient, workspace_);
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
   for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
     gradient.template segment<Dim>(bodies + Dim * o) =
@@ -289,13 +292,14 @@ bool StepProblem<Dim>::has_lagged_loads() const {
   return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_));
 }
 
-/// By how much of itself what `part` adds to an energy changes from `lagged_` to `now`, in its forces on unknowns at x.
+/// By how much of themselves terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in their forces on
+/// unknowns at x.
 template <int Dim>
-template <typename Part>
-double StepProblem<Dim>::change_of(const VectorX& x, const Lagged& now, const Part& part) {
+template <typename F>
+double StepProblem<Dim>::change_of(const VectorX& x, const Lagged& now, const F& is_asked) {
   const auto gradient_of = [&](const Lagged& lagged) {
     EnergySum sum;
-    part(lagged, sum);
+    potential_.add_to(sum, lagged, is_asked);
     VectorX gradient = VectorX::Zero(x.size());
     sum.add_gradient(x, gradient, workspace_);
     for (Eigen::Index i = 0; i < x.size(); ++i)
@@ -314,10 +318,7 @@ void StepProblem<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now
                                      NewtonSummary& summary) {
   if (!now) now = potential_.lag(x, workspace_);
   if (has_lagged_loads()) {
-    const double off = change_of(x, *now, [](const Lagged& lagged, EnergySum& sum) {
-      if (lagged.pressure) sum.add(lagged.pressure);
-      if (lagged.follower) sum.add(lagged.follower);
-    });
+    const double off = change_of(x, *now, [](const Traits& term) { return term.has_no_potential; });
     if (off > setup_.lagged_load_tolerance) {
       summary.termination = Termination::lagging;
       summary.message = fmt::format(
@@ -335,7 +336,7 @@ void StepProblem<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now
           how, rounds);
   }
   if (!lagged_.friction || !now->friction) return;
-  const double off = change_of(x, *now, [](const Lagged& lagged, EnergySum& sum) { sum.add(lagged.friction); });
+  const double off = change_of(x, *now, [](const Traits& term) { return term.kind == TermKind::friction; });
   if (off > kFrictionWorthSaying)
     summary.message += fmt::format(
         "{}friction is {:.2g} of itself off that of the contact forces reached, {} after {} solves "
@@ -443,53 +444,44 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
 template <int Dim>
 EnergyReport StepProblem<Dim>::report(const VectorX& x) {
   EnergyReport report;
-  const auto value = [&](const auto& term) { return term ? term->value(x, workspace_) / terms_.scaling : 0.0; };
-  report.inertia = value(potential_.inertia());
-  report.elastic = value(potential_.elastic());
-  report.body = value(potential_.loads()) + value(lagged_.pressure);
-  report.contact = value(potential_.contact_of_cells());
-  report.friction = value(potential_.lag_friction(x, workspace_));
-  for (const auto& term : lagged_.damping) report.damping += value(term);
-  for (const auto& term : potential_.host()) report.host += value(term);
-  report.host += value(lagged_.follower);
-  report.total = report.inertia + report.elastic + report.body + report.contact + report.friction + report.damping;
-  report.total += report.host;
+  Lagged shown = lagged_;
+  shown.friction = potential_.lag_friction(x, workspace_);
+  potential_.for_each(shown, [&](TermKind kind, const auto& term) {
+    entry_of(report, traits<Dim>(kind).energy) += term->value(x, workspace_) / terms_.scaling;
+  });
+  for (std::size_t i = 0; i < kNumEnergyEntries; ++i) report.total += entry_of(report, static_cast<EnergyEntry>(i));
   return report;
 }
 
 template <int Dim>
 NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
-  const auto force = [&](const Energy* term) {
-    VectorX gradient = VectorX::Zero(x.size());
-    if (term) term->add_gradient(x, gradient, workspace_);
-    return VectorX(-gradient.head(bodies) / terms_.scaling);
-  };
   NodalForces forces;
   const FieldOptions& asked = setup_.fields;
   const bool all = !asked.curves.empty();
-  const auto split = [&](const Energy* term, VectorX& of_bodies, VectorX& of_obstacles) {
+  const auto get = [&](const EnergySum& sum, VectorX& of_bodies, VectorX* of_obstacles) {
     VectorX gradient = VectorX::Zero(x.size());
-    if (term) term->add_gradient(x, gradient, workspace_);
+    sum.add_gradient(x, gradient, workspace_);
     of_bodies = -gradient.head(bodies) / terms_.scaling;
-    of_obstacles = -gradient.tail(x.size() - bodies) / terms_.scaling;
+    if (of_obstacles) *of_obstacles = -gradient.tail(x.size() - bodies) / terms_.scaling;
   };
-  if (asked.contact_forces || all) split(potential_.contact_of_cells().get(), forces.contact, forces.obstacle_contact);
-  if (asked.friction_forces || all) split(lagged_.friction.get(), forces.friction, forces.obstacle_friction);
+  const auto add = [&](ForceEntry entry, EnergySum& sum) {
+    potential_.add_to(sum, lagged_, [&](const Traits& term) { return term.force == entry; });
+  };
+  EnergySum contact, friction, applied;
+  add(ForceEntry::contact, contact);
+  add(ForceEntry::friction, friction);
+  if (asked.contact_forces || all) get(contact, forces.contact, &forces.obstacle_contact);
+  if (asked.friction_forces || all) get(friction, forces.friction, &forces.obstacle_friction);
   if (asked.applied_forces || all) {
     const Loads<Dim> tractions{{}, terms_.loads.tractions, {}};
-    EnergySum applied;
     applied.add(std::make_shared<LoadEnergy<Dim>>(cells_, setup_.materials, tractions, terms_.scaling));
-    for (const auto& term : potential_.host()) applied.add(term);
-    if (lagged_.pressure) applied.add(lagged_.pressure);
-    if (lagged_.follower) applied.add(lagged_.follower);
-    forces.applied = force(&applied);
+    add(ForceEntry::applied, applied);
+    get(applied, forces.applied, nullptr);
   }
   if (!asked.reaction_forces && !all) return forces;
-  const EnergySum sum = potential_.sum(lagged_);
-  forces.reaction = -force(&sum);
-  for (Eigen::Index i = 0; i < bodies; ++i)
-    if (dofs_.unknown[i] != kNone) forces.reaction[i] = 0;
+  get(potential_.sum(lagged_), forces.reaction, nullptr);
+  for (Eigen::Index i = 0; i < bodies; ++i) forces.reaction[i] = dofs_.unknown[i] == kNone ? -forces.reaction[i] : 0;
   return forces;
 }
 
@@ -499,9 +491,7 @@ VectorX StepProblem<Dim>::total_force(const VectorX& x, const VectorX& v) {
   if (adaptive_) initialize_stiffness(x);
   lagged_ = potential_.lag(x, workspace_);
   EnergySum sum;
-  const EnergySum all = potential_.sum(lagged_);
-  for (const auto& term : all.terms())
-    if (term != potential_.inertia()) sum.add(term);
+  potential_.add_to(sum, lagged_, [](const Traits& term) { return term.kind != TermKind::inertia; });
   VectorX gradient = VectorX::Zero(x.size());
   sum.add_gradient(x, gradient, workspace_);
   return -gradient / terms_.scaling;
@@ -513,14 +503,13 @@ double StepProblem<Dim>::created_energy(const History& history, const VectorX& x
   const bool trapezoidal = TimeIntegrator(setup_.time).is_trapezoidal(history);
   double rise = 0;
   VectorX gradient = VectorX::Zero(x.size());  // twice the mean over the step
-  const auto add = [&](const Energy& term) {
-    rise += term.value(x, workspace_) - term.value(x0, workspace_);
-    term.add_gradient(x, gradient, workspace_);
-    term.add_gradient(trapezoidal ? x0 : x, gradient, workspace_);
-  };
-  add(*potential_.elastic());
-  if (potential_.contact()) add(*potential_.contact_of_cells());
-  for (const auto& term : potential_.host()) add(*term);
+  EnergySum stored;
+  potential_.add_to(stored, lagged_, [](const Traits& term) { return term.is_stored; });
+  for (const auto& term : stored.terms()) {
+    rise += term->value(x, workspace_) - term->value(x0, workspace_);
+    term->add_gradient(x, gradient, workspace_);
+    term->add_gradient(trapezoidal ? x0 : x, gradient, workspace_);
+  }
   const double created = (rise - 0.5 * gradient.dot(x - x0)) / terms_.scaling;
   if (trapezoidal) return created;
   const VectorX change = TimeIntegrator(setup_.time).velocity(x, history) - v0;
@@ -536,8 +525,10 @@ VectorX StepProblem<Dim>::momentum(const VectorX& v) const {
 
 template <int Dim>
 double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
-  double energy = potential_.elastic()->value(x, workspace_) / terms_.scaling;
-  if (potential_.contact()) energy += potential_.contact_of_cells()->value(x, workspace_) / terms_.scaling;
+  double energy = 0;
+  potential_.for_each(lagged_, [&](TermKind kind, const auto& term) {
+    if (traits<Dim>(kind).is_stored && kind != TermKind::host) energy += term->value(x, workspace_) / terms_.scaling;
+  });
   return energy + 0.5 * v.dot(momentum(v));
 }
 

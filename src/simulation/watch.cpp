@@ -75,11 +75,11 @@ void Watch<Dim>::find_starved_remeshing(const Setup<Dim>& setup, const StepRepor
   if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled) return;
   if (!(report.residual_worth > kResidualShare * report.split_tolerance)) return;
   has_said_remeshing_ = true;
-  logger.warning(
-      fmt::format("step {}: Newton ended where one more iteration would gain {:.2g} J, and a split is made for {:.2g} J: "
-                  "refinement sees the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these "
-                  "tolerances",
-                  report.step, report.residual_worth, report.split_tolerance));
+  logger.warning(fmt::format(
+      "step {}: Newton ended where one more iteration would gain {}, and a split is made for {}: "
+      "refinement sees the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these "
+      "tolerances",
+      report.step, setup.units.text(report.residual_worth, "J", 2), setup.units.text(report.split_tolerance, "J", 2)));
 }
 
 /// A residual that is worth a part e of the energy stands for forces off by about sqrt(e). A first touch is passed over, and
@@ -93,9 +93,9 @@ void Watch<Dim>::find_loose_forces(const Setup<Dim>& setup, const State<Dim>& st
   if (loose_steps_ < kLooseSteps && !(loose_steps_ > 0 && state.step >= setup.time.steps)) return;
   has_said_forces_ = true;
   logger.warning(fmt::format(
-      "step {}: Newton ended where one more iteration would gain {:.2g} J of {:.2g} J: forces may be off by about "
+      "step {}: Newton ended where one more iteration would gain {} of {}: forces may be off by about "
       "{:.2g} %; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
-      report.step, report.residual_worth, energy, 100 * error));
+      report.step, setup.units.text(report.residual_worth, "J", 2), setup.units.text(energy, "J", 2), 100 * error));
 }
 
 template <int Dim>
@@ -115,12 +115,12 @@ std::string find_jump(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const 
   }
   if (!(most > limit)) return {};
   std::string place;
-  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.3g}", c ? ", " : "", before[where + c]);
+  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.3g}", c ? ", " : "", setup.units.from_si(before[where + c], "m"));
   return fmt::format(
-      "the body at ({}) jumps by {:.3g} m, further than the scene is wide ({:.3g} m): neither inertia nor a "
+      "the body at ({}) jumps by {}, further than the scene is wide ({}): neither inertia nor a "
       "held vertex nor contact holds it; hold it, add friction or leave /time/quasistatic out "
       "(/time/allow_jumps = true lets it go)",
-      place, most, limit);
+      place, setup.units.text(most, "m", 3), setup.units.text(limit, "m", 3));
 }
 
 #define ITR_INSTANTIATE(Dim) \

@@ -102,7 +102,7 @@ def patch(context, below, above, dhat):
     content["geometry"] = geometry
     frame = run_scene(context, f"patch-{below}-{above}-{dhat:g}", with_contact(content, dhat, YOUNG)).last()
     points = frame.rest[:frame.cells.max() + 1]
-    nodes, cells = with_edge_nodes(points, frame.cells)
+    nodes, cells, _ = with_edge_nodes(points, frame.cells)
     assert np.allclose(nodes, frame.rest, atol=1e-12)
     uniform = np.diag([0, -PRESSURE / YOUNG])
     slope = errors(points, cells, frame.u, np.zeros_like, lambda X: np.broadcast_to(uniform, (len(X), 2, 2)), 2)[1]

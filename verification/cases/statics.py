@@ -6,11 +6,11 @@ import ufl
 from harness.materials import words
 from harness.scenes import run_scene, scene
 from harness.suite import Result
-from harness.two_bodies import two_bodies
+from harness.two_bodies import MIXED, two_bodies
 
 TITLE = "Static solutions against FEniCSx"
 QUANTITY = "nodal displacement relative to the largest; elastic energy, relative"
-REFERENCE = "FEniCSx (dolfinx), same P1 or P2 mesh, Newton to round-off"
+REFERENCE = "FEniCSx (dolfinx), same P1, P2 or mixed mesh, Newton to round-off"
 TOLERANCE = 1e-9
 NEEDS = ("dolfinx", "meshio", "h5py", "scipy")
 
@@ -19,8 +19,12 @@ PULL, GRAVITY, STRETCH = [60.0, -10.0, 5.0], -0.3, 0.01  # St. Venant-Kirchhoff 
 
 
 def results(context):
-    for order in (1, 2):
+    for order in (1, 2, MIXED):
         yield from results_of(context, order)
+
+
+def label(order):
+    return "P1 and P2" if order == MIXED else f"P{order}"
 
 
 def results_of(context, order):
@@ -34,18 +38,18 @@ def results_of(context, order):
         for share in np.linspace(0.1, 1, 10):  # loads step by step, so that Newton finds its way
             u = body.solve(share * load, held, share * targets.ravel(), u)
         for kind in ("quasi-static", "static") if name.startswith("neo") else ("quasi-static",):
-            run = run_scene(context, f"{dim}d-p{order}-{words(name)}-{kind}", scene_of(case, kind, order))
+            run = run_scene(context, f"{dim}d-{words(label(order))}-{words(name)}-{kind}", scene_of(case, kind))
             ours = run.last().u.ravel()
-            yield Result(f"{dim}D, P{order}, {name}, {kind}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()),
+            yield Result(f"{dim}D, {label(order)}, {name}, {kind}, displacement", float(np.abs(ours - u).max() / np.abs(u).max()),
                          TOLERANCE, note=f"{len(points)} nodes, up to {np.abs(u).max():.3g} m")
             energy = body.energy(u)
-            yield Result(f"{dim}D, P{order}, {name}, {kind}, elastic energy",
+            yield Result(f"{dim}D, {label(order)}, {name}, {kind}, elastic energy",
                          abs(run.steps[-1]["energy"]["elastic"] / energy - 1), TOLERANCE)
 
 
-def scene_of(case, kind, order):
+def scene_of(case, kind):
     dim, share = case.dim, "1" if kind == "static" else "t"
-    content = scene(case.mesh, case.materials(), order,
+    content = scene(case.mesh, case.materials(), case.discr_order(),
                     boundary_conditions={
                         "rhs": [0, f"{-GRAVITY} * {share}", 0][:dim],
                         "dirichlet_boundary": [{"id": 1, "value": [0, f"{STRETCH} * y * {share}", 0][:dim]}],

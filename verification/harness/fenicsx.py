@@ -63,21 +63,39 @@ def vertices_of_dofs(domain, original, V):
     return vertex
 
 
+def straightened(num_points, edges, curved, dim):
+    """The matrix from values at the points and at the nodes of `curved` edges to those at the nodes of all `edges`: the node of
+    another edge has the mean of its ends. Edges have ascending ends; values are flat."""
+    number = {tuple(edge): num_points + k for k, edge in enumerate(curved)}
+    entries = [(i, i, 1.0) for i in range(num_points)]
+    for k, edge in enumerate(map(tuple, edges)):
+        entries += [(num_points + k, number[edge], 1.0)] if edge in number else [(num_points + k, end, 0.5) for end in edge]
+    row, column, value = zip(*entries)
+    shape = (num_points + len(edges), num_points + len(curved))
+    return scipy.sparse.kron(scipy.sparse.csr_matrix((value, (row, column)), shape), scipy.sparse.identity(dim), "csr")
+
+
 class Space:
     """P1 or P2 vectors on a mesh. Arrays are n x dim in the order of `nodes`, which begin with `points`; matrices act on them
-    flattened."""
+    flattened. With `curved` edges (ascending pairs) the other edges of P2 are straight, and their nodes no unknowns."""
 
-    def __init__(self, points, cells, order=1):
+    def __init__(self, points, cells, order=1, curved=None):
         self.dim = points.shape[1]
         self.order = order
-        self.nodes = points if order == 1 else with_edge_nodes(points, cells)[0]
+        self.nodes, self.prolongation = points, None
+        if order == 2:
+            self.nodes, _, edges = with_edge_nodes(points, cells)
+        all_nodes = self.nodes
+        if curved is not None:
+            self.prolongation = straightened(len(points), edges, curved, self.dim)
+            self.nodes = np.concatenate([points, points[curved].mean(axis=1)])
         self.num_nodes = len(self.nodes)
         self.domain, self.original = create_domain(points, cells)
         self.V = fem.VectorFunctionSpace(self.domain, ("Lagrange", order))
         if order == 1:
             node_of_dof = vertices_of_dofs(self.domain, self.original, self.V)
         else:
-            node_of_dof = nodes_of_dofs(self.V, self.nodes)
+            node_of_dof = nodes_of_dofs(self.V, all_nodes)
         block = np.arange(self.dim)
         self.rows = (self.dim * node_of_dof[:, None] + block).ravel()  # our flat index of each dolfinx dof
 
@@ -97,12 +115,13 @@ class Space:
     def renumbered(self, assembled):
         coo = to_csr(assembled).tocoo()
         assembled.destroy()
-        return scipy.sparse.csr_matrix((coo.data, (self.rows[coo.row], self.rows[coo.col])), shape=coo.shape)
+        matrix = scipy.sparse.csr_matrix((coo.data, (self.rows[coo.row], self.rows[coo.col])), shape=coo.shape)
+        return matrix if self.prolongation is None else self.prolongation.T @ matrix @ self.prolongation
 
     def to_ours(self, values):
-        flat = np.empty(self.dim * self.num_nodes)
+        flat = np.empty(len(values))
         flat[self.rows] = values
-        return flat
+        return flat if self.prolongation is None else self.prolongation.T @ flat
 
     def mass(self, density=1.0):
         u, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
@@ -116,8 +135,8 @@ class Body(Space):
     value a cell; `sides` names facets by predicates of coordinates.
     """
 
-    def __init__(self, points, cells, law, parameters, rho=1.0, sides=None, order=1):
-        super().__init__(points, cells, order)
+    def __init__(self, points, cells, law, parameters, rho=1.0, sides=None, order=1, curved=None):
+        super().__init__(points, cells, order, curved)
         self.rho = rho
         constants = [self.coefficient(p) for p in parameters]
         self.u = fem.Function(self.V)
@@ -144,7 +163,8 @@ class Body(Space):
         self.mass_matrix = self.mass(rho)
 
     def set_displacement(self, u):
-        self.u.x.array[:] = np.asarray(u).ravel()[self.rows]
+        flat = np.asarray(u).ravel()
+        self.u.x.array[:] = (flat if self.prolongation is None else self.prolongation @ flat)[self.rows]
 
     def energy(self, u):
         self.set_displacement(u)

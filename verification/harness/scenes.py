@@ -38,12 +38,12 @@ EDGES = {2: [(0, 1), (1, 2), (0, 2)], 3: [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3)
 
 
 def with_edge_nodes(points, cells):
-    """Nodes and cells of the mesh with a node in the middle of each edge, numbered as the library numbers those of curved
-    edges: after the vertices, in the order of their edges' ends."""
+    """Nodes and cells of the mesh with a node in the middle of each edge, and these edges. The nodes are numbered as the library
+    numbers those of curved edges: after the vertices, in the order of their edges' ends."""
     pairs = np.sort(np.concatenate([cells[:, list(edge)] for edge in EDGES[points.shape[1]]]), axis=1)
     edges, of_cell = np.unique(pairs, axis=0, return_inverse=True)
     middles = len(points) + of_cell.reshape(-1, len(cells)).T
-    return np.concatenate([points, points[edges].mean(axis=1)]), np.column_stack([cells, middles])
+    return np.concatenate([points, points[edges].mean(axis=1)]), np.column_stack([cells, middles]), edges
 
 
 def write_mesh(path, points, cells, bodies=None):
@@ -61,7 +61,7 @@ def scene(mesh, material, order=1, **parts):
     """A scene of one mesh file whose box sides are tagged 1 left, 2 bottom, 3 right, 4 top, 5 back, 6 front; solved as
     accurately as round-off lets it. `parts` are further top-level objects, replacing the ones here."""
     return {"geometry": [{"mesh": str(mesh), "surface_selection": {"threshold": 1e-6}}], "materials": material,
-            "contact": {"enabled": False}, **({"space": {"discr_order": order}} if order > 1 else {}),
+            "contact": {"enabled": False}, **({"space": {"discr_order": order}} if order != 1 else {}),
             "solver": {"nonlinear": {"x_delta": 1e-11, "grad_norm": 1e-300, "max_iterations": 200,
                                      "advanced": {"first_grad_norm_tol": 1e-300}}}, **parts}
 
@@ -76,6 +76,7 @@ class Frame:
             self.step = int(file.attrs["step"])
             self.rest, self.cells = file["mesh/rest"][()], file["mesh/simplices"][()]
             self.body = file["mesh/body"][()]
+            self.curved = file["mesh/curved_edges"][()] if "mesh/curved_edges" in file else np.empty((0, 2), dtype=int)
             self.x, self.u, self.v = (file["fields/" + name][()] for name in ("x", "u", "v"))
 
 

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The terms of the incremental potential (paper eq. 4), listed once for every scope: the whole mesh, a patch, one vertex.
+// The incremental potential (paper eq. 4) of a scope: the whole mesh, a patch, one vertex.
 #pragma once
 
-#include <functional>
-#include <map>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include "itr/core/kept_vector.hpp"
@@ -13,32 +10,12 @@
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/damping.hpp"
 #include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/host_terms.hpp"
 #include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/material.hpp"
 #include "itr/energy/pressure.hpp"
+#include "itr/energy/terms.hpp"
 #include "itr/fem/vertex_map.hpp"
 
 namespace itr {
-
-/// What acts in a step, whatever cells it is summed over.
-template <int Dim>
-struct PotentialTerms {
-  std::map<int, Material> materials;  ///< by body
-  Loads<Dim> loads;                   ///< at the end of the step
-  bool has_inertia = true;
-  MassKind mass = MassKind::consistent;
-  int quadrature_degree = kElasticDegree;  ///< of elasticity on curved elements
-  double scaling = 1;                      ///< alpha h^2 [s^2]
-  ContactOptions contact;
-  std::vector<DampingOptions> damping;  ///< empty in statics
-  double velocity_rate = 1;             ///< of VelocityRule [1/s]
-  std::vector<TermFactory<Dim>> host;   ///< what the program adds
-  double t = 0;                         ///< at the end of the step, for them [s]
-  /// Its forces of positions, linearised at those of the cells' vertices; empty: none. On the whole mesh only.
-  std::function<std::shared_ptr<const Energy>(const VectorX& x)> follower;
-};
 
 /// Where the vertices of a scope come from: interleaved over its vertices, obstacles included. Refers to what is handed in.
 struct PotentialHistory {
@@ -72,17 +49,38 @@ class IncrementalPotential {
   std::shared_ptr<const Energy> lag_friction(ConstVectorView x, Workspace& workspace) const;
   bool has_friction() const;
 
-  /// Everything, with these lagged terms.
-  EnergySum sum(const Lagged& lagged) const;
-  /// Adds it to a sum.
+  /// Calls f(kind, term) for all terms that there are, with these lagged ones: the only list of them.
+  template <typename F>
+  void for_each(const Lagged& lagged, const F& f) const {
+    const auto visit = [&](TermKind kind, const auto& term) {
+      if (term) f(kind, term);
+    };
+    visit(TermKind::inertia, inertia_);
+    visit(TermKind::elastic, elastic_);
+    visit(TermKind::loads, loads_);
+    for (const auto& term : host_) visit(TermKind::host, term);
+    visit(TermKind::follower, lagged.follower);
+    visit(TermKind::contact, contact_of_cells_);
+    visit(TermKind::friction, lagged.friction);
+    visit(TermKind::pressure, lagged.pressure);
+    for (const auto& term : lagged.damping) visit(TermKind::damping, term);
+  }
+  /// Adds those to a sum of which `is_asked(traits)` holds.
+  template <typename F>
+  void add_to(EnergySum& sum, const Lagged& lagged, const F& is_asked) const {
+    for_each(lagged, [&](TermKind kind, const auto& term) {
+      if (is_asked(traits<Dim>(kind))) sum.add(term);
+    });
+  }
+  /// Adds everything to it.
   void add_to(EnergySum& sum, const Lagged& lagged) const;
+  EnergySum sum(const Lagged& lagged) const;
 
   /// Null where the scene has no such term.
   const std::shared_ptr<InertiaEnergy<Dim>>& inertia() const { return inertia_; }
   const std::shared_ptr<ElasticEnergy<Dim>>& elastic() const { return elastic_; }
   const std::shared_ptr<LoadEnergy<Dim>>& loads() const { return loads_; }
-  const std::shared_ptr<ContactEnergy<Dim>>& contact() const { return contact_; }   ///< over the surface's vertices
-  const std::vector<std::shared_ptr<const Energy>>& host() const { return host_; }  ///< what the program adds
+  const std::shared_ptr<ContactEnergy<Dim>>& contact() const { return contact_; }  ///< over the surface's vertices
   const std::shared_ptr<const Energy>& contact_of_cells() const { return contact_of_cells_; }  ///< over the cells' vertices
 
  private:

@@ -6,30 +6,12 @@
 #include <array>
 #include <functional>
 #include <optional>
-#include <string_view>
 
 #include "itr/mesh/mesh.hpp"
 #include "itr/mesh/strata.hpp"
+#include "itr/remesh/refusal.hpp"
 
 namespace itr {
-
-/// Why an operation is not possible.
-enum class Refusal {
-  none,
-  gone,          ///< no such edge, facet or vertex in the mesh
-  non_manifold,  ///< the cells around it are neither a ball nor a half ball
-  held,       ///< whatever would have to go or move is on a feature, corner or patch that it may not leave: the shape would
-              ///< change
-  link,       ///< a collapse that would change the topology of the bodies, their surfaces or features (link condition)
-  exists,     ///< the edge that a swap makes is there already
-  long_ring,  ///< an edge to be removed has too many cells around it
-  shape,      ///< a cell would be inverted, flat, or much worse than the worst that is there now
-  outside,    ///< the target of a move lies outside of the cells around
-  cost,       ///< infinite cost of each triangulation of the ring
-  curved      ///< an edge of the cells around it is curved, or the edge itself is already
-};
-inline constexpr int kRefusals = 11;
-std::string_view name(Refusal refusal);
 
 /// An edit, or why there is none.
 template <int Dim>
@@ -67,9 +49,10 @@ template <int Dim>
 Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge);
 
 /// Collapses an edge where no cell around it has a curved edge (the same holds for swaps, removals and moves below) and
-/// where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev 1999 in the volume,
-/// on patches and along features) and the rest shape exactly: an end may go where the edge is of its own stratum (in the
-/// volume, within its patch, along its straight feature). Where both may, the midpoint is tried first, then either end.
+/// where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev
+/// 1999 in the volume, on patches and along features) and the rest shape exactly: an end may go where the edge is of its own
+/// stratum (in the volume, within its patch, along its straight feature). Where both may, the midpoint is tried first, then
+/// either end.
 template <int Dim>
 Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata, const EdgeKey& edge,
                                const QualityRule& rule = {});

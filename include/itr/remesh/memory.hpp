@@ -15,16 +15,16 @@ namespace itr {
 struct RemeshMemory {
   /// A signal is a number that stands for what a verdict depended on: as long as it stays in the range, so does the verdict.
   /// It is infinite where nobody can tell (pressure, damping, forces of programs); then no verdict stays.
-  struct Refusal {
-    double least_signal, most_signal;
+  struct SignalRange {
+    double least, most;
     bool in_contact;
     bool holds(double signal, bool contact) const {
-      return contact == in_contact && std::isfinite(signal) && signal >= least_signal && signal <= most_signal;
+      return contact == in_contact && std::isfinite(signal) && signal >= least && signal <= most;
     }
   };
   struct Entry {
     EdgeKey edge;  ///< smaller vertex first; {vertex, kNone} of a vertex that was not moved
-    Refusal refusal;
+    SignalRange range;
   };
   enum Kind { split, collapse, swap, smooth, reshape, curve };
   static constexpr int kKinds = 6;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "itr/core/units.hpp"
 #include "itr/energy/contact/options.hpp"
 #include "itr/energy/damping_options.hpp"
 #include "itr/energy/host_terms.hpp"
@@ -127,6 +128,8 @@ struct StepSetup {
   /// they end farther off those of its own solution than this share of themselves.
   double lagged_load_tolerance = 1e-2;
   int quadrature_degree = kElasticDegree;  ///< of elasticity on cells with curved edges: 1 to 5
+
+  Units units;  ///< that messages and results are to be in; all numbers here are in SI units
 
   // Only a program can set the following.
   std::vector<TermFactory<Dim>> terms;

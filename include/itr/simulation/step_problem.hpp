@@ -74,6 +74,7 @@ class StepProblem {
 
  private:
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
+  using Traits = TermTraits<Dim>;
   NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {});
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
@@ -84,8 +85,8 @@ class StepProblem {
   VectorX start_of_solve(const VectorX& x);
   int most_rounds() const;
   bool has_lagged_loads() const;
-  template <typename Part>
-  double change_of(const VectorX& x, const Lagged& now, const Part& part);
+  template <typename F>
+  double change_of(const VectorX& x, const Lagged& now, const F& is_asked);
   void judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds, NewtonSummary& summary);
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;

@@ -53,6 +53,7 @@ Overrides remeshed(const Overrides& changes = {}) {
 
 const scene::Override kFixed = {"/space/remesh/enabled", "false"};
 const scene::Override kQuadratic = {"/space/discr_order", "2"};
+const scene::Override kCurve = {"/space/remesh/curve/enabled", "true"};
 const scene::Override kSwap = {"/space/remesh/swap/enabled", "true"}, kSmooth = {"/space/remesh/smooth/enabled", "true"};
 
 /// The scene as its options ask for, merged.
@@ -62,6 +63,7 @@ class Source {
     json_ = Json::parse(scene_.identity);
     const auto look = [&](auto setup) {
       dim = static_cast<int>(setup.mesh.rest(0).size());
+      units = setup.units;
       time = setup.time;
       if constexpr (std::is_same_v<decltype(setup), Setup<3>>) box = find_box(setup.mesh);
       num_cells = setup.mesh.num_cells();
@@ -74,7 +76,9 @@ class Source {
       setup.choose_defaults();
       remesh = setup.remesh;
       // What remeshing would choose holds for all runs: they are to have one limit.
-      if (is_open) pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness)}};
+      const double unit = setup.contact.convergent ? units.factor("Pa") : units.factor("J") / std::pow(units.factor("m"), 4);
+      if (is_open)
+        pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness / unit)}};
       const auto& contact = setup.contact;
       has_friction = contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0;
       if (has_friction) pin_friction(options.overrides);
@@ -89,6 +93,7 @@ class Source {
   }
 
   int dim = 0;
+  Units units;  ///< of the scene's keys; all that is told of its runs is in SI units
   TimeOptions time;
   RemeshOptions remesh;          ///< with its defaults chosen
   Overrides pinned;              ///< what the scene leaves open and all runs have to agree on
@@ -111,6 +116,7 @@ class Source {
     if (has(pointer + "/array") || has("/contact/collision_mesh")) return std::nullopt;
     if (!has_one_body && !has(pointer + "/volume_selection")) return std::nullopt;
     Overrides all = {{pointer + "/mesh", Json(file.generic_string()).dump()}, {pointer + "/n_refs", "0"}};
+    if (!units.is_si()) all.push_back({pointer + "/unit", "\"m\""});
     if (has(pointer + "/transformation")) all.push_back({pointer + "/transformation", "{}"});
     return all;
   }
@@ -153,10 +159,10 @@ bool contains(const Overrides& all, const scene::Override& one) {
 /// The tolerances of the operations of a series, in the ratio of the split's to the scene's own.
 Overrides with_tolerance(const Source& source, const Series& series, double tolerance) {
   const double own = *source.remesh.split.acceptance_tolerance;
-  Overrides all = {{"/space/remesh/split/acceptance_tolerance", fmt::format("{}", tolerance)}};
+  Overrides all = {{"/space/remesh/split/acceptance_tolerance", fmt::format("{}", source.units.from_si(tolerance, "J"))}};
   const auto scale = [&](const char* operation, double value) {
-    all.push_back(
-        {fmt::format("/space/remesh/{}/acceptance_tolerance", operation), fmt::format("{}", value * tolerance / own)});
+    all.push_back({fmt::format("/space/remesh/{}/acceptance_tolerance", operation),
+                   fmt::format("{}", source.units.from_si(value * tolerance / own, "J"))});
   };
   scale("collapse", *source.remesh.collapse.acceptance_tolerance);
   if (contains(series.overrides, kSwap)) scale("swap", *source.remesh.swap.acceptance_tolerance);
@@ -167,7 +173,8 @@ Overrides with_tolerance(const Source& source, const Series& series, double tole
 /// The same end in steps of dt / parts.
 Overrides with_time_step(const Source& source, int parts, int skip) {
   Overrides all = {{"/output/paraview/skip_frame", std::to_string(skip * parts)}};
-  if (source.has("/time/dt")) all.push_back({"/time/dt", fmt::format("{}", source.time.dt / parts)});
+  if (source.has("/time/dt"))
+    all.push_back({"/time/dt", fmt::format("{}", source.units.from_si(source.time.dt / parts, "s"))});
   if (source.has("/time/time_steps")) all.push_back({"/time/time_steps", std::to_string(source.time.steps * parts)});
   return all;
 }
@@ -219,6 +226,7 @@ class Planner {
 
  private:
   PlannedRun complete(PlannedRun run) const {
+    if (!source_.units.is_si()) run.overrides.insert(run.overrides.begin(), {"/output/units", "\"SI\""});
     run.overrides.insert(run.overrides.begin(), {{"/output/paraview/skip_frame", std::to_string(skip_)},
                                                  {"/output/paraview/options/kinetic_energy", "true"},
                                                  {"/output/paraview/options/momentum", "true"}});
@@ -313,7 +321,9 @@ class Planner {
     std::string name = fmt::format("{}-{:g}", series.name, tolerance), label = fmt::format("tolerance {:g} J", tolerance);
     if (start > 0) name += fmt::format("-from-{}", start), label += ", from " + source_.level_label(start);
     add({name, &series, label,
-         linear(series.overrides) + source_.refined(start) + with_tolerance(source_, series, tolerance), "", kReference});
+         (is_quadratic(series) ? series.overrides : linear(series.overrides)) + source_.refined(start) +
+             with_tolerance(source_, series, tolerance),
+         "", kReference});
   }
 
   const Options& options_;
@@ -334,6 +344,9 @@ const std::vector<Series>& all_series() {
       {"itr", Kind::tolerances, true, "splits and collapses", remeshed()},
       {"swaps", Kind::tolerances, true, "splits, collapses and swaps", remeshed({kSwap})},
       {"smoothing", Kind::tolerances, true, "splits, collapses, swaps and smoothing", remeshed({kSwap, kSmooth})},
+      {"hp", Kind::tolerances, false, "splits, curved edges and collapses", remeshed({kCurve})},
+      {"p", Kind::tolerances, false, "curved edges alone", remeshed({kCurve, {"/space/remesh/split/enabled", "false"}})},
+      {"splits-p2", Kind::tolerances, false, "splits of quadratic elements; not with contact", remeshed({kQuadratic})},
       {"no-screening", Kind::tolerances, false, "`smoothing`, a patch relaxed for every edge",
        remeshed({kSwap, kSmooth, {"/space/remesh/screening", "\"none\""}})},
       {"culling", Kind::tolerances, false, "`smoothing`, the paper's culling by energy",

@@ -95,6 +95,11 @@ class Run {
     this.stored.forEach((f, i) => (f.largest = this.meta.largest[i], f.shown = this.meta.shown[i]));
   }
 
+  // The scene's name of a unit of SI.
+  unit(si) {
+    return this.meta.units[si] ?? si;
+  }
+
   async load() {
     const n = this.meta.counts, dim = this.dim;
     const [topology, steps, forces] =

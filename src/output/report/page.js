@@ -8,7 +8,7 @@ function describe(run) {
     parts.push(`${s.scene}: ${s.outcome}`, `solver ${s.solver}`);
   else
     parts.push('not finished');
-  if (last) parts.push(`${last.step} steps to t = ${shortNumber(last.t)} s`);
+  if (last) parts.push(`${last.step} steps to t = ${shortNumber(last.t)} ${run.unit('s')}`);
   if (s) parts.push(`computed in ${shortNumber(s.seconds.total)} s`);
   return parts.join(' · ');
 }

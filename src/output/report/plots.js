@@ -70,14 +70,15 @@ function plotsOf(run) {
   const steps = run.steps, times = steps.map(s => s.t), take = f => steps.map(s => f(s) ?? NaN), list = [];
   const add = (title, unit, series, log = false, at = times) => {
     const shown = series.filter(s => s.values.some(v => Number.isFinite(v) && v !== 0));
-    if (shown.length && at.length > 1) list.push({title, unit, log, times: at, series: shown});
+    if (shown.length && at.length > 1)
+      list.push({title, unit: run.unit(unit), time: run.unit('s'), log, times: at, series: shown});
   };
   const names = ['inertia', 'elastic', 'body', 'contact', 'friction', 'damping'];
   add('Energy of the step by term', 'J', [
     ...names.map((name, k) => ({name, colour: LINE_COLOURS[k]})), {name: 'total', colour: '#1d2530', dashes: '4 3'}
   ].map(s => ({...s, values: take(step => step.step > 0 ? step.energy?.[s.name] : NaN)})));  // no step has made step 0
   add('Vertices', '', [{name: '', values: take(s => s.vertices)}]);
-  add('Seconds a step', 's', [
+  add('Seconds a step', '', [
     'total', 'remesh', 'linear_solve', 'assembly', 'ccd'
   ].map(name => ({name: name.replace('_', ' '), values: take(s => s.seconds?.[name])})));
   add('Newton iterations a step', '', [{name: '', values: take(s => s.newton_iterations)}]);
@@ -132,7 +133,7 @@ class Plot {
     }
     for (const tick of ticksOf(t0, t1, false))
       this.drawing.append(svg('text', {x: this.x(tick), y: height - 7, 'text-anchor': 'middle'}, shortNumber(tick)));
-    this.drawing.append(svg('text', {x: left - 16, y: height - 7, 'text-anchor': 'end'}, 't [s]'));
+    this.drawing.append(svg('text', {x: left - 16, y: height - 7, 'text-anchor': 'end'}, `t [${this.time ?? 's'}]`));
     const colourOf = (s, k) => s.colour ?? LINE_COLOURS[k % LINE_COLOURS.length];
     this.series.forEach((s, k) => this.drawing.append(svg('path', {
       d: this.path(s.values),

@@ -88,7 +88,8 @@ class View {
     return this.extras[name]?.values ?? this.frame.field(name);
   }
   unit(name) {
-    const unit = this.extras[name]?.unit ?? {u: 'm', size: 'm'}[name] ?? this.run.stored.find(f => f.name === name)?.unit;
+    const length = this.run.unit('m'), unit = this.extras[name]?.unit ?? {u: length, size: length}[name] ??
+        this.run.stored.find(f => f.name === name)?.unit;
     return (unit ?? '').replace('^2', '²').replace('^3', '³');
   }
 
@@ -177,7 +178,7 @@ class View {
       input.type === 'checkbox' ? input.checked = this.state[key] : input.value = this.state[key] ?? '';
     this.slider.value = this.state.frame;
     const f = this.run.frames[this.state.frame];
-    this.time.textContent = `t = ${shortNumber(f.t)} s · step ${f.step} · ${f.vertices} vertices · ${f.cells} cells`;
+    this.time.textContent = `t = ${shortNumber(f.t)} ${run.unit('s')} · step ${f.step} · ${f.vertices} vertices · ${f.cells} cells`;
   }
 
   // One update after another; what was asked for meanwhile is done at once at the end.
@@ -499,8 +500,8 @@ class View {
     const {vertex} = pick,
           point = column => column.map((of, k) => shortNumber(Number((of + run.meta.origin[k]).toPrecision(7)))).join(', ');
     const lines = [
-      `vertex ${vertex}`, `  rest  ${point(run.rest.map(c => c[vertex]))} m`,
-      `  now   ${point(run.rest.map((c, k) => c[vertex] + frame.u[k][vertex]))} m`
+      `vertex ${vertex}`, `  rest  ${point(run.rest.map(c => c[vertex]))} ${run.unit('m')}`,
+      `  now   ${point(run.rest.map((c, k) => c[vertex] + frame.u[k][vertex]))} ${run.unit('m')}`
     ];
     const show = (of, id) => {
       for (const name of this.fields()) {

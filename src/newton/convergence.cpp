@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+#include "convergence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace itr {
+
+namespace {
+
+constexpr double kNothing = 1e-10;   ///< see NewtonExtras::way_to_start
+constexpr int kMostUnresolved = 20;  ///< steps in a row below round-off: the gradient is round-off, and shrinks no further
+constexpr double kNear = 10;         ///< times a tolerance
+
+}  // namespace
+
+bool Convergence::has_small_gradient() {
+  if (!held_.is_done()) return false;
+  const NewtonOptions& options = task_.options;
+  const double now = at_.gradient_norm();
+  if (first_gradient_ < 0) first_gradient_ = now;
+  if (!is_first()) return now < options.gradient_tolerance || now < options.relative_gradient_tolerance * first_gradient_;
+  if (begins_elsewhere() && now > kNothing * task_.norms.of_gradient(task_.extras.gradient_of_way)) return false;
+  return now < options.first_gradient_tolerance;
+}
+
+bool Convergence::has_small_step(const Step& step) {
+  const NewtonOptions& options = task_.options;
+  if (first_step_ < 0) first_step_ = step.norm;
+  if (!is_first()) return step.norm < options.step_tolerance || step.norm < options.relative_step_tolerance * first_step_;
+  if (begins_elsewhere() && step.norm > kNothing * task_.norms.of_step(task_.extras.way_to_start)) return false;
+  return step.norm < options.step_tolerance;
+}
+
+std::optional<Termination> Convergence::test(const Step& step) {
+  if (!held_.is_done()) {
+    unresolved_ = 0;
+    return {};
+  }
+  if (has_small_step(step)) return Termination::step;
+  if (at_.decrement_of(step) < task_.options.decrement_tolerance) return Termination::decrement;
+  unresolved_ = at_.is_unresolved(step) ? unresolved_ + 1 : 0;
+  if (unresolved_ >= kMostUnresolved) return Termination::round_off;
+  return {};
+}
+
+bool Convergence::is_at_round_off(const Step& step) const {
+  return at_.is_unresolved(step) || at_.decrement_of(step) < kUnresolved * std::abs(at_.first_value());
+}
+
+bool Convergence::has_stalled(double value_before) {
+  const bool hardly_changed = std::abs(at_.value() - value_before) < task_.options.energy_tolerance;
+  stalled_ = held_.is_done() && hardly_changed ? stalled_ + 1 : 0;
+  return stalled_ >= task_.options.energy_steps && task_.options.energy_tolerance > 0;
+}
+
+bool Convergence::is_near(const Step& step) const {
+  const NewtonOptions& options = task_.options;
+  return step.norm < kNear * options.step_tolerance || step.norm < kNear * options.relative_step_tolerance * first_step_ ||
+         at_.decrement_of(step) < kNear * options.decrement_tolerance || at_.is_unresolved(step);
+}
+
+double Convergence::gradient_asked() const {
+  return std::max(task_.options.gradient_tolerance, task_.options.relative_gradient_tolerance * first_gradient_);
+}
+
+void Convergence::note_decrement(const Step& step) {
+  decrement_ = at_.decrement_of(step);
+  gradient_of_decrement_ = at_.gradient_norm();
+}
+
+/// The decrement scales with the square of the gradient.
+void Convergence::foresee_decrement() {
+  if (!(gradient_of_decrement_ > 0)) return;
+  const double ratio = at_.gradient_norm() / gradient_of_decrement_;
+  decrement_ *= std::min(1.0, ratio * ratio);
+}
+
+}  // namespace itr

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+#include "direction.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "itr/core/timer.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kLoosest = 1e-4;      ///< residual of a direction
+constexpr int kMostLoose = 8;          ///< iterations of a solve that may be loose
+constexpr double kFirstShift = 1e-10;  ///< of the diagonal
+constexpr int kMostShifts = 12;        ///< each ten times the one before
+
+/// Whether a shift of the Hessian may help.
+bool is_curable(linear::Outcome outcome) {
+  return outcome != linear::Outcome::non_finite && outcome != linear::Outcome::out_of_memory &&
+         outcome != linear::Outcome::failed;
+}
+
+}  // namespace
+
+Direction::Direction(const Task& task, const Iterate& at, HeldMotion& held, const Convergence& convergence)
+    : task_(task),
+      at_(at),
+      held_(held),
+      convergence_(convergence),
+      kept_(task.workspace.get<Kept>()),
+      step_{kept_.step.resize(at.x().size())} {}
+
+bool Direction::find() {
+  const NewtonOptions& options = task_.options;
+  asked_ = digits_to_ask();
+  gradient_before_ = at_.gradient_norm();
+  // A direction of the true Hessian is only taken where it is known to lead to a minimum, not to a saddle.
+  const bool may_be_true = options.indefinite == IndefiniteHessian::accept || task_.system.tells_definiteness();
+  is_projected_ = options.project_to_psd && (projected_iterations_ > 0 || options.projected_iterations == 0 || !may_be_true);
+  if (projected_iterations_ > 0) --projected_iterations_;
+  if (!is_projected_ && find_with(PsdProjection::none)) return true;
+  if (options.project_to_psd) {
+    if (!is_projected_) projected_iterations_ = options.projected_iterations - 1;
+    is_projected_ = true;
+    if (find_with(projection())) return true;
+  }
+  double shift = kFirstShift * std::max(task_.system.diagonal_scale(), 1e-300);
+  for (int attempt = 0; attempt < kMostShifts && is_curable(outcome_); ++attempt, shift *= 10)
+    if (solve(shift)) return true;
+  return false;
+}
+
+bool Direction::find_projected() {
+  if (is_projected_ || !task_.options.project_to_psd) return false;
+  projected_iterations_ = task_.options.projected_iterations - 1;
+  is_projected_ = true;
+  return find_with(projection());
+}
+
+bool Direction::tighten() {
+  is_tight_ = true;
+  asked_ = kTightResidual;
+  const bool found = solve(shift_);
+  if (!is_projected_ && shift_ == 0) note_definiteness();
+  return found || find();
+}
+
+/// Relative residual to which a step is solved. The gradient after a Newton step is at best of second order in the one
+/// before, so more digits are wasted (Eisenstat & Walker 1996). Only steps that may end the solve get all digits.
+double Direction::digits_to_ask() const {
+  if (is_tight_ || !held_.is_done() || task_.options.indefinite == IndefiniteHessian::accept) return kTightResidual;
+  // Loose solves may overlook negative curvature; Newton then creeps.
+  if (indefinite_ > 0 || task_.summary.iterations >= kMostLoose) return kTightResidual;
+  const double left = gradient_before_ > 0 ? at_.gradient_norm() / gradient_before_ : 1;
+  const double asked = std::clamp(0.1 * left * left, kTightResidual, kLoosest);
+  const bool may_be_last = 0.1 * at_.gradient_norm() * std::max(left * left, asked) < convergence_.gradient_asked();
+  return may_be_last ? kTightResidual : asked;
+}
+
+bool Direction::find_with(PsdProjection psd) {
+  assemble(psd);
+  const bool found = solve(0);
+  if (psd == PsdProjection::none) note_definiteness();
+  return found;
+}
+
+void Direction::assemble(PsdProjection psd) {
+  const ScopedTimer timer(task_.summary.assembly_seconds);
+  task_.system.assemble(task_.energy, at_.x(), psd, task_.dofs, held_.motion(), task_.workspace);
+}
+
+/// Records whether the true Hessian at x is indefinite. It has to be the last matrix that was factorised.
+void Direction::note_definiteness() {
+  was_indefinite_ = outcome_ == linear::Outcome::not_positive_definite || task_.system.negative_pivots() > 0;
+  known_at_ = at_.revision();
+  indefinite_ += was_indefinite_;
+}
+
+bool Direction::is_hessian_indefinite() {
+  if (task_.options.indefinite == IndefiniteHessian::accept || !task_.has_unknowns()) return false;
+  if (!was_indefinite_ && !is_loose_) return false;
+  if (was_indefinite_ && known_at_ == at_.revision()) return true;
+  assemble(PsdProjection::none);
+  const ScopedTimer timer(task_.summary.linear_seconds);
+  outcome_ = was_indefinite_ ? task_.system.factorize(0) : task_.system.prepare(0, right_hand_side(), kTightResidual);
+  is_loose_ = false;
+  note_definiteness();
+  return was_indefinite_;
+}
+
+ConstVectorView Direction::right_hand_side() {
+  VectorView rhs = kept_.rhs.resize(task_.dofs.num_unknowns);
+  rhs.setZero();
+  if (held_.motion().coupling.size() > 0) rhs -= held_.motion().coupling;
+  for (Eigen::Index i = 0; i < at_.x().size(); ++i)
+    if (task_.dofs.unknown[i] != kNone) rhs[task_.dofs.unknown[i]] -= at_.gradient()[i];
+  return rhs;
+}
+
+/// Solves for the full step; true where it is one of descent.
+bool Direction::solve(double shift) {
+  shift_ = shift;
+  is_loose_ = false;
+  const ScopedTimer timer(task_.summary.linear_seconds);
+  if (!task_.has_unknowns()) {
+    begin_step();
+    step_.norm = 0;
+    step_.curvature = held_.motion().curvature;
+    return true;
+  }
+  NewtonSystem& system = task_.system;
+  const ConstVectorView rhs = right_hand_side();
+  VectorView solution = kept_.solution.resize(rhs.size());
+  outcome_ = system.prepare(shift, rhs, asked_);
+  if (outcome_ != linear::Outcome::ok) return fail();
+  // L D L^T factorises an indefinite Hessian, too. Its solution must not be used: along eigenvectors of negative
+  // eigenvalues, Newton's step goes up to a saddle.
+  if (task_.options.indefinite == IndefiniteHessian::project && system.negative_pivots() > 0) {
+    outcome_ = linear::Outcome::not_positive_definite;
+    failure_ = " (linear solve: " + std::to_string(system.negative_pivots()) + " negative eigenvalues)";
+    return false;
+  }
+  const auto report = system.solve(rhs, solution);
+  outcome_ = report.outcome;
+  if ((outcome_ != linear::Outcome::ok && outcome_ != linear::Outcome::not_converged) || !solution.allFinite())
+    return fail();
+  is_loose_ = report.relative_residual > kTightResidual && report.relative_residual <= asked_;
+  if (!is_loose_) task_.summary.linear_residual = std::max(task_.summary.linear_residual, report.relative_residual);
+  return set_step(rhs, solution);
+}
+
+bool Direction::set_step(ConstVectorView rhs, ConstVectorView solution) {
+  const double descent = solution.dot(rhs);  // of no minimiser of a convex model where it is not positive
+  if (!(descent > 0) && !rhs.isZero(0)) return false;
+  begin_step();
+  // way^T H way over all dofs, with H_ff way_f = rhs.
+  const PrescribedMotion& motion = held_.motion();
+  step_.curvature = descent;
+  if (motion.coupling.size() > 0) step_.curvature += 2 * solution.dot(motion.coupling);
+  step_.curvature += motion.curvature;
+  for (Eigen::Index i = 0; i < step_.way.size(); ++i)
+    if (task_.dofs.unknown[i] != kNone) step_.way[i] = solution[task_.dofs.unknown[i]];
+  step_.norm = task_.norms.of_step(step_.way);
+  return true;
+}
+
+/// Sets the step to the prescribed motion of the held dofs, and to zero elsewhere.
+void Direction::begin_step() {
+  step_.is_set = true;
+  if (held_.is_advancing())
+    step_.way = held_.motion().step;
+  else
+    step_.way.setZero();
+}
+
+bool Direction::fail() {
+  if (!task_.extras.is_brief)
+    failure_ = std::string(" (linear solve: ") + to_string(outcome_) + ", " + task_.system.message() + ")";
+  return false;
+}
+
+}  // namespace itr

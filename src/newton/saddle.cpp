@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+#include "saddle.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "curvature.hpp"
+#include "itr/core/timer.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kRoundOff = 1e-9;  ///< relative change of energy that the first step exceeds
+constexpr int kMostDoublings = 12;
+
+}  // namespace
+
+Saddle::Saddle(const Task& task, Iterate& at, Direction& direction, Search& search)
+    : task_(task),
+      at_(at),
+      direction_(direction),
+      search_(search),
+      candidate_(task.workspace.get<Kept>().candidate.resize(at.x().size())) {}
+
+/// Goes along an eigenvector of a negative eigenvalue as long as that lowers the energy.
+bool Saddle::descend() {
+  VectorView way = direction_.step().way;
+  if (!find_way(way)) return false;
+  for (int k = 0; k < kMostDoublings; ++k, way *= 2) {
+    if (at_.free_share(way) < 1) return false;
+    candidate_ = at_.x() + way;
+    const double value = at_.value_at(candidate_);
+    if (!(value < at_.value())) continue;
+    at_.move_to(candidate_, value);
+    search_.go_on(way);
+    return true;
+  }
+  return false;
+}
+
+/// The shortest step whose change of energy exceeds round-off, down the slope. If the slope is round-off, the sign of the
+/// eigenvector decides, which is the same for all linear solvers; the other branch may be as low.
+bool Saddle::find_way(VectorView way) {
+  direction_.assemble(PsdProjection::none);
+  VectorX eigenvector;
+  double curvature = 0;
+  {
+    const ScopedTimer timer(task_.summary.linear_seconds);
+    curvature = find_negative_curvature(task_.system, task_.dofs.num_unknowns, eigenvector);
+  }
+  if (!(curvature < 0)) return false;
+  way.setZero();
+  for (Eigen::Index i = 0; i < way.size(); ++i)
+    if (task_.dofs.unknown[i] != kNone) way[i] = eigenvector[task_.dofs.unknown[i]];
+  const double resolved = kRoundOff * std::abs(at_.value());
+  way *= std::max(task_.options.step_tolerance, std::sqrt(2 * resolved / -curvature));
+  if (way.dot(at_.gradient()) > resolved) way = -way;
+  return true;
+}
+
+}  // namespace itr

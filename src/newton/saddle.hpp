@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "direction.hpp"
+#include "search.hpp"
+
+namespace itr {
+
+/// NewtonSummary::message of a solve that ends at a saddle.
+inline constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
+
+/// The way off a saddle, where Newton's method would end as if it were a minimum.
+class Saddle {
+ public:
+  Saddle(const Task& task, Iterate& at, Direction& direction, Search& search);
+
+  bool is_here() { return direction_.is_hessian_indefinite(); }
+  /// Called before a solve ends: leaves x if it is a saddle. Returns whether x has moved to a lower energy.
+  bool leave() { return is_here() && descend(); }
+
+ private:
+  struct Kept {
+    KeptVector candidate;
+  };
+  bool descend();
+  bool find_way(VectorView way);
+
+  const Task& task_;
+  Iterate& at_;
+  Direction& direction_;
+  Search& search_;
+  VectorView candidate_;
+};
+
+}  // namespace itr

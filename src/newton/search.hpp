@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "held_motion.hpp"
+
+namespace itr {
+
+/// How far to go along a step: as far as the energy falls and the way is free. A step that contact or inversion blocks is
+/// turned first, or each vertex goes as far as it can alone.
+class Search {
+ public:
+  Search(const Task& task, Iterate& at, HeldMotion& held);
+
+  /// Moves along the step; false where no share of it lowers the energy enough. The step may be turned.
+  bool along(Step& step);
+  /// Goes on along a way that lowered the energy, in steps of twice the length as long as they lower it. Near a saddle the
+  /// projected Hessian is much stiffer than the true one, and Newton would need hundreds of equal steps.
+  void go_on(ConstVectorView way);
+
+ private:
+  struct Kept {
+    KeptVector candidate, other, ways;
+  };
+  /// What is known of a step before the search.
+  struct Way {
+    double share;          ///< that is free
+    double slope;          ///< of the energy
+    bool has_single_ways;  ///< those of each vertex alone are known
+  };
+  Way look_ahead(Step& step);
+  bool is_acceptable(double value, double share, const Way& way, const Step& step);
+  bool falls_straight(double value, double share, const Way& way, const Step& step);
+  void try_single_ways(double& value);
+  void note_blocked(const Step& step);
+  double slope_at_candidate(const Step& step);
+
+  const Task& task_;
+  Iterate& at_;
+  HeldMotion& held_;
+  Kept& kept_;
+  VectorView candidate_, other_;
+};
+
+}  // namespace itr

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include "units.hpp"
+
+#include <cmath>
+
+namespace itr::output {
+
+std::vector<double> from_si(std::span<const double> values, const Units& units, const char* unit) {
+  const double factor = units.factor(unit);
+  std::vector<double> result(values.begin(), values.end());
+  for (double& value : result) value /= factor;
+  return result;
+}
+
+std::vector<ForceCurvePoint> in_units(std::vector<ForceCurvePoint> curves, const Units& units) {
+  const double force = units.factor("N"), moment = units.factor("N m");
+  for (ForceCurvePoint& curve : curves)
+    for (auto& kind : curve.kinds)
+      for (std::size_t i = 0; i < kind.size(); ++i) kind[i] /= i < static_cast<std::size_t>(units.dim) ? force : moment;
+  return curves;
+}
+
+StepReport in_units(StepReport report, const Units& units) {
+  if (units.is_si()) return report;
+  EnergyReport& e = report.energy;
+  const double energy = units.factor("J");
+  for (double* value : {&e.inertia, &e.elastic, &e.body, &e.contact, &e.friction, &e.damping, &e.total, &e.host,
+                        &report.energy_before_remesh, &report.history_loss, &report.split_tolerance,
+                        &report.best_refused_split, &report.residual_worth})
+    *value /= energy;
+  report.t /= units.factor("s");
+  report.min_distance /= units.factor("m");
+  return report;
+}
+
+DisplacementNorms in_units(DisplacementNorms norms, const Units& units) {
+  if (units.is_si()) return norms;
+  const double length = units.factor("m"), root_of_volume = std::pow(length, 0.5 * units.dim);
+  norms.l2 /= length * root_of_volume;
+  norms.h1_semi /= root_of_volume;
+  norms.h1 = std::hypot(norms.l2, norms.h1_semi);
+  norms.linf /= length;
+  norms.lp /= length * std::pow(length, units.dim / 8.0);
+  return norms;
+}
+
+}  // namespace itr::output

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+// What is written, in the units of a scene.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "itr/core/units.hpp"
+#include "itr/output/writer.hpp"
+
+namespace itr::output {
+
+std::vector<double> from_si(std::span<const double> values, const Units& units, const char* unit);
+std::vector<ForceCurvePoint> in_units(std::vector<ForceCurvePoint> curves, const Units& units);
+StepReport in_units(StepReport report, const Units& units);
+/// `lp` is that of the exponent 8.
+DisplacementNorms in_units(DisplacementNorms norms, const Units& units);
+
+}  // namespace itr::output
