@@ -174,6 +174,7 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
                                                      "energy",
                                                      "energy_before_remesh",
                                                      "splits",
+                                                     "curves",
                                                      "collapses",
                                                      "swaps",
                                                      "smooths",

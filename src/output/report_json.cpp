@@ -116,7 +116,7 @@ void for_each_number(Report& r, Visit&& visit) {
                   &r.reused_factors, &r.linear_iterations, &r.indefinite, &r.bound_by_dhat, &r.reverted_remeshes,
                   &r.damped_steps, &r.refined_quadrature, &r.cut_steps})
     visit(*n);
-  for (auto* count : {&r.splits, &r.curves, &r.collapses, &r.swaps, &r.smooths}) {
+  for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths}) {
     visit(count->tried);
     visit(count->relaxed);
     visit(count->accepted);
@@ -129,7 +129,9 @@ void for_each_number(Report& r, Visit&& visit) {
   for (auto* x : {&r.t, &r.energy_before_remesh, &r.history_loss, &r.min_distance, &r.min_volume_ratio, &r.processor_seconds,
                   &r.peak_rss_mb})
     visit(*x);
-  for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths})  // last: 0.1.0 did not save them
+  // Last: 0.1.0 did not save them.
+  for (auto* x : {&r.curves.tried, &r.curves.relaxed, &r.curves.accepted}) visit(*x);
+  for (auto* count : {&r.splits, &r.curves, &r.collapses, &r.swaps, &r.smooths})
     for (auto& refused : count->refused) visit(refused);
 }
 
@@ -143,8 +145,8 @@ std::vector<double> Totals::save() const {
 
 void Totals::restore(const std::vector<double>& values) {
   const std::size_t expected = save().size();
-  const bool is_without_refusals = values.size() == expected - 4 * kRefusals;
-  if (values.size() != expected && !is_without_refusals)
+  const bool is_of_first_version = values.size() == expected - 3 - 5 * kRefusals;
+  if (values.size() != expected && !is_of_first_version)
     throw InputError({"", "saved totals", std::to_string(values.size()) + " numbers", std::to_string(expected)});
   gain_ = values[0];
   std::size_t next = 1;
