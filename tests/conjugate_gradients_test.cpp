@@ -48,7 +48,7 @@ TEST_F(Block, ReachesWhatIsAskedAndGoesOn) {
       r[i] -= block.values[p] * iteration.solution()[j];
       if (i != j) r[j] -= block.values[p] * iteration.solution()[i];
     }
-  EXPECT_NEAR(norm(r) / norm(b), iteration.residual(), 1e-12);
+  EXPECT_NEAR(ConjugateGradients::norm(r) / ConjugateGradients::norm(b), iteration.residual(), 1e-12);
 }
 
 TEST_F(Block, EndsWhereItIsTooSlow) {

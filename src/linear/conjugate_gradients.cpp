@@ -46,7 +46,7 @@ void multiply(const SystemView& system, std::span<const double> x, std::span<dou
 
 }  // namespace
 
-double norm(std::span<const double> a) { return std::sqrt(dot(a, a)); }
+double ConjugateGradients::norm(std::span<const double> a) { return std::sqrt(dot(a, a)); }
 
 bool ConjugateGradients::begin(const SystemView& system, const Preconditioner& precondition) {
   const std::size_t n = system.b.size();

@@ -9,8 +9,6 @@
 
 namespace itr::linear {
 
-double norm(std::span<const double> a);
-
 /// A x = b, of a lower triangle. It refers to what others own.
 struct SystemView {
   const SparsityPattern& pattern;
@@ -32,6 +30,8 @@ class ConjugateGradients {
   bool begin(const SystemView& system, const Preconditioner& precondition);
   /// Goes on to a residual of `target`, relative to b, with at most so many iterations.
   End run(const SystemView& system, const Preconditioner& precondition, double target, int most);
+
+  static double norm(std::span<const double> a);
 
   std::span<const double> solution() const { return x_; }
   double residual() const { return residual_; }   ///< relative, computed from the solution

@@ -26,6 +26,8 @@ constexpr double kNoResidual = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
+struct ReusingSolver::Iteration : ConjugateGradients {};
+
 /// Seconds, by counts.
 struct ReusingSolver::Costs {
   double factorization, iteration;
@@ -40,7 +42,7 @@ std::shared_ptr<const FactoredMatrix> make_factored_matrix(SparsityPattern patte
 }
 
 ReusingSolver::ReusingSolver(Solver& solver, bool reuses)
-    : solver_(solver), reuses_(reuses), iteration_(std::make_unique<ConjugateGradients>()) {}
+    : solver_(solver), reuses_(reuses), iteration_(std::make_unique<Iteration>()) {}
 
 ReusingSolver::~ReusingSolver() = default;
 
@@ -170,7 +172,7 @@ ReusingSolver::Costs ReusingSolver::costs() const {
 void ReusingSolver::iterate(std::span<const double> values, std::span<const double> b, double asked) {
   const bool goes_on = std::exchange(last_, Last::none) == Last::iterated;
   const SystemView system{*pattern_, values, b};
-  const double scale = norm(b), from = goes_on ? iteration_->residual() : 1;
+  const double scale = ConjugateGradients::norm(b), from = goes_on ? iteration_->residual() : 1;
   if (!(scale > 0) || !std::isfinite(scale)) return;
   const auto precondition = [this](std::span<const double> residual, std::span<double> z) {
     return solver_.solve(residual, z, 1, kNoResidual).outcome == Outcome::ok;  // which would be that of the old matrix

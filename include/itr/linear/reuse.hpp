@@ -38,8 +38,6 @@ struct SolveCounts {
   int iterations = 0;  ///< of conjugate gradients over such factors, failed attempts included
 };
 
-class ConjugateGradients;
-
 /// A solver over a direct one. A matrix that is the last one bit by bit is not factorised again. Another one of the same
 /// order, whatever its pattern, may be given to conjugate gradients with the last factor as preconditioner (solve_system);
 /// where they take too long or meet a direction of no positive curvature, the matrix is factorised.
@@ -90,6 +88,7 @@ class ReusingSolver final : public Solver {
     refused    ///< they found it not positive definite
   };
   struct Costs;
+  struct Iteration;
 
   void take_in(std::span<const double> values);
   bool may_iterate(std::span<const double> values, std::span<const double> b);
@@ -112,7 +111,7 @@ class ReusingSolver final : public Solver {
   std::vector<double> coordinates_;
   bool may_keep_order_ = true;  ///< so said every call of analyze since solver_ analysed last
   Last last_ = Last::none;
-  std::unique_ptr<ConjugateGradients> iteration_;
+  std::unique_ptr<Iteration> iteration_;
   int iterations_ = 0;  ///< of the last solve
   SolveCounts counts_;
 };
