@@ -159,7 +159,7 @@ class Quotes(unittest.TestCase):
             [linear] = [row for row in csv.DictReader(file) if row["run"] == "uniform-3"]
         exact = float(re.search(r"STORED_ENERGY = ([-\d.]+)", (SOURCE / "verification/cases/cook.py").read_text())[1])
         text = (SOURCE / "README.md").read_text()
-        self.assertIn(f"need {float(linear['unknowns']):,.0f} for".replace(",", " "), text)
+        self.assertIn(f"need {float(linear['unknowns']):,.0f} unknowns for".replace(",", " "), text)
         self.assertIn(f"for {(float(linear['potential']) - exact) / 1000:.0f} kJ", text)
 
 
