@@ -11,71 +11,15 @@
 #include <vector>
 
 #include <boost/container/small_vector.hpp>
-#include "itr/energy/elastic/laws.hpp"
+#include "energy/elastic/point.hpp"
+#include "energy/load_points.hpp"
+#include "itr/fem/mass.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
 
 namespace itr {
 
 namespace {
-
-/// W at F, and its derivatives by the position of a vertex whose shape function has a gradient.
-template <int Dim>
-class ElasticResponse {
- public:
-  ElasticResponse(const Mat<Dim>& F, const ElasticModuli& moduli) : F_(F), moduli_(moduli) {
-    if (is_neo_hookean()) {  // with one inverse and one logarithm
-      J_ = F.determinant();
-      log_J_ = std::log(J_);
-      inverse_ = F.inverse();
-    } else {
-      density_ = elastic_density<Dim>(F, moduli);
-      stress_ = elastic_stress<Dim>(F, moduli);
-      system_ = elastic_eigensystem<Dim>(F, moduli);
-    }
-  }
-  double density() const {
-    if (!is_neo_hookean()) return density_;
-    const double mu = moduli_.lame.mu, lambda = moduli_.lame.lambda;
-    return J_ > 0 ? mu / 2 * (F_.squaredNorm() - Dim - 2 * log_J_) + lambda / 2 * log_J_ * log_J_
-                  : std::numeric_limits<double>::infinity();
-  }
-  /// P gradient
-  Vec<Dim> force(const Vec<Dim>& gradient) const {
-    if (!is_neo_hookean()) return stress_ * gradient;
-    const double mu = moduli_.lame.mu, lambda = moduli_.lame.lambda;
-    return mu * F_ * gradient + (lambda * log_J_ - mu) * (inverse_.transpose() * gradient);
-  }
-  /// Of v -> v . d2W/dF2 : (v x gradient)
-  Mat<Dim> stiffness(const Vec<Dim>& gradient) const {
-    Mat<Dim> sum = Mat<Dim>::Zero();
-    if (is_neo_hookean()) {
-      const double mu = moduli_.lame.mu, lambda = moduli_.lame.lambda;
-      const Vec<Dim> h = inverse_.transpose() * gradient;
-      return mu * gradient.squaredNorm() * Mat<Dim>::Identity() + (mu - lambda * log_J_ + lambda) * h * h.transpose();
-    }
-    for (std::size_t k = 0; k < system_.values.size(); ++k) {
-      const Vec<Dim> w = system_.modes[k] * gradient;
-      sum += system_.values[k] * w * w.transpose();
-    }
-    return sum;
-  }
-
- private:
-  bool is_neo_hookean() const { return moduli_.law == MaterialLaw::neo_hookean; }
-  const Mat<Dim>& F_;
-  const ElasticModuli& moduli_;
-  double J_ = 0, log_J_ = 0, density_ = 0;
-  Mat<Dim> inverse_, stress_;
-  EigenSystem<Dim> system_{};
-};
-
-/// Gradient of the shape function of a cell's vertex, from the inverse of its edges.
-template <int Dim>
-Vec<Dim> shape_gradient(const Mat<Dim>& inverse_edges, int k) {
-  if (k == 0) return -inverse_edges.colwise().sum().transpose();
-  return inverse_edges.row(k - 1).transpose();
-}
 
 /// Energy of cells, and what it does when one of their vertices moves.
 template <int Dim>
@@ -109,12 +53,12 @@ class QuadraticModel {
     add_inertia_and_load(cell, kNone);
   }
   /// The same where its corner `moving` moves; the response is the cell's.
-  void add_cell(const CellAt& cell, const ElasticResponse<Dim>& response, int moving) {
+  void add_cell(const CellAt& cell, const ElasticPoint<Dim>& response, int moving) {
     const double s = context_.scaling, V = cell.volume;
-    const Vec<Dim> gradient = shape_gradient<Dim>(cell.inverse, moving);
+    const Vec<Dim> gradient = barycentric_gradient<Dim>(cell.inverse, moving);
     energy_ += s * V * response.density();
-    gradient_ += s * V * response.force(gradient);
-    hessian_ += s * V * response.stiffness(gradient);
+    gradient_ += s * V * response.gradient(gradient);
+    hessian_ += s * V * response.hessian(gradient);
     add_inertia_and_load(cell, moving);
   }
   /// `moving`: the corner that moves, or kNone.
@@ -123,7 +67,7 @@ class QuadraticModel {
     if (moving == kNone)
       add_cell(cell);
     else
-      add_cell(cell, ElasticResponse<Dim>(cell.F, cell.moduli), moving);
+      add_cell(cell, ElasticPoint<Dim>(cell.F, cell.moduli), moving);
   }
 
   /// What splitting a cell of constant moduli at the middle of its edge from corner `a` to `b` changes: both halves deform
@@ -133,17 +77,17 @@ class QuadraticModel {
     const ElasticModuli moduli = elastic_moduli<Dim>(material, at.rest[0]);
     const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
     const Mat<Dim> F = edge_matrix<Dim>(at.x) * inverse;
-    const ElasticResponse<Dim> response(F, moduli);
-    const Vec<Dim> ga = shape_gradient<Dim>(inverse, a), gb = shape_gradient<Dim>(inverse, b);
+    const ElasticPoint<Dim> response(F, moduli);
+    const Vec<Dim> ga = barycentric_gradient<Dim>(inverse, a), gb = barycentric_gradient<Dim>(inverse, b);
     const double sV = context_.scaling * mesh.volume(c), mass = material.density * mesh.volume(c);
-    gradient_ += sV * response.force(ga + gb);
-    hessian_ += 2 * sV * (response.stiffness(ga) + response.stiffness(gb));
+    gradient_ += sV * response.gradient(ga + gb);
+    hessian_ += 2 * sV * (response.hessian(ga) + response.hessian(gb));
     if (context_.has_inertia) {
-      Vec<Dim> total = (at.x[a] - at.predictor[a] + at.x[b] - at.predictor[b]) / 2;
+      const ElementMass<Dim> matrix(context_.mass, mass);
+      Vec<Dim> total = Vec<Dim>::Zero();
       for (int k = 0; k <= Dim; ++k) total += at.x[k] - at.predictor[k];
-      const double share = mass / ((Dim + 1) * (Dim + 2));
-      gradient_ += share * total;
-      hessian_.diagonal().array() += 2 * share;
+      gradient_ += matrix.product(total, Vec<Dim>((at.x[a] - at.predictor[a] + at.x[b] - at.predictor[b]) / 2));
+      hessian_.diagonal().array() += matrix.diagonal();
     }
     if (!context_.loads.acceleration) return;
     add_load(at.rest, at.x, -context_.scaling * mass, context_.loads.acceleration, kNone);
@@ -187,7 +131,7 @@ class QuadraticModel {
 
   void add_facet(const std::array<Vec<Dim>, Dim>& rest, const std::array<Vec<Dim>, Dim>& x, int tag, int moving) {
     for (const auto& [loaded, traction] : context_.loads.tractions)
-      if (loaded == tag) add_load(rest, x, context_.scaling * area(rest), traction, moving);
+      if (loaded == tag) add_load(rest, x, context_.scaling * facet_area(rest), traction, moving);
   }
 
   double energy() const { return energy_; }
@@ -217,26 +161,20 @@ class QuadraticModel {
     if (context_.loads.acceleration)
       add_load(cell.at.rest, cell.at.x, context_.scaling * cell.mass, context_.loads.acceleration, moving);
   }
-  /// As LoadEnergy does it.
   template <std::size_t N>
   void add_load(const std::array<Vec<Dim>, N>& rest, const std::array<Vec<Dim>, N>& x, double weight,
                 const std::function<Vec<Dim>(const Vec<Dim>&)>& load, int moving) {
-    constexpr double kNear = near_vertex<N>(), kFar = (1 - kNear) / (N - 1);
-    Vec<Dim> X_sum = Vec<Dim>::Zero(), u_sum = Vec<Dim>::Zero();
+    using Point = LoadPoint<N>;
+    std::array<Vec<Dim>, N> u;
+    Vec<Dim> sum = Vec<Dim>::Zero();
     for (std::size_t k = 0; k < N; ++k) {
-      X_sum += rest[k];
-      u_sum += x[k] - rest[k];
+      u[k] = x[k] - rest[k];
+      sum += u[k];
     }
-    for (std::size_t q = 0; q < N; ++q) {
-      const Vec<Dim> force = weight / N * load(kFar * X_sum + (kNear - kFar) * rest[q]);
-      energy_ -= force.dot(kFar * u_sum + (kNear - kFar) * (x[q] - rest[q]));
-      if (moving != kNone) gradient_ -= (static_cast<int>(q) == moving ? kNear : kFar) * force;
-    }
-  }
-  static double area(const std::array<Vec<2>, 2>& p) { return (p[1] - p[0]).norm(); }
-  static double area(const std::array<Vec<3>, 3>& p) {
-    const Vec<3> a = p[1] - p[0], b = p[2] - p[0];
-    return 0.5 * std::sqrt(std::max(0.0, a.squaredNorm() * b.squaredNorm() - a.dot(b) * a.dot(b)));
+    for_each_load_point<Dim>(rest, weight, load, [&](std::size_t q, const Vec<Dim>& force) {
+      energy_ -= force.dot(Point::at(q, u, sum));
+      if (moving != kNone) gradient_ -= (static_cast<int>(q) == moving ? Point::kNear : Point::kFar) * force;
+    });
   }
 
   void add_inertia(const Corners& at, double mass, int moving) {
@@ -247,13 +185,11 @@ class QuadraticModel {
       total += d;
       squares += d.squaredNorm();
     }
-    const bool lumped = context_.mass == MassKind::lumped;
-    const double share = lumped ? mass / (Dim + 1) : mass / ((Dim + 1) * (Dim + 2));
-    energy_ += 0.5 * share * (squares + (lumped ? 0 : total.squaredNorm()));
+    const ElementMass<Dim> matrix(context_.mass, mass);
+    energy_ += matrix.energy(total, squares);
     if (moving == kNone) return;
-    const Vec<Dim> d = at.x[moving] - at.predictor[moving];
-    gradient_ += share * (lumped ? d : Vec<Dim>(total + d));
-    hessian_.diagonal().array() += lumped ? share : 2 * share;
+    gradient_ += matrix.product(total, Vec<Dim>(at.x[moving] - at.predictor[moving]));
+    hessian_.diagonal().array() += matrix.diagonal();
   }
 
   const StepContext<Dim>& context_;
@@ -326,7 +262,7 @@ class MovingModels {
   void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body) {
     const auto corners = corners_of(state_, cell);
     const typename QuadraticModel<Dim>::CellAt at(state_.context, corners, body);
-    const ElasticResponse<Dim> response(at.F, at.moduli);
+    const ElasticPoint<Dim> response(at.F, at.moduli);
     still_.add_cell(at);
     for (int k = 0; k <= Dim; ++k) moving_[index(cell[k])].add_cell(at, response, k);
   }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "energy/elastic/point.hpp"
 #include "itr/fem/mass.hpp"
 #include "mesh/connected_parts.hpp"
 
@@ -56,11 +57,10 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   std::vector<double> energy(mesh.vertex_slots(), context.coupling);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
-    const typename CellSet<Dim>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
+    const auto element = element_of(mesh, c);
     const Material& material = context.materials.at(element.body);
-    const Mat<Dim> F = deformation_gradient<Dim>(element, fields.x);
     const auto moduli = elastic_moduli<Dim>(material, mesh.rest(element.vertices[0]));
-    energy[parts[element.vertices[0]]] += context.scaling * element.volume * elastic_density<Dim>(F, moduli);
+    energy[parts[element.vertices[0]]] += context.scaling * elastic_energy<Dim>(element, fields.x, moduli);
     if (!context.has_inertia) continue;
     const ElementMass<Dim> mass(context.mass, material.density * element.volume);
     Vec<Dim> total = Vec<Dim>::Zero();
@@ -70,7 +70,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
       total += d;
       squares += d.squaredNorm();
     }
-    energy[parts[element.vertices[0]]] += 0.5 * (mass.off * total.squaredNorm() + mass.extra * squares);
+    energy[parts[element.vertices[0]]] += mass.energy(total, squares);
   }
   return *std::max_element(energy.begin(), energy.end());
 }

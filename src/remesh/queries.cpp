@@ -112,9 +112,7 @@ double RemeshQueries<Dim>::roughness(const EdgeKey& edge) const {
     Mat<Dim> sum = Mat<Dim>::Zero();
     double total = 0, squares = 0;
     for (const CellId c : around) {
-      const typename CellSet<Dim>::Element element{mesh_.cell(c), mesh_.body(c), mesh_.volume(c),
-                                                   mesh_.inverse_rest_edges(c)};
-      const Mat<Dim> gradient = deformation_gradient<Dim>(element, field);
+      const Mat<Dim> gradient = deformation_gradient<Dim>(element_of(mesh_, c), field);
       const double w = weight(c);
       sum += w * gradient;
       squares += w * gradient.squaredNorm();

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "itr/energy/elastic/laws.hpp"
+#include "energy/elastic/point.hpp"
 
 namespace itr {
 
@@ -35,11 +35,8 @@ std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>
   for (int c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
     const Material& material = context.materials.at(mesh.body(c));
-    const typename CellSet<Dim>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
-    Vec<Dim> barycenter = Vec<Dim>::Zero();
-    for (const int v : mesh.cell(c)) barycenter += mesh.rest(v) / (Dim + 1);
-    const Mat<Dim> F = deformation_gradient<Dim>(element, fields.x);
-    energies[c] = context.scaling * mesh.volume(c) * elastic_density<Dim>(F, elastic_moduli<Dim>(material, barycenter));
+    const auto moduli = elastic_moduli<Dim>(material, rest_barycenter(mesh, c));
+    energies[c] = context.scaling * elastic_energy<Dim>(element_of(mesh, c), fields.x, moduli);
   }
   return energies;
 }

@@ -52,12 +52,9 @@ Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& ask, VertexId vertex
   for (const CellId c : mesh.cells_of(vertex)) {
     const auto& cell = mesh.cell(c);
     const auto k = std::find(cell.begin(), cell.end(), vertex) - cell.begin();
-    const typename CellSet<Dim>::Element element{cell, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
-    const Vec<Dim> gradient = k == 0 ? Vec<Dim>(-element.inverse_edges.colwise().sum().transpose())
-                                     : Vec<Dim>(element.inverse_edges.row(k - 1).transpose());
-    Vec<Dim> barycenter = Vec<Dim>::Zero();
-    for (const int v : cell) barycenter += mesh.rest(v) / (Dim + 1);
-    const ElasticModuli moduli = elastic_moduli<Dim>(ask.context().materials.at(mesh.body(c)), barycenter);
+    const auto element = element_of(mesh, c);
+    const Vec<Dim> gradient = barycentric_gradient<Dim>(element.inverse_edges, static_cast<int>(k));
+    const ElasticModuli moduli = elastic_moduli<Dim>(ask.context().materials.at(element.body), rest_barycenter(mesh, c));
     const Mat<Dim> F = deformation_gradient<Dim>(element, ask.fields().x);
     const double weight = ask.context().scaling * element.volume;
     sum +=
