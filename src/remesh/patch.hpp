@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "itr/mesh/mesh.hpp"
@@ -10,17 +9,17 @@
 
 namespace itr {
 
-/// The support of a trial, ascending: `options.rings` rings around the seeds, as many whole rings as stay below
-/// `options.max_cells`; with a `relative_volume` also the cells within the ball of that share of the total around `center`
-/// (rest shape), grown to that volume (paper §4.3). Both sides of a comparison use it.
+/// The support of a trial, ascending: `options.rings` rings around the cells that the edit removes, as many whole rings as
+/// stay below `options.max_cells`; with a `relative_volume` at least that share of `total_volume` [m^Dim]. Both sides of a
+/// comparison use it.
 template <int Dim>
-void select_patch(const Mesh<Dim>& mesh, std::span<const CellId> seeds, const Vec<Dim>& center, double total_volume,
-                  const LocalRelaxationOptions& options, Marks& marks, std::vector<CellId>& patch);
+void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, double total_volume,
+                  Marks& marks, std::vector<CellId>& patch);
 template <int Dim>
-std::vector<CellId> select_patch(const Mesh<Dim>& mesh, std::span<const CellId> seeds, const Vec<Dim>& center,
-                                 double total_volume, const LocalRelaxationOptions& options, Marks& marks) {
+std::vector<CellId> select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options,
+                                 double total_volume, Marks& marks) {
   std::vector<CellId> patch;
-  select_patch(mesh, seeds, center, total_volume, options, marks, patch);
+  select_patch(mesh, edit, options, total_volume, marks, patch);
   return patch;
 }
 

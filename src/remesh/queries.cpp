@@ -113,16 +113,16 @@ double RemeshQueries<Dim>::largest_poisson_ratio(std::span<const CellId> cells) 
 }
 
 template <int Dim>
-void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const Vec<Dim>& center, double tolerance,
-                               const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const {
+void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local,
+                               LocalScratch<Dim>& scratch) const {
   const ScopedTimer timer(trial.seconds);
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
-  TrialOptions options{.required = context_.scaling * tolerance, .local = local};
+  TrialOptions options{.required = context_.scaling * tolerance, .total_volume = total_volume_, .local = local};
   if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth && edit.value)
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;
-  preview<Dim>(state, gate_, edit, center, total_volume_, options, scratch, trial.verdict);
+  preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);
 }
 

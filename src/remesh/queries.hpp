@@ -73,8 +73,7 @@ class RemeshQueries {
            at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
   }
   /// Decides about the edit of a trial that has to gain `tolerance` [J].
-  void judge(Trial<Dim>& trial, const Vec<Dim>& center, double tolerance, const LocalRelaxationOptions& local,
-             LocalScratch<Dim>& scratch) const;
+  void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
 
  private:
   RemeshState<Dim> state() const { return {mesh_, fields_, context_, gate_.present(), options_.history}; }

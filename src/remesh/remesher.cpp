@@ -2,7 +2,6 @@
 #include "itr/remesh/remesher.hpp"
 
 #include "prospect.hpp"
-#include "ranking.hpp"
 #include "session.hpp"
 
 namespace itr {
@@ -23,13 +22,12 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   RemeshReport& report = session.report();
   for (int sweep = 0; sweep < options.sweeps; ++sweep) {
     const int before = report.accepted();
-    EdgeRanks ranks;
-    if (options.screening == Screening::energy_percentile) ranks = rank_edges(mesh, fields, context, options);
+    session.culling().rank(session.ask());
     if (by_size) {
       follow_sizing_field(session);
     } else {
-      if (may_split) split_edges(session, ranks);
-      if (options.collapse.enabled) collapse_edges(session, ranks);
+      if (may_split) split_edges(session);
+      if (options.collapse.enabled) collapse_edges(session);
     }
     if (may_stir && (has_to_stir || report.accepted() > 0)) {
       session.memory().mark_gains();

@@ -12,19 +12,18 @@ namespace {
 template <int Dim>
 class Splitter {
  public:
-  Splitter(RemeshSession<Dim>& session, EdgeRanks& ranks)
+  explicit Splitter(RemeshSession<Dim>& session)
       : session_(session),
         ask_(session.ask()),
         options_(ask_.options().split),
         tolerance_(options_.acceptance_tolerance.value()),
-        count_(session.report().splits),
-        ranks_(ranks) {}
+        count_(session.report().splits) {}
 
   // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the same
   // with fewer vertices: verification/paper.)
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
     if (session_.memory().depth(edge) >= options_.max_depth) return std::nullopt;
-    if (is_culled() && inherited(edge) != Rank::top) return std::nullopt;
+    if (!session_.culling().may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_split(edge);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
@@ -42,7 +41,7 @@ class Splitter {
     trial.edit = make_split(ask_.mesh(), edge);
     if (!trial.in_contact && is_hopeless(trial.edit->removed_cells, trial.signal))  // there trials tell
       return trial.refuse(Refusal::prediction);
-    ask_.judge(trial, trial.edit->value->rest, tolerance_, ask_.options().local, scratch);
+    ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
@@ -71,17 +70,11 @@ class Splitter {
   Refusal refuse(const EdgeKey& edge) const {
     return session_.memory().depth(edge) >= options_.max_depth ? Refusal::depth : ask_.refuse_split(edge);
   }
-  bool is_culled() const { return ask_.options().screening == Screening::energy_percentile; }
   void note_refused(double gain) {
     double& best = session_.report().best_refused_gain;
     if (gain > best) best = gain;
   }
   bool is_hopeless(std::span<const CellId> cells, double gain) const { return ask_.is_hopeless(cells, gain, tolerance_); }
-
-  Rank inherited(const EdgeKey& edge) const {
-    const auto it = ranks_.find(edge);
-    return it == ranks_.end() ? Rank::middle : it->second;
-  }
 
   /// Bulk terms alone tell when a refused split can have become worthwhile; in contact any change may have done it.
   void remember(const Trial<Dim>& trial) {
@@ -97,12 +90,11 @@ class Splitter {
 
   /// Rank and depth of the edges at the new vertex.
   void inherit(const EdgeKey& edge, VertexId created) {
-    const Rank from = inherited(edge);
     const int generation = session_.memory().depth(edge) + 1;
     const auto ring = ask_.mesh().cells_of(created);
     for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ring)) {
       if (near[0] != created && near[1] != created) continue;
-      if (is_culled()) ranks_[near] = from;
+      session_.culling().inherit(edge, near);
       session_.memory().set_depth(near, generation);
     }
   }
@@ -112,19 +104,18 @@ class Splitter {
   const SplitOptions& options_;
   double tolerance_;  ///< [J]
   OperationCount& count_;
-  EdgeRanks& ranks_;
 };
 
 }  // namespace
 
 template <int Dim>
-void split_edges(RemeshSession<Dim>& session, EdgeRanks& ranks) {
-  Splitter<Dim> splitter(session, ranks);
+void split_edges(RemeshSession<Dim>& session) {
+  Splitter<Dim> splitter(session);
   run_waves(session, splitter, session.ask().mesh().edges());
   session.memory().forget_depths();
 }
 
-template void split_edges(RemeshSession<2>&, EdgeRanks&);
-template void split_edges(RemeshSession<3>&, EdgeRanks&);
+template void split_edges(RemeshSession<2>&);
+template void split_edges(RemeshSession<3>&);
 
 }  // namespace itr

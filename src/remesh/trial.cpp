@@ -69,8 +69,8 @@ double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, Loca
 }
 
 template <int Dim>
-void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
-             double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
+void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const TrialOptions& options,
+             LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
   verdict.clear();
   verdict.refusal = Refusal::invalid;
   if (!gate.passes(edit, scratch.gate)) return;
@@ -102,7 +102,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
       if (is_refused_on_star(state.history)) return;
     }
   }
-  select_patch<Dim>(state.mesh, edit.removed_cells, center, total_volume, options.local, scratch.patch, verdict.patch);
+  select_patch<Dim>(state.mesh, edit, options.local, options.total_volume, scratch.patch, verdict.patch);
   if (is_enough) {
     LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
     verdict.touches_contact = after.touches_contact();
@@ -119,10 +119,10 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   if (!verdict.accepted()) verdict.refusal = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                       \
-  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);              \
-  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const Vec<Dim>&, double, \
-                             const TrialOptions&, LocalScratch<Dim>&, Verdict<Dim>&);
+#define ITR_INSTANTIATE(Dim)                                                                                   \
+  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);          \
+  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const TrialOptions&, \
+                             LocalScratch<Dim>&, Verdict<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE
