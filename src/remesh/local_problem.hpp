@@ -111,6 +111,7 @@ class LocalProblem {
   void add_loaded_facets();
   void hold_vertices();
   void find_contacts();
+  void find_stars_of_touching();
   void add_surface();
   void find_what_changes();
   ConstVectorView gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, KeptVector& values) const;
