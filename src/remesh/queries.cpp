@@ -25,14 +25,6 @@ std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cel
 }
 
 template <int Dim>
-bool RemeshQueries<Dim>::is_surface(const EdgeKey& e) const {
-  const auto facets = mesh_.facets_of(e[0]);
-  return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
-    return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end();
-  });
-}
-
-template <int Dim>
 Refusal RemeshQueries<Dim>::refuse_split(const EdgeKey& e) const {
   if (!exists(e)) return Refusal::gone;
   const double length = rest_length(e), dhat = context_.contact.activation_distance;
@@ -56,11 +48,8 @@ template <int Dim>
 bool RemeshQueries<Dim>::is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
   if (!has_contact()) return false;
   const double dhat = context_.contact.activation_distance;
-  const auto facets = mesh_.facets_of(e[0]);
-  return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
-    return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() &&
-           scratch.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch.hits);
-  });
+  return any_facet_at(
+      e, [&](FacetId f) { return scratch.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch.hits); });
 }
 
 template <int Dim>

@@ -38,7 +38,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   }
   fields.trim(mesh.vertex_slots());
   report.trial_seconds = session.commits().median_trial_seconds();
-  memory = session.memory().remembered(mesh);
+  memory = session.memory().remembered(session.ask());
   return report;
 }
 
