@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The record of what commits change, against the meshes before and after.
-#include "remesh/change_log.hpp"
+#include "remesh/schedule/change_log.hpp"
 
 #include <gtest/gtest.h>
 

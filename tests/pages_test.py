@@ -142,7 +142,7 @@ class Architecture(unittest.TestCase):
         self.assertEqual(found, {name.split("::")[-1] for name in re.findall(r"`([\w:]+)`", reasons)})
 
     def test_reasons_of_refusals_are_on_their_page(self):
-        names = re.search(r"kNames\[\] = \{(.*?)\}", (SOURCE / "src/remesh/edit_checks.cpp").read_text(), re.DOTALL).group(1)
+        names = re.search(r"kNames\[\] = \{(.*?)\}", (SOURCE / "src/remesh/edits/edit_checks.cpp").read_text(), re.DOTALL).group(1)
         page = (SOURCE / "REMESHING.md").read_text().partition("## Why an operation was refused")[2]
         for name in set(re.findall(r"\w+", names)) - {"none", "not_asked", "gone"}:  # these are not counted
             self.assertIn(f"`{name}`", page)

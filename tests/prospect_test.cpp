@@ -4,10 +4,10 @@
 
 #include <Eigen/Geometry>
 
-#include "remesh/gate.hpp"
-#include "remesh/local_problem.hpp"
-#include "remesh/patch.hpp"
-#include "remesh/prospect.hpp"
+#include "remesh/contact/gate.hpp"
+#include "remesh/decide/local_problem.hpp"
+#include "remesh/decide/patch.hpp"
+#include "remesh/decide/prospect.hpp"
 #include "remesh_options.hpp"
 #include "tet_scene.hpp"
 

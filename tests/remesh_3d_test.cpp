@@ -10,9 +10,9 @@
 #include "itr/geometry/intersection.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "remesh/patch.hpp"
-#include "remesh/prediction.hpp"
-#include "remesh/trial.hpp"
+#include "remesh/decide/patch.hpp"
+#include "remesh/decide/prediction.hpp"
+#include "remesh/decide/trial.hpp"
 #include "remesh_options.hpp"
 #include "tet_scene.hpp"
 

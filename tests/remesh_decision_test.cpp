@@ -9,7 +9,7 @@
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
-#include "remesh/patch.hpp"
+#include "remesh/decide/patch.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

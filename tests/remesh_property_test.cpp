@@ -13,7 +13,7 @@
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
-#include "remesh/patch.hpp"
+#include "remesh/decide/patch.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

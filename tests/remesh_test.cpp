@@ -9,8 +9,8 @@
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
-#include "remesh/patch.hpp"
-#include "remesh/prediction.hpp"
+#include "remesh/decide/patch.hpp"
+#include "remesh/decide/prediction.hpp"
 #include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"
 

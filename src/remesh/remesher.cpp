@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "itr/remesh/remesher.hpp"
 
-#include "prospect.hpp"
-#include "session.hpp"
+#include "remesh/decide/prospect.hpp"
+#include "remesh/schedule/session.hpp"
 
 namespace itr {
 

@@ -4,8 +4,8 @@
 #include <benchmark/benchmark.h>
 
 #include "bodies.hpp"
-#include "remesh/prediction.hpp"
-#include "remesh/trial.hpp"
+#include "remesh/decide/prediction.hpp"
+#include "remesh/decide/trial.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "marks.hpp"
+#include "remesh/marks.hpp"
 #include "surface_index.hpp"
 
 namespace itr {

@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include "contact_reach.hpp"
-#include "gate.hpp"
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/remesh/fields.hpp"
-#include "marks.hpp"
+#include "remesh/contact/contact_reach.hpp"
+#include "remesh/contact/gate.hpp"
+#include "remesh/marks.hpp"
 
 namespace itr {
 

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "committer.hpp"
-#include "culling.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "queries.hpp"
+#include "remesh/baselines/culling.hpp"
+#include "remesh/decide/queries.hpp"
 #include "session_memory.hpp"
 
 namespace itr {

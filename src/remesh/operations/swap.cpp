@@ -3,8 +3,8 @@
 #include <span>
 #include <unordered_map>
 
-#include "edit_checks.hpp"
-#include "wave.hpp"
+#include "remesh/edits/edit_checks.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 

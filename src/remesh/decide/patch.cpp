@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "patch_volume.hpp"
+#include "remesh/baselines/patch_volume.hpp"
 
 namespace itr {
 

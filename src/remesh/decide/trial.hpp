@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "gate.hpp"
 #include "itr/remesh/edits.hpp"
 #include "local_problem.hpp"
-#include "queue.hpp"
+#include "remesh/contact/gate.hpp"
+#include "remesh/schedule/queue.hpp"
 
 namespace itr {
 

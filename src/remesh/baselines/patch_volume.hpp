@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "itr/mesh/mesh.hpp"
-#include "marks.hpp"
+#include "remesh/marks.hpp"
 
 namespace itr {
 

@@ -7,7 +7,7 @@
 
 #include "change_log.hpp"
 #include "itr/remesh/memory.hpp"
-#include "queries.hpp"
+#include "remesh/decide/queries.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 
 #include <unordered_map>
 
-#include "queries.hpp"
+#include "remesh/decide/queries.hpp"
 
 namespace itr {
 

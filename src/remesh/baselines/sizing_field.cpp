@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "edit_checks.hpp"
 #include "itr/geometry/distance.hpp"
-#include "session.hpp"
+#include "remesh/edits/edit_checks.hpp"
+#include "remesh/schedule/session.hpp"
 
 namespace itr {
 

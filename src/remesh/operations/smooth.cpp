@@ -9,7 +9,7 @@
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
-#include "wave.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 

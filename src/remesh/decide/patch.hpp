@@ -5,7 +5,7 @@
 
 #include "itr/mesh/mesh.hpp"
 #include "itr/remesh/options.hpp"
-#include "marks.hpp"
+#include "remesh/marks.hpp"
 
 namespace itr {
 

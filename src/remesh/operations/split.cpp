@@ -3,7 +3,7 @@
 #include <span>
 
 #include "itr/remesh/edits.hpp"
-#include "wave.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "itr/remesh/edits.hpp"
-#include "wave.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 
