@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "ranking.hpp"
+#include "culling.hpp"
 
 #include <algorithm>
 
@@ -9,24 +9,7 @@ namespace itr {
 
 namespace {
 
-/// Thresholds of one energy field over the edges, and ranks by them.
-class Thresholds {
- public:
-  Thresholds(std::vector<double> energies, const RemeshOptions& options) {
-    if (energies.empty()) return;
-    std::sort(energies.begin(), energies.end());
-    const double low = energies.front(), range = energies.back() - low, s = options.split.culling_threshold;
-    const auto index = std::min(energies.size() - 1, static_cast<std::size_t>(s * static_cast<double>(energies.size())));
-    top_ = std::max(std::min(low + range * s, energies[index]), std::min(1e-12, options.split.acceptance_tolerance.value()));
-    bottom_ = low + range * options.collapse.culling_threshold;
-  }
-  Rank operator()(double energy) const {
-    return energy >= top_ ? Rank::top : energy <= bottom_ ? Rank::bottom : Rank::middle;
-  }
-
- private:
-  double top_ = 0, bottom_ = 0;
-};
+constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges
 
 /// Elastic energy times the scaling, a cell.
 template <int Dim>
@@ -85,12 +68,35 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
 
 }  // namespace
 
+/// Thresholds of one energy field over the edges, and ranks by them.
 template <int Dim>
-EdgeRanks rank_edges(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
-                     const RemeshOptions& options) {
+class Culling<Dim>::Thresholds {
+ public:
+  Thresholds(std::vector<double> energies, const RemeshOptions& options) {
+    if (energies.empty()) return;
+    std::sort(energies.begin(), energies.end());
+    const double low = energies.front(), range = energies.back() - low, s = options.split.culling_threshold;
+    const auto index = std::min(energies.size() - 1, static_cast<std::size_t>(s * static_cast<double>(energies.size())));
+    top_ = std::max(std::min(low + range * s, energies[index]), std::min(1e-12, options.split.acceptance_tolerance.value()));
+    bottom_ = low + range * options.collapse.culling_threshold;
+  }
+  Rank operator()(double energy) const {
+    return energy >= top_ ? Rank::top : energy <= bottom_ ? Rank::bottom : Rank::middle;
+  }
+
+ private:
+  double top_ = 0, bottom_ = 0;
+};
+
+template <int Dim>
+void Culling<Dim>::rank(const RemeshQueries<Dim>& ask) {
+  is_on_ = ask.options().screening == Screening::energy_percentile;
+  if (!is_on_) return;
+  tiny_ = kTinyEdge * ask.context().shortest_edge;
+  const Mesh<Dim>& mesh = ask.mesh();
   const auto edges = mesh.edges();
-  const auto of_cells = cell_energies(mesh, fields, context);
-  const auto of_vertices = vertex_contact_energies(mesh, fields, context);
+  const auto of_cells = cell_energies(mesh, ask.fields(), ask.context());
+  const auto of_vertices = vertex_contact_energies(mesh, ask.fields(), ask.context());
   std::vector<double> elastic, contact;
   for (const EdgeKey& edge : edges) {
     double sum = 0;
@@ -101,26 +107,21 @@ EdgeRanks rank_edges(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, con
         ++count;
       }
     elastic.push_back(sum / count);
-    const auto facets = mesh.facets_of(edge[0]);
-    const bool on_surface = std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
-      return std::find(mesh.facet(f).begin(), mesh.facet(f).end(), edge[1]) != mesh.facet(f).end();
-    });
-    contact.push_back(on_surface ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
+    contact.push_back(ask.is_surface(edge) ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
   }
   const bool touching = std::any_of(contact.begin(), contact.end(), [](double e) { return e > 0; });
-  const Thresholds by_elastic(elastic, options), by_contact(contact, options);
-  EdgeRanks ranks;
-  ranks.reserve(edges.size());
+  const Thresholds by_elastic(elastic, ask.options()), by_contact(contact, ask.options());
+  ranks_.clear();
+  ranks_.reserve(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const Rank a = by_elastic(elastic[i]), b = touching ? by_contact(contact[i]) : a;
-    ranks[edges[i]] = a == Rank::top || b == Rank::top         ? Rank::top
-                      : a == Rank::bottom && b == Rank::bottom ? Rank::bottom
-                                                               : Rank::middle;
+    ranks_[edges[i]] = a == Rank::top || b == Rank::top         ? Rank::top
+                       : a == Rank::bottom && b == Rank::bottom ? Rank::bottom
+                                                                : Rank::middle;
   }
-  return ranks;
 }
 
-template EdgeRanks rank_edges(const Mesh<2>&, const RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&);
-template EdgeRanks rank_edges(const Mesh<3>&, const RemeshFields<3>&, const StepContext<3>&, const RemeshOptions&);
+template class Culling<2>;
+template class Culling<3>;
 
 }  // namespace itr

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "itr/remesh/edits.hpp"
-#include "wave.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 
@@ -17,13 +17,12 @@ bool is_to_be_curved(const EdgeKey& key) { return key[0] > key[1]; }
 template <int Dim>
 class Refiner {
  public:
-  Refiner(RemeshSession<Dim>& session, EdgeRanks& ranks)
+  explicit Refiner(RemeshSession<Dim>& session)
       : session_(session),
         ask_(session.ask()),
         options_(ask_.options().split),
         tolerance_(options_.acceptance_tolerance.value()),
-        curve_tolerance_(ask_.options().curve.acceptance_tolerance.value_or(tolerance_)),
-        ranks_(ranks) {}
+        curve_tolerance_(ask_.options().curve.acceptance_tolerance.value_or(tolerance_)) {}
 
   /// What there is to ask of these edges.
   std::vector<EdgeKey> candidates(std::vector<EdgeKey> edges) const {
@@ -40,7 +39,7 @@ class Refiner {
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
     if (is_to_be_curved(edge)) return rank_curve(edge, scratch);
     if (session_.memory().depth(edge) >= options_.max_depth) return std::nullopt;
-    if (is_culled() && inherited(edge) != Rank::top) return std::nullopt;
+    if (!session_.culling().may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_split(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
@@ -61,7 +60,7 @@ class Refiner {
     trial.edit = make_split(ask_.mesh(), edge);
     if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, trial.signal, tolerance_))  // there trials tell
       return trial.refuse(Refusal::prediction);
-    ask_.judge(trial, trial.edit->value->rest, tolerance_, ask_.options().local, scratch);
+    ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
@@ -116,8 +115,7 @@ class Refiner {
     trial.edit = make_curve(ask_.mesh(), edge);
     if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_))
       return trial.refuse(Refusal::prediction);
-    const Vec<Dim> center = 0.5 * (ask_.mesh().rest(edge[0]) + ask_.mesh().rest(edge[1]));
-    ask_.judge(trial, center, curve_tolerance_, ask_.options().local, scratch);
+    ask_.judge(trial, curve_tolerance_, ask_.options().local, scratch);
   }
 
   /// By how many nodes a split enlarges the space.
@@ -130,15 +128,9 @@ class Refiner {
   Refusal refuse(const EdgeKey& edge) const {
     return session_.memory().depth(edge) >= options_.max_depth ? Refusal::depth : ask_.refuse_split(edge);
   }
-  bool is_culled() const { return ask_.options().screening == Screening::energy_percentile; }
   void note_refused(double gain) {
     double& best = session_.report().best_refused_gain;
     if (gain > best) best = gain;
-  }
-
-  Rank inherited(const EdgeKey& edge) const {
-    const auto it = ranks_.find(edge);
-    return it == ranks_.end() ? Rank::middle : it->second;
   }
 
   /// Bulk terms alone tell when a refused split can have become worthwhile; in contact any change may have done it.
@@ -157,12 +149,11 @@ class Refiner {
 
   /// Rank and depth of the edges at the new vertex.
   void inherit(const EdgeKey& edge, VertexId created) {
-    const Rank from = inherited(edge);
     const int generation = session_.memory().depth(edge) + 1;
     const auto ring = ask_.mesh().cells_of(created);
     for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ring)) {
       if (near[0] != created && near[1] != created) continue;
-      if (is_culled()) ranks_[near] = from;
+      session_.culling().inherit(edge, near);
       session_.memory().set_depth(near, generation);
     }
   }
@@ -171,19 +162,18 @@ class Refiner {
   const RemeshQueries<Dim>& ask_;
   const SplitOptions& options_;
   double tolerance_, curve_tolerance_;  ///< [J]
-  EdgeRanks& ranks_;
 };
 
 }  // namespace
 
 template <int Dim>
-void refine_edges(RemeshSession<Dim>& session, EdgeRanks& ranks) {
-  Refiner<Dim> refiner(session, ranks);
+void refine_edges(RemeshSession<Dim>& session) {
+  Refiner<Dim> refiner(session);
   run_waves(session, refiner, refiner.candidates(session.ask().mesh().edges()));
   session.memory().forget_depths();
 }
 
-template void refine_edges(RemeshSession<2>&, EdgeRanks&);
-template void refine_edges(RemeshSession<3>&, EdgeRanks&);
+template void refine_edges(RemeshSession<2>&);
+template void refine_edges(RemeshSession<3>&);
 
 }  // namespace itr

@@ -26,14 +26,6 @@ std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cel
 }
 
 template <int Dim>
-bool RemeshQueries<Dim>::is_surface(const EdgeKey& e) const {
-  const auto facets = mesh_.facets_of(e[0]);
-  return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
-    return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end();
-  });
-}
-
-template <int Dim>
 Refusal RemeshQueries<Dim>::refuse_split(const EdgeKey& e) const {
   if (!exists(e)) return Refusal::gone;
   const double length = rest_length(e), dhat = context_.contact.activation_distance;
@@ -84,11 +76,8 @@ template <int Dim>
 bool RemeshQueries<Dim>::is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
   if (!has_contact()) return false;
   const double dhat = context_.contact.activation_distance;
-  const auto facets = mesh_.facets_of(e[0]);
-  return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
-    return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() &&
-           scratch.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch.hits);
-  });
+  return any_facet_at(
+      e, [&](FacetId f) { return scratch.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch.hits); });
 }
 
 template <int Dim>
@@ -139,17 +128,17 @@ double RemeshQueries<Dim>::largest_poisson_ratio(std::span<const CellId> cells) 
 }
 
 template <int Dim>
-void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const Vec<Dim>& center, double tolerance,
-                               const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const {
+void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local,
+                               LocalScratch<Dim>& scratch) const {
   const ScopedTimer timer(trial.seconds);
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
-  TrialOptions options{.required = context_.scaling * tolerance, .local = local};
+  TrialOptions options{.required = context_.scaling * tolerance, .total_volume = total_volume_, .local = local};
   if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth &&
       (edit.value || !edit.inserted_nodes.empty()))
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;
-  preview<Dim>(state, gate_, edit, center, total_volume_, options, scratch, trial.verdict);
+  preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);
 }
 

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "marks.hpp"
+#include "remesh/marks.hpp"
 #include "surface_index.hpp"
 
 namespace itr {
@@ -20,10 +20,9 @@ class Neighbourhoods {
  public:
   using Hits = typename SurfaceIndex<Dim>::Hits;
   struct Near {
-    int piece;        ///< a facet, or of_obstacle(primitive)
+    SurfaceId piece;
     double distance;  ///< see distance_below [m]
   };
-  static constexpr int of_obstacle(int primitive) { return kNone - 1 - primitive; }  ///< and back
 
   /// All that the facet could touch nearer than `radius` [m], at most the surface's span, and perhaps more.
   std::span<const Near> near(const SurfaceIndex<Dim>& surface, FacetId f, double radius, Hits& hits);
@@ -63,10 +62,11 @@ class ContactReach {
         continue;
       }
       for (const auto& [other, distance] : neighbourhoods.near(surface, own_[i].facet, dhat + 2 * room_, hits)) {
-        const bool is_obstacle = other < 0;
-        if ((!is_obstacle && is_gone(other)) || distance >= reach(own_[i].moves, !is_obstacle && moves(other))) continue;
+        const bool is_facet = !other.is_of_obstacle();
+        const int number = other.number();
+        if ((is_facet && is_gone(number)) || distance >= reach(own_[i].moves, is_facet && moves(number))) continue;
         mark(own_[i].piece);
-        mark(is_obstacle ? surface.obstacle_piece(Neighbourhoods<Dim>::of_obstacle(other)) : surface.piece(other));
+        mark(is_facet ? surface.piece(number) : surface.obstacle_piece(number));
       }
     }
     sort();
@@ -76,8 +76,8 @@ class ContactReach {
   /// Holds all of the surface that could have made a difference.
   const Box<Dim>& read() const { return read_; }
   /// Vertices of what can touch, ascending by their ids in pieces.
-  const std::vector<int>& touching() const { return touching_; }
-  bool touches(int id) const { return std::binary_search(touching_.begin(), touching_.end(), id); }
+  const std::vector<SurfaceId>& touching() const { return touching_; }
+  bool touches(SurfaceId id) const { return std::binary_search(touching_.begin(), touching_.end(), id); }
 
  private:
   struct Own {
@@ -111,7 +111,7 @@ class ContactReach {
   std::vector<Own> own_;
   Marks known_;
   std::vector<int> own_of_;  ///< by facet, where it is known
-  std::vector<int> touching_;
+  std::vector<SurfaceId> touching_;
   double dhat_ = 0, room_ = 0;
   Box<Dim> read_;
 };

@@ -25,10 +25,10 @@ struct Comparison {
   Box<Dim> surface_read{};
 };
 
-/// `settle`, called with the side after the edit where it gains `required`, may go on with it.
-template <int Dim, typename Settle>
+/// `accept`, called with the side after the edit where it gains `required`, may go on with it.
+template <int Dim, typename Accept>
 Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, double required,
-                        int iterations, int contact_iterations, LocalScratch<Dim>& scratch, const Settle& settle) {
+                        int iterations, int contact_iterations, LocalScratch<Dim>& scratch, const Accept& accept) {
   LocalProblem<Dim> before(state, patch, edit, false, scratch);
   LocalProblem<Dim> after(state, patch, edit, true, scratch);
   Comparison<Dim> result;
@@ -42,7 +42,7 @@ Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> p
   result.gain = energy_before - energy_after;
   // The side without the edit gets the same effort, so that residual left over elsewhere is not credited to the edit.
   if (result.gain >= required && before.has_unknowns()) result.gain = before.relax(effort).energy - energy_after;
-  if (result.gain >= required) settle(after);
+  if (result.gain >= required) accept(after);
   return result;
 }
 
@@ -69,12 +69,18 @@ double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, Loca
 }
 
 template <int Dim>
-void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
-             double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
+void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const TrialOptions& options,
+             LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
   verdict.clear();
   verdict.refusal = Refusal::invalid;
   if (!gate.passes(edit, scratch.gate)) return;
-  const auto finish = [&](LocalProblem<Dim>& after) {
+  const auto note = [&](const Comparison<Dim>& found, Refusal refusal) {
+    verdict.refusal = refusal;
+    verdict.gain = found.gain;
+    verdict.touches_contact = found.touches_contact;
+    verdict.surface_read.include(found.surface_read);
+  };
+  const auto accept = [&](LocalProblem<Dim>& after) {
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
     verdict.refusal = Refusal::none;
     after.get_positions(verdict.positions);
@@ -82,47 +88,38 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   bool is_enough = false;
   if (options.patch_over_vertex > 0) {
     find_star(state.mesh, edit, scratch.star);
-    const auto is_refused_on_star = [&](HistoryRule history) {
+    // History that the new mesh cannot represent takes the longest to find, so the first of two checks leaves it out.
+    const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
+    for (int check = is_nested ? 1 : 0; check < 2; ++check) {
+      const HistoryRule history = check == 0 ? HistoryRule::interpolated : state.history;
       const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
+      is_enough = false;
       const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, kBoundIterations,
                                       kBoundContactIterations, scratch, [&](auto&) { is_enough = true; });
+      note(bound, Refusal::bound);
       const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();
-      verdict.refusal = Refusal::bound;
-      verdict.gain = bound.gain;
-      verdict.touches_contact = bound.touches_contact;
-      verdict.surface_read.include(bound.surface_read);
-      return at_most(bound.gain, surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex) <
-             options.required;
-    };
-    // History that the new mesh cannot represent takes the longest to find, so the first check leaves it out.
-    const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
-    if (is_refused_on_star(is_nested ? state.history : HistoryRule::interpolated)) return;
-    if (!is_nested) {
-      is_enough = false;
-      if (is_refused_on_star(state.history)) return;
+      const double factor = surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex;
+      if (at_most(bound.gain, factor) < options.required) return;
     }
   }
-  select_patch<Dim>(state.mesh, edit.removed_cells, center, total_volume, options.local, scratch.patch, verdict.patch);
+  select_patch<Dim>(state.mesh, edit, options.local, options.total_volume, scratch.patch, verdict.patch);
   if (is_enough) {
     LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
     verdict.touches_contact = after.touches_contact();
     verdict.surface_read.include(after.surface_read());
-    finish(after);
-    return;
+    return accept(after);
   }
   const auto found = compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
-                                  options.local.max_contact_iterations, scratch, finish);
-  verdict.gain = found.gain;
-  verdict.touches_contact = found.touches_contact;
-  verdict.surface_read.include(found.surface_read);
+                                  options.local.max_contact_iterations, scratch, accept);
+  const Refusal otherwise = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
+  note(found, verdict.accepted() ? Refusal::none : otherwise);
   verdict.was_relaxed = true;
-  if (!verdict.accepted()) verdict.refusal = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                       \
-  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);              \
-  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const Vec<Dim>&, double, \
-                             const TrialOptions&, LocalScratch<Dim>&, Verdict<Dim>&);
+#define ITR_INSTANTIATE(Dim)                                                                                   \
+  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);          \
+  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const TrialOptions&, \
+                             LocalScratch<Dim>&, Verdict<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

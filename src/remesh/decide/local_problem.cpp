@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "curved_cell.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/projection/forgotten_history.hpp"
+#include "remesh/curved_cell.hpp"
 
 namespace itr {
 
@@ -337,6 +337,30 @@ void LocalProblem<Dim>::find_contacts() {
              [&](FacetId f) { return is_removed(f); });
 }
 
+/// What stands around the vertices of what can touch, ascending: facets that stay and primitives of obstacles.
+template <int Dim>
+void LocalProblem<Dim>::find_stars_of_touching() {
+  std::vector<FacetId>& facets = scratch_.near_facets;
+  std::vector<int>& primitives = scratch_.near_primitives;
+  facets.clear();
+  primitives.clear();
+  const ObstaclePrimitives& obstacles = state_.surface.primitives();
+  scratch_.facets.clear(mesh_.facet_slots());
+  scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
+  for (const SurfaceId id : scratch_.reach.touching()) {
+    if (id == kNewVertex) continue;
+    if (id.is_of_obstacle()) {
+      for (const int i : obstacles.at_vertex[id.number()])
+        if (scratch_.primitives.mark(i)) primitives.push_back(i);
+      continue;
+    }
+    for (const FacetId f : mesh_.facets_of(id.number()))
+      if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
+  }
+  std::sort(facets.begin(), facets.end());
+  std::sort(primitives.begin(), primitives.end());
+}
+
 /// The part of the surface that can touch what changes, with the stars of its vertices: contact is weighted by them.
 template <int Dim>
 void LocalProblem<Dim>::add_surface() {
@@ -366,25 +390,8 @@ void LocalProblem<Dim>::add_surface() {
     for (int k = 0; k < Dim; ++k) ids[k] = local(facet[k]);
     add(ids, Dim);
   };
-  std::vector<FacetId>& facets = scratch_.near_facets;
-  std::vector<int>& primitives = scratch_.near_primitives;
-  facets.clear();
-  primitives.clear();
-  const ObstaclePrimitives& obstacles = state_.surface.primitives();
-  scratch_.facets.clear(mesh_.facet_slots());
-  scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
-  for (const int id : reach.touching()) {
-    if (id == kNewVertex) continue;
-    if (id < 0) {
-      for (const int i : obstacles.at_vertex[SurfacePiece<Dim>::id_of_obstacle(id)])
-        if (scratch_.primitives.mark(i)) primitives.push_back(i);
-      continue;
-    }
-    for (const FacetId f : mesh_.facets_of(id))
-      if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
-  }
-  std::sort(facets.begin(), facets.end());
-  for (const FacetId f : facets) {
+  find_stars_of_touching();
+  for (const FacetId f : scratch_.near_facets) {
     add_facet(mesh_.facet(f));
     for (const VertexId v : mesh_.facet(f)) surface_read_.include(state_.surface.at(v));
   }
@@ -392,8 +399,8 @@ void LocalProblem<Dim>::add_surface() {
     for (const auto& facet : edit_.inserted_facets)
       if (std::any_of(facet.vertices.begin(), facet.vertices.end(), [&](int v) { return reach.touches(v); }))
         add_facet(facet.vertices);
-  std::sort(primitives.begin(), primitives.end());
-  for (const int i : primitives) {
+  const ObstaclePrimitives& obstacles = state_.surface.primitives();
+  for (const int i : scratch_.near_primitives) {
     std::array<int, 3> ids{};
     for (int k = 0; k < obstacles.all[i].size; ++k) ids[k] = local({Kind::of_obstacle, obstacles.all[i].vertices[k]});
     add(ids, obstacles.all[i].size);

@@ -6,7 +6,7 @@
 
 #include "change_log.hpp"
 #include "itr/remesh/report.hpp"
-#include "trial.hpp"
+#include "remesh/decide/trial.hpp"
 
 namespace itr {
 

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "contact_reach.hpp"
-#include "curved_cell.hpp"
 #include "itr/geometry/predicates.hpp"
+#include "remesh/curved_cell.hpp"
 
 namespace itr {
 
@@ -100,6 +100,27 @@ std::array<Vec<3>, 4> between_diagonals(const Mesh<3>& mesh, const SurfaceIndex<
 }
 std::array<Vec<2>, 3> between_diagonals(const Mesh<2>&, const SurfaceIndex<2>&, const Edit<2>&) { return {}; }
 
+/// What the surface sweeps over. Two vertices move on the way to the new surface, both to the target: the one that is set
+/// and the one that disappears.
+template <int Dim>
+void find_swept(const Mesh<Dim>& mesh, const SurfaceIndex<Dim>& surface, const Edit<Dim>& edit, const Vec<Dim>& target,
+                std::vector<std::array<Vec<Dim>, Dim + 1>>& swept) {
+  swept.clear();
+  if (edit.kind == Edit<Dim>::Kind::swap) swept.push_back(between_diagonals(mesh, surface, edit));
+  const VertexId set = edit.value ? edit.value->vertex : kNone;
+  for (const FacetId f : edit.removed_facets) {
+    std::array<Vec<Dim>, Dim + 1> simplex;
+    int moving = 0;
+    for (int k = 0; k < Dim; ++k) {
+      const VertexId v = mesh.facet(f)[k];
+      simplex[k] = surface.at(v);
+      moving += v == set || v == edit.removed_vertex;
+    }
+    simplex[Dim] = target;
+    if (moving > 0) swept.push_back(simplex);
+  }
+}
+
 }  // namespace
 
 template <int Dim>
@@ -153,20 +174,7 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
     for (const VertexId v : mesh_.facet(f)) box.include(surface.at(v));
   surface.query(box, scratch.hits);
 
-  // Two vertices move on the way to the new surface, both to the target: the one that is set and the one that disappears.
-  scratch.swept.clear();
-  if (edit.kind == Edit<Dim>::Kind::swap) scratch.swept.push_back(between_diagonals(mesh_, surface, edit));
-  for (const FacetId f : edit.removed_facets) {
-    std::array<Vec<Dim>, Dim + 1> simplex;
-    int moving = 0;
-    for (int k = 0; k < Dim; ++k) {
-      const VertexId v = mesh_.facet(f)[k];
-      simplex[k] = surface.at(v);
-      moving += v == set || v == edit.removed_vertex;
-    }
-    simplex[Dim] = target;
-    if (moving > 0) scratch.swept.push_back(simplex);
-  }
+  find_swept<Dim>(mesh_, surface, edit, target, scratch.swept);
   const auto is_swept = [&](const Vec<Dim>& point) {
     return std::any_of(scratch.swept.begin(), scratch.swept.end(),
                        [&](const auto& simplex) { return lies_in<Dim>(point, simplex); });
@@ -199,7 +207,7 @@ bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& conf
   for (const int i : scratch.hits.obstacles) {
     SurfacePiece<Dim> piece;
     for (const int v : primitives_.all[i].ids()) {
-      piece.add(surface.obstacle_at(v), SurfacePiece<Dim>::id_of_obstacle(v));
+      piece.add(surface.obstacle_at(v), SurfaceId::of_obstacle(v));
       if (is_swept(surface.obstacle_at(v))) return false;
     }
     if (!is_free_of(piece)) return false;

@@ -44,7 +44,9 @@ std::span<const typename Neighbourhoods<Dim>::Near> Neighbourhoods<Dim>::near(co
   if (is_wide && entry.stamp == surface.stamp(f)) return entry.near;
   // Where the facet is where it was, only what has changed around it is looked at.
   const bool is_there = is_wide && surface.changed(f) <= entry.stamp;
-  const auto has_changed = [&](int other) { return other >= 0 && surface.changed(other) > entry.stamp; };
+  const auto has_changed = [&](SurfaceId other) {
+    return !other.is_of_obstacle() && surface.changed(other.number()) > entry.stamp;
+  };
   if (is_there)
     std::erase_if(entry.near, [&](const Near& known) { return has_changed(known.piece); });
   else
@@ -52,14 +54,14 @@ std::span<const typename Neighbourhoods<Dim>::Near> Neighbourhoods<Dim>::near(co
   entry.radius = std::max(entry.radius, radius);
   const SurfacePiece<Dim> piece = surface.piece(f);
   surface.query(piece.box.inflated(entry.radius), hits);
-  const auto look_at = [&](int other, const SurfacePiece<Dim>& there) {
+  const auto look_at = [&](SurfaceId other, const SurfacePiece<Dim>& there) {
     const double distance = distance_below(piece, there, entry.radius);
     if (distance < entry.radius) entry.near.push_back({other, distance});
   };
   for (const FacetId other : hits.facets)
     if (other != f && (!is_there || has_changed(other))) look_at(other, surface.piece(other));
   if (!is_there)
-    for (const int i : hits.obstacles) look_at(of_obstacle(i), surface.obstacle_piece(i));
+    for (const int i : hits.obstacles) look_at(SurfaceId::of_obstacle(i), surface.obstacle_piece(i));
   std::sort(entry.near.begin(), entry.near.end(), [](const Near& a, const Near& b) { return a.piece < b.piece; });
   entry.stamp = surface.stamp(f);
   return entry.near;

@@ -66,7 +66,7 @@ SurfacePiece<Dim> SurfaceIndex<Dim>::piece(FacetId f) const {
 template <int Dim>
 SurfacePiece<Dim> SurfaceIndex<Dim>::obstacle_piece(int primitive) const {
   SurfacePiece<Dim> piece;
-  for (const int v : primitives_->all[primitive].ids()) piece.add(obstacle_at(v), SurfacePiece<Dim>::id_of_obstacle(v));
+  for (const int v : primitives_->all[primitive].ids()) piece.add(obstacle_at(v), SurfaceId::of_obstacle(v));
   return piece;
 }
 

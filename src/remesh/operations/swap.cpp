@@ -3,8 +3,8 @@
 #include <span>
 #include <unordered_map>
 
-#include "edit_checks.hpp"
-#include "wave.hpp"
+#include "remesh/edits/edit_checks.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 
@@ -103,8 +103,7 @@ class Swapper {
     trial.is_asked = true;
     if (!trial.in_contact && !is_promising(ask_, *trial.edit, least))  // there trials tell
       return trial.refuse(Refusal::prediction);
-    const Vec<Dim> center = 0.5 * (ask_.mesh().rest(edge[0]) + ask_.mesh().rest(edge[1]));
-    ask_.judge(trial, center, least, ask_.options().local, scratch);
+    ask_.judge(trial, least, ask_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
@@ -149,10 +148,9 @@ void remove_facets(RemeshSession<3>& session) {
       const auto& cells = proposal.edit->removed_cells;
       if (std::min(cells[0], cells[1]) != c || shape_gain(mesh, *proposal.edit) < 1 / kBetter) continue;
       if (!is_promising(ask, *proposal.edit, least)) continue;
-      const Vec<3> center = (mesh.rest(facet[0]) + mesh.rest(facet[1]) + mesh.rest(facet[2])) / 3;
       Trial<3> trial{.candidate = {.edge = proposal.edit->edge, .priority = 0}, .edit = std::move(proposal.edit)};
       session.commits().begin_wave();
-      ask.judge(trial, center, least, ask.options().local, session.scratch());
+      ask.judge(trial, least, ask.options().local, session.scratch());
       session.report().swaps.note(trial.verdict.refusal);
       session.commits().commit(trial, session.report().swaps);
     }

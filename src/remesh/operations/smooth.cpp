@@ -9,7 +9,7 @@
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
-#include "wave.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 
@@ -83,7 +83,7 @@ class Mover {
     if (!trial.take(propose_move<Dim>(mesh_, ask_.strata(), trial.edge()[0], target))) return;
     if (ask_.is_hopeless(trial.edit->removed_cells, ask_.predict(*trial.edit), tolerance))
       return trial.refuse(Refusal::prediction);
-    ask_.judge(trial, target, tolerance, one_ring_, scratch);
+    ask_.judge(trial, tolerance, one_ring_, scratch);
   }
   /// `same`: the change of the signal by which it is asked again.
   void settle(Trial<Dim>& trial, RemeshMemory::Kind kind, double same) {

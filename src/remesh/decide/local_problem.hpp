@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include "contact_reach.hpp"
-#include "gate.hpp"
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/remesh/fields.hpp"
-#include "marks.hpp"
+#include "remesh/contact/contact_reach.hpp"
+#include "remesh/contact/gate.hpp"
+#include "remesh/marks.hpp"
 
 namespace itr {
 
@@ -122,6 +122,7 @@ class LocalProblem {
   template <typename Hold>
   void hold_node(std::size_t i, const EdgeKey& edge, const Hold& hold_components);
   void find_contacts();
+  void find_stars_of_touching();
   void add_surface();
   void find_what_changes();
   ConstVectorView gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, KeptVector& values) const;

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "gate.hpp"
 #include "itr/remesh/edits.hpp"
 #include "local_problem.hpp"
-#include "queue.hpp"
+#include "remesh/contact/gate.hpp"
+#include "remesh/schedule/queue.hpp"
 
 namespace itr {
 
@@ -63,6 +63,7 @@ struct Trial {
 struct TrialOptions {
   double required = 0;           ///< least gain [J, times the scaling]
   double patch_over_vertex = 0;  ///< see prediction.hpp; 0: bounds decide nothing
+  double total_volume = 0;       ///< of the bodies at rest [m^Dim]
   LocalRelaxationOptions local;
 };
 
@@ -72,8 +73,8 @@ struct TrialOptions {
 /// gain is too little, it refuses. A trial on a patch decides the rest. Once scratch and verdict have served for similar
 /// edits, only the history that an edit forgets, damping, pressure and terms of the program allocate memory.
 template <int Dim>
-void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const Vec<Dim>& center,
-             double total_volume, const TrialOptions& options, LocalScratch<Dim>& scratch, Verdict<Dim>& verdict);
+void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const TrialOptions& options,
+             LocalScratch<Dim>& scratch, Verdict<Dim>& verdict);
 
 /// Returns only the lower bound: the gain of the edit if the only vertices that move have all their cells among the edit's
 /// own or around the vertex that it sets. [J, times the scaling]

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <compare>
 
 #include "itr/geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
@@ -11,22 +12,34 @@
 
 namespace itr {
 
+/// The number of a vertex or facet of the mesh, or of a vertex or primitive of the obstacles: these come first in order.
+class SurfaceId {
+ public:
+  constexpr SurfaceId() = default;
+  constexpr SurfaceId(int of_mesh) : code_(of_mesh) {}
+  static constexpr SurfaceId of_obstacle(int number) { return kNone - 1 - number; }
+  constexpr bool is_of_obstacle() const { return code_ < kNone; }
+  constexpr int number() const { return is_of_obstacle() ? kNone - 1 - code_ : code_; }
+  auto operator<=>(const SurfaceId&) const = default;
+
+ private:
+  int code_ = kNone;
+};
+
 /// Positions [m] and ids, which say what corners two pieces share.
 template <int Dim>
 struct SurfacePiece {
   std::array<Vec<Dim>, 3> p;
-  std::array<int, 3> id{kNone, kNone, kNone};
+  std::array<SurfaceId, 3> id{};
   int size = 0;
   Box<Dim> box;
 
-  /// Of the obstacles' vertices, and back; those of the mesh keep theirs.
-  static constexpr int id_of_obstacle(int v) { return kNone - 1 - v; }
-  void add(const Vec<Dim>& point, int number) {
+  void add(const Vec<Dim>& point, SurfaceId number) {
     p[size] = point;
     id[size++] = number;
     box.include(point);
   }
-  bool has(int number) const { return std::find(id.begin(), id.begin() + size, number) != id.begin() + size; }
+  bool has(SurfaceId number) const { return std::find(id.begin(), id.begin() + size, number) != id.begin() + size; }
 };
 
 /// Least distance of a vertex and an edge (2D), a vertex and a triangle or two edges (3D) of two pieces, without a common

@@ -10,8 +10,8 @@
 #include "itr/core/parallel.hpp"
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "queries.hpp"
-#include "ranking.hpp"
+#include "remesh/baselines/culling.hpp"
+#include "remesh/decide/queries.hpp"
 #include "session_memory.hpp"
 
 namespace itr {
@@ -28,6 +28,8 @@ class RemeshSession {
   SessionMemory<Dim>& memory() { return memory_; }
   const SessionMemory<Dim>& memory() const { return memory_; }
   Committer<Dim>& commits() { return commits_; }
+  Culling<Dim>& culling() { return culling_; }
+  const Culling<Dim>& culling() const { return culling_; }
   RemeshReport& report() { return report_; }
 
   /// Whether badly shaped cells at an edge (a vertex {v, kNone}) do harm. They do where the fields vary enough, where an
@@ -60,16 +62,16 @@ class RemeshSession {
   RemeshQueries<Dim> ask_;
   SessionMemory<Dim> memory_;
   Committer<Dim> commits_;
+  Culling<Dim> culling_;
   std::deque<LocalScratch<Dim>> lanes_;
   RemeshReport report_;
 };
 
-/// The operations, one file each; splits and curves share one queue. They count what they do in session.report(). `ranks`
-/// (of the paper's culling; empty where it is not asked for) are inherited by the edges that splits make.
+/// The operations, one file each; splits and curves share one queue. They count what they do in session.report().
 template <int Dim>
-void refine_edges(RemeshSession<Dim>& session, EdgeRanks& ranks);
+void refine_edges(RemeshSession<Dim>& session);
 template <int Dim>
-void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks);
+void collapse_edges(RemeshSession<Dim>& session);
 /// In 3D: edges are removed such that the energy of the new cells is least, then facets (2-3 swaps).
 void swap_edges(RemeshSession<2>& session);
 void swap_edges(RemeshSession<3>& session);

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "edit_checks.hpp"
 #include "itr/geometry/distance.hpp"
-#include "session.hpp"
+#include "remesh/edits/edit_checks.hpp"
+#include "remesh/schedule/session.hpp"
 
 namespace itr {
 
@@ -130,7 +130,8 @@ class SizingField {
     };
     for (const FacetId f : ask_.mesh().facets_of(vertex)) {
       const auto own = piece(f);
-      const auto at = static_cast<int>(std::find(own.now.id.begin(), own.now.id.end(), vertex) - own.now.id.begin());
+      const auto at =
+          static_cast<int>(std::find(own.now.id.begin(), own.now.id.end(), SurfaceId(vertex)) - own.now.id.begin());
       for (const auto& other : pieces_in_contact(f)) {
         look_at(own, at, other);
         for (int k = 0; k < other.now.size; ++k) look_at(other, k, own);
@@ -156,14 +157,14 @@ class SizingField {
     std::vector<Piece> pieces;
     for (const auto& [other, distance] : scratch.neighbourhoods.near(surface, f, dhat, scratch.hits)) {
       if (distance >= dhat) continue;
-      if (other >= 0) {
-        pieces.push_back(piece(other));
+      if (!other.is_of_obstacle()) {
+        pieces.push_back(piece(other.number()));
         continue;
       }
-      const int primitive = Neighbourhoods<Dim>::of_obstacle(other);
+      const int primitive = other.number();
       Piece& obstacle = pieces.emplace_back(Piece{surface.obstacle_piece(primitive), {}});
       for (const int v : surface.primitives().all[primitive].ids())
-        obstacle.rest.add(ask_.context().obstacles.rest[v], SurfacePiece<Dim>::id_of_obstacle(v));
+        obstacle.rest.add(ask_.context().obstacles.rest[v], SurfaceId::of_obstacle(v));
     }
     return pieces;
   }

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "queries.hpp"
-
 namespace itr {
 
 template <int Dim>
@@ -23,15 +21,12 @@ void SessionMemory<Dim>::follow(const Mesh<Dim>& mesh, const Change<Dim>& change
 }
 
 template <int Dim>
-RemeshMemory SessionMemory<Dim>::remembered(const Mesh<Dim>& mesh) const {
+RemeshMemory SessionMemory<Dim>::remembered(const RemeshQueries<Dim>& ask) const {
   RemeshMemory memory;
-  const auto is_there = [&](const EdgeKey& edge) {
-    return mesh.is_vertex_alive(edge[0]) && (edge[1] == kNone || mesh.are_joined(edge[0], edge[1]));
-  };
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     auto& list = memory.refusals[kind];
     for (const auto& [edge, range] : refused_[kind])
-      if (is_there(edge)) list.push_back({edge, range});
+      if (ask.exists(edge)) list.push_back({edge, range});
     std::sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.edge < y.edge; });
   }
   return memory;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <unordered_map>
 #include <vector>
@@ -50,7 +49,7 @@ class EdgeQueue {
       const auto it = last_.find(entry.edge);
       if (it == last_.end()) return entry;
       if (it->second != entry.priority) continue;  // moved, or popped since
-      it->second = std::numeric_limits<double>::quiet_NaN();
+      it->second.reset();
       return entry;
     }
     return std::nullopt;
@@ -66,7 +65,8 @@ class EdgeQueue {
     return a.priority != b.priority ? a.priority < b.priority : a.edge > b.edge;
   }
   std::vector<Entry> heap_;
-  std::unordered_map<EdgeKey, double, EdgeKeyHash> last_;  ///< priorities of edges that did not come first; NaN: popped
+  /// Priorities of edges that did not come first; none: popped.
+  std::unordered_map<EdgeKey, std::optional<double>, EdgeKeyHash> last_;
 };
 
 }  // namespace itr

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "local_problem.hpp"
+#include "remesh/decide/local_problem.hpp"
 
 namespace itr {
 

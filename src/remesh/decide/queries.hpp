@@ -3,6 +3,7 @@
 // several threads may ask, each with a scratch of its own.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -45,7 +46,9 @@ class RemeshQueries {
     if (e[1] == kNone) return mesh_.is_vertex_alive(e[0]);
     return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && mesh_.are_joined(e[0], e[1]);
   }
-  bool is_surface(const EdgeKey& e) const;
+  bool is_surface(const EdgeKey& e) const {
+    return any_facet_at(e, [](FacetId) { return true; });
+  }
   /// Why an edge, by its lengths, cannot be split or may not collapse.
   Refusal refuse_split(const EdgeKey& e) const;
   Refusal refuse_collapse(const EdgeKey& e) const;
@@ -77,10 +80,16 @@ class RemeshQueries {
            at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
   }
   /// Decides about the edit of a trial that has to gain `tolerance` [J].
-  void judge(Trial<Dim>& trial, const Vec<Dim>& center, double tolerance, const LocalRelaxationOptions& local,
-             LocalScratch<Dim>& scratch) const;
+  void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
 
  private:
+  template <typename Condition>
+  bool any_facet_at(const EdgeKey& e, const Condition& holds) const {
+    const auto facets = mesh_.facets_of(e[0]);
+    return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
+      return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() && holds(f);
+    });
+  }
   RemeshState<Dim> state() const { return {mesh_, fields_, context_, gate_.present(), options_.history}; }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
 

@@ -4,27 +4,25 @@
 #include <limits>
 
 #include "itr/remesh/edits.hpp"
-#include "wave.hpp"
+#include "remesh/schedule/wave.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
-
 template <int Dim>
 class Collapser {
  public:
-  Collapser(RemeshSession<Dim>& session, const EdgeRanks& ranks)
+  explicit Collapser(RemeshSession<Dim>& session)
       : session_(session),
         ask_(session.ask()),
         options_(ask_.options().collapse),
-        tolerance_(options_.acceptance_tolerance.value()),
-        ranks_(ranks) {}
+        tolerance_(options_.acceptance_tolerance.value()) {}
 
   /// Shortest first.
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
-    if (!is_candidate(edge) || ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
+    if (!session_.culling().may_collapse(edge, ask_.rest_length(edge)) || ask_.refuse_collapse(edge) != Refusal::none)
+      return std::nullopt;
     return EdgeQueue::Entry{.edge = edge, .priority = -ask_.rest_length(edge)};
   }
 
@@ -39,7 +37,7 @@ class Collapser {
     if (!trial.take(propose_collapse(ask_.mesh(), ask_.strata(), edge))) return;
     if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, ask_.predict(*trial.edit), tolerance_))
       return trial.refuse(Refusal::prediction);
-    ask_.judge(trial, trial.edit->value->rest, tolerance_, ask_.options().local, scratch);
+    ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
@@ -64,30 +62,22 @@ class Collapser {
   }
 
  private:
-  bool is_candidate(const EdgeKey& edge) const {
-    if (ask_.options().screening != Screening::energy_percentile) return true;
-    const auto it = ranks_.find(edge);
-    return (it != ranks_.end() && it->second == Rank::bottom) ||
-           ask_.rest_length(edge) < kTinyEdge * ask_.context().shortest_edge;
-  }
-
   RemeshSession<Dim>& session_;
   const RemeshQueries<Dim>& ask_;
   const CollapseOptions& options_;
   double tolerance_;  ///< [J]
-  const EdgeRanks& ranks_;
 };
 
 }  // namespace
 
 template <int Dim>
-void collapse_edges(RemeshSession<Dim>& session, const EdgeRanks& ranks) {
-  Collapser<Dim> collapser(session, ranks);
+void collapse_edges(RemeshSession<Dim>& session) {
+  Collapser<Dim> collapser(session);
   run_waves(session, collapser, session.ask().mesh().edges());
   session.memory().forget_depths();
 }
 
-template void collapse_edges(RemeshSession<2>&, const EdgeRanks&);
-template void collapse_edges(RemeshSession<3>&, const EdgeRanks&);
+template void collapse_edges(RemeshSession<2>&);
+template void collapse_edges(RemeshSession<3>&);
 
 }  // namespace itr
