@@ -324,7 +324,7 @@ class Minimizer {
     return false;
   }
 
-  PsdProjection projection() const { return options_.absolute_eigenvalues ? PsdProjection::absolute : PsdProjection::clamp; }
+  PsdProjection projection() const { return PsdProjection::clamp; }
 
   bool try_direction(PsdProjection psd, double shift) {
     {

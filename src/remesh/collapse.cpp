@@ -10,8 +10,6 @@ namespace itr {
 
 namespace {
 
-constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges: shorter ones may collapse whatever their rank
-
 template <int Dim>
 class Collapser {
  public:
@@ -66,8 +64,7 @@ class Collapser {
   bool is_candidate(const EdgeKey& edge) const {
     if (session_.options().screening != Screening::energy_percentile) return true;
     const auto it = ranks_.find(edge);
-    return (it != ranks_.end() && it->second == Rank::bottom) ||
-           session_.rest_length(edge) < kTinyEdge * session_.context().shortest_edge;
+    return it != ranks_.end() && it->second == Rank::bottom;
   }
 
   RemeshSession<Dim>& session_;

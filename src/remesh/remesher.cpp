@@ -21,22 +21,18 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   if (!may_split && !may_collapse && !has_to_stir && !by_size) return {};
   RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();
-  for (int sweep = 0; sweep < options.sweeps; ++sweep) {
-    const int before = report.accepted();
-    EdgeRanks ranks;
-    if (options.screening == Screening::energy_percentile) ranks = rank_edges(mesh, fields, context, options);
-    if (by_size) {
-      follow_sizing_field(session);
-    } else {
-      if (may_split) split_edges(session, ranks);
-      if (options.collapse.enabled) collapse_edges(session, ranks);
-    }
-    if (may_stir && (has_to_stir || report.accepted() > 0)) {
-      session.mark_gains();
-      if (options.swap.enabled) swap_edges(session);
-      if (options.smooth.enabled) smooth_vertices(session);
-    }
-    if (report.accepted() == before) break;
+  EdgeRanks ranks;
+  if (options.screening == Screening::energy_percentile) ranks = rank_edges(mesh, fields, context, options);
+  if (by_size) {
+    follow_sizing_field(session);
+  } else {
+    if (may_split) split_edges(session, ranks);
+    if (options.collapse.enabled) collapse_edges(session, ranks);
+  }
+  if (may_stir && (has_to_stir || report.accepted() > 0)) {
+    session.mark_gains();
+    if (options.swap.enabled) swap_edges(session);
+    if (options.smooth.enabled) smooth_vertices(session);
   }
   fields.trim(mesh.vertex_slots());
   report.trial_seconds = session.median_trial_seconds();
