@@ -9,7 +9,6 @@ namespace itr {
 
 namespace {
 
-constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges
 
 /// Elastic energy times the scaling, a cell.
 template <int Dim>
@@ -92,7 +91,6 @@ template <int Dim>
 void Culling<Dim>::rank(const RemeshQueries<Dim>& ask) {
   is_on_ = ask.options().screening == Screening::energy_percentile;
   if (!is_on_) return;
-  tiny_ = kTinyEdge * ask.context().shortest_edge;
   const Mesh<Dim>& mesh = ask.mesh();
   const auto edges = mesh.edges();
   const auto of_cells = cell_energies(mesh, ask.fields(), ask.context());
