@@ -200,8 +200,8 @@ StepContext<Dim> context_of(unsigned seed) {
   context.has_inertia = seed % 2 == 0;
   context.newton.step_tolerance = 1e-9;
   context.shortest_edge = 0.1;
-  context.loads.acceleration = [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(Dim - 1) * -2); };
-  context.loads.tractions.emplace_back(1, [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(0) * 0.3); });
+  context.loads.acceleration = [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(Dim - 1) * -0.2); };
+  context.loads.tractions.emplace_back(1, [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(0) * 0.03); });
   context.held_components[Dim == 2 ? 2 : 0].fill(true);
   return context;
 }
@@ -240,12 +240,13 @@ struct View {
         state{scene.mesh, scene.fields, context, gate.present(), HistoryRule::function} {}
 };
 
+/// Cells are far from inversions here, so that no energy needs more points of quadrature.
 /// The gain that a patch finds is the fall of the energy of the whole mesh where the edit and its positions are taken over.
 TYPED_TEST(Curved, PatchesSeeWhatTheWholeMeshSees) {
   constexpr int Dim = TypeParam::value;
   int compared = 0, moved_nodes = 0;
   for (unsigned seed = 0; seed < 40; ++seed) {
-    CurvedScene<Dim> scene(seed, seed % 4 == 0 ? 0 : 0.3, 0.01);
+    CurvedScene<Dim> scene(seed, seed % 4 == 0 ? 0 : 0.3, 0.001);
     const StepContext<Dim> context = context_of<Dim>(seed);
     for (int i = 0; i < 6; ++i) {
       const EdgeKey edge = scene.edge();

@@ -404,6 +404,20 @@ void LocalProblem<Dim>::add_surface() {
   complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 
+/// As the solve of the step does: where the points of a cell do not see how near it is to an inversion, there are more.
+template <int Dim>
+void LocalProblem<Dim>::set_quadrature(ConstVectorView x) {
+  ElasticEnergy<Dim>& elastic = *storage_->potential->elastic();
+  if (!state_.fields.levels.empty()) {
+    const std::uint8_t of_new = is_after_ ? state_.fields.level_of_new_cells(edit_) : std::uint8_t{0};
+    QuadratureLevels levels;
+    for (const auto& element : cells_.curved_elements)
+      levels.push_back(element.cell == kNone ? of_new : state_.fields.levels[element.cell]);
+    elastic.set_quadrature_levels(levels);
+  }
+  elastic.refine_quadrature(x);
+}
+
 template <int Dim>
 void LocalProblem<Dim>::add_terms() {
   const StepContext<Dim>& context = state_.context;
@@ -420,6 +434,7 @@ void LocalProblem<Dim>::add_terms() {
   else
     storage_->potential.emplace(context, cells_, history);
   IncrementalPotential<Dim>& potential = *storage_->potential;
+  if (!cells_.curved_elements.empty()) set_quadrature(x);
   // With lumped mass a split changes how inertia is integrated.
   const bool is_nested = !is_after_ || (edit_.is_nested() && context.mass == MassKind::consistent);
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
@@ -489,6 +504,8 @@ NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
   NewtonOptions options = state_.context.newton;
   options.max_iterations = max_iterations;
   NewtonExtras extras{.is_brief = true};
+  if (!cells_.curved_elements.empty())
+    extras.after_step = [&](const VectorX& x) { return storage_->potential->elastic()->refine_quadrature(x); };
   if (options.norm != NewtonNorm::euclidean) {
     VectorView weights = storage_->norm_weights.resize(Dim * cells_.num_vertices);
     get_unit_mass_diagonal(cells_, weights);
