@@ -383,6 +383,45 @@ TYPED_TEST(Curved, RunsChooseTheOrderToo) {
   }
 }
 
+/// Collapses and swaps beside curved edges: the projection of the history stays within straight cells, and keeps momentum.
+TYPED_TEST(Curved, RunsInFreeFlightKeepMomentum) {
+  constexpr int Dim = TypeParam::value;
+  Setup<Dim> setup = bar<Dim>();
+  setup.dirichlet.clear();
+  setup.body_acceleration = nullptr;
+  setup.initial_velocity = {{1, [](const Vec<Dim>& X, double) {
+                               return Vec<Dim>(Vec<Dim>::Unit(0) + 2 * std::sin(1.5 * X[0]) * Vec<Dim>::Unit(1));
+                             }}};
+  setup.newton.step_tolerance = 1e-10;
+  setup.remesh.curve.enabled = true;
+  setup.remesh.split.acceptance_tolerance = Dim == 2 ? 0.2 : 0.1;
+  setup.remesh.collapse.acceptance_tolerance = -0.05;
+  setup.remesh.collapse.rel_max_edge_length = 3;
+  const auto momentum = [&](const State<Dim>& state) {
+    const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+    VectorX product = VectorX::Zero(state.history.v[0].size());
+    InertiaEnergy<Dim>(cells, setup.materials, MassKind::consistent, VectorX::Zero(product.size()))
+        .add_mass_product(state.history.v[0], product);
+    Vec<Dim> sum = Vec<Dim>::Zero();
+    for (Eigen::Index i = 0; i < product.size(); i += Dim) sum += product.segment<Dim>(i);
+    return sum;
+  };
+  setup.choose_defaults();
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  const Vec<Dim> before = momentum(simulation.state());
+  int curves = 0, coarsened = 0;
+  while (!simulation.finished()) {
+    const StepResult step = simulation.advance();
+    ASSERT_TRUE(step.ok) << step.reason;
+    curves += step.report.curves.accepted;
+    coarsened += step.report.collapses.accepted + step.report.swaps.accepted + step.report.smooths.accepted;
+  }
+  EXPECT_GT(curves, 3);
+  EXPECT_GT(coarsened, 3);
+  EXPECT_LT((momentum(simulation.state()) - before).norm(), 1e-9 * before.norm());
+}
+
 /// Without splits the mesh stays; a scene of order 2 splits curved edges.
 TYPED_TEST(Curved, RunsWithOneOfTheTwo) {
   constexpr int Dim = TypeParam::value;
