@@ -451,9 +451,37 @@ void LocalProblem<Dim>::add_terms() {
   potential.add_to(energy_, potential.lag(x, workspace_));
 }
 
+/// The same where an edge is straightened: its node's shape function times by how much the predictor was off the mean of the
+/// ends.
+template <int Dim>
+void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
+  const VectorX& predictor = state_.fields.predictor;
+  const VertexId node = mesh_.node_of(edit_.edge[0], edit_.edge[1]);
+  const auto at = [&](VertexId v) -> Vec<Dim> { return predictor.segment<Dim>(Dim * v); };
+  const Vec<Dim> gap = at(node) - (at(edit_.edge[0]) + at(edit_.edge[1])) / 2;
+  VectorX residual = VectorX::Zero(Dim * static_cast<int>(vertices_.size()));
+  const auto add = [&](VertexId v, double mass) {
+    const auto place = std::find(vertices_.begin(), vertices_.end(), LocalVertex{Kind::of_mesh, v}) - vertices_.begin();
+    residual.segment<Dim>(Dim * place) -= mass * gap;
+  };
+  double loss = 0;
+  for (const CellId c : edit_.removed_cells) {
+    const auto cell = curved_cell<Dim>(mesh_.cell(c), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); });
+    const double mass = state_.context.materials.at(mesh_.body(c)).density * mesh_.volume(c);
+    const auto matrix = quadratic_mass<Dim>(MassKind::consistent, cell.edges);
+    const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+      if (k != n && (k <= Dim || cell.edges >> (k - Dim - 1) & 1)) add(cell.nodes[k], mass * matrix(k, n));
+    for (const VertexId end : edit_.edge) add(end, mass * matrix(n, n) / 2);  // the straight edge moves with its ends
+    loss += 0.5 * mass * matrix(n, n) * gap.squaredNorm();
+  }
+  inertia.set_unrepresented_history(residual, loss);
+}
+
 /// Adds the part of the predictor, a function on the old mesh, that the new mesh cannot represent.
 template <int Dim>
 void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) const {
+  if (edit_.kind == Edit<Dim>::Kind::straighten) return add_history_of_node(inertia);
   // Numbering of the removed cells' own: their vertices carry the functions as they were.
   std::vector<VertexId> old_ids, new_ids;
   std::vector<std::array<int, Dim + 1>> old_cells, new_cells;

@@ -176,6 +176,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   report.best_refused_split = remeshed.best_refused_gain / problem.scaling();
   report.splits = remeshed.splits;
   report.curves = remeshed.curves;
+  report.straightens = remeshed.straightens;
   report.collapses = remeshed.collapses;
   report.swaps = remeshed.swaps;
   report.smooths = remeshed.smooths;
