@@ -283,6 +283,33 @@ TYPED_TEST(Curved, PatchesSeeWhatTheWholeMeshSees) {
   EXPECT_GT(moved_nodes, 100);
 }
 
+/// A straight edge is a curved one with its node at the mean of the ends. So the space after straightening lies in the one
+/// before, and the energy of what it can hold, forgotten history included, is that on the mesh before.
+TYPED_TEST(Curved, StraighteningIsChargedForWhatItForgets) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.5, 0.001);
+    const StepContext<Dim> context = context_of<Dim>(seed);
+    const View<Dim> view(scene, context);
+    LocalScratch<Dim> scratch;
+    const auto nodes = scene.mesh.nodes();
+    if (nodes.empty()) continue;
+    const auto [edge, node] = nodes[scene.random() % nodes.size()];
+    const Edit<Dim> edit = make_straighten(scene.mesh, edge);
+    const double gain = LocalProblem<Dim>(view.state, edit.removed_cells, edit, false, scratch).value() -
+                        LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, scratch).value();
+    const double before = whole_energy(scene.mesh, scene.fields, context);
+    RemeshFields<Dim> straight = scene.fields;
+    const auto at = [&](VertexId v) { return straight.x.template segment<Dim>(Dim * v); };
+    at(node) = (at(edge[0]) + at(edge[1])) / 2;
+    EXPECT_NEAR(gain, before - whole_energy(scene.mesh, straight, context), 1e-11 * std::abs(before) + 1e-13)
+        << "seed " << seed;
+    ++compared;
+  }
+  EXPECT_GT(compared, 30);
+}
+
 /// With a quadratic energy the prediction of a curve is what the new node alone gains.
 TYPED_TEST(Curved, PredictionOfACurveIsWhatItsNodeGains) {
   constexpr int Dim = TypeParam::value;
@@ -396,6 +423,7 @@ TYPED_TEST(Curved, RunsInFreeFlightKeepMomentum) {
   setup.remesh.curve.enabled = true;
   setup.remesh.split.acceptance_tolerance = Dim == 2 ? 0.2 : 0.1;
   setup.remesh.collapse.acceptance_tolerance = -0.05;
+  setup.remesh.straighten.enabled = true;
   setup.remesh.collapse.rel_max_edge_length = 3;
   const auto momentum = [&](const State<Dim>& state) {
     const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
@@ -410,15 +438,17 @@ TYPED_TEST(Curved, RunsInFreeFlightKeepMomentum) {
   linear::Registry registry;
   Simulation<Dim> simulation(setup, registry);
   const Vec<Dim> before = momentum(simulation.state());
-  int curves = 0, coarsened = 0;
+  int curves = 0, coarsened = 0, straightened = 0;
   while (!simulation.finished()) {
     const StepResult step = simulation.advance();
     ASSERT_TRUE(step.ok) << step.reason;
     curves += step.report.curves.accepted;
+    straightened += step.report.straightens.accepted;
     coarsened += step.report.collapses.accepted + step.report.swaps.accepted + step.report.smooths.accepted;
   }
   EXPECT_GT(curves, 3);
   EXPECT_GT(coarsened, 3);
+  EXPECT_GT(straightened, 0);
   EXPECT_LT((momentum(simulation.state()) - before).norm(), 1e-9 * before.norm());
 }
 
