@@ -175,6 +175,7 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
                                                      "energy_before_remesh",
                                                      "splits",
                                                      "curves",
+                                                     "straightens",
                                                      "collapses",
                                                      "swaps",
                                                      "smooths",

@@ -71,7 +71,7 @@ inline std::optional<Edit<2>> random_edit(const Mesh<2>& mesh, std::mt19937& ran
 }
 
 inline std::ostream& operator<<(std::ostream& out, Edit<2>::Kind kind) {
-  constexpr const char* kNames[] = {"split", "collapse", "swap", "smooth"};
+  constexpr const char* kNames[] = {"split", "collapse", "swap", "smooth", "curve", "straighten"};
   return out << kNames[static_cast<int>(kind)];
 }
 inline std::ostream& operator<<(std::ostream& out, HistoryRule rule) {

@@ -14,7 +14,7 @@
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 #include "remesh/curved_cell.hpp"
-#include "remesh/prediction.hpp"
+#include "remesh/decide/prediction.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {
@@ -200,8 +200,8 @@ StepContext<Dim> context_of(unsigned seed) {
   context.has_inertia = seed % 2 == 0;
   context.newton.step_tolerance = 1e-9;
   context.shortest_edge = 0.1;
-  context.loads.acceleration = [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(Dim - 1) * -2); };
-  context.loads.tractions.emplace_back(1, [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(0) * 0.3); });
+  context.loads.acceleration = [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(Dim - 1) * -0.2); };
+  context.loads.tractions.emplace_back(1, [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(0) * 0.03); });
   context.held_components[Dim == 2 ? 2 : 0].fill(true);
   return context;
 }
@@ -240,12 +240,13 @@ struct View {
         state{scene.mesh, scene.fields, context, gate.present(), HistoryRule::function} {}
 };
 
+/// Cells are far from inversions here, so that no energy needs more points of quadrature.
 /// The gain that a patch finds is the fall of the energy of the whole mesh where the edit and its positions are taken over.
 TYPED_TEST(Curved, PatchesSeeWhatTheWholeMeshSees) {
   constexpr int Dim = TypeParam::value;
   int compared = 0, moved_nodes = 0;
   for (unsigned seed = 0; seed < 40; ++seed) {
-    CurvedScene<Dim> scene(seed, seed % 4 == 0 ? 0 : 0.3, 0.01);
+    CurvedScene<Dim> scene(seed, seed % 4 == 0 ? 0 : 0.3, 0.001);
     const StepContext<Dim> context = context_of<Dim>(seed);
     for (int i = 0; i < 6; ++i) {
       const EdgeKey edge = scene.edge();
@@ -280,6 +281,33 @@ TYPED_TEST(Curved, PatchesSeeWhatTheWholeMeshSees) {
   }
   EXPECT_GT(compared, 100);
   EXPECT_GT(moved_nodes, 100);
+}
+
+/// A straight edge is a curved one with its node at the mean of the ends. So the space after straightening lies in the one
+/// before, and the energy of what it can hold, forgotten history included, is that on the mesh before.
+TYPED_TEST(Curved, StraighteningIsChargedForWhatItForgets) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.5, 0.001);
+    const StepContext<Dim> context = context_of<Dim>(seed);
+    const View<Dim> view(scene, context);
+    LocalScratch<Dim> scratch;
+    const auto nodes = scene.mesh.nodes();
+    if (nodes.empty()) continue;
+    const auto [edge, node] = nodes[scene.random() % nodes.size()];
+    const Edit<Dim> edit = make_straighten(scene.mesh, edge);
+    const double gain = LocalProblem<Dim>(view.state, edit.removed_cells, edit, false, scratch).value() -
+                        LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, scratch).value();
+    const double before = whole_energy(scene.mesh, scene.fields, context);
+    RemeshFields<Dim> straight = scene.fields;
+    const auto at = [&](VertexId v) { return straight.x.template segment<Dim>(Dim * v); };
+    at(node) = (at(edge[0]) + at(edge[1])) / 2;
+    EXPECT_NEAR(gain, before - whole_energy(scene.mesh, straight, context), 1e-11 * std::abs(before) + 1e-13)
+        << "seed " << seed;
+    ++compared;
+  }
+  EXPECT_GT(compared, 30);
 }
 
 /// With a quadratic energy the prediction of a curve is what the new node alone gains.
@@ -380,6 +408,48 @@ TYPED_TEST(Curved, RunsChooseTheOrderToo) {
     const ThreadLimit limit(threads);
     expect_same(run<Dim>(setup).state, both.state);
   }
+}
+
+/// Collapses and swaps beside curved edges: the projection of the history stays within straight cells, and keeps momentum.
+TYPED_TEST(Curved, RunsInFreeFlightKeepMomentum) {
+  constexpr int Dim = TypeParam::value;
+  Setup<Dim> setup = bar<Dim>();
+  setup.dirichlet.clear();
+  setup.body_acceleration = nullptr;
+  setup.initial_velocity = {{1, [](const Vec<Dim>& X, double) {
+                               return Vec<Dim>(Vec<Dim>::Unit(0) + 2 * std::sin(1.5 * X[0]) * Vec<Dim>::Unit(1));
+                             }}};
+  setup.newton.step_tolerance = 1e-10;
+  setup.remesh.curve.enabled = true;
+  setup.remesh.split.acceptance_tolerance = Dim == 2 ? 0.2 : 0.1;
+  setup.remesh.collapse.acceptance_tolerance = -0.05;
+  setup.remesh.straighten.enabled = true;
+  setup.remesh.collapse.rel_max_edge_length = 3;
+  const auto momentum = [&](const State<Dim>& state) {
+    const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+    VectorX product = VectorX::Zero(state.history.v[0].size());
+    InertiaEnergy<Dim>(cells, setup.materials, MassKind::consistent, VectorX::Zero(product.size()))
+        .add_mass_product(state.history.v[0], product);
+    Vec<Dim> sum = Vec<Dim>::Zero();
+    for (Eigen::Index i = 0; i < product.size(); i += Dim) sum += product.segment<Dim>(i);
+    return sum;
+  };
+  setup.choose_defaults();
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  const Vec<Dim> before = momentum(simulation.state());
+  int curves = 0, coarsened = 0, straightened = 0;
+  while (!simulation.finished()) {
+    const StepResult step = simulation.advance();
+    ASSERT_TRUE(step.ok) << step.reason;
+    curves += step.report.curves.accepted;
+    straightened += step.report.straightens.accepted;
+    coarsened += step.report.collapses.accepted + step.report.swaps.accepted + step.report.smooths.accepted;
+  }
+  EXPECT_GT(curves, 3);
+  EXPECT_GT(coarsened, 3);
+  EXPECT_GT(straightened, 0);
+  EXPECT_LT((momentum(simulation.state()) - before).norm(), 1e-9 * before.norm());
 }
 
 /// Without splits the mesh stays; a scene of order 2 splits curved edges.

@@ -112,14 +112,15 @@ std::string describe_remeshing(const StepReport& totals, const Units& units, int
     return c.tried > 0 ? fmt::format(", {} of {} {}", c.accepted, c.tried, name) : std::string();
   };
   const std::string done =
-      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}{}{}{}{}{}{}", vertices_before,
-                  totals.vertices, totals.splits.accepted, totals.splits.tried, count(totals.curves, "curved edges"),
+      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}{}{}{}{}{}{}{}{}",
+                  vertices_before, totals.vertices, totals.splits.accepted, totals.splits.tried,
+                  count(totals.curves, "curved edges"), count(totals.straightens, "straightened"),
                   count(totals.collapses, "collapses"), count(totals.swaps, "swaps"), count(totals.smooths, "moves"),
                   describe_refusals(totals.splits, "splits"), describe_refusals(totals.curves, "curved edges"),
-                  describe_refusals(totals.collapses, "collapses"), describe_refusals(totals.swaps, "swaps"),
-                  describe_refusals(totals.smooths, "moves"));
-  const int accepted = totals.splits.accepted + totals.curves.accepted + totals.collapses.accepted + totals.swaps.accepted +
-                       totals.smooths.accepted;
+                  describe_refusals(totals.straightens, "straightened"), describe_refusals(totals.collapses, "collapses"),
+                  describe_refusals(totals.swaps, "swaps"), describe_refusals(totals.smooths, "moves"));
+  const int accepted = totals.splits.accepted + totals.curves.accepted + totals.straightens.accepted +
+                       totals.collapses.accepted + totals.swaps.accepted + totals.smooths.accepted;
   if (accepted > 0) return done;
   const std::string bound = totals.bound_by_dhat > 0
                                 ? fmt::format("; d-hat kept {} surface edges from being split", totals.bound_by_dhat)

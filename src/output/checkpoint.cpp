@@ -98,7 +98,7 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
   return mesh;
 }
 
-constexpr const char* kOperations[RemeshMemory::kKinds] = {"split", "collapse", "swap", "smooth", "reshape", "curve"};
+constexpr const char* kOperations[RemeshMemory::kKinds] = {"split", "collapse", "swap", "smooth", "reshape", "curve", "straighten"};
 constexpr int kRefusalColumns = 5;  ///< two vertices, least and most signal, whether in contact
 
 std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }

@@ -76,14 +76,14 @@ std::string common_members(const StepReport& r) {
   return fmt::format(
       R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"factorizations":{},"linear_solves":{},)"
       R"("reused_factors":{},"linear_iterations":{},"energy":{},"energy_before_remesh":{},)"
-      R"("splits":{},"curves":{},"collapses":{},"swaps":{},"smooths":{},"bound_by_dhat":{},"reverted_remeshes":{},)"
+      R"("splits":{},"curves":{},"straightens":{},"collapses":{},"swaps":{},"smooths":{},"bound_by_dhat":{},"reverted_remeshes":{},)"
       R"("min_distance":{},"min_volume_ratio":{},"history_loss":{},)"
       R"("indefinite":{},"damped_steps":{},"refined_quadrature":{},"seconds":{},"processor_seconds":{},"peak_rss_mb":{})",
       r.vertices, r.elements, r.unknowns, r.newton_iterations, r.factorizations, r.linear_solves, r.reused_factors,
       r.linear_iterations, energy_json(r.energy), number(r.energy_before_remesh), count_json(r.splits), count_json(r.curves),
-      count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), r.bound_by_dhat, r.reverted_remeshes,
-      number(r.min_distance), number(r.min_volume_ratio), number(r.history_loss), r.indefinite, r.damped_steps,
-      r.refined_quadrature, seconds_json(r.seconds), number(r.processor_seconds), number(r.peak_rss_mb));
+      count_json(r.straightens), count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), r.bound_by_dhat,
+      r.reverted_remeshes, number(r.min_distance), number(r.min_volume_ratio), number(r.history_loss), r.indefinite,
+      r.damped_steps, r.refined_quadrature, seconds_json(r.seconds), number(r.processor_seconds), number(r.peak_rss_mb));
 }
 
 }  // namespace
@@ -130,8 +130,12 @@ void for_each_number(Report& r, Visit&& visit) {
                   &r.peak_rss_mb})
     visit(*x);
   // Last: 0.1.0 did not save them.
-  for (auto* x : {&r.curves.tried, &r.curves.relaxed, &r.curves.accepted}) visit(*x);
-  for (auto* count : {&r.splits, &r.curves, &r.collapses, &r.swaps, &r.smooths})
+  for (auto* count : {&r.curves, &r.straightens}) {
+    visit(count->tried);
+    visit(count->relaxed);
+    visit(count->accepted);
+  }
+  for (auto* count : {&r.splits, &r.curves, &r.straightens, &r.collapses, &r.swaps, &r.smooths})
     for (auto& refused : count->refused) visit(refused);
 }
 
@@ -145,7 +149,7 @@ std::vector<double> Totals::save() const {
 
 void Totals::restore(const std::vector<double>& values) {
   const std::size_t expected = save().size();
-  const bool is_of_first_version = values.size() == expected - 3 - 5 * kRefusals;
+  const bool is_of_first_version = values.size() == expected - 6 - 6 * kRefusals;
   if (values.size() != expected && !is_of_first_version)
     throw InputError({"", "saved totals", std::to_string(values.size()) + " numbers", std::to_string(expected)});
   gain_ = values[0];

@@ -8,6 +8,7 @@
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/projection/volume_barrier.hpp"
 
@@ -112,6 +113,11 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem, co
   for (const auto& element : problem.cells.elements)
     for (const int v : element.vertices)
       masses[v] += problem.materials.at(element.body).density * element.volume / (Dim + 1);
+  for (const auto& element : problem.cells.curved_elements) {
+    const auto shares = quadratic_mass<Dim>(MassKind::consistent, element.curved).rowwise().sum().eval();
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // 0 at straight edges
+      masses[element.nodes[k]] += problem.materials.at(element.body).density * element.volume * shares[k];
+  }
   std::vector<Integral> integrals(parts * Dim);
   for (int v = 0; v < patch; ++v)
     for (int c = 0; c < Dim; ++c) {
@@ -124,6 +130,23 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem, co
   std::erase_if(integrals, [](const Integral& integral) { return integral.dofs.empty(); });
   return integrals;
 }
+
+/// Ends steps before a cell with curved edges is inverted; without a barrier, so that a solve may end there.
+template <int Dim>
+class InversionGuard final : public Energy {
+ public:
+  explicit InversionGuard(std::shared_ptr<const ElasticEnergy<Dim>> elastic) : elastic_(std::move(elastic)) {}
+  std::string_view name() const override { return "inversion guard"; }
+  double value(ConstVectorView, Workspace&) const override { return 0; }
+  void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+  double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override {
+    return elastic_->max_step(x, dx, workspace);
+  }
+
+ private:
+  std::shared_ptr<const ElasticEnergy<Dim>> elastic_;
+};
 
 /// What must not become worse on the way from the interpolant.
 template <int Dim>
@@ -149,7 +172,12 @@ Barriers<Dim> barriers_for(const SafeProjectionProblem<Dim>& problem, const Vect
     mass += problem.materials.at(element.body).density * element.volume;
     volume += element.volume;
   }
-  const double size = std::pow(volume / problem.cells.elements.size(), 1.0 / Dim);
+  for (const auto& element : problem.cells.curved_elements) {
+    mass += problem.materials.at(element.body).density * element.volume;
+    volume += element.volume;
+  }
+  const std::size_t count = problem.cells.elements.size() + problem.cells.curved_elements.size();
+  const double size = std::pow(volume / count, 1.0 / Dim);
   Barriers<Dim> barriers{std::make_shared<ElasticEnergy<Dim>>(problem.cells, problem.materials, 1), nullptr, nullptr,
                          least_ratio / 2};
   barriers.volume = std::make_shared<VolumeBarrier<Dim>>(problem.cells, barriers.least_ratio, mass / volume * size * size);
@@ -182,11 +210,17 @@ std::vector<char> near_barriers(const SafeProjectionProblem<Dim>& problem, const
     for (const ContactStencil& pair : barriers.distance->active(end, workspace))
       for (int k = 0; k < pair.size(); ++k) is_near[pair.vertices[k]] = 1;
   }
+  for (const auto& element : problem.cells.curved_elements)
+    if (max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, way)) < 1)
+      for (const int v : element.nodes) is_near[v] = 1;
   for (int ring = 0; ring < problem.rings; ++ring) {
     const std::vector<char> before = is_near;
     for (const auto& element : problem.cells.elements)
       if (std::any_of(element.vertices.begin(), element.vertices.end(), [&](int v) { return before[v]; }))
         for (const int v : element.vertices) is_near[v] = 1;
+    for (const auto& element : problem.cells.curved_elements)
+      if (std::any_of(element.nodes.begin(), element.nodes.end(), [&](int v) { return before[v]; }))
+        for (const int v : element.nodes) is_near[v] = 1;
   }
   return is_near;
 }
@@ -234,6 +268,7 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   EnergySum energy;
   energy.add(std::make_shared<InertiaEnergy<Dim>>(problem.cells, problem.materials, MassKind::consistent, projected));
   energy.add(barriers.volume);
+  if (!problem.cells.curved_elements.empty()) energy.add(std::make_shared<InversionGuard<Dim>>(barriers.inversion));
   if (barriers.distance) energy.add(barriers.distance);
   SparseSystem sparse(solver);
   sparse.reset(dofs, Dim, element_stencils(problem.cells));

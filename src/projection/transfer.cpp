@@ -36,19 +36,83 @@ double cell_mass(const TransferMesh<Dim>& mesh, int cell) {
   return mesh.density[cell] * simplex_volume<Dim>(corners<Dim>(mesh, cell));
 }
 
+/// Whether a cell with these curved edges has its i-th node.
+template <int Dim>
+bool is_node(CurvedEdges curved, int i) {
+  return i <= Dim || curved >> (i - Dim - 1) & 1;
+}
+
+/// Shape functions of all nodes of a cell at barycentric coordinates.
+template <int Dim>
+Vec<kQuadraticNodes<Dim>> shapes_at(CurvedEdges curved, const Vec<Dim + 1>& weights) {
+  std::array<double, Dim + 1> l;
+  for (int k = 0; k <= Dim; ++k) l[k] = weights[k];
+  return quadratic_shapes<Dim>(curved, l);
+}
+
+/// Values of a column at the nodes of a cell.
+template <int Dim>
+Vec<kQuadraticNodes<Dim>> values_in(const TransferMesh<Dim>& mesh, int cell, const MatrixX& u, Eigen::Index column) {
+  const CurvedEdges curved = mesh.curved_edges(cell);
+  Vec<kQuadraticNodes<Dim>> values = Vec<kQuadraticNodes<Dim>>::Zero();
+  for (int i = 0; i <= Dim; ++i) values[i] = u(mesh.cells[cell][i], column);
+  for (int i = Dim + 1; i < kQuadraticNodes<Dim>; ++i)
+    if (is_node<Dim>(curved, i)) values[i] = u(mesh.nodes[cell][i], column);
+  return values;
+}
+
+/// Adds the difference of an old and a new cell where one of them has curved edges.
+template <int Dim>
+void add_curved_difference(const TransferMesh<Dim>& old_mesh, int old_cell, const TransferMesh<Dim>& new_mesh, int new_cell,
+                           const std::vector<OverlapPiece<Dim>>& pieces, const MatrixX& u_old, const MatrixX& u_bar,
+                           TouchedDifference& difference) {
+  const CurvedEdges old_curved = old_mesh.curved_edges(old_cell), new_curved = new_mesh.curved_edges(new_cell);
+  const double density = old_mesh.density[old_cell];
+  for (const OverlapPiece<Dim>& piece : pieces)
+    for (const auto& point : quadrature<Dim>(kMassDegree)) {
+      Vec<Dim + 1> in_new = Vec<Dim + 1>::Zero(), in_old = in_new;
+      for (int k = 0; k <= Dim; ++k) {
+        in_new += point.weights[k] * piece.in_a[k];
+        in_old += point.weights[k] * piece.in_b[k];
+      }
+      const auto new_shapes = shapes_at<Dim>(new_curved, in_new), old_shapes = shapes_at<Dim>(old_curved, in_old);
+      const double weight = density * point.share * piece.volume;
+      for (Eigen::Index column = 0; column < u_old.cols(); ++column) {
+        const double gap = old_shapes.dot(values_in<Dim>(old_mesh, old_cell, u_old, column)) -
+                           new_shapes.dot(values_in<Dim>(new_mesh, new_cell, u_bar, column));
+        for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
+          if (is_node<Dim>(new_curved, i))
+            difference.residual(i <= Dim ? new_mesh.cells[new_cell][i] : new_mesh.nodes[new_cell][i], column) +=
+                weight * new_shapes[i] * gap;
+        difference.squares[column] += weight * gap * gap;
+      }
+    }
+}
+
 /// The density-weighted mass matrix on the entries that are not fixed, under constraints that prescribe moments of the
 /// solution: integrals of rho p u over each connected part for p = 1 and the coordinates.
 template <int Dim>
 class ConstrainedMass {
  public:
   ConstrainedMass(const TransferMesh<Dim>& mesh, std::span<const char> fixed, Eigen::Index columns)
-      : part_(connected_parts<Dim + 1>(mesh.rest.size(), mesh.cells)), columns_(columns) {
+      : part_(parts_of(mesh)), columns_(columns) {
     const auto n = static_cast<Eigen::Index>(mesh.rest.size());
     VectorX lumped = VectorX::Zero(n);
     std::vector<Eigen::Triplet<double>> entries;
     entries.reserve(mesh.cells.size() * (Dim + 1) * (Dim + 1));
     for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
       const double mass = cell_mass(mesh, static_cast<int>(c));
+      if (const CurvedEdges curved = mesh.curved_edges(c)) {
+        const auto matrix = quadratic_mass<Dim>(MassKind::consistent, curved);
+        const auto diagonal = quadratic_mass<Dim>(MassKind::lumped, curved);
+        for (int i = 0; i < kQuadraticNodes<Dim>; ++i) {
+          if (!is_node<Dim>(curved, i)) continue;
+          lumped[mesh.nodes[c][i]] += mass * diagonal(i, i);
+          for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
+            if (is_node<Dim>(curved, j)) entries.emplace_back(mesh.nodes[c][i], mesh.nodes[c][j], mass * matrix(i, j));
+        }
+        continue;
+      }
       const ElementMass<Dim> element(MassKind::consistent, mass);
       for (const int i : mesh.cells[c]) {
         lumped[i] += mass / (Dim + 1);
@@ -159,6 +223,15 @@ class ConstrainedMass {
 }  // namespace
 
 template <int Dim>
+std::vector<int> parts_of(const TransferMesh<Dim>& mesh) {
+  std::vector<int> part = connected_parts<Dim + 1>(mesh.rest.size(), mesh.cells);
+  for (std::size_t c = 0; c < mesh.curved.size(); ++c)
+    for (int i = Dim + 1; i < kQuadraticNodes<Dim>; ++i)
+      if (is_node<Dim>(mesh.curved[c], i)) part[mesh.nodes[c][i]] = part[mesh.cells[c][0]];
+  return part;
+}
+
+template <int Dim>
 TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& new_mesh,
                                      const TouchedCells& touched, const MatrixX& u_old, const MatrixX& u_bar) {
   const Eigen::Index k = u_old.cols();
@@ -172,6 +245,7 @@ TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const Tr
   const Bvh<Dim> tree(boxes);
   std::vector<int> hits;
   OverlapIntegrals<Dim> overlap;
+  std::vector<OverlapPiece<Dim>> pieces;
   for (const int c : touched.new_cells) {
     const auto& new_cell = new_mesh.cells[c];
     const Simplex<Dim> simplex(corners<Dim>(new_mesh, c));
@@ -179,6 +253,11 @@ TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const Tr
     tree.query(box_of<Dim>(simplex.corners), hits);
     std::sort(hits.begin(), hits.end());
     for (const int hit : hits) {
+      if (new_mesh.curved_edges(c) || old_mesh.curved_edges(touched.old_cells[hit])) {
+        list_overlap(simplex, old_simplices[hit], pieces);
+        add_curved_difference(old_mesh, touched.old_cells[hit], new_mesh, c, pieces, u_old, u_bar, difference);
+        continue;
+      }
       if (!integrate_overlap(simplex, old_simplices[hit], overlap)) continue;
       const auto& old_cell = old_mesh.cells[touched.old_cells[hit]];
       const double density = old_mesh.density[touched.old_cells[hit]];
@@ -243,8 +322,19 @@ MatrixX solve_projection(const TransferMesh<Dim>& mesh, const MatrixX& residual,
 template <int Dim>
 VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d) {
   MatrixX product = MatrixX::Zero(d.rows(), d.cols());
-  for (std::size_t c = 0; c < mesh.cells.size(); ++c)
-    ElementMass<Dim>(MassKind::consistent, cell_mass(mesh, static_cast<int>(c))).add_product(mesh.cells[c], d, product);
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    const double mass = cell_mass(mesh, static_cast<int>(c));
+    const CurvedEdges curved = mesh.curved_edges(c);
+    if (!curved) {
+      ElementMass<Dim>(MassKind::consistent, mass).add_product(mesh.cells[c], d, product);
+      continue;
+    }
+    const auto matrix = quadratic_mass<Dim>(MassKind::consistent, curved);
+    for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
+      for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
+        if (is_node<Dim>(curved, i) && is_node<Dim>(curved, j))
+          product.row(mesh.nodes[c][i]) += mass * matrix(i, j) * d.row(mesh.nodes[c][j]);
+  }
   return d.cwiseProduct(product).colwise().sum().transpose();
 }
 
@@ -262,6 +352,7 @@ MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& n
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                                \
+  template std::vector<int> parts_of<Dim>(const TransferMesh<Dim>&);                                                        \
   template TouchedDifference touched_difference<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&,                    \
                                                      const TouchedCells&, const MatrixX&, const MatrixX&);                  \
   template MatrixX solve_projection<Dim>(const TransferMesh<Dim>&, const MatrixX&, std::span<const char>, TransferReport&); \

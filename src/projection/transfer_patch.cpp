@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <span>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -15,27 +16,44 @@ namespace {
 template <int Dim>
 class Numbering {
  public:
-  Numbering(const Mesh<Dim>& mesh, const std::map<int, Material>& materials, TransferCells<Dim>& out)
-      : mesh_(mesh), materials_(materials), out_(out) {}
+  Numbering(const Mesh<Dim>& mesh, const Space& space, const std::map<int, Material>& materials, TransferCells<Dim>& out)
+      : mesh_(mesh), space_(space), materials_(materials), out_(out) {}
 
   void add(CellId c) {
     std::array<int, Dim + 1> cell;
     for (int k = 0; k <= Dim; ++k) cell[k] = local(mesh_.cell(c)[k]);
     out_.cells.push_back(cell);
     out_.density.push_back(materials_.at(mesh_.body(c)).density);
+    if (!space_.is_linear()) add_nodes(c, cell);
   }
 
  private:
-  int local(VertexId v) {
-    const auto [it, is_new] = known_.try_emplace(v, static_cast<int>(out_.vertices.size()));
+  int local(VertexId v) { return local(v, mesh_.rest(v)); }
+  int local(int id, const Vec<Dim>& rest) {
+    const auto [it, is_new] = known_.try_emplace(id, static_cast<int>(out_.vertices.size()));
     if (is_new) {
-      out_.vertices.push_back(v);
-      out_.rest.push_back(mesh_.rest(v));
+      out_.vertices.push_back(id);
+      out_.rest.push_back(rest);
     }
     return it->second;
   }
+  void add_nodes(CellId c, const std::array<int, Dim + 1>& numbers) {
+    const auto& cell = mesh_.cell(c);
+    std::array<int, kQuadraticNodes<Dim>> nodes;
+    std::copy(numbers.begin(), numbers.end(), nodes.begin());
+    CurvedEdges curved = 0;
+    for_each_edge<Dim>([&](int edge, int i, int j) {
+      const int at = space_.find(cell[i], cell[j]);
+      nodes[Dim + 1 + edge] =
+          at == kNone ? numbers[i] : local(mesh_.vertex_slots() + at, (mesh_.rest(cell[i]) + mesh_.rest(cell[j])) / 2);
+      if (at != kNone) curved = static_cast<CurvedEdges>(curved | 1 << edge);
+    });
+    out_.nodes.push_back(nodes);
+    out_.curved.push_back(curved);
+  }
 
   const Mesh<Dim>& mesh_;
+  const Space& space_;
   const std::map<int, Material>& materials_;
   TransferCells<Dim>& out_;
   std::unordered_map<VertexId, int> known_;
@@ -52,10 +70,12 @@ MatrixX TransferCells<Dim>::gather(const VectorX& field) const {
 }
 
 template <int Dim>
-TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const Space& space,
-                                       const TouchedCells& touched, const std::map<int, Material>& materials, int rings) {
+TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Space& old_space, const Mesh<Dim>& mesh,
+                                       const Space& space, const TouchedCells& touched,
+                                       const std::map<int, Material>& materials, int rings) {
   TransferPatch<Dim> patch;
-  Numbering<Dim> old_numbering(old_mesh, materials, patch.old_cells), numbering(mesh, materials, patch.new_cells);
+  Numbering<Dim> old_numbering(old_mesh, old_space, materials, patch.old_cells),
+      numbering(mesh, space, materials, patch.new_cells);
   for (const CellId c : touched.old_cells) old_numbering.add(c);
   std::vector<CellId> ids = touched.new_cells;
   std::unordered_set<CellId> inside(ids.begin(), ids.end());
@@ -67,28 +87,39 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
   std::size_t first = 0;
   for (int ring = 0; ring <= rings; ++ring) {  // cells around the vertices of the ring before
     const std::size_t end = patch.new_cells.vertices.size();
-    for (std::size_t i = std::exchange(first, end); i < end; ++i)
-      for (const CellId c : mesh.cells_of(patch.new_cells.vertices[i]))
-        if (!has_curved_edge(mesh, space, c) && inside.insert(c).second) {
+    for (std::size_t i = std::exchange(first, end); i < end; ++i) {
+      const int v = patch.new_cells.vertices[i];
+      if (v >= mesh.vertex_slots()) continue;  // a node: its ends are there too
+      for (const CellId c : mesh.cells_of(v))
+        if (inside.insert(c).second) {
           ids.push_back(c);
           numbering.add(c);
         }
+    }
   }
-  for (const VertexId v : patch.new_cells.vertices) {
-    const auto around = mesh.cells_of(v);
+  for (const int v : patch.new_cells.vertices) {
+    std::vector<CellId> of_edge;
+    if (v >= mesh.vertex_slots()) of_edge = mesh.cells_of_edge(space.curved_edges()[v - mesh.vertex_slots()]);
+    const std::span<const CellId> around = v < mesh.vertex_slots() ? mesh.cells_of(v) : std::span<const CellId>(of_edge);
     patch.at_rim.push_back(!std::all_of(around.begin(), around.end(), [&](CellId c) { return inside.contains(c); }));
   }
   patch.cells.num_vertices = static_cast<int>(patch.new_cells.vertices.size());
   patch.cells.rest = patch.new_cells.rest;
-  for (std::size_t i = 0; i < ids.size(); ++i)
-    patch.cells.elements.push_back(
-        {patch.new_cells.cells[i], mesh.body(ids[i]), mesh.volume(ids[i]), mesh.inverse_rest_edges(ids[i])});
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const CellId c = ids[i];
+    const CurvedEdges curved = patch.new_cells.view().curved_edges(i);
+    if (curved)
+      patch.cells.curved_elements.push_back(
+          {patch.new_cells.nodes[i], curved, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), c});
+    else
+      patch.cells.elements.push_back({patch.new_cells.cells[i], mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)});
+  }
   return patch;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                             \
-  template struct TransferCells<Dim>;                                                                    \
-  template TransferPatch<Dim> make_transfer_patch<Dim>(const Mesh<Dim>&, const Mesh<Dim>&, const Space&, \
+#define ITR_INSTANTIATE(Dim)                                                                                           \
+  template struct TransferCells<Dim>;                                                                                  \
+  template TransferPatch<Dim> make_transfer_patch<Dim>(const Mesh<Dim>&, const Space&, const Mesh<Dim>&, const Space&, \
                                                        const TouchedCells&, const std::map<int, Material>&, int);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -7,6 +7,7 @@ namespace itr {
 
 template <int Dim>
 void RemeshFields<Dim>::follow(const Edit<Dim>& edit, VertexId created, VertexId first_node) {
+  if (!levels.empty()) levels.insert(levels.end(), edit.inserted_cells.size(), level_of_new_cells(edit));
   const int nodes = static_cast<int>(edit.inserted_nodes.size());
   if (nodes > 0) make_room(first_node + nodes);
   for_each([&](VectorX& field) {
@@ -18,6 +19,14 @@ void RemeshFields<Dim>::follow(const Edit<Dim>& edit, VertexId created, VertexId
     if (field.size() < Dim * (v + 1)) field.conservativeResize(Dim * (v + 1));
     field.template segment<Dim>(Dim * v) = value;
   });
+}
+
+template <int Dim>
+std::uint8_t RemeshFields<Dim>::level_of_new_cells(const Edit<Dim>& edit) const {
+  std::uint8_t level = 0;
+  if (!levels.empty() && edit.is_nested())
+    for (const CellId c : edit.removed_cells) level = std::max(level, levels[c]);
+  return level;
 }
 
 template <int Dim>

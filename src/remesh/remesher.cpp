@@ -32,7 +32,8 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   const bool may_refine = refines && !by_size && is_enough_there;
   const bool has_to_stir = may_stir && (is_enough_there || !screens(options));
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
-  if (!may_refine && !may_collapse && !has_to_stir && !by_size) return {};
+  const bool may_straighten = options.straighten.enabled && !by_size;
+  if (!may_refine && !(may_straighten && mesh.has_nodes()) && !may_collapse && !has_to_stir && !by_size) return {};
   RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();
   session.culling().rank(session.ask());
@@ -40,6 +41,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
     follow_sizing_field(session);
   } else {
     if (may_refine) refine_edges(session);
+    if (may_straighten && mesh.has_nodes()) straighten_edges(session);
     if (options.collapse.enabled) collapse_edges(session);
   }
   if (may_stir && (has_to_stir || report.accepted() > 0)) {

@@ -124,7 +124,7 @@ void warn_of_idle_keys(const Node& root, const TimeOptions& time, bool has_obsta
     warn(contact["friction_coefficient"], "without /contact/enabled = true there is no friction");
   if (remesh.exists() && !remesh.has("enabled") && !remesh.json().empty())
     warn(remesh, "without \"enabled\": true the mesh stays as it is");
-  for (const char* operation : {"collapse", "swap", "smooth"})
+  for (const char* operation : {"straighten", "collapse", "swap", "smooth"})
     if (const Node tolerance = remesh[operation]["acceptance_tolerance"]; tolerance.number(0) > 0)
       warn(tolerance,
            "positive: only what lowers the energy by so much is done, and hardly anything is; -1e-8 allows a rise");
@@ -319,6 +319,8 @@ RemeshOptions read_remesh(const Node& root) {
   if (split.has("min_edge_length")) options.split.min_edge_length = split["min_edge_length"].non_negative(0);
 
   read_acceptance(node["curve"], options.curve.enabled, options.curve.acceptance_tolerance);
+  options.straighten.enabled = options.curve.enabled;
+  read_acceptance(node["straighten"], options.straighten.enabled, options.straighten.acceptance_tolerance);
 
   read_acceptance(collapse, options.collapse.enabled, options.collapse.acceptance_tolerance);
   options.collapse.culling_threshold = read_share(collapse["culling_threshold"], options.collapse.culling_threshold);

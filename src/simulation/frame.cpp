@@ -24,6 +24,7 @@ void StepReport::add_effort(const StepReport& before) {
   indefinite += before.indefinite;
   splits += before.splits;
   curves += before.curves;
+  straightens += before.straightens;
   collapses += before.collapses;
   swaps += before.swaps;
   smooths += before.smooths;
@@ -37,7 +38,7 @@ void StepReport::add_effort(const StepReport& before) {
 }
 
 void StepReport::forget_operations() {
-  for (auto* operations : {&splits, &curves, &collapses, &swaps, &smooths}) operations->accepted = 0;
+  for (auto* operations : {&splits, &curves, &straightens, &collapses, &swaps, &smooths}) operations->accepted = 0;
   history_loss = 0;
 }
 

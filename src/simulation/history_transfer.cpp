@@ -3,7 +3,6 @@
 
 #include "itr/projection/safe_projection.hpp"
 #include "itr/projection/transfer_patch.hpp"
-#include "mesh/connected_parts.hpp"
 #include "simulation/patch_surface.hpp"
 
 namespace itr {
@@ -25,11 +24,12 @@ VectorX interleaved(const MatrixX& rows) {
 template <int Dim>
 class HistoryTransfer {
  public:
-  HistoryTransfer(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const Space& space,
-                  const TouchedCells& touched)
+  HistoryTransfer(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space, const Mesh<Dim>& mesh,
+                  const Space& space, const TouchedCells& touched)
       : setup_(setup),
         mesh_(mesh),
-        patch_(make_transfer_patch(old_mesh, mesh, space, touched, setup.materials, kRings<Dim>)) {
+        space_(space),
+        patch_(make_transfer_patch(old_mesh, old_space, mesh, space, touched, setup.materials, kRings<Dim>)) {
     const auto n = patch_.new_cells.vertices.size();
     prescribed_.assign(Dim * n, 0);
     const auto hold = [&](std::size_t i, int tag) {
@@ -40,7 +40,12 @@ class HistoryTransfer {
         }
     };
     for (std::size_t i = 0; i < n; ++i) {
-      const VertexId v = patch_.new_cells.vertices[i];
+      const int v = patch_.new_cells.vertices[i];
+      if (v >= mesh.vertex_slots()) {
+        for (const FacetId f : mesh.facets_of_edge(space.curved_edges()[v - mesh.vertex_slots()]))
+          hold(i, mesh.facet_tag(f));
+        continue;
+      }
       for (const FacetId f : mesh.facets_of(v)) hold(i, mesh.facet_tag(f));
       if (mesh.vertex_tag(v) != kNoTag) hold(i, mesh.vertex_tag(v));
     }
@@ -108,7 +113,8 @@ class HistoryTransfer {
     PatchSurface<Dim> surface;
     CellSet<Dim> cells = patch_.cells;
     if (setup_.contact.enabled) {
-      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance);
+      surface =
+          patch_surface(mesh_, space_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance);
       cells.num_vertices += static_cast<int>(surface.others.size());
       interpolant.conservativeResize(Dim * cells.num_vertices);
       for (std::size_t i = 0; i < surface.others.size(); ++i)
@@ -119,10 +125,10 @@ class HistoryTransfer {
     }
     SafeProjectionReport<Dim> safe;
     const auto& patch = patch_.new_cells;
-    VectorX x = project_safely<Dim>(
-        {cells, surface.empty() ? nullptr : &surface.surface, setup_.materials, setup_.contact.activation_distance,
-         std::move(held), connected_parts<Dim + 1>(patch.vertices.size(), patch.cells), kRings<Dim>},
-        interpolant, goal, solver, safe);
+    VectorX x =
+        project_safely<Dim>({cells, surface.empty() ? nullptr : &surface.surface, setup_.materials,
+                             setup_.contact.activation_distance, std::move(held), parts_of(patch.view()), kRings<Dim>},
+                            interpolant, goal, solver, safe);
     report.with_barriers += safe.used_barriers;
     report.not_converged += !safe.converged;
     lost += safe.lost;
@@ -131,6 +137,7 @@ class HistoryTransfer {
 
   const StepSetup<Dim>& setup_;
   const Mesh<Dim>& mesh_;
+  const Space& space_;
   TransferPatch<Dim> patch_;
   std::vector<char> prescribed_;  ///< by dof of the patch
   std::vector<MatrixX> old_values_, new_values_;
@@ -143,11 +150,7 @@ template <int Dim>
 HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space,
                                        const History& old_history, const Mesh<Dim>& mesh, const Space& space,
                                        const TouchedCells& touched, linear::Solver& solver, History& history) {
-  TouchedCells straight = touched;
-  std::erase_if(straight.old_cells, [&](CellId c) { return has_curved_edge(old_mesh, old_space, c); });
-  std::erase_if(straight.new_cells, [&](CellId c) { return has_curved_edge(mesh, space, c); });
-  if (straight.new_cells.empty()) return {};
-  HistoryTransfer<Dim> transfer(setup, old_mesh, mesh, space, straight);
+  HistoryTransfer<Dim> transfer(setup, old_mesh, old_space, mesh, space, touched);
   std::vector<VectorX*> fields;
   const auto add = [&](const std::vector<VectorX>& old_fields, std::vector<VectorX>& new_fields) {
     for (std::size_t i = 0; i < new_fields.size(); ++i) {

@@ -10,13 +10,15 @@
 namespace itr {
 
 template <int Dim>
-PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const TransferPatch<Dim>& patch,
-                                const std::vector<char>& moving, const VectorX& x, const VectorX& goal, double reach) {
+PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const Obstacles<Dim>& obstacles,
+                                const TransferPatch<Dim>& patch, const std::vector<char>& moving, const VectorX& x,
+                                const VectorX& goal, double reach) {
   PatchSurface<Dim> result;
   const auto& vertices = patch.new_cells.vertices;
   std::vector<FacetId> own;
   for (std::size_t i = 0; i < vertices.size(); ++i)
-    if (moving[i]) own.insert(own.end(), mesh.facets_of(vertices[i]).begin(), mesh.facets_of(vertices[i]).end());
+    if (moving[i] && vertices[i] < mesh.vertex_slots())
+      own.insert(own.end(), mesh.facets_of(vertices[i]).begin(), mesh.facets_of(vertices[i]).end());
   if (own.empty()) return result;
   std::sort(own.begin(), own.end());
   own.erase(std::unique(own.begin(), own.end()), own.end());
@@ -43,11 +45,11 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obs
   };
 
   std::vector<Vec<Dim>> rest = patch.new_cells.rest;
-  const int bodies = mesh.vertex_slots();
+  const int bodies = num_nodes(mesh, space);  // nodes are not on a surface that can touch
   const auto local = [&](int v) {
     const auto [it, is_new] = known.try_emplace(v, static_cast<int>(rest.size()));
     if (is_new) {
-      rest.push_back(v < bodies ? mesh.rest(v) : obstacles.rest[v - bodies]);
+      rest.push_back(v < mesh.vertex_slots() ? mesh.rest(v) : obstacles.rest[v - bodies]);
       result.others.push_back(v);
     }
     return it->second;
@@ -77,9 +79,9 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obs
   return result;
 }
 
-template PatchSurface<2> patch_surface<2>(const Mesh<2>&, const Obstacles<2>&, const TransferPatch<2>&,
+template PatchSurface<2> patch_surface<2>(const Mesh<2>&, const Space&, const Obstacles<2>&, const TransferPatch<2>&,
                                           const std::vector<char>&, const VectorX&, const VectorX&, double);
-template PatchSurface<3> patch_surface<3>(const Mesh<3>&, const Obstacles<3>&, const TransferPatch<3>&,
+template PatchSurface<3> patch_surface<3>(const Mesh<3>&, const Space&, const Obstacles<3>&, const TransferPatch<3>&,
                                           const std::vector<char>&, const VectorX&, const VectorX&, double);
 
 }  // namespace itr

@@ -32,22 +32,29 @@ void add_nodes(State<Dim>& state) {
   state.space = {};
 }
 
-/// Levels of quadrature by curved element of `space`, from those before a change: cells that are new begin at 0.
+/// Levels of quadrature from those by element with curved edges to those by cell; empty where all are 0.
 template <int Dim>
-QuadratureLevels renumbered(const QuadratureLevels& levels, const Mesh<Dim>& old_mesh, const Space& old_space,
-                            const Mesh<Dim>& mesh, const Space& space, const std::vector<CellId>& number) {
-  if (levels.empty()) return {};
-  std::vector<std::uint8_t> of_cell(mesh.cell_slots(), 0);
+QuadratureLevels levels_by_cell(const State<Dim>& state) {
+  if (state.quadrature.empty()) return {};
+  QuadratureLevels levels(state.mesh.cell_slots(), 0);
   std::size_t next = 0;
-  for (CellId c = 0; c < old_mesh.cell_slots(); ++c) {
-    if (!has_curved_edge(old_mesh, old_space, c)) continue;
-    if (number[c] != kNone) of_cell[number[c]] = levels[next];
-    ++next;
-  }
-  QuadratureLevels result;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (has_curved_edge(mesh, space, c)) result.push_back(of_cell[c]);
-  return result;
+  for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
+    if (has_curved_edge(state.mesh, state.space, c)) levels[c] = state.quadrature[next++];
+  return levels;
+}
+
+/// And back, on the mesh that has been made compact.
+template <int Dim>
+QuadratureLevels levels_by_element(const QuadratureLevels& by_slot, const std::vector<CellId>& number,
+                                   const State<Dim>& state) {
+  if (by_slot.empty()) return {};
+  std::vector<std::uint8_t> by_cell(state.mesh.cell_slots(), 0);
+  for (std::size_t slot = 0; slot < by_slot.size(); ++slot)
+    if (number[slot] != kNone) by_cell[number[slot]] = by_slot[slot];
+  QuadratureLevels levels;
+  for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
+    if (has_curved_edge(state.mesh, state.space, c)) levels.push_back(by_cell[c]);
+  return levels;
 }
 
 template <int Dim>
@@ -96,6 +103,7 @@ RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const PotentialTerms<
   const TimeIntegrator integrator(setup.time);
   RemeshFields<Dim> fields;
   fields.x = head_of(x, dofs);
+  fields.levels = levels_by_cell(state);
   if (is_in(TermKind::inertia, terms)) fields.predictor = head_of(integrator.predictor(state.history), dofs);
   if (needs_velocities(terms)) fields.velocity_reference = head_of(integrator.velocity_reference(state.history), dofs);
   for (const auto& past : state.history.x) fields.past_positions.push_back(head_of(past, dofs));
@@ -168,6 +176,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   report.best_refused_split = remeshed.best_refused_gain / problem.scaling();
   report.splits = remeshed.splits;
   report.curves = remeshed.curves;
+  report.straightens = remeshed.straightens;
   report.collapses = remeshed.collapses;
   report.swaps = remeshed.swaps;
   report.smooths = remeshed.smooths;
@@ -197,7 +206,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   std::vector<EdgeKey> curved;  // renumbering keeps their order
   for (const auto& [edge, node] : nodes) curved.push_back({renumbering.vertex[edge[0]], renumbering.vertex[edge[1]]});
   state.space = Space(std::move(curved));
-  state.quadrature = renumbered(before.quadrature, before.mesh, before.space, state.mesh, state.space, renumbering.cell);
+  state.quadrature = levels_by_element(fields.levels, renumbering.cell, state);
   const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
     VectorX field(Dim * num_nodes(state.mesh, state.space) + obstacle_dofs);

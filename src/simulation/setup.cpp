@@ -72,6 +72,8 @@ void check_remeshing(const RemeshOptions& remesh) {
   require_positive("/space/remesh/relative_tolerance", remesh.relative_tolerance);
   require_positive("/space/remesh/split/acceptance_tolerance", remesh.split.acceptance_tolerance.value_or(1));
   require_positive("/space/remesh/curve/acceptance_tolerance", remesh.curve.acceptance_tolerance.value_or(1));
+  require(true, "/space/remesh/straighten/acceptance_tolerance", remesh.straighten.acceptance_tolerance.value_or(0),
+          "a number");
   require_not_negative("/space/remesh/split/min_edge_length", remesh.split.min_edge_length.value_or(0));
   require(true, "/space/remesh/collapse/acceptance_tolerance", remesh.collapse.acceptance_tolerance.value_or(0), "a number");
   require(true, "/space/remesh/swap/acceptance_tolerance", remesh.swap.acceptance_tolerance.value_or(0), "a number");

@@ -160,6 +160,7 @@ class StepAttempt {
       report_.energy_before_remesh = report_.energy.total;
     }
     next_.stiffness = problem_->stiffness();
+    next_.quadrature = problem_->quadrature_levels();
     const State<Dim> unchanged = next_;
     const VectorX solution = x_;
     auto renumbering = remesh_and_project(tools_, *problem_, unchanged, next_, x_, report_);

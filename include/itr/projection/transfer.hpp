@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// L2 transfer of piecewise linear fields between two meshes of one domain (paper eq. 7). It is weighted by density, so that
-// it keeps momentum. It is local: M (u_new - u_bar) = A u_old - M u_bar has a right-hand side on touched cells only.
+// L2 transfer of piecewise linear and quadratic fields between two meshes of one domain (paper eq. 7). It is weighted by
+// density, so that it keeps momentum. It is local: M (u_new - u_bar) = A u_old - M u_bar has a right-hand side on touched
+// cells only.
 #pragma once
 
 #include <span>
@@ -14,10 +15,19 @@ namespace itr {
 /// A mesh, or a patch of one, as plain arrays: rest positions, cells, density of each cell.
 template <int Dim>
 struct TransferMesh {
-  std::span<const Vec<Dim>> rest;                   ///< [m]
+  std::span<const Vec<Dim>> rest;                   ///< of vertices and nodes [m]
   std::span<const std::array<int, Dim + 1>> cells;  ///< positive volumes
   std::span<const double> density;                  ///< [kg/m^Dim] a cell
+  /// Of cells with curved edges, as those of a CellSet; both empty where no cell has any.
+  std::span<const std::array<int, kQuadraticNodes<Dim>>> nodes{};
+  std::span<const CurvedEdges> curved{};
+
+  CurvedEdges curved_edges(std::size_t cell) const { return curved.empty() ? CurvedEdges{0} : curved[cell]; }
 };
+
+/// By vertex and node: the number of the connected part that it belongs to.
+template <int Dim>
+std::vector<int> parts_of(const TransferMesh<Dim>& mesh);
 
 /// The cells by which two meshes differ. They cover the same region in both. All other cells are the same in both meshes,
 /// and u_bar equals u_old at their vertices.

@@ -15,12 +15,14 @@ namespace itr {
 /// Some cells of a mesh with a numbering of their own.
 template <int Dim>
 struct TransferCells {
-  std::vector<VertexId> vertices;  ///< ids in the mesh
+  std::vector<int> vertices;  ///< and nodes of curved edges: ids in fields
   std::vector<Vec<Dim>> rest;
   std::vector<std::array<int, Dim + 1>> cells;
   std::vector<double> density;
+  std::vector<std::array<int, kQuadraticNodes<Dim>>> nodes{};  ///< of cells; this and the next empty: no cell has any
+  std::vector<CurvedEdges> curved{};
 
-  TransferMesh<Dim> view() const { return {rest, cells, density}; }
+  TransferMesh<Dim> view() const { return {rest, cells, density, nodes, curved}; }
   /// Rows of values at these vertices, of an interleaved field over the mesh.
   MatrixX gather(const VectorX& field) const;
 };
@@ -34,10 +36,11 @@ struct TransferPatch {
   CellSet<Dim> cells;            ///< `new_cells` as energies see them
 };
 
-/// `touched` are cells of the two meshes, which are compact, with straight edges alone. Free to move are the vertices of
-/// touched cells and those up to `rings` edges away, but for those of cells with edges that are curved in `space`.
+/// `touched` are cells of the two meshes, which are compact. Free to move are the vertices of touched cells and those up to
+/// `rings` edges away, and the nodes of edges of which all cells are in the patch.
 template <int Dim>
-TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const Space& space,
-                                       const TouchedCells& touched, const std::map<int, Material>& materials, int rings);
+TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Space& old_space, const Mesh<Dim>& mesh,
+                                       const Space& space, const TouchedCells& touched,
+                                       const std::map<int, Material>& materials, int rings);
 
 }  // namespace itr

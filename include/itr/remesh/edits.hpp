@@ -48,6 +48,10 @@ Proposal<Dim> propose_split(const Mesh<Dim>& mesh, const EdgeKey& edge, const Qu
 template <int Dim>
 Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge);
 
+/// Makes a curved edge straight: its node goes, and fields keep their values at all other nodes.
+template <int Dim>
+Edit<Dim> make_straighten(const Mesh<Dim>& mesh, const EdgeKey& edge);
+
 /// Collapses an edge where no cell around it has a curved edge (the same holds for swaps, removals and moves below) and
 /// where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev
 /// 1999 in the volume, on patches and along features) and the rest shape exactly: an end may go where the edge is of its own

@@ -21,6 +21,7 @@ struct RemeshFields {
   VectorX velocity_reference;  ///< positions of no velocity [m], for friction and damping; empty where there is none
   std::vector<VectorX> past_positions;  ///< must stay free of inversion and intersection
   std::vector<VectorX> past_rates;      ///< velocities and accelerations
+  QuadratureLevels levels;              ///< of the elastic energy, by cell slot; empty: all 0
 
   /// Calls f(field) on each field that is there.
   template <typename F>
@@ -40,6 +41,8 @@ struct RemeshFields {
   /// Extends or updates all fields for an edit that was just applied and created `created` (or kNone); its
   /// nodes have the slots from `first_node` on.
   void follow(const Edit<Dim>& edit, VertexId created, VertexId first_node = kNone);
+  /// What energies of the cells that an edit inserts begin with: refinement keeps what was found about the cells before.
+  std::uint8_t level_of_new_cells(const Edit<Dim>& edit) const;
   /// Makes all fields as long as so many vertices need, and longer where they grow: edits then seldom copy them.
   void make_room(int vertices);
   /// Ends them behind so many vertices.

@@ -26,8 +26,8 @@ struct RemeshMemory {
     EdgeKey edge;  ///< smaller vertex first; {vertex, kNone} of a vertex that was not moved
     SignalRange range;
   };
-  enum Kind { split, collapse, swap, smooth, reshape, curve };
-  static constexpr int kKinds = 6;
+  enum Kind { split, collapse, swap, smooth, reshape, curve, straighten };
+  static constexpr int kKinds = 7;
   std::array<std::vector<Entry>, kKinds> refusals;  ///< by Kind; ascending by edge
 
   /// With the vertex numbers of a compacted mesh; `number` has kNone for vertices that are gone.

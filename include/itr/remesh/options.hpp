@@ -34,6 +34,11 @@ struct CurveOptions {
   std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]; none: that of splits
 };
 
+struct StraightenOptions {
+  bool enabled = false;
+  std::optional<double> acceptance_tolerance;  ///< [J]; negative: allowed increase; none: that of collapses
+};
+
 struct CollapseOptions {
   bool enabled = true;
   std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]; negative: allowed increase
@@ -75,6 +80,7 @@ struct RemeshOptions {
   SizingFieldOptions sizing_field;
   SplitOptions split;
   CurveOptions curve;
+  StraightenOptions straighten;
   CollapseOptions collapse;
   SwapOptions swap;
   SmoothOptions smooth;

@@ -40,7 +40,7 @@ struct StepReport {
   /// What the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]: not
   /// gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
   double history_loss = 0;
-  OperationCount splits, curves, collapses, swaps, smooths;
+  OperationCount splits, curves, straightens, collapses, swaps, smooths;
   int bound_by_dhat = 0;          ///< surface edges that were not split because the halves would be below dhat
   int reverted_remeshes = 0;      ///< all of a step's operations were dropped, as the state on the new mesh failed
   double split_tolerance = 0;     ///< of this step [J]; 0: no remeshing

@@ -21,7 +21,6 @@ struct HistoryTransferReport {
 /// `old_mesh`: positions safely, velocities and accelerations freely. `touched` are the cells by which the meshes differ;
 /// values change on these and some rings around them only. The integrals of rho x, rho v and rho a over each connected part
 /// of that are kept to round-off. Prescribed components of positions stay what they are.
-/// Cells with curved edges keep what they carry: refinement has made those that are new, and functions are the same there.
 template <int Dim>
 HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space,
                                        const History& old_history, const Mesh<Dim>& mesh, const Space& space,

@@ -9,7 +9,6 @@ namespace itr {
 
 namespace {
 
-
 /// Elastic energy times the scaling, a cell.
 template <int Dim>
 std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {

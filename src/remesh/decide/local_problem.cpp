@@ -411,6 +411,20 @@ void LocalProblem<Dim>::add_surface() {
   complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 
+/// As the solve of the step does: where the points of a cell do not see how near it is to an inversion, there are more.
+template <int Dim>
+void LocalProblem<Dim>::set_quadrature(ConstVectorView x) {
+  ElasticEnergy<Dim>& elastic = *storage_->potential->elastic();
+  if (!state_.fields.levels.empty()) {
+    const std::uint8_t of_new = is_after_ ? state_.fields.level_of_new_cells(edit_) : std::uint8_t{0};
+    QuadratureLevels levels;
+    for (const auto& element : cells_.curved_elements)
+      levels.push_back(element.cell == kNone ? of_new : state_.fields.levels[element.cell]);
+    elastic.set_quadrature_levels(levels);
+  }
+  elastic.refine_quadrature(x);
+}
+
 template <int Dim>
 void LocalProblem<Dim>::add_terms() {
   const StepContext<Dim>& context = state_.context;
@@ -427,6 +441,7 @@ void LocalProblem<Dim>::add_terms() {
   else
     storage_->potential.emplace(context, cells_, history);
   IncrementalPotential<Dim>& potential = *storage_->potential;
+  if (!cells_.curved_elements.empty()) set_quadrature(x);
   // With lumped mass a split changes how inertia is integrated.
   const bool is_nested = !is_after_ || (edit_.is_nested() && context.mass == MassKind::consistent);
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
@@ -443,9 +458,37 @@ void LocalProblem<Dim>::add_terms() {
   potential.add_to(energy_, potential.lag(x, workspace_));
 }
 
+/// The same where an edge is straightened: its node's shape function times by how much the predictor was off the mean of the
+/// ends.
+template <int Dim>
+void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
+  const VectorX& predictor = state_.fields.predictor;
+  const VertexId node = mesh_.node_of(edit_.edge[0], edit_.edge[1]);
+  const auto at = [&](VertexId v) -> Vec<Dim> { return predictor.segment<Dim>(Dim * v); };
+  const Vec<Dim> gap = at(node) - (at(edit_.edge[0]) + at(edit_.edge[1])) / 2;
+  VectorX residual = VectorX::Zero(Dim * static_cast<int>(vertices_.size()));
+  const auto add = [&](VertexId v, double mass) {
+    const auto place = std::find(vertices_.begin(), vertices_.end(), LocalVertex{Kind::of_mesh, v}) - vertices_.begin();
+    residual.segment<Dim>(Dim * place) -= mass * gap;
+  };
+  double loss = 0;
+  for (const CellId c : edit_.removed_cells) {
+    const auto cell = curved_cell<Dim>(mesh_.cell(c), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); });
+    const double mass = state_.context.materials.at(mesh_.body(c)).density * mesh_.volume(c);
+    const auto matrix = quadratic_mass<Dim>(MassKind::consistent, cell.edges);
+    const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+      if (k != n && (k <= Dim || cell.edges >> (k - Dim - 1) & 1)) add(cell.nodes[k], mass * matrix(k, n));
+    for (const VertexId end : edit_.edge) add(end, mass * matrix(n, n) / 2);  // the straight edge moves with its ends
+    loss += 0.5 * mass * matrix(n, n) * gap.squaredNorm();
+  }
+  inertia.set_unrepresented_history(residual, loss);
+}
+
 /// Adds the part of the predictor, a function on the old mesh, that the new mesh cannot represent.
 template <int Dim>
 void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) const {
+  if (edit_.kind == Edit<Dim>::Kind::straighten) return add_history_of_node(inertia);
   // Numbering of the removed cells' own: their vertices carry the functions as they were.
   std::vector<VertexId> old_ids, new_ids;
   std::vector<std::array<int, Dim + 1>> old_cells, new_cells;
@@ -496,6 +539,8 @@ NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
   NewtonOptions options = state_.context.newton;
   options.max_iterations = max_iterations;
   NewtonExtras extras{.is_brief = true};
+  if (!cells_.curved_elements.empty())
+    extras.after_step = [&](const VectorX& x) { return storage_->potential->elastic()->refine_quadrature(x); };
   if (options.norm != NewtonNorm::euclidean) {
     VectorView weights = storage_->norm_weights.resize(Dim * cells_.num_vertices);
     get_unit_mass_diagonal(cells_, weights);

@@ -127,7 +127,9 @@ class LocalProblem {
   void find_what_changes();
   ConstVectorView gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, KeptVector& values) const;
   void add_terms();
+  void set_quadrature(ConstVectorView x);
   void add_unrepresented_history(InertiaEnergy<Dim>& inertia) const;
+  void add_history_of_node(InertiaEnergy<Dim>& inertia) const;
   bool is_value_vertex(const LocalVertex& v) const;
   Vec<Dim> rest_position(const LocalVertex& v) const;
   Vec<Dim> field_value(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, const LocalVertex& v) const;

@@ -48,13 +48,21 @@ Refusal RemeshQueries<Dim>::refuse_collapse(const EdgeKey& e) const {
 }
 
 template <int Dim>
-Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e, CellId first_coarsened) const {
+Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e) const {
   if (!exists(e)) return Refusal::gone;
   if (mesh_.node_of(e[0], e[1]) != kNone) return Refusal::not_asked;
-  if (has_contact() && is_surface(e)) return Refusal::held;
-  const auto around = mesh_.cells_of_edge(e);
-  const bool is_fresh = std::any_of(around.begin(), around.end(), [&](CellId c) { return c >= first_coarsened; });
-  return is_fresh ? Refusal::depth : Refusal::none;
+  return has_contact() && is_surface(e) ? Refusal::held : Refusal::none;
+}
+
+template <int Dim>
+Refusal RemeshQueries<Dim>::refuse_straighten(const EdgeKey& e) const {
+  if (!exists(e)) return Refusal::gone;
+  return mesh_.node_of(e[0], e[1]) == kNone ? Refusal::not_asked : Refusal::none;
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  return gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch);
 }
 
 template <int Dim>
@@ -135,7 +143,7 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
   const Edit<Dim>& edit = *trial.edit;
   TrialOptions options{.required = context_.scaling * tolerance, .total_volume = total_volume_, .local = local};
   if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth &&
-      (edit.value || !edit.inserted_nodes.empty()))
+      (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);

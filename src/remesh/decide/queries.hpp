@@ -52,9 +52,9 @@ class RemeshQueries {
   /// Why an edge, by its lengths, cannot be split or may not collapse.
   Refusal refuse_split(const EdgeKey& e) const;
   Refusal refuse_collapse(const EdgeKey& e) const;
-  /// Why an edge cannot be curved: the surface stays straight where contact is enabled, and cells from `first_coarsened` on
-  /// stay straight until the history is projected onto them.
-  Refusal refuse_curve(const EdgeKey& e, CellId first_coarsened) const;
+  /// Why an edge cannot be curved: the surface stays straight where contact is enabled.
+  Refusal refuse_curve(const EdgeKey& e) const;
+  Refusal refuse_straighten(const EdgeKey& e) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
   bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
   /// The same of a trial's edge.
@@ -70,6 +70,7 @@ class RemeshQueries {
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
   double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
   double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
+  double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
   /// Energy of a cell, which need not be in the mesh, at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body) const {
     return cell_energy<Dim>(state(), cell, body);

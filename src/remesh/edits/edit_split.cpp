@@ -48,6 +48,14 @@ void add_nodes_of_split(const Mesh<Dim>& mesh, Edit<Dim>& edit) {
   for (const VertexId v : around) add_node_from_middle(mesh, a, b, v, edit);
 }
 
+template <int Dim>
+Edit<Dim> replace_by_themselves(const Mesh<Dim>& mesh, const EdgeKey& edge, typename Edit<Dim>::Kind kind) {
+  Edit<Dim> edit{.kind = kind, .edge = edge};
+  edit.removed_cells = mesh.cells_of_edge(edge);
+  for (const CellId c : edit.removed_cells) edit.inserted_cells.push_back({mesh.cell(c), mesh.body(c)});
+  return edit;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -81,12 +89,17 @@ Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
 
 template <int Dim>
 Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge) {
-  Edit<Dim> edit{.kind = Edit<Dim>::Kind::curve, .edge = edge};
-  edit.removed_cells = mesh.cells_of_edge(edge);
-  for (const CellId c : edit.removed_cells) edit.inserted_cells.push_back({mesh.cell(c), mesh.body(c)});
+  Edit<Dim> edit = replace_by_themselves(mesh, edge, Edit<Dim>::Kind::curve);
   typename Edit<Dim>::NewNode node{edge};
   for (const VertexId end : edge) node.add_parent(end, 0.5);
   edit.inserted_nodes.push_back(node);
+  return edit;
+}
+
+template <int Dim>
+Edit<Dim> make_straighten(const Mesh<Dim>& mesh, const EdgeKey& edge) {
+  Edit<Dim> edit = replace_by_themselves(mesh, edge, Edit<Dim>::Kind::straighten);
+  edit.removed_nodes.push_back(edge);
   return edit;
 }
 
@@ -108,6 +121,8 @@ template Edit<2> make_split<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_split<3>(const Mesh<3>&, const EdgeKey&);
 template Edit<2> make_curve<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_curve<3>(const Mesh<3>&, const EdgeKey&);
+template Edit<2> make_straighten<2>(const Mesh<2>&, const EdgeKey&);
+template Edit<3> make_straighten<3>(const Mesh<3>&, const EdgeKey&);
 template Proposal<2> propose_split<2>(const Mesh<2>&, const EdgeKey&, const QualityRule&);
 template Proposal<3> propose_split<3>(const Mesh<3>&, const EdgeKey&, const QualityRule&);
 

@@ -86,7 +86,7 @@ class Refiner {
   void pass_over(std::span<const EdgeQueue::Entry> entries) {
     for (const EdgeQueue::Entry& entry : entries) {
       const bool curves = is_to_be_curved(entry.edge);
-      const Refusal refusal = curves ? refuse_curve(reversed(entry.edge)) : refuse(entry.edge);
+      const Refusal refusal = curves ? ask_.refuse_curve(reversed(entry.edge)) : refuse(entry.edge);
       OperationCount& count = curves ? session_.report().curves : session_.report().splits;
       count.note(refusal == Refusal::none ? Refusal::prediction : refusal);
       note_refused(entry.priority);
@@ -94,11 +94,9 @@ class Refiner {
   }
 
  private:
-  Refusal refuse_curve(const EdgeKey& edge) const { return ask_.refuse_curve(edge, session_.commits().first_coarsened()); }
-
   std::optional<EdgeQueue::Entry> rank_curve(const EdgeKey& key, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = reversed(key);
-    if (refuse_curve(edge) != Refusal::none) return std::nullopt;
+    if (ask_.refuse_curve(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_curve(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::curve, edge, gain, false)) return std::nullopt;
     return EdgeQueue::Entry{.edge = key,
@@ -108,7 +106,7 @@ class Refiner {
 
   void look_at_curve(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = reversed(trial.edge());
-    if (const Refusal refusal = refuse_curve(edge); refusal != Refusal::none) return trial.refuse(refusal);
+    if (const Refusal refusal = ask_.refuse_curve(edge); refusal != Refusal::none) return trial.refuse(refusal);
     const bool is_known = session_.is_unchanged(trial.candidate);
     if (is_known && trial.candidate.is_hopeless) return trial.refuse(Refusal::prediction);
     trial.signal = is_known ? trial.candidate.priority : ask_.predict_curve(edge, scratch);

@@ -38,7 +38,6 @@ Change<Dim> ChangeLog<Dim>::commit(const Edit<Dim>& edit, std::span<const Positi
   const FacetId first_facet = mesh_.facet_slots();
   Change<Dim> change{.edit = edit, .created = mesh_.apply(edit), .first_facet = first_facet, .first_node = kNone};
   change.first_node = mesh_.vertex_slots() - static_cast<int>(edit.inserted_nodes.size());
-  if (!edit.is_nested()) first_coarsened_ = std::min(first_coarsened_, first_cell);
   change.cells.resize(mesh_.cell_slots() - first_cell);
   std::iota(change.cells.begin(), change.cells.end(), first_cell);
   const auto slot_of = [&](VertexId v) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <functional>
-#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -36,8 +35,6 @@ class ChangeLog {
   /// Applies an edit with the positions to which it relaxed.
   Change<Dim> commit(const Edit<Dim>& edit, std::span<const Position> positions);
 
-  /// Cells from this one on were made after the first commit of an edit that is not nested.
-  CellId first_coarsened() const { return first_coarsened_; }
   /// Number of the last commit.
   unsigned now() const { return static_cast<unsigned>(surfaces_.size()); }
   /// Whether a commit after `since` replaced cells at an edge (a vertex {v, kNone}) or moved a vertex of these.
@@ -67,7 +64,6 @@ class ChangeLog {
   std::vector<std::function<void(const Change<Dim>&)>> followers_;
   std::vector<Touched> touched_;    ///< by vertex
   std::vector<Box<Dim>> surfaces_;  ///< by commit
-  CellId first_coarsened_ = std::numeric_limits<CellId>::max();
 };
 
 }  // namespace itr

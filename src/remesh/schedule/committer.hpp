@@ -29,7 +29,6 @@ class Committer {
   /// Commits an edit without relaxing, if the gate lets it pass. Returns whether it did, and counts it.
   bool commit_unjudged(const Edit<Dim>& edit, GateScratch<Dim>& scratch, OperationCount& count);
 
-  CellId first_coarsened() const { return log_.first_coarsened(); }
   double median_trial_seconds();
 
  private:

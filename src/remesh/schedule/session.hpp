@@ -71,6 +71,8 @@ class RemeshSession {
 template <int Dim>
 void refine_edges(RemeshSession<Dim>& session);
 template <int Dim>
+void straighten_edges(RemeshSession<Dim>& session);
+template <int Dim>
 void collapse_edges(RemeshSession<Dim>& session);
 /// In 3D: edges are removed such that the energy of the new cells is least, then facets (2-3 swaps).
 void swap_edges(RemeshSession<2>& session);
