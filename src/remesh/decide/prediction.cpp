@@ -106,13 +106,13 @@ class QuadraticModel {
     const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
     const Mat<Dim> F = edge_matrix<Dim>(at.x) * inverse;
     const ElasticModuli moduli = elastic_moduli<Dim>(material, at.rest[0]);
-    const ElasticResponse<Dim> response(F, moduli);
-    const Vec<Dim> ga = shape_gradient<Dim>(inverse, a), gb = shape_gradient<Dim>(inverse, b);
+    const ElasticPoint<Dim> response(F, moduli);
+    const Vec<Dim> ga = barycentric_gradient<Dim>(inverse, a), gb = barycentric_gradient<Dim>(inverse, b);
     const double sV = context_.scaling * mesh.volume(c), mass = material.density * mesh.volume(c);
     constexpr double kFirst = 1.0 / (Dim + 1), kSecond = kFirst / (Dim + 2), kThird = kSecond / (Dim + 3),
                      kFourth = kThird / (Dim + 4);  // integrals of products of different coordinates, by the volume
-    gradient_ += 4 * kFirst * sV * response.force(ga + gb);
-    hessian_ += 16 * kSecond * sV * (response.stiffness(ga) + response.stiffness(gb) + response.stiffness(ga + gb));
+    gradient_ += 4 * kFirst * sV * response.gradient(ga + gb);
+    hessian_ += 16 * kSecond * sV * (response.hessian(ga) + response.hessian(gb) + response.hessian(ga + gb));
     if (context_.has_inertia) {
       Vec<Dim> total = at.x[a] - at.predictor[a] + at.x[b] - at.predictor[b];
       for (int k = 0; k <= Dim; ++k) total += at.x[k] - at.predictor[k];
@@ -126,7 +126,7 @@ class QuadraticModel {
   void add_curved_facet(const std::array<Vec<Dim>, Dim>& rest, const Vec<Dim>& middle, int tag) {
     constexpr double kSecond = 1.0 / (Dim * (Dim + 1));
     for (const auto& [loaded, traction] : context_.loads.tractions)
-      if (loaded == tag) gradient_ -= context_.scaling * 4 * kSecond * area(rest) * traction(middle);
+      if (loaded == tag) gradient_ -= context_.scaling * 4 * kSecond * facet_area(rest) * traction(middle);
   }
 
   void add_facet(const std::array<Vec<Dim>, Dim>& rest, const std::array<Vec<Dim>, Dim>& x, int tag, int moving) {
