@@ -4,10 +4,10 @@
 
 #include <Eigen/Geometry>
 
-#include "remesh/gate.hpp"
-#include "remesh/local_problem.hpp"
-#include "remesh/patch.hpp"
-#include "remesh/prospect.hpp"
+#include "remesh/contact/gate.hpp"
+#include "remesh/decide/local_problem.hpp"
+#include "remesh/decide/patch.hpp"
+#include "remesh/decide/prospect.hpp"
 #include "remesh_options.hpp"
 #include "tet_scene.hpp"
 
@@ -73,7 +73,7 @@ TEST(Prospect, NoSplitGainsMoreThanIsThere) {
     Marks marks;
     for (const EdgeKey& edge : scene.mesh.edges()) {
       const auto split = make_split(scene.mesh, edge);
-      const auto patch = select_patch<3>(scene.mesh, split.removed_cells, {}, 1, {}, marks);
+      const auto patch = select_patch<3>(scene.mesh, split, {}, 1, marks);
       LocalProblem<3> before(state, patch, split, false, scratch), after(state, patch, split, true, scratch);
       if (!after.has_unknowns()) continue;
       EXPECT_LE(before.value() - after.relax(20).energy, available) << "seed " << seed;

@@ -14,7 +14,7 @@
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/remesh/edits.hpp"
 #include "itr/remesh/fields.hpp"
-#include "remesh/trial.hpp"
+#include "remesh/decide/trial.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

@@ -10,9 +10,9 @@
 #include "itr/geometry/intersection.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "remesh/patch.hpp"
-#include "remesh/prediction.hpp"
-#include "remesh/trial.hpp"
+#include "remesh/decide/patch.hpp"
+#include "remesh/decide/prediction.hpp"
+#include "remesh/decide/trial.hpp"
 #include "remesh_options.hpp"
 #include "tet_scene.hpp"
 
@@ -64,7 +64,7 @@ void for_random_edits(int count, int edits_a_scene, double friction, const Compa
     for (int i = 0; i < edits_a_scene; ++i) {
       const auto edit = random_edit(scene, strata, scene.random);
       if (!edit || !gate.passes(*edit, scratch.gate)) continue;
-      const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
+      const auto patch = select_patch<3>(scene.mesh, *edit, {}, 1, marks);
       LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
       Mesh<3> changed = scene.mesh;
       RemeshFields<3> fields = scene.fields;
@@ -159,7 +159,7 @@ TEST(ContactReach3d, NeighbourhoodsAreKeptThroughEditsAndMoves) {
       Neighbourhoods<3> fresh;
       for (FacetId f = 0; f < scene.mesh.facet_slots(); ++f) {
         if (!scene.mesh.is_facet_alive(f)) continue;
-        std::map<int, double> expected;
+        std::map<SurfaceId, double> expected;
         for (const auto& [piece, distance] : fresh.near(surface, f, radius, hits)) expected[piece] = distance;
         for (const auto& [piece, distance] : kept.near(surface, f, radius, hits)) {
           ASSERT_TRUE(expected.contains(piece)) << "seed " << seed << ", edit " << i;
@@ -188,7 +188,7 @@ TEST(Bounds3d, OfOneVertexNeverExceedWhatAPatchGains) {
       const auto edit = random_edit(scene, strata, scene.random);
       if (!edit || !gate.passes(*edit, scratch.gate)) continue;
       const double bound = gain_of_vertex<3>(state, *edit, scratch);
-      const auto patch = select_patch<3>(scene.mesh, edit->removed_cells, {}, 1, {}, marks);
+      const auto patch = select_patch<3>(scene.mesh, *edit, {}, 1, marks);
       LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
       const double energy = before.value();
       const double gain = energy - (after.has_unknowns() ? after.relax(100).energy : after.value());

@@ -13,7 +13,7 @@
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
-#include "remesh/patch.hpp"
+#include "remesh/decide/patch.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {
@@ -315,10 +315,8 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
   const bool moves = kind == Kind::smooth;
   LocalRelaxationOptions local = options.local;
   if (moves) local.rings = 1, local.relative_volume = 0;
-  const Vec<2> center =
-      edit->value ? edit->value->rest : Vec<2>(0.5 * (scene.mesh.rest(edit->edge[0]) + scene.mesh.rest(edit->edge[1])));
   Marks marks;
-  const auto patch = select_patch<2>(scene.mesh, edit->removed_cells, center, scene.mesh.total_volume(), local, marks);
+  const auto patch = select_patch<2>(scene.mesh, *edit, local, scene.mesh.total_volume(), marks);
   LocalView view(scene, history);
   const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
   const double energy_before = before->value();

@@ -84,12 +84,12 @@ TEST_P(Engines, AFactorSolvesWhatIsLikeIt) {
   ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
   for (const double change : {0.0, 0.01, 0.02}) {
     const auto values = changed(block(), change);
-    ASSERT_EQ(solver.prepare(values, b, kAsked), Outcome::ok);
-    const SolveReport report = solver.solve(b, x, 1, kAsked);
+    const SystemReport report = solver.solve_system(values, b, {kAsked}, x);
     ASSERT_EQ(report.outcome, Outcome::ok) << solver.message();
     const double achieved = residual(block().pattern, values, x, b);
     EXPECT_LE(achieved, kAsked);
-    EXPECT_NEAR(report.relative_residual, achieved, 1e-3 * kAsked);
+    EXPECT_NEAR(report.residual, achieved, 1e-3 * kAsked);
+    if (solver.capabilities().tells_definiteness) EXPECT_EQ(report.definiteness, Definiteness::positive);
   }
   EXPECT_EQ(solver.counts().factorizations, 1);
   EXPECT_EQ(solver.counts().reused, 2);
@@ -102,20 +102,19 @@ TEST_P(Engines, ALooseSolveGoesOnToAllDigits) {
   ReusingSolver in_two(*other, true);
   const auto b = load(block().pattern.order);
   std::vector<double> x(b.size());
-  const auto solve = [&](ReusingSolver& solver, double change, double asked) {
+  const auto solve = [&](ReusingSolver& solver, double change, const Asked& asked) {
     const auto values = changed(block(), change);
     EXPECT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
-    EXPECT_EQ(solver.prepare(values, b, asked), Outcome::ok);
-    EXPECT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    EXPECT_EQ(solver.solve_system(values, b, asked, x).outcome, Outcome::ok);
     return residual(block().pattern, values, x, b);
   };
-  for (ReusingSolver* solver : {&at_once, &in_two}) solve(*solver, 0, kAsked);
-  EXPECT_LE(solve(at_once, 0.02, kAsked), kAsked);
-  const double loose = solve(in_two, 0.02, 1e-3);
+  for (ReusingSolver* solver : {&at_once, &in_two}) solve(*solver, 0, {kAsked});
+  EXPECT_LE(solve(at_once, 0.02, {kAsked}), kAsked);
+  const double loose = solve(in_two, 0.02, {.residual = kAsked, .loose = 1e-3});
   EXPECT_GT(loose, kAsked);
   EXPECT_LE(loose, 1e-3);
   EXPECT_LT(in_two.counts().iterations, at_once.counts().iterations);
-  EXPECT_LE(solve(in_two, 0.02, kAsked), kAsked);
+  EXPECT_LE(solve(in_two, 0.02, {.residual = kAsked, .goes_on = true}), kAsked);
   EXPECT_LE(in_two.counts().iterations, at_once.counts().iterations + 2);
   EXPECT_EQ(in_two.counts().factorizations, 1);
   EXPECT_EQ(in_two.counts().solves, 2);
@@ -137,8 +136,7 @@ TEST_P(Engines, AGrownPatternDoesNotMatter) {
   std::vector<double> x(n);
   for (const Elastic* system : {&block(), const_cast<const Elastic*>(&touched)}) {
     ASSERT_EQ(solver.analyze(system->pattern, system->hints()), Outcome::ok);
-    ASSERT_EQ(solver.prepare(system->values, b, kAsked), Outcome::ok);
-    ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    ASSERT_EQ(solver.solve_system(system->values, b, {kAsked}, x).outcome, Outcome::ok);
   }
   EXPECT_LE(residual(touched.pattern, touched.values, x, b), kAsked);
   EXPECT_EQ(solver.counts().factorizations, 1);
@@ -156,16 +154,43 @@ TEST_P(Engines, IndefinitenessIsSeenInEveryDirection) {
   std::vector<double> b = load(order), x(order);
   b.back() = 0;
   ASSERT_EQ(solver.analyze(system.pattern, {}), Outcome::ok);
-  ASSERT_EQ(solver.prepare(system.values, b, kAsked), Outcome::ok);
-  ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+  ASSERT_EQ(solver.solve_system(system.values, b, {kAsked}, x).outcome, Outcome::ok);
   system.values.back() = -1e-3;
-  if (const Outcome loose = solver.prepare(system.values, b, 1e-2); loose != Outcome::ok)
-    EXPECT_EQ(loose, Outcome::not_positive_definite);
-  Outcome outcome = solver.prepare(system.values, b, kAsked);  // which a loose solve before does not hide
-  if (solver.capabilities().indefinite)
-    EXPECT_EQ(outcome, Outcome::ok);
-  else
-    EXPECT_EQ(outcome, Outcome::not_positive_definite);
+  const SystemReport loose = solver.solve_system(system.values, b, {.residual = kAsked, .loose = 1e-2}, x);
+  if (loose.outcome != Outcome::ok) EXPECT_EQ(loose.outcome, Outcome::not_positive_definite);
+  // A loose solve before does not hide it.
+  const SystemReport report = solver.solve_system(system.values, b, {.residual = kAsked, .goes_on = true}, x);
+  if (solver.capabilities().tells_definiteness || !solver.capabilities().indefinite) {
+    EXPECT_EQ(report.outcome, Outcome::not_positive_definite);
+    EXPECT_EQ(report.definiteness, Definiteness::indefinite);
+  } else {
+    EXPECT_EQ(report.outcome, Outcome::ok);
+    EXPECT_EQ(report.definiteness, Definiteness::unknown);
+  }
+  if (!solver.capabilities().indefinite) return;
+  EXPECT_EQ(solver.solve_system(system.values, b, {.residual = kAsked, .if_indefinite = true}, x).outcome, Outcome::ok);
+  EXPECT_LE(residual(system.pattern, system.values, x, b), kAsked);
+}
+
+/// What was solved by iterations has no factor of its own, and what was not asked for is not counted as solved.
+TEST_P(Engines, WhatAMatrixIsCanBeAskedAlone) {
+  ReusingSolver solver(*direct, true);
+  const auto b = load(block().pattern.order);
+  std::vector<double> x(b.size());
+  ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
+  ASSERT_EQ(solver.solve_system(block().values, b, {kAsked}, x).outcome, Outcome::ok);
+  EXPECT_TRUE(solver.has_factor());
+  const auto values = changed(block(), 0.01);
+  const SystemReport report = solver.solve_system(values, b, {kAsked}, {});
+  EXPECT_EQ(report.outcome, Outcome::ok);
+  EXPECT_EQ(report.definiteness, Definiteness::positive);
+  EXPECT_EQ(solver.counts().solves, 1);
+  EXPECT_EQ(solver.counts().factorizations, 1);
+  EXPECT_FALSE(solver.has_factor());
+  EXPECT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::failed) << "the factor is of another matrix";
+  ASSERT_EQ(solver.factorize(values), Outcome::ok);
+  EXPECT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+  EXPECT_LE(residual(block().pattern, values, x, b), kAsked);
 }
 
 TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
@@ -175,8 +200,7 @@ TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
   ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
   for (const double change : {0.0, 1e6}) {
     const auto values = changed(block(), change);
-    ASSERT_EQ(solver.prepare(values, b, kAsked), Outcome::ok);
-    ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    ASSERT_EQ(solver.solve_system(values, b, {kAsked}, x).outcome, Outcome::ok);
     EXPECT_LE(residual(block().pattern, values, x, b), kAsked);
   }
   EXPECT_EQ(solver.counts().factorizations, 2);
@@ -190,8 +214,7 @@ TEST_P(Engines, ARecordIsAllThatMatters) {
   const auto solve = [&](ReusingSolver& solver, double change) {
     std::vector<double> x(b.size());
     EXPECT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
-    EXPECT_EQ(solver.prepare(changed(block(), change), b, kAsked), Outcome::ok);
-    EXPECT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    EXPECT_EQ(solver.solve_system(changed(block(), change), b, {kAsked}, x).outcome, Outcome::ok);
     return x;
   };
   for (const double change : {0.0, 0.01, 0.02}) solve(through, change);
@@ -229,8 +252,7 @@ TEST(Record, IsEmptyWhereAnOrderCameFromAnEarlierPattern) {
     const auto b = load(system.pattern.order);
     std::vector<double> x(b.size());
     ASSERT_EQ(solver.analyze(system.pattern, hints), Outcome::ok);
-    ASSERT_EQ(solver.prepare(system.values, b, kAsked), Outcome::ok);
-    ASSERT_EQ(solver.solve(b, x, 1, kAsked).outcome, Outcome::ok);
+    ASSERT_EQ(solver.solve_system(system.values, b, {kAsked}, x).outcome, Outcome::ok);
     EXPECT_EQ(solver.record().matrix == nullptr, may_keep_order);
   }
   EXPECT_EQ(solver.counts().factorizations, 2);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <numeric>
 #include <set>
 
 #include "itr/core/error.hpp"
@@ -16,6 +15,7 @@
 #include "itr/simulation/advice.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "itr/simulation/step_problem.hpp"
+#include "mesh/connected_parts.hpp"
 #include "solver_choice.hpp"
 
 namespace itr::cli {
@@ -42,22 +42,6 @@ const char* name_of(MaterialLaw law) {
 
 void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
-}
-
-/// Which connected surface every vertex of the scene belongs to, by its smallest vertex.
-std::vector<int> find_components(const CollisionSurface& surface, std::size_t num_vertices) {
-  std::vector<int> parent(num_vertices);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&](int v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const auto& [a, b] : surface.edges) {
-    const int first = find(a), second = find(b);
-    parent[std::max(first, second)] = std::min(first, second);
-  }
-  for (std::size_t v = 0; v < num_vertices; ++v) parent[v] = find(static_cast<int>(v));
-  return parent;
 }
 
 std::string describe(const TimeOptions& time, const Units& units) {
@@ -239,7 +223,7 @@ class Explanation {
     const ContactSurface<Dim> contact = contact_surface(setup_, setup_.mesh, simulation_.state().space);
     const CollisionSurface& surface = contact.surface;
     const VectorX x = contact.positions(simulation_.state().history.x[0]);
-    const auto component = find_components(surface, surface.counts.size());
+    const auto component = connected_parts<2>(surface.counts.size(), surface.edges);
     std::set<int> moving, fixed;
     for (const int v : surface.vertices) (surface.counts[v] ? moving : fixed).insert(component[v]);
     const std::size_t m = moving.size(), f = fixed.size();

@@ -132,7 +132,7 @@ std::string Units::name(std::string_view unit) const {
     for (const auto& [derived, e] : kDerived) {
       if (part != derived) continue;
       const double factor = power(length_.factor, e.length) * power(mass_.factor, e.mass) * power(time_.factor, e.time);
-      if (const char* prefix = prefix_of(factor)) return prefix + std::string(derived);
+      if (const char* prefix = prefix_of(factor)) return fmt::format("{}{}", prefix, derived);
       const std::string above = with_exponent(length_.name, std::max(e.length, 1)), below = with_exponent(time_.name, 2);
       if (e.length < 0) return "(" + mass_.name + "/(" + length_.name + " " + below + "))";
       return "(" + mass_.name + " " + above + "/" + below + ")";

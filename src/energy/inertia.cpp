@@ -74,8 +74,7 @@ double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
         total += d;
         squares += d.squaredNorm();
       }
-      const ElementMass<Dim> mass(kind_, mass_[e]);
-      part += 0.5 * (mass.off * total.squaredNorm() + mass.extra * squares);
+      part += ElementMass<Dim>(kind_, mass_[e]).energy(total, squares);
     }
     return part;
   });

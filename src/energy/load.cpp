@@ -1,27 +1,32 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/load.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/fem/quadrature.hpp"
+#include "load_points.hpp"
 
 namespace itr {
 
 namespace {
 
 template <int Dim, std::size_t Vertices>
+std::array<Vec<Dim>, Vertices> rest_of(const std::array<int, Vertices>& vertices, const CellSet<Dim>& cells) {
+  std::array<Vec<Dim>, Vertices> rest;
+  for (std::size_t k = 0; k < Vertices; ++k) rest[k] = cells.rest[vertices[k]];
+  return rest;
+}
+
+template <int Dim, std::size_t Vertices>
 void add_forces(const std::array<int, Vertices>& vertices, const CellSet<Dim>& cells, double weight,
                 const std::function<Vec<Dim>(const Vec<Dim>&)>& load, VectorView forces) {
-  constexpr double kNear = near_vertex<Vertices>(), kFar = (1 - kNear) / (Vertices - 1);
-  for (std::size_t q = 0; q < Vertices; ++q) {
-    Vec<Dim> X = Vec<Dim>::Zero();
-    for (std::size_t k = 0; k < Vertices; ++k) X += (k == q ? kNear : kFar) * cells.rest[vertices[k]];
-    const Vec<Dim> f = weight / Vertices * load(X);
-    for (std::size_t k = 0; k < Vertices; ++k) forces.segment<Dim>(Dim * vertices[k]) += (k == q ? kNear : kFar) * f;
-  }
+  using Point = LoadPoint<Vertices>;
+  for_each_load_point<Dim>(rest_of(vertices, cells), weight, load, [&](std::size_t q, const Vec<Dim>& f) {
+    for (std::size_t k = 0; k < Vertices; ++k)
+      forces.segment<Dim>(Dim * vertices[k]) += (k == q ? Point::kNear : Point::kFar) * f;
+  });
 }
 
 /// The same on a simplex with curved edges, by the rule for products of two quadratic functions.
@@ -36,13 +41,6 @@ void add_curved_forces(const std::array<int, kQuadraticNodes<SimplexDim>>& nodes
     const auto shapes = quadratic_shapes<SimplexDim>(curved, point.weights);
     for (int k = 0; k < kQuadraticNodes<SimplexDim>; ++k) forces.segment<Dim>(Dim * nodes[k]) += shapes[k] * f;
   }
-}
-
-double facet_area(const std::array<int, 2>& f, const CellSet<2>& cells) {
-  return (cells.rest[f[1]] - cells.rest[f[0]]).norm();
-}
-double facet_area(const std::array<int, 3>& f, const CellSet<3>& cells) {
-  return 0.5 * (cells.rest[f[1]] - cells.rest[f[0]]).cross(cells.rest[f[2]] - cells.rest[f[0]]).norm();
 }
 
 }  // namespace
@@ -77,12 +75,13 @@ void LoadEnergy<Dim>::renew(const std::map<int, Material>& materials, const Load
       std::array<int, Dim> corners;
       std::copy_n(facet.nodes.begin(), Dim, corners.begin());
       add_curved_forces<Dim, Dim - 1>(
-          facet.nodes, facet.curved, cells_, facet_area(corners, cells_), [](const Vec<Dim>&) { return 1.0; }, traction,
-          forces);
+          facet.nodes, facet.curved, cells_, facet_area(rest_of(corners, cells_)), [](const Vec<Dim>&) { return 1.0; },
+          traction, forces);
     }
   for (const auto& facet : cells_.facets)
     for (const auto& [tag, traction] : loads.tractions)
-      if (tag == facet.tag) add_forces<Dim>(facet.vertices, cells_, facet_area(facet.vertices, cells_), traction, forces);
+      if (tag == facet.tag)
+        add_forces<Dim>(facet.vertices, cells_, facet_area(rest_of(facet.vertices, cells_)), traction, forces);
   for (int v = 0; v < cells_.num_vertices; ++v) rest_work_ += forces.segment<Dim>(Dim * v).dot(cells_.rest[v]);
 }
 

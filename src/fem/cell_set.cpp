@@ -37,7 +37,7 @@ CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extr
     if (element.curved)
       set.curved_elements.push_back(element);
     else
-      set.elements.push_back({mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)});
+      set.elements.push_back(element_of(mesh, c));
   }
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;

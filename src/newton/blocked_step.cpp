@@ -12,6 +12,7 @@ constexpr int kMostRounds = 3;           ///< gaps are linearised so often
 constexpr Eigen::Index kMostPairs = 32;  ///< a back-solve each
 constexpr double kAhead = 4;             ///< pairs that stop the step within so many times its free share are bounded
 constexpr double kFreeEnough = 0.5;      ///< share of the step with which it is done
+constexpr double kLongest = 10;          ///< of the step's largest motion: a turned one is not longer
 
 /// Solves for the multipliers l >= 0 of the bounds S l >= asked by Gauss-Seidel. A multiplier is 0 if its bound holds
 /// without it.
@@ -107,6 +108,8 @@ double turn_blocked_step(const StepOrigin& origin, VectorView step, double share
       way[i] = first[i] + correction[unknown];
       slope_of_correction += gradient[i] * correction[unknown];
     }
+    // Nearly dependent bounds ask for forces without limit, and for far motions all pairs are candidates of contact.
+    if (!(way.lpNorm<Eigen::Infinity>() <= kLongest * first.lpNorm<Eigen::Infinity>())) break;
     free = energy.max_step(x, way, workspace);
     const ModelAlong model{slope + slope_of_correction, -slope - 2 * slope_of_correction + curvature_of_correction};
     if (model.slope < 0 && model.change(free) < least) {

@@ -9,7 +9,9 @@ namespace itr {
 namespace {
 
 constexpr double kNothing = 1e-10;   ///< see NewtonExtras::way_to_start
-constexpr int kMostUnresolved = 20;  ///< steps in a row below round-off: the gradient is round-off, and shrinks no further
+constexpr int kMostUnresolved = 20;  ///< steps in a row below round-off
+constexpr int kMostStill = 4;        ///< of these, steps in a row after which the gradient had not shrunk: it is round-off
+constexpr double kShrunk = 0.9;      ///< share of the gradient that had shrunk last
 constexpr double kNear = 10;         ///< times a tolerance
 
 }  // namespace
@@ -39,9 +41,18 @@ std::optional<Termination> Convergence::test(const Step& step) {
   }
   if (has_small_step(step)) return Termination::step;
   if (at_.decrement_of(step) < task_.options.decrement_tolerance) return Termination::decrement;
-  unresolved_ = at_.is_unresolved(step) ? unresolved_ + 1 : 0;
-  if (unresolved_ >= kMostUnresolved) return Termination::round_off;
+  if (is_lost_in_round_off(step)) return Termination::round_off;
   return {};
+}
+
+/// Whether many steps in a row promised a decrease below the resolution of energy or positions. They still may lower the
+/// gradient, but not below its own round-off.
+bool Convergence::is_lost_in_round_off(const Step& step) {
+  unresolved_ = at_.is_unresolved(step) ? unresolved_ + 1 : 0;
+  const double now = at_.gradient_norm();
+  still_ = unresolved_ > 1 && now > kShrunk * last_shrunk_ ? still_ + 1 : 0;
+  if (still_ == 0) last_shrunk_ = now;
+  return still_ >= kMostStill || unresolved_ >= kMostUnresolved;
 }
 
 bool Convergence::is_at_round_off(const Step& step) const {

@@ -34,13 +34,16 @@ class Convergence {
   bool is_first() const { return task_.summary.iterations == 0; }
   bool begins_elsewhere() const { return task_.extras.way_to_start.size() > 0; }
   bool has_small_step(const Step& step);
+  bool is_lost_in_round_off(const Step& step);
 
   const Task& task_;
   const Iterate& at_;
   const HeldMotion& held_;
   double first_gradient_ = -1, first_step_ = -1;  ///< norms with the held dofs in place; below 0: not there yet
   double decrement_ = 0, gradient_of_decrement_ = 0;
-  int unresolved_ = 0;  ///< steps in a row that promised less than round-off
+  int unresolved_ = 0;      ///< steps in a row that promised less than round-off
+  double last_shrunk_ = 0;  ///< gradient norm of the last of these where it was less than before
+  int still_ = 0;           ///< of these, those since
   int stalled_ = 0;
 };
 

@@ -10,7 +10,8 @@ double find_negative_curvature(NewtonSystem& system, int unknowns, VectorX& v) {
   constexpr int kMostShifts = 14, kMostSolves = 30;
   constexpr double kSettled = 0.05;  // relative change of the curvature
   const auto is_definite = [&](double shift) {
-    return system.factorize(shift) == linear::Outcome::ok && system.negative_pivots() == 0;
+    const linear::SystemReport report = system.factorize(shift);
+    return report.outcome == linear::Outcome::ok && report.definiteness != linear::Definiteness::indefinite;
   };
   double shift = 1e-10 * std::max(system.diagonal_scale(), 1e-300);
   for (int attempt = 0; !is_definite(shift); ++attempt, shift *= 10)
@@ -21,7 +22,7 @@ double find_negative_curvature(NewtonSystem& system, int unknowns, VectorX& v) {
   VectorX next(unknowns);
   double curvature = 0;
   for (int k = 0; k < kMostSolves; ++k) {
-    const auto outcome = system.solve(v, next).outcome;
+    const auto outcome = system.solve_again(v, next).outcome;
     if (outcome != linear::Outcome::ok && outcome != linear::Outcome::not_converged) return 0;
     const double before = curvature;
     curvature = next.dot(v) / next.squaredNorm() - shift;  // (H + shift) next = v

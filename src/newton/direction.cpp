@@ -46,7 +46,7 @@ bool Direction::find() {
     if (find_with(projection())) return true;
   }
   double shift = kFirstShift * std::max(task_.system.diagonal_scale(), 1e-300);
-  for (int attempt = 0; attempt < kMostShifts && is_curable(outcome_); ++attempt, shift *= 10)
+  for (int attempt = 0; attempt < kMostShifts && is_curable(solved_.outcome); ++attempt, shift *= 10)
     if (solve(shift)) return true;
   return false;
 }
@@ -61,7 +61,7 @@ bool Direction::find_projected() {
 bool Direction::tighten() {
   is_tight_ = true;
   asked_ = kTightResidual;
-  const bool found = solve(shift_);
+  const bool found = solve(shift_, true);
   if (!is_projected_ && shift_ == 0) note_definiteness();
   return found || find();
 }
@@ -90,9 +90,9 @@ void Direction::assemble(PsdProjection psd) {
   task_.system.assemble(task_.energy, at_.x(), psd, task_.dofs, held_.motion(), task_.workspace);
 }
 
-/// Records whether the true Hessian at x is indefinite. It has to be the last matrix that was factorised.
+/// Records whether the true Hessian at x is indefinite. It has to be the last matrix that was solved with.
 void Direction::note_definiteness() {
-  was_indefinite_ = outcome_ == linear::Outcome::not_positive_definite || task_.system.negative_pivots() > 0;
+  was_indefinite_ = solved_.definiteness == linear::Definiteness::indefinite;
   known_at_ = at_.revision();
   indefinite_ += was_indefinite_;
 }
@@ -103,7 +103,8 @@ bool Direction::is_hessian_indefinite() {
   if (was_indefinite_ && known_at_ == at_.revision()) return true;
   assemble(PsdProjection::none);
   const ScopedTimer timer(task_.summary.linear_seconds);
-  outcome_ = was_indefinite_ ? task_.system.factorize(0) : task_.system.prepare(0, right_hand_side(), kTightResidual);
+  VectorX none;
+  solved_ = was_indefinite_ ? task_.system.factorize(0) : task_.system.solve(0, right_hand_side(), {kTightResidual}, none);
   is_loose_ = false;
   note_definiteness();
   return was_indefinite_;
@@ -118,8 +119,8 @@ ConstVectorView Direction::right_hand_side() {
   return rhs;
 }
 
-/// Solves for the full step; true where it is one of descent.
-bool Direction::solve(double shift) {
+/// Solves for the full step; true where it is one of descent. `goes_on`: from the solution that is there.
+bool Direction::solve(double shift, bool goes_on) {
   shift_ = shift;
   is_loose_ = false;
   const ScopedTimer timer(task_.summary.linear_seconds);
@@ -129,24 +130,19 @@ bool Direction::solve(double shift) {
     step_.curvature = held_.motion().curvature;
     return true;
   }
-  NewtonSystem& system = task_.system;
   const ConstVectorView rhs = right_hand_side();
   VectorView solution = kept_.solution.resize(rhs.size());
-  outcome_ = system.prepare(shift, rhs, asked_);
-  if (outcome_ != linear::Outcome::ok) return fail();
-  // L D L^T factorises an indefinite Hessian, too. Its solution must not be used: along eigenvectors of negative
-  // eigenvalues, Newton's step goes up to a saddle.
-  if (task_.options.indefinite == IndefiniteHessian::project && system.negative_pivots() > 0) {
-    outcome_ = linear::Outcome::not_positive_definite;
-    failure_ = " (linear solve: " + std::to_string(system.negative_pivots()) + " negative eigenvalues)";
-    return false;
-  }
-  const auto report = system.solve(rhs, solution);
-  outcome_ = report.outcome;
-  if ((outcome_ != linear::Outcome::ok && outcome_ != linear::Outcome::not_converged) || !solution.allFinite())
-    return fail();
-  is_loose_ = report.relative_residual > kTightResidual && report.relative_residual <= asked_;
-  if (!is_loose_) task_.summary.linear_residual = std::max(task_.summary.linear_residual, report.relative_residual);
+  // The solution of an indefinite Hessian must not be used: along eigenvectors of negative eigenvalues, Newton's step goes
+  // up to a saddle.
+  const bool if_indefinite = task_.options.indefinite == IndefiniteHessian::accept;
+  solved_ = task_.system.solve(shift, rhs, {kTightResidual, asked_, if_indefinite, goes_on}, solution);
+  if (solved_.negative_eigenvalues > 0 && !if_indefinite)
+    return fail(std::to_string(solved_.negative_eigenvalues) + " negative eigenvalues");
+  const bool has_solution = solved_.outcome == linear::Outcome::ok || solved_.outcome == linear::Outcome::not_converged;
+  if (!has_solution || !solution.allFinite())
+    return fail(std::string(to_string(solved_.outcome)) + ", " + task_.system.message());
+  is_loose_ = solved_.residual > kTightResidual && solved_.residual <= asked_;
+  if (!is_loose_) task_.summary.linear_residual = std::max(task_.summary.linear_residual, solved_.residual);
   return set_step(rhs, solution);
 }
 
@@ -174,9 +170,8 @@ void Direction::begin_step() {
     step_.way.setZero();
 }
 
-bool Direction::fail() {
-  if (!task_.extras.is_brief)
-    failure_ = std::string(" (linear solve: ") + to_string(outcome_) + ", " + task_.system.message() + ")";
+bool Direction::fail(const std::string& reason) {
+  if (!task_.extras.is_brief) failure_ = " (linear solve: " + reason + ")";
   return false;
 }
 

@@ -37,12 +37,12 @@ class Direction {
   };
   double digits_to_ask() const;
   bool find_with(PsdProjection psd);
-  bool solve(double shift);
+  bool solve(double shift, bool goes_on = false);
   bool set_step(ConstVectorView rhs, ConstVectorView solution);
   void begin_step();
   ConstVectorView right_hand_side();
   void note_definiteness();
-  bool fail();
+  bool fail(const std::string& reason);
   PsdProjection projection() const {
     return task_.options.absolute_eigenvalues ? PsdProjection::absolute : PsdProjection::clamp;
   }
@@ -53,8 +53,8 @@ class Direction {
   const Convergence& convergence_;
   Kept& kept_;
   Step step_;
-  linear::Outcome outcome_ = linear::Outcome::ok;  ///< of the last linear solve
-  std::string failure_;                            ///< why the last one failed that did
+  linear::SystemReport solved_;  ///< the last system
+  std::string failure_;          ///< why the last one failed that did
 
   bool is_projected_ = false;     ///< the step is of the projected Hessian
   int projected_iterations_ = 0;  ///< that are still to come before the true one is tried again

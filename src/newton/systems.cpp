@@ -7,10 +7,17 @@
 
 namespace itr {
 
+linear::SystemReport NewtonSystem::solve(double shift, ConstVectorView rhs, const linear::Asked& asked,
+                                         VectorView solution) {
+  const linear::SystemReport report = factorize(shift);
+  if (solution.size() == 0) return report;
+  return linear::with_solution(report, asked, [&] { return solve_again(rhs, solution); });
+}
+
 bool NewtonSystem::solve_columns(const MatrixX& B, MatrixX& X) {
   X.resize(B.rows(), B.cols());
   for (Eigen::Index j = 0; j < B.cols(); ++j)
-    if (solve(B.col(j), X.col(j)).outcome != linear::Outcome::ok) return false;
+    if (solve_again(B.col(j), X.col(j)).outcome != linear::Outcome::ok) return false;
   return X.allFinite();
 }
 
@@ -23,15 +30,17 @@ void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjectio
   energy.add_hessian(x, psd, sink, workspace);
 }
 
-linear::Outcome DenseSystem::factorize(double shift) {
+linear::SystemReport DenseSystem::factorize(double shift) {
   factor_.resize(order_ * order_) = hessian_.view();
   Eigen::Ref<MatrixX> factor = factor_.matrix(order_);
   if (shift != 0) factor.diagonal().array() += shift;
   const Eigen::LLT<Eigen::Ref<MatrixX>, Eigen::Lower> llt(factor);  // in place
-  return llt.info() == Eigen::Success ? linear::Outcome::ok : linear::Outcome::not_positive_definite;
+  if (llt.info() != Eigen::Success)
+    return {.outcome = linear::Outcome::not_positive_definite, .definiteness = linear::Definiteness::indefinite};
+  return {.definiteness = linear::Definiteness::positive};
 }
 
-linear::SolveReport DenseSystem::solve(ConstVectorView rhs, VectorView solution) {
+linear::SolveReport DenseSystem::solve_again(ConstVectorView rhs, VectorView solution) {
   const auto lower = factor_.matrix(order_).triangularView<Eigen::Lower>();
   solution = rhs;
   lower.solveInPlace(solution);
@@ -54,6 +63,7 @@ void SparseSystem::reset(const DofMap& dofs, int dim, std::vector<Stencils> sten
 
 void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                             PrescribedMotion& motion, Workspace& workspace) {
+  matrix_ = {};
   assembler_.begin();
   HessianSink sink(dofs, assembler_);
   sink.set_motion(motion);
@@ -81,32 +91,43 @@ linear::Outcome SparseSystem::analyze() {
   return outcome;
 }
 
-std::span<const double> SparseSystem::shifted(double shift) {
-  if (shift == 0) return assembler_.values();
-  shifted_.assign(assembler_.values().begin(), assembler_.values().end());
+void SparseSystem::shift_by(double shift) {
+  matrix_ = assembler_.values();
+  if (shift == 0) return;
+  shifted_.assign(matrix_.begin(), matrix_.end());
   for (int j = 0; j < assembler_.pattern().order; ++j) shifted_[assembler_.pattern().column_starts[j]] += shift;
-  return shifted_;
+  matrix_ = shifted_;
 }
 
-linear::Outcome SparseSystem::factorize(double shift) {
-  const auto outcome = analyze();
-  return outcome == linear::Outcome::ok ? solver_.factorize(shifted(shift)) : outcome;
+linear::SystemReport SparseSystem::factorize(double shift) {
+  if (const auto outcome = analyze(); outcome != linear::Outcome::ok) return {.outcome = outcome};
+  shift_by(shift);
+  return linear::describe(solver_.factorize(matrix_), solver_);
 }
 
-linear::Outcome SparseSystem::prepare(double shift, ConstVectorView rhs, double asked) {
-  if (!reusing_) return factorize(shift);
-  const auto outcome = analyze();
-  if (outcome != linear::Outcome::ok) return outcome;
-  return reusing_->prepare(shifted(shift), {rhs.data(), static_cast<std::size_t>(rhs.size())}, asked);
+linear::SystemReport SparseSystem::solve(double shift, ConstVectorView rhs, const linear::Asked& asked,
+                                         VectorView solution) {
+  if (!reusing_) return NewtonSystem::solve(shift, rhs, asked, solution);
+  if (const auto outcome = analyze(); outcome != linear::Outcome::ok) return {.outcome = outcome};
+  shift_by(shift);
+  return reusing_->solve_system(matrix_, {rhs.data(), static_cast<std::size_t>(rhs.size())}, asked,
+                                {solution.data(), static_cast<std::size_t>(solution.size())});
 }
 
-linear::SolveReport SparseSystem::solve(ConstVectorView rhs, VectorView solution) {
+/// Iterations may have solved the system of the matrix given last without a factor of it.
+bool SparseSystem::has_factor() {
+  return !reusing_ || reusing_->has_factor() || solver_.factorize(matrix_) == linear::Outcome::ok;
+}
+
+linear::SolveReport SparseSystem::solve_again(ConstVectorView rhs, VectorView solution) {
+  if (!has_factor()) return {linear::Outcome::failed};
   return solver_.solve({rhs.data(), static_cast<std::size_t>(rhs.size())},
                        {solution.data(), static_cast<std::size_t>(solution.size())}, 1, kTightResidual);
 }
 
 bool SparseSystem::solve_columns(const MatrixX& B, MatrixX& X) {
   constexpr double kRough = 1e-4;  // directions are only turned by it
+  if (!has_factor()) return false;
   X.resize(B.rows(), B.cols());
   const auto report = solver_.solve({B.data(), static_cast<std::size_t>(B.size())},
                                     {X.data(), static_cast<std::size_t>(X.size())}, static_cast<int>(B.cols()), kRough);

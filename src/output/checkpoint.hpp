@@ -22,6 +22,6 @@ struct Progress {
 /// Adds to a frame that has /mesh of `state` already. All is in SI units, so where `units` are others rest positions and
 /// time are saved again.
 template <int Dim>
-void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress, const Units& units);
+void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress, const Units& units = {});
 
 }  // namespace itr::output

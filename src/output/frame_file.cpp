@@ -225,8 +225,8 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
 }  // namespace
 
 template <int Dim>
-void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, const Units& units,
-                 Durability durability, const FrameExtra& extra) {
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, Durability durability,
+                 const FrameExtra& extra, const Units& units) {
   const hdf5::Session session;
   hdf5::File file = hdf5::File::create(path);
   fill(file, frame, step, t, units);
@@ -402,10 +402,10 @@ std::vector<StoredField> read_frame_fields(const std::filesystem::path& path) {
   return fields;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                     \
-  template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, const Units&, \
-                                 Durability, const FrameExtra&);                                                 \
-  template int drawn_nodes<Dim>(const FrameView<Dim>&);                                                          \
+#define ITR_INSTANTIATE(Dim)                                                                                   \
+  template void write_frame<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, Durability, \
+                                 const FrameExtra&, const Units&);                                             \
+  template int drawn_nodes<Dim>(const FrameView<Dim>&);                                                        \
   template void FrameFiles::write<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, const Units&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -21,8 +21,8 @@ namespace itr::output {
 using FrameExtra = std::function<void(hdf5::File&)>;
 
 template <int Dim>
-void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t, const Units& units,
-                 Durability durability = Durability::process, const FrameExtra& extra = {});
+void write_frame(const std::filesystem::path& path, const FrameView<Dim>& frame, int step, double t,
+                 Durability durability = Durability::process, const FrameExtra& extra = {}, const Units& units = {});
 
 /// Writes frames one after another. While they are small and of one shape they are made in one file in memory: to make it
 /// anew each time takes longer than a step.

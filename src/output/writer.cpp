@@ -89,8 +89,8 @@ struct Writer::Impl {
       sync_frames();
       const std::vector<double> saved_totals = totals.save();
       const Progress progress{info.scene_identity, info.backend, saved_totals, steps.size()};
-      write_frame(directory / name, frame, step, t, options.units, Durability::power,
-                  [&](hdf5::File& file) { write_checkpoint(file, *checkpoint, progress, options.units); });
+      const auto add = [&](hdf5::File& file) { write_checkpoint(file, *checkpoint, progress, options.units); };
+      write_frame(directory / name, frame, step, t, Durability::power, add, options.units);
       sync(directory / "frames");
       last_checkpoint = seconds_now();
     } else {

@@ -75,24 +75,23 @@ class PenalisedSystem final : public NewtonSystem {
                 Workspace& workspace) override {
     system_.assemble(energy, x, psd, dofs, motion, workspace);
   }
-  linear::Outcome factorize(double shift) override {
-    const linear::Outcome outcome = system_.factorize(shift);
-    if (outcome != linear::Outcome::ok) return outcome;
+  linear::SystemReport factorize(double shift) override {
+    linear::SystemReport report = system_.factorize(shift);
+    if (report.outcome != linear::Outcome::ok) return report;
     solved_.resize(columns_.rows(), columns_.cols());
     VectorX solution(columns_.rows());
     for (Eigen::Index q = 0; q < columns_.cols(); ++q) {
-      const linear::SolveReport report = system_.solve(columns_.col(q), solution);
-      if (report.outcome != linear::Outcome::ok) return report.outcome;
+      report.outcome = system_.solve_again(columns_.col(q), solution).outcome;
+      if (report.outcome != linear::Outcome::ok) return report;
       solved_.col(q) = solution;
     }
     MatrixX small = columns_.transpose() * solved_;
     small.diagonal() += inverse_weights_;
     small_.compute(small);
-    return linear::Outcome::ok;
+    return report;
   }
-  linear::Outcome prepare(double shift, ConstVectorView, double) override { return factorize(shift); }
-  linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override {
-    const linear::SolveReport report = system_.solve(rhs, solution);
+  linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override {
+    const linear::SolveReport report = system_.solve_again(rhs, solution);
     solution -= solved_ * small_.solve(columns_.transpose() * solution);
     return report;
   }

@@ -3,9 +3,8 @@
 
 #include <algorithm>
 
-#include "prospect.hpp"
-#include "ranking.hpp"
-#include "session.hpp"
+#include "remesh/decide/prospect.hpp"
+#include "remesh/schedule/session.hpp"
 
 namespace itr {
 
@@ -39,14 +38,13 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   RemeshReport& report = session.report();
   for (int sweep = 0; sweep < options.sweeps; ++sweep) {
     const int before = report.accepted();
-    EdgeRanks ranks;
-    if (options.screening == Screening::energy_percentile) ranks = rank_edges(mesh, fields, context, options);
+    session.culling().rank(session.ask());
     if (by_size) {
       follow_sizing_field(session);
     } else {
-      if (may_refine) refine_edges(session, ranks);
+      if (may_refine) refine_edges(session);
       if (may_straighten && mesh.has_nodes()) straighten_edges(session);
-      if (options.collapse.enabled) collapse_edges(session, ranks);
+      if (options.collapse.enabled) collapse_edges(session);
     }
     if (may_stir && (has_to_stir || report.accepted() > 0)) {
       session.memory().mark_gains();
@@ -57,7 +55,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   }
   fields.trim(mesh.vertex_slots());
   report.trial_seconds = session.commits().median_trial_seconds();
-  memory = session.memory().remembered(mesh);
+  memory = session.memory().remembered(session.ask());
   return report;
 }
 

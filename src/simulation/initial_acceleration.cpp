@@ -31,8 +31,8 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, Pro
     if (dofs.unknown[i] != kNone) rhs[dofs.unknown[i]] = force[i] - of_held[i];
   if (dofs.num_unknowns == 0) return;
   system.assemble(sum, zero, PsdProjection::none, dofs, motion, workspace);
-  linear::Outcome outcome = rhs.allFinite() ? system.factorize(0) : linear::Outcome::non_finite;
-  if (outcome == linear::Outcome::ok) outcome = system.solve(rhs, solution).outcome;
+  linear::Outcome outcome = rhs.allFinite() ? system.factorize(0).outcome : linear::Outcome::non_finite;
+  if (outcome == linear::Outcome::ok) outcome = system.solve_again(rhs, solution).outcome;
   if (outcome != linear::Outcome::ok)
     throw InputError({"", "/initial_conditions/acceleration",
                       "\"consistent\", but M a = f cannot be solved at the start: " + std::string(to_string(outcome)) +

@@ -58,7 +58,7 @@ void Watch<Dim>::find_rotation(const Setup<Dim>& setup, const State<Dim>& state,
   int body = 0;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c) || setup.materials.at(mesh.body(c)).law != MaterialLaw::linear) continue;
-    const typename CellSet<Dim>::Element element{mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
+    const auto element = element_of(mesh, c);
     const double angle = rotation_angle(deformation_gradient<Dim>(element, state.history.x[0]));
     if (angle > most) most = angle, body = mesh.body(c);
   }

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""The paper's scenes with every term, operation and output on, against what `itr explain` chose. Writes results.csv and README.md's table.
+"""The paper's scenes with every term, operation and output on, against what `itr explain` chose. Writes results.csv and table.md.
 
 python3 verification/needs/run.py [--case PART-OF-NAME]... [--page] [--itr build/release/bin/itr] [--shared ../shared] [--runs DIR]
 

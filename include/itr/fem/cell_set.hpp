@@ -113,6 +113,13 @@ Eigen::Matrix<double, Dim, Dim + 1> barycentric_gradients(const Mat<Dim>& invers
   return gradients;
 }
 
+/// One of them.
+template <int Dim>
+Vec<Dim> barycentric_gradient(const Mat<Dim>& inverse_edges, int k) {
+  if (k == 0) return -inverse_edges.colwise().sum().transpose();
+  return inverse_edges.row(k - 1).transpose();
+}
+
 /// Gradients of the shape functions at a point of a cell with curved edges, as columns.
 template <int Dim>
 Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> shape_gradients(const typename CellSet<Dim>::CurvedElement& element,
@@ -135,6 +142,18 @@ template <int Dim>
 Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) {
   Vec<Dim> sum = Vec<Dim>::Zero();
   for (const int v : element.vertices) sum += cells.rest[v];
+  return sum / (Dim + 1);
+}
+
+/// A straight cell of a mesh with the ids of its vertices there.
+template <int Dim>
+typename CellSet<Dim>::Element element_of(const Mesh<Dim>& mesh, CellId c) {
+  return {mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
+}
+template <int Dim>
+Vec<Dim> rest_barycenter(const Mesh<Dim>& mesh, CellId c) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const int v : mesh.cell(c)) sum += mesh.rest(v);
   return sum / (Dim + 1);
 }
 

@@ -23,6 +23,12 @@ struct ElementMass {
       : off(kind == MassKind::lumped ? 0 : mass / ((Dim + 1) * (Dim + 2))),
         extra(kind == MassKind::lumped ? mass / (Dim + 1) : mass / ((Dim + 1) * (Dim + 2))) {}
 
+  /// 1/2 d . M d of nodal vectors d with this sum and these squared norms.
+  double energy(const Vec<Dim>& total, double squares) const { return 0.5 * (off * total.squaredNorm() + extra * squares); }
+  /// M d at a node of value d.
+  Vec<Dim> product(const Vec<Dim>& total, const Vec<Dim>& d) const { return off * total + extra * d; }
+  double diagonal() const { return off + extra; }
+
   /// y += M x, for nodal values that are the rows of x and y.
   template <typename X, typename Y>
   void add_product(const std::array<int, Dim + 1>& vertices, const X& x, Y& y) const {

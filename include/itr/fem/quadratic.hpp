@@ -46,6 +46,13 @@ Eigen::Matrix<double, Rows, kQuadraticNodes<Dim>> quadratic_gradients(CurvedEdge
                                                                       const std::array<double, Dim + 1>& l,
                                                                       const Eigen::Matrix<double, Rows, Dim + 1>& linear) {
   Eigen::Matrix<double, Rows, kQuadraticNodes<Dim>> gradients = Eigen::Matrix<double, Rows, kQuadraticNodes<Dim>>::Zero();
+  if (curved == kAllCurved<Dim>) {  // the same, since the gradients of l sum to zero
+    for (int i = 0; i <= Dim; ++i) gradients.col(i) = (4 * l[i] - 1) * linear.col(i);
+    for_each_edge<Dim>([&](int edge, int i, int j) {
+      gradients.col(Dim + 1 + edge) = (4 * l[i]) * linear.col(j) + (4 * l[j]) * linear.col(i);
+    });
+    return gradients;
+  }
   gradients.template leftCols<Dim + 1>() = linear;
   for_each_edge<Dim>([&](int edge, int i, int j) {
     if (!(curved >> edge & 1)) return;

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "itr/linear/solver.hpp"
+#include "itr/linear/system.hpp"
 
 namespace itr::linear {
 
@@ -39,8 +39,8 @@ struct SolveCounts {
 };
 
 /// A solver over a direct one. A matrix that is the last one bit by bit is not factorised again. Another one of the same
-/// order, whatever its pattern, may be given to conjugate gradients with the last factor as preconditioner (prepare); where
-/// they take too long or meet a direction of no positive curvature, the matrix is factorised.
+/// order, whatever its pattern, may be given to conjugate gradients with the last factor as preconditioner (solve_system);
+/// where they take too long or meet a direction of no positive curvature, the matrix is factorised.
 ///
 /// What is tried depends on counts (flops of a factorisation, entries of a factor, iterations), never on time. A matrix
 /// that iterations solved to 1e-8 is positive definite: they start from an error with a part in every direction, and with
@@ -51,20 +51,25 @@ struct SolveCounts {
 class ReusingSolver final : public Solver {
  public:
   /// `solver` must outlive this. Without `reuses` every matrix that is not the last one is factorised.
-  ReusingSolver(Solver& solver, bool reuses) : solver_(solver), reuses_(reuses) {}
+  ReusingSolver(Solver& solver, bool reuses);
+  ~ReusingSolver() override;
 
   std::string_view name() const override { return solver_.name(); }
   std::string_view name_in_use() const override { return solver_.name_in_use(); }
   Capabilities capabilities() const override { return solver_.capabilities(); }
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override;
   Outcome factorize(std::span<const double> values) override;
-  /// Factorises, or else solves the system of the right-hand side b to the asked residual by iterations, for solve() to
-  /// return, whatever that is asked for. Either way ok says of the matrix what it says after factorize(). The same system
-  /// asked again goes on where it was.
-  Outcome prepare(std::span<const double> values, std::span<const double> b, double asked_residual);
+  /// With the factor; none is there after a solve_system that needed none.
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked_residual) override;
   Statistics statistics() const override;
   std::string message() const override;
+
+  /// Solves A x = b for the matrix of these values: to `asked.residual` by a factor of it, else to `asked.loose` by
+  /// iterations, else factorises it first. If x is empty, only what the matrix is is found out.
+  SystemReport solve_system(std::span<const double> values, std::span<const double> b, const Asked& asked,
+                            std::span<double> x);
+  /// Whether the matrix given last has been factorised.
+  bool has_factor() const { return last_ == Last::factorized || last_ == Last::found; }
 
   /// The factor for a saved state; none where its fill-reducing order came from an earlier pattern, so that it could not be
   /// made again from its matrix alone.
@@ -74,18 +79,26 @@ class ReusingSolver final : public Solver {
   const SolveCounts& counts() const { return counts_; }
 
  private:
-  bool take_in(std::span<const double> values);
-  bool is_worth_trying();
+  /// What became of the matrix given last.
+  enum class Last {
+    none,
+    factorized,
+    found,     ///< the factor that was there is its own
+    iterated,  ///< iterations have solved its system
+    refused    ///< they found it not positive definite
+  };
+  struct Costs;
+  struct Iteration;
+
+  void take_in(std::span<const double> values);
+  bool may_iterate(std::span<const double> values, std::span<const double> b);
   Outcome analyze_now();
-  Outcome factorize_now();
-  bool iterate(std::span<const double> b, double asked, bool goes_on);
-  bool begin();
-  void compute_residual();
-  bool run(double target, int most);
-  bool precondition(std::span<const double> residual, std::span<double> z);
-  int most_iterations() const;
-  double iteration_cost() const;
-  double factorization_cost() const;
+  Outcome factorize_now(std::span<const double> values);
+  void iterate(std::span<const double> values, std::span<const double> b, double asked);
+  void pause();
+  SystemReport solve_by_factor(std::span<const double> values, std::span<const double> b, const Asked& asked,
+                               std::span<double> x);
+  Costs costs() const;
 
   Solver& solver_;
   bool reuses_;
@@ -93,17 +106,12 @@ class ReusingSolver final : public Solver {
   bool has_own_order_ = false;  ///< the order of solver_'s analysis came from the pattern analysed, not from an earlier one
   bool is_analyzed_ = false;    ///< the pattern below by solver_
   std::shared_ptr<const SparsityPattern> pattern_;
-  std::vector<double> values_;
   int block_size_ = 1;
   std::vector<int> dofs_;
   std::vector<double> coordinates_;
   bool may_keep_order_ = true;  ///< so said every call of analyze since solver_ analysed last
-  bool is_old_ = false;         ///< the factor was there before the values were given
-  bool is_refused_ = false;     ///< the matrix is known not to be positive definite, and is not factorised
-  std::vector<double> b_, x_;   ///< the system that iterations solved
-  bool is_counted_ = false;     ///< and solve() gave out
-  SolveReport report_;          ///< of that; b_ is empty where the matrix is factorised
-  std::vector<double> r_, z_, p_, q_;
+  Last last_ = Last::none;
+  std::unique_ptr<Iteration> iteration_;
   int iterations_ = 0;  ///< of the last solve
   SolveCounts counts_;
 };

@@ -25,20 +25,17 @@ class NewtonSystem {
   /// Assembles the Hessian over the unknowns of `dofs`, and what `motion` of the held dofs does to it.
   virtual void assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                         PrescribedMotion& motion, Workspace& workspace) = 0;
+  /// Solves (Hessian + shift * I) solution = rhs, by a factorisation unless a system knows better. If `solution` is empty,
+  /// only what the matrix is is found out.
+  virtual linear::SystemReport solve(double shift, ConstVectorView rhs, const linear::Asked& asked, VectorView solution);
   /// Factorises Hessian + shift * I.
-  virtual linear::Outcome factorize(double shift) = 0;
-  /// Does that, or else finds by other means, to the relative residual `asked`, what solve(rhs) is to return; its outcome
-  /// says the same of the matrix, the less surely the more is asked.
-  virtual linear::Outcome prepare(double shift, ConstVectorView rhs, double asked) = 0;
-  /// `solution` has the length of `rhs`.
-  virtual linear::SolveReport solve(ConstVectorView rhs, VectorView solution) = 0;
-  /// Solves for every column of B with the matrix that was factorised last, each on its own unless a system knows better.
-  /// False where one fails.
+  virtual linear::SystemReport factorize(double shift) = 0;
+  /// Solves with the matrix that was given last.
+  virtual linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) = 0;
+  /// The same for every column of B, each on its own unless a system knows better. False where one fails.
   virtual bool solve_columns(const MatrixX& B, MatrixX& X);
-  /// Whether factorize, solve or negative_pivots tells of every matrix that is not positive definite.
+  /// Whether solve and factorize tell of every matrix that is not positive definite.
   virtual bool tells_definiteness() const { return true; }
-  /// Of the last factorisation: as many as negative eigenvalues of the matrix; 0 where the solver does not count them.
-  virtual int negative_pivots() const { return 0; }
   /// Who failed and why, after an outcome that was not ok.
   virtual std::string message() const = 0;
   /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
@@ -49,9 +46,8 @@ class NewtonSystem {
 class DenseSystem final : public NewtonSystem {
  public:
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
-  linear::Outcome factorize(double shift) override;
-  linear::Outcome prepare(double shift, ConstVectorView, double) override { return factorize(shift); }
-  linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override;
+  linear::SystemReport factorize(double shift) override;
+  linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override;
   std::string message() const override { return "dense Cholesky"; }
   double diagonal_scale() const override;
 
@@ -72,23 +68,24 @@ class SparseSystem final : public NewtonSystem {
   void reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils);
   linear::Solver& solver() { return solver_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
-  linear::Outcome factorize(double shift) override;
-  linear::Outcome prepare(double shift, ConstVectorView rhs, double asked) override;
-  linear::SolveReport solve(ConstVectorView rhs, VectorView solution) override;
+  linear::SystemReport solve(double shift, ConstVectorView rhs, const linear::Asked& asked, VectorView solution) override;
+  linear::SystemReport factorize(double shift) override;
+  linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override;
   bool solve_columns(const MatrixX& B, MatrixX& X) override;
   bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
-  int negative_pivots() const override { return solver_.statistics().negative_pivots; }
   std::string message() const override;
   double diagonal_scale() const override;
 
  private:
   linear::Outcome analyze();
-  std::span<const double> shifted(double shift);
+  void shift_by(double shift);
+  bool has_factor();
 
   linear::Solver& solver_;
   linear::ReusingSolver* reusing_ = nullptr;
   SparseAssembler assembler_;
   std::vector<double> shifted_;
+  std::span<const double> matrix_;  ///< given last: the assembler's values, or the shifted ones
   bool pattern_changed_ = true;
   bool may_keep_order_ = false;  ///< not over resets: a resumed run begins with one
   int dim_ = 1;

@@ -8,6 +8,7 @@
 #include "itr/core/check.hpp"
 #include "itr/core/parallel_reduce.hpp"
 #include "itr/geometry/measures.hpp"
+#include "point.hpp"
 #include "quadratic.hpp"
 
 namespace itr {
@@ -75,16 +76,16 @@ using ElementBlock = Mat<Dim*(Dim + 1)>;
 template <int Dim>
 void exact_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const LameParameters& lame, double weight,
                  ElementBlock<Dim>& block) {
-  const double J = F.determinant();
-  const ShapeGradients<Dim> h = F.inverse().transpose() * gradients;
-  const double c = weight * (lame.mu - lame.lambda * std::log(J)), mu = weight * lame.mu, lambda = weight * lame.lambda;
+  const NeoHookeanPoint<Dim> point(F, lame);
+  const auto stiffness = point.stiffness(weight);
+  const ShapeGradients<Dim> h = point.inverse().transpose() * gradients;
   for (int j = 0; j <= Dim; ++j)
     for (int i = j; i <= Dim; ++i) {
-      const double diagonal = mu * gradients.col(i).dot(gradients.col(j));
+      const double diagonal = stiffness.diagonal(gradients.col(i), gradients.col(j));
       for (int b = 0; b < Dim; ++b)
         for (int a = 0; a < Dim; ++a)
           block(Dim * i + a, Dim * j + b) = block(Dim * j + b, Dim * i + a) =
-              c * h(a, j) * h(b, i) + lambda * h(a, i) * h(b, j) + (a == b ? diagonal : 0);
+              stiffness(h.col(i), h.col(j), a, b) + (a == b ? diagonal : 0);
     }
 }
 
@@ -158,10 +159,8 @@ template <int Dim>
 double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   const double straight = scale_ * parallel_sum(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
                             double sum = 0;
-                            for (std::size_t e = begin; e < end; ++e) {
-                              const auto& element = cells_.elements[e];
-                              sum += element.volume * elastic_density<Dim>(deformation_gradient<Dim>(element, x), moduli(e));
-                            }
+                            for (std::size_t e = begin; e < end; ++e)
+                              sum += elastic_energy<Dim>(cells_.elements[e], x, moduli(e));
                             return sum;
                           });
   return curved_ ? straight + curved_->value(x) : straight;

@@ -5,26 +5,22 @@
 #include "itr/energy/elastic/neo_hookean.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <cmath>
-#include <limits>
 
 #include "isotropic.hpp"
+#include "point.hpp"
 
 namespace itr {
 
 template <int Dim>
 double neo_hookean_density(const Mat<Dim>& F, const LameParameters& lame) {
-  const double J = F.determinant();
-  if (!(J > 0)) return std::numeric_limits<double>::infinity();
-  const double log_J = std::log(J);
-  return lame.mu / 2 * (F.squaredNorm() - Dim - 2 * log_J) + lame.lambda / 2 * log_J * log_J;
+  return NeoHookeanPoint<Dim>(F, lame).density();
 }
 
 template <int Dim>
 Mat<Dim> neo_hookean_stress(const Mat<Dim>& F, const LameParameters& lame) {
-  const Mat<Dim> inverse_transposed = F.inverse().transpose();
-  return lame.mu * F + (lame.lambda * std::log(F.determinant()) - lame.mu) * inverse_transposed;
+  const NeoHookeanPoint<Dim> point(F, lame);
+  return point.stress(point.inverse());
 }
 
 namespace {

@@ -2,9 +2,11 @@
 #include "quadratic.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "itr/core/parallel_reduce.hpp"
+#include "itr/energy/elastic/neo_hookean.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr {
@@ -19,25 +21,27 @@ constexpr double kBlindTolerance = 0.1;   ///< relative, of the bound that tells
 template <int Dim>
 using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
 
-/// Sums value * mode * mode^T over modes of the cell's forces, many at a time: a product of matrices.
+/// Adds value * mode * mode^T over modes of the cell's forces to a block, many at a time: a product of matrices.
 template <int Dim>
 class ModalSum {
  public:
   static constexpr int kRows = Dim * kQuadraticNodes<Dim>;
 
-  explicit ModalSum(Mat<kRows>& block) : block_(block) { block.setZero(); }
+  explicit ModalSum(Mat<kRows>& block) : block_(block) {}
+  void add(double value, const Mat<Dim>& mode, const Nodal<Dim>& gradients) {
+    if (value == 0) return;
+    if (count_ == kBatch) flush();
+    Eigen::Map<Nodal<Dim>>(modes_.col(count_).data()).noalias() = mode * gradients;
+    weighted_.col(count_) = value * modes_.col(count_);
+    ++count_;
+  }
   /// Those of a density's Hessian at a point, `weight` times.
   void add(const EigenSystem<Dim>& system, PsdProjection psd, const Nodal<Dim>& gradients, double weight) {
-    for (std::size_t k = 0; k < system.values.size(); ++k) {
-      const double value = weight * projected(system.values[k], psd);
-      if (value == 0) continue;
-      if (count_ == kBatch) flush();
-      Eigen::Map<Nodal<Dim>>(modes_.col(count_).data()).noalias() = system.modes[k] * gradients;
-      weighted_.col(count_) = value * modes_.col(count_);
-      ++count_;
-    }
+    for (std::size_t k = 0; k < system.values.size(); ++k)
+      add(weight * projected(system.values[k], psd), system.modes[k], gradients);
   }
   void finish() {
+    if (count_ == 0) return;
     flush();
     block_.template triangularView<Eigen::StrictlyUpper>() = block_.transpose();
   }
@@ -53,6 +57,56 @@ class ModalSum {
   Mat<kRows>& block_;
   Eigen::Matrix<double, kRows, kBatch> modes_, weighted_;
   int count_ = 0;
+};
+
+/// The sum over points of neo-Hookean Hessians, not projected: with h = F^-T grad of the shape functions, the entry of nodes
+/// a, b and directions i, j is lambda h_ai h_bj + c h_aj h_bi + (i == j) mu grad_a . grad_b. Directions are kept apart,
+/// which makes columns of one node's entries.
+template <int Dim>
+class NeoHookeanSum {
+ public:
+  void add(const Mat<Dim>& F, const Nodal<Dim>& gradients, const LameParameters& lame, double weight) {
+    const double c = weight * (lame.mu - lame.lambda * std::log(F.determinant()));
+    const double lambda = weight * lame.lambda, mu = weight * lame.mu;
+    const Nodal<Dim> transformed = F.inverse().transpose() * gradients;
+    double h[Dim][kPadded] = {}, g[Dim][kPadded] = {};
+    for (int i = 0; i < Dim; ++i)
+      for (int a = 0; a < kNodes; ++a) h[i][a] = transformed(i, a), g[i][a] = gradients(i, a);
+    for (int b = 0; b < kNodes; ++b) {
+      int pair = 0;
+      for (int i = 0; i < Dim; ++i) {
+        add_column(mu * g[i][b], g[i], same_[b]);
+        add_column((lambda + c) * h[i][b], h[i], pairs_[pair++][b]);
+        for (int j = i + 1; j < Dim; ++j, ++pair) {
+          add_column(lambda * h[j][b], h[i], pairs_[pair][b]);
+          add_column(c * h[i][b], h[j], pairs_[pair][b]);
+        }
+      }
+    }
+  }
+
+  void add_to(Mat<Dim * kQuadraticNodes<Dim>>& block) const {
+    for (int b = 0; b < kNodes; ++b)
+      for (int a = 0; a < kNodes; ++a)
+        for (int i = 0, pair = 0; i < Dim; ++i) {
+          const int low = std::min(a, b), high = std::max(a, b);  // the two halves have the same bits
+          block(Dim * a + i, Dim * b + i) += same_[low][high] + pairs_[pair++][low][high];
+          for (int j = i + 1; j < Dim; ++j, ++pair) {
+            block(Dim * a + i, Dim * b + j) += pairs_[pair][b][a];
+            block(Dim * b + j, Dim * a + i) += pairs_[pair][b][a];
+          }
+        }
+  }
+
+ private:
+  static constexpr int kNodes = kQuadraticNodes<Dim>, kPadded = (kNodes + 3) / 4 * 4;
+
+  static void add_column(double factor, const double* values, double* sum) {
+    for (int a = 0; a < kPadded; ++a) sum[a] += factor * values[a];
+  }
+
+  double same_[kNodes][kPadded] = {};                        ///< of mu, for i == j
+  double pairs_[Dim * (Dim + 1) / 2][kNodes][kPadded] = {};  ///< of i <= j; columns of b
 };
 
 template <int Dim>
@@ -169,14 +223,28 @@ void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd,
   sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, Mat<Dim * kNodes>& block) {
     const Element& element = cells_.curved_elements[e];
     const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
-    ModalSum<Dim> sum(block);
     const auto& rule = this->rule(e);
+    block.setZero();
+    ModalSum<Dim> modes(block);
+    NeoHookeanSum<Dim> exact;
+    const bool is_neo_hookean = by_element_[e]->law == MaterialLaw::neo_hookean;
     for (std::size_t q = 0; q < rule.size(); ++q) {
       const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
       const Mat<Dim> F = positions * gradients.transpose();
-      sum.add(elastic_eigensystem<Dim>(F, moduli(e, q)), psd, gradients, scale_ * rule[q].share * element.volume);
+      const double weight = scale_ * rule[q].share * element.volume;
+      const ElasticModuli& here = moduli(e, q);
+      if (!is_neo_hookean) {
+        modes.add(elastic_eigensystem<Dim>(F, here), psd, gradients, weight);
+        continue;
+      }
+      exact.add(F, gradients, here.lame, weight);
+      if (psd == PsdProjection::none) continue;
+      const NegativeModes<Dim> negative = neo_hookean_negative_modes<Dim>(F, here.lame);
+      for (int k = 0; k < negative.count; ++k)
+        modes.add(weight * (projected(negative.values[k], psd) - negative.values[k]), negative.modes[k], gradients);
     }
-    sum.finish();
+    modes.finish();
+    if (is_neo_hookean) exact.add_to(block);
   });
 }
 

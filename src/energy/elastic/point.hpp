@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// A law at one deformation gradient F: its energy density and derivatives by the positions of a cell's vertices. Sums over
+// cells (ElasticEnergy) and predictions of gains (remesh) are made of it.
+#pragma once
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+
+#include "itr/energy/elastic/laws.hpp"
+#include "itr/fem/cell_set.hpp"
+
+namespace itr {
+
+/// Neo-Hookean elasticity (itr/energy/elastic/neo_hookean.hpp). F must outlive this.
+template <int Dim>
+class NeoHookeanPoint {
+ public:
+  NeoHookeanPoint(const Mat<Dim>& F, const LameParameters& lame)
+      : F_(F), lame_(lame), J_(F.determinant()), log_J_(std::log(J_)) {}
+
+  double density() const {
+    return J_ > 0 ? lame_.mu / 2 * (F_.squaredNorm() - Dim - 2 * log_J_) + lame_.lambda / 2 * log_J_ * log_J_
+                  : std::numeric_limits<double>::infinity();
+  }
+  Mat<Dim> inverse() const { return F_.inverse(); }
+  Mat<Dim> stress(const Mat<Dim>& inverse) const {
+    return lame_.mu * F_ + (lame_.lambda * log_J_ - lame_.mu) * inverse.transpose();
+  }
+
+  /// Second derivatives times a weight, by vertices whose shape functions have the gradients g_i and g_j.
+  struct Stiffness {
+    double c, lambda, mu;  ///< times the weight; c = mu - lambda ln J
+
+    /// The part of components a of i and b of j that depends on F: h = F^-T g.
+    template <typename Column>
+    double operator()(const Column& h_i, const Column& h_j, int a, int b) const {
+      return c * h_j[a] * h_i[b] + lambda * h_i[a] * h_j[b];
+    }
+    /// What is added where a = b.
+    template <typename Column>
+    double diagonal(const Column& g_i, const Column& g_j) const {
+      return mu * g_i.dot(g_j);
+    }
+  };
+  Stiffness stiffness(double weight) const {
+    return {weight * (lame_.mu - lame_.lambda * log_J_), weight * lame_.lambda, weight * lame_.mu};
+  }
+
+ private:
+  const Mat<Dim>& F_;
+  LameParameters lame_;
+  double J_, log_J_;
+};
+
+/// Any law at F, and its derivatives by the position of one vertex. F and the moduli must outlive this.
+template <int Dim>
+class ElasticPoint {
+ public:
+  ElasticPoint(const Mat<Dim>& F, const ElasticModuli& moduli) : is_neo_hookean_(moduli.law == MaterialLaw::neo_hookean) {
+    if (is_neo_hookean_) {  // with one inverse and one logarithm
+      const NeoHookeanPoint<Dim> point(F, moduli.lame);
+      inverse_ = point.inverse();
+      density_ = point.density();
+      stress_ = point.stress(inverse_);
+      stiffness_ = point.stiffness(1);
+    } else {
+      density_ = elastic_density<Dim>(F, moduli);
+      stress_ = elastic_stress<Dim>(F, moduli);
+      system_ = elastic_eigensystem<Dim>(F, moduli);
+    }
+  }
+  double density() const { return density_; }
+  /// On a vertex whose shape function has this gradient, by volume.
+  Vec<Dim> gradient(const Vec<Dim>& shape) const { return stress_ * shape; }
+  Mat<Dim> hessian(const Vec<Dim>& shape) const {
+    Mat<Dim> sum = Mat<Dim>::Zero();
+    if (is_neo_hookean_) {
+      const Vec<Dim> h = inverse_.transpose() * shape;
+      for (int b = 0; b < Dim; ++b)
+        for (int a = 0; a < Dim; ++a) sum(a, b) = stiffness_(h, h, a, b);
+      sum.diagonal().array() += stiffness_.diagonal(shape, shape);
+      return sum;
+    }
+    for (std::size_t k = 0; k < system_.values.size(); ++k) {
+      const Vec<Dim> w = system_.modes[k] * shape;
+      sum += system_.values[k] * w * w.transpose();
+    }
+    return sum;
+  }
+
+ private:
+  bool is_neo_hookean_;
+  double density_;
+  Mat<Dim> stress_, inverse_;
+  typename NeoHookeanPoint<Dim>::Stiffness stiffness_{};
+  EigenSystem<Dim> system_;  ///< of other laws
+};
+
+/// Of a straight element.
+template <int Dim>
+double elastic_energy(const typename CellSet<Dim>::Element& element, ConstVectorView x, const ElasticModuli& moduli) {
+  return element.volume * elastic_density<Dim>(deformation_gradient<Dim>(element, x), moduli);
+}
+
+}  // namespace itr

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The quadrature of a load on one simplex: the nodal forces of LoadEnergy and the work in predictions of gains are made of
+// it.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+
+#include "itr/energy/load.hpp"
+
+namespace itr {
+
+/// Barycentric coordinates of the points: this at the vertex of the point's number, and at the others.
+template <std::size_t Vertices>
+struct LoadPoint {
+  static constexpr double kNear = near_vertex<Vertices>(), kFar = (1 - kNear) / (Vertices - 1);
+  /// Of a linear function with these values at the vertices, of which `sum` is the sum.
+  template <typename Value>
+  static Value at(std::size_t point, const std::array<Value, Vertices>& values, const Value& sum) {
+    return kFar * sum + (kNear - kFar) * values[point];
+  }
+};
+
+/// Calls visit(point, force) with the share of the total `weight * load` that acts at each point.
+template <int Dim, std::size_t Vertices, typename Load, typename Visit>
+void for_each_load_point(const std::array<Vec<Dim>, Vertices>& rest, double weight, const Load& load, const Visit& visit) {
+  using Point = LoadPoint<Vertices>;
+  for (std::size_t q = 0; q < Vertices; ++q) {
+    Vec<Dim> X = Vec<Dim>::Zero();
+    for (std::size_t k = 0; k < Vertices; ++k) X += (k == q ? Point::kNear : Point::kFar) * rest[k];
+    visit(q, Vec<Dim>(weight / Vertices * load(X)));
+  }
+}
+
+inline double facet_area(const std::array<Vec<2>, 2>& p) { return (p[1] - p[0]).norm(); }
+inline double facet_area(const std::array<Vec<3>, 3>& p) { return 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm(); }
+
+}  // namespace itr

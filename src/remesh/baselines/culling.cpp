@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+#include "culling.hpp"
+
+#include <algorithm>
+
+#include "energy/elastic/point.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges
+
+/// Elastic energy times the scaling, a cell.
+template <int Dim>
+std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
+  std::vector<double> energies(mesh.cell_slots(), 0);
+  for (int c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    const Material& material = context.materials.at(mesh.body(c));
+    const auto moduli = elastic_moduli<Dim>(material, rest_barycenter(mesh, c));
+    energies[c] = context.scaling * elastic_energy<Dim>(element_of(mesh, c), fields.x, moduli);
+  }
+  return energies;
+}
+
+/// Contact energy (stiffness left out) of each vertex: its share of the pairs that it is part of.
+template <int Dim>
+std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields,
+                                            const StepContext<Dim>& context) {
+  const auto& obstacles = context.obstacles;
+  const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.x.size());
+  std::vector<double> energies(total, 0);
+  if (!context.contact.enabled) return energies;
+  std::vector<std::array<int, 2>> edges;
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<int> points;
+  std::vector<char> counts(total, 0);
+  for (int f = 0; f < mesh.facet_slots(); ++f) {
+    if (!mesh.is_facet_alive(f)) continue;
+    for (const int v : mesh.facet(f)) counts[v] = 1;
+    if constexpr (Dim == 2)
+      edges.push_back(mesh.facet(f));
+    else
+      triangles.push_back(mesh.facet(f));
+  }
+  for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
+  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
+  std::vector<Vec<Dim>> rest(total);
+  for (int v = 0; v < bodies; ++v) rest[v] = mesh.rest(v);
+  VectorX x(Dim * total);
+  x.head(Dim * bodies) = fields.x.head(Dim * bodies);
+  for (int o = 0; o < total - bodies; ++o) {
+    points.push_back(bodies + o);
+    rest[bodies + o] = obstacles.rest[o];
+    x.segment<Dim>(Dim * (bodies + o)) = obstacles.x[o];
+  }
+  const CollisionSurface surface =
+      make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
+  const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
+  Workspace workspace;
+  for (const auto& s : contact.active(x, workspace)) {
+    const double share = context.scaling * contact.pair_energy(s, x) / s.size();
+    for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += share;
+  }
+  return energies;
+}
+
+}  // namespace
+
+/// Thresholds of one energy field over the edges, and ranks by them.
+template <int Dim>
+class Culling<Dim>::Thresholds {
+ public:
+  Thresholds(std::vector<double> energies, const RemeshOptions& options) {
+    if (energies.empty()) return;
+    std::sort(energies.begin(), energies.end());
+    const double low = energies.front(), range = energies.back() - low, s = options.split.culling_threshold;
+    const auto index = std::min(energies.size() - 1, static_cast<std::size_t>(s * static_cast<double>(energies.size())));
+    top_ = std::max(std::min(low + range * s, energies[index]), std::min(1e-12, options.split.acceptance_tolerance.value()));
+    bottom_ = low + range * options.collapse.culling_threshold;
+  }
+  Rank operator()(double energy) const {
+    return energy >= top_ ? Rank::top : energy <= bottom_ ? Rank::bottom : Rank::middle;
+  }
+
+ private:
+  double top_ = 0, bottom_ = 0;
+};
+
+template <int Dim>
+void Culling<Dim>::rank(const RemeshQueries<Dim>& ask) {
+  is_on_ = ask.options().screening == Screening::energy_percentile;
+  if (!is_on_) return;
+  tiny_ = kTinyEdge * ask.context().shortest_edge;
+  const Mesh<Dim>& mesh = ask.mesh();
+  const auto edges = mesh.edges();
+  const auto of_cells = cell_energies(mesh, ask.fields(), ask.context());
+  const auto of_vertices = vertex_contact_energies(mesh, ask.fields(), ask.context());
+  std::vector<double> elastic, contact;
+  for (const EdgeKey& edge : edges) {
+    double sum = 0;
+    int count = 0;
+    for (const CellId c : mesh.cells_of(edge[0]))
+      if (const auto& cell = mesh.cell(c); std::find(cell.begin(), cell.end(), edge[1]) != cell.end()) {
+        sum += of_cells[c];
+        ++count;
+      }
+    elastic.push_back(sum / count);
+    contact.push_back(ask.is_surface(edge) ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
+  }
+  const bool touching = std::any_of(contact.begin(), contact.end(), [](double e) { return e > 0; });
+  const Thresholds by_elastic(elastic, ask.options()), by_contact(contact, ask.options());
+  ranks_.clear();
+  ranks_.reserve(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const Rank a = by_elastic(elastic[i]), b = touching ? by_contact(contact[i]) : a;
+    ranks_[edges[i]] = a == Rank::top || b == Rank::top         ? Rank::top
+                       : a == Rank::bottom && b == Rank::bottom ? Rank::bottom
+                                                                : Rank::middle;
+  }
+}
+
+template class Culling<2>;
+template class Culling<3>;
+
+}  // namespace itr

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// Finds the parts of the surface that can touch where an edit and the relaxation after it change the surface. Most patches
+// of a mesh touch nothing and need no contact.
+#pragma once
+
+#include <vector>
+
+#include "remesh/marks.hpp"
+#include "surface_index.hpp"
+
+namespace itr {
+
+/// What is worth knowing of clearances on this surface [m]: the `span` of its index.
+template <int Dim>
+double span_of_clearances(const Mesh<Dim>& mesh, const VectorX& x, double dhat);
+
+/// What lies near each facet, and how far away. Found on demand, and kept as long as nothing changes there.
+template <int Dim>
+class Neighbourhoods {
+ public:
+  using Hits = typename SurfaceIndex<Dim>::Hits;
+  struct Near {
+    SurfaceId piece;
+    double distance;  ///< see distance_below [m]
+  };
+
+  /// All that the facet could touch nearer than `radius` [m], at most the surface's span, and perhaps more.
+  std::span<const Near> near(const SurfaceIndex<Dim>& surface, FacetId f, double radius, Hits& hits);
+  /// Whether something is nearer than dhat [m].
+  bool is_in_contact(const SurfaceIndex<Dim>& surface, FacetId f, double dhat, Hits& hits);
+
+ private:
+  struct Entry {
+    std::vector<Near> near;
+    double radius = 0;
+    unsigned stamp = 0;
+  };
+  std::vector<Entry> entries_;  ///< by facet
+};
+
+/// What the facets of one patch could touch.
+template <int Dim>
+class ContactReach {
+ public:
+  using Hits = typename SurfaceIndex<Dim>::Hits;
+
+  /// Forgets the last patch. `facet_slots`: facets of the mesh, gone ones included.
+  void clear(int facet_slots);
+  /// Adds a facet of the patch. It `moves` if it is replaced or one of its vertices is free. `facet` is its id, or kNone if
+  /// the edit inserts it.
+  void add(const SurfacePiece<Dim>& piece, FacetId facet, bool moves);
+  /// Finds everything that the added facets could touch, also each other, as long as no vertex moves further than room().
+  /// Leaves out facets that are gone (`is_gone(facet)`). `dhat` [m].
+  template <typename IsGone>
+  void find(const SurfaceIndex<Dim>& surface, Neighbourhoods<Dim>& neighbourhoods, double dhat, Hits& hits,
+            const IsGone& is_gone) {
+    choose_room(dhat, surface.span());
+    for (const Own& own : own_) read_.include(own.piece.box.inflated(dhat_ + 2 * room_));
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+      if (own_[i].facet == kNone) {
+        look_around(surface, static_cast<int>(i), hits, is_gone);
+        continue;
+      }
+      for (const auto& [other, distance] : neighbourhoods.near(surface, own_[i].facet, dhat + 2 * room_, hits)) {
+        const bool is_facet = !other.is_of_obstacle();
+        const int number = other.number();
+        if ((is_facet && is_gone(number)) || distance >= reach(own_[i].moves, is_facet && moves(number))) continue;
+        mark(own_[i].piece);
+        mark(is_facet ? surface.piece(number) : surface.obstacle_piece(number));
+      }
+    }
+    sort();
+  }
+  /// How far vertices may move [m].
+  double room() const { return room_; }
+  /// Holds all of the surface that could have made a difference.
+  const Box<Dim>& read() const { return read_; }
+  /// Vertices of what can touch, ascending by their ids in pieces.
+  const std::vector<SurfaceId>& touching() const { return touching_; }
+  bool touches(SurfaceId id) const { return std::binary_search(touching_.begin(), touching_.end(), id); }
+
+ private:
+  struct Own {
+    SurfacePiece<Dim> piece;
+    FacetId facet;
+    bool moves;
+  };
+  void choose_room(double dhat, double span);
+  bool moves(FacetId f) const { return known_[f] && own_[own_of_[f]].moves; }
+  double reach(bool first_moves, bool second_moves) const { return dhat_ + (first_moves + second_moves) * room_; }
+  void compare(int own, const SurfacePiece<Dim>& other, bool other_moves) {
+    if (!come_near(own_[own].piece, other, reach(own_[own].moves, other_moves))) return;
+    mark(own_[own].piece);
+    mark(other);
+  }
+  /// Compares a facet that the edit inserts with all others.
+  template <typename IsGone>
+  void look_around(const SurfaceIndex<Dim>& surface, int inserted, Hits& hits, const IsGone& is_gone) {
+    surface.query(own_[inserted].piece.box.inflated(reach(own_[inserted].moves, true)), hits);
+    for (const FacetId f : hits.facets)
+      if (!is_gone(f)) compare(inserted, surface.piece(f), moves(f));
+    for (const int i : hits.obstacles) compare(inserted, surface.obstacle_piece(i), false);
+    for (int i = 0; i < inserted; ++i)
+      if (own_[i].facet == kNone) compare(inserted, own_[i].piece, own_[i].moves);
+  }
+  void mark(const SurfacePiece<Dim>& piece) {
+    touching_.insert(touching_.end(), piece.id.begin(), piece.id.begin() + piece.size);
+  }
+  void sort();
+
+  std::vector<Own> own_;
+  Marks known_;
+  std::vector<int> own_of_;  ///< by facet, where it is known
+  std::vector<SurfaceId> touching_;
+  double dhat_ = 0, room_ = 0;
+  Box<Dim> read_;
+};
+
+extern template class Neighbourhoods<2>;
+extern template class Neighbourhoods<3>;
+extern template class ContactReach<2>;
+extern template class ContactReach<3>;
+
+}  // namespace itr

@@ -1,0 +1,563 @@
+// SPDX-License-Identifier: MIT
+#include "local_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "itr/geometry/measures.hpp"
+#include "itr/projection/forgotten_history.hpp"
+#include "remesh/curved_cell.hpp"
+
+namespace itr {
+
+/// Keeps vertices of the surface within `room` of their start, because the patch knows only what they could touch there. It
+/// is an energy of value zero that only limits steps.
+template <int Dim>
+class MotionBound final : public Energy {
+ public:
+  /// Bounds no vertex until `add` names some.
+  void reset(ConstVectorView start, double room) {
+    bounded_.clear();
+    start_ = start;
+    room_ = room;
+  }
+  void add(int vertex) { bounded_.push_back(vertex); }
+  std::string_view name() const override { return "motion bound"; }
+  double value(ConstVectorView, Workspace&) const override { return 0; }
+  void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+  double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override {
+    double step = 1;
+    const ConstVectorView start = start_.view();
+    for (const int v : bounded_) {
+      const Vec<Dim> move = dx.segment<Dim>(Dim * v), away = x.segment<Dim>(Dim * v) - start.segment<Dim>(Dim * v);
+      if ((away + step * move).norm() <= room_) continue;
+      // Where the way leaves the ball: |away + t move| = room.
+      const double a = move.squaredNorm(), b = away.dot(move), c = std::max(0.0, room_ * room_ - away.squaredNorm());
+      step = std::min(step, 0.99 * c / (b + std::sqrt(b * b + a * c)));
+    }
+    return step;
+  }
+
+ private:
+  std::vector<int> bounded_;
+  KeptVector start_;
+  double room_ = 0;
+};
+
+/// Storage that another problem has left, or new one.
+template <int Dim>
+std::unique_ptr<LocalStorage<Dim>> LocalScratch<Dim>::take_storage() {
+  if (spare.empty()) return std::make_unique<LocalStorage<Dim>>();
+  auto storage = std::move(spare.back());
+  spare.pop_back();
+  return storage;
+}
+
+template <int Dim>
+LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit,
+                                bool is_after, LocalScratch<Dim>& scratch)
+    : state_(state),
+      mesh_(state.mesh),
+      edit_(edit),
+      is_after_(is_after),
+      scratch_(scratch),
+      storage_(scratch.take_storage()) {
+  scratch_.known.clear(mesh_.vertex_slots());
+  scratch_.known_obstacles.clear(static_cast<int>(state.context.obstacles.x.size()));
+  if (static_cast<int>(scratch_.local_of.size()) < mesh_.vertex_slots()) scratch_.local_of.resize(2 * mesh_.vertex_slots());
+  scratch_.local_of_obstacle.resize(state.context.obstacles.x.size());
+  add_cells(patch);
+  if (needs_facets(state.context)) add_loaded_facets();
+  hold_vertices();
+  if (state.context.contact.enabled) add_surface();
+  add_terms();
+}
+
+template <int Dim>
+LocalProblem<Dim>::~LocalProblem() {
+  cells_.rest.clear();
+  cells_.elements.clear();
+  cells_.facets.clear();
+  cells_.curved_elements.clear();
+  cells_.curved_facets.clear();
+  vertices_.clear();
+  changes_.clear();
+  energy_.clear();
+  if (!state_.context.host.empty()) workspace_ = {};  // what they keep in it may be of this one
+  scratch_.spare.push_back(std::move(storage_));
+}
+
+/// Whether the edit sets this vertex, after it.
+template <int Dim>
+bool LocalProblem<Dim>::is_value_vertex(const LocalVertex& v) const {
+  return is_after_ && v.kind != Kind::of_obstacle && edit_.value && edit_.value->vertex == v.id;
+}
+
+/// Of a node that the edit creates; null of others.
+template <int Dim>
+const typename Edit<Dim>::NewNode* LocalProblem<Dim>::created_node(const LocalVertex& v) const {
+  return v.kind == Kind::created && v.id != kNewVertex ? &edit_.inserted_nodes[kNewVertex - 1 - v.id] : nullptr;
+}
+
+/// The edge of which this is the node; {kNone, kNone} of a vertex.
+template <int Dim>
+EdgeKey LocalProblem<Dim>::edge_of(const LocalVertex& v) const {
+  if (v.kind == Kind::of_mesh) return mesh_.edge_of_node(v.id);
+  const auto* node = created_node(v);
+  return node ? node->edge : EdgeKey{kNone, kNone};
+}
+
+template <int Dim>
+Vec<Dim> LocalProblem<Dim>::rest_position(const LocalVertex& v) const {
+  if (v.kind == Kind::of_obstacle) return state_.context.obstacles.rest[v.id];
+  if (const auto* node = created_node(v)) {
+    const auto of_end = [&](VertexId end) {
+      return rest_position({end == kNewVertex ? Kind::created : Kind::of_mesh, end});
+    };
+    return (of_end(node->edge[0]) + of_end(node->edge[1])) / 2;
+  }
+  return is_value_vertex(v) ? edit_.value->rest : mesh_.rest(v.id);
+}
+
+template <int Dim>
+Vec<Dim> LocalProblem<Dim>::field_value(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values,
+                                        const LocalVertex& v) const {
+  if (v.kind == Kind::of_obstacle) return obstacle_values.empty() ? Vec<Dim>(Vec<Dim>::Zero()) : obstacle_values[v.id];
+  if (is_value_vertex(v)) return RemeshFields<Dim>::interpolate(field, *edit_.value);
+  if (const auto* node = created_node(v)) return RemeshFields<Dim>::interpolate(field, *node);
+  return field.segment<Dim>(Dim * v.id);
+}
+
+template <int Dim>
+ConstVectorView LocalProblem<Dim>::gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values,
+                                          KeptVector& values) const {
+  VectorView view = values.resize(static_cast<Eigen::Index>(Dim * vertices_.size()));
+  for (std::size_t i = 0; i < vertices_.size(); ++i)
+    view.segment<Dim>(Dim * static_cast<int>(i)) = field_value(field, obstacle_values, vertices_[i]);
+  return view;
+}
+
+/// The local id of a vertex, made on first use.
+template <int Dim>
+int LocalProblem<Dim>::local(LocalVertex v) {
+  if (v.kind == Kind::of_mesh) {
+    if (!scratch_.known.mark(v.id)) return scratch_.local_of[v.id];
+  } else if (v.kind == Kind::of_obstacle) {
+    if (!scratch_.known_obstacles.mark(v.id)) return scratch_.local_of_obstacle[v.id];
+  } else if (const auto it = std::find(vertices_.begin(), vertices_.end(), v); it != vertices_.end()) {
+    return static_cast<int>(it - vertices_.begin());
+  }
+  const int id = static_cast<int>(vertices_.size());
+  vertices_.push_back(v);
+  cells_.rest.push_back(rest_position(v));
+  if (v.kind == Kind::of_mesh) scratch_.local_of[v.id] = id;
+  if (v.kind == Kind::of_obstacle) scratch_.local_of_obstacle[v.id] = id;
+  return id;
+}
+
+template <int Dim>
+bool LocalProblem<Dim>::is_free(int i) const {
+  const auto* unknown = &dofs_.unknown[Dim * i];
+  return std::any_of(unknown, unknown + Dim, [](int u) { return u != kNone; });
+}
+
+template <int Dim>
+bool LocalProblem<Dim>::is_removed(FacetId f) const {
+  return is_after_ && std::find(edit_.removed_facets.begin(), edit_.removed_facets.end(), f) != edit_.removed_facets.end();
+}
+
+template <int Dim>
+void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
+  scratch_.cells.clear(mesh_.cell_slots());
+  cells_.elements.reserve(patch.size() + edit_.inserted_cells.size());
+  for (const CellId c : patch) {
+    scratch_.cells.mark(c);
+    if (is_after_ && std::find(edit_.removed_cells.begin(), edit_.removed_cells.end(), c) != edit_.removed_cells.end())
+      continue;
+    add_cell(mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c), c);
+  }
+  if (!is_after_) return;
+  for (const auto& cell : edit_.inserted_cells) {
+    std::array<Vec<Dim>, Dim + 1> p;
+    for (int k = 0; k <= Dim; ++k) p[k] = cells_.rest[local(cell.vertices[k])];
+    const Mat<Dim> edges = edge_matrix<Dim>(p);
+    add_cell(cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), kNone);
+  }
+}
+
+/// Local ids of a simplex's nodes, and which of its edges are curved.
+template <int Dim>
+template <int SimplexDim>
+CurvedEdges LocalProblem<Dim>::find_nodes(const std::array<VertexId, SimplexDim + 1>& vertices,
+                                          std::array<int, kQuadraticNodes<SimplexDim>>& nodes) {
+  if (!mesh_.has_nodes() && (!is_after_ || edit_.inserted_nodes.empty())) return 0;
+  const CurvedCell<SimplexDim> found = curved_cell<SimplexDim>(
+      vertices, [&](VertexId a, VertexId b) { return is_after_ ? node_after(mesh_, edit_, a, b) : mesh_.node_of(a, b); });
+  if (found.edges)
+    for (std::size_t k = 0; k < nodes.size(); ++k) nodes[k] = local(found.nodes[k]);
+  return found.edges;
+}
+
+template <int Dim>
+void LocalProblem<Dim>::add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume,
+                                 const Mat<Dim>& inverse_edges, CellId c) {
+  typename CellSet<Dim>::CurvedElement curved{{}, 0, body, volume, inverse_edges, c};
+  curved.curved = find_nodes<Dim>(cell, curved.nodes);
+  if (curved.curved) {
+    cells_.curved_elements.push_back(curved);
+    return;
+  }
+  std::array<int, Dim + 1> vertices;
+  for (int k = 0; k <= Dim; ++k) vertices[k] = local(cell[k]);
+  cells_.elements.push_back({vertices, body, volume, inverse_edges});
+}
+
+template <int Dim>
+void LocalProblem<Dim>::add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag) {
+  typename CellSet<Dim>::CurvedFacet curved{{}, 0, tag};
+  curved.curved = find_nodes<Dim - 1>(facet, curved.nodes);
+  if (curved.curved) {
+    cells_.curved_facets.push_back(curved);
+    return;
+  }
+  typename CellSet<Dim>::BoundaryFacet loaded{{}, tag};
+  for (int k = 0; k < Dim; ++k) loaded.vertices[k] = local(facet[k]);
+  cells_.facets.push_back(loaded);
+}
+
+template <int Dim>
+void LocalProblem<Dim>::add_loaded_facets() {
+  const std::size_t count = vertices_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const LocalVertex v = vertices_[i];
+    if (v.kind == Kind::created) continue;
+    for (const FacetId f : mesh_.facets_of(v.id)) {
+      const auto& facet = mesh_.facet(f);
+      const auto is_known = [&](VertexId w) { return scratch_.known[w]; };
+      if (facet[0] != v.id || !std::all_of(facet.begin() + 1, facet.end(), is_known) || is_removed(f)) continue;
+      add_loaded_facet(facet, mesh_.facet_tag(f));
+    }
+  }
+  if (!is_after_) return;
+  for (const auto& facet : edit_.inserted_facets) add_loaded_facet(facet.vertices, facet.tag);
+}
+
+/// Holds the node of an edge as held_dofs() does: by the facets at the edge, after the edit those that it has then.
+template <int Dim>
+template <typename Hold>
+void LocalProblem<Dim>::hold_node(std::size_t i, const EdgeKey& edge, const Hold& hold_components) {
+  const auto holds = [](const auto& ids, const EdgeKey& ends) {
+    return std::all_of(ends.begin(), ends.end(), [&](int v) { return std::find(ids.begin(), ids.end(), v) != ids.end(); });
+  };
+  if (is_after_)
+    for (const auto& facet : edit_.inserted_facets)
+      if (holds(facet.vertices, edge)) hold_components(i, facet.tag);
+  if (edge[1] == kNewVertex) return;
+  const auto around = mesh_.cells_of_edge(edge);
+  if (!std::all_of(around.begin(), around.end(), [&](CellId c) { return scratch_.cells[c]; }))
+    std::fill_n(storage_->held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
+  for (const FacetId f : mesh_.facets_of_edge(edge))
+    if (!is_removed(f)) hold_components(i, mesh_.facet_tag(f));
+}
+
+template <int Dim>
+void LocalProblem<Dim>::hold_vertices() {
+  std::vector<char>& held = storage_->held;
+  held.assign(Dim * vertices_.size(), 0);
+  const auto hold_components = [&](std::size_t i, int tag) {
+    const auto it = state_.context.held_components.find(tag);
+    if (it == state_.context.held_components.end()) return;
+    for (int c = 0; c < Dim; ++c)
+      if (it->second[c]) held[Dim * i + c] = 1;
+  };
+  for (std::size_t i = 0; i < vertices_.size(); ++i) {
+    const LocalVertex v = vertices_[i];
+    if (const EdgeKey edge = edge_of(v); edge[0] != kNone) {
+      hold_node(i, edge, hold_components);
+      continue;
+    }
+    if (v.kind == Kind::created) {
+      for (const auto& facet : edit_.inserted_facets)
+        if (std::find(facet.vertices.begin(), facet.vertices.end(), v.id) != facet.vertices.end())
+          hold_components(i, facet.tag);
+      if (edit_.value->tag != kNoTag) hold_components(i, edit_.value->tag);
+      continue;
+    }
+    const auto around = mesh_.cells_of(v.id);
+    if (!std::all_of(around.begin(), around.end(), [&](CellId c) { return scratch_.cells[c]; }))
+      std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
+    else
+      for (const FacetId f : mesh_.facets_of(v.id)) hold_components(i, mesh_.facet_tag(f));
+    if (mesh_.vertex_tag(v.id) != kNoTag) hold_components(i, mesh_.vertex_tag(v.id));
+  }
+  dofs_.hold(held);
+}
+
+/// Free vertices of the surface, and those whose facets the edit replaces (on both sides of the comparison).
+template <int Dim>
+void LocalProblem<Dim>::find_what_changes() {
+  changes_.assign(vertices_.size(), 0);
+  for (std::size_t i = 0; i < vertices_.size(); ++i)
+    if (vertices_[i].kind == Kind::of_mesh && mesh_.is_boundary(vertices_[i].id)) changes_[i] = is_free(static_cast<int>(i));
+  const auto mark = [&](VertexId v) {
+    if (v == kNewVertex && !is_after_) return;
+    if (is_after_ && v == edit_.removed_vertex) return;
+    changes_[local(v)] = 1;
+  };
+  for (const FacetId f : edit_.removed_facets)
+    for (const int v : mesh_.facet(f)) mark(v);
+  for (const auto& facet : edit_.inserted_facets)
+    for (const int v : facet.vertices) mark(v);
+}
+
+/// Hands over the facets at what changes, and looks for what they could touch.
+template <int Dim>
+void LocalProblem<Dim>::find_contacts() {
+  ContactReach<Dim>& reach = scratch_.reach;
+  reach.clear(mesh_.facet_slots());
+  const auto add = [&](const typename MeshTypes<Dim>::Facet& facet, FacetId f) {
+    SurfacePiece<Dim> piece;
+    bool moves = false;
+    for (const VertexId v : facet) {
+      piece.add(field_value(state_.fields.x, {}, {v == kNewVertex ? Kind::created : Kind::of_mesh, v}), v);
+      moves = moves || (v == kNewVertex || scratch_.known[v] ? is_free(local(v)) : false);
+    }
+    reach.add(piece, f, moves);
+  };
+  scratch_.facets.clear(mesh_.facet_slots());
+  for (std::size_t i = 0; i < changes_.size(); ++i) {
+    if (!changes_[i] || vertices_[i].kind != Kind::of_mesh) continue;
+    for (const FacetId f : mesh_.facets_of(vertices_[i].id))
+      if (scratch_.facets.mark(f) && !is_removed(f)) add(mesh_.facet(f), f);
+  }
+  if (is_after_)
+    for (const auto& facet : edit_.inserted_facets) add(facet.vertices, kNone);
+  reach.find(state_.surface, scratch_.neighbourhoods, state_.context.contact.activation_distance, scratch_.hits,
+             [&](FacetId f) { return is_removed(f); });
+}
+
+/// What stands around the vertices of what can touch, ascending: facets that stay and primitives of obstacles.
+template <int Dim>
+void LocalProblem<Dim>::find_stars_of_touching() {
+  std::vector<FacetId>& facets = scratch_.near_facets;
+  std::vector<int>& primitives = scratch_.near_primitives;
+  facets.clear();
+  primitives.clear();
+  const ObstaclePrimitives& obstacles = state_.surface.primitives();
+  scratch_.facets.clear(mesh_.facet_slots());
+  scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
+  for (const SurfaceId id : scratch_.reach.touching()) {
+    if (id == kNewVertex) continue;
+    if (id.is_of_obstacle()) {
+      for (const int i : obstacles.at_vertex[id.number()])
+        if (scratch_.primitives.mark(i)) primitives.push_back(i);
+      continue;
+    }
+    for (const FacetId f : mesh_.facets_of(id.number()))
+      if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
+  }
+  std::sort(facets.begin(), facets.end());
+  std::sort(primitives.begin(), primitives.end());
+}
+
+/// The part of the surface that can touch what changes, with the stars of its vertices: contact is weighted by them.
+template <int Dim>
+void LocalProblem<Dim>::add_surface() {
+  find_what_changes();
+  if (std::find(changes_.begin(), changes_.end(), 1) == changes_.end()) return;
+  find_contacts();
+  has_surface_ = true;
+  const ContactReach<Dim>& reach = scratch_.reach;
+  surface_read_ = reach.read();
+  touches_contact_ = !reach.touching().empty();
+  if (!touches_contact_) return;
+
+  using Facet = typename MeshTypes<Dim>::Facet;
+  CollisionSurface& surface = storage_->surface;
+  surface.edges.clear();
+  surface.triangles.clear();
+  std::vector<int>& points = scratch_.points;
+  points.clear();
+  const auto add = [&](const auto& ids, std::size_t size) {  // local ones
+    if (size == 1) points.push_back(ids[0]);
+    if (size == 2) surface.edges.push_back({ids[0], ids[1]});
+    if constexpr (Dim == 3)
+      if (size == 3) surface.triangles.push_back({ids[0], ids[1], ids[2]});
+  };
+  const auto add_facet = [&](const Facet& facet) {
+    Facet ids;
+    for (int k = 0; k < Dim; ++k) ids[k] = local(facet[k]);
+    add(ids, Dim);
+  };
+  find_stars_of_touching();
+  for (const FacetId f : scratch_.near_facets) {
+    add_facet(mesh_.facet(f));
+    for (const VertexId v : mesh_.facet(f)) surface_read_.include(state_.surface.at(v));
+  }
+  if (is_after_)
+    for (const auto& facet : edit_.inserted_facets)
+      if (std::any_of(facet.vertices.begin(), facet.vertices.end(), [&](int v) { return reach.touches(v); }))
+        add_facet(facet.vertices);
+  const ObstaclePrimitives& obstacles = state_.surface.primitives();
+  for (const int i : scratch_.near_primitives) {
+    std::array<int, 3> ids{};
+    for (int k = 0; k < obstacles.all[i].size; ++k) ids[k] = local({Kind::of_obstacle, obstacles.all[i].vertices[k]});
+    add(ids, obstacles.all[i].size);
+  }
+  dofs_.unknown.resize(Dim * vertices_.size(), kNone);
+  changes_.resize(vertices_.size(), 0);
+  surface.counts = changes_;
+  complete_collision_surface<Dim>(surface, points, cells_.rest);
+}
+
+/// As the solve of the step does: where the points of a cell do not see how near it is to an inversion, there are more.
+template <int Dim>
+void LocalProblem<Dim>::set_quadrature(ConstVectorView x) {
+  ElasticEnergy<Dim>& elastic = *storage_->potential->elastic();
+  if (!state_.fields.levels.empty()) {
+    const std::uint8_t of_new = is_after_ ? state_.fields.level_of_new_cells(edit_) : std::uint8_t{0};
+    QuadratureLevels levels;
+    for (const auto& element : cells_.curved_elements)
+      levels.push_back(element.cell == kNone ? of_new : state_.fields.levels[element.cell]);
+    elastic.set_quadrature_levels(levels);
+  }
+  elastic.refine_quadrature(x);
+}
+
+template <int Dim>
+void LocalProblem<Dim>::add_terms() {
+  const StepContext<Dim>& context = state_.context;
+  cells_.num_vertices = static_cast<int>(vertices_.size());
+  const ConstVectorView x = gather(state_.fields.x, context.obstacles.x, x_);
+  storage_->predictor.resize(0);
+  storage_->velocity_reference.resize(0);
+  if (context.has_inertia) gather(state_.fields.predictor, {}, storage_->predictor);
+  if (needs_velocities(context, touches_contact_) && state_.fields.velocity_reference.size() > 0)
+    gather(state_.fields.velocity_reference, context.obstacles.velocity_reference, storage_->velocity_reference);
+  const PotentialHistory history{storage_->predictor.view(), storage_->velocity_reference.view()};
+  if (storage_->potential)
+    storage_->potential->renew(context, history);
+  else
+    storage_->potential.emplace(context, cells_, history);
+  IncrementalPotential<Dim>& potential = *storage_->potential;
+  if (!cells_.curved_elements.empty()) set_quadrature(x);
+  // With lumped mass a split changes how inertia is integrated.
+  const bool is_nested = !is_after_ || (edit_.is_nested() && context.mass == MassKind::consistent);
+  if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
+    add_unrepresented_history(*potential.inertia());
+  if (has_surface_) {
+    auto& motion_bound = storage_->motion_bound;
+    if (!motion_bound) motion_bound = std::make_shared<MotionBound<Dim>>();
+    motion_bound->reset(x, scratch_.reach.room());
+    for (int i = 0; i < static_cast<int>(changes_.size()); ++i)
+      if (changes_[i] && is_free(i)) motion_bound->add(i);
+    energy_.add(motion_bound);  // first: contact then looks no further than that
+  }
+  if (touches_contact_) potential.add_contact(storage_->surface, context.contact.barrier_stiffness);
+  potential.add_to(energy_, potential.lag(x, workspace_));
+}
+
+/// The same where an edge is straightened: its node's shape function times by how much the predictor was off the mean of the
+/// ends.
+template <int Dim>
+void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
+  const VectorX& predictor = state_.fields.predictor;
+  const VertexId node = mesh_.node_of(edit_.edge[0], edit_.edge[1]);
+  const auto at = [&](VertexId v) -> Vec<Dim> { return predictor.segment<Dim>(Dim * v); };
+  const Vec<Dim> gap = at(node) - (at(edit_.edge[0]) + at(edit_.edge[1])) / 2;
+  VectorX residual = VectorX::Zero(Dim * static_cast<int>(vertices_.size()));
+  const auto add = [&](VertexId v, double mass) {
+    const auto place = std::find(vertices_.begin(), vertices_.end(), LocalVertex{Kind::of_mesh, v}) - vertices_.begin();
+    residual.segment<Dim>(Dim * place) -= mass * gap;
+  };
+  double loss = 0;
+  for (const CellId c : edit_.removed_cells) {
+    const auto cell = curved_cell<Dim>(mesh_.cell(c), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); });
+    const double mass = state_.context.materials.at(mesh_.body(c)).density * mesh_.volume(c);
+    const auto matrix = quadratic_mass<Dim>(MassKind::consistent, cell.edges);
+    const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+      if (k != n && (k <= Dim || cell.edges >> (k - Dim - 1) & 1)) add(cell.nodes[k], mass * matrix(k, n));
+    for (const VertexId end : edit_.edge) add(end, mass * matrix(n, n) / 2);  // the straight edge moves with its ends
+    loss += 0.5 * mass * matrix(n, n) * gap.squaredNorm();
+  }
+  inertia.set_unrepresented_history(residual, loss);
+}
+
+/// Adds the part of the predictor, a function on the old mesh, that the new mesh cannot represent.
+template <int Dim>
+void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) const {
+  if (edit_.kind == Edit<Dim>::Kind::straighten) return add_history_of_node(inertia);
+  // Numbering of the removed cells' own: their vertices carry the functions as they were.
+  std::vector<VertexId> old_ids, new_ids;
+  std::vector<std::array<int, Dim + 1>> old_cells, new_cells;
+  std::vector<double> old_density, new_density;
+  const auto numbered = [](std::vector<VertexId>& ids, const auto& cell) {
+    std::array<int, Dim + 1> numbers;
+    for (int k = 0; k <= Dim; ++k) {
+      const auto it = std::find(ids.begin(), ids.end(), cell[k]);
+      numbers[k] = static_cast<int>(it - ids.begin());
+      if (it == ids.end()) ids.push_back(cell[k]);
+    }
+    return numbers;
+  };
+  const auto density = [&](int body) { return state_.context.materials.at(body).density; };
+  for (const CellId c : edit_.removed_cells) {
+    old_cells.push_back(numbered(old_ids, mesh_.cell(c)));
+    old_density.push_back(density(mesh_.body(c)));
+  }
+  for (const auto& cell : edit_.inserted_cells) {
+    new_cells.push_back(numbered(new_ids, cell.vertices));
+    new_density.push_back(density(cell.body));
+  }
+  const auto of_mesh = [](VertexId v) { return LocalVertex{v == kNewVertex ? Kind::created : Kind::of_mesh, v}; };
+  std::vector<Vec<Dim>> old_rest, new_rest;
+  for (const VertexId v : old_ids) old_rest.push_back(mesh_.rest(v));
+  for (const VertexId v : new_ids) new_rest.push_back(rest_position(of_mesh(v)));
+  const TransferMesh<Dim> old_mesh{old_rest, old_cells, old_density}, new_mesh{new_rest, new_cells, new_density};
+  const VectorX& predictor = state_.fields.predictor;
+  MatrixX old_predictor(old_ids.size(), Dim), new_predictor(new_ids.size(), Dim), new_x(new_ids.size(), Dim);
+  for (std::size_t i = 0; i < old_ids.size(); ++i)
+    old_predictor.row(i) = predictor.segment<Dim>(Dim * old_ids[i]).transpose();
+  for (std::size_t i = 0; i < new_ids.size(); ++i) {
+    new_predictor.row(i) = field_value(predictor, {}, of_mesh(new_ids[i])).transpose();
+    new_x.row(i) = field_value(state_.fields.x, {}, of_mesh(new_ids[i])).transpose();
+  }
+  const ForgottenHistory forgotten =
+      forgotten_history<Dim>(state_.context.mass, old_mesh, new_mesh, old_predictor, new_predictor, new_x);
+  VectorX residual = VectorX::Zero(Dim * static_cast<int>(vertices_.size()));
+  for (std::size_t i = 0; i < new_ids.size(); ++i) {
+    const auto at = std::find(vertices_.begin(), vertices_.end(), of_mesh(new_ids[i])) - vertices_.begin();
+    residual.segment<Dim>(Dim * at) = forgotten.residual.row(i).transpose();
+  }
+  inertia.set_unrepresented_history(residual, forgotten.loss);
+}
+
+template <int Dim>
+NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
+  NewtonOptions options = state_.context.newton;
+  options.max_iterations = max_iterations;
+  NewtonExtras extras{.is_brief = true};
+  if (!cells_.curved_elements.empty())
+    extras.after_step = [&](const VectorX& x) { return storage_->potential->elastic()->refine_quadrature(x); };
+  if (options.norm != NewtonNorm::euclidean) {
+    VectorView weights = storage_->norm_weights.resize(Dim * cells_.num_vertices);
+    get_unit_mass_diagonal(cells_, weights);
+    extras.norm_weights = {weights.data(), static_cast<std::size_t>(weights.size())};
+  }
+  return minimize(energy_, x_.view(), dofs_, VectorX(), scratch_.system, options, workspace_, extras);
+}
+
+template <int Dim>
+void LocalProblem<Dim>::get_positions(std::vector<Position>& positions) const {
+  positions.clear();
+  const ConstVectorView x = x_.view();
+  for (int i = 0; i < static_cast<int>(vertices_.size()); ++i)
+    if (is_free(i)) positions.push_back({vertices_[i].id, x.segment<Dim>(Dim * i)});
+}
+
+template class LocalProblem<2>;
+template class LocalProblem<3>;
+
+}  // namespace itr

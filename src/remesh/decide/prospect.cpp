@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include "prospect.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "energy/elastic/point.hpp"
+#include "itr/fem/mass.hpp"
+#include "mesh/connected_parts.hpp"
+
+namespace itr {
+
+namespace {
+
+/// The acceleration of all vertices, if it is one.
+template <int Dim>
+std::optional<Vec<Dim>> uniform_acceleration(const Mesh<Dim>& mesh, const Loads<Dim>& loads) {
+  std::optional<Vec<Dim>> all;
+  if (!loads.acceleration) return Vec<Dim>::Zero();
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+    if (!mesh.is_vertex_alive(v)) continue;
+    const Vec<Dim> own = loads.acceleration(mesh.rest(v));
+    if (all && *all != own) return std::nullopt;
+    all = own;
+  }
+  return all;
+}
+
+/// By vertex slot, the number of its connected part.
+template <int Dim>
+std::vector<int> parts_of(const Mesh<Dim>& mesh) {
+  std::vector<typename Mesh<Dim>::Cell> cells;
+  cells.reserve(mesh.cell_slots());
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (mesh.is_cell_alive(c)) cells.push_back(mesh.cell(c));
+  return connected_parts<Dim + 1>(mesh.vertex_slots(), cells);
+}
+
+/// Of a cell whose edges are so long: isosceles and right-angled in 2D, regular in 3D.
+template <int Dim>
+double volume_of(double length) {
+  return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));
+}
+
+}  // namespace
+
+template <int Dim>
+double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  if (!is_bounded<Dim>(context) || !std::isfinite(context.coupling) || mesh.has_nodes()) return kUnknown;
+  const auto acceleration = uniform_acceleration(mesh, context.loads);
+  if (!acceleration) return kUnknown;
+  const Vec<Dim> fall = context.scaling * *acceleration;
+  const std::vector<int> parts = parts_of(mesh);
+  std::vector<double> energy(mesh.vertex_slots(), context.coupling);
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    const auto element = element_of(mesh, c);
+    const Material& material = context.materials.at(element.body);
+    const auto moduli = elastic_moduli<Dim>(material, mesh.rest(element.vertices[0]));
+    energy[parts[element.vertices[0]]] += context.scaling * elastic_energy<Dim>(element, fields.x, moduli);
+    if (!context.has_inertia) continue;
+    const ElementMass<Dim> mass(context.mass, material.density * element.volume);
+    Vec<Dim> total = Vec<Dim>::Zero();
+    double squares = 0;
+    for (const int v : element.vertices) {
+      const Vec<Dim> d = fields.x.template segment<Dim>(Dim * v) - fields.predictor.template segment<Dim>(Dim * v) - fall;
+      total += d;
+      squares += d.squaredNorm();
+    }
+    energy[parts[element.vertices[0]]] += mass.energy(total, squares);
+  }
+  return *std::max_element(energy.begin(), energy.end());
+}
+
+template <int Dim>
+double longest_collapse(const CollapseOptions& options, const StepContext<Dim>& context) {
+  return std::min(options.abs_max_edge_length, options.rel_max_edge_length * context.shortest_edge);
+}
+
+template <int Dim>
+bool is_small(const Mesh<Dim>& mesh, CellId cell, double longest) {
+  return mesh.volume(cell) <= volume_of<Dim>(longest);
+}
+
+template <int Dim>
+bool any_may_collapse(const Mesh<Dim>& mesh, const CollapseOptions& options, const StepContext<Dim>& context) {
+  const double longest = longest_collapse(options, context);
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c) || !is_small(mesh, c, longest)) continue;
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = i + 1; j <= Dim; ++j)
+        if ((mesh.rest(mesh.cell(c)[i]) - mesh.rest(mesh.cell(c)[j])).norm() <= longest) return true;
+  }
+  return false;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                  \
+  template double available_energy<Dim>(const Mesh<Dim>&, const RemeshFields<Dim>&, const StepContext<Dim>&); \
+  template double longest_collapse<Dim>(const CollapseOptions&, const StepContext<Dim>&);                     \
+  template bool is_small<Dim>(const Mesh<Dim>&, CellId, double);                                              \
+  template bool any_may_collapse<Dim>(const Mesh<Dim>&, const CollapseOptions&, const StepContext<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: MIT
+#include "queries.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <boost/container/small_vector.hpp>
+#include "itr/core/timer.hpp"
+#include "itr/remesh/edits.hpp"
+#include "prospect.hpp"
+
+namespace itr {
+
+template <int Dim>
+std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cells) {
+  std::vector<EdgeKey> edges;
+  for (const CellId c : cells) {
+    if (!mesh.is_cell_alive(c)) continue;
+    const auto& cell = mesh.cell(c);
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = i + 1; j <= Dim; ++j) edges.push_back({std::min(cell[i], cell[j]), std::max(cell[i], cell[j])});
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+template <int Dim>
+Refusal RemeshQueries<Dim>::refuse_split(const EdgeKey& e) const {
+  if (!exists(e)) return Refusal::gone;
+  const double length = rest_length(e), dhat = context_.contact.activation_distance;
+  if (length < options_.split.min_edge_length.value()) return Refusal::length;
+  const auto x = [&](VertexId v) { return fields_.x.template segment<Dim>(Dim * v); };
+  const bool is_bound = has_contact() && is_surface(e) && (length < 2 * dhat || (x(e[0]) - x(e[1])).norm() < 2 * dhat);
+  return is_bound ? Refusal::dhat : Refusal::none;
+}
+
+template <int Dim>
+Refusal RemeshQueries<Dim>::refuse_collapse(const EdgeKey& e) const {
+  if (!exists(e)) return Refusal::gone;
+  const double longest = longest_collapse(options_.collapse, context_);
+  if (rest_length(e) > longest) return Refusal::length;
+  const auto around = mesh_.cells_of_edge(e);
+  if (mesh_.has_nodes() && std::any_of(around.begin(), around.end(), [&](CellId c) { return mesh_.is_curved(c); }))
+    return Refusal::curved;
+  const bool is_one_small = std::any_of(around.begin(), around.end(), [&](CellId c) { return is_small(mesh_, c, longest); });
+  return is_one_small ? Refusal::none : Refusal::length;
+}
+
+template <int Dim>
+Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e) const {
+  if (!exists(e)) return Refusal::gone;
+  if (mesh_.node_of(e[0], e[1]) != kNone) return Refusal::not_asked;
+  return has_contact() && is_surface(e) ? Refusal::held : Refusal::none;
+}
+
+template <int Dim>
+Refusal RemeshQueries<Dim>::refuse_straighten(const EdgeKey& e) const {
+  if (!exists(e)) return Refusal::gone;
+  return mesh_.node_of(e[0], e[1]) == kNone ? Refusal::not_asked : Refusal::none;
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  return gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch);
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
+  if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
+  const auto around = mesh_.cells_of_edge(edge);
+  if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
+  return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch);
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  const double gain = itr::predict_curve<Dim>(state(), edge);
+  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_curve(mesh_, edge), scratch) : gain;
+}
+
+template <int Dim>
+bool RemeshQueries<Dim>::is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
+  if (!has_contact()) return false;
+  const double dhat = context_.contact.activation_distance;
+  return any_facet_at(
+      e, [&](FacetId f) { return scratch.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch.hits); });
+}
+
+template <int Dim>
+void RemeshQueries<Dim>::find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
+  trial.in_contact = is_in_contact(trial.edge(), scratch);
+  if (!has_contact() || !is_surface(trial.edge())) return;
+  Box<Dim> edge;
+  for (const FacetId f : mesh_.facets_of(trial.edge()[0]))
+    for (const VertexId v : mesh_.facet(f)) edge.include(gate_.present().at(v));
+  trial.surface_read.include(edge.inflated(context_.contact.activation_distance));
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::roughness(const EdgeKey& edge) const {
+  const auto& at_first = mesh_.cells_of(edge[0]);
+  boost::container::small_vector<CellId, Dim == 2 ? 16 : 64> around(at_first.begin(), at_first.end());
+  if (edge[1] != kNone)
+    for (const CellId c : mesh_.cells_of(edge[1]))
+      if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around.push_back(c);
+  const auto variation = [&](const VectorX& field, auto&& weight) {
+    Mat<Dim> sum = Mat<Dim>::Zero();
+    double total = 0, squares = 0;
+    for (const CellId c : around) {
+      const Mat<Dim> gradient = deformation_gradient<Dim>(element_of(mesh_, c), field);
+      const double w = weight(c);
+      sum += w * gradient;
+      squares += w * gradient.squaredNorm();
+      total += w;
+    }
+    return std::max(0.0, squares - sum.squaredNorm() / total);
+  };
+  const auto stiffness = [&](CellId c) { return mesh_.volume(c) * context_.materials.at(mesh_.body(c)).youngs_modulus; };
+  double result = context_.scaling * variation(fields_.x, stiffness);
+  if (context_.has_inertia) {
+    const double size =
+        edge[1] == kNone ? mesh_.volume(around[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
+    const auto mass = [&](CellId c) { return size * mesh_.volume(c) * context_.materials.at(mesh_.body(c)).density; };
+    result += variation(fields_.predictor, mass);
+  }
+  return result;
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::largest_poisson_ratio(std::span<const CellId> cells) const {
+  double nu = 0;
+  for (const CellId c : cells) nu = std::max(nu, context_.materials.at(mesh_.body(c)).poisson_ratio);
+  return nu;
+}
+
+template <int Dim>
+void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local,
+                               LocalScratch<Dim>& scratch) const {
+  const ScopedTimer timer(trial.seconds);
+  const RemeshState<Dim> state = this->state();
+  const Edit<Dim>& edit = *trial.edit;
+  TrialOptions options{.required = context_.scaling * tolerance, .total_volume = total_volume_, .local = local};
+  if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth &&
+      (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
+    options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
+  trial.is_asked = trial.was_previewed = true;
+  preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
+  trial.surface_read.include(trial.verdict.surface_read);
+}
+
+template std::vector<EdgeKey> edges_of(const Mesh<2>&, std::span<const CellId>);
+template std::vector<EdgeKey> edges_of(const Mesh<3>&, std::span<const CellId>);
+template class RemeshQueries<2>;
+template class RemeshQueries<3>;
+
+}  // namespace itr

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// What operations ask about the mesh, the fields and the energy of the step, as they are now. Nothing here changes anything:
+// several threads may ask, each with a scratch of its own.
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "prediction.hpp"
+#include "trial.hpp"
+
+namespace itr {
+
+/// Whether predictions may leave out trials.
+inline bool screens(const RemeshOptions& options) { return options.screening != Screening::none; }
+
+/// Edges of those cells that are alive, ascending.
+template <int Dim>
+std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cells);
+
+template <int Dim>
+class RemeshQueries {
+ public:
+  RemeshQueries(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
+                const RemeshOptions& options, const Strata<Dim>& strata, const Gate<Dim>& gate)
+      : mesh_(mesh),
+        fields_(fields),
+        context_(context),
+        options_(options),
+        strata_(strata),
+        gate_(gate),
+        total_volume_(mesh.total_volume()) {}
+
+  const Mesh<Dim>& mesh() const { return mesh_; }
+  const RemeshFields<Dim>& fields() const { return fields_; }
+  const StepContext<Dim>& context() const { return context_; }
+  const Strata<Dim>& strata() const { return strata_; }
+  const RemeshOptions& options() const { return options_; }
+  const SurfaceIndex<Dim>& surface() const { return gate_.present(); }
+  bool has_contact() const { return context_.contact.enabled; }
+  bool is_cancelled() const { return context_.newton.is_cancelled(); }
+
+  double rest_length(const EdgeKey& e) const { return (mesh_.rest(e[0]) - mesh_.rest(e[1])).norm(); }
+  bool exists(const EdgeKey& e) const {  ///< also of a vertex {v, kNone}
+    if (e[1] == kNone) return mesh_.is_vertex_alive(e[0]);
+    return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && mesh_.are_joined(e[0], e[1]);
+  }
+  bool is_surface(const EdgeKey& e) const {
+    return any_facet_at(e, [](FacetId) { return true; });
+  }
+  /// Why an edge, by its lengths, cannot be split or may not collapse.
+  Refusal refuse_split(const EdgeKey& e) const;
+  Refusal refuse_collapse(const EdgeKey& e) const;
+  /// Why an edge cannot be curved: the surface stays straight where contact is enabled.
+  Refusal refuse_curve(const EdgeKey& e) const;
+  Refusal refuse_straighten(const EdgeKey& e) const;
+  /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
+  bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
+  /// The same of a trial's edge.
+  void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;
+  /// How much the deformation and the history vary over the cells around an edge (a vertex {v, kNone}). No edit gains or
+  /// loses energy where both are linear. [J, times the scaling, up to a factor]
+  double roughness(const EdgeKey& edge) const;
+
+  bool screens() const { return itr::screens(options_); }
+  /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
+  double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance.value() : 0; }
+  /// See prediction.hpp.
+  double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
+  double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
+  double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
+  double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
+  /// Energy of a cell, which need not be in the mesh, at present positions. [J, times the scaling]
+  double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body) const {
+    return cell_energy<Dim>(state(), cell, body);
+  }
+  /// Whether the prediction of an edit of these cells tells that its patch cannot gain the tolerance [J] either.
+  bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance) const {
+    return screens() &&
+           at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
+  }
+  /// Decides about the edit of a trial that has to gain `tolerance` [J].
+  void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
+
+ private:
+  template <typename Condition>
+  bool any_facet_at(const EdgeKey& e, const Condition& holds) const {
+    const auto facets = mesh_.facets_of(e[0]);
+    return std::any_of(facets.begin(), facets.end(), [&](FacetId f) {
+      return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() && holds(f);
+    });
+  }
+  RemeshState<Dim> state() const { return {mesh_, fields_, context_, gate_.present(), options_.history}; }
+  double largest_poisson_ratio(std::span<const CellId> cells) const;
+
+  const Mesh<Dim>& mesh_;
+  const RemeshFields<Dim>& fields_;
+  const StepContext<Dim>& context_;
+  const RemeshOptions& options_;
+  const Strata<Dim>& strata_;
+  const Gate<Dim>& gate_;
+  double total_volume_;
+};
+
+}  // namespace itr

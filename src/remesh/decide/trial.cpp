@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+#include "trial.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "patch.hpp"
+#include "prediction.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr int kIterationsAfterAcceptance = 100;
+constexpr int kBoundIterations = 1, kBoundContactIterations = 2;  ///< of Newton, for a vertex alone
+
+/// Both sides of a comparison on one support.
+template <int Dim>
+struct Comparison {
+  double gain = -std::numeric_limits<double>::infinity();
+  bool touches_contact = false;
+  bool has_unknowns = false;
+  Box<Dim> surface_read{};
+};
+
+/// `accept`, called with the side after the edit where it gains `required`, may go on with it.
+template <int Dim, typename Accept>
+Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, double required,
+                        int iterations, int contact_iterations, LocalScratch<Dim>& scratch, const Accept& accept) {
+  LocalProblem<Dim> before(state, patch, edit, false, scratch);
+  LocalProblem<Dim> after(state, patch, edit, true, scratch);
+  Comparison<Dim> result;
+  result.touches_contact = before.touches_contact() || after.touches_contact();
+  result.has_unknowns = after.has_unknowns();
+  result.surface_read = before.surface_read();
+  result.surface_read.include(after.surface_read());
+  const int effort = result.touches_contact ? contact_iterations : iterations;
+  const double energy_before = before.value();
+  const double energy_after = after.has_unknowns() ? after.relax(effort).energy : after.value();
+  result.gain = energy_before - energy_after;
+  // The side without the edit gets the same effort, so that residual left over elsewhere is not credited to the edit.
+  if (result.gain >= required && before.has_unknowns()) result.gain = before.relax(effort).energy - energy_after;
+  if (result.gain >= required) accept(after);
+  return result;
+}
+
+/// The cells of an edit and those around the vertex that it sets.
+template <int Dim>
+void find_star(const Mesh<Dim>& mesh, const Edit<Dim>& edit, std::vector<CellId>& cells) {
+  cells.assign(edit.removed_cells.begin(), edit.removed_cells.end());
+  if (edit.value && edit.value->vertex != kNewVertex) {
+    const auto around = mesh.cells_of(edit.value->vertex);
+    cells.insert(cells.end(), around.begin(), around.end());
+  }
+  std::sort(cells.begin(), cells.end());
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+}
+
+}  // namespace
+
+template <int Dim>
+double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch) {
+  find_star(state.mesh, edit, scratch.star);
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  return compare<Dim>(state, scratch.star, edit, kNever, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {})
+      .gain;
+}
+
+template <int Dim>
+void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const TrialOptions& options,
+             LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
+  verdict.clear();
+  verdict.refusal = Refusal::invalid;
+  if (!gate.passes(edit, scratch.gate)) return;
+  const auto note = [&](const Comparison<Dim>& found, Refusal refusal) {
+    verdict.refusal = refusal;
+    verdict.gain = found.gain;
+    verdict.touches_contact = found.touches_contact;
+    verdict.surface_read.include(found.surface_read);
+  };
+  const auto accept = [&](LocalProblem<Dim>& after) {
+    if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
+    verdict.refusal = Refusal::none;
+    after.get_positions(verdict.positions);
+  };
+  bool is_enough = false;
+  if (options.patch_over_vertex > 0) {
+    find_star(state.mesh, edit, scratch.star);
+    // History that the new mesh cannot represent takes the longest to find, so the first of two checks leaves it out.
+    const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
+    for (int check = is_nested ? 1 : 0; check < 2; ++check) {
+      const HistoryRule history = check == 0 ? HistoryRule::interpolated : state.history;
+      const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
+      is_enough = false;
+      const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, kBoundIterations,
+                                      kBoundContactIterations, scratch, [&](auto&) { is_enough = true; });
+      note(bound, Refusal::bound);
+      const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();
+      const double factor = surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex;
+      if (at_most(bound.gain, factor) < options.required) return;
+    }
+  }
+  select_patch<Dim>(state.mesh, edit, options.local, options.total_volume, scratch.patch, verdict.patch);
+  if (is_enough) {
+    LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
+    verdict.touches_contact = after.touches_contact();
+    verdict.surface_read.include(after.surface_read());
+    return accept(after);
+  }
+  const auto found = compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
+                                  options.local.max_contact_iterations, scratch, accept);
+  const Refusal otherwise = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
+  note(found, verdict.accepted() ? Refusal::none : otherwise);
+  verdict.was_relaxed = true;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                   \
+  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);          \
+  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const TrialOptions&, \
+                             LocalScratch<Dim>&, Verdict<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

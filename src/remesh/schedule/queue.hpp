@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "itr/mesh/mesh.hpp"
+
+namespace itr {
+
+/// Edges (a vertex v is {v, kNone}) in order of descending priority, ties by key. One that is pushed again moves. Priorities
+/// count to four digits: those of mirror images differ by the round-off of a solve, which is not to decide what is done
+/// first.
+class EdgeQueue {
+ public:
+  struct Entry {
+    EdgeKey edge;
+    double priority;
+    unsigned since = 0;        ///< commit after which that was found
+    bool is_hopeless = false;  ///< nothing to gain, then
+  };
+
+  /// Several at once, each edge once.
+  void push(std::vector<Entry> entries) {
+    if (!heap_.empty() || !last_.empty()) {
+      for (const Entry& entry : entries) push(entry);
+      return;
+    }
+    heap_ = std::move(entries);
+    for (Entry& entry : heap_) entry.priority = rounded(entry.priority);
+    std::make_heap(heap_.begin(), heap_.end(), is_after);
+  }
+  void push(Entry entry) {
+    entry.priority = rounded(entry.priority);
+    last_[entry.edge] = entry.priority;
+    heap_.push_back(entry);
+    std::push_heap(heap_.begin(), heap_.end(), is_after);
+  }
+
+  std::optional<Entry> pop() {
+    while (!heap_.empty()) {
+      std::pop_heap(heap_.begin(), heap_.end(), is_after);
+      const Entry entry = heap_.back();
+      heap_.pop_back();
+      if (last_.empty()) return entry;
+      const auto it = last_.find(entry.edge);
+      if (it == last_.end()) return entry;
+      if (it->second != entry.priority) continue;  // moved, or popped since
+      it->second.reset();
+      return entry;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static double rounded(double priority) {
+    int exponent = 0;
+    const double fraction = std::frexp(priority, &exponent);
+    return std::isfinite(priority) ? std::ldexp(std::round(fraction * 16384), exponent - 14) : priority;
+  }
+  static bool is_after(const Entry& a, const Entry& b) {
+    return a.priority != b.priority ? a.priority < b.priority : a.edge > b.edge;
+  }
+  std::vector<Entry> heap_;
+  /// Priorities of edges that did not come first; none: popped.
+  std::unordered_map<EdgeKey, std::optional<double>, EdgeKeyHash> last_;
+};
+
+}  // namespace itr

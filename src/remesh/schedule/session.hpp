@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+// What all operations of one call of the remesher share: what they ask, what they remember, what they commit.
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <vector>
+
+#include "committer.hpp"
+#include "itr/core/parallel.hpp"
+#include "itr/mesh/strata.hpp"
+#include "itr/remesh/remesher.hpp"
+#include "remesh/baselines/culling.hpp"
+#include "remesh/decide/queries.hpp"
+#include "session_memory.hpp"
+
+namespace itr {
+
+template <int Dim>
+class RemeshSession {
+ public:
+  RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context, const RemeshOptions& options,
+                const RemeshMemory& memory, Strata<Dim>& strata);
+  RemeshSession(const RemeshSession&) = delete;
+  RemeshSession& operator=(const RemeshSession&) = delete;
+
+  const RemeshQueries<Dim>& ask() const { return ask_; }
+  SessionMemory<Dim>& memory() { return memory_; }
+  const SessionMemory<Dim>& memory() const { return memory_; }
+  Committer<Dim>& commits() { return commits_; }
+  Culling<Dim>& culling() { return culling_; }
+  const Culling<Dim>& culling() const { return culling_; }
+  RemeshReport& report() { return report_; }
+
+  /// Whether badly shaped cells at an edge (a vertex {v, kNone}) do harm. They do where the fields vary enough, where an
+  /// edit nearby gained energy, and where a shape is so bad that rules only allow it to improve. Elsewhere swaps and moves
+  /// for better shapes would be wasted work.
+  bool shape_matters(const EdgeKey& e, double roughness) const;
+  /// Whether bulk terms at an entry's edge are as they were when it was stamped.
+  bool is_unchanged(const EdgeQueue::Entry& entry) const { return !log_.has_changed_around(entry.edge, entry.since); }
+  EdgeQueue::Entry stamped(EdgeQueue::Entry entry) const {
+    entry.since = log_.now();
+    return entry;
+  }
+
+  /// Threads that look at candidates at the same time.
+  int num_lanes() const { return static_cast<int>(lanes_.size()); }
+  /// Calls f(i, scratch) for all i below n, on all of them.
+  template <typename F>
+  void for_each(std::size_t n, const F& f) {
+    std::atomic<std::size_t> next = 0;
+    parallel_blocks(std::min(n, lanes_.size()), 1, [&](std::size_t lane, std::size_t) {
+      for (std::size_t i = next++; i < n; i = next++) f(i, lanes_[lane]);
+    });
+  }
+  /// For calls from the thread that owns this.
+  LocalScratch<Dim>& scratch() { return lanes_.front(); }
+
+ private:
+  Gate<Dim> gate_;
+  ChangeLog<Dim> log_;
+  RemeshQueries<Dim> ask_;
+  SessionMemory<Dim> memory_;
+  Committer<Dim> commits_;
+  Culling<Dim> culling_;
+  std::deque<LocalScratch<Dim>> lanes_;
+  RemeshReport report_;
+};
+
+/// The operations, one file each; splits and curves share one queue. They count what they do in session.report().
+template <int Dim>
+void refine_edges(RemeshSession<Dim>& session);
+template <int Dim>
+void straighten_edges(RemeshSession<Dim>& session);
+template <int Dim>
+void collapse_edges(RemeshSession<Dim>& session);
+/// In 3D: edges are removed such that the energy of the new cells is least, then facets (2-3 swaps).
+void swap_edges(RemeshSession<2>& session);
+void swap_edges(RemeshSession<3>& session);
+template <int Dim>
+void smooth_vertices(RemeshSession<Dim>& session);
+/// The baseline: splits and collapses by a sizing field instead of energies.
+template <int Dim>
+void follow_sizing_field(RemeshSession<Dim>& session);
+
+}  // namespace itr

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#include "session_memory.hpp"
+
+#include <algorithm>
+
+namespace itr {
+
+template <int Dim>
+SessionMemory<Dim>::SessionMemory(const RemeshMemory& memory, Screening screening, const ChangeLog<Dim>& log)
+    : log_(log), remembers_(screening == Screening::bounds) {
+  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
+    refused_[kind].reserve(2 * memory.refusals[kind].size());
+    for (const auto& [edge, range] : memory.refusals[kind]) refused_[kind][edge] = range;
+  }
+}
+
+template <int Dim>
+void SessionMemory<Dim>::follow(const Mesh<Dim>& mesh, const Change<Dim>& change) {
+  for (const EdgeKey& edge : edges_of<Dim>(mesh, change.cells))
+    for (auto& map : refused_) map.erase(edge);
+}
+
+template <int Dim>
+RemeshMemory SessionMemory<Dim>::remembered(const RemeshQueries<Dim>& ask) const {
+  RemeshMemory memory;
+  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
+    auto& list = memory.refusals[kind];
+    for (const auto& [edge, range] : refused_[kind])
+      if (ask.exists(edge)) list.push_back({edge, range});
+    std::sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.edge < y.edge; });
+  }
+  return memory;
+}
+
+template class SessionMemory<2>;
+template class SessionMemory<3>;
+
+}  // namespace itr
