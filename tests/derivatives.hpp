@@ -50,10 +50,6 @@ inline void expect_psd(const Energy& energy, const VectorX& x) {
   const MatrixX projected = hessian_of(energy, x, PsdProjection::clamp);
   const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(projected);
   EXPECT_GE(eigen.eigenvalues()[0], -1e-10 * projected.norm()) << energy.name();
-  // Turning a negative eigenvalue adds twice as much to the true Hessian as leaving it out.
-  const MatrixX exact = hessian_of(energy, x, PsdProjection::none),
-                absolute = hessian_of(energy, x, PsdProjection::absolute);
-  EXPECT_LE((absolute - exact - 2 * (projected - exact)).norm(), 1e-10 * projected.norm()) << energy.name();
 }
 
 }  // namespace itr

@@ -338,10 +338,6 @@ TEST(Direction, IsProjectedForSomeIterationsWhereTheTrueHessianIsIndefinite) {
   for (int i = 0; i < 4; ++i) ASSERT_TRUE(parts.direction->find());
   EXPECT_EQ(parts.system.projections, (std::vector{none, clamp, clamp, clamp, none, clamp}));
   EXPECT_EQ(parts.direction->indefinite(), 2);
-  options.absolute_eigenvalues = true;
-  Parts other(energy, Vec<2>(0.1, 0.1), options);
-  ASSERT_TRUE(other.direction->find());
-  EXPECT_EQ(other.system.projections.back(), absolute);
 }
 
 TEST(Direction, IsShiftedWhereItIsNotProjected) {

@@ -70,20 +70,20 @@ std::string options_of(const Scene& scene) {
   text += fmt::format("{} {} {} {} {} {} {} {} {}|", c.enabled, c.activation_distance, c.convergent, c.barrier_stiffness,
                       c.adaptive_stiffness, c.friction_coefficient, c.friction_velocity, c.friction_iterations,
                       c.friction_tolerance);
-  text += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}|", n.max_iterations, static_cast<int>(n.norm),
+  text += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {}|", n.max_iterations, static_cast<int>(n.norm),
                       n.step_tolerance, n.gradient_tolerance, n.first_gradient_tolerance, n.relative_step_tolerance,
                       n.relative_gradient_tolerance, n.decrement_tolerance, n.energy_tolerance, n.energy_steps,
-                      static_cast<int>(n.line_search), n.project_to_psd, n.absolute_eigenvalues, n.projected_iterations,
-                      n.extend_steps, static_cast<int>(n.indefinite));
-  text += fmt::format("{} {} {} {} {} {}|{} {} {} {} {}|{} {} {} {} {} {}|{} {} {}|{} {} {}|{} {} {}|", r.enabled,
-                      r.sizing_field.enabled, static_cast<int>(r.screening), static_cast<int>(r.history), r.sweeps,
-                      r.relative_tolerance, r.split.enabled, r.split.acceptance_tolerance.value_or(1e99),
-                      r.split.culling_threshold, r.split.max_depth, r.split.min_edge_length.value_or(1e99),
-                      r.collapse.enabled, r.collapse.acceptance_tolerance.value_or(1e99), r.collapse.culling_threshold,
-                      r.collapse.max_depth, r.collapse.rel_max_edge_length, r.collapse.abs_max_edge_length, r.swap.enabled,
-                      r.swap.acceptance_tolerance.value_or(1e99), r.swap.max_depth, r.smooth.enabled,
-                      r.smooth.acceptance_tolerance.value_or(1e99), r.smooth.max_iterations, r.local.rings,
-                      r.local.relative_volume, r.local.max_iterations);
+                      static_cast<int>(n.line_search), n.project_to_psd, n.projected_iterations, n.extend_steps,
+                      static_cast<int>(n.indefinite));
+  text +=
+      fmt::format("{} {} {} {} {}|{} {} {} {} {}|{} {} {} {} {} {}|{} {} {}|{} {} {}|{} {} {}|", r.enabled,
+                  r.sizing_field.enabled, static_cast<int>(r.screening), static_cast<int>(r.history), r.relative_tolerance,
+                  r.split.enabled, r.split.acceptance_tolerance.value_or(1e99), r.split.culling_threshold, r.split.max_depth,
+                  r.split.min_edge_length.value_or(1e99), r.collapse.enabled, r.collapse.acceptance_tolerance.value_or(1e99),
+                  r.collapse.culling_threshold, r.collapse.max_depth, r.collapse.rel_max_edge_length,
+                  r.collapse.abs_max_edge_length, r.swap.enabled, r.swap.acceptance_tolerance.value_or(1e99),
+                  r.swap.max_depth, r.smooth.enabled, r.smooth.acceptance_tolerance.value_or(1e99), r.smooth.max_iterations,
+                  r.local.rings, r.local.relative_volume, r.local.max_iterations);
   text += fmt::format("{} {} {} {} {} {}|", s.lump_mass, s.mesh.num_vertices(), fmt::join(s.linear.solvers, ","),
                       s.linear.fallback.size(), s.linear.options.size(), s.damping.size());
   text += fmt::format(

@@ -265,8 +265,6 @@ TEST_F(SceneTest, WaysToProjectTheHessian) {
     return read2(square({{"solver", {{"nonlinear", {{"Newton", options}}}}}})).newton;
   };
   EXPECT_FALSE(newton({{"use_psd_projection", false}}).project_to_psd);
-  EXPECT_TRUE(newton({{"psd_projection", "absolute"}}).absolute_eigenvalues);
-  EXPECT_FALSE(newton({{"psd_projection", "clamp"}}).absolute_eigenvalues);
   EXPECT_EQ(newton({{"projected_iterations", 0}}).projected_iterations, 0);
   EXPECT_EQ(newton({{"force_psd_projection", true}}).projected_iterations, 0);
   EXPECT_GT(newton({{"force_psd_projection", false}}).projected_iterations, 0);
@@ -582,7 +580,7 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
        "3 is a surface of a body, which this does not move"},
       {R"({"contact": {"enabled": false}})", "/contact/enabled: not true"},
       {R"({"contact": null})", "bodies pass through the obstacles"},
-      {R"({"space": {"remesh": {"sweeps": 2}}})", "/space/remesh: without \"enabled\": true"},
+      {R"({"space": {"remesh": {"type": "sizing_field"}}})", "/space/remesh: without \"enabled\": true"},
       {R"({"space": {"remesh": {"enabled": true, "collapse": {"acceptance_tolerance": 1e-3}}}})",
        "/space/remesh/collapse/acceptance_tolerance: positive"},
       {R"({"boundary_conditions": {"rhs": [0, 9.81, 0]}})", "/boundary_conditions/rhs: [0,9.81,0] has more components"},
@@ -656,7 +654,7 @@ TEST_F(SceneTest, ValuesThatAreNotDefinedAreRefused) {
 
 TEST_F(SceneTest, RemeshOptions) {
   const RemeshOptions options = read2(square({{"space", {{"remesh", json::parse(R"({
-      "enabled": true, "type": "sizing_field", "screening": "none", "sweeps": 2, "history": "interpolated",
+      "enabled": true, "type": "sizing_field", "screening": "none", "history": "interpolated",
       "split": {"acceptance_tolerance": 0.4}, "collapse": {"rel_max_edge_length": 3}, "swap": {"enabled": true},
       "smooth": {"max_iters": 4}, "local_relaxation": {"local_mesh_n_ring": 3},
       "sizing_field": {"rel_min_edge_length": 0.02}})")}}}}))

@@ -12,8 +12,8 @@
 #include "itr/remesh/edits.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
-#include "remesh/prediction.hpp"
-#include "remesh/prospect.hpp"
+#include "remesh/decide/prediction.hpp"
+#include "remesh/decide/prospect.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

@@ -43,7 +43,7 @@ bool Direction::find() {
   if (options.project_to_psd) {
     if (!is_projected_) projected_iterations_ = options.projected_iterations - 1;
     is_projected_ = true;
-    if (find_with(projection())) return true;
+    if (find_with(PsdProjection::clamp)) return true;
   }
   double shift = kFirstShift * std::max(task_.system.diagonal_scale(), 1e-300);
   for (int attempt = 0; attempt < kMostShifts && is_curable(solved_.outcome); ++attempt, shift *= 10)
@@ -55,7 +55,7 @@ bool Direction::find_projected() {
   if (is_projected_ || !task_.options.project_to_psd) return false;
   projected_iterations_ = task_.options.projected_iterations - 1;
   is_projected_ = true;
-  return find_with(projection());
+  return find_with(PsdProjection::clamp);
 }
 
 bool Direction::tighten() {

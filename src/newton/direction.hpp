@@ -43,9 +43,6 @@ class Direction {
   ConstVectorView right_hand_side();
   void note_definiteness();
   bool fail(const std::string& reason);
-  PsdProjection projection() const {
-    return task_.options.absolute_eigenvalues ? PsdProjection::absolute : PsdProjection::clamp;
-  }
 
   const Task& task_;
   const Iterate& at_;

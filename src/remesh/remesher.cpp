@@ -36,22 +36,18 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   if (!may_refine && !(may_straighten && mesh.has_nodes()) && !may_collapse && !has_to_stir && !by_size) return {};
   RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();
-  for (int sweep = 0; sweep < options.sweeps; ++sweep) {
-    const int before = report.accepted();
-    session.culling().rank(session.ask());
-    if (by_size) {
-      follow_sizing_field(session);
-    } else {
-      if (may_refine) refine_edges(session);
-      if (may_straighten && mesh.has_nodes()) straighten_edges(session);
-      if (options.collapse.enabled) collapse_edges(session);
-    }
-    if (may_stir && (has_to_stir || report.accepted() > 0)) {
-      session.memory().mark_gains();
-      if (options.swap.enabled) swap_edges(session);
-      if (options.smooth.enabled) smooth_vertices(session);
-    }
-    if (report.accepted() == before) break;
+  session.culling().rank(session.ask());
+  if (by_size) {
+    follow_sizing_field(session);
+  } else {
+    if (may_refine) refine_edges(session);
+    if (may_straighten && mesh.has_nodes()) straighten_edges(session);
+    if (options.collapse.enabled) collapse_edges(session);
+  }
+  if (may_stir && (has_to_stir || report.accepted() > 0)) {
+    session.memory().mark_gains();
+    if (options.swap.enabled) swap_edges(session);
+    if (options.smooth.enabled) smooth_vertices(session);
   }
   fields.trim(mesh.vertex_slots());
   report.trial_seconds = session.commits().median_trial_seconds();

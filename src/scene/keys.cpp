@@ -261,7 +261,6 @@ constexpr Key kKeys[] = {
     {"/solver/nonlinear/Newton/use_psd_projection", read, "boolean", "true", "",
      "make Hessians definite where the sum is not"},
     {"/solver/nonlinear/Newton/force_psd_projection", read, "boolean", "false", "", "in every iteration"},
-    {"/solver/nonlinear/Newton/psd_projection", read, "clamp|absolute", "\"clamp\"", "", "what negative eigenvalues become"},
     {"/solver/nonlinear/Newton/projected_iterations", read, "natural", "5", "",
      "iterations with projection before the true Hessian is tried again; 0: it never is"},
     {"/solver/nonlinear/Newton/indefinite", read, "project|accept",
@@ -304,7 +303,6 @@ constexpr Key kKeys[] = {
     {"/space/remesh/screening", read, "energy-percentile|bounds|none", "\"bounds\"", "",
      "which edges are tried and what decides: those at the top by energy, by patches that relax (the paper); every edge, by "
      "what one vertex alone gains and by patches where that does not tell; every edge by patches, which takes longer"},
-    {"/space/remesh/sweeps", read, "count", "1", "", "passes a step"},
     {"/space/remesh/history", read, "function|interpolated", "\"function\"", "",
      "what an operation is charged for forgetting of the past: what the new mesh cannot represent, or nothing (the paper)"},
     {"/space/remesh/relative_tolerance", read, "positive", "1e-4", "",

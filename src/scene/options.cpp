@@ -264,7 +264,6 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
       {"Backtracking", "Armijo", "RobustArmijo"}, static_cast<int>(options.line_search)));
   const Node newton = nonlinear["Newton"];
   options.project_to_psd = newton["use_psd_projection"].boolean(true);
-  options.absolute_eigenvalues = newton["psd_projection"].choice({"clamp", "absolute"}, 0) == 1;
   // PolyFEM leaves a fallback strategy after one step more than that.
   options.projected_iterations =
       1 + nonlinear["iterations_per_strategy"].integer_at_least(1, options.projected_iterations - 1);
@@ -311,7 +310,6 @@ RemeshOptions read_remesh(const Node& root) {
   options.screening = static_cast<Screening>(
       node["screening"].choice({"energy-percentile", "bounds", "none"}, static_cast<int>(options.screening)));
   options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));
-  options.sweeps = node["sweeps"].integer_at_least(1, 1);
   options.relative_tolerance = node["relative_tolerance"].positive(options.relative_tolerance);
 
   const Node split = node["split"], collapse = node["collapse"], swap = node["swap"], smooth = node["smooth"];

@@ -87,7 +87,6 @@ void check_remeshing(const RemeshOptions& remesh) {
   require_at_least("/space/remesh/smooth/max_iters", remesh.smooth.max_iterations, 1);
   require_at_least("/space/remesh/local_relaxation/local_mesh_n_ring", remesh.local.rings, 0);
   require_at_least("/space/remesh/local_relaxation/max_nl_iterations", remesh.local.max_iterations, 1);
-  require_at_least("/space/remesh/sweeps", remesh.sweeps, 1);
   require_not_negative("/space/remesh/sizing_field/rel_min_edge_length", remesh.sizing_field.rel_min_edge_length);
 }
 

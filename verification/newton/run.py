@@ -33,8 +33,6 @@ VARIANTS = [
     ("always clamped", ["projected_iterations=0"]),
     ("always clamped, without extended steps", ["projected_iterations=0", "extend_steps=false"]),
     ("true Hessian first, 1 clamped after a failure", ["projected_iterations=1"]),
-    ("true Hessian first, 5 of absolute eigenvalues", ['psd_projection="absolute"']),
-    ("always absolute eigenvalues", ["projected_iterations=0", 'psd_projection="absolute"']),
     ("never projected, shifted by multiples of I", ["use_psd_projection=false"]),
 ]
 

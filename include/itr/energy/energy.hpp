@@ -14,12 +14,10 @@
 
 namespace itr {
 
-/// What becomes of the negative eigenvalues of a stencil's Hessian: they stay, become 0, or change their sign (Chen et al.
-/// 2024, "Stabler Neo-Hookean Simulation").
-enum class PsdProjection { none, clamp, absolute };
+/// What becomes of the negative eigenvalues of a stencil's Hessian: they stay or become 0.
+enum class PsdProjection { none, clamp };
 inline double projected(double eigenvalue, PsdProjection psd) {
-  if (eigenvalue >= 0 || psd == PsdProjection::none) return eigenvalue;
-  return psd == PsdProjection::clamp ? 0 : -eigenvalue;
+  return eigenvalue >= 0 || psd == PsdProjection::none ? eigenvalue : 0;
 }
 
 /// Scratch of one solve, owned by the caller: terms keep no mutable caches, so solves never meet. What is in it never

@@ -48,10 +48,9 @@ struct NewtonOptions {
   int energy_steps = 100;
   LineSearch line_search = LineSearch::robust_armijo;
   IndefiniteHessian indefinite = IndefiniteHessian::project;
-  bool project_to_psd = true;         ///< project stencils' Hessians to semi-definite ones where the sum is not definite
-  bool absolute_eigenvalues = false;  ///< by changing the sign of negative eigenvalues instead of clamping them
-  int projected_iterations = 5;       ///< iterations with it before the true Hessian is tried again; 0: it never is
-  bool extend_steps = true;           ///< go on along a step over which the energy fell in a straight line
+  bool project_to_psd = true;    ///< project stencils' Hessians to semi-definite ones where the sum is not definite
+  int projected_iterations = 5;  ///< iterations with it before the true Hessian is tried again; 0: it never is
+  bool extend_steps = true;      ///< go on along a step over which the energy fell in a straight line
   /// If it becomes true, the solve ends before its next iteration without convergence and the step is dropped. Another
   /// thread or a signal handler may set it. It must outlive the solves. Null: solves cannot be cancelled.
   const std::atomic<bool>* cancel = nullptr;

@@ -88,7 +88,6 @@ struct RemeshOptions {
   double relative_tolerance = 1e-4;  ///< share of the scene's energy that choose_defaults takes as tolerance of splits
   Screening screening = Screening::bounds;
   HistoryRule history = HistoryRule::function;
-  int sweeps = 1;
 };
 
 }  // namespace itr

@@ -9,8 +9,6 @@ namespace itr {
 
 namespace {
 
-constexpr double kTinyEdge = 1e-3;  ///< in shortest initial edges
-
 /// Elastic energy times the scaling, a cell.
 template <int Dim>
 std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
@@ -92,7 +90,6 @@ template <int Dim>
 void Culling<Dim>::rank(const RemeshQueries<Dim>& ask) {
   is_on_ = ask.options().screening == Screening::energy_percentile;
   if (!is_on_) return;
-  tiny_ = kTinyEdge * ask.context().shortest_edge;
   const Mesh<Dim>& mesh = ask.mesh();
   const auto edges = mesh.edges();
   const auto of_cells = cell_energies(mesh, ask.fields(), ask.context());

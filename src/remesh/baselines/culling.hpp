@@ -16,9 +16,7 @@ class Culling {
   /// no edge with another screening than `energy_percentile`.
   void rank(const RemeshQueries<Dim>& ask);
   bool may_split(const EdgeKey& edge) const { return !is_on_ || rank_of(edge) == Rank::top; }
-  bool may_collapse(const EdgeKey& edge, double rest_length) const {
-    return !is_on_ || rank_of(edge) == Rank::bottom || rest_length < tiny_;
-  }
+  bool may_collapse(const EdgeKey& edge) const { return !is_on_ || rank_of(edge) == Rank::bottom; }
   /// A part of a split edge gets its rank.
   void inherit(const EdgeKey& split, const EdgeKey& part) {
     if (is_on_) ranks_[part] = rank_of(split);
@@ -32,7 +30,6 @@ class Culling {
     return it == ranks_.end() ? Rank::middle : it->second;
   }
   bool is_on_ = false;
-  double tiny_ = 0;  ///< shorter edges may collapse whatever their rank [m]
   std::unordered_map<EdgeKey, Rank, EdgeKeyHash> ranks_;
 };
 

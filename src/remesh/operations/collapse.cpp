@@ -21,8 +21,7 @@ class Collapser {
 
   /// Shortest first.
   std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
-    if (!session_.culling().may_collapse(edge, ask_.rest_length(edge)) || ask_.refuse_collapse(edge) != Refusal::none)
-      return std::nullopt;
+    if (!session_.culling().may_collapse(edge) || ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
     return EdgeQueue::Entry{.edge = edge, .priority = -ask_.rest_length(edge)};
   }
 
