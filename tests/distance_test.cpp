@@ -48,8 +48,7 @@ class DistanceTest : public testing::Test {
     asked.kinetic_energy = {2.5};
     asked.momentum.assign(Dim, 0.5 * step);
     const fs::path path = folder / "frames" / (std::to_string(step) + ".h5");
-    write_frame<Dim>(path, {mesh, x, v, density, obstacles, edges, triangles, &asked, {}, &space}, step, 0.1 * step,
-                     Units());
+    write_frame<Dim>(path, {mesh, x, v, density, obstacles, edges, triangles, &asked, {}, &space}, step, 0.1 * step);
     return path;
   }
 

@@ -209,8 +209,8 @@ std::string saved_state(Setup<Dim> setup, const fs::path& folder) {
   const fs::path path = folder / "original.h5";
   const std::vector<double> totals(60);
   simulation.observe([&](const FrameView<Dim>& frame) {
-    output::write_frame(path, frame, 2, simulation.state().t, Units(), {}, [&](hdf5::File& file) {
-      output::write_checkpoint(file, simulation.state(), {"{}", "eigen", totals, 0}, Units());
+    output::write_frame(path, frame, 2, simulation.state().t, {}, [&](hdf5::File& file) {
+      output::write_checkpoint(file, simulation.state(), {"{}", "eigen", totals, 0});
     });
   });
   return bytes_of(path);

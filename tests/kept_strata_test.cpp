@@ -130,8 +130,8 @@ class SavedStrata : public ::testing::Test {
   template <typename Damage>
   State<3> saved(const Damage& damage) {
     simulation.observe([&](const FrameView<3>& frame) {
-      output::write_frame(path, frame, 2, simulation.state().t, Units(), {}, [&](hdf5::File& file) {
-        output::write_checkpoint(file, simulation.state(), {"scene", "backend", {}, 0}, Units());
+      output::write_frame(path, frame, 2, simulation.state().t, {}, [&](hdf5::File& file) {
+        output::write_checkpoint(file, simulation.state(), {"scene", "backend", {}, 0});
         damage(file);
       });
     });

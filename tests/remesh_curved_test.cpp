@@ -256,8 +256,7 @@ TYPED_TEST(Curved, PatchesSeeWhatTheWholeMeshSees) {
       Verdict<Dim> verdict;
       {
         View<Dim> view(scene, context);
-        preview<Dim>(view.state, view.gate, edit, scene.mesh.rest(edge[0]), scene.mesh.total_volume(),
-                     {.required = -1e9, .local = {.rings = 1 + i % 3}}, view.scratch, verdict);
+        preview<Dim>(view.state, view.gate, edit, {.required = -1e9, .local = {.rings = 1 + i % 3}}, view.scratch, verdict);
         ASSERT_NE(verdict.refusal, Refusal::invalid) << "seed " << seed;
         LocalProblem<Dim> at_start(view.state, verdict.patch, edit, false, view.scratch),
             after(view.state, verdict.patch, edit, true, view.scratch);
