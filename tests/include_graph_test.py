@@ -42,7 +42,7 @@ OPTIONS = {
     "time/options.hpp",
 }
 EXTRA = {"scene": OPTIONS | {"simulation/setup.hpp", "simulation/unsupported.hpp"}, "embed": {"itr.h"}}
-SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp"}
+SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp", "core/units.hpp"}
 
 # Third-party header -> the modules that may know it.
 WALLS = {
