@@ -45,7 +45,7 @@ struct Target {
     if (units.is_si())
       file.write(name, values, columns);
     else
-      file.write(name, from_si(values, units, unit), columns);
+      file.write(name, in_units(values, units, unit), columns);
     if (is_new) file.write_attribute(name, "unit", units.name(unit));
   }
 };

@@ -5,7 +5,7 @@
 
 namespace itr::output {
 
-std::vector<double> from_si(std::span<const double> values, const Units& units, const char* unit) {
+std::vector<double> in_units(std::span<const double> values, const Units& units, const char* unit) {
   const double factor = units.factor(unit);
   std::vector<double> result(values.begin(), values.end());
   for (double& value : result) value /= factor;

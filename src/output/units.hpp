@@ -10,7 +10,7 @@
 
 namespace itr::output {
 
-std::vector<double> from_si(std::span<const double> values, const Units& units, const char* unit);
+std::vector<double> in_units(std::span<const double> values, const Units& units, const char* unit);
 std::vector<ForceCurvePoint> in_units(std::vector<ForceCurvePoint> curves, const Units& units);
 StepReport in_units(StepReport report, const Units& units);
 /// `lp` is that of the exponent 8.

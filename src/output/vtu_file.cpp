@@ -106,7 +106,7 @@ void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& fra
   };
   vectors("u", displacement(frame), length);
   vectors("v", frame.v, units.factor("m/s"));
-  const auto pressures = [&](const std::vector<double>& values) { return from_si(values, units, "Pa"); };
+  const auto pressures = [&](const std::vector<double>& values) { return in_units(values, units, "Pa"); };
   std::vector<std::int64_t> body;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) body.push_back(mesh.body(c));
   cells += array("body", "Int64", body, 1) + array("elastic_density", "Float64", pressures(frame.elastic_density), 1);

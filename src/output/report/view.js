@@ -178,7 +178,8 @@ class View {
       input.type === 'checkbox' ? input.checked = this.state[key] : input.value = this.state[key] ?? '';
     this.slider.value = this.state.frame;
     const f = this.run.frames[this.state.frame];
-    this.time.textContent = `t = ${shortNumber(f.t)} ${run.unit('s')} · step ${f.step} · ${f.vertices} vertices · ${f.cells} cells`;
+    const time = `t = ${shortNumber(f.t)} ${this.run.unit('s')}`;
+    this.time.textContent = `${time} · step ${f.step} · ${f.vertices} vertices · ${f.cells} cells`;
   }
 
   // One update after another; what was asked for meanwhile is done at once at the end.
