@@ -32,6 +32,36 @@ void add_nodes(State<Dim>& state) {
   state.space = {};
 }
 
+/// Undoes that where no operation was accepted.
+template <int Dim>
+void remove_nodes(const Space& space, State<Dim>& state) {
+  if (space.is_linear()) return;
+  const auto map = state.mesh.compact();
+  state.strata.compact(map);
+  state.remesh_memory.renumber(map.vertex);
+  state.space = space;
+}
+
+/// The space of these nodes on the mesh that has been made compact; renumbering keeps the order of edges.
+Space space_of(const std::vector<std::pair<EdgeKey, VertexId>>& nodes, const std::vector<VertexId>& number) {
+  std::vector<EdgeKey> curved;
+  for (const auto& [edge, node] : nodes) curved.push_back({number[edge[0]], number[edge[1]]});
+  return Space(std::move(curved));
+}
+
+void tell_operations(const RemeshReport& remeshed, double split_tolerance, double scaling, StepReport& report) {
+  report.split_tolerance = split_tolerance;
+  report.best_refused_split = remeshed.best_refused_gain / scaling;
+  report.splits = remeshed.splits;
+  report.curves = remeshed.curves;
+  report.straightens = remeshed.straightens;
+  report.collapses = remeshed.collapses;
+  report.swaps = remeshed.swaps;
+  report.smooths = remeshed.smooths;
+  report.trial_seconds = remeshed.trial_seconds;
+  report.bound_by_dhat = remeshed.splits.refused_by(Refusal::dhat);
+}
+
 /// Levels of quadrature from those by element with curved edges to those by cell; empty where all are 0.
 template <int Dim>
 QuadratureLevels levels_by_cell(const State<Dim>& state) {
@@ -172,23 +202,9 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
     add_nodes(state);
     remeshed = remesh(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
-  report.split_tolerance = *options.split.acceptance_tolerance;
-  report.best_refused_split = remeshed.best_refused_gain / problem.scaling();
-  report.splits = remeshed.splits;
-  report.curves = remeshed.curves;
-  report.straightens = remeshed.straightens;
-  report.collapses = remeshed.collapses;
-  report.swaps = remeshed.swaps;
-  report.smooths = remeshed.smooths;
-  report.trial_seconds = remeshed.trial_seconds;
-  report.bound_by_dhat = remeshed.splits.refused_by(Refusal::dhat);
+  tell_operations(remeshed, *options.split.acceptance_tolerance, problem.scaling(), report);
   if (!remeshed.changed()) {
-    state.space = before.space;
-    if (!state.space.is_linear()) {
-      auto map = state.mesh.compact();
-      state.strata.compact(map);
-      state.remesh_memory.renumber(map.vertex);
-    }
+    remove_nodes(before.space, state);
     return std::nullopt;
   }
 
@@ -203,9 +219,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   state.remesh_memory.renumber(renumbering.vertex);
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
-  std::vector<EdgeKey> curved;  // renumbering keeps their order
-  for (const auto& [edge, node] : nodes) curved.push_back({renumbering.vertex[edge[0]], renumbering.vertex[edge[1]]});
-  state.space = Space(std::move(curved));
+  state.space = space_of(nodes, renumbering.vertex);
   state.quadrature = levels_by_element(fields.levels, renumbering.cell, state);
   const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
