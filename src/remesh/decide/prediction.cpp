@@ -16,6 +16,7 @@
 #include "itr/fem/mass.hpp"
 #include "itr/geometry/measures.hpp"
 #include "itr/remesh/edits.hpp"
+#include "remesh/curved_cell.hpp"
 
 namespace itr {
 
@@ -121,6 +122,39 @@ class QuadraticModel {
     }
     if (context_.loads.acceleration)
       gradient_ -= context_.scaling * 4 * kSecond * mass * context_.loads.acceleration((at.rest[a] + at.rest[b]) / 2);
+  }
+  /// The same where other edges of the cell are curved, by the rules of quadrature that energy and mass have.
+  void add_mixed_cell(const RemeshState<Dim>& state, CellId c, const EdgeKey& edge) {
+    const Mesh<Dim>& mesh = state.mesh;
+    const auto cell = curved_cell<Dim>(mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
+    const Material& material = context_.materials.at(mesh.body(c));
+    const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
+    const ElasticModuli moduli = elastic_moduli<Dim>(material, mesh.rest(mesh.cell(c)[0]));
+    const auto place = [&](VertexId v) { return std::find(cell.nodes.begin(), cell.nodes.end(), v) - cell.nodes.begin(); };
+    const auto a = place(edge[0]), b = place(edge[1]);
+    const double sV = context_.scaling * mesh.volume(c), mass = material.density * mesh.volume(c);
+    const auto x = at_nodes<Dim>(cell.nodes, state.fields.x);
+    for (const auto& point : quadrature<Dim>(context_.quadrature_degree)) {
+      const auto& l = point.weights;
+      const Mat<Dim> F = x * quadratic_gradients<Dim, Dim>(cell.edges, l, linear).transpose();
+      const ElasticPoint<Dim> response(F, moduli);
+      const Vec<Dim> bubble = 4 * (l[a] * linear.col(b) + l[b] * linear.col(a));
+      gradient_ += sV * point.share * response.gradient(bubble);
+      hessian_ += sV * point.share * response.hessian(bubble);
+    }
+    const auto way = [&]() -> QuadraticCell<Dim> {
+      if (!context_.has_inertia) return QuadraticCell<Dim>::Zero();
+      return x - at_nodes<Dim>(cell.nodes, state.fields.predictor);
+    }();
+    for (const auto& point : quadrature<Dim>(kMassDegree)) {
+      const double bubble = 4 * point.weights[a] * point.weights[b], weight = point.share * mass * bubble;
+      if (context_.has_inertia) {
+        gradient_ += weight * way * quadratic_shapes<Dim>(cell.edges, point.weights);
+        hessian_.diagonal().array() += weight * bubble;
+      }
+      if (context_.loads.acceleration)
+        gradient_ -= context_.scaling * weight * context_.loads.acceleration((mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2);
+    }
   }
   /// The same of a facet at the edge.
   void add_curved_facet(const std::array<Vec<Dim>, Dim>& rest, const Vec<Dim>& middle, int tag) {
@@ -389,12 +423,14 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const Mesh<Dim>& mesh = state.mesh;
   if (!is_predictable(context)) return kUnknown;
   const auto around = mesh.cells_of_edge(edge);
-  const auto is_hard = [&](CellId c) {
-    return mesh.is_curved(c) || context.materials.at(mesh.body(c)).has_varying_moduli();
-  };
+  const auto is_hard = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
   if (context.mass == MassKind::lumped || std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
   QuadraticModel<Dim> model(context);
   for (const CellId c : around) {
+    if (mesh.is_curved(c)) {
+      model.add_mixed_cell(state, c, edge);
+      continue;
+    }
     const auto& cell = mesh.cell(c);
     const auto place = [&](VertexId v) { return static_cast<int>(std::find(cell.begin(), cell.end(), v) - cell.begin()); };
     model.add_curved_cell(mesh, c, corners_of(state, cell), place(edge[0]), place(edge[1]));
