@@ -8,42 +8,11 @@
 #include <optional>
 #include <vector>
 
+#include "double_well.hpp"
 #include "newton/saddle.hpp"
 
 namespace itr {
 namespace {
-
-/// The sum over the dofs of x^4 / 4 - c x^2 / 2, with walls: no step goes beyond |x| = wall.
-class Wells final : public Energy {
- public:
-  explicit Wells(double c, double wall = 1e9) : c_(c), wall_(wall) {}
-  std::string_view name() const override { return "wells"; }
-  double value(ConstVectorView x, Workspace&) const override {
-    return (x.array().pow(4) / 4 - c_ * x.array().square() / 2).sum();
-  }
-  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
-    gradient.array() += x.array().cube() - c_ * x.array();
-  }
-  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override {
-    for (int v = 0; v < x.size() / 2; ++v) {
-      Mat<2> block = Mat<2>::Zero();
-      for (int k = 0; k < 2; ++k) {
-        const double second = 3 * x[2 * v + k] * x[2 * v + k] - c_;
-        block(k, k) = psd == PsdProjection::none ? second : std::max(second, 1.0);
-      }
-      sink.add<2>(std::array{v}, block.data());
-    }
-  }
-  double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override {
-    double share = 1;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (std::abs(x[i] + dx[i]) > wall_) share = std::min(share, 0.9 * (wall_ - std::abs(x[i])) / std::abs(dx[i]));
-    return share;
-  }
-
- private:
-  double c_, wall_;
-};
 
 /// Solves exactly, and remembers what was asked. Where the caller is content with less, it says that it has no more.
 class Recording final : public NewtonSystem {
@@ -117,7 +86,7 @@ struct Parts {
 };
 
 TEST(Iterate, KnowsWhereItIs) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(2, 3));
   EXPECT_EQ(parts.at->value(), 4 - 2 + 81 / 4.0 - 4.5);
   EXPECT_EQ(parts.at->gradient(), VectorX(Vec<2>(6, 24)));
@@ -131,7 +100,7 @@ TEST(Iterate, KnowsWhereItIs) {
 }
 
 TEST(Iterate, SaysWhatIsBelowItsResolution) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(2, 3));
   Step& step = parts.direction->step();
   const auto is_unresolved = [&](double length) {
@@ -147,7 +116,7 @@ TEST(Iterate, SaysWhatIsBelowItsResolution) {
 }
 
 TEST(HeldMotion, TakesTurnsWithTheBodies) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1, 1), {}, {0, 1}, Vec<2>(7, 2));
   HeldMotion& motion = *parts.motion;
   EXPECT_TRUE(motion.is_advancing());
@@ -168,7 +137,7 @@ TEST(HeldMotion, TakesTurnsWithTheBodies) {
 }
 
 TEST(HeldMotion, GivesUpWhereItIsBlocked) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1, 1), {}, {0, 1}, Vec<2>(1, 2));
   HeldMotion& motion = *parts.motion;
   for (int i = 0; i < 50; ++i) EXPECT_TRUE(motion.takes_turns(true));
@@ -188,14 +157,14 @@ TEST(HeldMotion, GivesUpWhereItIsBlocked) {
 }
 
 TEST(HeldMotion, PutsDofsAtTheirTargetsWithinTheTolerance) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.step_tolerance = 1e-3;
   Parts parts(energy, Vec<2>(1, 1), options, {0, 1}, Vec<2>(1, 1 + 1e-4));
   EXPECT_TRUE(parts.motion->is_done());
   EXPECT_EQ(parts.x[1], 1 + 1e-4);
   EXPECT_EQ(parts.at->value(), energy.value(parts.x, parts.workspace));
-  const Wells walled(1, 1 + 1e-5);
+  const DoubleWell walled(1, 0, 1 + 1e-5);
   Parts blocked(walled, Vec<2>(1, 1), options, {0, 1}, Vec<2>(1, 1 + 1e-4));
   EXPECT_TRUE(blocked.motion->is_advancing());
   EXPECT_EQ(blocked.x[1], 1);
@@ -203,7 +172,7 @@ TEST(HeldMotion, PutsDofsAtTheirTargetsWithinTheTolerance) {
 
 /// The merit falls along the way to the target even where the energy rises.
 TEST(HeldMotion, RaisesItsPenalty) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1, 1), {}, {0, 1}, Vec<2>(1, 2));
   ASSERT_TRUE(parts.direction->find());
   const double slope = 5;
@@ -217,7 +186,7 @@ TEST(HeldMotion, RaisesItsPenalty) {
 }
 
 TEST(Convergence, HasATighterGradientAtTheStart) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.gradient_tolerance = 1e-2;
   options.first_gradient_tolerance = 1e-4;
@@ -236,7 +205,7 @@ TEST(Convergence, HasATighterGradientAtTheStart) {
 }
 
 TEST(Convergence, WaitsForHeldDofs) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.gradient_tolerance = options.first_gradient_tolerance = options.decrement_tolerance = 1e9;
   Parts moving(energy, Vec<2>(2, 1), options, {0, 1}, Vec<2>(2, 2)), still(energy, Vec<2>(2, 1), options);
@@ -249,7 +218,7 @@ TEST(Convergence, WaitsForHeldDofs) {
 
 /// The gradient times `shrinks` in each step: how many steps below round-off are taken until the solve ends, up to 100.
 int count_unresolved(double shrinks) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.gradient_tolerance = options.first_gradient_tolerance = 0;
   Parts parts(energy, Vec<2>(1 + 1e-9, 1), options);
@@ -273,7 +242,7 @@ TEST(Convergence, EndsWhereStepsBelowRoundOffDoNotShrinkTheGradient) {
 }
 
 TEST(Convergence, CountsStepsBelowRoundOffInARow) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.gradient_tolerance = options.first_gradient_tolerance = 0;
   Parts parts(energy, Vec<2>(2, 3), options);
@@ -290,7 +259,7 @@ TEST(Convergence, CountsStepsBelowRoundOffInARow) {
 }
 
 TEST(Convergence, CountsIterationsThatHardlyChangeTheEnergy) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.energy_tolerance = 0.1;
   options.energy_steps = 2;
@@ -303,7 +272,7 @@ TEST(Convergence, CountsIterationsThatHardlyChangeTheEnergy) {
 }
 
 TEST(Convergence, ForeseesTheDecrementByTheGradient) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1.01, 1));
   ASSERT_TRUE(parts.direction->find());
   parts.convergence->note_decrement(parts.direction->step());
@@ -316,7 +285,7 @@ TEST(Convergence, ForeseesTheDecrementByTheGradient) {
 }
 
 TEST(Direction, IsOfTheTrueHessianWhereThatIsDefinite) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1.1, 1));
   ASSERT_TRUE(parts.direction->find());
   EXPECT_EQ(parts.system.projections, std::vector{PsdProjection::none});
@@ -330,7 +299,7 @@ TEST(Direction, IsOfTheTrueHessianWhereThatIsDefinite) {
 }
 
 TEST(Direction, IsProjectedForSomeIterationsWhereTheTrueHessianIsIndefinite) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.projected_iterations = 3;
   Parts parts(energy, Vec<2>(0.1, 0.1), options);
@@ -341,7 +310,7 @@ TEST(Direction, IsProjectedForSomeIterationsWhereTheTrueHessianIsIndefinite) {
 }
 
 TEST(Direction, IsShiftedWhereItIsNotProjected) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   NewtonOptions options;
   options.project_to_psd = false;
   Parts parts(energy, Vec<2>(0.1, 0.1), options);
@@ -354,7 +323,7 @@ TEST(Direction, IsShiftedWhereItIsNotProjected) {
 }
 
 TEST(Direction, AsksForAsManyDigitsAsItCanUse) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(3, 3));
   Direction& direction = *parts.direction;
   ASSERT_TRUE(direction.find());
@@ -378,7 +347,7 @@ TEST(Direction, AsksForAsManyDigitsAsItCanUse) {
 }
 
 TEST(Direction, RemembersWhatTheHessianIsWhileTheIterateStays) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(0.1, 0.1));
   ASSERT_TRUE(parts.direction->find());
   const int before = parts.system.factorizations;
@@ -390,7 +359,7 @@ TEST(Direction, RemembersWhatTheHessianIsWhileTheIterateStays) {
 }
 
 TEST(Search, StopsBeforeWhatIsInTheWay) {
-  const Wells energy(4, 1.5);
+  const DoubleWell energy(4, 0, 1.5);
   Parts parts(energy, Vec<2>(1.4, 1.4));
   ASSERT_TRUE(parts.direction->find());
   const double before = parts.at->value();
@@ -407,7 +376,7 @@ TEST(Search, StopsBeforeWhatIsInTheWay) {
 }
 
 TEST(Search, StaysWhereNothingLowersTheEnergy) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   for (const LineSearch rule : {LineSearch::backtracking, LineSearch::armijo, LineSearch::robust_armijo}) {
     NewtonOptions options;
     options.line_search = rule;
@@ -422,7 +391,7 @@ TEST(Search, StaysWhereNothingLowersTheEnergy) {
 }
 
 TEST(Search, GoesOnWhereTheEnergyFallsInAStraightLine) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   for (const bool extends : {false, true}) {
     NewtonOptions options;
     options.extend_steps = extends;
@@ -434,7 +403,7 @@ TEST(Search, GoesOnWhereTheEnergyFallsInAStraightLine) {
 }
 
 TEST(Search, PutsHeldDofsExactlyAtTheirTargets) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1, 0.1), {}, {0, 1}, Vec<2>(1, 0.7));
   ASSERT_TRUE(parts.direction->find());
   ASSERT_TRUE(parts.search->along(parts.direction->step()));
@@ -442,7 +411,7 @@ TEST(Search, PutsHeldDofsExactlyAtTheirTargets) {
 }
 
 TEST(Saddle, IsLeftDownwards) {
-  const Wells energy(1);
+  const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(0, 1));
   ASSERT_TRUE(parts.direction->find());
   EXPECT_TRUE(parts.saddle->is_here());

@@ -9,38 +9,12 @@
 #include <atomic>
 #include <cmath>
 
+#include "double_well.hpp"
 #include "itr/energy/contact/contact.hpp"
 #include "itr/linear/choice.hpp"
 
 namespace itr {
 namespace {
-
-/// A constant and the sum over the dofs of x^4 / 4 - c x^2 / 2: a saddle at 0, minima at +-sqrt(c). Its "projected" Hessian
-/// is much stiffer than the true one near the saddle, as the sum of projected element Hessians is near a buckling load.
-class DoubleWell final : public Energy {
- public:
-  explicit DoubleWell(double c, double constant = 0) : c_(c), constant_(constant) {}
-  std::string_view name() const override { return "double well"; }
-  double value(ConstVectorView x, Workspace&) const override {
-    return constant_ + (x.array().pow(4) / 4 - c_ * x.array().square() / 2).sum();
-  }
-  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
-    gradient.array() += x.array().cube() - c_ * x.array();
-  }
-  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override {
-    for (int v = 0; v < x.size() / 2; ++v) {
-      Mat<2> block = Mat<2>::Zero();
-      for (int k = 0; k < 2; ++k) {
-        const double second = 3 * x[2 * v + k] * x[2 * v + k] - c_;
-        block(k, k) = psd == PsdProjection::clamp ? std::max(second, 1.0) : second;
-      }
-      sink.add<2>(std::array{v}, block.data());
-    }
-  }
-
- private:
-  double c_, constant_;
-};
 
 /// Until a step is below this, whatever the gradient.
 NewtonOptions until_steps_below(double tolerance) {

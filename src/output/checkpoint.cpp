@@ -98,7 +98,8 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
   return mesh;
 }
 
-constexpr const char* kOperations[RemeshMemory::kKinds] = {"split", "collapse", "swap", "smooth", "reshape", "curve", "straighten"};
+constexpr const char* kOperations[RemeshMemory::kKinds] = {"split",   "collapse", "swap",      "smooth",
+                                                           "reshape", "curve",    "straighten"};
 constexpr int kRefusalColumns = 5;  ///< two vertices, least and most signal, whether in contact
 
 std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }
@@ -108,8 +109,7 @@ void write_memory(hdf5::File& file, const RemeshMemory& memory) {
     std::vector<double> rows;
     rows.reserve(kRefusalColumns * memory.refusals[kind].size());
     for (const auto& [edge, range] : memory.refusals[kind])
-      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), range.least, range.most,
-                               range.in_contact ? 1.0 : 0.0});
+      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), range.least, range.most, range.in_contact ? 1.0 : 0.0});
     if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
   }
 }
