@@ -17,12 +17,11 @@ cmake --build --preset release -- -j "${ITR_JOBS:-2}"
 ctest --test-dir build/release --output-on-failure --no-tests=error -LE long -j "${ITR_JOBS:-2}"
 
 # A ball that hits a wall, with remeshing and friction: each edit and each step is checked.
-cmake --preset audit -D ITR_BUILD_TESTS=OFF
-cmake --build --preset audit --target itr -- -j "${ITR_JOBS:-2}"
-audited=build/audit/runs/ball_wall
-build/audit/bin/itr run examples/ball_wall.json -o "$audited" --overwrite --set /time/tend=0.0008 \
+cmake --build --preset release --target itr_audited -- -j "${ITR_JOBS:-2}"
+audited=build/release/runs/ball_wall
+build/release/bin/itr_audited run examples/ball_wall.json -o "$audited" --overwrite --set /time/tend=0.0008 \
   --set '/initial_conditions/velocity/0/value=[67, -20]' --set '/geometry/0/transformation/translation=[0.0629, 0]' \
   --set /contact/friction_coefficient=0.3 --set /space/remesh/split/acceptance_tolerance=1
-build/audit/bin/itr certify "$audited"
+build/release/bin/itr_audited certify "$audited"
 
 python3 verification/run.py --quick
