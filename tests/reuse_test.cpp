@@ -89,7 +89,9 @@ TEST_P(Engines, AFactorSolvesWhatIsLikeIt) {
     const double achieved = residual(block().pattern, values, x, b);
     EXPECT_LE(achieved, kAsked);
     EXPECT_NEAR(report.residual, achieved, 1e-3 * kAsked);
-    if (solver.capabilities().tells_definiteness) EXPECT_EQ(report.definiteness, Definiteness::positive);
+    if (solver.capabilities().tells_definiteness) {
+      EXPECT_EQ(report.definiteness, Definiteness::positive);
+    }
   }
   EXPECT_EQ(solver.counts().factorizations, 1);
   EXPECT_EQ(solver.counts().reused, 2);
@@ -157,7 +159,9 @@ TEST_P(Engines, IndefinitenessIsSeenInEveryDirection) {
   ASSERT_EQ(solver.solve_system(system.values, b, {kAsked}, x).outcome, Outcome::ok);
   system.values.back() = -1e-3;
   const SystemReport loose = solver.solve_system(system.values, b, {.residual = kAsked, .loose = 1e-2}, x);
-  if (loose.outcome != Outcome::ok) EXPECT_EQ(loose.outcome, Outcome::not_positive_definite);
+  if (loose.outcome != Outcome::ok) {
+    EXPECT_EQ(loose.outcome, Outcome::not_positive_definite);
+  }
   // A loose solve before does not hide it.
   const SystemReport report = solver.solve_system(system.values, b, {.residual = kAsked, .goes_on = true}, x);
   if (solver.capabilities().tells_definiteness || !solver.capabilities().indefinite) {
