@@ -71,6 +71,7 @@ TEST(ChangeLog, KnowsEveryVertexAndPartOfTheSurfaceThatACommitChanged) {
       const Box<2>& box = log.surfaces(since)[0];
       for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
         const bool was = f < before.facet_slots() && before.is_facet_alive(f), is = mesh.is_facet_alive(f);
+        if (!was && !is) continue;
         const auto& facet = was ? before.facet(f) : mesh.facet(f);
         if (was == is && !is_changed[facet[0]] && !is_changed[facet[1]]) continue;
         for (const VertexId v : facet) {

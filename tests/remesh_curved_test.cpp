@@ -204,6 +204,7 @@ StepContext<Dim> context_of(unsigned seed) {
   context.loads.acceleration = [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(Dim - 1) * -0.2); };
   context.loads.tractions.emplace_back(1, [](const Vec<Dim>&) { return Vec<Dim>(Vec<Dim>::Unit(0) * 0.03); });
   context.held_components[Dim == 2 ? 2 : 0].fill(true);
+  context.obstacles.past_x.resize(1);  // of the one past position
   return context;
 }
 
