@@ -2,10 +2,13 @@
 // Forces, stresses, kinetic energy and momentum that observers ask for, against closed forms.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 
-#include "block.hpp"
+#include "host_block.hpp"
+#include "itr/core/error.hpp"
+#include "itr/simulation/resultant.hpp"
 
 namespace itr {
 namespace {
@@ -186,6 +189,54 @@ TEST(Fields, ThatNobodyAsksForAreNotThere) {
   const AskedFields fields = after_one_step(setup);
   EXPECT_EQ(fields.forces.contact.size() + fields.forces.friction.size() + fields.forces.reaction.size(), 0);
   EXPECT_TRUE(fields.von_mises.empty() && fields.stress.empty() && fields.kinetic_energy.empty() && fields.momentum.empty());
+}
+
+template <int Dim>
+void expect_resultants() {
+  Setup<Dim> setup = sliding_block<Dim>(1);
+  setup.fields.applied_forces = true;
+  setup.newton.step_tolerance = 0;  // forces are as exact as the gradient is small
+  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 1e-14;
+  setup.neumann.push_back({2, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Constant(40)); }});
+  setup.pressure.push_back({3, [](const Vec<Dim>&, double) { return 30.0; }});
+  setup.dirichlet.push_back({1, {true}, [](const Vec<Dim>&, double t) { return Vec<Dim>(2 * t * Vec<Dim>::Unit(0)); }});
+  auto simulation = simulate(setup);
+  Vec<Dim> before = Vec<Dim>::Zero();
+  for (int i = 0; i < 4; ++i) {
+    if (i > 0) before = Vec<Dim>(asked(simulation).momentum.data());
+    const StepResult result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    if (i == 0) continue;
+    const Resultant<Dim> all = resultant<Dim>(simulation, std::array{1, 2, 3}, Vec<Dim>::Zero());
+    const Vec<Dim> gain = Vec<Dim>(asked(simulation).momentum.data()) - before;
+    const Vec<Dim> force = all.force - weight<Dim>() * Vec<Dim>::Unit(1);
+    EXPECT_LT((setup.time.dt * force - gain).norm(), 1e-10 * weight<Dim>() * setup.time.dt) << "step " << i;
+    EXPECT_GT(all.force.norm(), 1);
+  }
+  auto unasked = simulate(block<Dim>());
+  EXPECT_THROW(resultant<Dim>(unasked, std::array{1}, Vec<Dim>::Zero()), InputError);
+}
+
+TEST(Resultants, AreTheRateOfMomentum) {
+  expect_resultants<2>();
+  expect_resultants<3>();
+}
+
+TEST(Resultants, HaveTheMomentOfTheForces) {
+  auto setup = block<2>();
+  setup.fields.applied_forces = true;
+  setup.body_acceleration = nullptr;
+  setup.dirichlet.push_back({1, {true, true}, [](const Vec<2>&, double) { return Vec<2>::Zero().eval(); }});
+  setup.neumann.push_back({2, [](const Vec<2>&, double) { return Vec<2>(0, -10); }});
+  setup.time.quasistatic = true;
+  auto simulation = simulate(setup);
+  ASSERT_TRUE(simulation.advance().ok);
+  const auto held = resultant<2>(simulation, std::array{1}, Vec<2>(0, 0));
+  const auto all = resultant<2>(simulation, std::array{1, 2, 3}, Vec<2>(0, 0));
+  EXPECT_LT(all.force.norm(), 1e-8);  // in balance, moments too
+  EXPECT_LT(all.moment.norm(), 1e-8);
+  EXPECT_NEAR(held.force[0], 0, 1e-8);
+  EXPECT_GT(held.moment[0], 0.1);  // left end holds what hangs right of it
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 
 namespace itr {
 
-/// What becomes of the negative eigenvalues of a stencil's Hessian: they stay or become 0.
+/// Projection of a stencil's Hessian to a positive semidefinite one: none, or its negative eigenvalues become 0.
 enum class PsdProjection { none, clamp };
 inline double projected(double eigenvalue, PsdProjection psd) {
   return eigenvalue >= 0 || psd == PsdProjection::none ? eigenvalue : 0;

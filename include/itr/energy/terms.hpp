@@ -22,7 +22,7 @@
 
 namespace itr {
 
-/// What acts in a step, whatever cells it is summed over.
+/// Options and loads of all terms of a step; the cells of the sum come from a CellSet.
 template <int Dim>
 struct PotentialTerms {
   std::map<int, Material> materials;  ///< by body
@@ -50,14 +50,14 @@ inline constexpr std::size_t kNumEnergyEntries = 7;
 /// Entries of a report of nodal forces.
 enum class ForceEntry { none, contact, friction, applied };
 
-/// What predictions of an edit's gain (remesh/prediction.hpp) know of a term.
+/// Part of a term in predictions of an edit's gain (src/remesh/decide/prediction.hpp).
 enum class InPredictions {
   unknown,   ///< nothing: no gain is predicted, and every edge is tried
   included,  ///< it is part of them
   left_out   ///< that it is left out: edits in its reach are tried
 };
 
-/// What others ask of a term. The defaults are safe for one that nobody knows.
+/// Properties of a term for those who handle terms without knowing them. The defaults are safe for any term.
 template <int Dim>
 struct TermTraits {
   using Question = bool (*)(const PotentialTerms<Dim>&);

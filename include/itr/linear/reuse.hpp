@@ -79,7 +79,7 @@ class ReusingSolver final : public Solver {
   const SolveCounts& counts() const { return counts_; }
 
  private:
-  /// What became of the matrix given last.
+  /// State of the matrix that was given last.
   enum class Last {
     none,
     factorized,

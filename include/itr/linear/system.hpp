@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a solution of one linear system is asked for, and what it tells: for those who solve a system by one call.
+// Request and report of the solution of one linear system by one call.
 #pragma once
 
 #include <limits>
@@ -8,7 +8,7 @@
 
 namespace itr::linear {
 
-/// What has been found out about a symmetric matrix.
+/// Definiteness of a symmetric matrix, as far as a solver has found it out.
 enum class Definiteness { unknown, positive, indefinite };
 
 struct SystemReport {
@@ -18,7 +18,7 @@ struct SystemReport {
   int negative_eigenvalues = 0;  ///< of an indefinite matrix; 0 where they were not counted
 };
 
-/// What is asked of the solution of a system.
+/// Accuracy that the caller asks for.
 struct Asked {
   double residual = 0;         ///< relative
   double loose = residual;     ///< enough where each digit costs iterations
@@ -26,7 +26,7 @@ struct Asked {
   bool goes_on = false;        ///< the system is the one of the call before, and its solution has too few digits
 };
 
-/// What a solver tells of a matrix that it has factorised with that outcome.
+/// Report of a factorisation with this outcome: definiteness, and negative eigenvalues where the solver counts them.
 SystemReport describe(Outcome outcome, const Solver& solver);
 
 /// The report of a system whose matrix has been factorised, with its solution by `solve` if that is what was asked.

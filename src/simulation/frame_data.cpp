@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// What frames show of a state: energy densities and stresses by cell, sums of forces, energy and momentum.
+#include <array>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "cell_stress.hpp"
+#include "itr/energy/inertia.hpp"
+#include "itr/simulation/contact_surface.hpp"
+#include "itr/simulation/resultant.hpp"
+
+namespace itr {
+
+namespace {
+
+/// Where output samples a cell: its mean has the weights `share`.
+template <int Dim>
+struct CellPoint {
+  Mat<Dim> F;
+  Vec<Dim> X;
+  double share;
+};
+
+/// f(material, points) for each cell in the mesh's order: one point where F is constant, those of the elastic energy's
+/// quadrature in cells with curved edges.
+template <int Dim, typename Function>
+void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Setup<Dim>& setup, const Function& f) {
+  const auto& rule = quadrature<Dim>(setup.quadrature_degree);
+  std::vector<CellPoint<Dim>> points;
+  auto straight = cells.elements.begin();
+  auto curved = cells.curved_elements.begin();
+  const std::size_t count = cells.elements.size() + cells.curved_elements.size();
+  for (std::size_t c = 0; c < count; ++c) {
+    points.clear();
+    if (curved == cells.curved_elements.end() || static_cast<std::size_t>(curved->cell) != c) {
+      points.push_back({deformation_gradient<Dim>(*straight, x), rest_barycenter(cells, *straight), 1});
+      f(setup.materials.at(straight->body), std::span<const CellPoint<Dim>>(points));
+      ++straight;
+      continue;
+    }
+    for (const auto& point : rule)
+      points.push_back({at_nodes<Dim>(curved->nodes, x) * shape_gradients<Dim>(*curved, point.weights).transpose(),
+                        rest_position<Dim>(cells, *curved, point.weights), point.share});
+    f(setup.materials.at(curved->body), std::span<const CellPoint<Dim>>(points));
+    ++curved;
+  }
+}
+
+}  // namespace
+
+template <int Dim>
+typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>& state, const NodalForces& forces) const {
+  const int bodies = num_nodes(state.mesh, state.space);
+  FrameData data;
+  data.x = state.history.x[0].head(Dim * bodies);
+  data.v = state.history.v[0].head(Dim * bodies);
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+  for_each_cell_in_order<Dim>(cells, data.x, setup(), [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+    double mean = 0;
+    for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
+    data.elastic_density.push_back(mean);
+  });
+  data.asked.forces = forces;
+  add_asked(cells, state, data);
+  const VectorX& all = state.history.x[0];
+  for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
+  if (setup().proxy) {
+    const VectorX y = proxy_map(setup(), state.mesh, state.space)->positions(all);
+    for (std::size_t v = 0; v < setup().proxy->rest.size(); ++v)
+      data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
+  }
+  return data;
+}
+
+namespace {
+
+template <int Dim>
+ForceCurvePoint curve_point(const ForceSums<Dim>& sums, const std::string& name) {
+  ForceCurvePoint point{name, {}};
+  const std::array<const Resultant<Dim>*, 4> kinds{&sums.contact, &sums.friction, &sums.reaction, &sums.all};
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    point.kinds[k].assign(kinds[k]->force.begin(), kinds[k]->force.end());
+    point.kinds[k].insert(point.kinds[k].end(), kinds[k]->moment.begin(), kinds[k]->moment.end());
+  }
+  return point;
+}
+
+/// Of the stress in space: zero out of the plane in plane stress, what F_zz = 1 gives in plane strain.
+template <int Dim>
+double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
+  Mat<3> s = Mat<3>::Zero();
+  s.template topLeftCorner<Dim, Dim>() = cauchy;
+  if (Dim == 2) s(2, 2) = out_of_plane;
+  const Mat<3> deviator = s - s.trace() / 3 * Mat<3>::Identity();
+  return std::sqrt(1.5) * deviator.norm();
+}
+
+template <int Dim>
+double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Vec<Dim>& X) {
+  if (Dim == 3 || !material.plane_strain) return 0;
+  Mat<3> in_space = Mat<3>::Identity();
+  in_space.template topLeftCorner<Dim, Dim>() = F;
+  Vec<3> place = Vec<3>::Zero();
+  place.template head<Dim>() = X;
+  return elastic_stress<3>(in_space, elastic_moduli<3>(material, place))(2, 2) / F.determinant();
+}
+
+template <int Dim>
+CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Setup<Dim>& setup) {
+  CellStress stress;
+  for_each_cell_in_order<Dim>(cells, x, setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+    Mat<Dim> cauchy = Mat<Dim>::Zero();
+    double equivalent = 0;
+    for (const auto& [F, X, share] : points) {
+      const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
+      cauchy += share * here;
+      equivalent += share * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
+    }
+    stress.von_mises.push_back(equivalent);
+    for (int i = 0; i < Dim; ++i)
+      for (int j = 0; j < Dim; ++j) stress.cauchy.push_back(cauchy(i, j));
+  });
+  return stress;
+}
+
+}  // namespace
+
+template <int Dim>
+CellStress cell_stress(const Simulation<Dim>& simulation) {
+  const State<Dim>& state = simulation.state();
+  const VectorX x = state.history.x[0].head(Dim * num_nodes(state.mesh, state.space));
+  return stress_of<Dim>(whole_mesh(state.mesh, {}, state.space), x, simulation.setup());
+}
+
+template CellStress cell_stress(const Simulation<2>&);
+template CellStress cell_stress(const Simulation<3>&);
+
+template <int Dim>
+void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, const State<Dim>& state, FrameData& data) const {
+  const FieldOptions& options = setup().fields;
+  AskedFields& asked = data.asked;
+  const NodalForces all = std::exchange(asked.forces, {});
+  if (options.contact_forces) asked.forces.contact = all.contact;
+  if (options.friction_forces) asked.forces.friction = all.friction;
+  if (options.reaction_forces) asked.forces.reaction = all.reaction;
+  if (options.applied_forces) asked.forces.applied = all.applied;
+  for (const ForceTarget& target : options.curves)
+    asked.curves.push_back(curve_point(force_sums(state, all, target), target.name));
+  if (options.von_mises || options.stress) {
+    CellStress stress = stress_of<Dim>(cells, data.x, setup());
+    if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
+    if (options.stress) asked.stress = std::move(stress.cauchy);
+  }
+  if (!options.kinetic_energy && !options.momentum) return;
+  VectorX product = VectorX::Zero(data.v.size());
+  InertiaEnergy<Dim>(cells, setup().materials, setup().lump_mass ? MassKind::lumped : MassKind::consistent,
+                     VectorX::Zero(data.v.size()))
+      .add_mass_product(data.v, product);
+  if (options.kinetic_energy) asked.kinetic_energy = {0.5 * data.v.dot(product)};
+  if (!options.momentum) return;
+  asked.momentum.assign(Dim, 0);
+  for (Eigen::Index i = 0; i < product.size(); ++i) asked.momentum[i % Dim] += product[i];
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                    \
+  template Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>&, const NodalForces&) const; \
+  template void Simulation<Dim>::add_asked(const CellSet<Dim>&, const State<Dim>&, Simulation<Dim>::FrameData&) const;
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+#include "incoming_state.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "itr/core/error.hpp"
+#include "itr/mesh/validate.hpp"
+#include "itr/simulation/invariants.hpp"
+
+namespace itr {
+
+namespace {
+
+template <int Dim>
+std::string describe(const Vec<Dim>& p) {
+  std::string text = "(";
+  for (int c = 0; c < Dim; ++c) text += (c ? ", " : "") + std::to_string(p[c]);
+  return text + ")";
+}
+
+/// Where no surfaces cross: what is wholly inside of a body.
+template <int Dim>
+void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
+  if (setup.proxy) return;
+  const auto refuse = [](const char* what, const Vec<Dim>& p) {
+    throw InputError({"", "initial state", what + (" inside of a body, at " + describe(p)), "surfaces that do not touch"});
+  };
+  const VectorX& x = state.history.x[0];
+  const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.space);
+  for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
+  for (Eigen::Index i = Dim * num_nodes(state.mesh, state.space); i < x.size(); i += Dim)
+    if (const Vec<Dim> p = x.segment<Dim>(i); boundary.touches(p) || boundary.winding(p) != 0) refuse("an obstacle", p);
+}
+
+/// Value of the first condition that names the body of one of the vertex's cells; the last cell's body wins.
+template <int Dim>
+VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<Dim>& mesh, const Space& space,
+               int obstacle_vertices) {
+  VectorX field = VectorX::Zero(Dim * (num_nodes(mesh, space) + obstacle_vertices));
+  if (conditions.empty()) return field;
+  const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
+  for (int c = 0; c < mesh.cell_slots(); ++c)
+    for (const auto& condition : conditions) {
+      if (condition.body != mesh.body(c)) continue;
+      const auto& cell = mesh.cell(c);
+      const auto set = [&](int node) { field.segment<Dim>(Dim * node) = condition.value(rest[node], 0); };
+      for (const int v : cell) set(v);
+      for_each_edge<Dim>([&](int, int i, int j) {
+        if (const int edge = space.find(cell[i], cell[j]); edge != kNone) set(mesh.vertex_slots() + edge);
+      });
+      break;
+    }
+  return field;
+}
+
+[[noreturn]] void refuse_state(const std::string& place, const std::string& found, const std::string& expected) {
+  throw InputError({"", place, found, expected});
+}
+
+void require_size(const std::string& place, std::size_t found, std::size_t expected) {
+  if (found != expected) refuse_state(place, std::to_string(found), std::to_string(expected));
+}
+
+void require_finite(const std::string& place, const VectorX& field) {
+  for (Eigen::Index i = 0; i < field.size(); ++i)
+    if (!std::isfinite(field[i]))
+      refuse_state(place + "[" + std::to_string(i) + "]", fmt::format("{}", field[i]), "a number");
+}
+
+/// How many past states there are, and how long they are.
+template <int Dim>
+void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
+  const TimeIntegrator integrator(setup.time);
+  const History& history = state.history;
+  if (history.x.empty() || history.x.size() > static_cast<std::size_t>(integrator.depth()))
+    refuse_state("saved positions", std::to_string(history.x.size()) + " past states",
+                 fmt::format("1 to {}, as the integrator remembers", integrator.depth()));
+  require_size("past states of saved velocities", history.v.size(), history.x.size());
+  require_size("past states of saved accelerations", history.a.size(),
+               integrator.uses_acceleration() ? history.x.size() : 0);
+  const auto size = static_cast<std::size_t>(Dim) *
+                    (static_cast<std::size_t>(num_nodes(state.mesh, state.space)) + setup.obstacles.rest.size());
+  const auto check = [&](const std::string& name, const VectorX& field) {
+    require_size("length of saved " + name, static_cast<std::size_t>(field.size()), size);
+    require_finite("saved " + name, field);
+  };
+  for (const VectorX& x : history.x) check("positions", x);
+  for (const VectorX& v : history.v) check("velocities", v);
+  for (const VectorX& a : history.a) check("accelerations", a);
+  if (state.deviation.size() > 0) check("deviation", state.deviation);
+}
+
+}  // namespace
+
+template <int Dim>
+void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
+  if (!setup.contact.enabled) return;
+  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.space);
+  const CollisionSurface& surface = contact.surface;
+  const VectorX x = contact.positions(state.history.x[0]);
+  const auto corners = [&](const auto& primitive) {
+    std::string text;
+    for (const int v : primitive) text.append(text.empty() ? "" : "-").append(describe<Dim>(x.segment<Dim>(Dim * v)));
+    return text;
+  };
+  constexpr std::size_t kMostNamed = 5;
+  const auto pairs = find_intersections<Dim>(surface, x, kMostNamed + 1);
+  if (pairs.empty()) return refuse_enclosed(setup, state);
+  std::string found;
+  for (std::size_t i = 0; i < std::min(pairs.size(), kMostNamed); ++i) {
+    const auto [first, second] = pairs[i];
+    found += (i ? "; " : "") + ("edge " + corners(surface.edges[first])) + " and " +
+             (Dim == 2 ? "edge " + corners(surface.edges[second]) : "triangle " + corners(surface.triangles[second]));
+  }
+  if (pairs.size() > kMostNamed) found += "; and more";
+  throw InputError({"", "initial state", "surfaces that intersect: " + found, "surfaces that do not touch"});
+}
+
+template <int Dim>
+State<Dim> initial_state(const Setup<Dim>& setup) {
+  State<Dim> state;
+  state.mesh = setup.mesh;
+  state.mesh.compact();
+  state.space = space_of_orders(state.mesh, setup.order);
+  state.t = setup.time.t0;
+  const int obstacles = static_cast<int>(setup.obstacles.rest.size());
+  const std::vector<Vec<Dim>> rest = node_rest_positions(state.mesh, state.space);
+  const auto sampled = [&](const auto& conditions) { return sample(conditions, state.mesh, state.space, obstacles); };
+  VectorX x = sampled(setup.initial_displacement);
+  for (std::size_t v = 0; v < rest.size(); ++v) vertex_of<Dim>(x, static_cast<int>(v)) += rest[v];
+  x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);
+  state.history.x = {std::move(x)};
+  state.history.v = {sampled(setup.initial_velocity)};
+  if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
+  return state;
+}
+
+template <int Dim>
+void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
+  const Mesh<Dim>& mesh = state.mesh;
+  if (mesh.num_vertices() != mesh.vertex_slots() || mesh.num_cells() != mesh.cell_slots())
+    refuse_state("saved mesh", "dead slots", "a compact mesh");
+  const bool may_differ =
+      setup.remesh.enabled && (setup.remesh.curve.enabled || !space_of_orders(mesh, setup.order).is_linear());
+  if (may_differ) {
+    for (const auto& [a, b] : state.space.curved_edges())
+      if (a < 0 || b <= a || b >= mesh.vertex_slots() || !mesh.are_joined(a, b))
+        refuse_state("curved edges of a saved state", fmt::format("{}-{}", a, b), "an edge of the mesh");
+  } else if (const Space expected = space_of_orders(mesh, setup.order); state.space != expected)
+    refuse_state("curved edges of a saved state", fmt::format("{}, others than the setup's", state.space.num_curved()),
+                 std::to_string(expected.num_curved()));
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (!setup.materials.contains(mesh.body(c)))
+      refuse_state("body of a saved cell", std::to_string(mesh.body(c)), "one that has a material");
+  check_history(setup, state);
+  if (!state.quadrature.empty())
+    require_size("saved levels of quadrature", state.quadrature.size(),
+                 whole_mesh(mesh, {}, state.space).curved_elements.size());
+  if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
+  for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
+                                    std::pair("barrier stiffness", state.stiffness.value)})
+    if (!std::isfinite(value)) refuse_state(std::string("saved ") + name, fmt::format("{}", value), "a number");
+  for (std::size_t age = 0; age < state.history.x.size(); ++age)
+    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.space); !violation.empty())
+      refuse_state(age == 0 ? "saved positions" : fmt::format("saved positions of {} steps before", age), violation,
+                   "positions without inversions and intersections");
+}
+
+#define ITR_INSTANTIATE(Dim)                                                \
+  template State<Dim> initial_state(const Setup<Dim>&);                     \
+  template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
+  template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// States that no step made: the initial one, and a saved one that is restored.
+#pragma once
+
+#include "itr/simulation/setup.hpp"
+#include "itr/simulation/step.hpp"
+
+namespace itr {
+
+/// The state at the setup's start time, by its initial conditions.
+template <int Dim>
+State<Dim> initial_state(const Setup<Dim>& setup);
+
+/// Throws InputError where surfaces of the state intersect, or a body or obstacle is inside of a body. Checks nothing where
+/// contact is not enabled.
+template <int Dim>
+void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state);
+
+/// Throws InputError for a state that no steps of this setup lead to.
+template <int Dim>
+void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state);
+
+}  // namespace itr

@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: MIT
+// The C interface: arrays in, steps, arrays out, statuses and messages instead of exceptions.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "block_arrays.hpp"
+#include "itr/itr.h"
+
+namespace itr {
+namespace {
+
+struct CBlock {
+  itr_model* model = itr_model_create(2);
+  itr_simulation* simulation = nullptr;
+  explicit CBlock(const char* more = "{}", const std::function<itr_status(itr_model*)>& change = nullptr) {
+    const Arrays<2> arrays;
+    EXPECT_EQ(itr_model_set_mesh(model, arrays.vertices.size() / 2, arrays.vertices.data(), arrays.cells.size() / 3,
+                                 arrays.cells.data(), nullptr),
+              ITR_SUCCESS);
+    const double low[] = {0, 0}, high[] = {0, 1};
+    EXPECT_EQ(itr_model_add_boundary_box(model, "left", low, high, nullptr), ITR_SUCCESS);
+    EXPECT_EQ(itr_model_set_options(model, kOptions), ITR_SUCCESS);
+    EXPECT_EQ(itr_model_set_options(model, more), ITR_SUCCESS);
+    EXPECT_EQ(change ? change(model) : ITR_SUCCESS, ITR_SUCCESS) << itr_model_message(model);
+    EXPECT_EQ(itr_simulation_create(model, nullptr, nullptr, &simulation), ITR_SUCCESS) << itr_model_message(model);
+  }
+  ~CBlock() {
+    itr_simulation_destroy(simulation);
+    itr_model_destroy(model);
+  }
+};
+
+TEST(CInterface, SaysWhatIsWrongAndGoesOn) {
+  EXPECT_EQ(itr_model_create(5), nullptr);
+  CBlock block;
+  EXPECT_EQ(itr_model_set_mesh(block.model, 3, nullptr, 1, nullptr, nullptr), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_model_message(block.model), "vertices: found NULL; expected an argument");
+  EXPECT_EQ(itr_model_set_options(block.model, "{"), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_model_message(block.model), "options: found text that is no JSON; expected a JSON object");
+  EXPECT_EQ(itr_model_read_scene(block.model, "nowhere.json"), ITR_BAD_INPUT);
+  EXPECT_NE(std::string(itr_model_message(block.model)).find("nowhere.json"), std::string::npos);
+  EXPECT_EQ(itr_step(nullptr, 1), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_step(block.simulation, -1), ITR_BAD_INPUT);
+  const int mask[] = {1, 1};
+  EXPECT_EQ(itr_fix(block.simulation, "right", mask, nullptr, nullptr), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(block.simulation), "boundary: found 'right'; expected 'left'");
+  EXPECT_EQ(itr_fix(block.simulation, "left", mask, nullptr, nullptr), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+}
+
+TEST(CInterface, AnswersAnErrorWithoutASimulation) {
+  EXPECT_TRUE(std::isnan(itr_time(nullptr)));
+  EXPECT_EQ(itr_steps(nullptr), -1);
+  EXPECT_EQ(itr_finished(nullptr), -1);
+  EXPECT_EQ(itr_dimension(nullptr), -1);
+  EXPECT_EQ(itr_num_vertices(nullptr) + itr_num_cells(nullptr) + itr_num_facets(nullptr), 0u);
+  EXPECT_EQ(itr_positions(nullptr), nullptr);
+  EXPECT_EQ(itr_velocities(nullptr), nullptr);
+  EXPECT_EQ(itr_forces(nullptr, ITR_CONTACT), nullptr);
+  EXPECT_EQ(itr_save(nullptr), nullptr);
+  itr_energies energies;
+  itr_step_statistics statistics;
+  EXPECT_EQ(itr_get_energies(nullptr, &energies), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_get_statistics(nullptr, &statistics), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_fix_values(nullptr, "left", nullptr, 0, nullptr), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_get_cells(nullptr, 0, nullptr), ITR_BAD_INPUT);
+  CBlock block;
+  EXPECT_EQ(itr_get_energies(block.simulation, nullptr), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(block.simulation), "energies: found NULL; expected an argument");
+  EXPECT_EQ(itr_get_statistics(block.simulation, nullptr), ITR_BAD_INPUT);
+}
+
+TEST(CInterface, ChecksTheLengthsOfArrays) {
+  CBlock block;
+  itr_simulation* s = block.simulation;
+  const int mask[] = {1, 1};
+  std::vector<double> numbers(32, 0.0);
+  std::vector<int> ids(54);
+  EXPECT_EQ(itr_fix_values(s, "left", mask, 31, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(s), "displacements: found 31 numbers; expected 32");
+  EXPECT_EQ(itr_set_traction_values(s, "left", 16, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_pressure_values(s, "left", 32, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_acceleration_values(s, 30, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_forces(s, 30, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_forces(s, 0, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_velocities(s, 33, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_get_rest_positions(s, 31, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(s), "X: found a length of 31; expected 32");
+  EXPECT_EQ(itr_get_cells(s, 53, ids.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_fix_values(s, "left", mask, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_traction_values(s, "left", 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_pressure_values(s, "left", 16, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_acceleration_values(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_forces(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_forces(s, 0, nullptr), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_velocities(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_get_rest_positions(s, 32, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_get_cells(s, 54, ids.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_step(s, 0), ITR_SUCCESS);
+}
+
+TEST(CInterface, RefusesChangesFromInsideOfAStep) {
+  CBlock block, other;
+  struct Seen {
+    itr_simulation* simulation;
+    itr_snapshot *start, *inside;
+    int calls, refused;
+  } seen{block.simulation, itr_save(block.simulation), nullptr, 0, 0};
+  itr_set_acceleration(
+      block.simulation, [](const double*, double, double* a, void*) { a[0] = 0, a[1] = -10; }, nullptr);
+  itr_on_iteration(
+      block.simulation,
+      [](int, double, double, double, void* user) {
+        auto& s = *static_cast<Seen*>(user);
+        const std::vector<double> zero(32);
+        ++s.calls;
+        s.refused += itr_restore(s.simulation, s.start) == ITR_BAD_INPUT;
+        s.refused += itr_set_velocities(s.simulation, 32, zero.data()) == ITR_BAD_INPUT;
+        s.refused += itr_step(s.simulation, 0) == ITR_BAD_INPUT;
+        s.refused += itr_set_acceleration(s.simulation, nullptr, nullptr) == ITR_BAD_INPUT;
+        s.refused += itr_on_iteration(s.simulation, nullptr, nullptr) == ITR_BAD_INPUT;
+        itr_snapshot_destroy(s.inside);
+        s.inside = itr_save(s.simulation);
+        return 1;
+      },
+      &seen);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS) << itr_simulation_message(block.simulation);
+  EXPECT_GT(seen.calls, 0);
+  EXPECT_EQ(seen.refused, 5 * seen.calls);
+  EXPECT_NEAR(itr_time(block.simulation), 0.01, 1e-15);
+  ASSERT_EQ(itr_restore(block.simulation, seen.inside), ITR_SUCCESS);
+  EXPECT_EQ(itr_time(block.simulation), 0);
+  EXPECT_EQ(itr_restore(other.simulation, seen.inside), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(other.simulation),
+               "saved state: found one of another simulation; expected one that this simulation has saved");
+  itr_snapshot_destroy(seen.start);
+  itr_snapshot_destroy(seen.inside);
+}
+
+TEST(CInterface, CancelsSavesAndRestores) {
+  CBlock block;
+  const auto gravity = [](const double*, double, double* a, void*) { a[0] = 0, a[1] = -10; };
+  itr_set_acceleration(block.simulation, gravity, nullptr);
+  int calls = 0;
+  itr_on_iteration(
+      block.simulation, [](int, double, double, double, void* user) { return ++*static_cast<int*>(user) < 1 ? 1 : 0; },
+      &calls);
+  EXPECT_EQ(itr_step(block.simulation, 0.01), ITR_CANCELLED);
+  EXPECT_EQ(calls, 1);
+  EXPECT_EQ(itr_steps(block.simulation), 0);
+  itr_on_iteration(block.simulation, nullptr, nullptr);
+  itr_snapshot* saved = itr_save(block.simulation);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+  EXPECT_NEAR(itr_velocities(block.simulation)[1], -0.1, 1e-9);
+  EXPECT_EQ(itr_forces(block.simulation, ITR_CONTACT), nullptr);
+  const double y = itr_positions(block.simulation)[1];
+  itr_energies energies;
+  itr_get_energies(block.simulation, &energies);
+  itr_step_statistics statistics;
+  itr_get_statistics(block.simulation, &statistics);
+  EXPECT_GT(statistics.newton_iterations, 0);
+  EXPECT_NEAR(energies.total, energies.inertia + energies.elastic + energies.body, 1e-12);
+  itr_restore(block.simulation, saved);
+  EXPECT_EQ(itr_time(block.simulation), 0);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+  EXPECT_EQ(itr_positions(block.simulation)[1], y);
+  itr_snapshot_destroy(saved);
+}
+
+TEST(CInterface, TakesForcesOfPositions) {
+  CBlock block;
+  itr_set_follower_forces(
+      block.simulation,
+      [](size_t n, const double*, const double* x, double, double* f, void*) {
+        for (size_t i = 0; i < 2 * n; ++i) f[i] -= 100 * x[i];
+      },
+      nullptr, nullptr);
+  for (int i = 0; i < 3; ++i)
+    ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS) << itr_simulation_message(block.simulation);
+  double sum = 0;  // drawn towards the origin
+  for (size_t i = 0; i < 2 * itr_num_vertices(block.simulation); ++i) sum += itr_velocities(block.simulation)[i];
+  EXPECT_LT(sum, -0.1);
+}
+
+TEST(CInterface, TakesTheirStiffness) {
+  std::vector<int> iterations;
+  std::vector<double> heights;
+  const auto springs = [](size_t n, const double*, const double* x, double, double* f, void*) {
+    for (size_t i = 0; i < 2 * n; ++i) f[i] -= 300 * x[i];
+  };
+  const auto stiffness = [](size_t n, const double*, const double*, double, itr_block_receiver add, void* to, void*) {
+    const double block[] = {300, 0, 0, 300};
+    for (int v = 0; v < static_cast<int>(n); ++v) add(to, 1, &v, block);
+  };
+  for (const bool with_stiffness : {false, true}) {
+    CBlock block;
+    itr_set_follower_forces(block.simulation, springs, with_stiffness ? +stiffness : nullptr, nullptr);
+    ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+    itr_step_statistics statistics;
+    itr_get_statistics(block.simulation, &statistics);
+    iterations.push_back(statistics.newton_iterations);
+    heights.push_back(itr_positions(block.simulation)[31]);
+  }
+  EXPECT_LT(iterations[1], iterations[0]);
+  EXPECT_NEAR(heights[1], heights[0], 1e-9);
+}
+
+constexpr double kFoundation = 1e4;  // [N/m^2]
+
+/// f(vertex, k) for the ends of the facets of the boundary of id 1, k by the trapezoidal rule.
+template <typename F>
+void for_each_spring(const itr_part* part, F&& f) {
+  for (size_t i = 0; i < part->num_facets; ++i)
+    if (part->boundaries[i] == 1) {
+      const int a = part->facets[2 * i], b = part->facets[2 * i + 1];
+      const double k =
+          kFoundation * std::hypot(part->X[2 * a] - part->X[2 * b], part->X[2 * a + 1] - part->X[2 * b + 1]) / 2;
+      f(a, k), f(b, k);
+    }
+}
+
+const itr_term kCFoundation{[](const itr_part* part, const double* x, void*) {
+                              double sum = 0;
+                              for_each_spring(part, [&](int v, double k) {
+                                for (int i = 2 * v; i < 2 * v + 2; ++i)
+                                  sum += k / 2 * (x[i] - part->X[i]) * (x[i] - part->X[i]);
+                              });
+                              return sum;
+                            },
+                            [](const itr_part* part, const double* x, double* gradient, void*) {
+                              for_each_spring(part, [&](int v, double k) {
+                                for (int i = 2 * v; i < 2 * v + 2; ++i) gradient[i] += k * (x[i] - part->X[i]);
+                              });
+                            },
+                            [](const itr_part* part, const double*, itr_block_receiver add, void* to, void*) {
+                              for_each_spring(part, [&](int v, double k) {
+                                const double block[] = {k, 0, 0, k};
+                                add(to, 1, &v, block);
+                              });
+                            }};
+
+/// The same as one of the library's kind.
+class Foundation final : public Energy {
+ public:
+  Foundation(const CellSet<2>& cells, double scale) : cells_(cells) {
+    for (const auto& facet : cells.facets)
+      if (facet.tag == 1) {
+        const auto [a, b] = facet.vertices;
+        const double k = scale * kFoundation * (cells.rest[a] - cells.rest[b]).norm() / 2;
+        springs_.insert(springs_.end(), {{a, k}, {b, k}});
+      }
+  }
+  std::string_view name() const override { return "foundation"; }
+  double value(ConstVectorView x, Workspace&) const override {
+    double sum = 0;
+    for (const auto& [v, k] : springs_) sum += k / 2 * (x.segment<2>(2 * v) - cells_.rest[v]).squaredNorm();
+    return sum;
+  }
+  void add_gradient(ConstVectorView x, VectorView g, Workspace&) const override {
+    for (const auto& [v, k] : springs_) g.segment<2>(2 * v) += k * (x.segment<2>(2 * v) - cells_.rest[v]);
+  }
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const override {
+    for (const auto& [v, k] : springs_) sink.add<2>(std::array{v}, Mat<2>(k * Mat<2>::Identity()).data());
+  }
+
+ private:
+  const CellSet<2>& cells_;
+  std::vector<std::pair<int, double>> springs_;
+};
+
+TEST(CInterface, TakesTermsThatTrialsAskToo) {
+  Model model = block_model<2>();
+  model.set_options(kRemesh);
+  AnySimulation cpp(model);
+  cpp.as<2>().conditions().terms.push_back(
+      [](const CellSet<2>& cells, double, double scale) { return std::make_shared<Foundation>(cells, scale); });
+  cpp.set_acceleration([](const double*, double, double* a) { a[1] = -100; });
+
+  CBlock block(kRemesh);
+  ASSERT_EQ(itr_set_term(block.simulation, "foundation", &kCFoundation, nullptr), ITR_SUCCESS);
+  itr_set_acceleration(
+      block.simulation, [](const double*, double, double* a, void*) { a[1] = -100; }, nullptr);
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_TRUE(cpp.step().ok);
+    ASSERT_EQ(itr_step(block.simulation, 0), ITR_SUCCESS) << itr_simulation_message(block.simulation);
+  }
+  EXPECT_NE(cpp.num_vertices(), 16);
+  ASSERT_EQ(itr_num_vertices(block.simulation), size_t(cpp.num_vertices()));
+  itr_energies energies;
+  itr_get_energies(block.simulation, &energies);
+  EXPECT_GT(energies.host, 0);
+  EXPECT_NEAR(energies.host, cpp.report().energy.host, 1e-9 * energies.host);
+  for (std::size_t i = 0; i < cpp.positions().size(); ++i)
+    EXPECT_NEAR(itr_positions(block.simulation)[i], cpp.positions()[i], 1e-9);
+
+  itr_term half = kCFoundation;
+  half.add_hessian = nullptr;
+  EXPECT_EQ(itr_set_term(block.simulation, "foundation", &half, nullptr), ITR_BAD_INPUT);
+  EXPECT_STREQ(itr_simulation_message(block.simulation), "term.add_hessian: found NULL; expected a function");
+  ASSERT_EQ(itr_set_term(block.simulation, "foundation", nullptr, nullptr), ITR_SUCCESS);
+  ASSERT_EQ(itr_step(block.simulation, 0), ITR_SUCCESS);
+  itr_get_energies(block.simulation, &energies);
+  EXPECT_EQ(energies.host, 0);
+}
+
+/// mu/2 (|F|^2 - 2 - 2 ln J) + lambda/2 (ln J)^2 in 2D; `user`: mu and lambda.
+const itr_law kCNeoHookean{
+    [](int, const double* F, void* user) {
+      const double* lame = static_cast<double*>(user);
+      const double log_j = std::log(F[0] * F[3] - F[1] * F[2]);
+      return lame[0] / 2 * (F[0] * F[0] + F[1] * F[1] + F[2] * F[2] + F[3] * F[3] - 2 - 2 * log_j) +
+             lame[1] / 2 * log_j * log_j;
+    },
+    [](int, const double* F, double* P, void* user) {
+      const double* lame = static_cast<double*>(user);
+      const double J = F[0] * F[3] - F[1] * F[2], T[] = {F[3] / J, -F[2] / J, -F[1] / J, F[0] / J};
+      for (int i = 0; i < 4; ++i) P[i] = lame[0] * (F[i] - T[i]) + lame[1] * std::log(J) * T[i];
+    },
+    [](int, const double* F, double* H, void* user) {
+      const double* lame = static_cast<double*>(user);
+      const double J = F[0] * F[3] - F[1] * F[2], T[] = {F[3] / J, -F[2] / J, -F[1] / J, F[0] / J};
+      const double c = lame[0] - lame[1] * std::log(J);
+      const double cofactor[4][4] = {{0, 0, 0, 1}, {0, 0, -1, 0}, {0, -1, 0, 0}, {1, 0, 0, 0}};  // d2J/dF2
+      for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j)
+          H[4 * j + i] = (i == j ? lame[0] : 0) + (c + lame[1]) * T[i] * T[j] - c * cofactor[i][j] / J;
+    }};
+
+TEST(CInterface, TakesLawsOfTheProgram) {
+  for (const char* more : {"{}", kRemesh}) {
+    Material material{.youngs_modulus = 1e5, .poisson_ratio = 0.3};
+    double lame[] = {material.lame_mu(), material.lame_lambda(2)};
+    CBlock library(more), own(more, [&](itr_model*model) { return itr_model_set_law(model, 0, &kCNeoHookean, lame); });
+    std::vector<double> heights;
+    for (itr_simulation* simulation : {library.simulation, own.simulation}) {
+      const int mask[] = {1, 1};
+      itr_fix(
+          simulation, "left", mask, [](const double*, double, double*, void*) {}, nullptr);
+      itr_set_acceleration(
+          simulation, [](const double*, double, double* a, void*) { a[1] = -100; }, nullptr);
+      for (int i = 0; i < 4; ++i) ASSERT_EQ(itr_step(simulation, 0), ITR_SUCCESS) << itr_simulation_message(simulation);
+      itr_energies energies;
+      itr_get_energies(simulation, &energies);
+      heights.push_back(energies.elastic);
+    }
+    EXPECT_EQ(itr_num_vertices(own.simulation) > 16, more == kRemesh);
+    EXPECT_NEAR(heights[1], heights[0], (more == kRemesh ? 1e-3 : 1e-8) * heights[0]);
+  }
+  // A law that gives no numbers: a step that cannot be done, with a reason.
+  itr_law broken = kCNeoHookean;
+  broken.stress = [](int, const double*, double* P, void*) { P[0] = std::numeric_limits<double>::quiet_NaN(); };
+  double lame[] = {1e5, 1e5};
+  CBlock block("{}", [&](itr_model* model) { return itr_model_set_law(model, 0, &broken, lame); });
+  itr_set_acceleration(
+      block.simulation, [](const double*, double, double* a, void*) { a[1] = -100; }, nullptr);
+  EXPECT_EQ(itr_step(block.simulation, 0), ITR_STOPPED);
+  EXPECT_STRNE(itr_simulation_message(block.simulation), "");
+  EXPECT_EQ(itr_steps(block.simulation), 0);
+}
+
+}  // namespace
+}  // namespace itr
