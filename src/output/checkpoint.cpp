@@ -102,6 +102,8 @@ constexpr const char* kOperations[RemeshMemory::kKinds] = {"split",   "collapse"
                                                            "reshape", "curve",    "straighten"};
 constexpr int kRefusalColumns = 5;  ///< two vertices, least and most signal, whether in contact
 
+constexpr const char* kRefusalTolerances = "/checkpoint/refusal_tolerances";  ///< [J], by operation
+
 std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }
 
 void write_memory(hdf5::File& file, const RemeshMemory& memory) {
@@ -112,10 +114,21 @@ void write_memory(hdf5::File& file, const RemeshMemory& memory) {
       rows.insert(rows.end(), {double(edge[0]), double(edge[1]), range.least, range.most, range.in_contact ? 1.0 : 0.0});
     if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
   }
+  std::vector<double> tolerances;
+  for (const auto& tolerance : memory.tolerances)
+    tolerances.push_back(tolerance.value_or(std::numeric_limits<double>::quiet_NaN()));
+  if (!std::isnan(tolerances[0])) file.write(kRefusalTolerances, tolerances, 1);
 }
 
 RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_vertices) {
   RemeshMemory memory;
+  if (file.contains(kRefusalTolerances)) {
+    const auto table = file.read_doubles(kRefusalTolerances);
+    if (table.values.size() != RemeshMemory::kKinds)
+      throw InputError({path.string(), kRefusalTolerances, std::to_string(table.values.size()) + " numbers",
+                        std::to_string(RemeshMemory::kKinds)});
+    std::copy(table.values.begin(), table.values.end(), memory.tolerances.begin());
+  }
   if (!file.contains("/checkpoint/refusals")) return memory;
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     if (!file.contains(refusals_name(kind))) continue;

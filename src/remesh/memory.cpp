@@ -5,6 +5,17 @@
 
 namespace itr {
 
+void RemeshMemory::begin(const std::array<double, kKinds>& present) {
+  constexpr double kClearly = 1.2;
+  for (int kind = 0; kind < kKinds; ++kind) {
+    const double now = present[kind];  // the least gain: negative where an operation may cost energy
+    std::optional<double>& before = tolerances[kind];
+    const bool accepts_more = before && (now > 0 ? kClearly * now < *before : now < kClearly * *before);
+    if (accepts_more) refusals[kind].clear();
+    before = before && !accepts_more ? std::max(*before, now) : now;
+  }
+}
+
 void RemeshMemory::renumber(std::span<const VertexId> number) {
   for (auto& list : refusals) {
     const auto renumbered = [&](Entry& entry) {

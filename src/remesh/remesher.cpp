@@ -18,6 +18,21 @@ double least_gain_of_refining(const RemeshOptions& options) {
   return options.split.enabled ? std::min(split, curve) : curve;
 }
 
+/// Of all operations, by RemeshMemory::Kind [J].
+std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& options) {
+  const double split = options.split.acceptance_tolerance.value_or(0),
+               collapse = options.collapse.acceptance_tolerance.value_or(0);
+  const double swap = options.swap.acceptance_tolerance.value_or(0),
+               smooth = options.smooth.acceptance_tolerance.value_or(0);
+  return {split,
+          collapse,
+          swap,
+          smooth,
+          smooth,
+          options.curve.acceptance_tolerance.value_or(split),
+          options.straighten.acceptance_tolerance.value_or(collapse)};
+}
+
 }  // namespace
 
 template <int Dim>
@@ -34,6 +49,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
   const bool may_straighten = options.straighten.enabled && !by_size;
   if (!may_refine && !(may_straighten && mesh.has_nodes()) && !may_collapse && !has_to_stir && !by_size) return {};
+  memory.begin(tolerances_of(options));
   RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
   RemeshReport& report = session.report();
   session.culling().rank(session.ask());
@@ -51,7 +67,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   }
   fields.trim(mesh.vertex_slots());
   report.trial_seconds = session.commits().median_trial_seconds();
-  memory = session.memory().remembered(session.ask());
+  memory.refusals = session.memory().remembered(session.ask());
   return report;
 }
 

@@ -42,8 +42,9 @@ class HistoryTransfer {
     for (std::size_t i = 0; i < n; ++i) {
       const int v = patch_.new_cells.vertices[i];
       if (v >= mesh.vertex_slots()) {
-        for (const FacetId f : mesh.facets_of_edge(space.curved_edges()[v - mesh.vertex_slots()]))
-          hold(i, mesh.facet_tag(f));
+        const EdgeKey& edge = space.curved_edges()[v - mesh.vertex_slots()];
+        for (const FacetId f : mesh.facets_of_edge(edge)) hold(i, mesh.facet_tag(f));
+        if (const int tag = mesh.edge_tag(edge); tag != kNoTag) hold(i, tag);
         continue;
       }
       for (const FacetId f : mesh.facets_of(v)) hold(i, mesh.facet_tag(f));

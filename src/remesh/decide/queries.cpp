@@ -68,6 +68,9 @@ double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<
 template <int Dim>
 double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
   const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
+  // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
+  if ((options_.curve.enabled || mesh_.has_nodes()) && !is_predictable(context_))
+    return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch);
   if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
   const auto around = mesh_.cells_of_edge(edge);
   if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);

@@ -67,9 +67,12 @@ class Refiner {
     const bool curves = is_to_be_curved(trial.edge());
     OperationCount& count = curves ? session_.report().curves : session_.report().splits;
     count.note(trial.verdict.refusal);
-    if (!trial.is_asked) return note_refused(trial.signal);
+    if (!trial.is_asked) {
+      if (!curves) note_refused(trial.signal);
+      return;
+    }
     if (!session_.commits().commit(trial, count)) {
-      note_refused(trial.verdict.gain);
+      if (!curves) note_refused(trial.verdict.gain);
       return remember(trial, curves);
     }
     auto changed = std::span<const CellId>(trial.verdict.patch).last(trial.edit->inserted_cells.size());
@@ -89,14 +92,14 @@ class Refiner {
       const Refusal refusal = curves ? ask_.refuse_curve(reversed(entry.edge)) : refuse(entry.edge);
       OperationCount& count = curves ? session_.report().curves : session_.report().splits;
       count.note(refusal == Refusal::none ? Refusal::prediction : refusal);
-      note_refused(entry.priority);
+      if (!curves) note_refused(entry.priority * nodes_of_split(entry.edge));
     }
   }
 
  private:
   std::optional<EdgeQueue::Entry> rank_curve(const EdgeKey& key, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = reversed(key);
-    if (ask_.refuse_curve(edge) != Refusal::none) return std::nullopt;
+    if (ask_.refuse_curve(edge) != Refusal::none || !session_.culling().may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_curve(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::curve, edge, gain, false)) return std::nullopt;
     return EdgeQueue::Entry{.edge = key,
@@ -133,6 +136,7 @@ class Refiner {
 
   /// Bulk terms alone tell when a refused split can have become worthwhile; in contact any change may have done it.
   void remember(const Trial<Dim>& trial, bool curves) {
+    if (trial.verdict.refusal == Refusal::invalid) return;  // the history decided
     const double tolerance = curves ? curve_tolerance_ : tolerance_;
     const double signal = trial.signal, gain = trial.verdict.gain;
     RemeshMemory::SignalRange range{signal / kSameSignal, signal * kSameSignal, trial.in_contact};

@@ -48,6 +48,7 @@ class Straightener {
       fresh.insert(fresh.end(), near.begin(), near.end());
       return;
     }
+    if (trial.verdict.refusal == Refusal::invalid) return;              // the history decided
     constexpr double kNever = std::numeric_limits<double>::infinity();  // a rounder edge loses more
     session_.memory().remember(RemeshMemory::straighten, trial.edge(), {trial.signal / kSameSignal, kNever, false});
   }

@@ -4,10 +4,33 @@
 #include <algorithm>
 
 #include "itr/core/check.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
 #include "itr/mesh/validate.hpp"
 #include "itr/remesh/edits.hpp"
+#include "remesh/curved_cell.hpp"
 
 namespace itr {
+
+namespace {
+
+/// A cell that is inverted somewhere, now or in the history, on a mesh with curved edges.
+template <int Dim>
+[[maybe_unused]] CellId find_inverted_curved(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields) {
+  const Edit<Dim> none;
+  const auto is_inverted = [&](CellId c, const VectorX& x) {
+    const auto cell = curved_cell_after<Dim>(mesh, none, mesh.cell(c));
+    return !is_positive_everywhere_exact<Dim>(cell.values(x, none));
+  };
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    if (is_inverted(c, fields.x)) return c;
+    for (const VectorX& past : fields.past_positions)
+      if (is_inverted(c, past)) return c;
+  }
+  return kNone;
+}
+
+}  // namespace
 
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
@@ -35,6 +58,7 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   log_.add_follower([&](const Change<Dim>&) {
     ITR_AUDIT(mesh.find_defect().empty(), mesh.find_defect());
     ITR_AUDIT(mesh.has_nodes() || find_inverted<Dim>(mesh, fields.x) == kNone);
+    ITR_AUDIT(!mesh.has_nodes() || find_inverted_curved(mesh, fields) == kNone);
   });
 }
 

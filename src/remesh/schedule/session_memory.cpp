@@ -21,15 +21,15 @@ void SessionMemory<Dim>::follow(const Mesh<Dim>& mesh, const Change<Dim>& change
 }
 
 template <int Dim>
-RemeshMemory SessionMemory<Dim>::remembered(const RemeshQueries<Dim>& ask) const {
-  RemeshMemory memory;
+RemeshMemory::Refusals SessionMemory<Dim>::remembered(const RemeshQueries<Dim>& ask) const {
+  RemeshMemory::Refusals refusals;
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
-    auto& list = memory.refusals[kind];
+    auto& list = refusals[kind];
     for (const auto& [edge, range] : refused_[kind])
       if (ask.exists(edge)) list.push_back({edge, range});
     std::sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.edge < y.edge; });
   }
-  return memory;
+  return refusals;
 }
 
 template class SessionMemory<2>;

@@ -22,7 +22,7 @@ class SessionMemory {
   /// Forgets refusals of the edges of new cells.
   void follow(const Mesh<Dim>& mesh, const Change<Dim>& change);
   /// Refusals of edges that are still there.
-  RemeshMemory remembered(const RemeshQueries<Dim>& ask) const;
+  RemeshMemory::Refusals remembered(const RemeshQueries<Dim>& ask) const;
 
   /// Whether the same edit was refused before and its signal is still in the refusal's range.
   bool was_refused(RemeshMemory::Kind kind, const EdgeKey& edge, double signal, bool in_contact) const {
