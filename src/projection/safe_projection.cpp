@@ -96,6 +96,7 @@ class PenalisedSystem final : public NewtonSystem {
     return report;
   }
   std::string message() const override { return system_.message(); }
+  bool tells_definiteness() const override { return system_.tells_definiteness(); }
   double diagonal_scale() const override { return system_.diagonal_scale(); }
 
  private:

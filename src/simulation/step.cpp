@@ -207,7 +207,7 @@ class StepAttempt {
       start->step = before_.step;
       start->t = before_.t;
       start->stiffness = before_.stiffness;
-      start->quadrature = before_.quadrature;
+      if (renumbering_.empty()) start->quadrature = before_.quadrature;  // else that of the new cells
       start->created_energy = before_.created_energy;
       start->stored_energy = before_.stored_energy;
       start->history.damp_next = before_.history.damp_next;
