@@ -8,10 +8,10 @@
 
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
-#include "itr/linear/choice.hpp"
 #include "itr/linear/registry.hpp"
-#include "itr/simulation/invariants.hpp"
-#include "itr/simulation/step.hpp"
+#include "linear/choice.hpp"
+#include "simulation/invariants.hpp"
+#include "simulation/step.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {

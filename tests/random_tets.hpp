@@ -9,10 +9,10 @@
 #include <set>
 #include <vector>
 
-#include "itr/geometry/measures.hpp"
+#include "geometry/measures.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/mesh/strata.hpp"
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 

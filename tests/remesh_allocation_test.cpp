@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "itr/remesh/edits.hpp"
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/trial.hpp"
+#include "remesh/edits.hpp"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define ITR_COUNTS_ALLOCATIONS 1

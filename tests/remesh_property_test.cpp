@@ -6,11 +6,11 @@
 
 #include <cstring>
 
+#include "geometry/measures.hpp"
 #include "itr/core/parallel.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/mesh/validate.hpp"
 #include "itr/projection/transfer.hpp"
 #include "itr/remesh/remesher.hpp"
+#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
 #include "remesh/decide/patch.hpp"

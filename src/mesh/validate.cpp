@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "itr/mesh/validate.hpp"
+#include "mesh/validate.hpp"
 
 #include <algorithm>
 
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/predicates.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/predicates.hpp"
 
 namespace itr {
 

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/intersection.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/intersection.hpp"
 #include "mesh/connected_parts.hpp"
 
 namespace itr {

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include <boost/container/small_vector.hpp>
-#include "itr/core/timer.hpp"
-#include "itr/remesh/edits.hpp"
+#include "core/timer.hpp"
 #include "prospect.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "itr/remesh/edits.hpp"
 #include "local_problem.hpp"
 #include "remesh/contact/gate.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/queue.hpp"
 
 namespace itr {

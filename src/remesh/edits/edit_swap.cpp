@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "edit_checks.hpp"
-#include "itr/mesh/edge_ring.hpp"
+#include "mesh/edge_ring.hpp"
 
 namespace itr {
 

@@ -6,9 +6,9 @@
 #include <limits>
 #include <optional>
 
+#include "geometry/measures.hpp"
 #include "itr/energy/elastic/laws.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
 namespace itr {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <span>
 
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
 namespace itr {

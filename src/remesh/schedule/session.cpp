@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "itr/core/check.hpp"
-#include "itr/mesh/validate.hpp"
-#include "itr/remesh/edits.hpp"
+#include "core/check.hpp"
+#include "mesh/validate.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 

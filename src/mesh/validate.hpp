@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/geometry/closed_surface.hpp"
+#include "geometry/closed_surface.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
