@@ -12,6 +12,7 @@
 #include "geometry/measures.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/mesh/strata.hpp"
+#include "propose_split.hpp"
 #include "remesh/edits.hpp"
 
 namespace itr {

@@ -114,16 +114,16 @@ TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
 TEST(Memory, FollowsVerticesWhenAMeshIsCompacted) {
   RemeshMemory memory;
   const RemeshMemory::SignalRange refusal{1, 2, false};
-  memory.refusals[RemeshMemory::split] = {{{0, 3}, refusal}, {{1, 2}, refusal}, {{2, 3}, refusal}};
-  memory.refusals[RemeshMemory::smooth] = {{{1, kNone}, refusal}, {{3, kNone}, refusal}};
+  memory.refusals[RemeshMemory::split] = {{EdgeKey{0, 3}, refusal}, {EdgeKey{1, 2}, refusal}, {EdgeKey{2, 3}, refusal}};
+  memory.refusals[RemeshMemory::smooth] = {{Place::at_vertex(1), refusal}, {Place::at_vertex(3), refusal}};
   const std::vector<VertexId> number{2, kNone, 0, 1};
   memory.renumber(number);
   const auto& splits = memory.refusals[RemeshMemory::split];
   ASSERT_EQ(splits.size(), 2u);
-  EXPECT_EQ(splits[0].edge, (EdgeKey{0, 1}));
-  EXPECT_EQ(splits[1].edge, (EdgeKey{1, 2}));
+  EXPECT_EQ(splits[0].place, Place(EdgeKey{0, 1}));
+  EXPECT_EQ(splits[1].place, Place(EdgeKey{1, 2}));
   ASSERT_EQ(memory.refusals[RemeshMemory::smooth].size(), 1u);
-  EXPECT_EQ(memory.refusals[RemeshMemory::smooth][0].edge, (EdgeKey{1, kNone}));
+  EXPECT_EQ(memory.refusals[RemeshMemory::smooth][0].place, Place::at_vertex(1));
 }
 
 /// A row of triangles under y = 0 whose top bulges; an obstacle point is above it or below.

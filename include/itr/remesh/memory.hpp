@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/remesh/place.hpp"
 
 namespace itr {
 
@@ -23,12 +23,12 @@ struct RemeshMemory {
     }
   };
   struct Entry {
-    EdgeKey edge;  ///< smaller vertex first; {vertex, kNone} of a vertex that was not moved
+    Place place;
     SignalRange range;
   };
   enum Kind { split, collapse, swap, smooth, reshape, curve, straighten };
   static constexpr int kKinds = 7;
-  std::array<std::vector<Entry>, kKinds> refusals;  ///< by Kind; ascending by edge
+  std::array<std::vector<Entry>, kKinds> refusals;  ///< by Kind; ascending by place
 
   /// With the vertex numbers of a compacted mesh; `number` has kNone for vertices that are gone.
   void renumber(std::span<const VertexId> number);

@@ -99,10 +99,11 @@ void RemeshQueries<Dim>::find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scra
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::roughness(const EdgeKey& edge) const {
+double RemeshQueries<Dim>::roughness(const Place& place) const {
+  const auto edge = place.vertices();
   const auto& at_first = mesh_.cells_of(edge[0]);
   boost::container::small_vector<CellId, Dim == 2 ? 16 : 64> around(at_first.begin(), at_first.end());
-  if (edge[1] != kNone)
+  if (!place.is_vertex())
     for (const CellId c : mesh_.cells_of(edge[1]))
       if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around.push_back(c);
   const auto variation = [&](const VectorX& field, auto&& weight) {
@@ -121,7 +122,7 @@ double RemeshQueries<Dim>::roughness(const EdgeKey& edge) const {
   double result = context_.scaling * variation(fields_.x, stiffness);
   if (context_.has_inertia) {
     const double size =
-        edge[1] == kNone ? mesh_.volume(around[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
+        place.is_vertex() ? mesh_.volume(around[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
     const auto mass = [&](CellId c) { return size * mesh_.volume(c) * context_.materials.at(mesh_.body(c)).density; };
     result += variation(fields_.predictor, mass);
   }

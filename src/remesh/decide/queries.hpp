@@ -42,8 +42,9 @@ class RemeshQueries {
   bool is_cancelled() const { return context_.newton.is_cancelled(); }
 
   double rest_length(const EdgeKey& e) const { return (mesh_.rest(e[0]) - mesh_.rest(e[1])).norm(); }
-  bool exists(const EdgeKey& e) const {  ///< also of a vertex {v, kNone}
-    if (e[1] == kNone) return mesh_.is_vertex_alive(e[0]);
+  bool exists(const Place& place) const {
+    const auto e = place.vertices();
+    if (place.is_vertex()) return mesh_.is_vertex_alive(e[0]);
     return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && mesh_.are_joined(e[0], e[1]);
   }
   bool is_surface(const EdgeKey& e) const {
@@ -59,9 +60,9 @@ class RemeshQueries {
   bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
   /// The same of a trial's edge.
   void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;
-  /// How much the deformation and the history vary over the cells around an edge (a vertex {v, kNone}). No edit gains or
+  /// How much the deformation and the history vary over the cells around an edge or a vertex. No edit gains or
   /// loses energy where both are linear. [J, times the scaling, up to a factor]
-  double roughness(const EdgeKey& edge) const;
+  double roughness(const Place& place) const;
 
   bool screens() const { return itr::screens(options_); }
   /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.

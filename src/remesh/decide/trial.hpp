@@ -35,7 +35,7 @@ struct Verdict {
 /// What was found about a candidate on the mesh as it was when its wave began.
 template <int Dim>
 struct Trial {
-  EdgeQueue::Entry candidate;
+  PlaceQueue::Entry candidate;
   std::optional<Edit<Dim>> edit{};
   double signal = 0;  ///< see RemeshMemory
   bool in_contact = false;
@@ -45,7 +45,7 @@ struct Trial {
   double seconds = 0;       ///< of the preview
   Verdict<Dim> verdict{};
 
-  const EdgeKey& edge() const { return candidate.edge; }
+  EdgeKey edge() const { return candidate.place.edge(); }
   void refuse(Refusal reason) { verdict.refusal = reason; }
   /// Takes the edit of a proposal, or the reason why there is none. Returns whether there is one.
   bool take(Proposal<Dim> proposal) {

@@ -20,13 +20,14 @@ class Collapser {
         tolerance_(options_.acceptance_tolerance.value()) {}
 
   /// Shortest first.
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
+    const EdgeKey edge = place.edge();
     if (!session_.culling().may_collapse(edge) || ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
-    return EdgeQueue::Entry{.edge = edge, .priority = -ask_.rest_length(edge)};
+    return PlaceQueue::Entry{.place = place, .priority = -ask_.rest_length(edge)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey& edge = trial.edge();
+    const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_collapse(edge); refusal != Refusal::none) return trial.refuse(refusal);
     if (session_.memory().depth(edge) >= options_.max_depth) return trial.refuse(Refusal::depth);
     trial.signal = ask_.roughness(edge);
@@ -39,7 +40,7 @@ class Collapser {
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+  void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
     OperationCount& count = session_.report().collapses;
     count.note(trial.verdict.refusal);
     if (!trial.is_asked) return;
@@ -72,7 +73,7 @@ class Collapser {
 template <int Dim>
 void collapse_edges(RemeshSession<Dim>& session) {
   Collapser<Dim> collapser(session);
-  run_waves(session, collapser, session.ask().mesh().edges());
+  run_waves(session, collapser, places(session.ask().mesh().edges()));
   session.memory().forget_depths();
 }
 

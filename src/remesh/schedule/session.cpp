@@ -39,13 +39,14 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
 }
 
 template <int Dim>
-bool RemeshSession<Dim>::shape_matters(const EdgeKey& e, double roughness) const {
-  if (!ask_.screens() || roughness >= ask_.context().scaling * ask_.least_worthwhile() || memory_.was_gain(e)) return true;
+bool RemeshSession<Dim>::shape_matters(const Place& place, double roughness) const {
+  if (!ask_.screens() || roughness >= ask_.context().scaling * ask_.least_worthwhile() || memory_.was_gain(place))
+    return true;
   const Mesh<Dim>& mesh = ask_.mesh();
-  const auto around = mesh.cells_of(e[0]);
+  const auto around = mesh.cells_of(place.vertices().front());
   return std::any_of(around.begin(), around.end(), [&](CellId c) {
     const auto& cell = mesh.cell(c);
-    return (e[1] == kNone || std::find(cell.begin(), cell.end(), e[1]) != cell.end()) &&
+    return std::find(cell.begin(), cell.end(), place.vertices().back()) != cell.end() &&
            mesh.quality(c) < QualityRule{}.floor;
   });
 }

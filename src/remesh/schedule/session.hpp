@@ -32,13 +32,13 @@ class RemeshSession {
   const Culling<Dim>& culling() const { return culling_; }
   RemeshReport& report() { return report_; }
 
-  /// Whether badly shaped cells at an edge (a vertex {v, kNone}) do harm. They do where the fields vary enough, where an
+  /// Whether badly shaped cells at an edge or a vertex do harm. They do where the fields vary enough, where an
   /// edit nearby gained energy, and where a shape is so bad that rules only allow it to improve. Elsewhere swaps and moves
   /// for better shapes would be wasted work.
-  bool shape_matters(const EdgeKey& e, double roughness) const;
-  /// Whether bulk terms at an entry's edge are as they were when it was stamped.
-  bool is_unchanged(const EdgeQueue::Entry& entry) const { return !log_.has_changed_around(entry.edge, entry.since); }
-  EdgeQueue::Entry stamped(EdgeQueue::Entry entry) const {
+  bool shape_matters(const Place& place, double roughness) const;
+  /// Whether bulk terms at an entry's place are as they were when it was stamped.
+  bool is_unchanged(const PlaceQueue::Entry& entry) const { return !log_.has_changed_around(entry.place, entry.since); }
+  PlaceQueue::Entry stamped(PlaceQueue::Entry entry) const {
     entry.since = log_.now();
     return entry;
   }

@@ -10,7 +10,7 @@ SessionMemory<Dim>::SessionMemory(const RemeshMemory& memory, Screening screenin
     : log_(log), remembers_(screening == Screening::bounds) {
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     refused_[kind].reserve(2 * memory.refusals[kind].size());
-    for (const auto& [edge, range] : memory.refusals[kind]) refused_[kind][edge] = range;
+    for (const auto& [place, range] : memory.refusals[kind]) refused_[kind].emplace(place, range);
   }
 }
 
@@ -25,9 +25,9 @@ RemeshMemory SessionMemory<Dim>::remembered(const RemeshQueries<Dim>& ask) const
   RemeshMemory memory;
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     auto& list = memory.refusals[kind];
-    for (const auto& [edge, range] : refused_[kind])
-      if (ask.exists(edge)) list.push_back({edge, range});
-    std::sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.edge < y.edge; });
+    for (const auto& [place, range] : refused_[kind])
+      if (ask.exists(place)) list.push_back({place, range});
+    std::sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.place < y.place; });
   }
   return memory;
 }
