@@ -142,8 +142,10 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
   const ScopedTimer timer(trial.seconds);
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
-  TrialOptions options{.required = context_.scaling * tolerance, .total_volume = total_volume_, .local = local};
-  if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth &&
+  const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
+  TrialOptions options{.required = context_.scaling * tolerance, .local = local};
+  if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
+  if ((!baseline_ || baseline_->has_bounds()) && !moves &&
       (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;

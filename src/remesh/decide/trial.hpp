@@ -63,7 +63,7 @@ struct Trial {
 struct TrialOptions {
   double required = 0;           ///< least gain [J, times the scaling]
   double patch_over_vertex = 0;  ///< see prediction.hpp; 0: bounds decide nothing
-  double total_volume = 0;       ///< of the bodies at rest [m^Dim]
+  double least_volume = 0;       ///< of the patch at rest [m^Dim]
   LocalRelaxationOptions local;
 };
 

@@ -22,7 +22,8 @@ class Collapser {
   /// Shortest first.
   std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
     const EdgeKey edge = place.edge();
-    if (!session_.culling().may_collapse(edge) || ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
+    if (const auto* baseline = session_.baseline(); baseline && !baseline->may_collapse(edge)) return std::nullopt;
+    if (ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
     return PlaceQueue::Entry{.place = place, .priority = -ask_.rest_length(edge)};
   }
 

@@ -74,7 +74,6 @@ class Mover {
         tolerance_(ask_.options().smooth.acceptance_tolerance.value()),
         one_ring_(ask_.options().local) {
     one_ring_.rings = 1;
-    one_ring_.relative_volume = 0;
   }
 
  protected:

@@ -37,7 +37,7 @@ class Refiner {
     const EdgeKey edge = place.edge();
     if (place.is_to_curve()) return rank_curve(edge, scratch);
     if (session_.memory().depth(edge) >= options_.max_depth) return std::nullopt;
-    if (!session_.culling().may_split(edge)) return std::nullopt;
+    if (const auto* baseline = session_.baseline(); baseline && !baseline->may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_split(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
@@ -147,7 +147,7 @@ class Refiner {
     const auto ring = ask_.mesh().cells_of(created);
     for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ring)) {
       if (near[0] != created && near[1] != created) continue;
-      session_.culling().inherit(edge, near);
+      if (session_.baseline()) session_.baseline()->inherit(edge, near);
       session_.memory().set_depth(near, generation);
     }
   }

@@ -11,11 +11,13 @@ namespace itr {
 
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
-                                  const RemeshOptions& options, const RemeshMemory& memory, Strata<Dim>& strata)
-    : gate_(mesh, fields, context),
+                                  const RemeshOptions& options, std::unique_ptr<Baseline<Dim>> baseline,
+                                  const RemeshMemory& memory, Strata<Dim>& strata)
+    : baseline_(std::move(baseline)),
+      gate_(mesh, fields, context),
       log_(mesh, fields.x, context.contact.enabled),
-      ask_(mesh, fields, context, options, strata, gate_),
-      memory_(memory, options.screening, log_),
+      ask_(mesh, fields, context, options, strata, gate_, baseline_.get()),
+      memory_(memory, !baseline_ || baseline_->has_bounds(), log_),
       commits_(mesh, gate_, context.contact.enabled, log_),
       lanes_(context.host.empty() ? num_threads() : 1) {  // terms of the program may not be for several threads
   if (strata.empty()) strata = Strata<Dim>(mesh);

@@ -6,8 +6,8 @@
 namespace itr {
 
 template <int Dim>
-SessionMemory<Dim>::SessionMemory(const RemeshMemory& memory, Screening screening, const ChangeLog<Dim>& log)
-    : log_(log), remembers_(screening == Screening::bounds) {
+SessionMemory<Dim>::SessionMemory(const RemeshMemory& memory, bool remembers, const ChangeLog<Dim>& log)
+    : log_(log), remembers_(remembers) {
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     refused_[kind].reserve(2 * memory.refusals[kind].size());
     for (const auto& [place, range] : memory.refusals[kind]) refused_[kind].emplace(place, range);

@@ -17,8 +17,8 @@ inline constexpr double kSameSignal = 1.2;
 template <int Dim>
 class SessionMemory {
  public:
-  /// Remembers refusals only with screening by bounds.
-  SessionMemory(const RemeshMemory& memory, Screening screening, const ChangeLog<Dim>& log);
+  /// `remembers`: refusals.
+  SessionMemory(const RemeshMemory& memory, bool remembers, const ChangeLog<Dim>& log);
   /// Forgets refusals of the edges of new cells.
   void follow(const Mesh<Dim>& mesh, const Change<Dim>& change);
   /// Refusals of edges that are still there.
