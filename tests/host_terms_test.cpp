@@ -7,10 +7,10 @@
 #include <string>
 
 #include "derivatives.hpp"
+#include "energy/follower.hpp"
 #include "host_block.hpp"
 #include "itr/core/error.hpp"
 #include "itr/energy/elastic/laws.hpp"
-#include "itr/energy/follower.hpp"
 #include "itr/energy/load.hpp"
 #include "itr/energy/point_forces.hpp"
 #include "itr/fem/cell_set.hpp"

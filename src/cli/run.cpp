@@ -17,13 +17,13 @@
 #include <stop_token>
 #include <thread>
 
+#include "core/timer.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
-#include "itr/core/timer.hpp"
 #include "itr/output/writer.hpp"
-#include "itr/simulation/advice.hpp"
 #include "ranks.hpp"
 #include "report.hpp"
+#include "simulation/advice.hpp"
 #include "solver_choice.hpp"
 #include "warnings.hpp"
 

@@ -8,10 +8,10 @@
 #include <map>
 
 #include "arrays.hpp"
+#include "fem/locator.hpp"
 #include "host_term.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/energy/point_forces.hpp"
-#include "itr/fem/locator.hpp"
 #include "itr/simulation/resultant.hpp"
 #include "simulation/cell_stress.hpp"
 

@@ -6,12 +6,12 @@
 #include <memory>
 #include <string>
 
+#include "fem/locator.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/core/error.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/fem/cell_set.hpp"
-#include "itr/fem/locator.hpp"
 #include "itr/fem/quadratic.hpp"
-#include "itr/geometry/bvh.hpp"
 
 namespace itr {
 

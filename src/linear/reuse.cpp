@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "conjugate_gradients.hpp"
-#include "itr/linear/choice.hpp"
-#include "itr/linear/dump.hpp"
+#include "linear/choice.hpp"
+#include "linear/dump.hpp"
 
 namespace itr::linear {
 

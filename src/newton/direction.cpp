@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/core/timer.hpp"
+#include "core/timer.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/projection/safe_projection.hpp"
+#include "projection/safe_projection.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "itr/energy/inertia.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 #include "itr/newton/newton.hpp"
-#include "itr/projection/volume_barrier.hpp"
+#include "projection/volume_barrier.hpp"
 
 namespace itr {
 

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/intersection.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/intersection.hpp"
 #include "mesh/connected_parts.hpp"
 
 namespace itr {

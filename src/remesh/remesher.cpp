@@ -38,21 +38,23 @@ std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& opti
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
-  const bool by_size = options.sizing_field.enabled, may_stir = options.swap.enabled || options.smooth.enabled;
+  auto baseline = Baseline<Dim>::chosen_by(options);
+  const bool by_size = baseline && baseline->decides_by_size(), predicts = !baseline || baseline->predicts();
+  const bool may_stir = options.swap.enabled || options.smooth.enabled;
   const bool refines = options.split.enabled || options.curve.enabled;
-  const bool asks_what_is_available = (refines && !by_size) || (may_stir && screens(options));
+  const bool asks_what_is_available = (refines && !by_size) || (may_stir && predicts);
   // If the available energy is less than the least gain of one split, shapes do not matter either: a body in flight.
   const bool is_enough_there = !asks_what_is_available ||
                                available_energy(mesh, fields, context) >= context.scaling * least_gain_of_refining(options);
   const bool may_refine = refines && !by_size && is_enough_there;
-  const bool has_to_stir = may_stir && (is_enough_there || !screens(options));
+  const bool has_to_stir = may_stir && (is_enough_there || !predicts);
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
   const bool may_straighten = options.straighten.enabled && !by_size;
   if (!may_refine && !(may_straighten && mesh.has_nodes()) && !may_collapse && !has_to_stir && !by_size) return {};
   memory.begin(tolerances_of(options));
-  RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
+  RemeshSession<Dim> session(mesh, fields, context, options, std::move(baseline), memory, strata);
   RemeshReport& report = session.report();
-  session.culling().rank(session.ask());
+  if (session.baseline()) session.baseline()->rank(session.ask());
   if (by_size) {
     follow_sizing_field(session);
   } else {

@@ -7,8 +7,8 @@
 
 #include "cell_stress.hpp"
 #include "itr/energy/inertia.hpp"
-#include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/resultant.hpp"
+#include "simulation/contact_surface.hpp"
 
 namespace itr {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/history_transfer.hpp"
+#include "simulation/history_transfer.hpp"
 
-#include "itr/projection/safe_projection.hpp"
-#include "itr/projection/transfer_patch.hpp"
+#include "projection/safe_projection.hpp"
+#include "projection/transfer_patch.hpp"
 #include "simulation/patch_surface.hpp"
 
 namespace itr {

@@ -9,12 +9,12 @@
 #include <string>
 #include <utility>
 
+#include "core/process.hpp"
 #include "incoming_state.hpp"
 #include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/process.hpp"
-#include "itr/linear/choice.hpp"
-#include "itr/simulation/step.hpp"
+#include "linear/choice.hpp"
+#include "simulation/step.hpp"
 #include "unsupported.hpp"
 #include "watch.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 #include <fmt/format.h>
 
@@ -11,9 +11,9 @@
 #include <optional>
 #include <utility>
 
+#include "core/timer.hpp"
 #include "diagnosis.hpp"
-#include "itr/core/timer.hpp"
-#include "itr/energy/follower.hpp"
+#include "energy/follower.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr {

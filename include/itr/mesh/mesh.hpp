@@ -86,7 +86,7 @@ struct Edit {
   };
 
   Kind kind;
-  EdgeKey edge{kNone, kNone};  ///< the edge; of a 2-3 swap the one it makes; for a smooth {vertex, kNone}
+  EdgeKey edge{kNone, kNone};  ///< the edge; of a 2-3 swap the one it makes; of a smooth none
   std::vector<CellId> removed_cells{};
   std::vector<NewCell> inserted_cells{};
   std::vector<FacetId> removed_facets{};

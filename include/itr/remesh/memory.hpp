@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/remesh/place.hpp"
 
 namespace itr {
 
@@ -24,13 +24,13 @@ struct RemeshMemory {
     }
   };
   struct Entry {
-    EdgeKey edge;  ///< smaller vertex first; {vertex, kNone} of a vertex that was not moved
+    Place place;
     SignalRange range;
   };
   enum Kind { split, collapse, swap, smooth, reshape, curve, straighten };
   static constexpr int kKinds = 7;
   using Refusals = std::array<std::vector<Entry>, kKinds>;
-  Refusals refusals;  ///< by Kind; ascending by edge
+  Refusals refusals;  ///< by Kind; ascending by place
   /// By Kind, the strictest that a refusal was given under [J]; none before the first.
   std::array<std::optional<double>, kKinds> tolerances{};
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <compare>
 
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 #include "itr/mesh/mesh.hpp"
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/geometry/measures.hpp"
-#include "itr/projection/forgotten_history.hpp"
+#include "geometry/measures.hpp"
+#include "projection/forgotten_history.hpp"
 #include "remesh/curved_cell.hpp"
 
 namespace itr {

@@ -13,10 +13,10 @@
 #include <boost/container/small_vector.hpp>
 #include "energy/elastic/point.hpp"
 #include "energy/load_points.hpp"
+#include "geometry/measures.hpp"
 #include "itr/fem/mass.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/remesh/edits.hpp"
 #include "remesh/curved_cell.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 

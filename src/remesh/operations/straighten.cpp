@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
 namespace itr {
@@ -21,15 +21,16 @@ class Straightener {
         count_(session.report().straightens) {}
 
   /// The cheapest first.
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>& scratch) const {
+    const EdgeKey edge = place.edge();
     if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_straighten(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), false)) return std::nullopt;
-    return EdgeQueue::Entry{.edge = edge, .priority = gain};
+    return PlaceQueue::Entry{.place = place, .priority = gain};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey& edge = trial.edge();
+    const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_straighten(edge); refusal != Refusal::none) return trial.refuse(refusal);
     const double gain =
         session_.is_unchanged(trial.candidate) ? trial.candidate.priority : ask_.predict_straighten(edge, scratch);
@@ -39,7 +40,7 @@ class Straightener {
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+  void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
     count_.note(trial.verdict.refusal);
     if (!trial.is_asked) return;
     if (session_.commits().commit(trial, count_)) {
@@ -65,8 +66,8 @@ class Straightener {
 template <int Dim>
 void straighten_edges(RemeshSession<Dim>& session) {
   Straightener<Dim> straightener(session);
-  std::vector<EdgeKey> edges;
-  for (const auto& [edge, node] : session.ask().mesh().nodes()) edges.push_back(edge);
+  std::vector<Place> edges;
+  for (const auto& [edge, node] : session.ask().mesh().nodes()) edges.emplace_back(edge);
   run_waves(session, straightener, std::move(edges));
 }
 
