@@ -45,7 +45,7 @@ class Refiner {
     if (session_.memory().was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
     return EdgeQueue::Entry{
         .edge = edge,
-        .priority = gain / nodes_of_split(edge),
+        .priority = gain / nodes_of_split(ask_.mesh(), edge),
         .is_hopeless = !in_contact && ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, tolerance_)};
   }
 
@@ -56,7 +56,8 @@ class Refiner {
     ask_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
     if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return trial.refuse(Refusal::prediction);
-    trial.signal = is_known ? trial.candidate.priority * nodes_of_split(edge) : ask_.predict_split(edge, scratch);
+    trial.signal =
+        is_known ? trial.candidate.priority * nodes_of_split(ask_.mesh(), edge) : ask_.predict_split(edge, scratch);
     trial.edit = make_split(ask_.mesh(), edge);
     if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, trial.signal, tolerance_))  // there trials tell
       return trial.refuse(Refusal::prediction);
@@ -114,13 +115,6 @@ class Refiner {
     if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, curve_tolerance_, ask_.options().local, scratch);
-  }
-
-  /// By how many nodes a split enlarges the space.
-  double nodes_of_split(const EdgeKey& edge) const {
-    if (!ask_.mesh().has_nodes()) return 1;
-    const Edit<Dim> edit = make_split(ask_.mesh(), edge);
-    return 1 + static_cast<double>(edit.inserted_nodes.size()) - static_cast<double>(edit.removed_nodes.size());
   }
 
   Refusal refuse(const EdgeKey& edge) const {
