@@ -234,14 +234,15 @@ TEST(Edits3D, EdgeRemovalHasTheLeastCostOfAllTriangulations) {
       Strata<3> strata(mesh);
       const unsigned salt = random();
       // Any number by the cell's vertices, sometimes infinite, sometimes negative.
-      const CellCost cost = [&](const Mesh<3>::Cell& cell, int body) {
+      const CellCost cost = [&](const Mesh<3>::Cell& cell, int body, const Edit<3>&) {
         EXPECT_EQ(body, 1);
         unsigned hash = salt;
         for (const int v : ascending(cell)) hash = (hash ^ static_cast<unsigned>(v)) * 2654435761u;
         return hash >> 16 & 15 ? (hash >> 8 & 1023) - 100.0 : HUGE_VAL;
       };
+      const Edit<3> none{.kind = Edit<3>::Kind::swap};
       const double expected = least_sum(0, n - 1, [&](int i, int k, int j) {
-        return cost({2 + i, 2 + k, 2 + j, 1}, 1) + cost({2 + i, 2 + j, 2 + k, 0}, 1);
+        return cost({2 + i, 2 + k, 2 + j, 1}, 1, none) + cost({2 + i, 2 + j, 2 + k, 0}, 1, none);
       });
       const auto proposal = propose_edge_removal(mesh, strata, {0, 1}, cost, kAnything);
       EXPECT_EQ(proposal.edit.has_value(), expected < HUGE_VAL);
@@ -251,7 +252,7 @@ TEST(Edits3D, EdgeRemovalHasTheLeastCostOfAllTriangulations) {
         continue;
       }
       double sum = 0;
-      for (const auto& cell : proposal.edit->inserted_cells) sum += cost(cell.vertices, cell.body);
+      for (const auto& cell : proposal.edit->inserted_cells) sum += cost(cell.vertices, cell.body, *proposal.edit);
       EXPECT_EQ(sum, expected);
       EXPECT_EQ(proposal.edit->inserted_cells.size(), 2u * (n - 2));
       const double volume = mesh.total_volume();

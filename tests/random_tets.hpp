@@ -210,7 +210,7 @@ enum class Operation { split, collapse, edge_removal, facet_removal, move };
 
 /// 1 / quality: what makes good cells.
 inline CellCost shape_cost(const Mesh<3>& mesh) {
-  return [&mesh](const Mesh<3>::Cell& cell, int) {
+  return [&mesh](const Mesh<3>::Cell& cell, int, const Edit<3>&) {
     return 1 / simplex_quality<3>({mesh.rest(cell[0]), mesh.rest(cell[1]), mesh.rest(cell[2]), mesh.rest(cell[3])});
   };
 }

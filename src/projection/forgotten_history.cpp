@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "projection/forgotten_history.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
 
@@ -20,16 +21,24 @@ Simplex<Dim> simplex_of(const TransferMesh<Dim>& mesh, std::size_t cell) {
 template <int Dim>
 VectorX lumped_masses(const TransferMesh<Dim>& mesh) {
   VectorX masses = VectorX::Zero(static_cast<Eigen::Index>(mesh.rest.size()));
-  for (std::size_t c = 0; c < mesh.cells.size(); ++c)
-    for (const int v : mesh.cells[c]) masses[v] += mesh.density[c] * simplex_of(mesh, c).volume / (Dim + 1);
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    const double mass = mesh.density[c] * simplex_of(mesh, c).volume;
+    const CurvedEdges curved = mesh.curved_edges(c);
+    if (!curved)
+      for (const int v : mesh.cells[c]) masses[v] += mass / (Dim + 1);
+    else  // 0 at straight edges
+      for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+        masses[mesh.nodes[c][k]] += mass * quadratic_mass<Dim>(MassKind::lumped, curved)(k, k);
+  }
   return masses;
 }
 
-/// Where a point is in a mesh that covers it: vertices and weights.
+/// Where a point is in a mesh that covers it: nodes and weights.
 template <int Dim>
 struct Place {
-  std::array<int, Dim + 1> vertices{};
-  Vec<Dim + 1> weights = Vec<Dim + 1>::Unit(0);
+  static constexpr int kNodes = kQuadraticNodes<Dim>;
+  std::array<int, kNodes> vertices{};
+  Vec<kNodes> weights = Vec<kNodes>::Unit(0);
 
   Place(const TransferMesh<Dim>& mesh, const Vec<Dim>& X) {
     for (std::size_t v = 0; v < mesh.rest.size(); ++v)
@@ -42,13 +51,21 @@ struct Place {
       const Vec<Dim + 1> here = simplex_of(mesh, c).barycentric(X);
       if (here.minCoeff() <= deepest) continue;
       deepest = here.minCoeff();
-      vertices = mesh.cells[c];
-      weights = here;
+      weights.setZero();
+      if (const CurvedEdges curved = mesh.curved_edges(c)) {
+        vertices = mesh.nodes[c];
+        std::array<double, Dim + 1> l;
+        for (int k = 0; k <= Dim; ++k) l[k] = here[k];
+        weights = quadratic_shapes<Dim>(curved, l);
+      } else {
+        std::copy(mesh.cells[c].begin(), mesh.cells[c].end(), vertices.begin());
+        weights.template head<Dim + 1>() = here;
+      }
     }
   }
   Vec<Dim> value(const MatrixX& rows) const {
     Vec<Dim> sum = Vec<Dim>::Zero();
-    for (int k = 0; k <= Dim; ++k) sum += weights[k] * rows.row(vertices[k]).transpose();
+    for (int k = 0; k < kNodes; ++k) sum += weights[k] * rows.row(vertices[k]).transpose();
     return sum;
   }
 };
@@ -64,7 +81,7 @@ ForgottenHistory forgotten_by_vertices(const TransferMesh<Dim>& old_patch, const
     const Place<Dim> place(new_patch, old_patch.rest[j]);
     const Vec<Dim> gap = place.value(new_predictor) - old_predictor.row(j).transpose();
     squares += old_mass[j] * (gap.squaredNorm() + place.value(way).squaredNorm());
-    for (int k = 0; k <= Dim; ++k)
+    for (int k = 0; k < Place<Dim>::kNodes; ++k)
       forgotten.residual.row(place.vertices[k]) += place.weights[k] * old_mass[j] * gap.transpose();
   }
   forgotten.loss = squares / 2;

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 
+#include "geometry/measures.hpp"
+#include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadratic.hpp"
+#include "itr/fem/quadrature.hpp"
 #include "itr/remesh/fields.hpp"
 
 namespace itr {
@@ -54,6 +57,22 @@ CurvedCell<Dim> curved_cell(const std::array<VertexId, Dim + 1>& vertices, const
     if (node != kNone) cell.edges = static_cast<CurvedEdges>(cell.edges | 1 << edge);
   });
   return cell;
+}
+
+template <int Dim>
+CurvedCell<Dim> cell_before(const Mesh<Dim>& mesh, CellId c) {
+  if (!mesh.has_nodes()) return {};
+  return curved_cell<Dim>(mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
+}
+
+/// Calls f(gradient, share of the volume) at the points of a rule that integrates squares of the gradient of a field on a
+/// cell with curved edges.
+template <int Dim, typename F>
+void for_each_gradient(const CurvedCell<Dim>& cell, const Mat<Dim>& inverse_edges, const VectorX& field, const F& f) {
+  const auto linear = barycentric_gradients<Dim>(inverse_edges);
+  const auto values = at_nodes<Dim>(cell.nodes, field);
+  for (const auto& point : quadrature<Dim>(2))
+    f(Mat<Dim>(values * quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear).transpose()), point.share);
 }
 
 template <int Dim>

@@ -37,6 +37,10 @@ struct QualityRule {
 template <int Dim>
 Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
 
+/// By how many nodes, the new vertex among them, a split enlarges the space.
+template <int Dim>
+int nodes_of_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
+
 /// Makes an edge curved. Its node is at the mean of the ends at rest and in all fields. The cells at the edge are replaced
 /// by themselves, so that whoever looks for changed cells finds them.
 template <int Dim>
@@ -46,32 +50,37 @@ Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge);
 template <int Dim>
 Edit<Dim> make_straighten(const Mesh<Dim>& mesh, const EdgeKey& edge);
 
-/// Collapses an edge where no cell around it has a curved edge (the same holds for swaps, removals and moves below) and
-/// where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev
+// Operations below replace edges. A new edge takes over whether it is curved from those that it replaces. Its node has what
+// the old functions have at its place, so that fields are their interpolants. Edges that are there before and after, with
+// both ends where they were, keep their nodes.
+
+/// Collapses an edge where that keeps every stratum's topology (the link conditions of Dey, Edelsbrunner, Guha & Nekhayev
 /// 1999 in the volume, on patches and along features) and the rest shape exactly: an end may go where the edge is of its own
 /// stratum (in the volume, within its patch, along its straight feature). Where both may, the midpoint is tried first, then
-/// either end.
+/// either end. An edge at the vertex that stays is curved if one of those that it replaces was, on the boundary one there.
 template <int Dim>
 Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata, const EdgeKey& edge,
                                const QualityRule& rule = {});
 
-/// Cost of a tetrahedron that an edit would insert, by its vertices (positively oriented) and body; infinite: never.
-using CellCost = std::function<double(const MeshTypes<3>::Cell& vertices, int body)>;
+/// Cost of a tetrahedron that an edit would insert, by its vertices (positively oriented) and body; infinite: never. The
+/// edit has the nodes of its edges.
+using CellCost = std::function<double(const MeshTypes<3>::Cell& vertices, int body, const Edit<3>& edit)>;
 
 /// The longest ring whose triangulations are searched.
 inline constexpr int kLongestRing = 7;
 
-/// Swaps the diagonal of the two triangles at an edge inside a body.
+/// Swaps the diagonal of the two triangles at an edge inside a body. The new one is curved if the old one is.
 Proposal<2> propose_diagonal_swap(const Mesh<2>& mesh, const Strata<2>& strata, const EdgeKey& edge,
                                   const QualityRule& rule = {});
 
 /// Removes an edge: the ring around it is triangulated such that the sum of the new cells' costs is least (Klincsek 1980;
 /// the 3-2 and 4-4 swaps are rings of 3 and 4), each of them by the rule. Also within a patch of the surface (2-2 and on) or
-/// of an interface, where the facets at the edge swap in their plane.
+/// of an interface, where the facets at the edge swap in their plane. New edges are curved if the edge is.
 Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, const EdgeKey& edge, const CellCost& cost,
                                  const QualityRule& rule = {});
 
-/// Replaces the two cells at an inner facet by three around the edge between their other vertices (2-3 swap).
+/// Replaces the two cells at an inner facet by three around the edge between their other vertices (2-3 swap), which is
+/// curved if all edges of the facet are.
 Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet& facet, const QualityRule& rule = {});
 
 /// Moves a vertex's rest position as far towards `target` as its stratum goes: in the volume to it, otherwise to its

@@ -59,8 +59,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
     follow_sizing_field(session);
   } else {
     if (may_refine) refine_edges(session);
-    if (may_straighten && mesh.has_nodes()) straighten_edges(session);
-    if (options.collapse.enabled) collapse_edges(session);
+    if (options.collapse.enabled || (may_straighten && mesh.has_nodes())) coarsen_edges(session);
   }
   if (may_stir && (has_to_stir || report.accepted() > 0)) {
     session.memory().mark_gains();

@@ -83,7 +83,7 @@ struct Body<3> {
   }
   /// Elastic energy at frozen positions.
   CellCost elastic_cost() const {
-    return [this](const Mesh<3>::Cell& cell, int) {
+    return [this](const Mesh<3>::Cell& cell, int, const Edit<3>&) {
       std::array<Vec<3>, 4> X, p;
       for (int k = 0; k < 4; ++k) X[k] = mesh.rest(cell[k]), p[k] = x.segment<3>(3 * cell[k]);
       const Mat<3> edges = edge_matrix<3>(X);

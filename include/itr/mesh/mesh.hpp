@@ -63,19 +63,19 @@ struct Edit {
     Facet vertices;
     Facet parent;  ///< the removed one whose place it takes a part of, or one of them
   };
+  static constexpr int kMostParents = (Dim + 1) * (Dim + 2) / 2;  ///< the nodes of a cell
   /// The one vertex whose position and field values the edit sets: kNewVertex, or one that stays.
   struct Value {
     VertexId vertex;
-    Vec<Dim> rest;                            ///< new rest position [m]
-    std::array<VertexId, Dim + 1> parents{};  ///< its fields are the weighted sums over parents of the old mesh
-    std::array<double, Dim + 1> weights{};
+    Vec<Dim> rest;                                 ///< new rest position [m]
+    std::array<VertexId, kMostParents> parents{};  ///< its fields are the weighted sums over parents of the old mesh
+    std::array<double, kMostParents> weights{};
     int num_parents = 0;
     int tag = kNoTag;  ///< of a new vertex
   };
-  /// The node of an edge that the edit curves, with fields as those of a Value.
+  /// The node of an edge that the edit curves, or that lies elsewhere after it, with fields as those of a Value.
   struct NewNode {
-    static constexpr int kMostParents = 6;  ///< the nodes of a triangle
-    EdgeKey edge;                           ///< smaller id first
+    EdgeKey edge;  ///< smaller id first
     std::array<VertexId, kMostParents> parents{};
     std::array<double, kMostParents> weights{};
     int num_parents = 0;
@@ -96,7 +96,7 @@ struct Edit {
   std::optional<Value> value{};
   VertexId removed_vertex = kNone;
   std::vector<NewNode> inserted_nodes{};
-  std::vector<EdgeKey> removed_nodes{};  ///< edges that are gone or straight after the edit
+  std::vector<EdgeKey> removed_nodes{};  ///< edges that are gone, straight or elsewhere after the edit
 
   /// Whether the space after the edit contains the one before, so that every field stays the function that it was.
   bool is_nested() const { return kind == Kind::split || kind == Kind::curve; }

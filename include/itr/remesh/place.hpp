@@ -10,19 +10,19 @@
 
 namespace itr {
 
-/// What an operation of remeshing asks about: an edge, an edge that may become curved, or a vertex.
+/// What an operation of remeshing asks about: an edge, the node of an edge (that it has or may get), or a vertex.
 class Place {
  public:
   Place() = default;                                                                            ///< none
   Place(const EdgeKey& edge) : ids_{std::min(edge[0], edge[1]), std::max(edge[0], edge[1])} {}  // NOLINT: an edge is one
-  static Place to_curve(const EdgeKey& edge) { return of_ids(std::max(edge[0], edge[1]), std::min(edge[0], edge[1])); }
+  static Place node_of(const EdgeKey& edge) { return of_ids(std::max(edge[0], edge[1]), std::min(edge[0], edge[1])); }
   static Place at_vertex(VertexId vertex) { return of_ids(vertex, kNone); }
 
   bool is_vertex() const { return ids_[1] == kNone; }
-  bool is_to_curve() const { return !is_vertex() && ids_[0] > ids_[1]; }
+  bool is_node() const { return !is_vertex() && ids_[0] > ids_[1]; }
   VertexId vertex() const { return ids_[0]; }
   /// Smaller id first.
-  EdgeKey edge() const { return is_to_curve() ? EdgeKey{ids_[1], ids_[0]} : ids_; }
+  EdgeKey edge() const { return is_node() ? EdgeKey{ids_[1], ids_[0]} : ids_; }
   /// The vertex, or the ends of the edge.
   std::span<const VertexId> vertices() const { return {ids_.data(), is_vertex() ? std::size_t{1} : std::size_t{2}}; }
 
@@ -38,7 +38,7 @@ class Place {
     place.ids_ = {a, b};
     return place;
   }
-  EdgeKey ids_{kNone, kNone};  ///< {vertex, kNone}; of an edge to curve the larger one first
+  EdgeKey ids_{kNone, kNone};  ///< {vertex, kNone}; of a node the larger one first
 };
 
 }  // namespace itr

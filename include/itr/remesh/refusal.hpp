@@ -26,14 +26,12 @@ enum class Refusal : char {
   outside,    ///< the target of a move lies outside of the cells around
   cost,       ///< infinite cost of each triangulation of the ring
   // A trial refused the edit.
-  invalid,      ///< some stored configuration would have inversions or intersections
-  bound,        ///< the energy cannot fall by enough: the new vertex alone tells
-  energy,       ///< a relaxed patch does not gain enough
-  no_unknowns,  ///< nothing of the patch is free
-  // Of scenes with curved edges.
-  curved  ///< a cell that would be replaced or changed in shape has a curved edge
+  invalid,     ///< some stored configuration would have inversions or intersections
+  bound,       ///< the energy cannot fall by enough: the new vertex alone tells
+  energy,      ///< a relaxed patch does not gain enough
+  no_unknowns  ///< nothing of the patch is free
 };
-inline constexpr int kRefusals = static_cast<int>(Refusal::curved) + 1;
+inline constexpr int kRefusals = static_cast<int>(Refusal::no_unknowns) + 1;
 /// As in `steps.jsonl`.
 std::string_view name(Refusal refusal);
 

@@ -10,6 +10,44 @@
 
 namespace itr {
 
+namespace {
+
+/// Cells before or after an edit, in a numbering of their own.
+template <int Dim>
+struct CellsOfOneSide {
+  std::vector<VertexId> ids;  ///< vertices and nodes
+  std::vector<Vec<Dim>> rest;
+  std::vector<std::array<int, Dim + 1>> cells;
+  std::vector<double> density;
+  std::vector<std::array<int, kQuadraticNodes<Dim>>> nodes;
+  std::vector<CurvedEdges> curved;
+
+  void add(const std::array<VertexId, Dim + 1>& vertices, const CurvedCell<Dim>& cell, double density_of_cell) {
+    cells.push_back(numbered(vertices));
+    density.push_back(density_of_cell);
+    curved.push_back(cell.edges);
+    nodes.push_back(cell.edges ? numbered(cell.nodes) : std::array<int, kQuadraticNodes<Dim>>{});
+  }
+  TransferMesh<Dim> view() const {
+    const bool is_linear = std::all_of(curved.begin(), curved.end(), [](CurvedEdges edges) { return edges == 0; });
+    return is_linear ? TransferMesh<Dim>{rest, cells, density} : TransferMesh<Dim>{rest, cells, density, nodes, curved};
+  }
+
+ private:
+  template <std::size_t N>
+  std::array<int, N> numbered(const std::array<VertexId, N>& of_mesh) {
+    std::array<int, N> numbers;
+    for (std::size_t k = 0; k < N; ++k) {
+      const auto it = std::find(ids.begin(), ids.end(), of_mesh[k]);
+      numbers[k] = static_cast<int>(it - ids.begin());
+      if (it == ids.end()) ids.push_back(of_mesh[k]);
+    }
+    return numbers;
+  }
+};
+
+}  // namespace
+
 /// Keeps vertices of the surface within `room` of their start, because the patch knows only what they could touch there. It
 /// is an energy of value zero that only limits steps.
 template <int Dim>
@@ -505,46 +543,29 @@ void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
 template <int Dim>
 void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) const {
   if (edit_.kind == Edit<Dim>::Kind::straighten) return add_history_of_node(inertia);
-  // Numbering of the removed cells' own: their vertices carry the functions as they were.
-  std::vector<VertexId> old_ids, new_ids;
-  std::vector<std::array<int, Dim + 1>> old_cells, new_cells;
-  std::vector<double> old_density, new_density;
-  const auto numbered = [](std::vector<VertexId>& ids, const auto& cell) {
-    std::array<int, Dim + 1> numbers;
-    for (int k = 0; k <= Dim; ++k) {
-      const auto it = std::find(ids.begin(), ids.end(), cell[k]);
-      numbers[k] = static_cast<int>(it - ids.begin());
-      if (it == ids.end()) ids.push_back(cell[k]);
-    }
-    return numbers;
-  };
+  // Numberings of the two sides' own: the nodes of removed cells carry the functions as they were.
+  CellsOfOneSide<Dim> old_side, new_side;
   const auto density = [&](int body) { return state_.context.materials.at(body).density; };
-  for (const CellId c : edit_.removed_cells) {
-    old_cells.push_back(numbered(old_ids, mesh_.cell(c)));
-    old_density.push_back(density(mesh_.body(c)));
-  }
-  for (const auto& cell : edit_.inserted_cells) {
-    new_cells.push_back(numbered(new_ids, cell.vertices));
-    new_density.push_back(density(cell.body));
-  }
-  const auto of_mesh = [](VertexId v) { return LocalVertex{v == kNewVertex ? Kind::created : Kind::of_mesh, v}; };
-  std::vector<Vec<Dim>> old_rest, new_rest;
-  for (const VertexId v : old_ids) old_rest.push_back(mesh_.rest(v));
-  for (const VertexId v : new_ids) new_rest.push_back(rest_position(of_mesh(v)));
-  const TransferMesh<Dim> old_mesh{old_rest, old_cells, old_density}, new_mesh{new_rest, new_cells, new_density};
+  for (const CellId c : edit_.removed_cells) old_side.add(mesh_.cell(c), cell_before(mesh_, c), density(mesh_.body(c)));
+  for (const auto& cell : edit_.inserted_cells)
+    new_side.add(cell.vertices, curved_cell_after(mesh_, edit_, cell.vertices), density(cell.body));
+  const auto local_vertex = [&](VertexId v) { return LocalVertex{is_created(v) ? Kind::created : Kind::of_mesh, v}; };
+  for (const VertexId v : old_side.ids) old_side.rest.push_back(mesh_.rest(v));
+  for (const VertexId v : new_side.ids) new_side.rest.push_back(rest_position(local_vertex(v)));
   const VectorX& predictor = state_.fields.predictor;
+  const std::vector<VertexId>&old_ids = old_side.ids, &new_ids = new_side.ids;
   MatrixX old_predictor(old_ids.size(), Dim), new_predictor(new_ids.size(), Dim), new_x(new_ids.size(), Dim);
   for (std::size_t i = 0; i < old_ids.size(); ++i)
     old_predictor.row(i) = predictor.segment<Dim>(Dim * old_ids[i]).transpose();
   for (std::size_t i = 0; i < new_ids.size(); ++i) {
-    new_predictor.row(i) = field_value(predictor, {}, of_mesh(new_ids[i])).transpose();
-    new_x.row(i) = field_value(state_.fields.x, {}, of_mesh(new_ids[i])).transpose();
+    new_predictor.row(i) = field_value(predictor, {}, local_vertex(new_ids[i])).transpose();
+    new_x.row(i) = field_value(state_.fields.x, {}, local_vertex(new_ids[i])).transpose();
   }
   const ForgottenHistory forgotten =
-      forgotten_history<Dim>(state_.context.mass, old_mesh, new_mesh, old_predictor, new_predictor, new_x);
+      forgotten_history<Dim>(state_.context.mass, old_side.view(), new_side.view(), old_predictor, new_predictor, new_x);
   VectorX residual = VectorX::Zero(Dim * static_cast<int>(vertices_.size()));
   for (std::size_t i = 0; i < new_ids.size(); ++i) {
-    const auto at = std::find(vertices_.begin(), vertices_.end(), of_mesh(new_ids[i])) - vertices_.begin();
+    const auto at = std::find(vertices_.begin(), vertices_.end(), local_vertex(new_ids[i])) - vertices_.begin();
     residual.segment<Dim>(Dim * at) = forgotten.residual.row(i).transpose();
   }
   inertia.set_unrepresented_history(residual, forgotten.loss);

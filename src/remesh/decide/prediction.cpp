@@ -156,6 +156,36 @@ class QuadraticModel {
         gradient_ -= context_.scaling * weight * context_.loads.acceleration((mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2);
     }
   }
+  /// The energy of a cell with curved edges after an edit.
+  void add_still_curved_cell(const RemeshState<Dim>& state, const CurvedCell<Dim>& cell, int body, const Edit<Dim>& edit) {
+    std::array<Vec<Dim>, Dim + 1> rest;
+    for (int k = 0; k <= Dim; ++k) rest[k] = state.mesh.rest(cell.nodes[k]);
+    const Mat<Dim> edges = edge_matrix<Dim>(rest);
+    const auto linear = barycentric_gradients<Dim>(edges.inverse());
+    const Material& material = context_.materials.at(body);
+    const double volume = simplex_volume<Dim>(edges);
+    const auto place = [&](const auto& l) {
+      Vec<Dim> X = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) X += l[k] * rest[k];
+      return X;
+    };
+    const QuadraticCell<Dim> x = cell.values(state.fields.x, edit);
+    for (const auto& point : quadrature<Dim>(context_.quadrature_degree)) {
+      const ElasticModuli moduli = elastic_moduli<Dim>(material, place(point.weights));
+      const Mat<Dim> F = x * quadratic_gradients<Dim, Dim>(kAllCurved<Dim>, point.weights, linear).transpose();
+      energy_ += context_.scaling * volume * point.share * elastic_density<Dim>(F, moduli);
+    }
+    const QuadraticCell<Dim> way =
+        context_.has_inertia ? QuadraticCell<Dim>(x - cell.values(state.fields.predictor, edit)) : x;
+    for (const auto& point : quadrature<Dim>(kMassDegree)) {
+      const auto shapes = quadratic_shapes<Dim>(kAllCurved<Dim>, point.weights);
+      const Vec<Dim> X = place(point.weights);
+      const double weight = point.share * mass_density<Dim>(material, X) * volume;
+      if (context_.has_inertia) energy_ += 0.5 * weight * (way * shapes).squaredNorm();
+      if (context_.loads.acceleration)
+        energy_ -= context_.scaling * weight * context_.loads.acceleration(X).dot(x * shapes - X);
+    }
+  }
   /// The same of a facet at the edge.
   void add_curved_facet(const std::array<Vec<Dim>, Dim>& rest, const Vec<Dim>& middle, int tag) {
     constexpr double kSecond = 1.0 / (Dim * (Dim + 1));
@@ -354,7 +384,10 @@ double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   const StepContext<Dim>& context = state.context;
-  if (!is_predictable(context)) return kUnknown;
+  const auto is_curved = [&](CellId c) { return state.mesh.is_curved(c); };
+  if (!is_predictable(context) ||
+      (state.mesh.has_nodes() && std::any_of(edit.removed_cells.begin(), edit.removed_cells.end(), is_curved)))
+    return kUnknown;
   if (!edit.value) return predict_gain_of_swap(state, edit);
   const VertexId set = edit.value->vertex;
   const auto at = [&](const VectorX& field, VertexId v, bool after) {
@@ -452,9 +485,14 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
 }
 
 template <int Dim>
-double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body) {
+double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body,
+                   const Edit<Dim>& edit) {
   QuadraticModel<Dim> model(state.context);
-  model.add_cell(corners_of(state, cell), body, kNone);
+  const auto curved = curved_cell_after(state.mesh, edit, cell);
+  if (curved.edges)
+    model.add_still_curved_cell(state, curved, body, edit);
+  else
+    model.add_cell(corners_of(state, cell), body, kNone);
   return model.energy();
 }
 
@@ -464,7 +502,7 @@ template double predict_split(const RemeshState<2>&, const EdgeKey&);
 template double predict_split(const RemeshState<3>&, const EdgeKey&);
 template double predict_curve(const RemeshState<2>&, const EdgeKey&);
 template double predict_curve(const RemeshState<3>&, const EdgeKey&);
-template double cell_energy<2>(const RemeshState<2>&, const MeshTypes<2>::Cell&, int);
-template double cell_energy<3>(const RemeshState<3>&, const MeshTypes<3>::Cell&, int);
+template double cell_energy<2>(const RemeshState<2>&, const MeshTypes<2>::Cell&, int, const Edit<2>&);
+template double cell_energy<3>(const RemeshState<3>&, const MeshTypes<3>::Cell&, int, const Edit<3>&);
 
 }  // namespace itr

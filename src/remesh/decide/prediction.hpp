@@ -21,7 +21,7 @@ inline constexpr double kPatchOverVertexInContact = Dim == 2 ? 30 : 10;
 
 /// What an edit is predicted to gain when only the vertex that it sets relaxes, to second order: a microsecond. Elasticity,
 /// inertia (history interpolated) and dead loads; contact and friction left out. [J, times the scaling]
-/// Infinite where the scene has pressure, damping or terms of the program, of which it knows nothing.
+/// Infinite where it knows nothing: of pressure, damping, terms of the program and cells with curved edges.
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 
@@ -35,9 +35,10 @@ template <int Dim>
 double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge);
 
 /// Elasticity, inertia and body forces of a cell on vertices of the mesh, whether it is there or not, at present positions.
-/// [J, times the scaling]
+/// Its curved edges are those after the edit. [J, times the scaling]
 template <int Dim>
-double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body);
+double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body,
+                   const Edit<Dim>& edit);
 
 /// Upper estimate of what an edit gains that has this lower bound.
 inline double at_most(double gain_of_vertex, double factor) {

@@ -7,6 +7,7 @@
 #include <boost/container/small_vector.hpp>
 #include "core/timer.hpp"
 #include "prospect.hpp"
+#include "remesh/curved_cell.hpp"
 #include "remesh/edits.hpp"
 
 namespace itr {
@@ -41,8 +42,6 @@ Refusal RemeshQueries<Dim>::refuse_collapse(const EdgeKey& e) const {
   const double longest = longest_collapse(options_.collapse, context_);
   if (rest_length(e) > longest) return Refusal::length;
   const auto around = mesh_.cells_of_edge(e);
-  if (mesh_.has_nodes() && std::any_of(around.begin(), around.end(), [&](CellId c) { return mesh_.is_curved(c); }))
-    return Refusal::curved;
   const bool is_one_small = std::any_of(around.begin(), around.end(), [&](CellId c) { return is_small(mesh_, c, longest); });
   return is_one_small ? Refusal::none : Refusal::length;
 }
@@ -63,6 +62,12 @@ Refusal RemeshQueries<Dim>::refuse_straighten(const EdgeKey& e) const {
 template <int Dim>
 double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
   return gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch);
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const {
+  const double gain = predict(edit);
+  return std::isfinite(gain) ? gain : gain_of_vertex<Dim>(state(), edit, scratch);
 }
 
 template <int Dim>
@@ -113,10 +118,17 @@ double RemeshQueries<Dim>::roughness(const Place& place) const {
     Mat<Dim> sum = Mat<Dim>::Zero();
     double total = 0, squares = 0;
     for (const CellId c : around) {
-      const Mat<Dim> gradient = deformation_gradient<Dim>(element_of(mesh_, c), field);
+      const auto element = element_of(mesh_, c);
       const double w = weight(c);
-      sum += w * gradient;
-      squares += w * gradient.squaredNorm();
+      const auto add = [&](const Mat<Dim>& gradient, double share) {
+        sum += share * gradient;
+        squares += share * gradient.squaredNorm();
+      };
+      if (const CurvedCell<Dim> cell = cell_before(mesh_, c); cell.edges)
+        for_each_gradient<Dim>(cell, element.inverse_edges, field,
+                               [&](const Mat<Dim>& gradient, double share) { add(gradient, share * w); });
+      else
+        add(deformation_gradient<Dim>(element, field), w);
       total += w;
     }
     return std::max(0.0, squares - sum.squaredNorm() / total);
@@ -148,7 +160,8 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
   const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
   TrialOptions options{.required = context_.scaling * tolerance, .local = local};
   if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
-  if ((!baseline_ || baseline_->has_bounds()) && !moves &&
+  // Of a move or a swap, the nodes that it sets do not tell what the vertices around them gain.
+  if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap &&
       (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;

@@ -73,9 +73,11 @@ class RemeshQueries {
   double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
   double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
   double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
-  /// Energy of a cell, which need not be in the mesh, at present positions. [J, times the scaling]
-  double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body) const {
-    return cell_energy<Dim>(state(), cell, body);
+  /// By what the vertex and the nodes that it sets gain where there are curved edges.
+  double predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const;
+  /// Energy of a cell, which need not be in the mesh, on the nodes of an edit at present positions. [J, times the scaling]
+  double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body, const Edit<Dim>& edit) const {
+    return cell_energy<Dim>(state(), cell, body, edit);
   }
   /// Whether the prediction of an edit of these cells tells that its patch cannot gain the tolerance [J] either.
   bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance) const {

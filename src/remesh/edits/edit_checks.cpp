@@ -7,8 +7,8 @@ namespace itr {
 
 std::string_view name(Refusal refusal) {
   static constexpr std::string_view kNames[] = {
-      "none",   "not_asked", "depth", "length",  "dhat", "prediction", "gone",  "non_manifold", "held",        "link",
-      "exists", "long_ring", "shape", "outside", "cost", "invalid",    "bound", "energy",       "no_unknowns", "curved"};
+      "none",   "not_asked", "depth", "length",  "dhat", "prediction", "gone",  "non_manifold", "held",       "link",
+      "exists", "long_ring", "shape", "outside", "cost", "invalid",    "bound", "energy",       "no_unknowns"};
   static_assert(std::size(kNames) == kRefusals);
   return kNames[static_cast<int>(refusal)];
 }
@@ -40,13 +40,6 @@ std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, s
   return found;
 }
 
-template <int Dim>
-bool has_curved(const Mesh<Dim>& mesh, std::span<const CellId> cells) {
-  return mesh.has_nodes() && std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh.is_curved(c); });
-}
-
-template bool has_curved(const Mesh<2>&, std::span<const CellId>);
-template bool has_curved(const Mesh<3>&, std::span<const CellId>);
 template bool extends_tags(const Mesh<2>&, const Edit<2>&);
 template bool extends_tags(const Mesh<3>&, const Edit<3>&);
 template std::vector<Mesh<2>::Facet> interfaces_among(const Mesh<2>&, std::span<const CellId>);

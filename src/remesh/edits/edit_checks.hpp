@@ -32,10 +32,6 @@ bool has_tag(const Mesh<Dim>& mesh, const EdgeKey& edge) {
 template <int Dim>
 bool extends_tags(const Mesh<Dim>& mesh, const Edit<Dim>& edit);
 
-/// Whether an edge of these cells is curved.
-template <int Dim>
-bool has_curved(const Mesh<Dim>& mesh, std::span<const CellId> cells);
-
 /// Facets between two of these cells that are of different bodies, vertices ascending.
 template <int Dim>
 std::vector<typename Mesh<Dim>::Facet> interfaces_among(const Mesh<Dim>& mesh, std::span<const CellId> cells);

@@ -2,6 +2,7 @@
 #include <bit>
 
 #include "edit_checks.hpp"
+#include "old_fields.hpp"
 
 namespace itr {
 
@@ -110,6 +111,38 @@ bool keeps_shape(const Mesh<Dim>& mesh, const Merge<Dim>& merge, const QualityRu
   return !merge.moves || std::all_of(ring.begin(), ring.end(), [&](CellId c) { return fine(c, merge.kept, merge.gone); });
 }
 
+/// An edge to the vertex that stays is curved if an edge that it replaces was; on the boundary, if one of the boundary was.
+/// An edge that is there before and after, with its vertices where they were, keeps what it has.
+template <int Dim>
+void merge_nodes(const Mesh<Dim>& mesh, const Merge<Dim>& merge, Edit<Dim>& edit) {
+  const auto& [gone, kept, place, moves] = merge;
+  std::vector<VertexId> around;  // in a fixed order
+  for (const CellId c : edit.removed_cells)
+    for (const VertexId v : mesh.cell(c))
+      if (v != gone && v != kept) around.push_back(v);
+  std::sort(around.begin(), around.end());
+  around.erase(std::unique(around.begin(), around.end()), around.end());
+  const auto on_boundary = [&](VertexId v) {
+    return std::any_of(edit.inserted_facets.begin(), edit.inserted_facets.end(),
+                       [&](const auto& facet) { return holds(facet.vertices, kept) && holds(facet.vertices, v); });
+  };
+  const auto remove = [&](VertexId end, VertexId v) {  // returns whether the edge's node has a successor
+    if (mesh.node_of(end, v) == kNone) return false;
+    const EdgeKey edge{std::min(end, v), std::max(end, v)};
+    edit.removed_nodes.push_back(edge);
+    return v != kept && (!on_boundary(v) || !mesh.facets_of_edge(edge).empty());
+  };
+  remove(gone, kept);
+  for (const VertexId v : around) {
+    bool is_curved = remove(gone, v);
+    if (moves)
+      is_curved = remove(kept, v) || is_curved;
+    else if (mesh.are_joined(kept, v))
+      continue;
+    if (is_curved) insert_node(mesh, kept, v, edit);
+  }
+}
+
 template <int Dim>
 Edit<Dim> make_edit(const Mesh<Dim>& mesh, const EdgeKey& edge, const Merge<Dim>& merge) {
   const auto& [gone, kept, place, moves] = merge;
@@ -120,6 +153,10 @@ Edit<Dim> make_edit(const Mesh<Dim>& mesh, const EdgeKey& edge, const Merge<Dim>
   value.num_parents = moves ? 2 : 1;
   value.weights[0] = moves ? 0.5 : 1;
   value.weights[1] = moves ? 0.5 : 0;
+  if (const VertexId node = mesh.node_of(kept, gone); moves && node != kNone) {
+    value.parents[0] = node;
+    value.weights[0] = value.num_parents = 1;
+  }
   edit.value = value;
   edit.removed_vertex = gone;
 
@@ -148,6 +185,7 @@ Edit<Dim> make_edit(const Mesh<Dim>& mesh, const EdgeKey& edge, const Merge<Dim>
     edit.removed_interfaces.push_back(facet);
     if (!holds(facet, kept)) edit.inserted_interfaces.push_back({ascending(replaced(facet, gone, kept)), facet});
   }
+  if (mesh.has_nodes()) merge_nodes(mesh, merge, edit);
   return edit;
 }
 
@@ -169,18 +207,13 @@ Proposal<Dim> propose_collapse(const Mesh<Dim>& mesh, const Strata<Dim>& strata,
   if (at_a == along && at_b == along) merges.push_back({b, a, 0.5 * (mesh.rest(a) + mesh.rest(b)), true});
   if (at_b == along) merges.push_back({b, a, mesh.rest(a), false});
   if (at_a == along) merges.push_back({a, b, mesh.rest(b), false});
-  Refusal refusal = Refusal::shape;
   for (const Merge<Dim>& merge : merges) {
     if (!keeps_shape(mesh, merge, rule)) continue;
-    if (has_curved(mesh, mesh.cells_of(merge.gone)) || (merge.moves && has_curved(mesh, mesh.cells_of(merge.kept)))) {
-      refusal = Refusal::curved;
-      continue;
-    }
     Edit<Dim> edit = make_edit(mesh, edge, merge);
     if (extends_tags(mesh, edit)) return refused<Dim>(Refusal::held);
     return {.edit = std::move(edit)};
   }
-  return refused<Dim>(refusal);
+  return refused<Dim>(Refusal::shape);
 }
 
 template Proposal<2> propose_collapse<2>(const Mesh<2>&, const Strata<2>&, const EdgeKey&, const QualityRule&);

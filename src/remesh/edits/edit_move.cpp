@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "edit_checks.hpp"
+#include "old_fields.hpp"
 
 namespace itr {
 
@@ -104,29 +105,17 @@ Vec<Dim> minimise(const StarShape<Dim>& measure, Vec<Dim> X, const Mat<Dim>* pro
   return X;
 }
 
-/// The old mesh's fields at `place`: barycentric coordinates in the cell around the vertex that it is deepest in. False
-/// where it lies in none.
+/// The nodes of curved edges at the vertex move with it.
 template <int Dim>
-bool find_parents(const Mesh<Dim>& mesh, VertexId vertex, const Vec<Dim>& place, typename Edit<Dim>::Value& value) {
-  constexpr double kOutside = 1e-9, kNothing = 1e-12;  // what a place on a facet may have by round-off
-  double deepest = -kOutside;
-  for (const CellId c : mesh.cells_of(vertex)) {
-    const Vec<Dim> tail = mesh.inverse_rest_edges(c) * (place - mesh.rest(mesh.cell(c)[0]));
-    const double first = 1 - tail.sum(), depth = std::min(first, tail.minCoeff());
-    if (!(depth > deepest)) continue;
-    deepest = depth;
-    value.num_parents = 0;
-    double sum = 0;
-    for (int k = 0; k <= Dim; ++k) {
-      const double weight = k == 0 ? first : tail[k - 1];
-      if (weight < kNothing) continue;
-      value.parents[value.num_parents] = mesh.cell(c)[k];
-      value.weights[value.num_parents++] = weight;
-      sum += weight;
-    }
-    for (int k = 0; k < value.num_parents; ++k) value.weights[k] /= sum;
+void move_nodes(const Mesh<Dim>& mesh, VertexId vertex, Edit<Dim>& edit) {
+  std::vector<VertexId> ends;
+  for (const CellId c : edit.removed_cells)
+    for (const VertexId v : mesh.cell(c))
+      if (mesh.node_of(vertex, v) != kNone && std::find(ends.begin(), ends.end(), v) == ends.end()) ends.push_back(v);
+  for (const VertexId v : ends) {
+    edit.removed_nodes.push_back({std::min(vertex, v), std::max(vertex, v)});
+    insert_node(mesh, vertex, v, edit);
   }
-  return value.num_parents > 0;
 }
 
 }  // namespace
@@ -138,14 +127,14 @@ Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, Ver
   const Stratum stratum = strata.vertex(vertex);
   if (stratum == Stratum::non_manifold) return refused<Dim>(Refusal::non_manifold);
   if (stratum == Stratum::corner) return refused<Dim>(Refusal::held);
-  if (has_curved(mesh, mesh.cells_of(vertex))) return refused<Dim>(Refusal::curved);
   const Vec<Dim>& from = mesh.rest(vertex);
   const Vec<Dim> place =
       stratum == Stratum::volume ? target : Vec<Dim>(from + strata.tangent_projector(mesh, vertex) * (target - from));
   Edit<Dim> edit{.kind = Edit<Dim>::Kind::smooth};
   typename Edit<Dim>::Value value{vertex, place};
-  if (!find_parents(mesh, vertex, place, value)) return refused<Dim>(Refusal::outside);
+  constexpr double kOutside = 1e-9;  // by round-off
   const auto around = mesh.cells_of(vertex);
+  if (!find_parents(mesh, around, place, -kOutside, value)) return refused<Dim>(Refusal::outside);
   const double least = rule.least(worst_quality<Dim>(mesh, around));
   for (const CellId c : around) {
     const double quality = quality_with<Dim>(mesh, mesh.cell(c), vertex, place);
@@ -162,6 +151,7 @@ Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, Ver
     edit.removed_facets.push_back(f);
     edit.inserted_facets.push_back({mesh.facet(f), mesh.facet_tag(f), f});
   }
+  if (mesh.has_nodes()) move_nodes(mesh, vertex, edit);
   return {.edit = std::move(edit)};
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <boost/container/small_vector.hpp>
 #include "edit_checks.hpp"
 #include "itr/fem/quadratic.hpp"
 
@@ -88,6 +89,24 @@ Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
 }
 
 template <int Dim>
+int nodes_of_split(const Mesh<Dim>& mesh, const EdgeKey& edge) {
+  if (!mesh.has_nodes()) return 1;
+  const auto [a, b] = edge;
+  const bool is_curved = mesh.node_of(a, b) != kNone;
+  boost::container::small_vector<VertexId, 32> around;
+  for (const CellId c : mesh.cells_of(a)) {
+    const auto& cell = mesh.cell(c);
+    if (!holds(cell, b)) continue;
+    for (const VertexId v : cell)
+      if (v != a && v != b && std::find(around.begin(), around.end(), v) == around.end()) around.push_back(v);
+  }
+  const auto gets_node = [&](VertexId v) {  // see add_node_from_middle
+    return is_curved || mesh.node_of(a, v) != kNone || mesh.node_of(b, v) != kNone;
+  };
+  return 1 + (is_curved ? 1 : 0) + static_cast<int>(std::count_if(around.begin(), around.end(), gets_node));
+}
+
+template <int Dim>
 Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   Edit<Dim> edit = replace_by_themselves(mesh, edge, Edit<Dim>::Kind::curve);
   typename Edit<Dim>::NewNode node{edge};
@@ -105,6 +124,8 @@ Edit<Dim> make_straighten(const Mesh<Dim>& mesh, const EdgeKey& edge) {
 
 template Edit<2> make_split<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_split<3>(const Mesh<3>&, const EdgeKey&);
+template int nodes_of_split<2>(const Mesh<2>&, const EdgeKey&);
+template int nodes_of_split<3>(const Mesh<3>&, const EdgeKey&);
 template Edit<2> make_curve<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_curve<3>(const Mesh<3>&, const EdgeKey&);
 template Edit<2> make_straighten<2>(const Mesh<2>&, const EdgeKey&);

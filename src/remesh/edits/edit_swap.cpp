@@ -3,6 +3,7 @@
 
 #include "edit_checks.hpp"
 #include "mesh/edge_ring.hpp"
+#include "old_fields.hpp"
 
 namespace itr {
 
@@ -18,8 +19,9 @@ struct Polygon {
 /// The cut of least cost by dynamic programming over the polygon's stretches (Klincsek 1980).
 class LeastCut {
  public:
-  LeastCut(const Mesh<3>& mesh, const EdgeKey& edge, const Polygon& polygon, double least_quality, const CellCost& cost)
-      : mesh_(mesh), edge_(edge), polygon_(polygon), least_quality_(least_quality), cost_of_(cost) {
+  /// `draft` removes the edge, with a node for each edge that a cut may make if that edge is curved.
+  LeastCut(const Mesh<3>& mesh, const Edit<3>& draft, const Polygon& polygon, double least_quality, const CellCost& cost)
+      : mesh_(mesh), draft_(draft), polygon_(polygon), least_quality_(least_quality), cost_of_(cost) {
     const int n = static_cast<int>(polygon.vertices.size());
     for (int length = 2; length < n; ++length)
       for (int i = 0; i + length < n; ++i) {
@@ -56,7 +58,7 @@ class LeastCut {
 
   std::array<Mesh<3>::Cell, 2> cells_on(int i, int k, int j) const {
     const VertexId u = polygon_.vertices[i], v = polygon_.vertices[k], w = polygon_.vertices[j];
-    return {{{u, w, v, edge_[0]}, {u, v, w, edge_[1]}}};
+    return {{{u, w, v, draft_.edge[0]}, {u, v, w, draft_.edge[1]}}};
   }
   double triangle_cost(int i, int k, int j) {
     double sum = 0;
@@ -65,7 +67,7 @@ class LeastCut {
       const double quality = quality_with<3>(mesh_, cell, kNone, Vec<3>::Zero());
       if (!(quality > 0 && quality >= least_quality_)) return HUGE_VAL;
     }
-    for (const auto& cell : cells) sum += cost_of_(cell, polygon_.body);
+    for (const auto& cell : cells) sum += cost_of_(cell, polygon_.body, draft_);
     if (sum < HUGE_VAL) return sum;
     cost_forbids_ = true;
     return HUGE_VAL;
@@ -87,7 +89,7 @@ class LeastCut {
   }
 
   const Mesh<3>& mesh_;
-  EdgeKey edge_;
+  const Edit<3>& draft_;
   const Polygon& polygon_;
   double least_quality_;
   const CellCost& cost_of_;
@@ -114,6 +116,21 @@ std::vector<Polygon> polygons_of(const Mesh<3>& mesh, const EdgeRing& ring) {
     polygons.push_back(polygon);
   }
   return polygons;
+}
+
+/// Where the edge is curved, so is whatever edge its removal makes.
+Edit<3> draft_removal(const Mesh<3>& mesh, const EdgeKey& edge, const std::vector<CellId>& cells,
+                      const std::vector<Polygon>& polygons) {
+  Edit<3> draft{.kind = Edit<3>::Kind::swap, .edge = edge, .removed_cells = cells};
+  if (mesh.node_of(edge[0], edge[1]) == kNone) return draft;
+  draft.removed_nodes.push_back(edge);
+  for (const auto& [vertices, body] : polygons)
+    for (std::size_t i = 0; i < vertices.size(); ++i)
+      for (std::size_t j = i + 1; j < vertices.size(); ++j)
+        if (!mesh.are_joined(vertices[i], vertices[j]) &&
+            draft.inserted_node({std::min(vertices[i], vertices[j]), std::max(vertices[i], vertices[j])}) == kNone)
+          insert_node(mesh, vertices[i], vertices[j], draft);
+  return draft;
 }
 
 /// The two facets at the edge swap in their plane: a-b gives way to u-v.
@@ -145,15 +162,15 @@ Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, c
   if (!ring) return refused<3>(mesh.cells_of_edge(edge).empty() ? Refusal::gone : Refusal::non_manifold);
   const Stratum along = strata.edge(mesh, edge);
   if (along != Stratum::volume && along != Stratum::surface) return refused<3>(Refusal::held);
-  if (has_curved<3>(mesh, ring->cells)) return refused<3>(Refusal::curved);
   if (ring->vertices.size() > kLongestRing) return refused<3>(Refusal::long_ring);
   const double least = rule.least(worst_quality<3>(mesh, ring->cells));
 
-  Edit<3> edit{.kind = Edit<3>::Kind::swap, .edge = edge, .removed_cells = ring->cells};
   const auto polygons = polygons_of(mesh, *ring);
+  const Edit<3> draft = draft_removal(mesh, edge, ring->cells, polygons);
+  Edit<3> edit = draft;
   for (const Polygon& polygon : polygons) {
     if (polygon.vertices.size() < 3) return refused<3>(Refusal::shape);  // a flat cell on a patch
-    const LeastCut cut(mesh, edge, polygon, least, cost);
+    const LeastCut cut(mesh, draft, polygon, least, cost);
     if (!(cut.cost() < HUGE_VAL)) return refused<3>(cut.cost_forbids() ? Refusal::cost : Refusal::shape);
     for (const auto& [u, v] : cut.diagonals())
       if (mesh.are_joined(u, v)) return refused<3>(Refusal::exists);
@@ -165,6 +182,11 @@ Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, c
     if (has_tag(mesh, edge) || has_tag<3>(mesh, {closing.front(), closing.back()})) return refused<3>(Refusal::held);
     swap_facets(mesh, strata, *ring, edit);
   }
+  std::erase_if(edit.inserted_nodes, [&](const auto& node) {
+    return std::none_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
+      return holds(cell.vertices, node.edge[0]) && holds(cell.vertices, node.edge[1]);
+    });
+  });
   return {.edit = std::move(edit)};
 }
 
@@ -174,7 +196,6 @@ Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet
     if (holds(mesh.cell(c), facet[1]) && holds(mesh.cell(c), facet[2])) cells.push_back(c);
   if (cells.empty()) return refused<3>(Refusal::gone);
   if (cells.size() == 1 || mesh.body(cells[0]) != mesh.body(cells[1])) return refused<3>(Refusal::held);
-  if (has_curved<3>(mesh, cells)) return refused<3>(Refusal::curved);
   const auto opposite = [&](CellId c) {
     const auto& cell = mesh.cell(c);
     return *std::find_if(cell.begin(), cell.end(), [&](int v) { return !holds(facet, v); });
@@ -189,6 +210,8 @@ Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet
     if (!(quality > 0 && quality >= least)) return refused<3>(Refusal::shape);
     edit.inserted_cells.push_back({cell, mesh.body(cells[0])});
   }
+  const auto is_curved = [&](int i, int j) { return mesh.node_of(facet[i], facet[j]) != kNone; };
+  if (is_curved(0, 1) && is_curved(0, 2) && is_curved(1, 2)) insert_node(mesh, d, e, edit);
   return {.edit = std::move(edit)};
 }
 
@@ -197,7 +220,6 @@ Proposal<2> propose_diagonal_swap(const Mesh<2>& mesh, const Strata<2>& strata, 
   const auto cells = mesh.cells_of_edge(edge);
   if (cells.empty()) return refused<2>(Refusal::gone);
   if (strata.edge(mesh, edge) != Stratum::volume) return refused<2>(Refusal::held);
-  if (has_curved<2>(mesh, cells)) return refused<2>(Refusal::curved);
   std::array<VertexId, 2> opposite;
   for (int i = 0; i < 2; ++i)
     for (const int v : mesh.cell(cells[i]))
@@ -211,6 +233,10 @@ Proposal<2> propose_diagonal_swap(const Mesh<2>& mesh, const Strata<2>& strata, 
     const double quality = quality_with<2>(mesh, cell, kNone, Vec<2>::Zero());
     if (!(quality > 0 && quality >= least)) return refused<2>(Refusal::shape);
     edit.inserted_cells.push_back({cell, mesh.body(cells[0])});
+  }
+  if (mesh.node_of(edge[0], edge[1]) != kNone) {
+    edit.removed_nodes.push_back(edge);
+    insert_node(mesh, opposite[0], opposite[1], edit);
   }
   return {.edit = std::move(edit)};
 }

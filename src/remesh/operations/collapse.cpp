@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
+// Collapses and straightenings. Where both are asked for, they are in one queue by what they are predicted to cost for each
+// node that they remove.
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
@@ -11,24 +14,46 @@ namespace itr {
 namespace {
 
 template <int Dim>
-class Collapser {
+class Coarsener {
  public:
-  explicit Collapser(RemeshSession<Dim>& session)
+  Coarsener(RemeshSession<Dim>& session, bool straightens)
       : session_(session),
         ask_(session.ask()),
         options_(ask_.options().collapse),
-        tolerance_(options_.acceptance_tolerance.value()) {}
+        straightens_(straightens),
+        tolerance_(options_.acceptance_tolerance.value()),
+        straighten_tolerance_(ask_.options().straighten.acceptance_tolerance.value_or(tolerance_)) {}
 
-  /// Shortest first.
-  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
+  /// What there is to ask of these edges.
+  std::vector<Place> candidates(const std::vector<EdgeKey>& edges) const {
+    if (!straightens_) return places(edges);
+    std::vector<Place> found;
+    for (const EdgeKey& edge : edges) {
+      if (options_.enabled) found.push_back(edge);
+      if (ask_.mesh().node_of(edge[0], edge[1]) != kNone) found.push_back(Place::node_of(edge));
+    }
+    return found;
+  }
+
+  /// Shortest first, or cheapest first.
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = place.edge();
+    if (place.is_node()) return rank_straighten(edge, scratch);
     if (const auto* baseline = session_.baseline(); baseline && !baseline->may_collapse(edge)) return std::nullopt;
     if (ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
-    return PlaceQueue::Entry{.place = place, .priority = -ask_.rest_length(edge)};
+    if (!straightens_) return PlaceQueue::Entry{.place = place, .priority = -ask_.rest_length(edge)};
+    if (session_.memory().was_refused(RemeshMemory::collapse, edge, ask_.roughness(edge), ask_.is_in_contact(edge, scratch)))
+      return std::nullopt;
+    const auto proposal = propose_collapse(ask_.mesh(), ask_.strata(), edge);
+    if (!proposal)
+      return PlaceQueue::Entry{.place = place, .priority = -std::numeric_limits<double>::max()};  // to be counted
+    const Edit<Dim>& edit = *proposal.edit;
+    return PlaceQueue::Entry{.place = place, .priority = ask_.predict_collapse(edit, scratch) / removed_nodes(edit)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = trial.edge();
+    if (trial.candidate.place.is_node()) return look_at_straighten(trial, scratch);
     if (const Refusal refusal = ask_.refuse_collapse(edge); refusal != Refusal::none) return trial.refuse(refusal);
     if (session_.memory().depth(edge) >= options_.max_depth) return trial.refuse(Refusal::depth);
     trial.signal = ask_.roughness(edge);
@@ -36,49 +61,86 @@ class Collapser {
     if (session_.memory().was_refused(RemeshMemory::collapse, edge, trial.signal, trial.in_contact)) return;
     trial.is_asked = true;
     if (!trial.take(propose_collapse(ask_.mesh(), ask_.strata(), edge))) return;
-    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, ask_.predict(*trial.edit), tolerance_))
+    const bool is_known = straightens_ && session_.is_unchanged(trial.candidate);
+    const double gain = is_known ? trial.candidate.priority * removed_nodes(*trial.edit) : ask_.predict(*trial.edit);
+    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, tolerance_))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
   void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
-    OperationCount& count = session_.report().collapses;
+    const bool straightens = trial.candidate.place.is_node();
+    OperationCount& count = straightens ? session_.report().straightens : session_.report().collapses;
     count.note(trial.verdict.refusal);
     if (!trial.is_asked) return;
-    const int generation = session_.memory().depth(trial.edge()) + 1;
-    if (session_.commits().commit(trial, count)) {
-      const VertexId kept = trial.edit->value->vertex;
-      for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(kept))) {
-        if (near[0] == kept || near[1] == kept) session_.memory().set_depth(near, generation);
-        fresh.push_back(near);
-      }
-      return;
-    }
+    if (session_.commits().commit(trial, count)) return straightens ? add_changed(trial, fresh) : add_around(trial, fresh);
     const Refusal refusal = trial.verdict.refusal;
     if (refusal != Refusal::prediction && refusal != Refusal::bound && refusal != Refusal::energy) return;
-    constexpr double kNever = std::numeric_limits<double>::infinity();  // a rougher field loses more
+    constexpr double kNever = std::numeric_limits<double>::infinity();  // a rougher field, a rounder edge lose more
     session_.memory().remember(
-        RemeshMemory::collapse, trial.edge(),
+        straightens ? RemeshMemory::straighten : RemeshMemory::collapse, trial.edge(),
         {trial.signal / kSameSignal, trial.in_contact ? trial.signal * kSameSignal : kNever, trial.in_contact});
   }
 
  private:
+  /// By how many nodes, the vertex among them, a collapse makes the space smaller.
+  static double removed_nodes(const Edit<Dim>& edit) {
+    return 1 + static_cast<double>(edit.removed_nodes.size()) - static_cast<double>(edit.inserted_nodes.size());
+  }
+
+  std::optional<PlaceQueue::Entry> rank_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+    if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
+    const double gain = ask_.predict_straighten(edge, scratch);
+    if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), false)) return std::nullopt;
+    return PlaceQueue::Entry{.place = Place::node_of(edge), .priority = gain};
+  }
+
+  void look_at_straighten(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
+    const EdgeKey edge = trial.edge();
+    if (const Refusal refusal = ask_.refuse_straighten(edge); refusal != Refusal::none) return trial.refuse(refusal);
+    const double gain =
+        session_.is_unchanged(trial.candidate) ? trial.candidate.priority : ask_.predict_straighten(edge, scratch);
+    trial.signal = std::abs(gain);
+    trial.edit = make_straighten(ask_.mesh(), edge);
+    if (ask_.is_hopeless(trial.edit->removed_cells, gain, straighten_tolerance_)) return trial.refuse(Refusal::prediction);
+    ask_.judge(trial, straighten_tolerance_, ask_.options().local, scratch);
+  }
+
+  void add(const std::vector<EdgeKey>& edges, std::vector<Place>& fresh) const {
+    const auto found = candidates(edges);
+    fresh.insert(fresh.end(), found.begin(), found.end());
+  }
+  void add_changed(const Trial<Dim>& trial, std::vector<Place>& fresh) const {
+    const auto changed = std::span<const CellId>(trial.verdict.patch).last(trial.edit->inserted_cells.size());
+    add(edges_of<Dim>(ask_.mesh(), changed), fresh);
+  }
+  void add_around(const Trial<Dim>& trial, std::vector<Place>& fresh) {
+    const VertexId kept = trial.edit->value->vertex;
+    const int generation = session_.memory().depth(trial.edge()) + 1;
+    const auto near = edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(kept));
+    for (const EdgeKey& edge : near)
+      if (edge[0] == kept || edge[1] == kept) session_.memory().set_depth(edge, generation);
+    add(near, fresh);
+  }
+
   RemeshSession<Dim>& session_;
   const RemeshQueries<Dim>& ask_;
   const CollapseOptions& options_;
-  double tolerance_;  ///< [J]
+  bool straightens_;
+  double tolerance_, straighten_tolerance_;  ///< [J]
 };
 
 }  // namespace
 
 template <int Dim>
-void collapse_edges(RemeshSession<Dim>& session) {
-  Collapser<Dim> collapser(session);
-  run_waves(session, collapser, places(session.ask().mesh().edges()));
+void coarsen_edges(RemeshSession<Dim>& session) {
+  const Mesh<Dim>& mesh = session.ask().mesh();
+  Coarsener<Dim> coarsener(session, session.ask().options().straighten.enabled && mesh.has_nodes());
+  run_waves(session, coarsener, coarsener.candidates(mesh.edges()));
   session.memory().forget_depths();
 }
 
-template void collapse_edges(RemeshSession<2>&);
-template void collapse_edges(RemeshSession<3>&);
+template void coarsen_edges(RemeshSession<2>&);
+template void coarsen_edges(RemeshSession<3>&);
 
 }  // namespace itr

@@ -8,6 +8,7 @@
 
 #include "geometry/measures.hpp"
 #include "itr/energy/elastic/laws.hpp"
+#include "remesh/curved_cell.hpp"
 #include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
@@ -44,7 +45,7 @@ double shortest_edge(const Mesh<Dim>& mesh, VertexId vertex) {
 }
 
 /// Derivative of the elastic energy by the rest position of a vertex that takes the deformation along: sum over its cells
-/// of V (W I - F^T P) grad phi (Eshelby 1975), times the scaling.
+/// of the integral of (W I - F^T P) grad phi (Eshelby 1975), times the scaling.
 template <int Dim>
 Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& ask, VertexId vertex) {
   const Mesh<Dim>& mesh = ask.mesh();
@@ -55,10 +56,16 @@ Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& ask, VertexId vertex
     const auto element = element_of(mesh, c);
     const Vec<Dim> gradient = barycentric_gradient<Dim>(element.inverse_edges, static_cast<int>(k));
     const ElasticModuli moduli = elastic_moduli<Dim>(ask.context().materials.at(element.body), rest_barycenter(mesh, c));
-    const Mat<Dim> F = deformation_gradient<Dim>(element, ask.fields().x);
+    const auto add = [&](const Mat<Dim>& F, double weight) {
+      sum += weight *
+             (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
+    };
     const double weight = ask.context().scaling * element.volume;
-    sum +=
-        weight * (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
+    if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
+      for_each_gradient<Dim>(curved, element.inverse_edges, ask.fields().x,
+                             [&](const Mat<Dim>& F, double share) { add(F, share * weight); });
+    else
+      add(deformation_gradient<Dim>(element, ask.fields().x), weight);
   }
   return sum;
 }

@@ -27,7 +27,7 @@ class Refiner {
     found.reserve(curves ? 2 * edges.size() : edges.size());
     if (options_.enabled || !curves) found.assign(edges.begin(), edges.end());
     if (curves)
-      for (const EdgeKey& edge : edges) found.push_back(Place::to_curve(edge));
+      for (const EdgeKey& edge : edges) found.push_back(Place::node_of(edge));
     return found;
   }
 
@@ -35,7 +35,7 @@ class Refiner {
   // with fewer vertices: verification/paper.)
   std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = place.edge();
-    if (place.is_to_curve()) return rank_curve(edge, scratch);
+    if (place.is_node()) return rank_curve(edge, scratch);
     if (session_.memory().depth(edge) >= options_.max_depth) return std::nullopt;
     if (const auto* baseline = session_.baseline(); baseline && !baseline->may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_split(edge, scratch);
@@ -43,18 +43,19 @@ class Refiner {
     if (session_.memory().was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
     return PlaceQueue::Entry{
         .place = place,
-        .priority = gain / nodes_of_split(edge),
+        .priority = gain / nodes_of_split(ask_.mesh(), edge),
         .is_hopeless = !in_contact && ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, tolerance_)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = trial.edge();
-    if (trial.candidate.place.is_to_curve()) return look_at_curve(trial, scratch);
+    if (trial.candidate.place.is_node()) return look_at_curve(trial, scratch);
     if (const Refusal refusal = refuse(edge); refusal != Refusal::none) return trial.refuse(refusal);
     ask_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
     if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return trial.refuse(Refusal::prediction);
-    trial.signal = is_known ? trial.candidate.priority * nodes_of_split(edge) : ask_.predict_split(edge, scratch);
+    trial.signal =
+        is_known ? trial.candidate.priority * nodes_of_split(ask_.mesh(), edge) : ask_.predict_split(edge, scratch);
     trial.edit = make_split(ask_.mesh(), edge);
     if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, trial.signal, tolerance_))  // there trials tell
       return trial.refuse(Refusal::prediction);
@@ -62,7 +63,7 @@ class Refiner {
   }
 
   void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
-    const bool curves = trial.candidate.place.is_to_curve();
+    const bool curves = trial.candidate.place.is_node();
     OperationCount& count = curves ? session_.report().curves : session_.report().splits;
     count.note(trial.verdict.refusal);
     if (!trial.is_asked) {
@@ -86,11 +87,11 @@ class Refiner {
   /// Counts what look would have: in free flight all edges are hopeless, and nothing is asked.
   void pass_over(std::span<const PlaceQueue::Entry> entries) {
     for (const PlaceQueue::Entry& entry : entries) {
-      const bool curves = entry.place.is_to_curve();
+      const bool curves = entry.place.is_node();
       const Refusal refusal = curves ? ask_.refuse_curve(entry.place.edge()) : refuse(entry.place.edge());
       OperationCount& count = curves ? session_.report().curves : session_.report().splits;
       count.note(refusal == Refusal::none ? Refusal::prediction : refusal);
-      if (!curves) note_refused(entry.priority * nodes_of_split(entry.place.edge()));
+      if (!curves) note_refused(entry.priority * nodes_of_split(ask_.mesh(), entry.place.edge()));
     }
   }
 
@@ -100,7 +101,7 @@ class Refiner {
     if (const auto* baseline = session_.baseline(); baseline && !baseline->may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_curve(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::curve, edge, gain, false)) return std::nullopt;
-    return PlaceQueue::Entry{.place = Place::to_curve(edge),
+    return PlaceQueue::Entry{.place = Place::node_of(edge),
                              .priority = gain,
                              .is_hopeless = ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, curve_tolerance_)};
   }
@@ -115,13 +116,6 @@ class Refiner {
     if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, curve_tolerance_, ask_.options().local, scratch);
-  }
-
-  /// By how many nodes a split enlarges the space.
-  double nodes_of_split(const EdgeKey& edge) const {
-    if (!ask_.mesh().has_nodes()) return 1;
-    const Edit<Dim> edit = make_split(ask_.mesh(), edge);
-    return 1 + static_cast<double>(edit.inserted_nodes.size()) - static_cast<double>(edit.removed_nodes.size());
   }
 
   Refusal refuse(const EdgeKey& edge) const {

@@ -44,6 +44,15 @@ double least_gain(const RemeshQueries<Dim>& ask) {
   return std::max(ask.least_worthwhile(), ask.options().swap.acceptance_tolerance.value());
 }
 
+/// What a swap has to gain beyond `least` for the nodes that it adds, as a curve does for each [J].
+template <int Dim>
+double with_nodes(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
+  const auto added = static_cast<int>(edit.inserted_nodes.size()) - static_cast<int>(edit.removed_nodes.size());
+  if (added <= 0) return least;
+  const RemeshOptions& options = ask.options();
+  return least + added * options.curve.acceptance_tolerance.value_or(options.split.acceptance_tolerance.value());
+}
+
 /// Whether the prediction from bulk terms reaches `least` [J].
 template <int Dim>
 bool is_promising(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
@@ -70,8 +79,9 @@ struct EdgeRemoval {
   bool may_go(const EdgeKey&) const { return true; }  // in the volume and within flat patches, as strata say
   double priority(const EdgeKey& edge) const { return -worst_quality<3>(ask.mesh(), ask.mesh().cells_of_edge(edge)); }
   Proposal<3> propose(const EdgeKey& edge) const {
-    return propose_edge_removal(ask.mesh(), ask.strata(), edge,
-                                [&](const auto& cell, int body) { return ask.energy_of(cell, body); });
+    return propose_edge_removal(ask.mesh(), ask.strata(), edge, [&](const auto& cell, int body, const Edit<3>& edit) {
+      return ask.energy_of(cell, body, edit);
+    });
   }
   bool betters_shape(const EdgeKey&, const Edit<3>& edit) const { return shape_gain(ask.mesh(), edit) > kBetter; }
   static constexpr bool kAsksAllAround = false;
@@ -100,7 +110,7 @@ class Swapper {
     if (session_.memory().was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
     if (!trial.take(policy_.propose(edge))) return;
     const bool for_shape = policy_.betters_shape(edge, *trial.edit) && session_.shape_matters(edge, trial.signal);
-    const double least = for_shape ? *options_.acceptance_tolerance : least_gain(ask_);
+    const double least = with_nodes(ask_, *trial.edit, for_shape ? *options_.acceptance_tolerance : least_gain(ask_));
     trial.is_asked = true;
     if (!trial.in_contact && !is_promising(ask_, *trial.edit, least))  // there trials tell
       return trial.refuse(Refusal::prediction);
@@ -148,10 +158,11 @@ void remove_facets(RemeshSession<3>& session) {
       if (!proposal) continue;
       const auto& cells = proposal.edit->removed_cells;
       if (std::min(cells[0], cells[1]) != c || shape_gain(mesh, *proposal.edit) < 1 / kBetter) continue;
-      if (!is_promising(ask, *proposal.edit, least)) continue;
+      const double required = with_nodes(ask, *proposal.edit, least);
+      if (!is_promising(ask, *proposal.edit, required)) continue;
       Trial<3> trial{.candidate = {.place = proposal.edit->edge, .priority = 0}, .edit = std::move(proposal.edit)};
       session.commits().begin_wave();
-      ask.judge(trial, least, ask.options().local, session.scratch());
+      ask.judge(trial, required, ask.options().local, session.scratch());
       session.report().swaps.note(trial.verdict.refusal);
       session.commits().commit(trial, session.report().swaps);
     }

@@ -13,19 +13,16 @@ namespace itr {
 
 namespace {
 
-/// A cell that is inverted somewhere, now or in the history, on a mesh with curved edges.
+/// The first cell that is not proven to be positively oriented everywhere.
 template <int Dim>
-[[maybe_unused]] CellId find_inverted_curved(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields) {
-  const Edit<Dim> none;
-  const auto is_inverted = [&](CellId c, const VectorX& x) {
-    const auto cell = curved_cell_after<Dim>(mesh, none, mesh.cell(c));
-    return !is_positive_everywhere_exact<Dim>(cell.values(x, none));
-  };
+[[maybe_unused]] CellId find_inverted_cell(const Mesh<Dim>& mesh, const VectorX& x) {
+  const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
-    if (is_inverted(c, fields.x)) return c;
-    for (const VectorX& past : fields.past_positions)
-      if (is_inverted(c, past)) return c;
+    const CurvedCell<Dim> cell = cell_before(mesh, c);
+    const bool is_positive =
+        cell.edges ? is_positive_everywhere<Dim>(cell.values(x, none)) : is_positively_oriented<Dim>(mesh.cell(c), x);
+    if (!is_positive) return c;
   }
   return kNone;
 }
@@ -59,8 +56,8 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   log_.add_follower([&](const Change<Dim>& change) { memory_.follow(mesh, change); });
   log_.add_follower([&](const Change<Dim>&) {
     ITR_AUDIT(mesh.find_defect().empty(), mesh.find_defect());
-    ITR_AUDIT(mesh.has_nodes() || find_inverted<Dim>(mesh, fields.x) == kNone);
-    ITR_AUDIT(!mesh.has_nodes() || find_inverted_curved(mesh, fields) == kNone);
+    ITR_AUDIT(find_inverted_cell(mesh, fields.x) == kNone, find_inverted_cell(mesh, fields.x));
+    for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(find_inverted_cell(mesh, past) == kNone);
   });
 }
 

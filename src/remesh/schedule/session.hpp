@@ -69,13 +69,12 @@ class RemeshSession {
   RemeshReport report_;
 };
 
-/// The operations, one file each; splits and curves share one queue. They count what they do in session.report().
+/// The operations, one file each; splits and curves share one queue, and so do collapses and straightenings. They count what
+/// they do in session.report().
 template <int Dim>
 void refine_edges(RemeshSession<Dim>& session);
 template <int Dim>
-void straighten_edges(RemeshSession<Dim>& session);
-template <int Dim>
-void collapse_edges(RemeshSession<Dim>& session);
+void coarsen_edges(RemeshSession<Dim>& session);
 /// In 3D: edges are removed such that the energy of the new cells is least, then facets (2-3 swaps).
 void swap_edges(RemeshSession<2>& session);
 void swap_edges(RemeshSession<3>& session);
