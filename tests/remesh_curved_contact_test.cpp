@@ -16,6 +16,7 @@
 #include "random_mesh.hpp"
 #include "remesh/curved_cell.hpp"
 #include "remesh/decide/patch.hpp"
+#include "simulation/patch_surface.hpp"
 #include "tet_scene.hpp"
 
 namespace itr {
@@ -253,6 +254,40 @@ TYPED_TEST(CurvedContact, WhatTheGateLetsPassIntersectsNothing) {
   }
   EXPECT_GT(passed, 200);
   EXPECT_GT(refused, 50);
+}
+
+/// With a reach that finds everything, a projection's surface is that of the step.
+TYPED_TEST(CurvedContact, ProjectionsSeeTheChordsOfTheWholeSurface) {
+  constexpr int Dim = TypeParam::value;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const Scene<Dim> scene(seed, 0.5, 0.004);
+    const Compact<Dim> compact(scene);
+    const auto& [mesh, space, obstacles, slots] = compact;
+    const VectorX x = compact.field(scene.fields.x, scene.context.obstacles.x);
+    const TouchedCells touched{.old_cells = {}, .new_cells = {0, 1, 2, 3}};
+    const auto patch = make_transfer_patch<Dim>(mesh, space, mesh, space, touched, scene.context.materials, 0);
+    const auto& ids = patch.new_cells.vertices;
+    std::vector<char> moving(ids.size());
+    VectorX goal(Dim * static_cast<Eigen::Index>(ids.size()));
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      moving[i] = !patch.at_rim[i];
+      vertex_of<Dim>(goal, static_cast<int>(i)) = vertex_of<Dim>(x, ids[i]);
+    }
+    const auto found = patch_surface<Dim>(mesh, space, obstacles, patch, moving, x, goal, 100);
+    if (found.empty()) continue;
+    const CollisionSurface whole = collision_surface(mesh, obstacles, space);
+    const auto id = [&](int v) {
+      const auto n = static_cast<int>(ids.size());
+      return v < n ? ids[v] : found.others[v - n];
+    };
+    std::map<int, double> area, whole_area;
+    for (const int v : found.surface.vertices) area[id(v)] = found.surface.area[v];
+    for (const int v : whole.vertices) whole_area[v] = whole.area[v];
+    ASSERT_EQ(area.size(), whole_area.size());
+    for (const auto& [v, a] : whole_area) EXPECT_NEAR(area.at(v), a, 1e-13) << v;
+    EXPECT_EQ(found.surface.edges.size(), whole.edges.size());
+    EXPECT_EQ(found.surface.triangles.size(), whole.triangles.size());
+  }
 }
 
 /// A unit square, its upper edge curved up by 0.1.
