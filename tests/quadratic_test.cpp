@@ -379,7 +379,7 @@ TEST(QuadraticRun, HasTheSameBitsOnAnyNumberOfThreads) {
 TEST(QuadraticRun, RefusesWhatItCannotDo) {
   linear::Registry registry;
   ::itr::Setup<2> setup = collision();
-  setup.remesh.enabled = true;
+  setup.remesh.enabled = setup.lump_mass = true;
   EXPECT_THROW(Simulation<2>(setup, registry), ::itr::InputError);
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "fem/chords.hpp"
+
 namespace itr {
 
 int Space::find(VertexId a, VertexId b) const {
@@ -59,50 +61,14 @@ std::vector<Vec<Dim>> node_rest_positions(const Mesh<Dim>& mesh, const Space& sp
   return rest;
 }
 
-template <>
-void add_chord_facets<2>(const MeshTypes<2>::Facet& facet, const Space& space, int num_vertices,
-                         std::vector<MeshTypes<2>::Facet>& chords) {
-  const int curved = space.find(facet[0], facet[1]);
-  if (curved == kNone) return chords.push_back(facet);
-  chords.push_back({facet[0], num_vertices + curved});
-  chords.push_back({num_vertices + curved, facet[1]});
-}
-
-template <>
-void add_chord_facets<3>(const MeshTypes<3>::Facet& facet, const Space& space, int num_vertices,
-                         std::vector<MeshTypes<3>::Facet>& chords) {
-  std::array<int, 3> middle;  // of the edge from corner k to corner k + 1
-  int count = 0;
-  for (int k = 0; k < 3; ++k) {
-    const int curved = space.find(facet[k], facet[(k + 1) % 3]);
-    middle[k] = curved == kNone ? kNone : num_vertices + curved;
-    count += curved != kNone;
-  }
-  if (count == 0) return chords.push_back(facet);
-  // Turned so that with one curved edge it is the first, and with two the straight one is the last.
-  int turn = 0;
-  while (count == 1 ? middle[turn] == kNone : count == 2 && middle[(turn + 2) % 3] != kNone) ++turn;
-  const auto corner = [&](int k) { return facet[(turn + k) % 3]; };
-  const int m01 = middle[turn], m12 = middle[(turn + 1) % 3], m20 = middle[(turn + 2) % 3];
-  if (count == 1) {
-    chords.push_back({corner(0), m01, corner(2)});
-    chords.push_back({m01, corner(1), corner(2)});
-    return;
-  }
-  chords.push_back({m01, corner(1), m12});
-  if (count == 2) {  // and the quadrilateral 0, m01, m12, 2
-    if (corner(0) < corner(2)) {
-      chords.push_back({corner(0), m01, m12});
-      chords.push_back({corner(0), m12, corner(2)});
-    } else {
-      chords.push_back({corner(0), m01, corner(2)});
-      chords.push_back({m01, m12, corner(2)});
-    }
-    return;
-  }
-  chords.push_back({corner(0), m01, m20});
-  chords.push_back({m20, m12, corner(2)});
-  chords.push_back({m01, m12, m20});
+template <int Dim>
+void add_chord_facets(const typename MeshTypes<Dim>::Facet& facet, const Space& space, int num_vertices,
+                      std::vector<typename MeshTypes<Dim>::Facet>& chords) {
+  const auto node_of = [&](VertexId a, VertexId b) {
+    const int curved = space.find(a, b);
+    return curved == kNone ? kNone : num_vertices + curved;
+  };
+  for_each_chord<Dim>(facet, node_of, [&](const auto& ids) { chords.push_back(ids); });
 }
 
 template Space space_of_orders<2>(const Mesh<2>&, const std::map<int, int>&);
@@ -113,5 +79,7 @@ template bool is_all_curved<2>(const Mesh<2>&, const Space&);
 template bool is_all_curved<3>(const Mesh<3>&, const Space&);
 template std::vector<Vec<2>> node_rest_positions<2>(const Mesh<2>&, const Space&);
 template std::vector<Vec<3>> node_rest_positions<3>(const Mesh<3>&, const Space&);
+template void add_chord_facets<2>(const MeshTypes<2>::Facet&, const Space&, int, std::vector<MeshTypes<2>::Facet>&);
+template void add_chord_facets<3>(const MeshTypes<3>::Facet&, const Space&, int, std::vector<MeshTypes<3>::Facet>&);
 
 }  // namespace itr

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "fem/chords.hpp"
 #include "geometry/measures.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadratic.hpp"
@@ -80,6 +81,24 @@ CurvedCell<Dim> curved_cell_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit,
                                   const std::array<VertexId, Dim + 1>& vertices) {
   if (!mesh.has_nodes() && edit.inserted_nodes.empty()) return {};
   return curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); });
+}
+
+/// Calls visit(f) for the boundary facets at a vertex, or at the edge of a node.
+template <int Dim, typename Visit>
+void for_each_facet_at(const Mesh<Dim>& mesh, VertexId v, const Visit& visit) {
+  if (mesh.is_vertex_alive(v)) {
+    for (const FacetId f : mesh.facets_of(v)) visit(f);
+  } else if (const EdgeKey edge = mesh.edge_of_node(v); edge[0] != kNone) {
+    for (const FacetId f : mesh.facets_of(edge[0]))
+      if (std::find(mesh.facet(f).begin(), mesh.facet(f).end(), edge[1]) != mesh.facet(f).end()) visit(f);
+  }
+}
+
+/// Calls visit(v) for the nodes on a facet's edges.
+template <int Dim, typename NodeOf, typename Visit>
+void for_each_node_on(const typename MeshTypes<Dim>::Facet& facet, const NodeOf& node_of, const Visit& visit) {
+  for (int k = 0; k < (Dim == 2 ? 1 : 3); ++k)
+    if (const VertexId node = node_of(facet[k], facet[(k + 1) % Dim]); node != kNone) visit(node);
 }
 
 }  // namespace itr

@@ -41,8 +41,8 @@ Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
 template <int Dim>
 int nodes_of_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
 
-/// Makes an edge curved. Its node is at the mean of the ends at rest and in all fields. The cells at the edge are replaced
-/// by themselves, so that whoever looks for changed cells finds them.
+/// Makes an edge curved. Its node is at the mean of the ends at rest and in all fields. The cells and boundary facets at the
+/// edge are replaced by themselves, so that whoever looks for changed ones finds them.
 template <int Dim>
 Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge);
 

@@ -287,7 +287,7 @@ constexpr Key kKeys[] = {
     {"/space/discr_order", read, "order", "1", "",
      "1: linear elements, 2: quadratic ones (curved edges); or a list by body, [{\"id\": 2, \"order\": 2}], bodies that are "
      "not "
-     "listed are linear. An edge has the least order of the cells at it; with remeshing 2 only where contact is off",
+     "listed are linear. An edge has the least order of the cells at it",
      basic},
     {"/space/advanced/quadrature_order", read, "integer", "-1", "",
      "degree of elasticity's quadrature on quadratic elements, 1 to 5; -1: 2, and the mass' is exact"},

@@ -16,9 +16,14 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
   PatchSurface<Dim> result;
   const auto& vertices = patch.new_cells.vertices;
   std::vector<FacetId> own;
-  for (std::size_t i = 0; i < vertices.size(); ++i)
-    if (moving[i] && vertices[i] < mesh.vertex_slots())
-      own.insert(own.end(), mesh.facets_of(vertices[i]).begin(), mesh.facets_of(vertices[i]).end());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!moving[i]) continue;
+    std::vector<FacetId> of_edge;
+    const int node = vertices[i] - mesh.vertex_slots();
+    if (node >= 0) of_edge = mesh.facets_of_edge(space.curved_edges()[node]);
+    const auto at = node < 0 ? mesh.facets_of(vertices[i]) : std::span<const FacetId>(of_edge);
+    own.insert(own.end(), at.begin(), at.end());
+  }
   if (own.empty()) return result;
   std::sort(own.begin(), own.end());
   own.erase(std::unique(own.begin(), own.end()), own.end());
@@ -26,12 +31,16 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
   std::unordered_map<int, int> known;  // from ids in fields to those in the patch
   for (std::size_t i = 0; i < vertices.size(); ++i) known[vertices[i]] = static_cast<int>(i);
   std::vector<Box<Dim>> boxes;
+  std::vector<typename MeshTypes<Dim>::Facet> chords;
   for (const FacetId f : own) {
     Box<Dim> box;
-    for (const VertexId v : mesh.facet(f)) {
-      box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
-      box.include(Vec<Dim>(goal.segment<Dim>(Dim * known.at(v))));
-    }
+    chords.clear();
+    add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
+    for (const auto& chord : chords)
+      for (const int v : chord) {
+        box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
+        box.include(Vec<Dim>(goal.segment<Dim>(Dim * known.at(v))));
+      }
     boxes.push_back(box.inflated(reach));
   }
   const Bvh<Dim> tree(boxes);
@@ -45,11 +54,17 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
   };
 
   std::vector<Vec<Dim>> rest = patch.new_cells.rest;
-  const int bodies = num_nodes(mesh, space);  // nodes are not on a surface that can touch
+  const int bodies = num_nodes(mesh, space);
+  const auto rest_of = [&](int v) -> Vec<Dim> {
+    if (v >= bodies) return obstacles.rest[v - bodies];
+    if (v < mesh.vertex_slots()) return mesh.rest(v);
+    const auto& [a, b] = space.curved_edges()[v - mesh.vertex_slots()];
+    return (mesh.rest(a) + mesh.rest(b)) / 2;
+  };
   const auto local = [&](int v) {
     const auto [it, is_new] = known.try_emplace(v, static_cast<int>(rest.size()));
     if (is_new) {
-      rest.push_back(v < mesh.vertex_slots() ? mesh.rest(v) : obstacles.rest[v - bodies]);
+      rest.push_back(rest_of(v));
       result.others.push_back(v);
     }
     return it->second;
@@ -67,7 +82,9 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
     else
       triangles.push_back(ids);
   };
-  for (int f = 0; f < mesh.facet_slots(); ++f) add(mesh.facet(f), 0);  // own ones are near themselves
+  chords.clear();  // own ones are near themselves
+  for (int f = 0; f < mesh.facet_slots(); ++f) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
+  for (const auto& chord : chords) add(chord, 0);
   for (const auto& edge : obstacles.edges) add(edge, bodies);
   for (const auto& triangle : obstacles.triangles) add(triangle, bodies);
   for (int o = 0; o < static_cast<int>(obstacles.rest.size()); ++o)

@@ -31,8 +31,6 @@ template <int Dim>
 constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup) { return setup.remesh.enabled && setup.proxy; }},
-    {{"/space/remesh/enabled", "remeshing of quadratic elements (discr_order 2) in a scene with contact"},
-     [](const Setup<Dim>& setup) { return setup.remesh.enabled && is_quadratic(setup) && setup.contact.enabled; }},
     {{"/solver/advanced/lump_mass_matrix", "lumped mass where remeshing splits or makes curved edges"},
      [](const Setup<Dim>& setup) { return setup.remesh.enabled && may_be_quadratic(setup) && setup.lump_mass; }},
     {{"/space/remesh/curve/enabled", "curved edges with a sizing field"},

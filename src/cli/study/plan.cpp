@@ -346,7 +346,7 @@ const std::vector<Series>& all_series() {
       {"smoothing", Kind::tolerances, true, "splits, collapses, swaps and smoothing", remeshed({kSwap, kSmooth})},
       {"hp", Kind::tolerances, false, "splits, curved edges and collapses", remeshed({kCurve})},
       {"p", Kind::tolerances, false, "curved edges alone", remeshed({kCurve, {"/space/remesh/split/enabled", "false"}})},
-      {"splits-p2", Kind::tolerances, false, "splits of quadratic elements; not with contact", remeshed({kQuadratic})},
+      {"splits-p2", Kind::tolerances, false, "splits of quadratic elements", remeshed({kQuadratic})},
       {"no-screening", Kind::tolerances, false, "`smoothing`, a patch relaxed for every edge",
        remeshed({kSwap, kSmooth, {"/space/remesh/screening", "\"none\""}})},
       {"culling", Kind::tolerances, false, "`smoothing`, the paper's culling by energy",

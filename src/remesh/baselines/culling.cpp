@@ -3,6 +3,7 @@
 
 #include "baseline.hpp"
 #include "energy/elastic/point.hpp"
+#include "fem/chords.hpp"
 #include "remesh/decide/queries.hpp"
 
 namespace itr {
@@ -36,11 +37,15 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   std::vector<char> counts(total, 0);
   for (int f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
-    for (const int v : mesh.facet(f)) counts[v] = 1;
-    if constexpr (Dim == 2)
-      edges.push_back(mesh.facet(f));
-    else
-      triangles.push_back(mesh.facet(f));
+    for_each_chord<Dim>(
+        mesh.facet(f), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); },
+        [&](const auto& ids) {
+          for (const int v : ids) counts[v] = 1;
+          if constexpr (Dim == 2)
+            edges.push_back(ids);
+          else
+            triangles.push_back(ids);
+        });
   }
   for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
   for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
@@ -61,6 +66,8 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
     const double share = context.scaling * contact.pair_energy(s, x) / s.size();
     for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += share;
   }
+  for (const auto& [edge, node] : mesh.nodes())
+    for (const VertexId end : edge) energies[end] += energies[node] / 2;
   return energies;
 }
 

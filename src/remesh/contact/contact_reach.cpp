@@ -52,16 +52,27 @@ std::span<const typename Neighbourhoods<Dim>::Near> Neighbourhoods<Dim>::near(co
   else
     entry.near.clear();
   entry.radius = std::max(entry.radius, radius);
-  const SurfacePiece<Dim> piece = surface.piece(f);
-  surface.query(piece.box.inflated(entry.radius), hits);
-  const auto look_at = [&](SurfaceId other, const SurfacePiece<Dim>& there) {
-    const double distance = distance_below(piece, there, entry.radius);
+  const SurfacePieces<Dim> pieces = surface.pieces(f);
+  surface.query(surface.box_of(f).inflated(entry.radius), hits);
+  const auto add = [&](SurfaceId other, double distance) {
     if (distance < entry.radius) entry.near.push_back({other, distance});
   };
-  for (const FacetId other : hits.facets)
-    if (other != f && (!is_there || has_changed(other))) look_at(other, surface.piece(other));
+  for (const FacetId other : hits.facets) {
+    if (is_there && !has_changed(other)) continue;
+    const SurfacePieces<Dim> there = surface.pieces(other);
+    double distance = entry.radius;
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+      for (std::size_t j = other == f ? i + 1 : 0; j < there.size(); ++j)
+        distance = distance_below(pieces[i], there[j], distance);
+    add(other, distance);
+  }
   if (!is_there)
-    for (const int i : hits.obstacles) look_at(SurfaceId::of_obstacle(i), surface.obstacle_piece(i));
+    for (const int i : hits.obstacles) {
+      const SurfacePiece<Dim> there = surface.obstacle_piece(i);
+      double distance = entry.radius;
+      for (const auto& piece : pieces) distance = distance_below(piece, there, distance);
+      add(SurfaceId::of_obstacle(i), distance);
+    }
   std::sort(entry.near.begin(), entry.near.end(), [](const Near& a, const Near& b) { return a.piece < b.piece; });
   entry.stamp = surface.stamp(f);
   return entry.near;

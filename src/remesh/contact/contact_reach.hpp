@@ -46,8 +46,8 @@ class ContactReach {
 
   /// Forgets the last patch. `facet_slots`: facets of the mesh, gone ones included.
   void clear(int facet_slots);
-  /// Adds a facet of the patch. It `moves` if it is replaced or one of its vertices is free. `facet` is its id, or kNone if
-  /// the edit inserts it.
+  /// Adds a facet of the patch, by its pieces one after the other. It `moves` if it is replaced or one of its vertices or
+  /// nodes is free. `facet` is its id, or kNone if the edit inserts it.
   void add(const SurfacePiece<Dim>& piece, FacetId facet, bool moves);
   /// Finds everything that the added facets could touch, also each other, as long as no vertex moves further than room().
   /// Leaves out facets that are gone (`is_gone(facet)`). `dhat` [m].
@@ -61,12 +61,16 @@ class ContactReach {
         look_around(surface, static_cast<int>(i), hits, is_gone);
         continue;
       }
+      if (own_of_[own_[i].facet] != static_cast<int>(i)) continue;  // another piece of a facet
       for (const auto& [other, distance] : neighbourhoods.near(surface, own_[i].facet, dhat + 2 * room_, hits)) {
         const bool is_facet = !other.is_of_obstacle();
         const int number = other.number();
         if ((is_facet && is_gone(number)) || distance >= reach(own_[i].moves, is_facet && moves(number))) continue;
-        mark(own_[i].piece);
-        mark(is_facet ? surface.piece(number) : surface.obstacle_piece(number));
+        for (const auto& piece : surface.pieces(own_[i].facet)) mark(piece);
+        if (is_facet)
+          for (const auto& piece : surface.pieces(number)) mark(piece);
+        else
+          mark(surface.obstacle_piece(number));
       }
     }
     sort();
@@ -98,7 +102,8 @@ class ContactReach {
   void look_around(const SurfaceIndex<Dim>& surface, int inserted, Hits& hits, const IsGone& is_gone) {
     surface.query(own_[inserted].piece.box.inflated(reach(own_[inserted].moves, true)), hits);
     for (const FacetId f : hits.facets)
-      if (!is_gone(f)) compare(inserted, surface.piece(f), moves(f));
+      if (!is_gone(f))
+        for (const auto& piece : surface.pieces(f)) compare(inserted, piece, moves(f));
     for (const int i : hits.obstacles) compare(inserted, surface.obstacle_piece(i), false);
     for (int i = 0; i < inserted; ++i)
       if (own_[i].facet == kNone) compare(inserted, own_[i].piece, own_[i].moves);

@@ -100,11 +100,11 @@ std::array<Vec<3>, 4> between_diagonals(const Mesh<3>& mesh, const SurfaceIndex<
 }
 std::array<Vec<2>, 3> between_diagonals(const Mesh<2>&, const SurfaceIndex<2>&, const Edit<2>&) { return {}; }
 
-/// What the surface sweeps over. Two vertices move on the way to the new surface, both to the target: the one that is set
+/// What straight facets sweep over. Two vertices move on the way to the new surface, both to the target: the one that is set
 /// and the one that disappears.
 template <int Dim>
-void find_swept(const Mesh<Dim>& mesh, const SurfaceIndex<Dim>& surface, const Edit<Dim>& edit, const Vec<Dim>& target,
-                std::vector<std::array<Vec<Dim>, Dim + 1>>& swept) {
+void find_swept_by_facets(const Mesh<Dim>& mesh, const SurfaceIndex<Dim>& surface, const Edit<Dim>& edit,
+                          const Vec<Dim>& target, std::vector<std::array<Vec<Dim>, Dim + 1>>& swept) {
   swept.clear();
   if (edit.kind == Edit<Dim>::Kind::swap) swept.push_back(between_diagonals(mesh, surface, edit));
   const VertexId set = edit.value ? edit.value->vertex : kNone;
@@ -119,6 +119,26 @@ void find_swept(const Mesh<Dim>& mesh, const SurfaceIndex<Dim>& surface, const E
     simplex[Dim] = target;
     if (moving > 0) swept.push_back(simplex);
   }
+}
+
+/// Whether a facet that the edit replaces or inserts is curved.
+template <int Dim>
+bool has_chords(const Edit<Dim>& edit, const GateScratch<Dim>& scratch) {
+  return scratch.removed.size() != edit.removed_facets.size() || scratch.inserted.size() != edit.inserted_facets.size();
+}
+
+/// Holds what lies between two surfaces of one rim: the cones over all of their simplices from a point of either.
+template <int Dim>
+void find_swept_by_chords(const std::vector<SurfacePiece<Dim>>& removed, const std::vector<SurfacePiece<Dim>>& inserted,
+                          const Vec<Dim>& apex, std::vector<std::array<Vec<Dim>, Dim + 1>>& swept) {
+  swept.clear();
+  for (const auto* pieces : {&removed, &inserted})
+    for (const SurfacePiece<Dim>& piece : *pieces) {
+      if (std::find(piece.p.begin(), piece.p.begin() + Dim, apex) != piece.p.begin() + Dim) continue;  // flat
+      auto& cone = swept.emplace_back();
+      std::copy_n(piece.p.begin(), Dim, cone.begin());
+      cone[Dim] = apex;
+    }
 }
 
 }  // namespace
@@ -138,7 +158,7 @@ template <int Dim>
 bool Gate<Dim>::passes(const Edit<Dim>& edit, GateScratch<Dim>& scratch) const {
   for (const auto& configuration : configurations_)
     if (!keeps_orientation(edit, *configuration.x)) return false;
-  if (!has_contact_ || edit.kind == Edit<Dim>::Kind::split || edit.inserted_facets.empty()) return true;
+  if (!moves_surface(edit)) return true;
   for (const auto& configuration : configurations_)
     if (!stays_free(edit, configuration, scratch)) return false;
   return true;
@@ -161,58 +181,93 @@ bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const
 }
 
 template <int Dim>
-bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& configuration, GateScratch<Dim>& scratch) const {
-  const VectorX& x = *configuration.x;
-  const SurfaceIndex<Dim>& surface = configuration.surface;
-  const VertexId set = edit.value ? edit.value->vertex : kNone;
-  const Vec<Dim> target = edit.value ? RemeshFields<Dim>::interpolate(x, *edit.value) : Vec<Dim>(Vec<Dim>::Zero());
-  const auto after = [&](VertexId v) { return v == set ? target : surface.at(v); };
-  Box<Dim> box;
-  for (const auto& facet : edit.inserted_facets)
-    for (const VertexId v : facet.vertices) box.include(after(v));
-  for (const FacetId f : edit.removed_facets)
-    for (const VertexId v : mesh_.facet(f)) box.include(surface.at(v));
-  surface.query(box, scratch.hits);
+bool Gate<Dim>::is_any_removed_curved(const Edit<Dim>& edit) const {
+  bool is_any = false;
+  if (mesh_.has_nodes())
+    for (const FacetId f : edit.removed_facets)
+      for_each_node_on<Dim>(
+          mesh_.facet(f), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); }, [&](VertexId) { is_any = true; });
+  return is_any;
+}
 
-  find_swept<Dim>(mesh_, surface, edit, target, scratch.swept);
+/// What the edit takes from the surface and what it adds.
+template <int Dim>
+void Gate<Dim>::find_pieces(const Edit<Dim>& edit, const Configuration<Dim>& at, GateScratch<Dim>& scratch) const {
+  const VectorX& x = *at.x;
+  const auto after = [&](VertexId v) {
+    if (edit.value && v == edit.value->vertex) return RemeshFields<Dim>::interpolate(x, *edit.value);
+    const int node = kNewVertex - 1 - v;
+    if (node < static_cast<int>(edit.inserted_nodes.size()))
+      return RemeshFields<Dim>::interpolate(x, edit.inserted_nodes[node]);
+    return Vec<Dim>(x.segment<Dim>(Dim * v));
+  };
+  scratch.removed.clear();
+  for (const FacetId f : edit.removed_facets) {
+    const auto pieces = at.surface.pieces(f);
+    scratch.removed.insert(scratch.removed.end(), pieces.begin(), pieces.end());
+  }
+  scratch.inserted.clear();
+  for (const auto& facet : edit.inserted_facets)
+    for_each_chord<Dim>(
+        facet.vertices, [&](VertexId a, VertexId b) { return node_after(mesh_, edit, a, b); },
+        [&](const auto& ids) {
+          SurfacePiece<Dim>& piece = scratch.inserted.emplace_back();
+          for (const VertexId v : ids) piece.add(after(v), v);
+        });
+}
+
+template <int Dim>
+void Gate<Dim>::find_swept(const Edit<Dim>& edit, const Configuration<Dim>& at, GateScratch<Dim>& scratch) const {
+  const VectorX& x = *at.x;
+  const Vec<Dim> target = edit.value ? RemeshFields<Dim>::interpolate(x, *edit.value) : Vec<Dim>(Vec<Dim>::Zero());
+  if (!has_chords(edit, scratch)) return find_swept_by_facets<Dim>(mesh_, at.surface, edit, target, scratch.swept);
+  const VertexId node = mesh_.node_of(edit.edge[0], edit.edge[1]);
+  const Vec<Dim> apex = edit.value ? target : Vec<Dim>(x.segment<Dim>(Dim * (node == kNone ? edit.edge[0] : node)));
+  find_swept_by_chords(scratch.removed, scratch.inserted, apex, scratch.swept);
+}
+
+template <int Dim>
+bool Gate<Dim>::stays_free(const Edit<Dim>& edit, const Configuration<Dim>& at, GateScratch<Dim>& scratch) const {
+  const SurfaceIndex<Dim>& surface = at.surface;
+  find_pieces(edit, at, scratch);
+  find_swept(edit, at, scratch);
+  const VertexId set = edit.value ? edit.value->vertex : kNone;
+  const Vec<Dim> target = edit.value ? RemeshFields<Dim>::interpolate(*at.x, *edit.value) : Vec<Dim>(Vec<Dim>::Zero());
+  Box<Dim> box;
+  for (const auto* pieces : {&scratch.removed, &scratch.inserted})
+    for (const SurfacePiece<Dim>& piece : *pieces) box.include(piece.box);
+  surface.query(box, scratch.hits);
   const auto is_swept = [&](const Vec<Dim>& point) {
     return std::any_of(scratch.swept.begin(), scratch.swept.end(),
                        [&](const auto& simplex) { return lies_in<Dim>(point, simplex); });
   };
-  const auto is_part = [&](VertexId v) {
-    if (v == set || v == edit.removed_vertex) return true;
-    return std::any_of(edit.inserted_facets.begin(), edit.inserted_facets.end(), [&](const auto& facet) {
-      return std::find(facet.vertices.begin(), facet.vertices.end(), v) != facet.vertices.end();
-    });
+  const auto is_part = [&](SurfaceId v) {
+    const auto has = [&](const SurfacePiece<Dim>& piece) { return piece.has(v); };
+    return v == set || v == edit.removed_vertex || std::any_of(scratch.inserted.begin(), scratch.inserted.end(), has) ||
+           std::any_of(scratch.removed.begin(), scratch.removed.end(), has);
   };
-
-  scratch.inserted.clear();
-  for (const auto& facet : edit.inserted_facets) {
-    SurfacePiece<Dim>& piece = scratch.inserted.emplace_back();
-    for (const VertexId v : facet.vertices) piece.add(after(v), v);
-  }
   const auto is_free_of = [&](const SurfacePiece<Dim>& other) {
     return std::none_of(scratch.inserted.begin(), scratch.inserted.end(),
                         [&](const SurfacePiece<Dim>& piece) { return piece.box.overlaps(other.box) && meet(piece, other); });
   };
   for (const FacetId f : scratch.hits.facets) {
     if (std::find(edit.removed_facets.begin(), edit.removed_facets.end(), f) != edit.removed_facets.end()) continue;
-    SurfacePiece<Dim> piece;
-    for (const VertexId v : mesh_.facet(f)) {
-      piece.add(after(v), v);
-      if (!is_part(v) && is_swept(after(v))) return false;
+    for (const SurfacePiece<Dim>& there : surface.pieces(f)) {
+      SurfacePiece<Dim> piece;
+      for (int k = 0; k < there.size; ++k) {
+        piece.add(there.id[k] == set ? target : there.p[k], there.id[k]);
+        if (!is_part(there.id[k]) && is_swept(piece.p[k])) return false;
+      }
+      if (!is_free_of(piece)) return false;
     }
-    if (!is_free_of(piece)) return false;
   }
   for (const int i : scratch.hits.obstacles) {
-    SurfacePiece<Dim> piece;
-    for (const int v : primitives_.all[i].ids()) {
-      piece.add(surface.obstacle_at(v), SurfaceId::of_obstacle(v));
-      if (is_swept(surface.obstacle_at(v))) return false;
-    }
+    const SurfacePiece<Dim> piece = surface.obstacle_piece(i);
+    for (int k = 0; k < piece.size; ++k)
+      if (is_swept(piece.p[k])) return false;
     if (!is_free_of(piece)) return false;
   }
-  return true;
+  return !has_chords(edit, scratch) || std::all_of(scratch.inserted.begin(), scratch.inserted.end(), is_free_of);
 }
 
 template <int Dim>

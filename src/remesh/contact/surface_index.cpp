@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "remesh/curved_cell.hpp"
+
 namespace itr {
 
 template <int Dim>
@@ -53,6 +55,10 @@ template <int Dim>
 Box<Dim> SurfaceIndex<Dim>::box_of(FacetId f) const {
   Box<Dim> box;
   for (const int v : mesh_->facet(f)) box.include(at(v));
+  if (mesh_->has_nodes())
+    for_each_node_on<Dim>(
+        mesh_->facet(f), [&](VertexId a, VertexId b) { return mesh_->node_of(a, b); },
+        [&](VertexId node) { box.include(at(node)); });
   return box;
 }
 
@@ -61,6 +67,22 @@ SurfacePiece<Dim> SurfaceIndex<Dim>::piece(FacetId f) const {
   SurfacePiece<Dim> piece;
   for (const int v : mesh_->facet(f)) piece.add(at(v), v);
   return piece;
+}
+
+template <int Dim>
+SurfacePieces<Dim> SurfaceIndex<Dim>::pieces(FacetId f) const {
+  SurfacePieces<Dim> result;
+  if (!mesh_->has_nodes()) {
+    result.push_back(piece(f));
+    return result;
+  }
+  for_each_chord<Dim>(
+      mesh_->facet(f), [&](VertexId a, VertexId b) { return mesh_->node_of(a, b); },
+      [&](const auto& ids) {
+        SurfacePiece<Dim>& piece = result.emplace_back();
+        for (const int v : ids) piece.add(at(v), v);
+      });
+  return result;
 }
 
 template <int Dim>
@@ -109,13 +131,13 @@ template <int Dim>
 void SurfaceIndex<Dim>::move(VertexId v) {
   ++now_;
   Box<Dim> around;
-  for (const FacetId f : mesh_->facets_of(v)) {
+  for_each_facet_at(*mesh_, v, [&](FacetId f) {
     const Box<Dim> box = box_of(f);
     changed_[f] = now_;
     around.include(facets_.box(f));
     around.include(box);
     facets_.update(f, box);
-  }
+  });
   stamp_near(around);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// All that can touch in one stored configuration: facets of the bodies, which edits and relaxations change, and obstacles,
-// which stand still while a mesh is changed. Found by place.
+// All that can touch in one stored configuration: facets of the bodies with the nodes of their edges, which edits and
+// relaxations change, and obstacles, which stand still while a mesh is changed. Found by place.
 #pragma once
 
 #include <array>
@@ -43,7 +43,7 @@ class SurfaceIndex {
   void query(const Box<Dim>& box, Hits& hits) const;
   /// Takes in that the mesh changed: facets from `first_new` on are new, `removed` are gone.
   void follow(std::span<const FacetId> removed, FacetId first_new);
-  /// Takes in that a vertex has moved.
+  /// Takes in that a vertex or a node has moved.
   void move(VertexId v);
 
   const Mesh<Dim>& mesh() const { return *mesh_; }
@@ -55,11 +55,14 @@ class SurfaceIndex {
   /// The stamp of the last change of the facet itself; later than all others where it is gone.
   unsigned changed(FacetId f) const { return changed_[f]; }
   double span() const { return span_; }
+  /// Of a facet's vertices alone.
   SurfacePiece<Dim> piece(FacetId f) const;
+  SurfacePieces<Dim> pieces(FacetId f) const;
+  /// Holds the pieces of a facet.
+  Box<Dim> box_of(FacetId f) const;
   SurfacePiece<Dim> obstacle_piece(int primitive) const;
 
  private:
-  Box<Dim> box_of(FacetId f) const;
   void stamp_near(const Box<Dim>& box);
 
   const Mesh<Dim>* mesh_;

@@ -6,6 +6,7 @@
 #include <array>
 #include <compare>
 
+#include <boost/container/static_vector.hpp>
 #include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 #include "itr/mesh/mesh.hpp"
@@ -41,6 +42,10 @@ struct SurfacePiece {
   }
   bool has(SurfaceId number) const { return std::find(id.begin(), id.begin() + size, number) != id.begin() + size; }
 };
+
+/// The simplices through all nodes of a facet: one where its edges are straight.
+template <int Dim>
+using SurfacePieces = boost::container::static_vector<SurfacePiece<Dim>, Dim == 2 ? 2 : 4>;
 
 /// Least distance of a vertex and an edge (2D), a vertex and a triangle or two edges (3D) of two pieces, without a common
 /// corner; `limit` where it is no less [m].

@@ -147,6 +147,19 @@ EdgeKey LocalProblem<Dim>::edge_of(const LocalVertex& v) const {
 }
 
 template <int Dim>
+VertexId LocalProblem<Dim>::node_of(VertexId a, VertexId b) const {
+  return is_after_ ? node_after(mesh_, edit_, a, b) : mesh_.node_of(a, b);
+}
+
+template <int Dim>
+bool LocalProblem<Dim>::is_on_surface(const LocalVertex& v) const {
+  if (v.kind != Kind::of_mesh) return false;
+  bool found = false;
+  for_each_facet_at(mesh_, v.id, [&](FacetId) { found = true; });
+  return found;
+}
+
+template <int Dim>
 Vec<Dim> LocalProblem<Dim>::rest_position(const LocalVertex& v) const {
   if (v.kind == Kind::of_obstacle) return state_.context.obstacles.rest[v.id];
   if (const auto* node = created_node(v)) {
@@ -230,8 +243,8 @@ template <int SimplexDim>
 CurvedEdges LocalProblem<Dim>::find_nodes(const std::array<VertexId, SimplexDim + 1>& vertices,
                                           std::array<int, kQuadraticNodes<SimplexDim>>& nodes) {
   if (!mesh_.has_nodes() && (!is_after_ || edit_.inserted_nodes.empty())) return 0;
-  const CurvedCell<SimplexDim> found = curved_cell<SimplexDim>(
-      vertices, [&](VertexId a, VertexId b) { return is_after_ ? node_after(mesh_, edit_, a, b) : mesh_.node_of(a, b); });
+  const CurvedCell<SimplexDim> found =
+      curved_cell<SimplexDim>(vertices, [&](VertexId a, VertexId b) { return node_of(a, b); });
   if (found.edges)
     for (std::size_t k = 0; k < nodes.size(); ++k) nodes[k] = local(found.nodes[k]);
   return found.edges;
@@ -344,21 +357,26 @@ void LocalProblem<Dim>::hold_vertices() {
   dofs_.hold(held);
 }
 
-/// Free vertices of the surface, and those whose facets the edit replaces (on both sides of the comparison).
+/// Free vertices and nodes of the surface, and those of facets that the edit replaces (on both sides of the comparison).
 template <int Dim>
 void LocalProblem<Dim>::find_what_changes() {
   changes_.assign(vertices_.size(), 0);
   for (std::size_t i = 0; i < vertices_.size(); ++i)
-    if (vertices_[i].kind == Kind::of_mesh && mesh_.is_boundary(vertices_[i].id)) changes_[i] = is_free(static_cast<int>(i));
+    if (is_on_surface(vertices_[i])) changes_[i] = is_free(static_cast<int>(i));
   const auto mark = [&](VertexId v) {
     if (v == kNewVertex && !is_after_) return;
     if (is_after_ && v == edit_.removed_vertex) return;
     changes_[local(v)] = 1;
   };
-  for (const FacetId f : edit_.removed_facets)
-    for (const int v : mesh_.facet(f)) mark(v);
-  for (const auto& facet : edit_.inserted_facets)
-    for (const int v : facet.vertices) mark(v);
+  const bool has_nodes = mesh_.has_nodes() || !edit_.inserted_nodes.empty();
+  const auto mark_all = [&](const typename MeshTypes<Dim>::Facet& facet) {
+    for (const int v : facet) mark(v);
+    if (has_nodes)
+      for_each_node_on<Dim>(
+          facet, [&](VertexId a, VertexId b) { return node_of(a, b); }, mark);
+  };
+  for (const FacetId f : edit_.removed_facets) mark_all(mesh_.facet(f));
+  for (const auto& facet : edit_.inserted_facets) mark_all(facet.vertices);
 }
 
 /// Hands over the facets at what changes, and looks for what they could touch.
@@ -367,19 +385,25 @@ void LocalProblem<Dim>::find_contacts() {
   ContactReach<Dim>& reach = scratch_.reach;
   reach.clear(mesh_.facet_slots());
   const auto add = [&](const typename MeshTypes<Dim>::Facet& facet, FacetId f) {
-    SurfacePiece<Dim> piece;
+    SurfacePieces<Dim> pieces;
     bool moves = false;
-    for (const VertexId v : facet) {
-      piece.add(field_value(state_.fields.x, {}, {v == kNewVertex ? Kind::created : Kind::of_mesh, v}), v);
-      moves = moves || (v == kNewVertex || scratch_.known[v] ? is_free(local(v)) : false);
-    }
-    reach.add(piece, f, moves);
+    for_each_chord<Dim>(
+        facet, [&](VertexId a, VertexId b) { return node_of(a, b); },
+        [&](const auto& ids) {
+          SurfacePiece<Dim>& piece = pieces.emplace_back();
+          for (const VertexId v : ids) {
+            piece.add(field_value(state_.fields.x, {}, {is_created(v) ? Kind::created : Kind::of_mesh, v}), v);
+            moves = moves || (is_created(v) || scratch_.known[v] ? is_free(local(v)) : false);
+          }
+        });
+    for (const auto& piece : pieces) reach.add(piece, f, moves);
   };
   scratch_.facets.clear(mesh_.facet_slots());
   for (std::size_t i = 0; i < changes_.size(); ++i) {
     if (!changes_[i] || vertices_[i].kind != Kind::of_mesh) continue;
-    for (const FacetId f : mesh_.facets_of(vertices_[i].id))
+    for_each_facet_at(mesh_, vertices_[i].id, [&](FacetId f) {
       if (scratch_.facets.mark(f) && !is_removed(f)) add(mesh_.facet(f), f);
+    });
   }
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets) add(facet.vertices, kNone);
@@ -398,14 +422,15 @@ void LocalProblem<Dim>::find_stars_of_touching() {
   scratch_.facets.clear(mesh_.facet_slots());
   scratch_.primitives.clear(static_cast<int>(obstacles.all.size()));
   for (const SurfaceId id : scratch_.reach.touching()) {
-    if (id == kNewVertex) continue;
     if (id.is_of_obstacle()) {
       for (const int i : obstacles.at_vertex[id.number()])
         if (scratch_.primitives.mark(i)) primitives.push_back(i);
       continue;
     }
-    for (const FacetId f : mesh_.facets_of(id.number()))
+    if (is_created(id.number())) continue;
+    for_each_facet_at(mesh_, id.number(), [&](FacetId f) {
       if (scratch_.facets.mark(f) && !is_removed(f)) facets.push_back(f);
+    });
   }
   std::sort(facets.begin(), facets.end());
   std::sort(primitives.begin(), primitives.end());
@@ -435,20 +460,26 @@ void LocalProblem<Dim>::add_surface() {
     if constexpr (Dim == 3)
       if (size == 3) surface.triangles.push_back({ids[0], ids[1], ids[2]});
   };
-  const auto add_facet = [&](const Facet& facet) {
-    Facet ids;
-    for (int k = 0; k < Dim; ++k) ids[k] = local(facet[k]);
-    add(ids, Dim);
+  const auto add_facet = [&](const Facet& facet, const auto& is_wanted) {
+    for_each_chord<Dim>(
+        facet, [&](VertexId a, VertexId b) { return node_of(a, b); },
+        [&](const Facet& chord) {
+          if (!is_wanted(chord)) return;
+          Facet ids;
+          for (int k = 0; k < Dim; ++k) ids[k] = local(chord[k]);
+          add(ids, Dim);
+        });
   };
   find_stars_of_touching();
   for (const FacetId f : scratch_.near_facets) {
-    add_facet(mesh_.facet(f));
-    for (const VertexId v : mesh_.facet(f)) surface_read_.include(state_.surface.at(v));
+    add_facet(mesh_.facet(f), [](const Facet&) { return true; });
+    surface_read_.include(state_.surface.box_of(f));
   }
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets)
-      if (std::any_of(facet.vertices.begin(), facet.vertices.end(), [&](int v) { return reach.touches(v); }))
-        add_facet(facet.vertices);
+      add_facet(facet.vertices, [&](const Facet& chord) {
+        return std::any_of(chord.begin(), chord.end(), [&](int v) { return reach.touches(v); });
+      });
   const ObstaclePrimitives& obstacles = state_.surface.primitives();
   for (const int i : scratch_.near_primitives) {
     std::array<int, 3> ids{};

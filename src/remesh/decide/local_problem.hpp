@@ -115,6 +115,9 @@ class LocalProblem {
   void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume, const Mat<Dim>& inverse_edges, CellId c);
   void add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag);
   EdgeKey edge_of(const LocalVertex& node) const;
+  /// The node of an edge on the side of the comparison that this is, or kNone.
+  VertexId node_of(VertexId a, VertexId b) const;
+  bool is_on_surface(const LocalVertex& v) const;
   const typename Edit<Dim>::NewNode* created_node(const LocalVertex& v) const;
   void add_cells(std::span<const CellId> patch);
   void add_loaded_facets();

@@ -29,11 +29,40 @@ std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cel
 template <int Dim>
 Refusal RemeshQueries<Dim>::refuse_split(const EdgeKey& e) const {
   if (!exists(e)) return Refusal::gone;
-  const double length = rest_length(e), dhat = context_.contact.activation_distance;
-  if (length < options_.split.min_edge_length.value()) return Refusal::length;
+  if (rest_length(e) < options_.split.min_edge_length.value()) return Refusal::length;
+  if (!has_contact() || !is_surface(e)) return Refusal::none;
+  return has_short_halves(e) || makes_short_chords(e) ? Refusal::dhat : Refusal::none;
+}
+
+template <int Dim>
+bool RemeshQueries<Dim>::has_short_halves(const EdgeKey& e) const {
+  const double dhat = context_.contact.activation_distance;
   const auto x = [&](VertexId v) { return fields_.x.template segment<Dim>(Dim * v); };
-  const bool is_bound = has_contact() && is_surface(e) && (length < 2 * dhat || (x(e[0]) - x(e[1])).norm() < 2 * dhat);
-  return is_bound ? Refusal::dhat : Refusal::none;
+  return rest_length(e) < 2 * dhat || (x(e[0]) - x(e[1])).norm() < 2 * dhat;
+}
+
+template <int Dim>
+bool RemeshQueries<Dim>::makes_short_chords(const EdgeKey& e) const {
+  if (!mesh_.has_nodes()) return false;
+  const double dhat = context_.contact.activation_distance;
+  const Edit<Dim> edit = make_split(mesh_, e);
+  const auto rest = [&](VertexId v) { return v == kNewVertex ? edit.value->rest : mesh_.rest(v); };
+  const auto x = [&](VertexId v) {
+    return v == kNewVertex ? fields_.interpolate(fields_.x, *edit.value)
+                           : Vec<Dim>(fields_.x.template segment<Dim>(Dim * v));
+  };
+  const auto is_on_surface = [&](const EdgeKey& edge) {
+    return std::any_of(edit.inserted_facets.begin(), edit.inserted_facets.end(), [&](const auto& facet) {
+      const auto has = [&](VertexId v) { return std::find(facet.vertices.begin(), facet.vertices.end(), v); };
+      return has(edge[0]) != facet.vertices.end() && has(edge[1]) != facet.vertices.end();
+    });
+  };
+  return std::any_of(edit.inserted_nodes.begin(), edit.inserted_nodes.end(), [&](const auto& node) {
+    if (!is_on_surface(node.edge)) return false;
+    const Vec<Dim> middle = fields_.interpolate(fields_.x, node);
+    return (rest(node.edge[0]) - rest(node.edge[1])).norm() < 2 * dhat || (x(node.edge[0]) - middle).norm() < dhat ||
+           (x(node.edge[1]) - middle).norm() < dhat;
+  });
 }
 
 template <int Dim>
@@ -50,7 +79,7 @@ template <int Dim>
 Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e) const {
   if (!exists(e)) return Refusal::gone;
   if (mesh_.node_of(e[0], e[1]) != kNone) return Refusal::not_asked;
-  return has_contact() && is_surface(e) ? Refusal::held : Refusal::none;
+  return has_contact() && is_surface(e) && has_short_halves(e) ? Refusal::dhat : Refusal::none;
 }
 
 template <int Dim>
@@ -101,8 +130,7 @@ void RemeshQueries<Dim>::find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scra
   trial.in_contact = is_in_contact(trial.edge(), scratch);
   if (!has_contact() || !is_surface(trial.edge())) return;
   Box<Dim> edge;
-  for (const FacetId f : mesh_.facets_of(trial.edge()[0]))
-    for (const VertexId v : mesh_.facet(f)) edge.include(gate_.present().at(v));
+  for (const FacetId f : mesh_.facets_of(trial.edge()[0])) edge.include(gate_.present().box_of(f));
   trial.surface_read.include(edge.inflated(context_.contact.activation_distance));
 }
 

@@ -53,7 +53,7 @@ class RemeshQueries {
   /// Why an edge, by its lengths, cannot be split or may not collapse.
   Refusal refuse_split(const EdgeKey& e) const;
   Refusal refuse_collapse(const EdgeKey& e) const;
-  /// Why an edge cannot be curved: the surface stays straight where contact is enabled.
+  /// Why an edge cannot be curved.
   Refusal refuse_curve(const EdgeKey& e) const;
   Refusal refuse_straighten(const EdgeKey& e) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
@@ -95,6 +95,10 @@ class RemeshQueries {
       return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() && holds(f);
     });
   }
+  /// Whether halves of an edge would be shorter than dhat, at rest or now.
+  bool has_short_halves(const EdgeKey& e) const;
+  /// The same of the chords that the split of an edge would bring to the surface beside those halves.
+  bool makes_short_chords(const EdgeKey& e) const;
   RemeshState<Dim> state() const {
     return {mesh_, fields_, context_, gate_.present(), baseline_ ? baseline_->history() : HistoryRule::function};
   }

@@ -54,6 +54,8 @@ Edit<Dim> replace_by_themselves(const Mesh<Dim>& mesh, const EdgeKey& edge, type
   Edit<Dim> edit{.kind = kind, .edge = edge};
   edit.removed_cells = mesh.cells_of_edge(edge);
   for (const CellId c : edit.removed_cells) edit.inserted_cells.push_back({mesh.cell(c), mesh.body(c)});
+  edit.removed_facets = mesh.facets_of_edge(edge);
+  for (const FacetId f : edit.removed_facets) edit.inserted_facets.push_back({mesh.facet(f), mesh.facet_tag(f), f});
   return edit;
 }
 

@@ -91,18 +91,21 @@ class Coarsener {
   std::optional<PlaceQueue::Entry> rank_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
     if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_straighten(edge, scratch);
-    if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), false)) return std::nullopt;
+    const bool in_contact = ask_.is_in_contact(edge, scratch);
+    if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact)) return std::nullopt;
     return PlaceQueue::Entry{.place = Place::node_of(edge), .priority = gain};
   }
 
   void look_at_straighten(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_straighten(edge); refusal != Refusal::none) return trial.refuse(refusal);
+    ask_.find_contact(trial, scratch);
     const double gain =
         session_.is_unchanged(trial.candidate) ? trial.candidate.priority : ask_.predict_straighten(edge, scratch);
     trial.signal = std::abs(gain);
     trial.edit = make_straighten(ask_.mesh(), edge);
-    if (ask_.is_hopeless(trial.edit->removed_cells, gain, straighten_tolerance_)) return trial.refuse(Refusal::prediction);
+    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, straighten_tolerance_))
+      return trial.refuse(Refusal::prediction);
     ask_.judge(trial, straighten_tolerance_, ask_.options().local, scratch);
   }
 

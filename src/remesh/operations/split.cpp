@@ -100,20 +100,23 @@ class Refiner {
     if (ask_.refuse_curve(edge) != Refusal::none) return std::nullopt;
     if (const auto* baseline = session_.baseline(); baseline && !baseline->may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_curve(edge, scratch);
-    if (session_.memory().was_refused(RemeshMemory::curve, edge, gain, false)) return std::nullopt;
-    return PlaceQueue::Entry{.place = Place::node_of(edge),
-                             .priority = gain,
-                             .is_hopeless = ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, curve_tolerance_)};
+    const bool in_contact = ask_.is_in_contact(edge, scratch);
+    if (session_.memory().was_refused(RemeshMemory::curve, edge, gain, in_contact)) return std::nullopt;
+    return PlaceQueue::Entry{
+        .place = Place::node_of(edge),
+        .priority = gain,
+        .is_hopeless = !in_contact && ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, curve_tolerance_)};
   }
 
   void look_at_curve(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_curve(edge); refusal != Refusal::none) return trial.refuse(refusal);
+    ask_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
-    if (is_known && trial.candidate.is_hopeless) return trial.refuse(Refusal::prediction);
+    if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return trial.refuse(Refusal::prediction);
     trial.signal = is_known ? trial.candidate.priority : ask_.predict_curve(edge, scratch);
     trial.edit = make_curve(ask_.mesh(), edge);
-    if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_))
+    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, curve_tolerance_, ask_.options().local, scratch);
   }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "remesh/curved_cell.hpp"
+
 namespace itr {
 
 template <int Dim>
@@ -18,8 +20,13 @@ void ChangeLog<Dim>::write(VertexId v) {
 
 template <int Dim>
 void ChangeLog<Dim>::write_surface(VertexId v) {
-  for (const FacetId f : mesh_.facets_of(v))
-    for (const VertexId w : mesh_.facet(f)) surfaces_.back().include(x_.template segment<Dim>(Dim * w));
+  const auto include = [&](VertexId w) { surfaces_.back().include(x_.template segment<Dim>(Dim * w)); };
+  for_each_facet_at(mesh_, v, [&](FacetId f) {
+    for (const VertexId w : mesh_.facet(f)) include(w);
+    if (mesh_.has_nodes())
+      for_each_node_on<Dim>(
+          mesh_.facet(f), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); }, include);
+  });
 }
 
 template <int Dim>

@@ -8,8 +8,7 @@ namespace itr {
 template <int Dim>
 bool Committer<Dim>::was_overtaken(const Trial<Dim>& trial) const {
   if (log_.now() == wave_began_) return false;
-  const bool reads_past_surface =
-      has_contact_ && trial.edit && !trial.edit->is_nested() && !trial.edit->inserted_facets.empty();  // see Gate
+  const bool reads_past_surface = trial.edit && gate_.moves_surface(*trial.edit);
   const auto surfaces = log_.surfaces(wave_began_);
   if (std::any_of(surfaces.begin(), surfaces.end(), [&](const Box<Dim>& box) {
         return box.min[0] <= box.max[0] && (reads_past_surface || box.overlaps(trial.surface_read));

@@ -13,8 +13,7 @@ namespace itr {
 template <int Dim>
 class Committer {
  public:
-  Committer(const Mesh<Dim>& mesh, const Gate<Dim>& gate, bool has_contact, ChangeLog<Dim>& log)
-      : mesh_(mesh), gate_(gate), has_contact_(has_contact), log_(log) {}
+  Committer(const Mesh<Dim>& mesh, const Gate<Dim>& gate, ChangeLog<Dim>& log) : mesh_(mesh), gate_(gate), log_(log) {}
 
   /// Begins a wave: the next two functions answer for commits after this call.
   void begin_wave() { wave_began_ = log_.now(); }
@@ -34,7 +33,6 @@ class Committer {
  private:
   const Mesh<Dim>& mesh_;
   const Gate<Dim>& gate_;
-  bool has_contact_;
   ChangeLog<Dim>& log_;
   unsigned wave_began_ = 0;
   std::vector<double> trial_seconds_;

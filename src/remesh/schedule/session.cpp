@@ -38,7 +38,7 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
       log_(mesh, fields.x, context.contact.enabled),
       ask_(mesh, fields, context, options, strata, gate_, baseline_.get()),
       memory_(memory, !baseline_ || baseline_->has_bounds(), log_),
-      commits_(mesh, gate_, context.contact.enabled, log_),
+      commits_(mesh, gate_, log_),
       lanes_(context.host.empty() ? num_threads() : 1) {  // terms of the program may not be for several threads
   if (strata.empty()) strata = Strata<Dim>(mesh);
   ITR_AUDIT(strata.find_defect(mesh).empty(), strata.find_defect(mesh));

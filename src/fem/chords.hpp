@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "itr/mesh/mesh.hpp"
+
+namespace itr {
+
+/// Calls add(ids) for the simplices through all nodes of a boundary facet, oriented as the facet (see add_chord_facets).
+/// `node_of(a, b)`: the node of an edge, or kNone where it is straight.
+template <int Dim, typename NodeOf, typename Add>
+void for_each_chord(const typename MeshTypes<Dim>::Facet& facet, const NodeOf& node_of, const Add& add) {
+  using Facet = typename MeshTypes<Dim>::Facet;
+  if constexpr (Dim == 2) {
+    const int middle = node_of(facet[0], facet[1]);
+    if (middle == kNone) return add(facet);
+    add(Facet{facet[0], middle});
+    add(Facet{middle, facet[1]});
+  } else {
+    std::array<int, 3> middle;  // of the edge from corner k to corner k + 1
+    int count = 0;
+    for (int k = 0; k < 3; ++k) {
+      middle[k] = node_of(facet[k], facet[(k + 1) % 3]);
+      count += middle[k] != kNone;
+    }
+    if (count == 0) return add(facet);
+    // Turned so that with one curved edge it is the first, and with two the straight one is the last.
+    int turn = 0;
+    while (count == 1 ? middle[turn] == kNone : count == 2 && middle[(turn + 2) % 3] != kNone) ++turn;
+    const auto corner = [&](int k) { return facet[(turn + k) % 3]; };
+    const int m01 = middle[turn], m12 = middle[(turn + 1) % 3], m20 = middle[(turn + 2) % 3];
+    if (count == 1) {
+      add(Facet{corner(0), m01, corner(2)});
+      add(Facet{m01, corner(1), corner(2)});
+      return;
+    }
+    add(Facet{m01, corner(1), m12});
+    if (count == 2) {  // and the quadrilateral 0, m01, m12, 2
+      if (corner(0) < corner(2)) {
+        add(Facet{corner(0), m01, m12});
+        add(Facet{corner(0), m12, corner(2)});
+      } else {
+        add(Facet{corner(0), m01, corner(2)});
+        add(Facet{m01, m12, corner(2)});
+      }
+      return;
+    }
+    add(Facet{corner(0), m01, m20});
+    add(Facet{m20, m12, corner(2)});
+    add(Facet{m01, m12, m20});
+  }
+}
+
+}  // namespace itr

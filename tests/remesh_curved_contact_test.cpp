@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: MIT
+// Curved edges of surfaces in contact: patches see the chords that the whole mesh sees, the gate covers what chords sweep
+// over, and random edits and whole runs intersect nothing.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <numeric>
+#include <random>
+
+#include "itr/core/parallel.hpp"
+#include "itr/remesh/remesher.hpp"
+#include "itr/simulation/simulation.hpp"
+#include "mesh/validate.hpp"
+#include "random_mesh.hpp"
+#include "remesh/curved_cell.hpp"
+#include "remesh/decide/patch.hpp"
+#include "simulation/contact_surface.hpp"
+#include "simulation/invariants.hpp"
+#include "simulation/patch_surface.hpp"
+#include "tet_scene.hpp"
+
+namespace itr {
+namespace {
+
+template <typename T>
+class CurvedContact : public ::testing::Test {};
+using Dimensions = ::testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
+TYPED_TEST_SUITE(CurvedContact, Dimensions);
+
+auto straight_scene(unsigned seed, std::integral_constant<int, 2>) {
+  return TrialScene(seed, 3, {.second_body = seed % 2 == 1, .moving_obstacle = seed % 3 == 0});
+}
+auto straight_scene(unsigned seed, std::integral_constant<int, 3>) { return TetScene(seed, 2); }
+
+/// A random scene in contact, a share of its edges curved; not all are valid.
+template <int Dim>
+struct Scene {
+  decltype(straight_scene(0, std::integral_constant<int, Dim>())) base;
+  Mesh<Dim>& mesh = base.mesh;
+  RemeshFields<Dim>& fields = base.fields;
+  StepContext<Dim>& context = base.context;
+  std::mt19937& random = base.random;
+  Strata<Dim> strata;
+
+  explicit Scene(unsigned seed, double share, double noise)
+      : base(straight_scene(seed, std::integral_constant<int, Dim>())) {
+    mesh.compact();
+    strata = Strata<Dim>(mesh);
+    std::uniform_real_distribution<double> off(-noise, noise);
+    for (const EdgeKey& edge : mesh.edges()) {
+      if (std::uniform_real_distribution<double>(0, 1)(random) >= share) continue;
+      const VertexId node = mesh.add_node(edge);
+      strata.add_nodes(1);
+      fields.for_each([&](VectorX& field) {
+        field.conservativeResize(Dim * (node + 1));
+        field.segment<Dim>(Dim * node) = (field.segment<Dim>(Dim * edge[0]) + field.segment<Dim>(Dim * edge[1])) / 2;
+        for (int k = 0; k < Dim; ++k) field[Dim * node + k] += off(random);
+      });
+    }
+  }
+  Scene(const Scene&) = delete;
+
+  EdgeKey edge(bool of_surface) {
+    const auto edges = mesh.edges();
+    for (;;)
+      if (const EdgeKey& edge = edges[random() % edges.size()]; !of_surface || !mesh.facets_of_edge(edge).empty())
+        return edge;
+  }
+  Edit<Dim> edit(bool of_surface) {
+    const EdgeKey e = edge(of_surface);
+    const bool is_curved = mesh.node_of(e[0], e[1]) != kNone;
+    if (random() % 2) return make_split(mesh, e);
+    return is_curved ? make_straighten(mesh, e) : make_curve(mesh, e);
+  }
+  void apply(const Edit<Dim>& edit) {
+    const VertexId created = mesh.apply(edit);
+    fields.follow(edit, created, mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size()));
+    strata.follow(edit, created);
+    ASSERT_EQ(mesh.find_defect(), "");
+    ASSERT_EQ(strata.find_misfit(mesh), "");
+  }
+};
+
+/// The mesh without slots of nodes, fields in the numbering of its space.
+template <int Dim>
+struct Compact {
+  Mesh<Dim> mesh;
+  Space space;
+  Obstacles<Dim> obstacles;
+  std::vector<int> slots;  ///< by node of the space
+
+  explicit Compact(const Scene<Dim>& scene) : mesh(scene.mesh) {
+    const auto nodes = mesh.nodes();
+    const auto map = mesh.compact();
+    std::vector<EdgeKey> curved;
+    for (const auto& [edge, node] : nodes) curved.push_back({map.vertex[edge[0]], map.vertex[edge[1]]});
+    space = Space(curved);
+    slots.resize(num_nodes(mesh, space));
+    for (std::size_t v = 0; v < map.vertex.size(); ++v)
+      if (map.vertex[v] != kNone) slots[map.vertex[v]] = static_cast<int>(v);
+    for (std::size_t i = 0; i < nodes.size(); ++i) slots[mesh.vertex_slots() + i] = nodes[i].second;
+    const auto& from = scene.context.obstacles;
+    obstacles = {.rest = from.rest, .edges = from.edges, .triangles = from.triangles, .motion = {}, .motions = {}};
+  }
+  VectorX field(const VectorX& of_slots, const std::vector<Vec<Dim>>& of_obstacles) const {
+    VectorX all(Dim * static_cast<Eigen::Index>(slots.size() + of_obstacles.size()));
+    for (std::size_t i = 0; i < slots.size(); ++i)
+      all.segment<Dim>(Dim * static_cast<int>(i)) = of_slots.segment<Dim>(Dim * slots[i]);
+    for (std::size_t o = 0; o < of_obstacles.size(); ++o)
+      all.segment<Dim>(Dim * static_cast<int>(slots.size() + o)) = of_obstacles[o];
+    return all;
+  }
+};
+
+/// All terms on the whole mesh, contact between the chords of the step's own surface.
+template <int Dim>
+double whole_energy(const Scene<Dim>& scene) {
+  const Compact<Dim> compact(scene);
+  const auto& obstacles = scene.context.obstacles;
+  const CellSet<Dim> cells = whole_mesh(compact.mesh, obstacles.rest, compact.space);
+  const CollisionSurface surface = collision_surface(compact.mesh, compact.obstacles, compact.space);
+  const VectorX x = compact.field(scene.fields.x, obstacles.x);
+  const VectorX predictor = compact.field(scene.fields.predictor, obstacles.x);
+  const VectorX reference = compact.field(scene.fields.velocity_reference, obstacles.velocity_reference);
+  IncrementalPotential<Dim> potential(scene.context, cells, {.predictor = predictor, .velocity_reference = reference});
+  potential.add_contact(surface, scene.context.contact.barrier_stiffness);
+  Workspace workspace;
+  return potential.sum(potential.lag(x, workspace)).value(x, workspace);
+}
+
+/// Whether no chords meet, no obstacle is inside, and no cell is inverted, in a configuration.
+template <int Dim>
+std::string violation(const Scene<Dim>& scene, const VectorX& x, const std::vector<Vec<Dim>>& of_obstacles) {
+  const Compact<Dim> compact(scene);
+  StepSetup<Dim> setup;
+  setup.contact.enabled = true;
+  setup.obstacles = compact.obstacles;
+  return find_violation(setup, compact.mesh, compact.field(x, of_obstacles), compact.space);
+}
+
+template <int Dim>
+bool is_valid(const Scene<Dim>& scene) {
+  const auto& obstacles = scene.context.obstacles;
+  if (!violation(scene, scene.fields.x, obstacles.x).empty()) return false;
+  for (std::size_t i = 0; i < scene.fields.past_positions.size(); ++i)
+    if (!violation(scene, scene.fields.past_positions[i], obstacles.past_x[i]).empty()) return false;
+  return true;
+}
+
+template <int Dim>
+struct View {
+  Gate<Dim> gate;
+  LocalScratch<Dim> scratch;
+  RemeshState<Dim> state;
+  explicit View(const Scene<Dim>& scene)
+      : gate(scene.mesh, scene.fields, scene.context),
+        state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::interpolated} {}
+};
+
+TYPED_TEST(CurvedContact, PatchesSeeWhatTheWholeMeshSees) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0, in_contact = 0, moved_nodes = 0;
+  std::map<typename Edit<Dim>::Kind, int> kinds;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    Scene<Dim> scene(seed, 0.1 * (seed % 8), 0.004);
+    scene.context.contact.friction_coefficient = seed % 2 ? 0 : 0.3;
+    if (!is_valid(scene)) continue;
+    for (int i = 0; i < 6; ++i) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << ", edit " << i);
+      const Edit<Dim> edit = scene.edit(i % 3 > 0);
+      View<Dim> view(scene);
+      if (!view.gate.passes(edit, view.scratch.gate)) continue;
+      const double before = whole_energy(scene);
+      if (!std::isfinite(before)) break;
+      Marks marks;
+      const auto patch = select_patch<Dim>(scene.mesh, edit, {.rings = 1 + i % 3}, 1, marks);
+      LocalProblem<Dim> old_side(view.state, patch, edit, false, view.scratch),
+          new_side(view.state, patch, edit, true, view.scratch);
+      const double start = old_side.value(), unrelaxed = new_side.value();
+      const bool relaxes = seed % 2 && new_side.has_unknowns();  // friction is lagged where a relaxation starts
+      const double relaxed = relaxes ? new_side.relax(4).energy : unrelaxed;
+      std::vector<typename LocalProblem<Dim>::Position> positions;
+      if (relaxes) new_side.get_positions(positions);
+      in_contact += old_side.touches_contact() && !edit.inserted_facets.empty();
+      scene.apply(edit);
+      EXPECT_NEAR(before - whole_energy(scene), start - unrelaxed, 1e-11 * std::abs(before) + 1e-13);
+      const VertexId first_node = scene.mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size());
+      for (const auto& [v, x] : positions) {
+        const VertexId slot = v == kNewVertex         ? first_node - 1
+                              : v > kNewVertex - 1000 ? first_node + (kNewVertex - 1 - v)
+                                                      : v;
+        scene.fields.x.template segment<Dim>(Dim * slot) = x;
+        if (const EdgeKey e = scene.mesh.edge_of_node(slot); e[0] != kNone)
+          moved_nodes += !scene.mesh.facets_of_edge(e).empty();
+      }
+      EXPECT_NEAR(before - whole_energy(scene), start - relaxed, 1e-10 * std::abs(before) + 1e-13);
+      EXPECT_EQ(violation(scene, scene.fields.x, scene.context.obstacles.x), "");
+      ++compared;
+      ++kinds[edit.kind];
+    }
+  }
+  EXPECT_GT(compared, 100);
+  EXPECT_GT(in_contact, 30);
+  EXPECT_GT(moved_nodes, 30);
+  EXPECT_EQ(kinds.size(), 3u);
+}
+
+/// Adds obstacle points near the surface, outside of bodies.
+template <int Dim>
+void scatter_points(Scene<Dim>& scene, int count) {
+  auto& obstacles = scene.context.obstacles;
+  const Compact<Dim> compact(scene);
+  const auto now = body_boundary(compact.mesh, compact.field(scene.fields.x, {}), compact.space);
+  const auto past = body_boundary(compact.mesh, compact.field(scene.fields.past_positions[0], {}), compact.space);
+  const auto is_outside = [](const ClosedSurface<Dim>& boundary, const Vec<Dim>& point) {
+    return !boundary.touches(point) && boundary.winding(point) == 0;
+  };
+  std::normal_distribution<double> off(0, 0.02);
+  std::uniform_real_distribution<double> part(0, 1);
+  for (int i = 0; i < count; ++i) {
+    const EdgeKey edge = scene.edge(true);
+    const VertexId node = scene.mesh.node_of(edge[0], edge[1]);
+    const double t = part(scene.random);
+    const VectorX& x = scene.fields.x;
+    Vec<Dim> point =
+        (1 - t) * vertex_of<Dim>(x, edge[i % 2]) + t * vertex_of<Dim>(x, node == kNone ? edge[1 - i % 2] : node);
+    for (int k = 0; k < Dim; ++k) point[k] += off(scene.random);
+    if (!is_outside(now, point) || !is_outside(past, point)) continue;
+    for (auto* points : {&obstacles.rest, &obstacles.x, &obstacles.velocity_reference}) points->push_back(point);
+    obstacles.past_x[0].push_back(point);
+  }
+}
+
+/// With obstacle points around the surface, many between where chords are and where they would be.
+TYPED_TEST(CurvedContact, WhatTheGateLetsPassIntersectsNothing) {
+  constexpr int Dim = TypeParam::value;
+  int passed = 0, refused = 0;
+  for (unsigned seed = 0; seed < (Dim == 2 ? 120 : 60); ++seed) {
+    Scene<Dim> scene(seed, 0.5, Dim == 2 ? 0.03 : 0.02);
+    if (!is_valid(scene)) continue;
+    scatter_points(scene, 300);
+    ASSERT_TRUE(is_valid(scene)) << "seed " << seed;
+    for (int i = 0; i < 25; ++i) {
+      const Edit<Dim> edit = scene.edit(true);
+      View<Dim> view(scene);
+      if (!view.gate.passes(edit, view.scratch.gate)) {
+        ++refused;
+        continue;
+      }
+      ++passed;
+      scene.apply(edit);
+      ASSERT_TRUE(is_valid(scene)) << "seed " << seed << ", edit " << i;
+    }
+  }
+  EXPECT_GT(passed, 200);
+  EXPECT_GT(refused, 50);
+}
+
+/// With a reach that finds everything, a projection's surface is that of the step.
+TYPED_TEST(CurvedContact, ProjectionsSeeTheChordsOfTheWholeSurface) {
+  constexpr int Dim = TypeParam::value;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const Scene<Dim> scene(seed, 0.5, 0.004);
+    const Compact<Dim> compact(scene);
+    const auto& [mesh, space, obstacles, slots] = compact;
+    const VectorX x = compact.field(scene.fields.x, scene.context.obstacles.x);
+    const TouchedCells touched{.old_cells = {}, .new_cells = {0, 1, 2, 3}};
+    const auto patch = make_transfer_patch<Dim>(mesh, space, mesh, space, touched, scene.context.materials, 0);
+    const auto& ids = patch.new_cells.vertices;
+    std::vector<char> moving(ids.size());
+    VectorX goal(Dim * static_cast<Eigen::Index>(ids.size()));
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      moving[i] = !patch.at_rim[i];
+      vertex_of<Dim>(goal, static_cast<int>(i)) = vertex_of<Dim>(x, ids[i]);
+    }
+    const auto found = patch_surface<Dim>(mesh, space, obstacles, patch, moving, x, goal, 100);
+    if (found.empty()) continue;
+    const CollisionSurface whole = collision_surface(mesh, obstacles, space);
+    const auto id = [&](int v) {
+      const auto n = static_cast<int>(ids.size());
+      return v < n ? ids[v] : found.others[v - n];
+    };
+    std::map<int, double> area, whole_area;
+    for (const int v : found.surface.vertices) area[id(v)] = found.surface.area[v];
+    for (const int v : whole.vertices) whole_area[v] = whole.area[v];
+    ASSERT_EQ(area.size(), whole_area.size());
+    for (const auto& [v, a] : whole_area) EXPECT_NEAR(area.at(v), a, 1e-13) << v;
+    EXPECT_EQ(found.surface.edges.size(), whole.edges.size());
+    EXPECT_EQ(found.surface.triangles.size(), whole.triangles.size());
+  }
+}
+
+/// A unit square, its upper edge curved up by 0.1.
+struct Bulge {
+  Mesh<2> mesh;
+  RemeshFields<2> fields;
+  StepContext<2> context;
+  EdgeKey top{2, 3};
+  explicit Bulge(double height, const Vec<2>& point) {
+    mesh = Mesh<2>({{0, 0}, {1, 0}, {0, 1}, {1, 1}}, {{0, 1, 2}, {1, 3, 2}}, {1, 1});
+    mesh.add_node(top);
+    fields.x.resize(10);
+    for (int v = 0; v < 5; ++v) vertex_of<2>(fields.x, v) = mesh.rest(v);
+    fields.x[9] += height;
+    fields.past_positions = {fields.x};
+    context.contact.enabled = true;
+    context.contact.activation_distance = 1e-3;
+    context.materials[1] = {};
+    auto& obstacles = context.obstacles;
+    obstacles.rest = obstacles.x = {point};
+    obstacles.past_x = {{Vec<2>(5, 5)}};
+  }
+  bool passes(const Edit<2>& edit) const {
+    GateScratch<2> scratch;
+    return Gate<2>(mesh, fields, context).passes(edit, scratch);
+  }
+};
+
+TEST(CurvedGate, CoversWhatTheSplitOfACurvedEdgeSweeps) {
+  for (const auto& [point, is_free] :
+       {std::pair(Vec<2>(0.25, 1.06), false), std::pair(Vec<2>(0.25, 1.08), true), std::pair(Vec<2>(0.5, 1.11), true)}) {
+    Bulge bulge(0.1, point);
+    EXPECT_EQ(bulge.passes(make_split(bulge.mesh, bulge.top)), is_free) << point.transpose();
+    std::swap(bulge.context.obstacles.x[0], bulge.context.obstacles.past_x[0][0]);  // the same in a past configuration
+    EXPECT_EQ(bulge.passes(make_split(bulge.mesh, bulge.top)), is_free) << point.transpose();
+  }
+}
+
+TEST(CurvedGate, CoversWhatStraighteningSweeps) {
+  for (const auto& [point, is_free] : {std::pair(Vec<2>(0.5, 0.95), false), std::pair(Vec<2>(0.5, 1.01), true)}) {
+    const Bulge bulge(-0.1, point);
+    EXPECT_EQ(bulge.passes(make_straighten(bulge.mesh, bulge.top)), is_free) << point.transpose();
+  }
+}
+
+/// A bar that is pressed onto obstacles.
+template <int Dim>
+Setup<Dim> pressed_bar() {
+  Setup<Dim> setup;
+  if constexpr (Dim == 2) {
+    const Grid grid = make_grid(
+        4, [](int i, int j) { return Vec<2>(i, 0.25 * j); }, [](int i, int j) { return (i + j) % 2; });
+    setup.mesh = Mesh<2>(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
+    setup.obstacles.motion.assign(5, kNone);
+    setup.obstacles.rest = {{1.6, -0.4}, {2.1, -0.03}, {2.6, -0.4}, {-1, -0.5}, {5, -0.5}};
+    setup.obstacles.edges = {{0, 1}, {1, 2}, {3, 4}};
+  } else {
+    setup.mesh = make_cubes(
+        2, [](int i, int j, int k) { return Vec<3>(2 * i, 0.5 * j, 0.5 * k); }, [](int, int, int) { return 1; });
+    setup.obstacles.motion.assign(6, kNone);
+    setup.obstacles.rest = {{1.5, -0.4, -1}, {2.2, -0.03, -1}, {2.9, -0.4, -1},
+                            {1.5, -0.4, 3},  {2.1, -0.03, 3},  {2.9, -0.4, 3}};
+    setup.obstacles.triangles = {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}};
+    setup.obstacles.edges = {{0, 1}, {1, 4}, {0, 4}, {4, 3}, {0, 3}, {1, 2}, {2, 5}, {1, 5}, {4, 5}};
+  }
+  for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f) {
+    const auto& facet = setup.mesh.facet(f);
+    const bool at_wall = std::all_of(facet.begin(), facet.end(), [&](int v) { return setup.mesh.rest(v)[0] == 0; });
+    setup.mesh.set_facet_tag(f, at_wall ? 7 : kNoTag);
+  }
+  std::array<bool, Dim> all;
+  all.fill(true);
+  setup.dirichlet = {{7, all, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); }}};
+  setup.materials[1] = {.youngs_modulus = 1e5, .poisson_ratio = 0.3, .density = 1000};
+  setup.body_acceleration = [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Unit(1) * -10); };
+  setup.time.dt = 0.05;
+  setup.time.steps = Dim == 2 ? 8 : 6;
+  setup.contact.enabled = true;
+  setup.contact.activation_distance = 0.01;
+  setup.contact.convergent = true;
+  setup.contact.barrier_stiffness = 1e5;
+  setup.contact.adaptive_stiffness = false;
+  setup.contact.friction_coefficient = 0.2;
+  setup.remesh.enabled = true;
+  setup.remesh.split.acceptance_tolerance = Dim == 2 ? 2 : 20;
+  setup.remesh.curve.enabled = setup.remesh.straighten.enabled = true;
+  setup.remesh.straighten.acceptance_tolerance = -0.05;
+  setup.remesh.collapse.rel_max_edge_length = 2;
+  setup.remesh.swap.enabled = setup.remesh.smooth.enabled = true;
+  return setup;
+}
+
+template <int Dim>
+struct Run {
+  int splits = 0, curves = 0, straightens = 0, reverted = 0, of_surface = 0;  ///< curved edges, in all of the steps
+  double nearest = 1;
+  State<Dim> state;
+};
+
+template <int Dim>
+Run<Dim> run(Setup<Dim> setup) {
+  setup.choose_defaults();
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  Run<Dim> result;
+  while (!simulation.finished()) {
+    const StepResult step = simulation.advance();
+    EXPECT_TRUE(step.ok) << step.reason;
+    if (!step.ok) break;
+    result.splits += step.report.splits.accepted;
+    result.curves += step.report.curves.accepted;
+    result.straightens += step.report.straightens.accepted;
+    result.reverted += step.report.reverted_remeshes;
+    result.nearest = std::min(result.nearest, step.report.min_distance);
+    const State<Dim>& state = simulation.state();
+    for (const EdgeKey& edge : state.space.curved_edges()) result.of_surface += !state.mesh.facets_of_edge(edge).empty();
+    for (const VectorX& x : state.history.x) EXPECT_EQ(find_violation(setup, state.mesh, x, state.space), "");
+  }
+  result.state = simulation.state();
+  return result;
+}
+
+TYPED_TEST(CurvedContact, RunsStayValidOnAnyNumberOfThreads) {
+  constexpr int Dim = TypeParam::value;
+  const Setup<Dim> setup = pressed_bar<Dim>();
+  const Run<Dim> first = run<Dim>(setup);
+  EXPECT_LT(first.nearest, 0.01);
+  EXPECT_GT(first.splits, 5);
+  EXPECT_GT(first.curves, 5);
+  EXPECT_GT(first.straightens, 0);
+  EXPECT_GT(first.of_surface, 20);
+  EXPECT_EQ(first.reverted, 0);
+  for (const int threads : {1, 3}) {
+    const ThreadLimit limit(threads);
+    const State<Dim> again = run<Dim>(setup).state;
+    ASSERT_EQ(again.mesh.vertex_slots(), first.state.mesh.vertex_slots());
+    EXPECT_TRUE(again.space == first.state.space);
+    EXPECT_EQ(again.history.x[0], first.state.history.x[0]);
+    EXPECT_EQ(again.history.v[0], first.state.history.v[0]);
+  }
+}
+
+/// A scene of order 2, its surface curved from the start.
+TYPED_TEST(CurvedContact, RunsOfOrderTwoSplit) {
+  constexpr int Dim = TypeParam::value;
+  Setup<Dim> setup = pressed_bar<Dim>();
+  setup.order[1] = 2;
+  setup.remesh.curve.enabled = setup.remesh.straighten.enabled = false;
+  setup.remesh.split.acceptance_tolerance = Dim == 2 ? 1 : 5;
+  setup.time.steps = 4;
+  const Run<Dim> result = run<Dim>(setup);
+  EXPECT_LT(result.nearest, 0.01);
+  EXPECT_GT(result.splits, 3);
+  EXPECT_EQ(result.reverted, 0);
+  EXPECT_TRUE(is_all_curved(result.state.mesh, result.state.space));
+}
+
+}  // namespace
+}  // namespace itr
