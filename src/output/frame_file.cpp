@@ -330,8 +330,6 @@ StoredForces read_frame_forces(const std::filesystem::path& path) {
   return forces;
 }
 
-namespace {
-
 Units read_units(const std::filesystem::path& path, const hdf5::File& file) {
   if (!file.contains(kUnits)) return {};
   const std::string text = file.read_text(kUnits);
@@ -345,8 +343,6 @@ Units read_units(const std::filesystem::path& path, const hdf5::File& file) {
     throw InputError({path.string(), kUnits, "'" + text + "'", "units of length, mass and time, such as 'mm t s'"});
   return {length, mass, time};
 }
-
-}  // namespace
 
 StoredFrame read_frame(const std::filesystem::path& path) {
   const hdf5::Session session;
