@@ -294,7 +294,8 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
 FrameTotals read_frame_totals(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
-  FrameTotals totals{step_of_frame(path), file.read_double_attribute("t"), {}, {}};
+  FrameTotals totals{step_of_frame(path), read_units(path, file), file.read_double_attribute("t"), {}, {}};
+  totals.units.dim = file.shape("/fields/x").columns;
   if (const char* name = "/totals/kinetic_energy"; file.contains(name)) {
     const auto values = file.read_doubles(name).values;
     if (values.size() != 1) throw InputError({path.string(), name, std::to_string(values.size()) + " numbers", "1"});
@@ -352,6 +353,7 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
   frame.dim = x.columns;
   frame.units = read_units(path, file);
+  frame.units.dim = frame.dim;
   frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
   frame.body = file.read_integers("/mesh/body").values;
   if (const std::size_t cells = frame.simplices.size() / (frame.dim + 1); frame.body.size() != cells)
