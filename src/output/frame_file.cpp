@@ -91,6 +91,17 @@ void write_space(const Target& target, const FrameView<Dim>& frame, const Space&
   write("/drawn/x", frame.x, "m");
   write("/drawn/u", u, "m");
   write("/drawn/v", frame.v, "m/s");
+  if (!frame.asked) return;
+  // Forces belong to nodes: there are none on straight edges.
+  const auto write_forces = [&](const char* name, ConstVectorView forces) {
+    if (forces.size() == 0) return;
+    VectorX all = VectorX::Zero(forces.size() + Dim * static_cast<Eigen::Index>(drawn.straight_edges.size()));
+    all.head(forces.size()) = forces;
+    target.write(name, as_span(all), Dim, "N");
+  };
+  write_forces("/drawn/contact_force", frame.asked->forces.contact);
+  write_forces("/drawn/friction_force", frame.asked->forces.friction);
+  write_forces("/drawn/reaction_force", frame.asked->forces.reaction);
 }
 
 template <int Dim>
@@ -286,8 +297,11 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
                    file.contains("/mesh/quadratic_cells"),
                    file.contains("/drawn/x") ? static_cast<int>(file.shape("/drawn/x").rows) : 0,
                    {}};
-  for (const char* name : kAskedFields)
-    if (file.contains(std::string("/fields/") + name)) sizes.asked.push_back(name);
+  for (const char* asked : kAskedFields) {
+    const std::string name = asked;
+    const bool is_drawn = sizes.drawn_nodes > 0 && name.ends_with("_force");
+    if (file.contains((is_drawn ? "/drawn/" : "/fields/") + name)) sizes.asked.push_back(name);
+  }
   return sizes;
 }
 
