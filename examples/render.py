@@ -37,6 +37,26 @@ PANEL_PIXELS = 900
 COLOURS = "YlOrRd"
 
 
+def units_of(file):
+    """Length, mass and time of an open frame."""
+    return file["/units"][()].tobytes().decode().split() if "/units" in file else ["m", "kg", "s"]
+
+
+FACTORS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1, "km": 1e3, "ug": 1e-9, "mg": 1e-6, "g": 1e-3,
+           "kg": 1, "t": 1e3, "ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1}
+PREFIXES = {1e-12: "p", 1e-9: "n", 1e-6: "u", 1e-3: "m", 1: "", 1e3: "k", 1e6: "M", 1e9: "G", 1e12: "T"}
+
+
+def force_unit(length, mass, time):
+    """As the command names it: N with a prefix where one says it."""
+    if {length, mass, time} <= set(FACTORS):
+        newtons = FACTORS[mass] * FACTORS[length] / FACTORS[time] ** 2
+        for factor, prefix in PREFIXES.items():
+            if abs(newtons - factor) <= 1e-9 * factor:
+                return prefix + "N"
+    return f"{mass} {length}/{time}^2"
+
+
 class Frame:
     """One frames/NNNNNN.h5."""
 
@@ -51,6 +71,7 @@ class Frame:
             curved = file["/mesh/curved_edges"][:] if "/mesh/curved_edges" in file else np.empty((0, 2), int)
             values = file["/fields"][field][:]
             self.unit = file["/fields"][field].attrs.get("unit", "")
+            self.time_unit = units_of(file)[2]
             self.obstacle_x = file["/obstacles/x"][:]
             self.obstacle_edges = file["/obstacles/edges"][:]
             self.obstacle_faces = file["/obstacles/faces"][:]
@@ -181,7 +202,7 @@ def draw(drawing, axes, frame):
     for artist in [*axes.collections, *axes.images]:
         artist.remove()
     drawing.draw(axes, frame)
-    axes.set_title(f"step {frame.step}, t = {frame.t:.4g} s: {frame.nodes()}, {len(frame.cells)} cells", fontsize=9)
+    axes.set_title(f"step {frame.step}, t = {frame.t:.4g} {frame.time_unit}: {frame.nodes()}, {len(frame.cells)} cells", fontsize=9)
 
 
 def make_figure(drawing, frames, options, count):
@@ -251,6 +272,8 @@ def read_forces(folder):
 def render_forces(folder, names, path):
     """A panel a curve and direction: each kind of force over time."""
     curves = read_forces(folder)
+    with h5py.File(next(iter(frame_paths(folder).values())), "r") as file:
+        units = units_of(file)
     absent = [name for name in names if name not in curves]
     if absent:
         raise SystemExit(f"--forces: no curve {absent[0]} in {folder}; there are {', '.join(curves)}")
@@ -266,8 +289,8 @@ def render_forces(folder, names, path):
                     style = {"color": "black", "linewidth": 1.6} if kind == "all" else {"linewidth": 1, "linestyle": "--"}
                     panel.plot(curves[name]["t"], values, label=kind, **style)
             panel.set_title(f"{name}, {direction}", fontsize=9)
-            panel.set_xlabel("t [s]", fontsize=8)
-            panel.set_ylabel("force [N]", fontsize=8)
+            panel.set_xlabel(f"t [{units[2]}]", fontsize=8)
+            panel.set_ylabel(f"force [{force_unit(*units)}]", fontsize=8)
             panel.grid(alpha=0.3)
             panel.legend(fontsize=7)
     path.parent.mkdir(parents=True, exist_ok=True)

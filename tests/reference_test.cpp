@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "itr/core/error.hpp"
 #include "itr/scene/scene.hpp"
 #include "scene/key_table.hpp"
 
@@ -142,6 +143,42 @@ TEST_F(Defaults, OfTheTableAreThoseOfTheReader) {
       ++checked;
     }
   EXPECT_GT(checked, 80);
+}
+
+/// Each pointer, and each value, that the page says is refused.
+TEST_F(Defaults, WhatIsRefusedIsRefusedThere) {
+  const auto place_of_refusal = [&](const std::string& pattern, const Json& value) {
+    Json scene = Json::parse(R"({"geometry": [{"mesh": "square.obj"}],
+                                 "materials": [{"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000}]})");
+    std::string pointer = pattern;
+    for (std::size_t star; (star = pointer.find('*')) != std::string::npos;) pointer[star] = '0';
+    scene[Json::json_pointer(pointer)] = value;
+    try {
+      options(scene);
+    } catch (const InputError& error) {
+      return error.parts().place == pointer ? pattern : error.parts().place;
+    }
+    return "nothing is refused of " + pattern + " = " + value.dump();
+  };
+  int keys_tried = 0;
+  for (const Key& key : keys())
+    for (const std::string& pattern : expand(key.pointer))
+      if (key.role == Role::refused || key.role == Role::only) {
+        EXPECT_EQ(place_of_refusal(pattern, "another"), pattern);
+        ++keys_tried;
+      }
+  EXPECT_GT(keys_tried, 18);
+  for (const auto& [pattern, values] : refused_values()) {
+    if (values == std::string("3 and above")) {
+      for (const int value : {3, 4}) EXPECT_EQ(place_of_refusal(pattern, value), pattern);
+      continue;
+    }
+    std::istringstream words(values);
+    for (std::string word; words >> word;) {
+      if (word.ends_with(',')) word.pop_back();
+      EXPECT_EQ(place_of_refusal(pattern, word), pattern) << word;
+    }
+  }
 }
 
 /// A setup that a program fills in by hand means what a scene with as little in it means (but for Newton's tolerances).

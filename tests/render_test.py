@@ -8,6 +8,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import types
 
 import h5py
 import numpy
@@ -27,6 +28,26 @@ def check_colours(examples, frame):
     numpy.testing.assert_array_equal(Frame(frame, "von_mises").values, stress)
     numpy.testing.assert_allclose(Frame(frame, "v").values, [speed[cell].mean() for cell in cells])
     assert (Frame(frame, "v").unit, Frame(frame, "von_mises").unit) == ("m/s", "Pa")
+
+
+def check_units(folder):
+    """Pictures name the units of the frames."""
+    import render
+
+    for units, force in {("m", "kg", "s"): "N", ("mm", "t", "s"): "N", ("mm", "g", "ms"): "N", ("mm", "kg", "s"): "mN",
+                         ("cm", "kg", "s"): "kg cm/s^2", ("in", "lb", "s"): "lb in/s^2"}.items():
+        assert render.force_unit(*units) == force, units
+    saved, texts = render.plt.Figure.savefig, []
+    render.plt.Figure.savefig = lambda figure, *rest, **more: texts.extend(
+        text for axes in figure.axes for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel()))
+    try:
+        render.render_forces(folder, [], folder / "units.png")
+        frames = [render.Frame(path) for path in sorted((folder / "frames").glob("*.h5"))[-1:]]
+        render.render_picture(frames, folder / "units.png", types.SimpleNamespace(field="elastic_density", range=None))
+    finally:
+        render.plt.Figure.savefig = saved
+    assert "t [ms]" in texts and "force [kN]" in texts, texts
+    assert any(" ms: " in text for text in texts), texts
 
 
 SCALE_CHECK = """
@@ -73,6 +94,9 @@ def main():
         frames = len(stored)
         assert frames > 3, frames
         check_colours(examples, stored[-1])
+        subprocess.run([*command[:4], folder / "units", *command[5:], "--set", '/units={"mass": "g", "length": "m", "time": "ms"}', "--set",
+                        "/time/dt=0.01", "--set", "/time/tend=0.02", "--set", "/initial_conditions/velocity/0/value=[0.067, 0]"], check=True, capture_output=True)
+        check_units(folder / "units")
         check_lengths_in_space(examples, folder)
 
         def render(*arguments, status=0):

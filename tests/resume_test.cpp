@@ -559,6 +559,76 @@ TEST_F(DamageTest, OfInvariantsIsRefused) {
   EXPECT_EQ(message_of([](State<2>&) {}), "taken");
 }
 
+/// A beam whose remeshing makes curved edges.
+Case curved(int steps) {
+  return {"curved",
+          "cantilever.json",
+          steps,
+          R"("dt":0.02)",
+          {"/space/remesh/curve/enabled=true", "/geometry/0/n_refs=1", "/space/remesh/split/acceptance_tolerance=300"}};
+}
+
+class CurvedRunTest : public InterruptTest, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(CurvedRunTest, KeepsItsCurvedEdgesWhereRemeshingChanges) {
+  const fs::path run = folder / "run";
+  ASSERT_EQ(start(arguments(curved(4), run, 0)).wait(), 0);
+  const auto lines = results_of(run);
+  const std::size_t edges = read_frame(stored_frames(run).back()).curved_edges.size();
+  ASSERT_GT(edges, 0u);
+  Case which = curved(6);
+  which.sets.emplace_back(GetParam());
+  const Command resumed = start(arguments(which, run, 0, true) + Arguments{"--allow-changes"});
+  ASSERT_EQ(resumed.wait(), 0) << resumed.said();
+  EXPECT_NE(resumed.said().find("going on after step 4"), std::string::npos) << resumed.said();
+  const auto longer = results_of(run);
+  ASSERT_EQ(longer.size(), 7u);
+  EXPECT_TRUE(std::equal(lines.begin(), lines.end(), longer.begin()));
+  const StoredFrame last = read_frame(stored_frames(run).back());
+  EXPECT_GT(last.curved_edges.size(), edges / 2);
+  if (GetParam() == std::string("/space/remesh/enabled=false")) EXPECT_EQ(last.curved_edges.size(), edges);
+  EXPECT_TRUE(certify(run).passed());
+}
+
+INSTANTIATE_TEST_SUITE_P(Changes, CurvedRunTest,
+                         ::testing::Values("/space/remesh/enabled=false", "/space/remesh/curve/enabled=false"),
+                         [](const auto& info) { return std::string(info.index == 0 ? "fixed_mesh" : "no_new_curves"); });
+
+/// Older states would not fit either, and their steps would replace those that are there.
+TEST_F(InterruptTest, AStateThatDoesNotFitIsRefusedAndKept) {
+  const fs::path run = folder / "run";
+  ASSERT_EQ(start(arguments(curved(4), run, 0)).wait(), 0);
+  const auto lines = results_of(run);
+  const auto frames = stored_frames(run);
+  Case which = curved(6);
+  which.sets.insert(which.sets.end(), {"/space/remesh/curve/enabled=false", "/solver/advanced/lump_mass_matrix=true"});
+  const Command resumed = start(arguments(which, run, 0, true) + Arguments{"--allow-changes"});
+  EXPECT_EQ(resumed.wait(), 2) << resumed.said();
+  EXPECT_NE(resumed.said().find("000004.h5: /solver/advanced/lump_mass_matrix"), std::string::npos) << resumed.said();
+  EXPECT_EQ(results_of(run), lines);
+  EXPECT_EQ(stored_frames(run), frames);
+}
+
+TEST_F(InterruptTest, OtherUnitsInOneFolderAreRefused) {
+  const fs::path run = folder / "run";
+  Case which = kStopped;
+  which.steps = 3;
+  which.sets.emplace_back(R"(/units={"mass":"g"})");
+  ASSERT_EQ(start(arguments(which, run, 0)).wait(), 0) << text_of(folder / "log");
+  const auto lines = results_of(run);
+  which.steps = 5;
+  const Arguments to_si = {"--set", R"(/output/units="SI")"};
+  const Command mixed = start(arguments(which, run, 0, true) + to_si);
+  EXPECT_EQ(mixed.wait(), 2) << mixed.said();
+  EXPECT_NE(mixed.said().find("/output/units: found results in m, kg, s; expected results in m, g, s"), std::string::npos)
+      << mixed.said();
+  EXPECT_EQ(results_of(run), lines);
+  const Command same = start(arguments(which, run, 0, true));
+  EXPECT_EQ(same.wait(), 0) << same.said();
+  const Command anew = start(arguments(which, folder / "si", 0) + to_si);
+  EXPECT_EQ(anew.wait(), 0) << anew.said();
+}
+
 /// As after an update of itr that changed the format of saved states.
 TEST_F(InterruptTest, FramesWithoutAReadableStateAreRefusedAndKept) {
   const fs::path run = folder / "run";

@@ -575,7 +575,10 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
                 .expected.find("1, 2, 3, 4"),
             std::string::npos);
 
-  const std::array<std::pair<const char*, const char*>, 13> warnings = {{
+  EXPECT_EQ(refused(R"({"geometry": [{"mesh": "square.obj", "volume_selection": 1}, {"type": "ground", "unit": "mm"}]})"),
+            "/geometry/1/unit");
+
+  const std::array<std::pair<const char*, const char*>, 14> warnings = {{
       {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 3, "value": [0, 1]}]}})",
        "3 is a surface of a body, which this does not move"},
       {R"({"contact": {"enabled": false}})", "/contact/enabled: not true"},
@@ -583,6 +586,8 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
       {R"({"space": {"remesh": {"type": "sizing_field"}}})", "/space/remesh: without \"enabled\": true"},
       {R"({"space": {"remesh": {"enabled": true, "collapse": {"acceptance_tolerance": 1e-3}}}})",
        "/space/remesh/collapse/acceptance_tolerance: positive"},
+      {R"({"space": {"remesh": {"enabled": true, "curve": {"acceptance_tolerance": 1e-3}}}})",
+       "/space/remesh/curve/acceptance_tolerance: without /space/remesh/curve/enabled"},
       {R"({"boundary_conditions": {"rhs": [0, 9.81, 0]}})", "/boundary_conditions/rhs: [0,9.81,0] has more components"},
       {R"({"boundary_conditions": {"dirichlet_boundary": [{"id": 1, "value": [0, 0], "dimension": [true, true, true]}]}})",
        "dimension: [true,true,true] has more components"},

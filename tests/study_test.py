@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """`itr study` on Cook's membrane, small. Arguments: the command, the folder of examples."""
 import csv
+import itertools
 import json
 import pathlib
 import re
@@ -32,6 +33,39 @@ def study(folder, *more, status=0, **options):
 def rows(folder):
     with open(folder / "study.csv", newline="") as file:
         return {row["run"]: row for row in csv.DictReader(file)}
+
+
+def write_box(path, counts, edge):
+    """Gmsh's file of a box of cubes, each of six tetrahedra."""
+    n = [count + 1 for count in counts]
+    number = lambda p: 1 + p[0] + n[0] * (p[1] + n[1] * p[2])
+    nodes = [(i, j, k) for k in range(n[2]) for j in range(n[1]) for i in range(n[0])]
+    tetrahedra = []
+    for corner in itertools.product(*map(range, counts)):
+        for order in itertools.permutations(range(3)):
+            places = [list(corner)]
+            for axis in order:
+                places.append([c + (k == axis) for k, c in enumerate(places[-1])])
+            even = order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+            tetrahedra.append([number(p) for p in (places if even else [places[1], places[0], *places[2:]])])
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", str(len(nodes))]
+    lines += [" ".join(map(str, (number(p), *(edge * c for c in p)))) for p in nodes]
+    lines += ["$EndNodes", "$Elements", str(len(tetrahedra))]
+    lines += [" ".join(map(str, (i + 1, 4, 2, 1, 1, *t))) for i, t in enumerate(tetrahedra)]
+    path.write_text("\n".join([*lines, "$EndElements", ""]))
+
+
+def write_beam(folder, units):
+    """A beam of 300 mm that its weight bends; its mesh is in millimetres. The numbers are those of `units`."""
+    write_box(folder / "box.msh", [3, 1, 1], 100)
+    kilogram, metre = (1, 1) if not units else (1e-3, 1e3)  # of tonnes and millimetres
+    scene = {"geometry": [{"mesh": "box.msh", "unit": "mm", "surface_selection": {"threshold": 1e-3 * metre}}],
+             "materials": {"type": "NeoHookean", "E": 2e5 * kilogram / metre, "nu": 0.3, "rho": 1000 * kilogram / metre**3},
+             "boundary_conditions": {"rhs": [0, 9.81 * metre, 0], "dirichlet_boundary": [{"id": 1, "value": [0, 0, 0]}]},
+             "time": {"dt": 0.5, "tend": 1, "quasistatic": True}, **({"units": units} if units else {})}
+    path = folder / "beam.json"
+    path.write_text(json.dumps(scene))
+    return path
 
 
 class Study(unittest.TestCase):
@@ -229,6 +263,41 @@ class Study(unittest.TestCase):
         self.assertNotIn("reference", found)
         self.assertEqual(float(found["uniform-1"]["l2"]), 0)
         self.assertGreater(float(found["uniform-2"]["l2"]), 1e-3)
+
+    def test_series_say_what_they_do_of_scenes_with_curved_edges(self):
+        study(self.folder, "--series", "itr,hp,p,sizing-field", "--set", "/space/remesh/curve/enabled=true", levels=1, tolerances="2000")
+        tried = lambda run: sum(json.loads(line)[kind]["tried"] for kind in ("curves", "straightens")
+                                for line in (self.folder / "runs" / run / "steps.jsonl").read_text().splitlines())
+        for name, row in rows(self.folder).items():
+            self.assertEqual(row["status"], "finished", f"{name}: {row['reason']}")
+            has_curves = name.split("-")[0] in ("hp", "p")
+            self.assertEqual(tried(name) > 0, has_curves, name)
+
+    def test_rows_of_a_mesh_in_millimetres(self):
+        scene = write_beam(self.folder, {})
+        done = subprocess.run([ITR, "study", scene, "-o", self.folder / "study", "--series", "uniform,rows", "--levels", "1",
+                               "--tolerances", "1e-4", "--frames", "2"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = rows(self.folder / "study")
+        self.assertEqual(found["rows-1"]["status"], "finished", found["rows-1"]["reason"])
+        self.assertLess(float(found["rows-1"]["l2"]), 1)
+
+    def test_a_given_reference_in_units_of_its_own(self):
+        scene = write_beam(self.folder, {"length": "mm", "mass": "t"})
+        errors = {}
+        for units in ("scene", "SI"):
+            reference = self.folder / units
+            subprocess.run([ITR, "run", scene, "-o", reference, "--set", "/geometry/0/n_refs=2", "--set", f'/output/units="{units}"'],
+                           check=True, capture_output=True)
+            done = subprocess.run([ITR, "study", scene, "-o", self.folder / "study", "--series", "uniform", "--levels", "1",
+                                   "--reference", reference, "--frames", "2"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            errors[units] = {run: {c: float(row[c]) for c in ("l2", "h1", "surface", "energy")}
+                             for run, row in rows(self.folder / "study").items()}
+        self.assertGreater(errors["SI"]["uniform-0"]["l2"], 0.01)
+        for run, values in errors["SI"].items():
+            for column, value in values.items():
+                self.assertAlmostEqual(errors["scene"][run][column], value, delta=1e-4 * value, msg=(run, column))
 
     def test_its_program_may_be_replaced_meanwhile(self):
         prefix = self.folder / "prefix"

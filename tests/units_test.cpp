@@ -392,7 +392,7 @@ TEST_F(UnitsTest, ExplainAndRunSpeakInThem) {
   ASSERT_EQ(itr("explain " + (folder / "scene.json").string()), 0) << said_;
   for (const char* words :
        {"units\n  mm, t, s: forces in N, stresses in MPa, energies in mJ, by mm of thickness", "area 4e+04 mm^2",
-        "E 0.1191 MPa", "rho 1e-09 t/mm^2", "4 steps of 0.005 s", "bodies accelerate by (0, -9810) mm/s^2", "d-hat 2 mm"})
+        "E 0.1191 MPa", "rho 1e-09 t/mm^3", "4 steps of 0.005 s", "bodies accelerate by (0, -9810) mm/s^2", "d-hat 2 mm"})
     EXPECT_NE(said_.find(words), std::string::npos) << words << said_;
   run(folder);
   EXPECT_NE(said_.find(" mJ "), std::string::npos) << said_;
@@ -411,6 +411,27 @@ TEST_F(UnitsTest, MeshInUnitsOfItsOwn) {
   std::ofstream(folder / "scene.json") << json.dump();
   ASSERT_EQ(itr("explain " + (folder / "scene.json").string()), 0) << said_;
   EXPECT_NE(said_.find("volume 0.007969 m^3"), std::string::npos) << said_;
+  json = scene<3>(kGrams);
+  json["geometry"][0]["unit"] = "";  // PolyFEM's default: the scene's
+  std::ofstream(folder / "scene.json") << json.dump();
+  ASSERT_EQ(itr("explain " + (folder / "scene.json").string()), 0) << said_;
+  EXPECT_NE(said_.find("volume 7.969e+06 mm^3"), std::string::npos) << said_;
+}
+
+TEST_F(UnitsTest, ResultsInSiUnitsAreSaidToBe) {
+  const fs::path folder = write<2>(kTonnes, scene<2>(in<2>(kTonnes)));
+  const std::string explain = "explain " + (folder / "scene.json").string();
+  ASSERT_EQ(itr(explain), 0) << said_;
+  EXPECT_NE(said_.find("by mm of thickness; results too\n"), std::string::npos) << said_;
+  ASSERT_EQ(itr(explain + " --set '/output/units=\"SI\"'"), 0) << said_;
+  EXPECT_NE(said_.find("by mm of thickness; results in SI units\n"), std::string::npos) << said_;
+}
+
+/// The t of a static solve is 1 in any unit of time.
+TEST_F(UnitsTest, StaticsHaveNoTime) {
+  const fs::path folder = write<2>(kGrams, scene<2>(in<2>(kGrams), {{"time", nullptr}, {"initial_conditions", nullptr}}));
+  run(folder);
+  EXPECT_NE(said_.find("step 1/1  t = 1  "), std::string::npos) << said_;
 }
 
 TEST(UnitsOf, HaveNamesAndFactors) {

@@ -49,8 +49,7 @@ def check_attributes(directory, frames):
             assert float(grid.find("Time").get("Value")) == file.attrs["t"]
             names = {attribute.get("Name") for attribute, _ in items(grid)}
             for field in file["fields"]:
-                is_left_out = field == "x" or ("drawn" in file and field.endswith("_force"))
-                assert is_left_out or field in names, (field, names)
+                assert field == "x" or field in names, (field, names)
             sizes = {"Node": len(file["drawn/x" if "drawn" in file else "fields/x"]), "Cell": len(file["mesh/body"])}
         for attribute, item in items(grid):
             assert len(read_item(directory, item)) == sizes[attribute.get("Center")], attribute.get("Name")
@@ -97,9 +96,13 @@ def check_meshio(directory, frames):
                 values = numpy.concatenate(mesh.cell_data[name])
                 assert numpy.array_equal(values, file["fields" if name == "von_mises" else "mesh"][name][()])
             assert numpy.array_equal(corners, file["mesh/simplices"][()])
-            for name in ("u", "v", "contact_force"):
-                if name in drawn:
+            for name in ("u", "v", "contact_force", "friction_force", "reaction_force"):
+                if name in file["fields"]:
                     assert numpy.array_equal(mesh.point_data[name], drawn[name][()]), name
+                if name in file["fields"] and name.endswith("_force"):
+                    nodes = len(file["fields/x"])
+                    assert numpy.array_equal(mesh.point_data[name][:nodes], file["fields"][name][()]), name
+                    assert not mesh.point_data[name][nodes:].any(), name
             stress = numpy.concatenate(mesh.cell_data["stress"])
             assert numpy.array_equal(stress.ravel(), file["fields/stress"][()].ravel())
             check_middles(mesh, file, dim)
@@ -122,6 +125,9 @@ def check_vtu(directory, frames):
             cells = file["mesh/quadratic_cells" if "curved_edges" in file["mesh"] else "mesh/simplices"][()]
             assert numpy.array_equal(mesh.cells_dict[kind], cells)
             assert numpy.array_equal(mesh.point_data["u"][:, :dim], drawn["u"][()])
+            for name in ("contact_force", "friction_force", "reaction_force"):
+                if name in drawn:
+                    assert numpy.array_equal(mesh.point_data[name][:, :dim], drawn[name][()]), name
             assert numpy.array_equal(mesh.cell_data["von_mises"][0].ravel(), file["fields/von_mises"][()])
             stress = mesh.cell_data["stress"][0].reshape(-1, 3, 3)[:, :dim, :dim]
             assert numpy.array_equal(stress.ravel(), file["fields/stress"][()].ravel())
@@ -155,6 +161,9 @@ def main(itr, examples):
             "quadratic tet": (folder / "tet.json", ["/space/discr_order=2"]),
             "quadratic square": (folder / "two.json", ["/space/discr_order=2"]),
             "mixed square": (folder / "two.json", ['/space/discr_order=[{"id":1,"order":2}]']),
+            "mixed and held": (folder / "two.json", [
+                '/space/discr_order=[{"id":1,"order":2}]', "/geometry/0/surface_selection=3",
+                '/boundary_conditions={"rhs":[0,9.81],"dirichlet_boundary":[{"id":3,"value":[0,0]}]}']),
         }
         for name, (scene, sets) in runs.items():
             directory = folder / name
@@ -164,6 +173,8 @@ def main(itr, examples):
             check_attributes(directory, frames)
             mesh = check_meshio(directory, frames)
             check_vtu(directory, frames)
+            if name == "mixed and held":
+                assert mesh.point_data["reaction_force"].any()
             if name == "tet":
                 assert mesh.cell_data["stress"][0].shape[-1] in (3, 9)
                 assert mesh.point_data["reaction_force"].shape == (4, 3)

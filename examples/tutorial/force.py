@@ -15,14 +15,16 @@ import numpy as np
 
 
 def curve(run):
-    """Rows of displacement [m], force [N] and number of vertices, both along y."""
+    """Rows of displacement [m] and force [N], both along y, and numbers of vertices and nodes: those and curved edges'."""
     rows, start = [], None
     for path in sorted((run / "frames").glob("*.h5")):
         with h5py.File(path) as frame:
             place = frame["/obstacles/x"][0, 1]
             start = place if start is None else start
             force = frame["/fields/contact_force"][:].sum(axis=0)[1]  # on the bodies: the opposite acts on the obstacle
-            rows.append((start - place, -force, len(frame["/fields/x"])))
+            nodes = len(frame["/fields/x"])
+            curved = len(frame["/mesh/curved_edges"]) if "/mesh/curved_edges" in frame else 0
+            rows.append((start - place, -force, nodes - curved, nodes))
     return np.array(rows)
 
 
@@ -33,8 +35,10 @@ def main():
     options = parser.parse_args()
     curves = {run: curve(run) for run in options.runs}
     for run, rows in curves.items():
-        np.savetxt(run / "curve.csv", rows, delimiter=",", header="displacement [m],force [N],vertices", comments="")
-        print(f"{run.name}: {rows[-1, 1]:.4g} N at {1000 * rows[-1, 0]:.4g} mm, {rows[-1, 2]:.0f} vertices")
+        np.savetxt(run / "curve.csv", rows, delimiter=",", header="displacement [m],force [N],vertices,nodes", comments="")
+        _, _, vertices, nodes = rows[-1]
+        print(f"{run.name}: {rows[-1, 1]:.4g} N at {1000 * rows[-1, 0]:.4g} mm, {vertices:.0f} vertices"
+              + (f", {nodes:.0f} nodes" if nodes > vertices else ""))
     if options.picture:
         import matplotlib
 

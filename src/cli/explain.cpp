@@ -65,11 +65,12 @@ class Explanation {
     for (std::string& found : find_suspicious(simulation_)) warnings_.push_back(std::move(found));
   }
 
-  void print() {
+  /// `results`: the units that they are in.
+  void print(const Units& results) {
     if (const Units& units = setup_.units; !units.is_si())
-      fmt::print("units\n  {}, {}, {}: forces in {}, stresses in {}, energies in {}{}; results too\n", units.length(),
+      fmt::print("units\n  {}, {}, {}: forces in {}, stresses in {}, energies in {}{}; results {}\n", units.length(),
                  units.mass(), units.time(), units.name("N"), units.name("Pa"), units.name("J"),
-                 Dim == 2 ? ", by " + units.length() + " of thickness" : "");
+                 Dim == 2 ? ", by " + units.length() + " of thickness" : "", results.is_si() ? "in SI units" : "too");
     bodies();
     fmt::print("time\n  {}\n", describe(setup_.time, setup_.units));
     fmt::print("in words\n");
@@ -120,7 +121,7 @@ class Explanation {
                  order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", Dim == 2 ? "area" : "volume",
                  units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"), name_of(material.law),
                  units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,
-                 units.from_si(material.density, "kg/m^3"), units.name(Dim == 2 ? "kg/m^2" : "kg/m^3"),
+                 units.from_si(material.density, "kg/m^3"), units.name("kg/m^3"),
                  units.text(material.density * sum.volume, "kg"));
     }
     fmt::print("  {} vertices, {} elements, edges {:.4g} to {}, worst quality {:.3g} (1: regular; element {})\n",
@@ -258,7 +259,7 @@ int explain(const RunOptions& options) {
       [&](auto& setup) {
         const SolverChoice choice = choose_solver(setup.linear, options, registry);
         for (const auto& warning : choice.warnings) scene.warnings.push_back(warning);
-        Explanation(setup, registry, scene.warnings).print();
+        Explanation(setup, registry, scene.warnings).print(scene.output.units);
       },
       scene.setup);
   return done;

@@ -169,6 +169,14 @@ void check_changes(const std::vector<scene::Change>& changes, const RunOptions& 
                                                    "/solver and /space/remesh")});
 }
 
+/// Throws InputError where new results would be in other units than those of the folder.
+void check_units(const Units& units, const RunOptions& options, const output::SavedState& saved) {
+  const auto names = [](const Units& of) { return "results in " + of.length() + ", " + of.mass() + ", " + of.time(); };
+  if (names(units) != names(saved.units))
+    throw InputError({options.scene.string(), "/output/units", names(units),
+                      names(saved.units) + ", as in " + saved.file.string() + ", or another folder (-o)"});
+}
+
 /// The state to go on from; none without --resume or where the folder has no frames.
 std::optional<output::SavedState> find_resumable(const std::string& directory, const RunOptions& options) {
   if (!options.resume) {
@@ -268,18 +276,27 @@ class Run {
   static constexpr std::chrono::milliseconds kLook{100};  ///< between looks at what a signal said
   static constexpr double kGrace = 5;                     ///< for a step that is to be dropped [s]
 
-  /// Takes the newest state that is whole: `saved`, or one before it.
+  /// Takes the newest state that is whole: `saved`, or one before it where it is damaged.
   output::Checkpoint<Dim> restore(output::SavedState saved, const scene::Scene& scene, const RunOptions& options) {
+    output::Checkpoint<Dim> checkpoint = read_whole(saved, scene, options);
+    try {
+      simulation_.restore(checkpoint.state);
+    } catch (const InputError& error) {  // older states would fit no better, and their steps would replace good results
+      throw InputError({saved.file.string(), error.parts().place, error.parts().found, error.parts().expected});
+    }
+    return checkpoint;
+  }
+
+  output::Checkpoint<Dim> read_whole(output::SavedState& saved, const scene::Scene& scene, const RunOptions& options) {
     for (std::optional<InputError> newest;;) {
       for (const std::string& text : saved.passed_over) spdlog::warn("a frame cannot be read, going further back: {}", text);
       check_changes(scene::find_changes(saved.scene, scene.identity), options, saved);
+      check_units(scene.output.units, options, saved);
       if (saved.backend != simulation_.solver_name() && !options.allow_changes)
         throw InputError({directory_, "--resume", "solver " + simulation_.solver_name(),
                           saved.backend + ", as before, or --allow-changes"});
       try {
-        output::Checkpoint<Dim> checkpoint = output::read_checkpoint<Dim>(saved);
-        simulation_.restore(checkpoint.state);
-        return checkpoint;
+        return output::read_checkpoint<Dim>(saved);
       } catch (const InputError& error) {
         if (!newest) newest = error;
         auto older = find_older(directory_, saved);

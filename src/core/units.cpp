@@ -151,7 +151,8 @@ std::string Units::name(std::string_view unit) const {
 }
 
 std::string Units::text(double value, std::string_view unit, int digits) const {
-  return fmt::format("{:.{}g} {}", from_si(value, unit), digits, name(unit));
+  const std::string number = fmt::format("{:.{}g}", from_si(value, unit), digits);
+  return unit == "s" && !has_steps ? number : number + " " + name(unit);
 }
 
 }  // namespace itr

@@ -312,6 +312,7 @@ std::optional<SavedState> find_saved_state(const fs::path& directory, int before
                         file.read_text("/checkpoint/backend"),
                         file.shape("/mesh/rest").columns,
                         step_of_frame(path),
+                        read_units(path, file),
                         passed_over};
     } catch (const InputError& error) {  // damaged, by a loss of power, say: the one before it is the newest
       passed_over.push_back(error.what());

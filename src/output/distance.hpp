@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "itr/core/units.hpp"
+
 namespace itr::output {
 
 /// Of a frame from a reference at the same time. Bodies are told apart by their ids, unless only together they have the
@@ -21,8 +23,8 @@ struct FrameDistance {
   double uncovered = 0;
 };
 
-/// Integrals are exact, over the intersections of the cells at rest. Throws InputError where a file is unreadable or the two
-/// have different dimensions.
+/// Integrals are exact, over the intersections of the cells at rest; the two may have other units. Throws InputError where a
+/// file is unreadable or the two have different dimensions.
 FrameDistance frame_distance(const std::filesystem::path& frame, const std::filesystem::path& reference);
 
 /// Largest mean displacement of a body (by id), over the diagonal of the box of the bodies at rest and the obstacles. Throws
@@ -32,6 +34,7 @@ double flight(const std::filesystem::path& frame);
 /// What a frame says of all bodies together, where its scene asked for it (FieldOptions).
 struct FrameTotals {
   int step = 0;
+  Units units;                           ///< of all numbers here; below they are named as of SI units
   double t = 0;                          ///< [s]
   std::optional<double> kinetic_energy;  ///< [J]
   std::vector<double> momentum;          ///< Dim numbers [kg m/s], or none

@@ -91,6 +91,17 @@ void write_space(const Target& target, const FrameView<Dim>& frame, const Space&
   write("/drawn/x", frame.x, "m");
   write("/drawn/u", u, "m");
   write("/drawn/v", frame.v, "m/s");
+  if (!frame.asked) return;
+  // Forces belong to nodes: there are none on straight edges.
+  const auto write_forces = [&](const char* name, ConstVectorView forces) {
+    if (forces.size() == 0) return;
+    VectorX all = VectorX::Zero(forces.size() + Dim * static_cast<Eigen::Index>(drawn.straight_edges.size()));
+    all.head(forces.size()) = forces;
+    target.write(name, as_span(all), Dim, "N");
+  };
+  write_forces("/drawn/contact_force", frame.asked->forces.contact);
+  write_forces("/drawn/friction_force", frame.asked->forces.friction);
+  write_forces("/drawn/reaction_force", frame.asked->forces.reaction);
 }
 
 template <int Dim>
@@ -286,15 +297,19 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
                    file.contains("/mesh/quadratic_cells"),
                    file.contains("/drawn/x") ? static_cast<int>(file.shape("/drawn/x").rows) : 0,
                    {}};
-  for (const char* name : kAskedFields)
-    if (file.contains(std::string("/fields/") + name)) sizes.asked.push_back(name);
+  for (const char* asked : kAskedFields) {
+    const std::string name = asked;
+    const bool is_drawn = sizes.drawn_nodes > 0 && name.ends_with("_force");
+    if (file.contains((is_drawn ? "/drawn/" : "/fields/") + name)) sizes.asked.push_back(name);
+  }
   return sizes;
 }
 
 FrameTotals read_frame_totals(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
-  FrameTotals totals{step_of_frame(path), file.read_double_attribute("t"), {}, {}};
+  FrameTotals totals{step_of_frame(path), read_units(path, file), file.read_double_attribute("t"), {}, {}};
+  totals.units.dim = file.shape("/fields/x").columns;
   if (const char* name = "/totals/kinetic_energy"; file.contains(name)) {
     const auto values = file.read_doubles(name).values;
     if (values.size() != 1) throw InputError({path.string(), name, std::to_string(values.size()) + " numbers", "1"});
@@ -330,8 +345,6 @@ StoredForces read_frame_forces(const std::filesystem::path& path) {
   return forces;
 }
 
-namespace {
-
 Units read_units(const std::filesystem::path& path, const hdf5::File& file) {
   if (!file.contains(kUnits)) return {};
   const std::string text = file.read_text(kUnits);
@@ -346,8 +359,6 @@ Units read_units(const std::filesystem::path& path, const hdf5::File& file) {
   return {length, mass, time};
 }
 
-}  // namespace
-
 StoredFrame read_frame(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
@@ -356,6 +367,7 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
   frame.dim = x.columns;
   frame.units = read_units(path, file);
+  frame.units.dim = frame.dim;
   frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
   frame.body = file.read_integers("/mesh/body").values;
   if (const std::size_t cells = frame.simplices.size() / (frame.dim + 1); frame.body.size() != cells)

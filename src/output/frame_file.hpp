@@ -94,6 +94,9 @@ struct StoredFrame {
   StoredSurface proxy;  ///< what touches in place of the boundary
 };
 
+/// Of an open frame.
+Units read_units(const std::filesystem::path& path, const hdf5::File& file);
+
 /// Names of what is not as it was written. Throws InputError where the file is unreadable.
 std::vector<std::string> find_damage(const std::filesystem::path& path);
 

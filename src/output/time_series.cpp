@@ -37,10 +37,11 @@ std::string tensor_field(const FrameEntry& entry, const std::string& name, const
   return attribute(name, entry.dim == 3 ? "Tensor" : "Matrix", "Cell", data_item(entry, set, shape, "Float"));
 }
 
-std::string asked_field(const FrameEntry& entry, const std::string& name) {
+/// `group`: where fields of nodes are.
+std::string asked_field(const FrameEntry& entry, const std::string& group, const std::string& name) {
   const std::string set = "/fields/" + name;
   if (name == "stress") return tensor_field(entry, name, set);
-  if (name != "von_mises") return vector_field(entry, name, set);
+  if (name != "von_mises") return vector_field(entry, name, group + name);
   return attribute(name, "Scalar", "Cell", data_item(entry, set, std::to_string(entry.cells), "Float"));
 }
 
@@ -65,9 +66,7 @@ std::string grid(const FrameEntry& entry) {
   text += vector_field(drawn, "u", group + "u") + vector_field(drawn, "v", group + "v");
   text += attribute("elastic_density", "Scalar", "Cell", data_item(entry, "/fields/elastic_density", cells, "Float"));
   text += attribute("body", "Scalar", "Cell", data_item(entry, "/mesh/body", cells, "Int"));
-  for (const std::string& name : entry.asked)
-    if (const bool is_on_cells = name == "von_mises" || name == "stress"; is_on_cells || !is_mixed)
-      text += asked_field(entry, name);
+  for (const std::string& name : entry.asked) text += asked_field(drawn, group, name);
   return text + "      </Grid>\n";
 }
 

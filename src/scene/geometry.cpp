@@ -272,7 +272,7 @@ Geometries list_geometries(const Node& root) {
       if (geometry.has(key) && (type != 2 + (key == std::string("height"))))
         geometry[key].fail("it beside this type", "point and normal with \"plane\", height with \"ground\"");
     if (is_flat_obstacle)
-      for (const char* key : {"mesh", "transformation", "n_refs", "extract", "array"})
+      for (const char* key : {"mesh", "unit", "transformation", "n_refs", "extract", "array"})
         if (geometry.has(key)) geometry[key].fail("it beside a plane or ground", "no such key");
     const bool is_array = type == 1;
     if (is_array != geometry.has("array")) geometry["array"].fail("an array if and only if type is \"mesh_array\"");

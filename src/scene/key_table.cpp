@@ -98,7 +98,7 @@ Kind kind_of(const Key& key) {
   std::istringstream words(name);
   for (std::string word; std::getline(words, word, '|');) {
     kind.choices.push_back(word);
-    kind.words += (kind.words.empty() ? "" : ", ") + word;
+    kind.words += (kind.words.empty() ? "" : ", ") + (word.empty() ? "\"\"" : word);
   }
   kind.schema = {{"enum", kind.choices}};
   return kind;

@@ -45,8 +45,8 @@ constexpr Key kKeys[] = {
      "of an obstacle: what of it collides; bodies are volumes"},
     {"/geometry/*/n_refs", read, "natural", "0", "",
      "uniform refinements: each takes 4 times the elements in 2D, 8 times in 3D", basic},
-    {"/geometry/*/unit", read, "nm|um|mm|cm|dm|m|km|in|ft", "(/units/length)", "",
-     "of the mesh file, before its transformation"},
+    {"/geometry/*/unit", read, "|nm|um|mm|cm|dm|m|km|in|ft", "(/units/length)", "",
+     "of the mesh file, before its transformation; \"\" is the default"},
     {"/geometry/*/height", read, "number", "0", "m", "of a ground: y in 2D and 3D"},
     {"/geometry/*/point", read, "numbers", "(the origin)", "m", "of a plane"},
     {"/geometry/*/normal", read, "numbers", "", "", "of a plane, either way; required there"},
@@ -107,7 +107,7 @@ constexpr Key kKeys[] = {
     {"/materials/*/nu", read, "number or expression", "", "", "Poisson's ratio, in (-1, 0.5)", basic},
     {"/materials/*/{lambda,mu}", read, "number or expression", "", "Pa", "Lame's parameters, both, instead of E and nu"},
     {"/materials/*/rho", read, "number or expression", "1", "kg/m^3",
-     "density; 2D: kg/m^2, that is for a thickness of 1 m; a warning where it is absent and matters", basic},
+     "density, in 2D too; a warning where it is absent and matters", basic},
     {"/materials/*/plane_strain", read, "boolean", "false", "", "2D: plane strain; false: plane stress"},
     {"/materials/*/{c1,c2,c3,d1,k}", read, "number", "", "Pa", "of the Mooney-Rivlin laws"},
     {"/materials/*/{phi,psi}", only, "", "0", "", "viscous damping of materials; see /solver/rayleigh_damping"},
@@ -126,7 +126,8 @@ constexpr Key kKeys[] = {
     {CONDITIONS "/*/id", read, "id or all", "", "", "of surface_selection or point_selection, or \"all\"", basic},
     {"/boundary_conditions/{dirichlet_boundary,obstacle_displacements}/*/value", read, "vector", "", "m",
      "displacement from rest at time t (not an increment)", basic},
-    {"/boundary_conditions/neumann_boundary/*/value", read, "vector", "", "N/m^2", "2D: N/m, for a thickness of 1 m", basic},
+    {"/boundary_conditions/neumann_boundary/*/value", read, "vector", "", "N/m^2",
+     "in 2D on bodies one unit of length thick (1 m in SI units)", basic},
     {"/boundary_conditions/pressure_boundary/*/value", read, "number or expression", "", "N/m^2", "2D: N/m"},
     {"/boundary_conditions/dirichlet_boundary/*/dimension", read, "booleans", "(all true)", "",
      "which components are prescribed: [true, false] is a roller", basic},
@@ -311,9 +312,8 @@ constexpr Key kKeys[] = {
      basic},
     {"/space/remesh/split/enabled", read, "boolean", "true", "", ""},
     {"/space/remesh/split/acceptance_tolerance", read, "positive", "(relative_tolerance chooses)", "J",
-     "least decrease of energy by a split, 2D: for a thickness of 1 m; smaller: more vertices, smaller error; time goes "
-     "with "
-     "the vertices",
+     "least decrease of energy by a split, 2D: for a thickness of one unit of length (1 m in SI units); smaller: more "
+     "vertices, smaller error; time goes with the vertices",
      basic},
     {"/space/remesh/split/culling_threshold", read, "share", "0.95", "",
      "with energy-percentile: edges below this share of the energies are not split"},
@@ -404,7 +404,7 @@ constexpr Key kKeys[] = {
 };
 
 constexpr RefusedValue kRefusedValues[] = {
-    {"/geometry/*/type", "plane, ground, mesh_sequence"},
+    {"/geometry/*/type", "mesh_sequence"},
     {"/space/discr_order", "3 and above"},
 };
 

@@ -124,6 +124,8 @@ void warn_of_idle_keys(const Node& root, const TimeOptions& time, bool has_obsta
     warn(contact["friction_coefficient"], "without /contact/enabled = true there is no friction");
   if (remesh.exists() && !remesh.has("enabled") && !remesh.json().empty())
     warn(remesh, "without \"enabled\": true the mesh stays as it is");
+  if (const Node curve = remesh["curve"]; curve.has("acceptance_tolerance") && !curve["enabled"].boolean(false))
+    warn(curve["acceptance_tolerance"], "without /space/remesh/curve/enabled = true no edge becomes curved");
   for (const char* operation : {"straighten", "collapse", "swap", "smooth"})
     if (const Node tolerance = remesh[operation]["acceptance_tolerance"]; tolerance.number(0) > 0)
       warn(tolerance,

@@ -83,8 +83,8 @@ Mat<3> read_rotation(const Node& node, const Mat<3>&) {
 
 /// Of a mesh file [m].
 double unit_of_mesh(const Node& geometry) {
-  const Node unit = geometry["unit"];
-  return unit.exists() ? Units::length_in_metres(unit.string("")) : geometry.document().units.factor("m");
+  const std::string unit = geometry["unit"].string("");
+  return unit.empty() ? geometry.document().units.factor("m") : Units::length_in_metres(unit);
 }
 
 }  // namespace

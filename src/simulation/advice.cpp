@@ -96,8 +96,8 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
                                   setup.units.text(material.youngs_modulus, "Pa", 3), setup.units.name("Pa")));
     if (has_mass && is_outside(material.density, kUsualDensity))
       found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?", body,
-                                  setup.units.from_si(material.density, "kg/m^3"),
-                                  setup.units.name(Dim == 2 ? "kg/m^2" : "kg/m^3"), setup.units.name("kg/m^3")));
+                                  setup.units.from_si(material.density, "kg/m^3"), setup.units.name("kg/m^3"),
+                                  setup.units.name("kg/m^3")));
   }
 }
 

@@ -145,15 +145,9 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
   const Mesh<Dim>& mesh = state.mesh;
   if (mesh.num_vertices() != mesh.vertex_slots() || mesh.num_cells() != mesh.cell_slots())
     refuse_state("saved mesh", "dead slots", "a compact mesh");
-  const bool may_differ =
-      setup.remesh.enabled && (setup.remesh.curve.enabled || !space_of_orders(mesh, setup.order).is_linear());
-  if (may_differ) {
-    for (const auto& [a, b] : state.space.curved_edges())
-      if (a < 0 || b <= a || b >= mesh.vertex_slots() || !mesh.are_joined(a, b))
-        refuse_state("curved edges of a saved state", fmt::format("{}-{}", a, b), "an edge of the mesh");
-  } else if (const Space expected = space_of_orders(mesh, setup.order); state.space != expected)
-    refuse_state("curved edges of a saved state", fmt::format("{}, others than the setup's", state.space.num_curved()),
-                 std::to_string(expected.num_curved()));
+  for (const auto& [a, b] : state.space.curved_edges())
+    if (a < 0 || b <= a || b >= mesh.vertex_slots() || !mesh.are_joined(a, b))
+      refuse_state("curved edges of a saved state", fmt::format("{}-{}", a, b), "an edge of the mesh");
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
     if (!setup.materials.contains(mesh.body(c)))
       refuse_state("body of a saved cell", std::to_string(mesh.body(c)), "one that has a material");

@@ -304,6 +304,7 @@ template <int Dim>
 void Simulation<Dim>::restore(State<Dim> state) {
   impl_->refuse_in_callback("restore");
   refuse_misfit(impl_->setup, state);
+  if (impl_->state->space.is_linear() && !state.space.is_linear()) refuse_unsupported(impl_->setup, state);
   if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
   impl_->change_to(std::make_shared<State<Dim>>(std::move(state)));
   ++impl_->mesh_revision;

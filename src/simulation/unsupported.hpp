@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "itr/simulation/setup.hpp"
+#include "itr/simulation/step.hpp"
 
 namespace itr {
 
@@ -18,5 +19,8 @@ std::vector<UnsupportedCombination> unsupported_combinations();
 /// Throws InputError for the first combination that the setup has.
 template <int Dim>
 void refuse_unsupported(const Setup<Dim>& setup);
+/// The same for a state to go on from, whose edges may be curved where the setup would curve none.
+template <int Dim>
+void refuse_unsupported(const Setup<Dim>& setup, const State<Dim>& state);
 
 }  // namespace itr

@@ -152,7 +152,8 @@ def last_ratio(verdict):
 
 
 def rows(name):
-    """Of each measure the series that is ahead at the smallest errors that uniform refinement reaches too."""
+    """Of each measure the series that is ahead at the smallest errors that uniform refinement reaches too, of those that the
+    study recommends."""
     content = json.loads((HERE / name / "study.json").read_text())
     if refused(content):
         return
@@ -160,6 +161,7 @@ def rows(name):
         own = [v for v in content["verdicts"] if v["measure"] == measure and v["series"] in SERIES and told(v)]
         if not own:
             continue
+        own = [v for v in own if v.get("is_recommended", True)] or own
         quadratic = [v for v in content["verdicts"] if v["measure"] == measure and v["series"] == "uniform-p2" and told(v)]
         for verdict in [min(own, key=last_ratio), *quadratic]:
             points = told(verdict)
@@ -180,8 +182,9 @@ def page():
              "Made by `studies.py` from the folders beside it; each has its page, table and diagram. Times are processor seconds of one",
              "thread, by those of uniform refinement at the same error (between its levels); unknowns are means over the steps, by its",
              "unknowns at the same error, both with linear elements; beside, the time by that with quadratic ones. Below 1, a series is ahead.",
-             "Of splits and collapses, with swaps, and with smoothing, the row has the one that is ahead at the smallest error; uniform",
-             "refinement with quadratic elements has a row of its own. Studies from before there were these say nothing of them.", "",
+             "Of splits and collapses, with swaps, and with smoothing, the row has the one that is ahead at the smallest error, of those",
+             "that the study recommends; uniform refinement with quadratic elements has a row of its own. Studies from before there were",
+             "these say nothing of them.", "",
              "| scene | error | series | errors reached | time | by quadratic | unknowns | does it pay? |", "|" + "---|" * 8]
     for name in here:
         lines += ["| " + " | ".join([f"[{row[0]}]({row[0]}/study.md)", *row[1:]]) + " |" for row in rows(name)]

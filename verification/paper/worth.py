@@ -35,7 +35,7 @@ def studies():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         if line.startswith("| [") and len(cells) == 8 and cells[2] != "uniform-p2":
             name = cells[0].partition("]")[0].lstrip("[")
-            rows[name, cells[1]] = {"time": cells[4], "unknowns": cells[6]}
+            rows[name, cells[1]] = {"time": cells[4], "unknowns": cells[6], "is_recommended": cells[7] != "nothing recommended"}
     return rows
 
 
@@ -46,7 +46,7 @@ def table():
     for name, error, words, reason in ROWS:
         row = found[name, error]
         highest, lowest = float(row["time"].split()[-1]), float(row["time"].split()[0])
-        verdict = "yes" if highest <= 1 else "no" if lowest > 1 else "hardly"
+        verdict = "not told" if not row["is_recommended"] else "yes" if highest <= 1 else "no" if lowest > 1 else "hardly"
         lines.append(f"| [{words}](verification/paper/{name}/study.md) | {error} | {row['time']} | {row['unknowns']} | "
                      f"{verdict} | {reason} |")
     return "\n".join(lines)

@@ -19,6 +19,7 @@ struct SavedState {
   std::string backend;  ///< solver of that run
   int dim = 0;
   int step = 0;
+  Units units{};                           ///< of that run's results
   std::vector<std::string> passed_over{};  ///< what is wrong with newer ones, a sentence each
 };
 

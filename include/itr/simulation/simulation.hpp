@@ -98,8 +98,9 @@ class Simulation {
   Snapshot<Dim> save() const;
   /// Throws InputError for a snapshot of another simulation.
   void restore(const Snapshot<Dim>& snapshot);
-  /// Restores a state of the same setup. Throws InputError if the state does not fit the setup, has numbers that are not
-  /// finite or violates invariants (find_violation). Strata of another mesh are dropped and found anew.
+  /// Restores a state of the same setup. Its curved edges stay curved also where the setup would curve none. Throws
+  /// InputError if the state does not fit the setup, has numbers that are not finite or violates invariants
+  /// (find_violation). Strata of another mesh are dropped and found anew.
   void restore(State<Dim> state);
 
   const State<Dim>& state() const;      ///< valid while no snapshot shares it; spans of its fields until it changes

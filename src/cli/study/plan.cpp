@@ -38,6 +38,8 @@ Overrides remeshed(const Overrides& changes = {}) {
   Overrides all = {{"/space/remesh/enabled", "true"},
                    {"/space/remesh/type", "\"physics\""},
                    {"/space/remesh/screening", "\"bounds\""},
+                   {"/space/remesh/curve/enabled", "false"},
+                   {"/space/remesh/straighten/enabled", "false"},
                    {"/space/remesh/swap/enabled", "false"},
                    {"/space/remesh/smooth/enabled", "false"}};
   for (const auto& change : changes) {
@@ -53,7 +55,8 @@ Overrides remeshed(const Overrides& changes = {}) {
 
 const scene::Override kFixed = {"/space/remesh/enabled", "false"};
 const scene::Override kQuadratic = {"/space/discr_order", "2"};
-const scene::Override kCurve = {"/space/remesh/curve/enabled", "true"};
+const scene::Override kCurve = {"/space/remesh/curve/enabled", "true"},
+                      kStraighten = {"/space/remesh/straighten/enabled", "true"};
 const scene::Override kSwap = {"/space/remesh/swap/enabled", "true"}, kSmooth = {"/space/remesh/smooth/enabled", "true"};
 
 /// The scene as its options ask for, merged.
@@ -116,7 +119,7 @@ class Source {
     if (has(pointer + "/array") || has("/contact/collision_mesh")) return std::nullopt;
     if (!has_one_body && !has(pointer + "/volume_selection")) return std::nullopt;
     Overrides all = {{pointer + "/mesh", Json(file.generic_string()).dump()}, {pointer + "/n_refs", "0"}};
-    if (!units.is_si()) all.push_back({pointer + "/unit", "\"m\""});
+    if (!units.is_si() || has(pointer + "/unit")) all.push_back({pointer + "/unit", "\"m\""});
     if (has(pointer + "/transformation")) all.push_back({pointer + "/transformation", "{}"});
     return all;
   }
@@ -167,6 +170,9 @@ Overrides with_tolerance(const Source& source, const Series& series, double tole
   scale("collapse", *source.remesh.collapse.acceptance_tolerance);
   if (contains(series.overrides, kSwap)) scale("swap", *source.remesh.swap.acceptance_tolerance);
   if (contains(series.overrides, kSmooth)) scale("smooth", *source.remesh.smooth.acceptance_tolerance);
+  const auto &curve = source.remesh.curve.acceptance_tolerance, &straighten = source.remesh.straighten.acceptance_tolerance;
+  if (contains(series.overrides, kCurve) && curve) scale("curve", *curve);
+  if (contains(series.overrides, kCurve) && straighten) scale("straighten", *straighten);
   return all;
 }
 
@@ -207,6 +213,7 @@ class Planner {
     plan_.dim = source_.dim;
     plan_.has_contact = source_.has_contact;
     plan_.has_friction = source_.has_friction;
+    plan_.is_static = source_.time.is_static;
     plan_.is_dynamic = !source_.time.is_static && !source_.time.quasistatic;
   }
 
@@ -344,8 +351,9 @@ const std::vector<Series>& all_series() {
       {"itr", Kind::tolerances, true, "splits and collapses", remeshed()},
       {"swaps", Kind::tolerances, true, "splits, collapses and swaps", remeshed({kSwap})},
       {"smoothing", Kind::tolerances, true, "splits, collapses, swaps and smoothing", remeshed({kSwap, kSmooth})},
-      {"hp", Kind::tolerances, false, "splits, curved edges and collapses", remeshed({kCurve})},
-      {"p", Kind::tolerances, false, "curved edges alone", remeshed({kCurve, {"/space/remesh/split/enabled", "false"}})},
+      {"hp", Kind::tolerances, false, "splits, curved edges and collapses", remeshed({kCurve, kStraighten})},
+      {"p", Kind::tolerances, false, "curved edges alone",
+       remeshed({kCurve, kStraighten, {"/space/remesh/split/enabled", "false"}})},
       {"splits-p2", Kind::tolerances, false, "splits of quadratic elements", remeshed({kQuadratic})},
       {"no-screening", Kind::tolerances, false, "`smoothing`, a patch relaxed for every edge",
        remeshed({kSwap, kSmooth, {"/space/remesh/screening", "\"none\""}})},

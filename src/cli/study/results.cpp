@@ -38,7 +38,7 @@ std::vector<Json> read_steps(const fs::path& folder) {
   return steps;
 }
 
-/// A stored time of a run.
+/// A stored time of a run, in SI units.
 struct Moment {
   fs::path file;
   output::FrameTotals totals;
@@ -46,15 +46,19 @@ struct Moment {
   double stored = 0;  ///< the same without body [J]
 };
 
-std::vector<Moment> read_moments(const fs::path& folder, bool is_dynamic) {
+std::vector<Moment> read_moments(const fs::path& folder, const Plan& plan) {
   const std::vector<Json> steps = read_steps(folder);
   std::vector<Moment> moments;
   for (auto& [file, totals] : output::list_frames(folder)) {
     if (totals.step >= static_cast<int>(steps.size())) continue;
     const Json& energy = steps[totals.step]["energy"];
-    double stored = is_dynamic ? totals.kinetic_energy.value_or(0) : 0;
+    const Units& units = totals.units;
+    if (!plan.is_static) totals.t = units.to_si(totals.t, "s");
+    for (double& component : totals.momentum) component = units.to_si(component, "kg m/s");
+    double stored = plan.is_dynamic ? totals.kinetic_energy.value_or(0) : 0;
     for (const char* term : {"elastic", "contact"}) stored += energy[term].get<double>();
-    moments.push_back({file, totals, stored + energy["body"].get<double>(), stored});
+    const double all = stored + energy["body"].get<double>();
+    moments.push_back({file, totals, units.to_si(all, "J"), units.to_si(stored, "J")});
   }
   return moments;
 }
@@ -186,12 +190,12 @@ Row read_row(const PlannedRun& run, const fs::path& folder, const fs::path& log,
   return row;
 }
 
-Errors measure_errors(const fs::path& folder, const fs::path& reference, bool is_dynamic) {
-  const std::vector<Moment> moments = read_moments(folder, is_dynamic), references = read_moments(reference, is_dynamic);
+Errors measure_errors(const fs::path& folder, const fs::path& reference, const Plan& plan) {
+  const std::vector<Moment> moments = read_moments(folder, plan), references = read_moments(reference, plan);
   const std::string key = kFormOfErrors + stamp(moments) + "/ " + stamp(references);
   const fs::path file = folder / "errors.json";
   if (const auto kept = read_kept(file, key)) return *kept;
-  const Errors errors = compare(moments, references, is_dynamic);
+  const Errors errors = compare(moments, references, plan.is_dynamic);
   if (errors.times == 0)
     throw InputError({reference.string(), "frames", "no frame at a time of " + folder.string(), "frames at the same times"});
   std::ofstream(file) << Json{{"of", key}, {"errors", to_json(errors)}}.dump(1) << '\n';

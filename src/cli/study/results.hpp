@@ -55,6 +55,6 @@ Row read_row(const PlannedRun& run, const std::filesystem::path& folder, const s
 
 /// Distances are kept in the folder until a frame of it or of the reference changes. Throws InputError where the two have no
 /// stored time in common, or bodies of other shapes.
-Errors measure_errors(const std::filesystem::path& folder, const std::filesystem::path& reference, bool is_dynamic);
+Errors measure_errors(const std::filesystem::path& folder, const std::filesystem::path& reference, const Plan& plan);
 
 }  // namespace itr::cli::study
