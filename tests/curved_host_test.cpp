@@ -133,7 +133,7 @@ TEST(Memory, ForgetsRefusalsByStricterTolerances) {
   tolerances[Memory::split] = 10;
   tolerances[Memory::collapse] = -1;
   memory.begin(tolerances);
-  memory.refusals[Memory::split] = memory.refusals[Memory::collapse] = {{{0, 1}, {1, 2, false}}};
+  memory.refusals[Memory::split] = memory.refusals[Memory::collapse] = {{Place(EdgeKey{0, 1}), {1, 2, false}}};
   const auto remembers = [&](double split, double collapse) {
     Memory copy = memory;
     tolerances[Memory::split] = split;

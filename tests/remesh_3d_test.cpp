@@ -356,7 +356,7 @@ struct Swapped {
       const RemeshState<3> state{slots, fields, context, gate.present(), HistoryRule::function};
       double sum = 0;
       for (CellId c = 0; c < slots.cell_slots(); ++c)
-        if (slots.is_cell_alive(c)) sum += cell_energy<3>(state, slots.cell(c), slots.body(c));
+        if (slots.is_cell_alive(c)) sum += cell_energy<3>(state, slots.cell(c), slots.body(c), {});
       return sum;
     };
     const double energy = energy_on(before);

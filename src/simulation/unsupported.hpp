@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "itr/simulation/setup.hpp"
-#include "itr/simulation/step.hpp"
+#include "simulation/step.hpp"
 
 namespace itr {
 
