@@ -4,6 +4,7 @@
 
 #include <numeric>
 #include <random>
+#include <set>
 
 #include "geometry/dynamic_tree.hpp"
 #include "itr/remesh/remesher.hpp"
@@ -109,6 +110,19 @@ TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
   RemeshMemory none;
   report = remesh(scene.mesh, scene.fields, scene.context, options, none, strata);
   EXPECT_GT(report.splits.relaxed + report.collapses.relaxed, 0);
+}
+
+TEST(Place, TellsAnEdgeAnEdgeToCurveAndAVertexApart) {
+  const Place edge(EdgeKey{4, 2}), curve = Place::to_curve({2, 4}), vertex = Place::at_vertex(2);
+  EXPECT_EQ(edge, Place(EdgeKey{2, 4}));
+  EXPECT_EQ(edge.edge(), (EdgeKey{2, 4}));
+  EXPECT_EQ(curve.edge(), (EdgeKey{2, 4}));
+  EXPECT_FALSE(edge.is_to_curve() || edge.is_vertex() || vertex.is_to_curve() || curve.is_vertex());
+  EXPECT_TRUE(curve.is_to_curve() && vertex.is_vertex());
+  EXPECT_EQ(std::set({edge, curve, vertex}).size(), 3u);
+  EXPECT_EQ(edge.vertices().size(), 2u);
+  EXPECT_EQ(vertex.vertices().size(), 1u);
+  EXPECT_EQ(vertex.vertex(), 2);
 }
 
 TEST(Memory, FollowsVerticesWhenAMeshIsCompacted) {

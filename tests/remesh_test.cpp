@@ -147,6 +147,35 @@ TEST(LocalProblem, HistoryAsAFunctionChargesTheIntegralOfWhatIsForgotten) {
   EXPECT_GT(compared, 5);
 }
 
+/// For each collapse, and for all but a few moves.
+TEST(LocalProblem, PredictionsChargeLessThanWhatIsForgotten) {
+  int compared = 0, above = 0;
+  for (unsigned seed = 0; seed < 2000; ++seed) {
+    TrialScene scene(seed);
+    scene.fields.x = scene.fields.predictor;  // all inertia is loss
+    const auto edges = scene.mesh.edges();
+    const EdgeKey edge = edges[scene.random() % edges.size()];
+    const Strata<2> strata(scene.mesh);
+    const auto edit = (seed % 2 ? propose_collapse(scene.mesh, strata, edge)
+                                : propose_move<2>(scene.mesh, strata, edge[0],
+                                                  0.7 * scene.mesh.rest(edge[0]) + 0.3 * scene.mesh.rest(edge[1])))
+                          .edit;
+    if (!edit) continue;
+    Marks marks;
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
+    const auto inertia = [&](HistoryRule rule) { return LocalView(scene, rule).problem(patch, *edit, true)->value(); };
+    const double forgotten = inertia(HistoryRule::function) - inertia(HistoryRule::interpolated);
+    if (!std::isfinite(forgotten)) continue;  // inverted by the random state
+    const double least = least_forgotten(LocalView(scene).state, *edit);
+    EXPECT_GT(least, 0) << "seed " << seed;
+    EXPECT_TRUE(least <= forgotten || edit->kind == Edit<2>::Kind::smooth) << "seed " << seed;
+    above += least > forgotten;
+    ++compared;
+  }
+  EXPECT_GT(compared, 1500);
+  EXPECT_LE(above, 2);
+}
+
 /// Lumped masses of a split mesh integrate inertia otherwise than those before it: that is no gain.
 TEST(LocalProblem, SplitsAloneChangeNoEnergyWithLumpedMassEither) {
   for (const MassKind mass : {MassKind::consistent, MassKind::lumped})

@@ -9,30 +9,34 @@
 
 namespace itr {
 
+namespace {
+
+/// Facets of the mesh at vertices that move, ascending.
 template <int Dim>
-PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const Obstacles<Dim>& obstacles,
-                                const TransferPatch<Dim>& patch, const std::vector<char>& moving, const VectorX& x,
-                                const VectorX& goal, double reach) {
-  PatchSurface<Dim> result;
-  const auto& vertices = patch.new_cells.vertices;
-  std::vector<FacetId> own;
+std::vector<FacetId> facets_of_moving(const Mesh<Dim>& mesh, const Space& space, std::span<const int> vertices,
+                                      const std::vector<char>& moving) {
+  std::vector<FacetId> facets;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     if (!moving[i]) continue;
     std::vector<FacetId> of_edge;
     const int node = vertices[i] - mesh.vertex_slots();
     if (node >= 0) of_edge = mesh.facets_of_edge(space.curved_edges()[node]);
     const auto at = node < 0 ? mesh.facets_of(vertices[i]) : std::span<const FacetId>(of_edge);
-    own.insert(own.end(), at.begin(), at.end());
+    facets.insert(facets.end(), at.begin(), at.end());
   }
-  if (own.empty()) return result;
-  std::sort(own.begin(), own.end());
-  own.erase(std::unique(own.begin(), own.end()), own.end());
+  std::sort(facets.begin(), facets.end());
+  facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
+  return facets;
+}
 
-  std::unordered_map<int, int> known;  // from ids in fields to those in the patch
-  for (std::size_t i = 0; i < vertices.size(); ++i) known[vertices[i]] = static_cast<int>(i);
+/// Boxes that hold facets on their way from `x` to `goal`, which is by the numbers that `known` has.
+template <int Dim>
+std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const Space& space, const std::vector<FacetId>& facets,
+                                    const std::unordered_map<int, int>& known, const VectorX& x, const VectorX& goal,
+                                    double reach) {
   std::vector<Box<Dim>> boxes;
   std::vector<typename MeshTypes<Dim>::Facet> chords;
-  for (const FacetId f : own) {
+  for (const FacetId f : facets) {
     Box<Dim> box;
     chords.clear();
     add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
@@ -43,7 +47,23 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
       }
     boxes.push_back(box.inflated(reach));
   }
-  const Bvh<Dim> tree(boxes);
+  return boxes;
+}
+
+}  // namespace
+
+template <int Dim>
+PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const Obstacles<Dim>& obstacles,
+                                const TransferPatch<Dim>& patch, const std::vector<char>& moving, const VectorX& x,
+                                const VectorX& goal, double reach) {
+  PatchSurface<Dim> result;
+  const auto& vertices = patch.new_cells.vertices;
+  const std::vector<FacetId> own = facets_of_moving<Dim>(mesh, space, vertices, moving);
+  if (own.empty()) return result;
+
+  std::unordered_map<int, int> known;  // from ids in fields to those in the patch
+  for (std::size_t i = 0; i < vertices.size(); ++i) known[vertices[i]] = static_cast<int>(i);
+  const Bvh<Dim> tree(boxes_of_ways<Dim>(mesh, space, own, known, x, goal, reach));
   std::vector<int> hits;
   const auto is_near = [&](std::span<const int> ids) {
     Box<Dim> box;

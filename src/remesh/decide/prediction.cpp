@@ -275,48 +275,6 @@ typename QuadraticModel<Dim>::Corners corners_of(const RemeshState<Dim>& state, 
 }
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
-/// Share of the forgotten history that no relaxation regains (ball-wall 2D: a share of 1 refuses so many collapses that a
-/// sixth more vertices stay).
-constexpr double kLeastForgotten = 0.3;
-
-/// Estimates the history that an edit forgets (see add_unrepresented_history) if it removes or moves a vertex: the gap
-/// between the old and the new predictor at the vertex's old place, times its hat function on the old cells.
-template <int Dim, typename At>
-double predict_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit, const At& at) {
-  double forgotten = 0;
-  for (const VertexId v : {edit.value->vertex, edit.removed_vertex}) {
-    if (v == kNone || v == kNewVertex) continue;
-    const Vec<Dim>& X = state.mesh.rest(v);
-    double mass = 0;
-    for (const CellId c : edit.removed_cells) {
-      const auto& cell = state.mesh.cell(c);
-      if (std::find(cell.begin(), cell.end(), v) != cell.end())
-        mass += state.context.materials.at(state.mesh.body(c)).density * state.mesh.volume(c) / (Dim + 1);
-    }
-    // There in the new mesh.
-    double deepest = -std::numeric_limits<double>::infinity();
-    Vec<Dim> way = Vec<Dim>::Zero(), predictor = way;
-    for (const auto& [cell, body] : edit.inserted_cells) {
-      std::array<Vec<Dim>, Dim + 1> rest;
-      for (int k = 0; k <= Dim; ++k) rest[k] = cell[k] == edit.value->vertex ? edit.value->rest : state.mesh.rest(cell[k]);
-      const Vec<Dim> weights = edge_matrix<Dim>(rest).inverse() * (X - rest[0]);
-      const double depth = std::min(weights.minCoeff(), 1 - weights.sum());
-      if (depth <= deepest) continue;
-      deepest = depth;
-      way = predictor = Vec<Dim>::Zero();
-      for (int k = 0; k <= Dim; ++k) {
-        const double weight = k == 0 ? 1 - weights.sum() : weights[k - 1];
-        const Vec<Dim> x_hat = at(state.fields.predictor, cell[k], true);
-        predictor += weight * x_hat;
-        way += weight * (at(state.fields.x, cell[k], true) - x_hat);
-      }
-    }
-    const Vec<Dim> gap = state.fields.predictor.template segment<Dim>(Dim * v) - predictor;
-    forgotten += mass * (gap.squaredNorm() / (Dim + 2) - gap.dot(way));
-  }
-  return forgotten;
-}
-
 /// One side of an edit that sets no vertex: as it is, and with each of some vertices moving by itself.
 template <int Dim>
 class MovingModels {
@@ -379,7 +337,51 @@ double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit
   return gain;
 }
 
+/// Share of the forgotten history that no relaxation regains (ball-wall 2D: a share of 1 refuses so many collapses that a
+/// sixth more vertices stay).
+constexpr double kLeastForgotten = 0.3;
+
 }  // namespace
+
+template <int Dim>
+double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
+  const auto after = [&](const VectorX& field, VertexId v) {
+    return v == edit.value->vertex ? RemeshFields<Dim>::interpolate(field, *edit.value)
+                                   : Vec<Dim>(field.segment<Dim>(Dim * v));
+  };
+  double forgotten = 0;
+  for (const VertexId v : {edit.value->vertex, edit.removed_vertex}) {
+    if (v == kNone || v == kNewVertex) continue;
+    const Vec<Dim>& X = state.mesh.rest(v);
+    double mass = 0;
+    for (const CellId c : edit.removed_cells) {
+      const auto& cell = state.mesh.cell(c);
+      if (std::find(cell.begin(), cell.end(), v) != cell.end())
+        mass += state.context.materials.at(state.mesh.body(c)).density * state.mesh.volume(c) / (Dim + 1);
+    }
+    // There in the new mesh.
+    double deepest = -std::numeric_limits<double>::infinity();
+    Vec<Dim> way = Vec<Dim>::Zero(), predictor = way;
+    for (const auto& [cell, body] : edit.inserted_cells) {
+      std::array<Vec<Dim>, Dim + 1> rest;
+      for (int k = 0; k <= Dim; ++k) rest[k] = cell[k] == edit.value->vertex ? edit.value->rest : state.mesh.rest(cell[k]);
+      const Vec<Dim> weights = edge_matrix<Dim>(rest).inverse() * (X - rest[0]);
+      const double depth = std::min(weights.minCoeff(), 1 - weights.sum());
+      if (depth <= deepest) continue;
+      deepest = depth;
+      way = predictor = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) {
+        const double weight = k == 0 ? 1 - weights.sum() : weights[k - 1];
+        const Vec<Dim> x_hat = after(state.fields.predictor, cell[k]);
+        predictor += weight * x_hat;
+        way += weight * (after(state.fields.x, cell[k]) - x_hat);
+      }
+    }
+    const Vec<Dim> gap = state.fields.predictor.template segment<Dim>(Dim * v) - predictor;
+    forgotten += mass * (gap.squaredNorm() / (Dim + 2) - gap.dot(way));
+  }
+  return kLeastForgotten * forgotten;
+}
 
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
@@ -425,7 +427,7 @@ double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   }
   double gain = before.energy() - after.relaxed();
   if (context.has_inertia && state.history == HistoryRule::function && !edit.is_nested())
-    gain -= kLeastForgotten * predict_forgotten<Dim>(state, edit, at);
+    gain -= least_forgotten<Dim>(state, edit);
   return gain;
 }
 
@@ -498,6 +500,8 @@ double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>:
 
 template double predict_gain(const RemeshState<2>&, const Edit<2>&);
 template double predict_gain(const RemeshState<3>&, const Edit<3>&);
+template double least_forgotten(const RemeshState<2>&, const Edit<2>&);
+template double least_forgotten(const RemeshState<3>&, const Edit<3>&);
 template double predict_split(const RemeshState<2>&, const EdgeKey&);
 template double predict_split(const RemeshState<3>&, const EdgeKey&);
 template double predict_curve(const RemeshState<2>&, const EdgeKey&);

@@ -25,8 +25,15 @@ inline constexpr double kPatchOverVertexInContact = Dim == 2 ? 30 : 10;
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 
-/// The same of the split of an edge, up to round-off: in one evaluation a cell around it, where moduli are constant in cells
-/// and mass is consistent.
+/// Lower estimate of what an edit that sets a vertex forgets of the history: a share of the square of the gap between the
+/// old and the new predictor at the place of each vertex that goes or moves, times its hat function on the old cells. It is
+/// below the exact value of forgotten_history, which takes much longer, in each of 815 random collapses and in all but 2 of
+/// 922 moves from x = x-hat. [J, times the scaling]
+template <int Dim>
+double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit);
+
+/// The prediction for the split of an edge, up to round-off: in one evaluation a cell around it, where moduli are constant
+/// in cells and mass is consistent.
 template <int Dim>
 double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge);
 
