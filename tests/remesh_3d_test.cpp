@@ -354,9 +354,10 @@ struct Swapped {
     const auto energy_on = [&](const Mesh<3>& slots) {
       const Gate<3> gate(slots, fields, context);
       const RemeshState<3> state{slots, fields, context, gate.present(), HistoryRule::function};
+      const Edit<3> none{.kind = Edit<3>::Kind::swap};
       double sum = 0;
       for (CellId c = 0; c < slots.cell_slots(); ++c)
-        if (slots.is_cell_alive(c)) sum += cell_energy<3>(state, slots.cell(c), slots.body(c), {});
+        if (slots.is_cell_alive(c)) sum += cell_energy<3>(state, slots.cell(c), slots.body(c), none);
       return sum;
     };
     const double energy = energy_on(before);

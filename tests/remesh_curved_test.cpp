@@ -380,6 +380,30 @@ TYPED_TEST(Curved, EveryOperationIsChargedForWhatItForgets) {
     EXPECT_GT(compared[kind], 0) << static_cast<int>(kind);
 }
 
+/// What edge removals minimise: the energy of the cells that an edit makes, with the nodes that it makes.
+TYPED_TEST(Curved, EnergiesOfCellsAreThoseOfPatches) {
+  constexpr int Dim = TypeParam::value;
+  int curved = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.5, 0.001);
+    StepContext<Dim> context = context_of<Dim>(seed);
+    context.loads.tractions.clear();
+    const auto proposal = propose_any(scene);
+    if (!proposal || proposal.edit->value) continue;  // as a swap, it sets no vertex
+    const Edit<Dim>& edit = *proposal.edit;
+    const View<Dim> view(scene, context, HistoryRule::interpolated);
+    LocalScratch<Dim> scratch;
+    double sum = 0;
+    for (const auto& cell : edit.inserted_cells) {
+      sum += cell_energy<Dim>(view.state, cell.vertices, cell.body, edit);
+      curved += curved_cell_after(scene.mesh, edit, cell.vertices).edges != 0;
+    }
+    const double expected = LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, scratch).value();
+    EXPECT_NEAR(sum, expected, 1e-9 * std::abs(expected)) << "seed " << seed;
+  }
+  EXPECT_GT(curved, 10);
+}
+
 /// With a quadratic energy the prediction of a curve is what the new node alone gains.
 TYPED_TEST(Curved, PredictionOfACurveIsWhatItsNodeGains) {
   constexpr int Dim = TypeParam::value;
