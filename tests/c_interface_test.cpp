@@ -172,6 +172,26 @@ TEST(CInterface, CancelsSavesAndRestores) {
   itr_snapshot_destroy(saved);
 }
 
+TEST(CInterface, CountsCurvedEdges) {
+  CBlock block(R"({"space": {"remesh": {"enabled": true, "split": {"enabled": false}, "collapse": {"enabled": false},
+                                        "curve": {"enabled": true, "acceptance_tolerance": 1e-6}}}})");
+  const size_t n = itr_num_vertices(block.simulation);
+  std::vector<double> rest(2 * n), held(2 * n, 0.0);
+  ASSERT_EQ(itr_get_rest_positions(block.simulation, rest.size(), rest.data()), ITR_SUCCESS);
+  const int both[] = {1, 1};
+  for (size_t i = 0; i < n; ++i) held[2 * i] = 0.05 * rest[2 * i + 1] * rest[2 * i + 1];
+  ASSERT_EQ(itr_fix_values(block.simulation, "left", both, held.size(), held.data()), ITR_SUCCESS)
+      << itr_simulation_message(block.simulation);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS) << itr_simulation_message(block.simulation);
+  itr_step_statistics statistics;
+  ASSERT_EQ(itr_get_statistics(block.simulation, &statistics), ITR_SUCCESS);
+  EXPECT_GT(statistics.curves, 0);
+  EXPECT_EQ(static_cast<size_t>(statistics.curves - statistics.straightens), itr_num_nodes(block.simulation) - n);
+  EXPECT_EQ(statistics.splits + statistics.collapses + statistics.swaps + statistics.smooths + statistics.cut_steps, 0);
+  EXPECT_GT(statistics.min_volume_ratio, 0);
+  EXPECT_GT(statistics.seconds, 0);
+}
+
 TEST(CInterface, TakesForcesOfPositions) {
   CBlock block;
   itr_set_follower_forces(

@@ -299,6 +299,19 @@ class Study(unittest.TestCase):
             for column, value in values.items():
                 self.assertAlmostEqual(errors["scene"][run][column], value, delta=1e-4 * value, msg=(run, column))
 
+    def test_a_given_reference_without_kinetic_energy(self):
+        scene, reference = write_beam(self.folder, {}), self.folder / "reference"
+        dynamic = ["--set", "/time/quasistatic=false"]
+        subprocess.run([ITR, "run", scene, "-o", reference, "--set", "/geometry/0/n_refs=2", *dynamic], check=True, capture_output=True)
+        for _ in range(2):  # measured, and kept
+            done = subprocess.run([ITR, "study", scene, "-o", self.folder / "study", "--series", "uniform", "--levels", "1", *dynamic,
+                                   "--reference", reference, "--frames", "2"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            row = rows(self.folder / "study")["uniform-0"]
+            self.assertGreater(float(row["l2"]), 0)
+            self.assertEqual((row["energy"], row["momentum"]), ("", ""))
+            self.assertIn("of energy and momentum no errors are told", done.stdout)
+
     def test_its_program_may_be_replaced_meanwhile(self):
         prefix = self.folder / "prefix"
         (prefix / "bin").mkdir(parents=True)

@@ -4,6 +4,7 @@
 import importlib.util
 import math
 import pathlib
+import re
 import sys
 import tempfile
 import types
@@ -26,6 +27,26 @@ def run_case(results):
                                  QUANTITY="x", REFERENCE="y", TOLERANCE=1, results=results)
     folder = pathlib.Path(tempfile.gettempdir())
     return suite.run_case(case, suite.Context(folder, folder, folder, folder, False, "case"))
+
+
+class Cases(unittest.TestCase):
+    def test_page_lists_them(self):
+        section = (SOURCE / "verification/README.md").read_text().partition("\n## Cases\n")[2].partition("\n## ")[0]
+        rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
+        listed = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
+        self.assertEqual(sorted(listed), sorted(path.stem for path in (SOURCE / "verification/cases").glob("*.py")))
+
+    def test_mixed_order_has_both_kinds_of_edges(self):
+        try:
+            import numpy
+            from harness.scenes import is_of_mixed_order, with_edge_nodes
+        except ImportError as error:
+            self.skipTest(str(error))
+        points, cells = numpy.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), numpy.array([[0, 1, 2], [0, 2, 3]])
+        nodes, _, edges = with_edge_nodes(points, cells)
+        for count in range(len(edges) + 1):
+            frame = types.SimpleNamespace(rest=nodes[:len(points) + count], cells=cells, curved=edges[:count])
+            self.assertEqual(is_of_mixed_order(frame), 0 < count < 5, count)
 
 
 class Judgement(unittest.TestCase):

@@ -260,7 +260,7 @@ typedef struct itr_energies {
 /** Counts and measures of the last step. history_loss is the energy that the projection onto the new mesh forgot [J],
  * min_distance the smallest gap in contact [m], min_volume_ratio the smallest ratio of present to rest volume of a cell. */
 typedef struct itr_step_statistics {
-  int newton_iterations, linear_solves, factorizations, splits, collapses, swaps, smooths, cut_steps;
+  int newton_iterations, linear_solves, factorizations, splits, curves, straightens, collapses, swaps, smooths, cut_steps;
   double history_loss, min_distance, min_volume_ratio, seconds;
 } itr_step_statistics;
 /** Writes the energies of the last step, of what itr_adapt or itr_restore led to, or of the start. */

@@ -394,9 +394,9 @@ itr_status itr_get_statistics(itr_simulation* simulation, itr_step_statistics* s
   return with(simulation, [&](itr::AnySimulation& s) {
     require(statistics, "statistics");
     const itr::StepReport& r = s.report();
-    *statistics = {r.newton_iterations,  r.linear_solves,  r.factorizations,   r.splits.accepted,
-                   r.collapses.accepted, r.swaps.accepted, r.smooths.accepted, r.cut_steps,
-                   r.history_loss,       r.min_distance,   r.min_volume_ratio, r.seconds.total};
+    *statistics = {r.newton_iterations,    r.linear_solves,      r.factorizations,   r.splits.accepted,  r.curves.accepted,
+                   r.straightens.accepted, r.collapses.accepted, r.swaps.accepted,   r.smooths.accepted, r.cut_steps,
+                   r.history_loss,         r.min_distance,       r.min_volume_ratio, r.seconds.total};
   });
 }
 

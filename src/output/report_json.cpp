@@ -129,7 +129,7 @@ void for_each_number(Report& r, Visit&& visit) {
   for (auto* x : {&r.t, &r.energy_before_remesh, &r.history_loss, &r.min_distance, &r.min_volume_ratio, &r.processor_seconds,
                   &r.peak_rss_mb})
     visit(*x);
-  // Last: 0.1.0 did not save them.
+  // Last: states that were saved before there were any do not have them.
   for (auto* count : {&r.curves, &r.straightens}) {
     visit(count->tried);
     visit(count->relaxed);

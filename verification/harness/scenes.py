@@ -46,6 +46,12 @@ def with_edge_nodes(points, cells):
     return np.concatenate([points, points[edges].mean(axis=1)]), np.column_stack([cells, middles]), edges
 
 
+def is_of_mixed_order(frame):
+    """Whether some edges of a stored frame are curved and some straight."""
+    vertices = frame.rest[:len(frame.rest) - len(frame.curved)]
+    return 0 < len(frame.curved) < len(with_edge_nodes(vertices, frame.cells)[2])
+
+
 def write_mesh(path, points, cells, bodies=None):
     import meshio
     dim = points.shape[1]

@@ -76,7 +76,7 @@ std::string about_worth(const Results& results) {
     return "What the reference is worth is not known: there is no second one to hold it against (`--second-reference`).";
   std::string text;
   for (const auto& measure : measures())
-    if (is_judged(measure))
+    if (is_judged(measure) && !std::isnan((*results.worth).*measure.value))
       text +=
           fmt::format("{}{} ({})", text.empty() ? "" : ", ", show((*results.worth).*measure.value, measure), measure.name);
   return fmt::format("The reference is worth {}: by so much {} differs from it. Smaller errors are not told.", text,
@@ -128,6 +128,10 @@ std::vector<std::string> doubts(const Results& results) {
     if (!sentence.empty()) sentences.push_back(std::move(sentence));
   };
   add(about_flights(results));
+  if (std::any_of(results.rows.begin(), results.rows.end(),
+                  [](const Row& row) { return row.errors && std::isnan(row.errors->energy); }))
+    add("Frames of the reference have no kinetic energy (/output/paraview/options/kinetic_energy, momentum): of energy and "
+        "momentum no errors are told.");
   for (const auto& measure : measures()) {
     if (!is_judged(measure)) continue;
     const double least = nearest(results, measure);

@@ -90,7 +90,7 @@ Json to_json(const Verdict& verdict) {
 
 /// Errors below what the reference is worth are bounds.
 std::string error_cell(const Results& results, const Row& row, const Measure& measure) {
-  if (!row.errors) return "";
+  if (!row.errors || std::isnan((*row.errors).*measure.value)) return "";
   if (const auto error = told_error(results, row, measure)) return fmt::format("{:.3g}", *error);
   return fmt::format("below {:.2g}", (*results.worth).*measure.value);
 }
@@ -109,7 +109,7 @@ std::string runs_table(const Results& results) {
     }
     text += fmt::format(" {} | {:.0f} | {:.3g} | {:.3g} | {:.0f} |", row.vertices, row.unknowns, row.processor_seconds,
                         row.seconds, row.memory_mb);
-    for (const auto& measure : measures()) text += " " + error_cell(results, row, measure) + " |";
+    for (const auto& measure : measures()) text += fmt::format(" {} |", error_cell(results, row, measure));
     text += fmt::format(" {:.8g} |", row.potential);
   }
   return text + "\n";
@@ -138,6 +138,7 @@ bool is_against_reference(const Row& row) { return row.run.reference == kReferen
 std::optional<double> told_error(const Results& results, const Row& row, const Measure& measure) {
   if (!row.errors) return std::nullopt;
   const double error = (*row.errors).*measure.value;
+  if (std::isnan(error)) return std::nullopt;
   const bool is_judged_by_worth = results.worth && is_against_reference(row) && row.run.name != kSecondReference;
   if (is_judged_by_worth && error < (*results.worth).*measure.value) return std::nullopt;
   return error;

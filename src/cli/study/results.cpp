@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -21,9 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr double kSameShape = 1e-6;           ///< share of the volume that two meshes of one shape may leave uncovered
-constexpr double kSameTime = 1e-9;            ///< relative
-constexpr const char* kFormOfErrors = "2: ";  ///< of what is kept in folders: changes with what Errors has or means
+constexpr double kSameShape = 1e-6;  ///< share of the volume that two meshes of one shape may leave uncovered
+constexpr double kSameTime = 1e-9;   ///< relative
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kFormOfErrors = "3: ";  ///< of what is kept in folders: changes with what Errors has or means
 
 std::vector<Json> read_steps(const fs::path& folder) {
   std::vector<Json> steps;
@@ -55,7 +57,7 @@ std::vector<Moment> read_moments(const fs::path& folder, const Plan& plan) {
     const Units& units = totals.units;
     if (!plan.is_static) totals.t = units.to_si(totals.t, "s");
     for (double& component : totals.momentum) component = units.to_si(component, "kg m/s");
-    double stored = plan.is_dynamic ? totals.kinetic_energy.value_or(0) : 0;
+    double stored = plan.is_dynamic ? totals.kinetic_energy.value_or(kUnknown) : 0;
     for (const char* term : {"elastic", "contact"}) stored += energy[term].get<double>();
     const double all = stored + energy["body"].get<double>();
     moments.push_back({file, totals, units.to_si(all, "J"), units.to_si(stored, "J")});
@@ -86,10 +88,13 @@ std::optional<Errors> read_kept(const fs::path& file, const std::string& key) {
   const Json kept = stream ? Json::parse(stream, nullptr, false) : Json();
   if (!kept.is_object() || kept.value("of", "") != key) return std::nullopt;
   const Json& e = kept["errors"];
-  return Errors{e["l2"], e["h1"], e["surface"], e["energy"], e["momentum"], e["reference_energy"], e["times"]};
+  const auto number = [](const Json& value) { return value.is_number() ? value.get<double>() : kUnknown; };
+  return Errors{e["l2"],   e["h1"], e["surface"], number(e["energy"]), number(e["momentum"]), number(e["reference_energy"]),
+                e["times"]};
 }
 
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.empty() || b.empty()) return kUnknown;
   double sum = 0;
   for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
   return std::sqrt(sum);

@@ -16,7 +16,7 @@ struct Errors {
   double l2 = 0, h1 = 0;  ///< of the displacement and its gradient: root mean square over time, by that of the reference
   double surface = 0;     ///< largest Hausdorff distance of the bodies' boundaries [m]
   double energy = 0;      ///< root mean square over time: kinetic, elastic, of loads and of contact together [J]
-  double momentum = 0;    ///< the same [kg m/s]
+  double momentum = 0;    ///< the same [kg m/s]; both NaN where a run's frames lack kinetic energy or momentum
   /// What errors of the energy are large or small beside: root mean square over time of the reference's kinetic, elastic and
   /// contact energy [J]. Loads are left out, since the zero of their energy is anywhere.
   double reference_energy = 0;
