@@ -22,12 +22,14 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE))
+import bodies  # noqa: E402
 from harness import stored  # noqa: E402
 
 BALL = "unused/ball-obstacle/2D-noremesh.json"
 MASTICATOR = "masticator/3D-noremesh-nref0.json"
 
-# Name, scene, what is set, whether it takes minutes.
+# Name, scene of the paper (None: one of bodies.py), what is set, whether it takes minutes.
 CASES = [
     ("ball on obstacle, n_refs 0", BALL, [], False),
     ("ball on obstacle, n_refs 1", BALL, ["/geometry/0/n_refs=1"], False),
@@ -38,6 +40,7 @@ CASES = [
     ("twisting beam", "twisting-beam/twisting-beam-noremesh-nref0.json", [], False),
     ("spikes 2D", "spikes2d/spikes2d-noremesh.json", [], False),
     ("ball on wall 3D, to t = 0.0024", "ball-wall/3D-noremesh-nref0.json", ["/time/tend=0.0024"], False),
+    *((name, None, [], False) for name in bodies.BODIES),
     ("ball on obstacle, n_refs 2", BALL, ["/geometry/0/n_refs=2"], True),
     ("ball on obstacle, n_refs 3, to t = 0.3", BALL, ["/geometry/0/n_refs=3", "/time/tend=0.3"], True),
     ("ball on obstacle, remeshed", "unused/ball-obstacle/2D.json", [], True),
@@ -54,7 +57,8 @@ def run(case, options):
     name, scene, sets, is_large = case
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch) / "out"
-        command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--threads", "1"]
+        path = options.shared / "paper-scenes/scripts" / scene if scene else bodies.build(name, scratch)
+        command = [str(options.itr), "run", str(path), "-o", str(folder), "--threads", "1"]
         for assignment in sets + options.set:
             command += ["--set", assignment]
         status = subprocess.run(command, capture_output=True).returncode
