@@ -112,14 +112,14 @@ TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
   EXPECT_GT(report.splits.relaxed + report.collapses.relaxed, 0);
 }
 
-TEST(Place, TellsAnEdgeAnEdgeToCurveAndAVertexApart) {
-  const Place edge(EdgeKey{4, 2}), curve = Place::to_curve({2, 4}), vertex = Place::at_vertex(2);
+TEST(Place, TellsAnEdgeItsNodeAndAVertexApart) {
+  const Place edge(EdgeKey{4, 2}), node = Place::node_of({2, 4}), vertex = Place::at_vertex(2);
   EXPECT_EQ(edge, Place(EdgeKey{2, 4}));
   EXPECT_EQ(edge.edge(), (EdgeKey{2, 4}));
-  EXPECT_EQ(curve.edge(), (EdgeKey{2, 4}));
-  EXPECT_FALSE(edge.is_to_curve() || edge.is_vertex() || vertex.is_to_curve() || curve.is_vertex());
-  EXPECT_TRUE(curve.is_to_curve() && vertex.is_vertex());
-  EXPECT_EQ(std::set({edge, curve, vertex}).size(), 3u);
+  EXPECT_EQ(node.edge(), (EdgeKey{2, 4}));
+  EXPECT_FALSE(edge.is_node() || edge.is_vertex() || vertex.is_node() || node.is_vertex());
+  EXPECT_TRUE(node.is_node() && vertex.is_vertex());
+  EXPECT_EQ(std::set({edge, node, vertex}).size(), 3u);
   EXPECT_EQ(edge.vertices().size(), 2u);
   EXPECT_EQ(vertex.vertices().size(), 1u);
   EXPECT_EQ(vertex.vertex(), 2);

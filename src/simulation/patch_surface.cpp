@@ -50,6 +50,13 @@ std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const Space& space, c
   return boxes;
 }
 
+template <int Dim>
+std::vector<typename MeshTypes<Dim>::Facet> chords_of(const Mesh<Dim>& mesh, const Space& space) {
+  std::vector<typename MeshTypes<Dim>::Facet> chords;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
+  return chords;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -102,9 +109,7 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
     else
       triangles.push_back(ids);
   };
-  chords.clear();  // own ones are near themselves
-  for (int f = 0; f < mesh.facet_slots(); ++f) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
-  for (const auto& chord : chords) add(chord, 0);
+  for (const auto& chord : chords_of(mesh, space)) add(chord, 0);  // own ones are near themselves
   for (const auto& edge : obstacles.edges) add(edge, bodies);
   for (const auto& triangle : obstacles.triangles) add(triangle, bodies);
   for (int o = 0; o < static_cast<int>(obstacles.rest.size()); ++o)
