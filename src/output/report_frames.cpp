@@ -228,6 +228,35 @@ void FrameEncoder::measure(const StoredFrame& frame, int cell) {
   include(longest_edges_, std::sqrt(longest));
 }
 
+/// What a page shows of one frame, and by which ids.
+struct FrameEncoder::Shown {
+  int nodes, cells, num_curved, num_vertices;
+  std::vector<int> owner;  ///< of facets of the surface
+  std::vector<char> keep_cell, keep_node;
+  std::vector<int> id_of, cell_id;                         ///< -1: not shown
+  std::vector<std::pair<int, int>> order{}, cell_order{};  ///< id, node (nodes of obstacles after the bodies'); id, cell
+
+  Shown(const StoredFrame& frame, bool with_inside)
+      : nodes(static_cast<int>(frame.x.size()) / frame.dim),
+        cells(static_cast<int>(frame.body.size())),
+        num_curved(static_cast<int>(frame.curved_edges.size()) / 2),
+        num_vertices(nodes - num_curved),
+        owner(cells_of_facets(frame)),
+        keep_cell(cells, with_inside || frame.dim == 2),
+        keep_node(nodes, 0),
+        id_of(nodes, -1),
+        cell_id(cells, -1) {
+    const int corners = frame.dim + 1;
+    for (const int cell : owner)
+      if (cell >= 0) keep_cell[cell] = 1;
+    for (int c = 0; c < cells; ++c)
+      if (keep_cell[c])
+        for (int k = 0; k < corners; ++k) keep_node[frame.simplices[c * corners + k]] = 1;
+    for (int e = 0; e < num_curved; ++e)
+      keep_node[num_vertices + e] = keep_node[frame.curved_edges[2 * e]] && keep_node[frame.curved_edges[2 * e + 1]];
+  }
+};
+
 void FrameEncoder::add(const std::filesystem::path& path) {
   const StoredFrame frame = read_frame(path);
   std::vector<StoredField> fields = read_frame_fields(path);
@@ -242,137 +271,147 @@ void FrameEncoder::add(const std::filesystem::path& path) {
       frame.obstacles.faces != obstacles_.faces)
     throw InputError({path.string(), "/obstacles", "other obstacles", "those of the first frame, at any place"});
 
-  const int dim = dim_, corners = dim + 1, index = static_cast<int>(frames_.size());
-  const int nodes = static_cast<int>(frame.x.size()) / dim, cells = static_cast<int>(frame.body.size());
-  const int num_curved = static_cast<int>(frame.curved_edges.size()) / 2, num_vertices = nodes - num_curved;
-  const std::vector<int> owner = cells_of_facets(frame);
-  std::vector<char> keep_cell(cells, with_inside_ || dim == 2), keep_node(nodes, 0);
-  for (const int cell : owner)
-    if (cell >= 0) keep_cell[cell] = 1;
-  for (int c = 0; c < cells; ++c)
-    if (keep_cell[c])
-      for (int k = 0; k < corners; ++k) keep_node[frame.simplices[c * corners + k]] = 1;
-  for (int e = 0; e < num_curved; ++e)
-    keep_node[num_vertices + e] = keep_node[frame.curved_edges[2 * e]] && keep_node[frame.curved_edges[2 * e + 1]];
-
+  Shown shown(frame, with_inside_);
+  touch_vertices(frame, shown);
+  touch_cells(frame, shown);
+  touch_facets(frame, shown);
+  touch_curved_edges(frame, shown);
+  EncodedFrame entry{step_of_frame(path), read_frame_sizes(path).t, 0, shown.num_vertices, shown.cells, {}};
+  const bool is_changed = vertices_.changes() + cells_.changes() + facets_.changes() + curved_.changes() > 0;
+  if (!frames_.empty()) entry.mesh = frames_.back().mesh + (is_changed ? 1 : 0);
   Pending pending;
-  const auto read_point = [&](const std::vector<double>& from, int i) {
-    std::array<double, 3> p{};
-    for (int k = 0; k < dim; ++k) p[k] = from[static_cast<std::size_t>(i) * dim + k];
-    return p;
-  };
+  add_positions(frame, shown, pending);
+  add_vertex_fields(fields, shown, pending, entry);
+  add_cell_fields(fields, shown, pending);
+  frames_.push_back(std::move(entry));
+  pending_.push_back(std::move(pending));
+  if (pending_.size() == kFramesOfChunk) flush();
+}
+
+std::array<double, 3> FrameEncoder::read_point(const std::vector<double>& from, int i) const {
+  std::array<double, 3> p{};
+  for (int k = 0; k < dim_; ++k) p[k] = from[static_cast<std::size_t>(i) * dim_ + k];
+  return p;
+}
+
+void FrameEncoder::touch_vertices(const StoredFrame& frame, Shown& shown) {
   // Where vertices coincide, the first of them at a place is the first of them in the next frame.
   std::unordered_map<LivingRows::Key, int, LivingRows::Hash> repeats;
-  std::vector<int> id_of(nodes, -1);
-  std::vector<std::pair<int, int>> order;  // id, node; nodes of obstacles after those of the bodies
-  vertices_.begin(index);
+  vertices_.begin(static_cast<int>(frames_.size()));
   const auto touch_vertex = [&](Kind kind, const LivingRows::Key& key, const std::array<double, 3>& rest) {
     const int known = vertices_.size();
     const int id = vertices_.touch(key, {kind});
     if (id == known) rest_.push_back(rest);
     return id;
   };
-  for (int i = 0; i < nodes; ++i) {
-    if (!keep_node[i]) continue;
-    const Kind kind = i < num_vertices ? vertex_kind : node_kind;
+  for (int i = 0; i < shown.nodes; ++i) {
+    if (!shown.keep_node[i]) continue;
+    const Kind kind = i < shown.num_vertices ? vertex_kind : node_kind;
     const std::array<double, 3> rest = read_point(frame.rest, i);
     LivingRows::Key key = {static_cast<std::uint64_t>(kind), 0};
-    for (int k = 0; k < dim; ++k) key[2 + k] = std::bit_cast<std::uint64_t>(rest[k] + 0.0);
+    for (int k = 0; k < dim_; ++k) key[2 + k] = std::bit_cast<std::uint64_t>(rest[k] + 0.0);
     key[1] = repeats[key]++;
-    id_of[i] = touch_vertex(kind, key, rest);
-    order.emplace_back(id_of[i], i);
+    shown.id_of[i] = touch_vertex(kind, key, rest);
+    shown.order.emplace_back(shown.id_of[i], i);
   }
-  const int num_obstacle = static_cast<int>(obstacles_.x.size()) / dim;
+  const int num_obstacle = static_cast<int>(obstacles_.x.size()) / dim_;
   for (int i = 0; i < num_obstacle; ++i)
-    order.emplace_back(
-        touch_vertex(obstacle_kind, {obstacle_kind, static_cast<std::uint64_t>(i)}, read_point(obstacles_.x, i)), nodes + i);
+    shown.order.emplace_back(
+        touch_vertex(obstacle_kind, {obstacle_kind, static_cast<std::uint64_t>(i)}, read_point(obstacles_.x, i)),
+        shown.nodes + i);
   vertices_.end();
-  std::sort(order.begin(), order.end());
+  std::sort(shown.order.begin(), shown.order.end());
+}
 
-  cells_.begin(index);
-  std::vector<std::pair<int, int>> cell_order;
-  std::vector<int> cell_id(cells, -1);
-  for (int c = 0; c < cells; ++c) {
-    if (!keep_cell[c]) continue;
+void FrameEncoder::touch_cells(const StoredFrame& frame, Shown& shown) {
+  const int corners = dim_ + 1;
+  cells_.begin(static_cast<int>(frames_.size()));
+  for (int c = 0; c < shown.cells; ++c) {
+    if (!shown.keep_cell[c]) continue;
     measure(frame, c);
     std::vector<int> row(corners);
-    for (int k = 0; k < corners; ++k) row[k] = id_of[frame.simplices[c * corners + k]];
+    for (int k = 0; k < corners; ++k) row[k] = shown.id_of[frame.simplices[c * corners + k]];
     LivingRows::Key key = sorted_key(row);
     row.push_back(static_cast<int>(frame.body[c]));
-    cell_id[c] = cells_.touch(key, row);
-    cell_order.emplace_back(cell_id[c], c);
+    shown.cell_id[c] = cells_.touch(key, row);
+    shown.cell_order.emplace_back(shown.cell_id[c], c);
   }
   cells_.end();
-  std::sort(cell_order.begin(), cell_order.end());
+  std::sort(shown.cell_order.begin(), shown.cell_order.end());
+}
 
-  facets_.begin(index);
-  for (std::size_t f = 0; f < owner.size(); ++f) {
-    if (owner[f] < 0) continue;
-    std::vector<int> row(dim);
-    for (int k = 0; k < dim; ++k) row[k] = id_of[frame.surface[f * dim + k]];
+void FrameEncoder::touch_facets(const StoredFrame& frame, const Shown& shown) {
+  facets_.begin(static_cast<int>(frames_.size()));
+  for (std::size_t f = 0; f < shown.owner.size(); ++f) {
+    if (shown.owner[f] < 0) continue;
+    std::vector<int> row(dim_);
+    for (int k = 0; k < dim_; ++k) row[k] = shown.id_of[frame.surface[f * dim_ + k]];
     LivingRows::Key key = sorted_key(row);
-    row.push_back(cell_id[owner[f]]);
-    key[dim] = cell_id[owner[f]];
+    row.push_back(shown.cell_id[shown.owner[f]]);
+    key[dim_] = shown.cell_id[shown.owner[f]];
     facets_.touch(key, row);
   }
   facets_.end();
+}
 
-  curved_.begin(index);
-  for (int e = 0; e < num_curved; ++e) {
-    if (!keep_node[num_vertices + e]) continue;
-    const std::vector<int> row = {id_of[frame.curved_edges[2 * e]], id_of[frame.curved_edges[2 * e + 1]],
-                                  id_of[num_vertices + e]};
+void FrameEncoder::touch_curved_edges(const StoredFrame& frame, const Shown& shown) {
+  curved_.begin(static_cast<int>(frames_.size()));
+  for (int e = 0; e < shown.num_curved; ++e) {
+    if (!shown.keep_node[shown.num_vertices + e]) continue;
+    const std::vector<int> row = {shown.id_of[frame.curved_edges[2 * e]], shown.id_of[frame.curved_edges[2 * e + 1]],
+                                  shown.id_of[shown.num_vertices + e]};
     curved_.touch(sorted_key(row), row);
   }
   curved_.end();
+}
 
-  EncodedFrame entry{step_of_frame(path), read_frame_sizes(path).t, 0, num_vertices, cells, {}};
-  const bool is_changed = vertices_.changes() + cells_.changes() + facets_.changes() + curved_.changes() > 0;
-  if (!frames_.empty()) entry.mesh = frames_.back().mesh + (is_changed ? 1 : 0);
-
-  for (const auto& [id, node] : order) {
+void FrameEncoder::add_positions(const StoredFrame& frame, const Shown& shown, Pending& pending) {
+  const int nodes = shown.nodes;
+  for (const auto& [id, node] : shown.order) {
     const std::array<double, 3> now = node < nodes ? read_point(frame.x, node) : read_point(frame.obstacles.x, node - nodes);
     pending.vertices.push_back(id);
     double u2 = 0;
-    for (int k = 0; k < dim && node < nodes; ++k) u2 += (now[k] - rest_[id][k]) * (now[k] - rest_[id][k]);
+    for (int k = 0; k < dim_ && node < nodes; ++k) u2 += (now[k] - rest_[id][k]) * (now[k] - rest_[id][k]);
     if (std::isfinite(u2)) largest_u_ = std::max(largest_u_, std::sqrt(u2));
-    for (int k = 0; k < dim; ++k) {
+    for (int k = 0; k < dim_; ++k) {
       pending.u[k].push_back(now[k] - rest_[id][k]);
       if (node >= nodes || !std::isfinite(now[k])) continue;
       low_[k] = std::min(low_[k], now[k]);
       high_[k] = std::max(high_[k], now[k]);
     }
   }
-  for (const auto& [id, cell] : cell_order) pending.cells.push_back(id);
-  const auto find = [&](const std::string& name) {
-    return std::find_if(fields.begin(), fields.end(), [&](const StoredField& field) { return field.name == name; });
-  };
+  for (const auto& [id, cell] : shown.cell_order) pending.cells.push_back(id);
+}
+
+void FrameEncoder::add_vertex_fields(const std::vector<StoredField>& fields, const Shown& shown, Pending& pending,
+                                     EncodedFrame& entry) {
+  const auto& order = shown.order;
   for (std::size_t i = 0; i < vertex_fields_.size(); ++i) {
     std::vector<std::uint16_t>& codes = pending.vertex_codes.emplace_back();
-    const auto field = find(vertex_fields_[i].name);
+    const auto field = std::ranges::find(fields, vertex_fields_[i].name, &StoredField::name);
     const int columns = field != fields.end() ? field->columns : 0;
-    const bool is_there = columns > 0 && field->values.size() == static_cast<std::size_t>(nodes) * columns;
+    const bool is_there = columns > 0 && field->values.size() == static_cast<std::size_t>(shown.nodes) * columns;
     std::vector<double> magnitudes(order.size(), 0);
     for (std::size_t k = 0; k < order.size(); ++k)
-      if (const int node = order[k].second; is_there && node < nodes)
+      if (const int node = order[k].second; is_there && node < shown.nodes)
         magnitudes[k] = magnitude(&field->values[static_cast<std::size_t>(node) * columns], columns);
     for (const double value : magnitudes) codes.push_back(code(i, value));
     include_shown(i, std::move(magnitudes));
     if (!is_there || !field->name.ends_with("_force")) continue;
     std::array<double, 3>& sum = entry.forces[field->name];
-    for (std::size_t k = 0; k < field->values.size(); ++k) sum[k % dim] += field->values[k];
+    for (std::size_t k = 0; k < field->values.size(); ++k) sum[k % dim_] += field->values[k];
   }
+}
+
+void FrameEncoder::add_cell_fields(const std::vector<StoredField>& fields, const Shown& shown, Pending& pending) {
   for (std::size_t i = 0; i < cell_fields_.size(); ++i) {
     std::vector<std::uint16_t>& codes = pending.cell_codes.emplace_back();
-    const auto field = find(cell_fields_[i].name);
-    const bool is_there = field != fields.end() && field->values.size() == static_cast<std::size_t>(cells);
-    for (const auto& [id, cell] : cell_order)
+    const auto field = std::ranges::find(fields, cell_fields_[i].name, &StoredField::name);
+    const bool is_there = field != fields.end() && field->values.size() == static_cast<std::size_t>(shown.cells);
+    for (const auto& [id, cell] : shown.cell_order)
       codes.push_back(is_there ? code(vertex_fields_.size() + i, field->values[cell]) : 0);
     if (is_there) include_shown(vertex_fields_.size() + i, field->values);
   }
-  frames_.push_back(std::move(entry));
-  pending_.push_back(std::move(pending));
-  if (pending_.size() == kFramesOfChunk) flush();
 }
 
 namespace {

@@ -105,7 +105,17 @@ class FrameEncoder {
     std::array<std::vector<double>, 3> u;                              ///< by component, in the order of `vertices`
     std::vector<std::vector<std::uint16_t>> vertex_codes, cell_codes;  ///< by field
   };
+  struct Shown;
   void start(const StoredFrame& frame, const std::vector<StoredField>& fields);
+  std::array<double, 3> read_point(const std::vector<double>& from, int i) const;
+  // What lives in a frame, one kind after another, each by the ids of those before; then positions and fields by these ids.
+  void touch_vertices(const StoredFrame& frame, Shown& shown);
+  void touch_cells(const StoredFrame& frame, Shown& shown);
+  void touch_facets(const StoredFrame& frame, const Shown& shown);
+  void touch_curved_edges(const StoredFrame& frame, const Shown& shown);
+  void add_positions(const StoredFrame& frame, const Shown& shown, Pending& pending);
+  void add_vertex_fields(const std::vector<StoredField>& fields, const Shown& shown, Pending& pending, EncodedFrame& entry);
+  void add_cell_fields(const std::vector<StoredField>& fields, const Shown& shown, Pending& pending);
   std::uint16_t code(std::size_t field, double value);
   void include_shown(std::size_t field, std::vector<double> values);
   void measure(const StoredFrame& frame, int cell);
