@@ -8,11 +8,11 @@ namespace itr {
 
 namespace {
 
-constexpr int kMostRounds = 3;           ///< gaps are linearised so often
-constexpr Eigen::Index kMostPairs = 32;  ///< a back-solve each
-constexpr double kAhead = 4;             ///< pairs that stop the step within so many times its free share are bounded
-constexpr double kFreeEnough = 0.5;      ///< share of the step with which it is done
-constexpr double kLongest = 10;          ///< of the step's largest motion: a turned one is not longer
+constexpr int kMostRounds = 6;            ///< gaps are linearised so often
+constexpr Eigen::Index kMostPairs = 128;  ///< a back-solve each
+constexpr double kAhead = 4;              ///< pairs that stop the step within so many times its free share are bounded
+constexpr double kFreeEnough = 0.5;       ///< share of the step with which it is done
+constexpr double kLongest = 10;           ///< of the step's largest motion: a turned one is not longer
 
 /// Solves for the multipliers l >= 0 of the bounds S l >= asked by Gauss-Seidel. A multiplier is 0 if its bound holds
 /// without it.

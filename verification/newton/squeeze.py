@@ -61,11 +61,13 @@ def run(case, options):
         command = [str(options.itr), "run", str(path), "-o", str(folder), "--threads", "1"]
         for assignment in sets + options.set:
             command += ["--set", assignment]
-        status = subprocess.run(command, capture_output=True).returncode
+        done = subprocess.run(command, capture_output=True, text=True)
+        if not (folder / "steps.jsonl").exists():
+            sys.exit(f"{name}: {' '.join(command)} wrote no steps.jsonl, its exit status is {done.returncode}: {done.stderr}")
         certified = subprocess.run([str(options.itr), "certify", str(folder)], capture_output=True).returncode == 0
         steps = [json.loads(line) for line in open(folder / "steps.jsonl")][1:]
     total = lambda key: sum(step[key] for step in steps)  # noqa: E731
-    return {"case": name, "large": is_large, "ended": status == 0, "certified": certified, "steps": len(steps),
+    return {"case": name, "large": is_large, "ended": done.returncode == 0, "certified": certified, "steps": len(steps),
             "iterations": total("newton_iterations"), "worst": max(step["newton_iterations"] for step in steps),
             "over_100": sum(step["newton_iterations"] > 100 for step in steps), "factorizations": total("factorizations"),
             "indefinite": total("indefinite"), "processor_seconds": total("processor_seconds"),
