@@ -3,10 +3,11 @@
 """Runs the paper's scenes one after another on one thread, writes results.csv and prints the table of README.md.
 
 python3 verification/paper/run.py [--check] [--itr build/release/bin/itr] [--shared ../shared] [--results DIR]
-                                  [--solids] [--case PART-OF-NAME]...
+                                  [--solids] [--curves] [--case PART-OF-NAME]...
 
 With --solids it runs the 3D scenes on uniform levels, with the sizing field and with remeshing, and prints the table that
-compares those; it stores nothing. With --check it runs the scenes that have bars (below) and stores nothing; the exit status is 1 if one is missed. Figures of the reference implementation are those of shared/reference-runs.md (its faster column). Every run is certified.
+compares those; it stores nothing. With --curves it runs scenes with linear elements and with curved edges, stores curves.csv
+and prints its table. With --check it runs the scenes that have bars (below) and stores nothing; the exit status is 1 if one is missed. Figures of the reference implementation are those of shared/reference-runs.md (its faster column). Every run is certified.
 """
 import argparse
 import csv
@@ -103,6 +104,24 @@ WAYS = [(f"uniform {k}", ["/space/remesh/enabled=false", f"/geometry/0/n_refs={k
     ("remeshed, swaps and smoothing", ["/space/remesh/swap/enabled=true", "/space/remesh/smooth/enabled=true"]),
 ]
 
+# Each as it is, and with curved edges by the same tolerance.
+SWAPS = ["/space/remesh/swap/enabled=true", "/space/remesh/smooth/enabled=true"]
+CURVES = [("cantilever", "cantilever/cantilever.json", []),
+          ("masticator 2D to t=3", "masticator/h=0.1.json", ["/time/tend=3"]),
+          ("ball-wall 2D to t=0.0024", "ball-wall/2D.json", ["/time/tend=0.0024"]),
+          ("spikes2d", "spikes2d/spikes2d.json", []),
+          ("shake-rod-x", "shake-rod/shake-rod-x.json", []),
+          ("shake-rod-y", "shake-rod/shake-rod-y.json", []),
+          ("1-square-dbc, edges of 0.005 m and longer", "unit-tests/1-square-dbc.json", ["/space/remesh/split/min_edge_length=0.005"]),
+          ("ball-wall 3D to t=0.00132", "ball-wall/3D.json", ["/time/tend=0.00132"]),
+          ("masticator 3D to t=1.1", "masticator/3D.json", ["/time/tend=1.1"]),
+          ("twisting-beam to t=0.2, tolerance 10", "twisting-beam/twisting-beam.json",
+           ["/time/tend=0.2", "/space/remesh/split/acceptance_tolerance=10"]),
+          ("rollers to t=0.1", "rollers/monkey-soft-hard.json", ["/time/tend=0.1"]),
+          ("spikes3d to t=0.3", "spikes3d/drop-ball.json", ["/time/tend=0.3"])]
+CURVE_WAYS = [("linear", []), ("curved", ["/space/remesh/curve/enabled=true"]),
+              ("curved, swaps and smoothing", ["/space/remesh/curve/enabled=true", *SWAPS])]
+
 # What a case has to reach: least gain [J] (0.8 of the reference's); energy of the last step [J], at most or (value, relative
 # deviation); most vertices there; and most processor seconds a step over those of another case, which neither a slow machine
 # nor a busy one changes much.
@@ -169,7 +188,7 @@ def median_trial(steps):
 
 def run(case, options):
     name, scene, sets, reference = case
-    folder = options.results / name.replace(" ", "_").replace("=", "").replace(",", "").replace(".", "").replace("'", "")
+    folder = options.results / name.replace(" ", "_").replace("=", "").replace("|", "").replace(",", "").replace(".", "").replace("'", "")
     command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--overwrite",
                "--threads", "1"]
     for assignment in sets:
@@ -200,6 +219,7 @@ def run(case, options):
         "peak_rss_mb": last["peak_rss_mb"],
         "linear_share": sum(s["seconds"]["linear_solve"] for s in steps) / total,
         "unknowns_mean": sum(s["unknowns"] for s in steps) / len(steps), "unknowns_max": max(s["unknowns"] for s in steps),
+        "curved": sum(s["curves"]["accepted"] for s in steps), "straightened": sum(s["straightens"]["accepted"] for s in steps),
         "tried": sum(s[k]["tried"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
         "reference_seconds": reference[0] if reference else None, "reference_gain": reference[1] if reference else None,
         "reference_mb": reference[2] if reference else None, "commit": stored.made("verification/paper/results.csv"),
@@ -248,6 +268,25 @@ def solids_table(rows):
     return "\n".join(lines)
 
 
+def curves_table(rows):
+    lines = ["| scene | edges | end | processor s/step | unknowns, mean (most) | vertices at the end | curved, straightened "
+             "| energy, last step [J] |", "|" + "---|" * 8]
+    for r in rows:
+        scene, _, way = r["case"].partition(" | ")
+        end = f"{r['steps']} steps, " + ("finished" if r["finished"] else "stopped")
+        end += ", certified" if r["certified"] else ", NOT CERTIFIED"
+        lines.append(f"| {scene} | {way} | {end} | {r['processor_seconds_per_step']:.4f} | {r['unknowns_mean']:.0f} "
+                     f"({r['unknowns_max']}) | {r['vertices']} | {r['curved']}, {r['straightened']} | {r['energy_total']:.8g} |")
+    return "\n".join(lines)
+
+
+def store(name, rows):
+    with open(HERE / name, "w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--itr", type=pathlib.Path, default=ROOT / "build/release/bin/itr")
@@ -256,10 +295,18 @@ def main():
     parser.add_argument("--case", action="append")
     parser.add_argument("--check", action="store_true", help="only the scenes that have bars, against them")
     parser.add_argument("--solids", action="store_true", help="3D scenes: uniform levels, sizing field and remeshing side by side")
+    parser.add_argument("--curves", action="store_true", help="scenes with linear elements and with curved edges side by side")
     options = parser.parse_args()
     if options.solids:
         cases = [(f"{name}, {way}", scene, sets + more, None) for name, scene, sets in SOLIDS for way, more in WAYS]
         print(solids_table([run(c, options) for c in cases if not options.case or any(part in c[0] for part in options.case)]))
+        return 0
+    if options.curves:
+        cases = [(f"{name} | {way}", scene, sets + more, None) for name, scene, sets in CURVES for way, more in CURVE_WAYS]
+        rows = [run(c, options) for c in cases if not options.case or any(part in c[0] for part in options.case)]
+        if not options.case:
+            store("curves.csv", rows)
+        print(curves_table(rows))
         return 0
     if options.check:
         missed = 0
@@ -270,10 +317,7 @@ def main():
     cases = [c for c in CASES if not options.case or any(part in c[0] for part in options.case)]
     rows = [run(case, options) for case in cases]
     if not options.case:
-        with open(HERE / "results.csv", "w", newline="") as file:
-            writer = csv.DictWriter(file, rows[0].keys())
-            writer.writeheader()
-            writer.writerows(rows)
+        store("results.csv", rows)
     print(table(rows))
     return 0 if all(r["finished"] and r["certified"] for r in rows) else 1
 
