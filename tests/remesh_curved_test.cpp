@@ -404,6 +404,30 @@ TYPED_TEST(Curved, EnergiesOfCellsAreThoseOfPatches) {
   EXPECT_GT(curved, 10);
 }
 
+/// With a quadratic energy the prediction of a swap is no less than what its one node gains alone.
+TYPED_TEST(Curved, PredictionOfASwapHasWhatItsNodeGains) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.5, 0.001);
+    StepContext<Dim> context = context_of<Dim>(3 * seed + 1);
+    context.loads.tractions.clear();
+    View<Dim> view(scene, context, HistoryRule::interpolated);
+    for (int i = 0; i < 10; ++i) {
+      const auto proposal = propose_any(scene);
+      if (!proposal || proposal.edit->kind != Edit<Dim>::Kind::swap || proposal.edit->inserted_nodes.size() != 1) continue;
+      const Edit<Dim>& edit = *proposal.edit;
+      LocalProblem<Dim> after(view.state, edit.removed_cells, edit, true, view.scratch);
+      if (after.num_unknowns() != Dim) continue;  // others are free, too
+      const double before = LocalProblem<Dim>(view.state, edit.removed_cells, edit, false, view.scratch).value();
+      const double gained = before - after.relax(1).energy, predicted = predict_gain<Dim>(view.state, edit);
+      EXPECT_GE(predicted, gained - 1e-9 * before) << "seed " << seed;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 5);
+}
+
 /// With a quadratic energy the prediction of a curve is what the new node alone gains.
 TYPED_TEST(Curved, PredictionOfACurveIsWhatItsNodeGains) {
   constexpr int Dim = TypeParam::value;
@@ -497,9 +521,11 @@ void expect_same(const State<Dim>& a, const State<Dim>& b) {
 TYPED_TEST(Curved, RunsChooseTheOrderToo) {
   constexpr int Dim = TypeParam::value;
   Setup<Dim> setup = bar<Dim>();
-  setup.remesh.curve.enabled = true;
+  setup.remesh.curve.enabled = setup.remesh.straighten.enabled = true;
+  setup.remesh.collapse.acceptance_tolerance = -0.1 * *setup.remesh.split.acceptance_tolerance;
   const Run<Dim> both = run<Dim>(setup);
   EXPECT_GT(both.curves, 5);
+  EXPECT_GT(both.collapses, 0);
   EXPECT_EQ(both.state.space.num_curved() > 0, true);
   for (const int threads : {1, 3}) {
     const ThreadLimit limit(threads);

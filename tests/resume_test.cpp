@@ -724,7 +724,7 @@ INSTANTIATE_TEST_SUITE_P(
              12,
              R"("dt":0.02)",
              {"/space/remesh/curve/enabled=true", "/geometry/0/n_refs=1", "/space/remesh/swap/enabled=true",
-              "/space/remesh/split/acceptance_tolerance=300"}},
+              "/space/remesh/smooth/enabled=true", "/space/remesh/split/acceptance_tolerance=300"}},
         Case{"kept_order",
              "cubes.json",
              45,

@@ -310,11 +310,128 @@ class MovingModels {
   std::vector<QuadraticModel<Dim>> moving_;
 };
 
-/// A swap sets no vertex. Each vertex moves by itself under the forces that the edit adds. Only the edit's cells resist
-/// here; in the mesh the cells around them resist, too.
+/// Of vertices under the forces that an edit adds: cells around resist, too, and are not in the model.
+constexpr double kShareOfRelaxation = 0.25;
+
+/// One side of an edit that replaces cells with curved edges: as it is, and with each vertex and node moving by itself.
+template <int Dim>
+class NodalModels {
+ public:
+  struct Model {
+    VertexId id;
+    Vec<Dim> gradient = Vec<Dim>::Zero();
+    Mat<Dim> hessian = Mat<Dim>::Zero();
+  };
+  NodalModels(const RemeshState<Dim>& state, const Edit<Dim>& edit) : state_(state), edit_(edit) {}
+
+  /// A cell after the edit; `is_after`: its vertices and nodes may be of the edit.
+  void add_cell(const typename MeshTypes<Dim>::Cell& vertices, int body, bool is_after) {
+    const Edit<Dim> none{.kind = edit_.kind};
+    const Edit<Dim>& edit = is_after ? edit_ : none;
+    const StepContext<Dim>& context = state_.context;
+    const auto cell =
+        curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(state_.mesh, edit, a, b); });
+    std::array<Vec<Dim>, Dim + 1> rest;
+    for (int k = 0; k <= Dim; ++k) {
+      const VertexId v = vertices[k];
+      rest[k] = edit.value && v == edit.value->vertex ? edit.value->rest : state_.mesh.rest(v);
+    }
+    const Mat<Dim> edges = edge_matrix<Dim>(rest);
+    const auto linear = barycentric_gradients<Dim>(edges.inverse());
+    const double volume = simplex_volume<Dim>(edges);
+    const Material& material = context.materials.at(body);
+    std::array<Model*, kQuadraticNodes<Dim>> models{};
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+      if (k <= Dim || cell.edges >> (k - Dim - 1) & 1) model(cell.nodes[k]);
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // all are there: none moves any more
+      if (k <= Dim || cell.edges >> (k - Dim - 1) & 1) models[k] = &model(cell.nodes[k]);
+    const auto place = [&](const auto& l) {
+      Vec<Dim> X = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) X += l[k] * rest[k];
+      return X;
+    };
+    const QuadraticCell<Dim> x = cell.values(state_.fields.x, edit);
+    for (const auto& point : quadrature<Dim>(cell.edges ? context.quadrature_degree : 1)) {
+      const auto shapes = quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear);
+      const ElasticModuli moduli = elastic_moduli<Dim>(material, place(point.weights));
+      const Mat<Dim> F = x * shapes.transpose();
+      const ElasticPoint<Dim> response(F, moduli);
+      const double weight = context.scaling * volume * point.share;
+      energy_ += weight * response.density();
+      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
+        if (!models[k]) continue;
+        models[k]->gradient += weight * response.gradient(shapes.col(k));
+        models[k]->hessian += weight * response.hessian(shapes.col(k));
+      }
+    }
+    if (!context.has_inertia && !context.loads.acceleration) return;
+    QuadraticCell<Dim> way = x;
+    if (context.has_inertia) way -= cell.values(state_.fields.predictor, edit);
+    for (const auto& point : quadrature<Dim>(cell.edges ? kMassDegree : 2)) {
+      const auto shapes = quadratic_shapes<Dim>(cell.edges, point.weights);
+      const Vec<Dim> X = place(point.weights);
+      const double weight = point.share * mass_density<Dim>(material, X) * volume;
+      Vec<Dim> force = Vec<Dim>::Zero();
+      if (context.has_inertia) {
+        force = weight * way * shapes;
+        energy_ += 0.5 / weight * force.squaredNorm();
+      }
+      if (context.loads.acceleration) {
+        const Vec<Dim> load = context.scaling * weight * context.loads.acceleration(X);
+        energy_ -= load.dot(x * shapes - X);
+        force -= load;
+      }
+      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
+        if (!models[k]) continue;
+        models[k]->gradient += shapes[k] * force;
+        if (context.has_inertia) models[k]->hessian.diagonal().array() += weight * shapes[k] * shapes[k];
+      }
+    }
+  }
+  double energy() const { return energy_; }
+  const auto& models() const { return models_; }
+  const Model* find(VertexId id) const {
+    const auto it = std::find_if(models_.begin(), models_.end(), [&](const Model& model) { return model.id == id; });
+    return it == models_.end() ? nullptr : &*it;
+  }
+
+ private:
+  Model& model(VertexId id) {
+    const auto it = std::find_if(models_.begin(), models_.end(), [&](const Model& model) { return model.id == id; });
+    if (it != models_.end()) return *it;
+    models_.push_back({id});
+    return models_.back();
+  }
+  const RemeshState<Dim>& state_;
+  const Edit<Dim>& edit_;
+  double energy_ = 0;
+  std::vector<Model> models_;
+};
+
+/// What the edit sets moves under all forces on it, since all of its cells are here, the others under those that the edit
+/// adds. Each moves by itself, which is an estimate of what they gain together. Forgotten history is left out.
+template <int Dim>
+double predict_gain_at_curves(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
+  if (!state.context.loads.tractions.empty() && !edit.inserted_facets.empty()) return kUnknown;
+  NodalModels<Dim> before(state, edit), after(state, edit);
+  for (const CellId c : edit.removed_cells) before.add_cell(state.mesh.cell(c), state.mesh.body(c), false);
+  for (const auto& cell : edit.inserted_cells) after.add_cell(cell.vertices, cell.body, true);
+  if (!std::isfinite(after.energy())) return kUnknown;  // inverted there
+  double gain = before.energy() - after.energy();
+  for (const auto& model : after.models()) {
+    const bool is_set = (edit.value && model.id == edit.value->vertex) || model.id >= state.mesh.vertex_slots();
+    const auto* old = is_set ? nullptr : before.find(model.id);
+    const Vec<Dim> force = old ? Vec<Dim>(model.gradient - old->gradient) : model.gradient;
+    const Eigen::LLT<Mat<Dim>> llt(model.hessian);
+    if (llt.info() != Eigen::Success) return kUnknown;
+    gain += (is_set ? 1 : kShareOfRelaxation) * 0.5 * force.dot(llt.solve(force));
+  }
+  return gain;
+}
+
+/// A swap sets no vertex. Each vertex moves by itself under the forces that the edit adds.
 template <int Dim>
 double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
-  constexpr double kShareOfRelaxation = 0.25;
   boost::container::small_vector<VertexId, 64> vertices;  // ascending
   for (const auto& cell : edit.inserted_cells) vertices.insert(vertices.end(), cell.vertices.begin(), cell.vertices.end());
   std::sort(vertices.begin(), vertices.end());
@@ -386,10 +503,12 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   const StepContext<Dim>& context = state.context;
-  const auto is_curved = [&](CellId c) { return state.mesh.is_curved(c); };
-  if (!is_predictable(context) ||
-      (state.mesh.has_nodes() && std::any_of(edit.removed_cells.begin(), edit.removed_cells.end(), is_curved)))
-    return kUnknown;
+  if (!is_predictable(context)) return kUnknown;
+  if (state.mesh.has_nodes()) {
+    const auto is_curved = [&](CellId c) { return state.mesh.is_curved(c); };
+    if (std::any_of(edit.removed_cells.begin(), edit.removed_cells.end(), is_curved))
+      return predict_gain_at_curves(state, edit);
+  }
   if (!edit.value) return predict_gain_of_swap(state, edit);
   const VertexId set = edit.value->vertex;
   const auto at = [&](const VectorX& field, VertexId v, bool after) {

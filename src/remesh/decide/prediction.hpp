@@ -21,7 +21,8 @@ inline constexpr double kPatchOverVertexInContact = Dim == 2 ? 30 : 10;
 
 /// What an edit is predicted to gain when only the vertex that it sets relaxes, to second order: a microsecond. Elasticity,
 /// inertia (history interpolated) and dead loads; contact and friction left out. [J, times the scaling]
-/// Infinite where it knows nothing: of pressure, damping, terms of the program and cells with curved edges.
+/// At curved edges an estimate: each node that the edit sets relaxes by itself, and history is left out.
+/// Infinite where the scene has pressure, damping or terms of the program, of which it knows nothing.
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 

@@ -95,8 +95,10 @@ double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<
 
 template <int Dim>
 double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const {
-  const double gain = predict(edit);
-  return std::isfinite(gain) ? gain : gain_of_vertex<Dim>(state(), edit, scratch);
+  const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
+  if (std::any_of(edit.removed_cells.begin(), edit.removed_cells.end(), is_curved))
+    return gain_of_vertex<Dim>(state(), edit, scratch);
+  return predict(edit);
 }
 
 template <int Dim>

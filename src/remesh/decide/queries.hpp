@@ -73,7 +73,7 @@ class RemeshQueries {
   double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
   double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
   double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
-  /// By what the vertex and the nodes that it sets gain where there are curved edges.
+  /// At curved edges by what the vertex and the nodes that it sets gain together, history included.
   double predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const;
   /// Energy of a cell, which need not be in the mesh, on the nodes of an edit at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body, const Edit<Dim>& edit) const {
