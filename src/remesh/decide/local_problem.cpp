@@ -618,6 +618,13 @@ NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
 }
 
 template <int Dim>
+bool LocalProblem<Dim>::distorts() const {
+  return std::any_of(cells_.curved_elements.begin(), cells_.curved_elements.end(), [&](const auto& element) {
+    return element.cell == kNone && relative_jacobian<Dim>(at_all_nodes<Dim>(element, x_.view())) < kLeastRelativeJacobian;
+  });
+}
+
+template <int Dim>
 void LocalProblem<Dim>::get_positions(std::vector<Position>& positions) const {
   positions.clear();
   const ConstVectorView x = x_.view();

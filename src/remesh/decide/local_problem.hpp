@@ -87,6 +87,8 @@ class LocalProblem {
   LocalProblem(const LocalProblem&) = delete;
   LocalProblem& operator=(const LocalProblem&) = delete;
 
+  /// Whether a cell with curved edges that the edit makes is distorted.
+  bool distorts() const;
   double value() { return energy_.value(x_.view(), workspace_); }
   /// Relaxes from the present positions by at most so many Newton iterations.
   NewtonSummary relax(int max_iterations);

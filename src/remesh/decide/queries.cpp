@@ -89,6 +89,15 @@ Refusal RemeshQueries<Dim>::refuse_straighten(const EdgeKey& e) const {
 }
 
 template <int Dim>
+bool RemeshQueries<Dim>::is_distorted(std::span<const CellId> cells) const {
+  const Edit<Dim> none{};
+  return std::any_of(cells.begin(), cells.end(), [&](CellId c) {
+    const CurvedCell<Dim> cell = cell_before(mesh_, c);
+    return cell.edges && relative_jacobian<Dim>(cell.values(fields_.x, none)) < kLeastRelativeJacobian;
+  });
+}
+
+template <int Dim>
 double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
   return gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch);
 }

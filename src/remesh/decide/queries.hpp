@@ -56,6 +56,8 @@ class RemeshQueries {
   /// Why an edge cannot be curved.
   Refusal refuse_curve(const EdgeKey& e) const;
   Refusal refuse_straighten(const EdgeKey& e) const;
+  /// Whether one of these cells is curved and distorted.
+  bool is_distorted(std::span<const CellId> cells) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
   bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
   /// The same of a trial's edge.

@@ -82,6 +82,10 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   };
   const auto accept = [&](LocalProblem<Dim>& after) {
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
+    if (edit.kind == Edit<Dim>::Kind::curve && after.distorts()) {
+      verdict.refusal = Refusal::shape;
+      return;
+    }
     verdict.refusal = Refusal::none;
     after.get_positions(verdict.positions);
   };

@@ -104,9 +104,12 @@ class Coarsener {
         session_.is_unchanged(trial.candidate) ? trial.candidate.priority : ask_.predict_straighten(edge, scratch);
     trial.signal = std::abs(gain);
     trial.edit = make_straighten(ask_.mesh(), edge);
-    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, straighten_tolerance_))
+    const double tolerance = ask_.is_distorted(trial.edit->removed_cells)
+                                 ? std::min(straighten_tolerance_, -ask_.options().split.acceptance_tolerance.value())
+                                 : straighten_tolerance_;
+    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, tolerance))
       return trial.refuse(Refusal::prediction);
-    ask_.judge(trial, straighten_tolerance_, ask_.options().local, scratch);
+    ask_.judge(trial, tolerance, ask_.options().local, scratch);
   }
 
   void add(const std::vector<EdgeKey>& edges, std::vector<Place>& fresh) const {
