@@ -40,7 +40,7 @@ struct Material {
   MaterialLaw law = MaterialLaw::neo_hookean;
   double youngs_modulus = 1e5;  ///< E [Pa]; of small strains where the law has other moduli; the largest where it varies
   double poisson_ratio = 0.3;   ///< as for E
-  double density = 1;           ///< rho [kg/m^3]; 2D: [kg/m^2]
+  double density = 1;           ///< rho [kg/m^3], in 2D too
   bool plane_strain = false;    ///< 2D: lambda = E nu / ((1 + nu)(1 - 2 nu)) instead of nu E / (1 - nu^2)
   MooneyRivlinModuli mooney_rivlin{};
   std::shared_ptr<const OwnLaw> own{};  ///< of MaterialLaw::own; E and nu then are those of small strains, a scale
