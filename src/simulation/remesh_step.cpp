@@ -187,13 +187,10 @@ void tell(const HistoryTransferReport& transfer, double extent, int step, const 
 
 }  // namespace
 
-namespace {
-
-/// `operate(mesh, fields, context, options, memory, strata)` on the state's mesh, and carries the state over.
-template <int Dim, typename Operate>
-std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+template <int Dim>
+std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                  StepReport& report, const Operate& operate) {
+                                                  StepReport& report) {
   const StepSetup<Dim>& setup = tools.setup;
   const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
   RemeshFields<Dim> fields = make_fields<Dim>(setup, context, before, x);
@@ -203,7 +200,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   {
     const ScopedTimer timer(report.seconds.remesh);
     add_nodes(state);
-    remeshed = operate(state.mesh, fields, context, options, state.remesh_memory, state.strata);
+    remeshed = remesh(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
   tell_operations(remeshed, *options.split.acceptance_tolerance, problem.scaling(), report);
   if (!remeshed.changed()) {
@@ -250,35 +247,9 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   return renumbering;
 }
 
-}  // namespace
-
-template <int Dim>
-std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
-                                                  const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                  StepReport& report) {
-  return change_and_project(tools, problem, before, state, x, report,
-                            [](auto&&... all) { return remesh<Dim>(std::forward<decltype(all)>(all)...); });
-}
-
-template <int Dim>
-std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
-                                                      const State<Dim>& before, State<Dim>& state, StepReport& report) {
-  const StepProblem<Dim> problem(tools.setup, before.mesh, before.space, before.history, before.t, tools.cache,
-                                 before.stiffness, before.quadrature);
-  VectorX x = before.history.x[0];
-  state = before;
-  auto renumbering = change_and_project(tools, problem, before, state, x, report, [&](auto&&... all) {
-    return straighten_cells<Dim>(cells, std::forward<decltype(all)>(all)...);
-  });
-  if (renumbering) state.deviation.resize(0);  // of another mesh
-  return renumbering;
-}
-
-#define ITR_INSTANTIATE(Dim)                                                                                              \
-  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&,         \
-                                                                  const State<Dim>&, State<Dim>&, VectorX&, StepReport&); \
-  template std::optional<MeshRenumbering> straighten_and_project<Dim>(const StepTools<Dim>&, std::span<const CellId>,     \
-                                                                      const State<Dim>&, State<Dim>&, StepReport&);
+#define ITR_INSTANTIATE(Dim)                                                                                      \
+  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&, \
+                                                                  const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE
