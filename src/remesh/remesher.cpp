@@ -72,6 +72,23 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   return report;
 }
 
+template <int Dim>
+RemeshReport straighten_cells(std::span<const CellId> cells, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
+                              const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
+                              Strata<Dim>& strata) {
+  RemeshSession<Dim> session(mesh, fields, context, options, nullptr, memory, strata);
+  for (const EdgeKey& edge : edges_of<Dim>(mesh, cells))
+    if (mesh.node_of(edge[0], edge[1]) != kNone)
+      session.commits().commit_unjudged(make_straighten(mesh, edge), session.scratch().gate, session.report().straightens);
+  fields.trim(mesh.vertex_slots());
+  memory.refusals = session.memory().remembered(session.ask());
+  return session.report();
+}
+
+template RemeshReport straighten_cells(std::span<const CellId>, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,
+                                       const RemeshOptions&, RemeshMemory&, Strata<2>&);
+template RemeshReport straighten_cells(std::span<const CellId>, Mesh<3>&, RemeshFields<3>&, const StepContext<3>&,
+                                       const RemeshOptions&, RemeshMemory&, Strata<3>&);
 template RemeshReport remesh(Mesh<2>&, RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&, RemeshMemory&,
                              Strata<2>&);
 template RemeshReport remesh(Mesh<3>&, RemeshFields<3>&, const StepContext<3>&, const RemeshOptions&, RemeshMemory&,

@@ -187,10 +187,13 @@ void tell(const HistoryTransferReport& transfer, double extent, int step, const 
 
 }  // namespace
 
-template <int Dim>
-std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+namespace {
+
+/// `operate(mesh, fields, context, options, memory, strata)` on the state's mesh, and carries the state over.
+template <int Dim, typename Operate>
+std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                  StepReport& report) {
+                                                  StepReport& report, const Operate& operate) {
   const StepSetup<Dim>& setup = tools.setup;
   const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
   RemeshFields<Dim> fields = make_fields<Dim>(setup, context, before, x);
@@ -200,7 +203,7 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   {
     const ScopedTimer timer(report.seconds.remesh);
     add_nodes(state);
-    remeshed = remesh(state.mesh, fields, context, options, state.remesh_memory, state.strata);
+    remeshed = operate(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
   tell_operations(remeshed, *options.split.acceptance_tolerance, problem.scaling(), report);
   if (!remeshed.changed()) {
@@ -247,9 +250,35 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
   return renumbering;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                      \
-  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&, \
-                                                                  const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
+}  // namespace
+
+template <int Dim>
+std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+                                                  const State<Dim>& before, State<Dim>& state, VectorX& x,
+                                                  StepReport& report) {
+  return change_and_project(tools, problem, before, state, x, report,
+                            [](auto&&... all) { return remesh<Dim>(std::forward<decltype(all)>(all)...); });
+}
+
+template <int Dim>
+std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
+                                                      const State<Dim>& before, State<Dim>& state, StepReport& report) {
+  const StepProblem<Dim> problem(tools.setup, before.mesh, before.space, before.history, before.t, tools.cache,
+                                 before.stiffness, before.quadrature);
+  VectorX x = before.history.x[0];
+  state = before;
+  auto renumbering = change_and_project(tools, problem, before, state, x, report, [&](auto&&... all) {
+    return straighten_cells<Dim>(cells, std::forward<decltype(all)>(all)...);
+  });
+  if (renumbering) state.deviation.resize(0);  // of another mesh
+  return renumbering;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                              \
+  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&,         \
+                                                                  const State<Dim>&, State<Dim>&, VectorX&, StepReport&); \
+  template std::optional<MeshRenumbering> straighten_and_project<Dim>(const StepTools<Dim>&, std::span<const CellId>,     \
+                                                                      const State<Dim>&, State<Dim>&, StepReport&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

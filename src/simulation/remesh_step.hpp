@@ -18,4 +18,9 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
                                                   StepReport& report);
 
+/// Makes the curved edges of cells straight in the state between two steps, whatever it costs, and carries it over.
+template <int Dim>
+std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
+                                                      const State<Dim>& before, State<Dim>& state, StepReport& report);
+
 }  // namespace itr

@@ -69,6 +69,25 @@ std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state,
   return violation;
 }
 
+/// Curved cells where det F is small somewhere, and those that share a vertex with one.
+template <int Dim>
+std::vector<CellId> nearly_inverted(const State<Dim>& state, const VectorX& x) {
+  constexpr double kSmall = 0.1, kTolerance = 0.1;
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+  std::vector<CellId> found;
+  for (const auto& element : cells.curved_elements) {
+    const double least = min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kTolerance);
+    if (least * element.inverse_edges.determinant() >= kSmall) continue;
+    for (int k = 0; k <= Dim; ++k) {
+      const auto around = state.mesh.cells_of(element.nodes[k]);
+      found.insert(found.end(), around.begin(), around.end());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
 /// A step by one integrator: that of the setup or, `damped`, implicit Euler.
 template <int Dim>
 class StepAttempt {
@@ -92,7 +111,10 @@ class StepAttempt {
     make_problem();
     NewtonSummary summary = solve(expected());
     const std::string jump = jumped();
-    if (!summary.converged()) return failed(summary, jump);
+    if (!summary.converged()) {
+      if (summary.termination == Termination::no_descent && setup_.remesh.enabled) blocking_ = nearly_inverted(next_, x_);
+      return failed(summary, jump);
+    }
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
     if (!jump.empty()) return failed(jump);
     if (setup_.remesh.enabled) {
@@ -109,6 +131,8 @@ class StepAttempt {
 
   /// Whether EnergyGuard was the one that ended it.
   bool creates_energy() const { return creates_energy_; }
+  /// Cells with curved edges that stopped the first solve, by the numbers of the state before.
+  const std::vector<CellId>& blocking_cells() const { return blocking_; }
 
  private:
   void make_problem() {
@@ -260,17 +284,22 @@ class StepAttempt {
   MeshRenumbering renumbering_;
   StepReport report_;
   bool creates_energy_ = false;
+  std::vector<CellId> blocking_;
   linear::SolveCounts solves_before_ = tools_.solver.counts();
   double start_ = seconds_now(), processor_start_ = processor_seconds_now();
 };
 
 }  // namespace
 
+namespace {
+
+/// By the setup's integrator, or by implicit Euler where that would create energy.
 template <int Dim>
-StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
-                     State<Dim>* start) {
+StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
+                             State<Dim>* start, std::vector<CellId>& blocking) {
   StepAttempt<Dim> attempt(tools, before, damped);
   StepResult result = attempt.run(after, start);
+  blocking = attempt.blocking_cells();
   if (!attempt.creates_energy()) return result;
   tools.logger.warning(
       fmt::format("step {}: Newmark would create energy here, implicit Euler takes this step", result.report.step));
@@ -279,6 +308,36 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
   result = StepAttempt<Dim>(tools, before, true).run(after, start);
   result.report.add_effort(effort);
   result.report.damped_steps = 1;
+  return result;
+}
+
+}  // namespace
+
+template <int Dim>
+StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
+                     State<Dim>* start) {
+  constexpr int kMostRetries = 3;
+  std::vector<CellId> blocking;
+  StepResult result = take_step_on_mesh(tools, before, after, damped, start, blocking);
+  if (result.ok || blocking.empty()) return result;
+  StepReport effort = result.report;
+  State<Dim> from = before;
+  MeshRenumbering renumbering;
+  for (int retry = 0; retry < kMostRetries && !result.ok && !blocking.empty(); ++retry) {
+    State<Dim> straightened;
+    const auto change = straighten_and_project<Dim>(tools, blocking, from, straightened, effort);
+    if (!change) return result;
+    renumbering = renumbering.empty() ? *change : compose(renumbering, *change);
+    from = std::move(straightened);
+    tools.logger.warning(
+        fmt::format("step {}: {}; takes the step again with {} curved edges fewer, where cells were nearly inverted",
+                    result.report.step, result.reason, before.space.num_curved() - from.space.num_curved()));
+    result = take_step_on_mesh(tools, from, after, damped, start, blocking);
+    if (!result.ok) effort.add_effort(result.report);
+  }
+  if (!result.ok) return result;
+  result.report.add_effort(effort);
+  result.renumbering = result.renumbering.empty() ? std::move(renumbering) : compose(renumbering, result.renumbering);
   return result;
 }
 

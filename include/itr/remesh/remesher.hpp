@@ -3,6 +3,8 @@
 // potential of the step, relaxing the neighbourhood of each operation before judging it.
 #pragma once
 
+#include <span>
+
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/fields.hpp"
 #include "itr/remesh/memory.hpp"
@@ -17,5 +19,11 @@ namespace itr {
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata);
+
+/// Makes all curved edges of these cells straight where that inverts and meets nothing, whatever it costs; else as `remesh`.
+template <int Dim>
+RemeshReport straighten_cells(std::span<const CellId> cells, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
+                              const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
+                              Strata<Dim>& strata);
 
 }  // namespace itr
