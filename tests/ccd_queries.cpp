@@ -18,8 +18,8 @@
 #include <string>
 #include <vector>
 
-#include "itr/geometry/ccd.hpp"
-#include "itr/geometry/predicates.hpp"
+#include "geometry/ccd.hpp"
+#include "geometry/predicates.hpp"
 
 namespace {
 

@@ -16,10 +16,10 @@
 #include "block.hpp"
 #include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
-#include "itr/output/certify.hpp"
 #include "itr/output/writer.hpp"
 #include "itr/scene/scene.hpp"
-#include "itr/simulation/contact_surface.hpp"
+#include "output/certify.hpp"
+#include "simulation/contact_surface.hpp"
 
 namespace itr {
 namespace {

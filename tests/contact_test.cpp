@@ -6,12 +6,12 @@
 #include <random>
 
 #include "derivatives.hpp"
+#include "energy/mapped.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/contact/surface.hpp"
 #include "itr/energy/damping.hpp"
-#include "itr/energy/mapped.hpp"
 
 namespace itr {
 namespace {

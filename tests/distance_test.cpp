@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Distances between stored frames on different meshes, against integrals by hand.
-#include "itr/output/distance.hpp"
+#include "output/distance.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <functional>
 
 #include "itr/core/error.hpp"
-#include "itr/mesh/refine.hpp"
+#include "mesh/refine.hpp"
 #include "output/frame_file.hpp"
 #include "output/surface_distance.hpp"
 

@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "itr/core/error.hpp"
-#include "itr/linear/dump.hpp"
+#include "linear/dump.hpp"
 #include "linear_systems.hpp"
 
 namespace itr::linear {

@@ -9,7 +9,7 @@
 
 #include "itr/linear/registry.hpp"
 #include "itr/simulation/simulation.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

@@ -12,7 +12,7 @@
 #include "itr/energy/inertia.hpp"
 #include "itr/energy/load.hpp"
 #include "itr/energy/pressure.hpp"
-#include "itr/projection/volume_barrier.hpp"
+#include "projection/volume_barrier.hpp"
 
 namespace itr {
 namespace {

@@ -37,15 +37,8 @@ def without_comments(path):
     return re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(), flags=re.DOTALL)
 
 
-def public_headers(include, seeds):
-    """Those named in src/itrPublicHeaders.cmake, with all that they include, without comments."""
-    texts, open_ = {}, list(seeds)
-    while open_:
-        header = open_.pop()
-        if header not in texts:
-            texts[header] = without_comments(include / header)
-            open_ += re.findall(r'^ *# *include *["<](itr/[^">]+)', texts[header], re.MULTILINE)
-    return texts
+def public_headers(include):
+    return {str(path.relative_to(include)): without_comments(path) for path in include.rglob("*.h*")}
 
 
 def entity(symbol):
@@ -75,8 +68,7 @@ def write_map(path, names):
 
 def main():
     root, shared, static = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3]
-    cmake = (root / "src/itrPublicHeaders.cmake").read_text()
-    headers = public_headers(root / "include", re.findall(r"\bitr/[\w/]+\.hp*", cmake))
+    headers = public_headers(root / "include")
     words = set(re.findall(r"\w+", "\n".join(headers.values())))
     entities = {entity(symbol) for symbol in symbols(static)} - {None}
     names = {name for name in entities if name_of(name) in words}

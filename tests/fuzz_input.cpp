@@ -16,12 +16,12 @@
 #include <random>
 #include <sstream>
 
+#include "core/process.hpp"
+#include "core/timer.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/process.hpp"
-#include "itr/core/timer.hpp"
-#include "itr/mesh/readers.hpp"
 #include "itr/scene/scene.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "mesh/mesh_file.hpp"
 
 namespace itr {
 namespace {

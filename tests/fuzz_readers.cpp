@@ -17,12 +17,12 @@
 #include <vector>
 
 #include "core/hdf5.hpp"
+#include "core/process.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/process.hpp"
-#include "itr/mesh/readers.hpp"
-#include "itr/output/certify.hpp"
 #include "itr/scene/scene.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "mesh/mesh_file.hpp"
+#include "output/certify.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
 

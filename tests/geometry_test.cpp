@@ -7,13 +7,13 @@
 #include <limits>
 #include <random>
 
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/ccd.hpp"
-#include "itr/geometry/closed_surface.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/ccd.hpp"
+#include "geometry/closed_surface.hpp"
+#include "geometry/intersection.hpp"
+#include "geometry/measures.hpp"
+#include "geometry/predicates.hpp"
 #include "itr/geometry/distance.hpp"
-#include "itr/geometry/intersection.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/geometry/predicates.hpp"
 
 namespace itr {
 namespace {

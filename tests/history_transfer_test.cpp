@@ -7,12 +7,12 @@
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/linear/registry.hpp"
-#include "itr/mesh/validate.hpp"
-#include "itr/projection/safe_projection.hpp"
-#include "itr/simulation/contact_surface.hpp"
-#include "itr/simulation/history_transfer.hpp"
+#include "mesh/validate.hpp"
+#include "projection/safe_projection.hpp"
 #include "random_cube.hpp"
 #include "random_mesh.hpp"
+#include "simulation/contact_surface.hpp"
+#include "simulation/history_transfer.hpp"
 
 namespace itr {
 namespace {

@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "fem/locator.hpp"
 #include "host_block.hpp"
 #include "itr/core/error.hpp"
-#include "itr/fem/locator.hpp"
 
 namespace itr {
 namespace {

@@ -8,10 +8,11 @@
 
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
-#include "itr/linear/choice.hpp"
 #include "itr/linear/registry.hpp"
-#include "itr/simulation/invariants.hpp"
-#include "itr/simulation/step.hpp"
+#include "linear/choice.hpp"
+#include "simulation/contact_surface.hpp"
+#include "simulation/invariants.hpp"
+#include "simulation/step.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {
@@ -61,7 +62,7 @@ TEST(Impact, RemeshingStaysOutsideOfObstaclePoints) {
     ASSERT_TRUE(result.ok) << result.reason;
     expect_valid(simulation);
     for (const VectorX& x : simulation.state().history.x) {
-      const ClosedSurface<2> boundary = boundary_at(simulation.state().mesh, x);
+      const auto boundary = body_boundary(simulation.state().mesh, x);
       for (const auto& p : setup.obstacles.rest) ASSERT_EQ(boundary.winding(p), 0) << "step " << simulation.state().step;
     }
     nearest = std::min(nearest, result.report.min_distance);

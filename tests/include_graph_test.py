@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Compares the includes between modules with the module table, and the walls around third-party libraries.
+"""Compares the includes between modules with the module table, the walls around third-party libraries, and include/ with what
+public headers include.
 
 usage: include_graph_test.py SOURCE_DIR
 """
@@ -43,6 +44,18 @@ OPTIONS = {
 }
 EXTRA = {"scene": OPTIONS | {"simulation/setup.hpp", "simulation/unsupported.hpp"}, "embed": {"itr.h"}}
 SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp", "core/units.hpp"}
+
+# What a program may include: these, and what they include. include/ has nothing else, as all of it is installed.
+PUBLIC = {
+    "itr.hpp",
+    "itr.h",
+    "energy/contact/contact.hpp",  # parts that are of use alone
+    "projection/transfer.hpp",
+    "remesh/remesher.hpp",
+    "linear/abi.h",  # for solver modules
+    "linear/iteration_options.hpp",
+    "linear/module_adapter.hpp",
+}
 
 # Third-party header -> the modules that may know it.
 WALLS = {
@@ -100,6 +113,23 @@ def find_violations(root):
                     yield f"{path.relative_to(root)}: <{name}> belongs behind {', '.join(sorted(owners))}"
 
 
+def find_stray_headers(include):
+    """Headers of include/ that no public header includes, and internal ones that it does."""
+    found, todo = set(), set(PUBLIC)
+    while todo:
+        header = todo.pop()
+        found.add(header)
+        for kind, name in INCLUDE.findall((include / header).read_text()):
+            if name.startswith("itr/"):
+                todo.add(name[len("itr/"):])
+            elif kind == '"':
+                yield f"include/itr/{header}: \"{name}\" is not installed"
+        todo = {name for name in todo - found if (include / name).is_file()}
+    for path in sorted(include.rglob("*.h*")):
+        if str(path.relative_to(include)) not in found:
+            yield f"include/itr/{path.relative_to(include)}: no public header includes it, so it belongs in src/"
+
+
 def check_table():
     """The table itself has no cycle: rows use earlier rows only."""
     seen = set()
@@ -111,8 +141,8 @@ def check_table():
 def main():
     root = pathlib.Path(sys.argv[1]).resolve()
     check_table()
-    violations = list(find_violations(root))
-    print("\n".join(violations) or "the include graph is as the module table says")
+    violations = [*find_violations(root), *find_stray_headers(root / "include/itr")]
+    print("\n".join(violations) or "the include graph is as the module table says, and include/ is public")
     return 1 if violations else 0
 
 

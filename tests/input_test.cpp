@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "itr/core/error.hpp"
-#include "itr/linear/choice.hpp"
 #include "itr/scene/scene.hpp"
+#include "linear/choice.hpp"
 
 namespace itr {
 namespace {

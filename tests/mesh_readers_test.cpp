@@ -8,8 +8,8 @@
 #include <numeric>
 
 #include "itr/core/error.hpp"
-#include "itr/mesh/readers.hpp"
-#include "itr/mesh/refine.hpp"
+#include "mesh/mesh_file.hpp"
+#include "mesh/refine.hpp"
 
 namespace itr {
 namespace {

@@ -7,13 +7,13 @@
 #include <random>
 #include <set>
 
+#include "geometry/measures.hpp"
+#include "geometry/predicates.hpp"
 #include "itr/core/error.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/geometry/predicates.hpp"
 #include "itr/mesh/mesh.hpp"
-#include "itr/mesh/refine.hpp"
-#include "itr/mesh/validate.hpp"
-#include "itr/remesh/edits.hpp"
+#include "mesh/refine.hpp"
+#include "mesh/validate.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 namespace {

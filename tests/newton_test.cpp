@@ -11,7 +11,7 @@
 
 #include "double_well.hpp"
 #include "itr/energy/contact/contact.hpp"
-#include "itr/linear/choice.hpp"
+#include "linear/choice.hpp"
 
 namespace itr {
 namespace {

@@ -12,10 +12,10 @@
 #include <sstream>
 
 #include "core/hdf5.hpp"
+#include "core/process.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/process.hpp"
-#include "itr/output/certify.hpp"
 #include "itr/output/writer.hpp"
+#include "output/certify.hpp"
 
 namespace itr::output {
 namespace {

@@ -7,8 +7,8 @@
 #include <optional>
 #include <random>
 
-#include "itr/geometry/measures.hpp"
-#include "itr/projection/transfer_patch.hpp"
+#include "geometry/measures.hpp"
+#include "projection/transfer_patch.hpp"
 #include "random_cube.hpp"
 #include "random_mesh.hpp"
 

@@ -73,7 +73,7 @@ TEST(Prospect, NoSplitGainsMoreThanIsThere) {
     Marks marks;
     for (const EdgeKey& edge : scene.mesh.edges()) {
       const auto split = make_split(scene.mesh, edge);
-      const auto patch = select_patch<3>(scene.mesh, split, {}, 1, marks);
+      const auto patch = select_patch<3>(scene.mesh, split, {}, 0, marks);
       LocalProblem<3> before(state, patch, split, false, scratch), after(state, patch, split, true, scratch);
       if (!after.has_unknowns()) continue;
       EXPECT_LE(before.value() - after.relax(20).energy, available) << "seed " << seed;

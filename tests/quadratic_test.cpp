@@ -15,10 +15,10 @@
 #include "itr/energy/pressure.hpp"
 #include "itr/fem/quadrature.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
-#include "itr/simulation/contact_surface.hpp"
-#include "itr/simulation/invariants.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "random_quadratic.hpp"
+#include "simulation/contact_surface.hpp"
+#include "simulation/invariants.hpp"
 
 namespace itr {
 namespace {

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "itr/geometry/measures.hpp"
+#include "geometry/measures.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {

@@ -12,9 +12,9 @@
 
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/elastic/elastic.hpp"
-#include "itr/remesh/edits.hpp"
 #include "itr/remesh/fields.hpp"
 #include "remesh/decide/trial.hpp"
+#include "remesh/edits.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

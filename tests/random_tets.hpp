@@ -9,10 +9,11 @@
 #include <set>
 #include <vector>
 
-#include "itr/geometry/measures.hpp"
+#include "geometry/measures.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/mesh/strata.hpp"
-#include "itr/remesh/edits.hpp"
+#include "propose_split.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 

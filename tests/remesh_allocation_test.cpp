@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "itr/remesh/edits.hpp"
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/trial.hpp"
+#include "remesh/edits.hpp"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define ITR_COUNTS_ALLOCATIONS 1
@@ -96,8 +96,7 @@ class WarmTrial : public ::testing::Test {
         sum += predict_gain<kDim>(state, edit) + gain_of_vertex<kDim>(state, edit, scratch);
         // Always enough; never, as the vertex alone tells; never, as a patch tells.
         for (const auto& [required, patch_over_vertex] : {std::pair{-1e9, 2.0}, {1e9, 2.0}, {1e9, 0.0}}) {
-          preview<kDim>(state, gate, edit,
-                        {.required = required, .patch_over_vertex = patch_over_vertex, .total_volume = 1, .local = {}},
+          preview<kDim>(state, gate, edit, {.required = required, .patch_over_vertex = patch_over_vertex, .local = {}},
                         scratch, verdict);
           sum += verdict.gain;
           accepted += verdict.accepted();

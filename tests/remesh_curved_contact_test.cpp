@@ -8,14 +8,14 @@
 #include <random>
 
 #include "itr/core/parallel.hpp"
-#include "itr/mesh/validate.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "itr/simulation/contact_surface.hpp"
-#include "itr/simulation/invariants.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "remesh/curved_cell.hpp"
 #include "remesh/decide/patch.hpp"
+#include "simulation/contact_surface.hpp"
+#include "simulation/invariants.hpp"
 #include "simulation/patch_surface.hpp"
 #include "tet_scene.hpp"
 

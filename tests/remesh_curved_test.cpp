@@ -10,13 +10,13 @@
 #include "itr/core/parallel.hpp"
 #include "itr/projection/transfer.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "itr/simulation/invariants.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 #include "remesh/curved_cell.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh_options.hpp"
+#include "simulation/invariants.hpp"
 
 namespace itr {
 namespace {

@@ -5,9 +5,9 @@
 #include <numeric>
 #include <random>
 
-#include "itr/geometry/dynamic_tree.hpp"
-#include "itr/mesh/validate.hpp"
+#include "geometry/dynamic_tree.hpp"
 #include "itr/remesh/remesher.hpp"
+#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh_options.hpp"
@@ -65,7 +65,7 @@ TEST(Bounds, OfOneVertexNeverExceedWhatAPatchGains) {
       const auto edit = random_edit(scene.mesh, scene.random);
       if (!edit || !view.gate.passes(*edit, view.scratch.gate)) continue;
       const double bound = gain_of_vertex<2>(view.state, *edit, view.scratch);
-      const auto patch = select_patch<2>(scene.mesh, *edit, {}, 1, marks);
+      const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
       const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
       const double energy = before->value();
       const double gain = energy - (after->has_unknowns() ? after->relax(100).energy : after->value());
@@ -114,16 +114,16 @@ TEST(Memory, NothingIsAskedTwiceWhereNothingChanged) {
 TEST(Memory, FollowsVerticesWhenAMeshIsCompacted) {
   RemeshMemory memory;
   const RemeshMemory::SignalRange refusal{1, 2, false};
-  memory.refusals[RemeshMemory::split] = {{{0, 3}, refusal}, {{1, 2}, refusal}, {{2, 3}, refusal}};
-  memory.refusals[RemeshMemory::smooth] = {{{1, kNone}, refusal}, {{3, kNone}, refusal}};
+  memory.refusals[RemeshMemory::split] = {{EdgeKey{0, 3}, refusal}, {EdgeKey{1, 2}, refusal}, {EdgeKey{2, 3}, refusal}};
+  memory.refusals[RemeshMemory::smooth] = {{Place::at_vertex(1), refusal}, {Place::at_vertex(3), refusal}};
   const std::vector<VertexId> number{2, kNone, 0, 1};
   memory.renumber(number);
   const auto& splits = memory.refusals[RemeshMemory::split];
   ASSERT_EQ(splits.size(), 2u);
-  EXPECT_EQ(splits[0].edge, (EdgeKey{0, 1}));
-  EXPECT_EQ(splits[1].edge, (EdgeKey{1, 2}));
+  EXPECT_EQ(splits[0].place, Place(EdgeKey{0, 1}));
+  EXPECT_EQ(splits[1].place, Place(EdgeKey{1, 2}));
   ASSERT_EQ(memory.refusals[RemeshMemory::smooth].size(), 1u);
-  EXPECT_EQ(memory.refusals[RemeshMemory::smooth][0].edge, (EdgeKey{1, kNone}));
+  EXPECT_EQ(memory.refusals[RemeshMemory::smooth][0].place, Place::at_vertex(1));
 }
 
 /// A row of triangles under y = 0 whose top bulges; an obstacle point is above it or below.

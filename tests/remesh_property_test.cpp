@@ -6,11 +6,11 @@
 
 #include <cstring>
 
+#include "geometry/measures.hpp"
 #include "itr/core/parallel.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/mesh/validate.hpp"
 #include "itr/projection/transfer.hpp"
 #include "itr/remesh/remesher.hpp"
+#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
 #include "remesh/decide/patch.hpp"
@@ -314,9 +314,10 @@ RC_GTEST_PROP(TrialProperties, AcceptedEditKeepsTheRuleAndIsAllThatChanged, ()) 
 
   const bool moves = kind == Kind::smooth;
   LocalRelaxationOptions local = options.local;
-  if (moves) local.rings = 1, local.relative_volume = 0;
+  if (moves) local.rings = 1;
   Marks marks;
-  const auto patch = select_patch<2>(scene.mesh, *edit, local, scene.mesh.total_volume(), marks);
+  const double least_volume = moves ? 0 : local.relative_volume * scene.mesh.total_volume();
+  const auto patch = select_patch<2>(scene.mesh, *edit, local, least_volume, marks);
   LocalView view(scene, history);
   const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
   const double energy_before = before->value();

@@ -5,9 +5,9 @@
 #include <map>
 #include <random>
 
-#include "itr/geometry/intersection.hpp"
-#include "itr/mesh/validate.hpp"
+#include "geometry/intersection.hpp"
 #include "itr/remesh/remesher.hpp"
+#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/prediction.hpp"
@@ -81,7 +81,7 @@ TEST(LocalProblem, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
     const auto edit = random_edit(scene.mesh, scene.random);
     if (!edit) continue;
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 1, marks);
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
     LocalView view(scene, HistoryRule::interpolated);
     const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
     const double local = after->value() - before->value();
@@ -105,7 +105,7 @@ TEST(LocalProblem, RelaxationLowersTheGlobalEnergyByWhatItReports) {
     const auto edges = scene.mesh.edges();
     const auto edit = make_split(scene.mesh, edges[scene.random() % edges.size()]);
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, edit, {}, 1, marks);
+    const auto patch = select_patch<2>(scene.mesh, edit, {}, 0, marks);
     LocalView view(scene);
     const auto after = view.problem(patch, edit, true);
     const double start = after->value(), end = after->relax(5).energy;
@@ -131,7 +131,7 @@ TEST(LocalProblem, HistoryAsAFunctionChargesTheIntegralOfWhatIsForgotten) {
     const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), edges[scene.random() % edges.size()]).edit;
     if (!edit) continue;
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 1, marks);
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
     const auto inertia = [&](HistoryRule rule) { return LocalView(scene, rule).problem(patch, *edit, true)->value(); };
     const double kept = inertia(HistoryRule::function), forgotten = inertia(HistoryRule::interpolated);
     if (!std::isfinite(kept)) continue;  // inverted by the random state
@@ -159,7 +159,7 @@ TEST(LocalProblem, SplitsAloneChangeNoEnergyWithLumpedMassEither) {
       const auto edges = scene.mesh.edges();
       const auto edit = make_split(scene.mesh, edges[scene.random() % edges.size()]);
       Marks marks;
-      const auto patch = select_patch<2>(scene.mesh, edit, {}, 1, marks);
+      const auto patch = select_patch<2>(scene.mesh, edit, {}, 0, marks);
       LocalView view(scene);
       const double before = view.problem(patch, edit, false)->value();
       EXPECT_NEAR(view.problem(patch, edit, true)->value(), before, 1e-12 * std::abs(before)) << "seed " << seed;
@@ -181,7 +181,7 @@ TEST(LocalProblem, ForgottenHistoryUsesTheLumpedMass) {
     const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), edges[scene.random() % edges.size()]).edit;
     if (!edit || edit->value->num_parents != 1) continue;  // onto one of its ends: one vertex disappears
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 1, marks);
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
     const double kept = LocalView(scene).problem(patch, *edit, true)->value();
     if (!std::isfinite(kept)) continue;  // inverted by the random state
     const VertexId gone = edit->removed_vertex;

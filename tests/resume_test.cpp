@@ -22,9 +22,9 @@
 
 #include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
-#include "itr/output/certify.hpp"
 #include "itr/output/checkpoint.hpp"
 #include "itr/scene/scene.hpp"
+#include "output/certify.hpp"
 #include "output/frame_file.hpp"
 
 namespace itr::output {

@@ -197,6 +197,20 @@ TEST_P(Engines, WhatAMatrixIsCanBeAskedAlone) {
   EXPECT_LE(residual(block().pattern, values, x, b), kAsked);
 }
 
+/// Iterations over the factor of an indefinite matrix prove nothing.
+TEST_P(Engines, NoFactorOfAnIndefiniteMatrixIsKept) {
+  if (!direct->capabilities().tells_definiteness || !direct->capabilities().indefinite) return;
+  ReusingSolver solver(*direct, true);
+  Elastic system = block();
+  for (int j = 0; j < 6; ++j) system.values[system.pattern.column_starts[j]] *= -1;
+  const auto b = load(system.pattern.order);
+  std::vector<double> x(b.size());
+  ASSERT_EQ(solver.analyze(system.pattern, system.hints()), Outcome::ok);
+  ASSERT_EQ(solver.solve_system(system.values, b, {.residual = kAsked, .if_indefinite = true}, x).outcome, Outcome::ok);
+  EXPECT_FALSE(solver.record().matrix);
+  EXPECT_EQ(solver.solve_system(changed(system, 1e-4), b, {kAsked}, x).definiteness, Definiteness::indefinite);
+}
+
 TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
   ReusingSolver solver(*direct, true);
   const auto b = load(block().pattern.order);

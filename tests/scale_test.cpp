@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "itr/core/count.hpp"
+#include "core/count.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/engine.hpp"
 #include "itr/linear/registry.hpp"

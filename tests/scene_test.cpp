@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "itr/scene/scene.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

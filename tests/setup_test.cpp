@@ -9,7 +9,7 @@
 
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
-#include "itr/simulation/advice.hpp"
+#include "simulation/advice.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

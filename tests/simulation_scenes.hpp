@@ -6,9 +6,9 @@
 
 #include <ostream>
 
-#include "itr/mesh/validate.hpp"
-#include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "mesh/validate.hpp"
+#include "simulation/contact_surface.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

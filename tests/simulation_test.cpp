@@ -8,7 +8,7 @@
 #include "itr/core/parallel.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/linear/registry.hpp"
-#include "itr/simulation/problem_cache.hpp"
+#include "simulation/problem_cache.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "itr/core/error.hpp"
-#include "itr/linear/choice.hpp"
 #include "itr/scene/scene.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "linear/choice.hpp"
 
 namespace itr::linear {
 namespace {

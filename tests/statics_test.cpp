@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "itr/linear/registry.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The problem of one step: what problems share of a cache belongs to whichever solves.
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 #include <gtest/gtest.h>
 

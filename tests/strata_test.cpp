@@ -2,7 +2,7 @@
 // Strata of meshes, and the ring of cells around an edge.
 #include <gtest/gtest.h>
 
-#include "itr/mesh/edge_ring.hpp"
+#include "mesh/edge_ring.hpp"
 #include "random_tets.hpp"
 #include "square_mesh.hpp"
 

@@ -11,7 +11,7 @@
 #include "cli/study/curves.hpp"
 #include "cli/study/plot.hpp"
 #include "cli/study/rows.hpp"
-#include "itr/mesh/readers.hpp"
+#include "mesh/mesh_file.hpp"
 
 namespace itr::cli::study {
 namespace {

@@ -7,13 +7,13 @@
 #include <limits>
 #include <map>
 
-#include "itr/energy/follower.hpp"
+#include "energy/follower.hpp"
 #include "itr/energy/incremental_potential.hpp"
-#include "itr/remesh/edits.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/prospect.hpp"
+#include "remesh/edits.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

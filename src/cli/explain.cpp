@@ -8,14 +8,14 @@
 #include <limits>
 #include <set>
 
+#include "geometry/measures.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadrature.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/linear/choice.hpp"
-#include "itr/simulation/advice.hpp"
 #include "itr/simulation/simulation.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "linear/choice.hpp"
 #include "mesh/connected_parts.hpp"
+#include "simulation/advice.hpp"
+#include "simulation/step_problem.hpp"
 #include "solver_choice.hpp"
 
 namespace itr::cli {

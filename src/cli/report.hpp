@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "itr/output/report.hpp"
+#include "output/report.hpp"
 
 namespace itr::cli {
 

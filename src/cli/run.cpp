@@ -17,13 +17,13 @@
 #include <stop_token>
 #include <thread>
 
+#include "core/timer.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
-#include "itr/core/timer.hpp"
 #include "itr/output/writer.hpp"
-#include "itr/simulation/advice.hpp"
 #include "ranks.hpp"
 #include "report.hpp"
+#include "simulation/advice.hpp"
 #include "solver_choice.hpp"
 #include "warnings.hpp"
 
@@ -125,6 +125,11 @@ std::string describe_remeshing(const StepReport& totals, const Units& units, int
   const std::string bound = totals.bound_by_dhat > 0
                                 ? fmt::format("; d-hat kept {} surface edges from being split", totals.bound_by_dhat)
                                 : std::string();
+  const auto was_refused = [](const OperationCount& c) {
+    return std::any_of(c.refused.begin(), c.refused.end(), [](int n) { return n > 0; });
+  };
+  if (!was_refused(totals.splits) && was_refused(totals.curves))  // splits are not enabled
+    return done + "; accepted nothing; a smaller /space/remesh/curve/acceptance_tolerance curves more edges";
   if (totals.splits.tried == 0 && best_refused == 0)
     return done + fmt::format("; accepted nothing, because no body ever stored the {} that a split has to gain{}",
                               units.text(split_tolerance, "J", 2), bound);

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "itr/core/error.hpp"
-#include "itr/linear/choice.hpp"
+#include "linear/choice.hpp"
 #include "scene/node.hpp"
 
 namespace itr::cli {

@@ -3,8 +3,8 @@
 
 #include <limits>
 
-#include "itr/core/check.hpp"
-#include "itr/core/count.hpp"
+#include "core/check.hpp"
+#include "core/count.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/core/process.hpp"
+#include "core/process.hpp"
 
 #include <sys/resource.h>
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "itr/core/check.hpp"
+#include "core/check.hpp"
 
 namespace itr {
 

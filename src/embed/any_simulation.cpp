@@ -8,10 +8,10 @@
 #include <map>
 
 #include "arrays.hpp"
+#include "fem/locator.hpp"
 #include "host_term.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/energy/point_forces.hpp"
-#include "itr/fem/locator.hpp"
 #include "itr/simulation/resultant.hpp"
 #include "simulation/cell_stress.hpp"
 
@@ -86,8 +86,11 @@ struct AnySimulation::Impl {
 
     const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
     const Space& space() const { return simulation.state().space; }
+    /// Also what remeshing may curve later, be the mesh frozen now or not.
     void refuse_curved(const std::string& place) const {
       if (!space().is_linear()) refuse(place, "curved edges", "a mesh with straight edges alone (discr_order 1)");
+      if (simulation.setup().remesh.curve.enabled)
+        refuse(place, "/space/remesh/curve/enabled", "a mesh of which the edges stay straight");
     }
     /// Of values by vertex linear on the cells of the present mesh, of values by node quadratic along its curved edges.
     template <int Components = Dim>
@@ -103,16 +106,21 @@ struct AnySimulation::Impl {
       return [f = nodal_function<Dim>(locator, as_field(values), is_by_node ? space() : Space())](
                  const Vec<Dim>& X, double) { return Vec<Components>(f(X)); };
     }
-    /// Puts a term in the place of the one of its name, which stays that of a null one.
+    /// Puts a term in the place of the one of its name; a null one goes.
     void set_term(const std::string& name, TermFactory<Dim> term) {
       auto& terms = simulation.conditions().terms;
-      if (!term && !term_places.contains(name)) return;
-      if (!term) term = [](const CellSet<Dim>&, double, double) { return nullptr; };
-      const auto [place, is_new] = term_places.try_emplace(name, terms.size());
-      if (is_new)
-        terms.push_back(std::move(term));
-      else
+      const auto place = term_places.find(name);
+      if (term && place != term_places.end()) {
         terms.at(place->second) = std::move(term);
+      } else if (term) {
+        term_places.emplace(name, terms.size());
+        terms.push_back(std::move(term));
+      } else if (place != term_places.end()) {
+        const std::size_t gone = place->second;
+        terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(gone));
+        term_places.erase(place);
+        for (auto& [other, index] : term_places) index -= index > gone;
+      }
     }
   };
 

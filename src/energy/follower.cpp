@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/follower.hpp"
+#include "energy/follower.hpp"
 
 #include "project_block.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "itr/energy/mapped.hpp"
+#include "energy/mapped.hpp"
 
 namespace itr {
 

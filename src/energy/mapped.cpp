@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/mapped.hpp"
+#include "energy/mapped.hpp"
 
 #include <algorithm>
 

@@ -6,11 +6,12 @@
 #include <memory>
 #include <string>
 
+#include "fem/locator.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/core/error.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/fem/cell_set.hpp"
-#include "itr/fem/locator.hpp"
-#include "itr/geometry/bvh.hpp"
+#include "itr/fem/quadratic.hpp"
 
 namespace itr {
 
@@ -43,34 +44,51 @@ struct Points {
 
 constexpr double kInside = -1e-9;  ///< least weight of a point in a cell
 
-/// Adds the forces of the points that are in some cell of the set: each to the cell that it is deepest in.
+/// Adds the forces of the points that are in some cell of the set: each to the cell that it is deepest in, by the values of
+/// its shape functions there.
 template <int Dim>
 void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& forces) {
   struct Best {
     double depth;
+    bool is_curved;
     std::size_t element;
     std::array<double, Dim + 1> weights;
   };
   std::map<int, Best> best;
   std::vector<int> hits;
-  for (std::size_t e = 0; e < cells.elements.size(); ++e) {
-    const auto& element = cells.elements[e];
+  const auto look_in = [&](bool is_curved, std::size_t e, const int* vertices, int body, const Mat<Dim>& inverse_edges) {
     Box<Dim> box;
-    for (const int v : element.vertices) box.include(cells.rest[v]);
+    for (int k = 0; k <= Dim; ++k) box.include(cells.rest[vertices[k]]);
     hits.clear();
     points.tree.query(box.inflated(1e-9 * (box.max - box.min).norm()), hits);
     for (const int i : hits) {
-      if (points.body[i] != element.body) continue;
-      const auto weights = barycentric_weights<Dim>(cells.rest[element.vertices[0]], element.inverse_edges, points.X[i]);
+      if (points.body[i] != body) continue;
+      const auto weights = barycentric_weights<Dim>(cells.rest[vertices[0]], inverse_edges, points.X[i]);
       const double depth = *std::min_element(weights.begin(), weights.end());
       if (depth < kInside) continue;
-      const auto [it, is_new] = best.try_emplace(i, Best{depth, e, weights});
-      if (!is_new && depth > it->second.depth) it->second = {depth, e, weights};
+      const auto [it, is_new] = best.try_emplace(i, Best{depth, is_curved, e, weights});
+      if (!is_new && depth > it->second.depth) it->second = {depth, is_curved, e, weights};
     }
+  };
+  for (std::size_t e = 0; e < cells.elements.size(); ++e) {
+    const auto& element = cells.elements[e];
+    look_in(false, e, element.vertices.data(), element.body, element.inverse_edges);
   }
-  for (const auto& [i, place] : best)
-    for (int k = 0; k <= Dim; ++k)
-      forces.segment<Dim>(Dim * cells.elements[place.element].vertices[k]) += place.weights[k] * points.force[i];
+  for (std::size_t e = 0; e < cells.curved_elements.size(); ++e) {
+    const auto& element = cells.curved_elements[e];
+    look_in(true, e, element.nodes.data(), element.body, element.inverse_edges);
+  }
+  for (const auto& [i, place] : best) {
+    if (!place.is_curved) {
+      for (int k = 0; k <= Dim; ++k)
+        forces.segment<Dim>(Dim * cells.elements[place.element].vertices[k]) += place.weights[k] * points.force[i];
+      continue;
+    }
+    const auto& element = cells.curved_elements[place.element];
+    const auto shapes = quadratic_shapes<Dim>(element.curved, place.weights);
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+      forces.segment<Dim>(Dim * element.nodes[k]) += shapes[k] * points.force[i];
+  }
 }
 
 /// Whether the points are the first vertices of the set, one by one.

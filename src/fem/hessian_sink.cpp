@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "itr/core/count.hpp"
+#include "core/count.hpp"
 
 namespace itr {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "itr/fem/locator.hpp"
+#include "fem/locator.hpp"
 
 #include <algorithm>
 #include <numeric>
 
+#include "geometry/bvh.hpp"
 #include "itr/fem/quadratic.hpp"
-#include "itr/geometry/bvh.hpp"
 
 namespace itr {
 

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "itr/core/check.hpp"
+#include "core/check.hpp"
 
 namespace itr {
 

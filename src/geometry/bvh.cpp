@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/geometry/ccd.hpp"
+#include "geometry/ccd.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/geometry/closed_surface.hpp"
+#include "geometry/closed_surface.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "itr/geometry/predicates.hpp"
+#include "geometry/predicates.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/geometry/dynamic_tree.hpp"
+#include "geometry/dynamic_tree.hpp"
 
 #include <algorithm>
 

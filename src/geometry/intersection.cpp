@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/geometry/intersection.hpp"
+#include "geometry/intersection.hpp"
 
 #include <cmath>
 

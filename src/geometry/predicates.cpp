@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/geometry/predicates.hpp"
+#include "geometry/predicates.hpp"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/intersections.h>

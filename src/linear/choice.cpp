@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/linear/choice.hpp"
+#include "linear/choice.hpp"
 
 #include <unistd.h>
 
@@ -11,7 +11,7 @@
 
 #include "forwarding.hpp"
 #include "itr/core/error.hpp"
-#include "itr/linear/dump.hpp"
+#include "linear/dump.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/linear/dump.hpp"
+#include "linear/dump.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "forwarding.hpp"
-#include "itr/linear/choice.hpp"
+#include "linear/choice.hpp"
 
 namespace itr::linear {
 

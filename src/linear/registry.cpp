@@ -10,8 +10,8 @@
 
 #include "eigen_engines.hpp"
 #include "itr/core/error.hpp"
-#include "itr/linear/choice.hpp"
 #include "itr/linear/iteration_options.hpp"
+#include "linear/choice.hpp"
 #include "modules.hpp"
 
 namespace itr::linear {

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "conjugate_gradients.hpp"
-#include "itr/linear/choice.hpp"
-#include "itr/linear/dump.hpp"
+#include "linear/choice.hpp"
+#include "linear/dump.hpp"
 
 namespace itr::linear {
 
@@ -71,8 +71,8 @@ Outcome ReusingSolver::analyze_now() {
 
 void ReusingSolver::take_in(std::span<const double> values) {
   iterations_ = 0;
-  const bool is_factors =
-      factor_.matrix && *factor_.matrix->pattern == *pattern_ && std::ranges::equal(factor_.matrix->values, values);
+  const bool is_factors = factor_.matrix && (factor_.matrix->pattern == pattern_ || *factor_.matrix->pattern == *pattern_) &&
+                          std::ranges::equal(factor_.matrix->values, values);
   last_ = is_factors ? Last::found : Last::none;
 }
 
@@ -91,7 +91,7 @@ Outcome ReusingSolver::factorize_now(std::span<const double> values) {
   const Outcome outcome = solver_.factorize(values);
   if (outcome != Outcome::ok) return outcome;
   last_ = Last::factorized;
-  if (capabilities().iterative) return outcome;
+  if (capabilities().iterative || describe(outcome, solver_).negative_eigenvalues > 0) return outcome;
   factor_.matrix = std::make_shared<const FactoredMatrix>(pattern_, std::vector(values.begin(), values.end()), block_size_);
   factor_.spent = costs().factorization;
   factor_.served = factor_.iterations = 1;
@@ -121,7 +121,8 @@ SystemReport ReusingSolver::solve_system(std::span<const double> values, std::sp
     counts_.solves += !goes_on;
     counts_.reused += !goes_on;
   }
-  return {Outcome::ok, iteration_->residual(), Definiteness::positive};
+  const double residual = iteration_->residual();
+  return {Outcome::ok, residual, residual <= kWholeSystem ? Definiteness::positive : Definiteness::unknown};
 }
 
 SystemReport ReusingSolver::solve_by_factor(std::span<const double> values, std::span<const double> b, const Asked& asked,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/mesh/edge_ring.hpp"
+#include "mesh/edge_ring.hpp"
 
 #include <algorithm>
 

@@ -7,9 +7,9 @@
 #include <numeric>
 #include <string>
 
-#include "itr/core/check.hpp"
+#include "core/check.hpp"
+#include "geometry/measures.hpp"
 #include "itr/core/error.hpp"
-#include "itr/geometry/measures.hpp"
 
 namespace itr {
 

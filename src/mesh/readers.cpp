@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/mesh/readers.hpp"
+#include "mesh/mesh_file.hpp"
 
 #include <algorithm>
 #include <cmath>

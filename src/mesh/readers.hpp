@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "itr/core/error.hpp"
-#include "itr/mesh/readers.hpp"
+#include "mesh/mesh_file.hpp"
 
 namespace itr {
 

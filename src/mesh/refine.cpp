@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "itr/mesh/refine.hpp"
+#include "mesh/refine.hpp"
 
 #include <algorithm>
 #include <map>
 
-#include "itr/core/check.hpp"
+#include "core/check.hpp"
 
 namespace itr {
 

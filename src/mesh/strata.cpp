@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "itr/core/check.hpp"
+#include "core/check.hpp"
 
 namespace itr {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "itr/mesh/validate.hpp"
+#include "mesh/validate.hpp"
 
 #include <algorithm>
 
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/predicates.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/predicates.hpp"
 
 namespace itr {
 
@@ -86,18 +86,6 @@ bool is_positively_oriented(const typename MeshTypes<Dim>::Cell& cell, ConstVect
   return cell_orientation(cell, x) > 0;
 }
 
-template <int Dim>
-ClosedSurface<Dim> boundary_at(const Mesh<Dim>& mesh, ConstVectorView x) {
-  std::vector<Vec<Dim>> points(mesh.vertex_slots());
-  for (int v = 0; v < mesh.vertex_slots(); ++v) points[v] = x.segment<Dim>(Dim * v);
-  std::vector<typename Mesh<Dim>::Facet> facets;
-  for (int f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) facets.push_back(mesh.facet(f));
-  return {std::move(points), facets};
-}
-
-template ClosedSurface<2> boundary_at<2>(const Mesh<2>&, ConstVectorView);
-template ClosedSurface<3> boundary_at<3>(const Mesh<3>&, ConstVectorView);
 template bool is_positively_oriented<2>(const MeshTypes<2>::Cell&, ConstVectorView);
 template bool is_positively_oriented<3>(const MeshTypes<3>::Cell&, ConstVectorView);
 template CellId find_inverted<2>(const Mesh<2>&, ConstVectorView);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/core/timer.hpp"
+#include "core/timer.hpp"
 
 namespace itr {
 
@@ -139,7 +139,7 @@ bool Direction::solve(double shift, bool goes_on) {
   if (solved_.negative_eigenvalues > 0 && !if_indefinite)
     return fail(std::to_string(solved_.negative_eigenvalues) + " negative eigenvalues");
   const bool has_solution = solved_.outcome == linear::Outcome::ok || solved_.outcome == linear::Outcome::not_converged;
-  if (!has_solution || !solution.allFinite())
+  if (!has_solution || !std::isfinite(solved_.residual) || !solution.allFinite())
     return fail(std::string(to_string(solved_.outcome)) + ", " + task_.system.message());
   is_loose_ = solved_.residual > kTightResidual && solved_.residual <= asked_;
   if (!is_loose_) task_.summary.linear_residual = std::max(task_.summary.linear_residual, solved_.residual);

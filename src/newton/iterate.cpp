@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/core/timer.hpp"
+#include "core/timer.hpp"
 
 namespace itr {
 

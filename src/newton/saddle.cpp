@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/timer.hpp"
 #include "curvature.hpp"
-#include "itr/core/timer.hpp"
 
 namespace itr {
 

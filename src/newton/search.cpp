@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "blocked_step.hpp"
-#include "itr/core/timer.hpp"
+#include "core/timer.hpp"
 
 namespace itr {
 
@@ -73,6 +73,8 @@ Search::Way Search::look_ahead(Step& step) {
 
 void Search::note_blocked(const Step& step) {
   NewtonSummary& summary = task_.summary;
+  if (summary.iterations == last_blocked_) return;  // a step of this iteration was, before it was given up
+  last_blocked_ = summary.iterations;
   ++summary.blocked;
   if (task_.extras.is_brief || summary.iterations < kLong) return;
   summary.blocked_from = at_.x();
@@ -88,7 +90,8 @@ bool Search::is_acceptable(double value, double share, const Way& way, const Ste
   if (advancing || rule == LineSearch::armijo) return false;
   // PolyFEM's "RobustArmijo" (CONVENTIONS.md, "Tolerances"; Hager & Zhang): if the energy changes little, in either
   // direction, a slope that still falls at the end suffices. This rule refuses full steps to the minimum of a quadratic.
-  // So, where the promised decrease is below round-off, a slope that shrinks to half suffices, too.
+  // So, where the energy changes by round-off alone, a slope that shrinks to half suffices, too: if the end is no higher, or
+  // the promised decrease was below round-off.
   const double change_of_energy = std::abs(value - at_.value());
   if (change_of_energy > 0.1 * std::abs(at_.value())) return false;
   const double after = slope_at_candidate(step);

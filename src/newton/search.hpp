@@ -39,6 +39,7 @@ class Search {
   HeldMotion& held_;
   Kept& kept_;
   VectorView candidate_, other_;
+  int last_blocked_ = -1;  ///< iteration
 };
 
 }  // namespace itr

@@ -3,7 +3,7 @@
 // Where a proxy touches in place of the boundary, it is the surface. Obstacles are prescribed, so two of them may cross each
 // other; anything else that shares a point without sharing a vertex is a violation, and so are neighbours that lie on each
 // other. What is wholly inside is found by winding numbers.
-#include "itr/output/certify.hpp"
+#include "output/certify.hpp"
 
 #include <fmt/format.h>
 
@@ -13,12 +13,12 @@
 #include <optional>
 
 #include "frame_file.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/closed_surface.hpp"
+#include "geometry/predicates.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
 #include "itr/fem/space.hpp"
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/closed_surface.hpp"
-#include "itr/geometry/predicates.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr::output {

@@ -100,7 +100,9 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
 
 constexpr const char* kOperations[RemeshMemory::kKinds] = {"split",   "collapse", "swap",      "smooth",
                                                            "reshape", "curve",    "straighten"};
-constexpr int kRefusalColumns = 5;  ///< two vertices, least and most signal, whether in contact
+constexpr int kRefusalColumns = 5;  ///< two vertices (one and kNone), least and most signal, whether in contact
+
+constexpr const char* kRefusalTolerances = "/checkpoint/refusal_tolerances";  ///< [J], by operation
 
 std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }
 
@@ -108,14 +110,28 @@ void write_memory(hdf5::File& file, const RemeshMemory& memory) {
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     std::vector<double> rows;
     rows.reserve(kRefusalColumns * memory.refusals[kind].size());
-    for (const auto& [edge, range] : memory.refusals[kind])
-      rows.insert(rows.end(), {double(edge[0]), double(edge[1]), range.least, range.most, range.in_contact ? 1.0 : 0.0});
+    for (const auto& [place, range] : memory.refusals[kind]) {
+      const auto vertices = place.vertices();
+      rows.insert(rows.end(), {double(vertices.front()), place.is_vertex() ? kNone : double(vertices.back()), range.least,
+                               range.most, range.in_contact ? 1.0 : 0.0});
+    }
     if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
   }
+  std::vector<double> tolerances;
+  for (const auto& tolerance : memory.tolerances)
+    tolerances.push_back(tolerance.value_or(std::numeric_limits<double>::quiet_NaN()));
+  if (!std::isnan(tolerances[0])) file.write(kRefusalTolerances, tolerances, 1);
 }
 
 RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_vertices) {
   RemeshMemory memory;
+  if (file.contains(kRefusalTolerances)) {
+    const auto table = file.read_doubles(kRefusalTolerances);
+    if (table.values.size() != RemeshMemory::kKinds)
+      throw InputError({path.string(), kRefusalTolerances, std::to_string(table.values.size()) + " numbers",
+                        std::to_string(RemeshMemory::kKinds)});
+    std::copy(table.values.begin(), table.values.end(), memory.tolerances.begin());
+  }
   if (!file.contains("/checkpoint/refusals")) return memory;
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     if (!file.contains(refusals_name(kind))) continue;
@@ -130,7 +146,8 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
         throw InputError({path.string(), refusals_name(kind),
                           "vertices " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]),
                           "numbers below " + std::to_string(num_vertices)});
-      memory.refusals[kind].push_back({edge, {row[2], row[3], row[4] != 0}});
+      const Place place = edge[1] == kNone ? Place::at_vertex(edge[0]) : Place(edge);
+      memory.refusals[kind].push_back({place, {row[2], row[3], row[4] != 0}});
     }
   }
   return memory;

@@ -3,7 +3,7 @@
 
 #include <zlib.h>
 
-#include "itr/core/check.hpp"
+#include "core/check.hpp"
 
 namespace itr::output {
 

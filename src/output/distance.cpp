@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/output/distance.hpp"
+#include "output/distance.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +7,11 @@
 #include <optional>
 
 #include "frame_file.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/intersection.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
 #include "itr/fem/quadrature.hpp"
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/intersection.hpp"
 #include "surface_distance.hpp"
 
 namespace itr::output {

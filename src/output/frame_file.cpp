@@ -6,8 +6,8 @@
 #include <sstream>
 #include <string>
 
+#include "core/check.hpp"
 #include "drawn_cells.hpp"
-#include "itr/core/check.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
 #include "units.hpp"

@@ -12,8 +12,8 @@
 #include "core/hdf5.hpp"
 #include "files.hpp"
 #include "itr/core/units.hpp"
-#include "itr/output/distance.hpp"
 #include "itr/simulation/frame.hpp"
+#include "output/distance.hpp"
 
 namespace itr::output {
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/measures.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadrature.hpp"
-#include "itr/geometry/measures.hpp"
 #include "itr/output/writer.hpp"
 
 namespace itr::output {

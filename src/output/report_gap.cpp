@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 
 namespace itr::output {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <queue>
 
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 
 namespace itr::output {

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "core/hdf5.hpp"
+#include "core/timer.hpp"
 #include "files.hpp"
-#include "itr/core/timer.hpp"
 
 namespace itr::output {
 

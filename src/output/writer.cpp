@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "checkpoint.hpp"
+#include "core/timer.hpp"
 #include "files.hpp"
 #include "force_file.hpp"
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/timer.hpp"
 #include "report_json.hpp"
 #include "time_series.hpp"
 #include "units.hpp"

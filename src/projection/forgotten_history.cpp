@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "itr/projection/forgotten_history.hpp"
+#include "projection/forgotten_history.hpp"
 
 #include <limits>
 #include <numeric>
 
-#include "itr/geometry/intersection.hpp"
+#include "geometry/intersection.hpp"
 
 namespace itr {
 

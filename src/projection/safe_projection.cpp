@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/projection/safe_projection.hpp"
+#include "projection/safe_projection.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "itr/energy/inertia.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 #include "itr/newton/newton.hpp"
-#include "itr/projection/volume_barrier.hpp"
+#include "projection/volume_barrier.hpp"
 
 namespace itr {
 
@@ -96,6 +96,7 @@ class PenalisedSystem final : public NewtonSystem {
     return report;
   }
   std::string message() const override { return system_.message(); }
+  bool tells_definiteness() const override { return system_.tells_definiteness(); }
   double diagonal_scale() const override { return system_.diagonal_scale(); }
 
  private:

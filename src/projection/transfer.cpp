@@ -5,9 +5,10 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
-#include "itr/geometry/bvh.hpp"
-#include "itr/geometry/intersection.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/intersection.hpp"
 #include "mesh/connected_parts.hpp"
 
 namespace itr {
@@ -228,6 +229,10 @@ std::vector<int> parts_of(const TransferMesh<Dim>& mesh) {
   for (std::size_t c = 0; c < mesh.curved.size(); ++c)
     for (int i = Dim + 1; i < kQuadraticNodes<Dim>; ++i)
       if (is_node<Dim>(mesh.curved[c], i)) part[mesh.nodes[c][i]] = part[mesh.cells[c][0]];
+  std::vector<int> used(part);  // alone, each node was a part
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  for (int& p : part) p = static_cast<int>(std::lower_bound(used.begin(), used.end(), p) - used.begin());
   return part;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/projection/transfer_patch.hpp"
+#include "projection/transfer_patch.hpp"
 
 #include <algorithm>
 #include <numeric>

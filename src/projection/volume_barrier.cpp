@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/projection/volume_barrier.hpp"
+#include "projection/volume_barrier.hpp"
 
 #include <Eigen/LU>
 #include <cmath>

@@ -13,8 +13,8 @@
 #include "embed/c_callbacks.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/itr.hpp"
-#include "itr/output/report.hpp"
 #include "itr/output/writer.hpp"
+#include "output/report.hpp"
 
 namespace py = pybind11;
 

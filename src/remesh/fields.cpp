@@ -7,7 +7,8 @@ namespace itr {
 
 template <int Dim>
 void RemeshFields<Dim>::follow(const Edit<Dim>& edit, VertexId created, VertexId first_node) {
-  if (!levels.empty()) levels.insert(levels.end(), edit.inserted_cells.size(), level_of_new_cells(edit));
+  if (!levels.empty())
+    for (std::size_t i = 0; i < edit.inserted_cells.size(); ++i) levels.push_back(level_of_new_cell(edit, i));
   const int nodes = static_cast<int>(edit.inserted_nodes.size());
   if (nodes > 0) make_room(first_node + nodes);
   for_each([&](VectorX& field) {
@@ -22,11 +23,11 @@ void RemeshFields<Dim>::follow(const Edit<Dim>& edit, VertexId created, VertexId
 }
 
 template <int Dim>
-std::uint8_t RemeshFields<Dim>::level_of_new_cells(const Edit<Dim>& edit) const {
-  std::uint8_t level = 0;
-  if (!levels.empty() && edit.is_nested())
-    for (const CellId c : edit.removed_cells) level = std::max(level, levels[c]);
-  return level;
+std::uint8_t RemeshFields<Dim>::level_of_new_cell(const Edit<Dim>& edit, std::size_t i) const {
+  using Kind = typename Edit<Dim>::Kind;
+  if (levels.empty()) return 0;
+  if (edit.kind == Kind::split) return levels[edit.removed_cells[i / 2]];
+  return edit.kind == Kind::curve || edit.kind == Kind::straighten ? levels[edit.removed_cells[i]] : std::uint8_t{0};
 }
 
 template <int Dim>

@@ -18,25 +18,43 @@ double least_gain_of_refining(const RemeshOptions& options) {
   return options.split.enabled ? std::min(split, curve) : curve;
 }
 
+/// Of all operations, by RemeshMemory::Kind [J].
+std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& options) {
+  const double split = options.split.acceptance_tolerance.value_or(0),
+               collapse = options.collapse.acceptance_tolerance.value_or(0);
+  const double swap = options.swap.acceptance_tolerance.value_or(0),
+               smooth = options.smooth.acceptance_tolerance.value_or(0);
+  return {split,
+          collapse,
+          swap,
+          smooth,
+          smooth,
+          options.curve.acceptance_tolerance.value_or(split),
+          options.straighten.acceptance_tolerance.value_or(collapse)};
+}
+
 }  // namespace
 
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
-  const bool by_size = options.sizing_field.enabled, may_stir = options.swap.enabled || options.smooth.enabled;
+  auto baseline = Baseline<Dim>::chosen_by(options);
+  const bool by_size = baseline && baseline->decides_by_size(), predicts = !baseline || baseline->predicts();
+  const bool may_stir = options.swap.enabled || options.smooth.enabled;
   const bool refines = options.split.enabled || options.curve.enabled;
-  const bool asks_what_is_available = (refines && !by_size) || (may_stir && screens(options));
+  const bool asks_what_is_available = (refines && !by_size) || (may_stir && predicts);
   // If the available energy is less than the least gain of one split, shapes do not matter either: a body in flight.
   const bool is_enough_there = !asks_what_is_available ||
                                available_energy(mesh, fields, context) >= context.scaling * least_gain_of_refining(options);
   const bool may_refine = refines && !by_size && is_enough_there;
-  const bool has_to_stir = may_stir && (is_enough_there || !screens(options));
+  const bool has_to_stir = may_stir && (is_enough_there || !predicts);
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
   const bool may_straighten = options.straighten.enabled && !by_size;
   if (!may_refine && !(may_straighten && mesh.has_nodes()) && !may_collapse && !has_to_stir && !by_size) return {};
-  RemeshSession<Dim> session(mesh, fields, context, options, memory, strata);
+  memory.begin(tolerances_of(options));
+  RemeshSession<Dim> session(mesh, fields, context, options, std::move(baseline), memory, strata);
   RemeshReport& report = session.report();
-  session.culling().rank(session.ask());
+  if (session.baseline()) session.baseline()->rank(session.ask());
   if (by_size) {
     follow_sizing_field(session);
   } else {
@@ -51,7 +69,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   }
   fields.trim(mesh.vertex_slots());
   report.trial_seconds = session.commits().median_trial_seconds();
-  memory = session.memory().remembered(session.ask());
+  memory.refusals = session.memory().remembered(session.ask());
   return report;
 }
 

@@ -12,7 +12,7 @@
 #include <sstream>
 #include <utility>
 
-#include "itr/mesh/refine.hpp"
+#include "mesh/refine.hpp"
 #include "selection.hpp"
 #include "transformation.hpp"
 

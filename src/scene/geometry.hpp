@@ -4,8 +4,8 @@
 
 #include <map>
 
-#include "itr/mesh/readers.hpp"
 #include "itr/simulation/setup.hpp"
+#include "mesh/mesh_file.hpp"
 #include "node.hpp"
 
 namespace itr::scene {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "itr/core/check.hpp"
+#include "core/check.hpp"
 
 namespace itr::scene {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/advice.hpp"
+#include "simulation/advice.hpp"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,8 @@
 #include <set>
 
 #include "barrier_stiffness.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "geometry/measures.hpp"
+#include "simulation/step_problem.hpp"
 #include "sizes.hpp"
 
 namespace itr {

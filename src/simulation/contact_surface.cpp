@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/contact_surface.hpp"
+#include "simulation/contact_surface.hpp"
 
 #include <numeric>
 #include <utility>

@@ -8,9 +8,9 @@
 #include <limits>
 
 #include "barrier_stiffness.hpp"
-#include "itr/simulation/remesh_step.hpp"
 #include "itr/simulation/setup.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/remesh_step.hpp"
+#include "simulation/step_problem.hpp"
 #include "sizes.hpp"
 
 namespace itr {

@@ -6,7 +6,7 @@
 
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
-#include "itr/simulation/contact_surface.hpp"
+#include "simulation/contact_surface.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/energy_guard.hpp"
+#include "simulation/energy_guard.hpp"
 
 #include <algorithm>
 #include <cmath>

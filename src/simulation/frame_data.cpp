@@ -7,8 +7,8 @@
 
 #include "cell_stress.hpp"
 #include "itr/energy/inertia.hpp"
-#include "itr/simulation/contact_surface.hpp"
 #include "itr/simulation/resultant.hpp"
+#include "simulation/contact_surface.hpp"
 
 namespace itr {
 
@@ -23,9 +23,10 @@ struct CellPoint {
 };
 
 /// f(material, points) for each cell in the mesh's order: one point where F is constant, those of the elastic energy's
-/// quadrature in cells with curved edges.
+/// quadrature in cells with curved edges, of which `levels` are those of the state.
 template <int Dim, typename Function>
-void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Setup<Dim>& setup, const Function& f) {
+void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels,
+                            const Setup<Dim>& setup, const Function& f) {
   const auto& rule = quadrature<Dim>(setup.quadrature_degree);
   std::vector<CellPoint<Dim>> points;
   auto straight = cells.elements.begin();
@@ -39,7 +40,9 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const S
       ++straight;
       continue;
     }
-    for (const auto& point : rule)
+    const std::size_t e = static_cast<std::size_t>(curved - cells.curved_elements.begin());
+    const bool is_refined = !levels.empty() && levels[e] > 0;
+    for (const auto& point : is_refined ? closed_quadrature<Dim>(levels[e]) : rule)
       points.push_back({at_nodes<Dim>(curved->nodes, x) * shape_gradients<Dim>(*curved, point.weights).transpose(),
                         rest_position<Dim>(cells, *curved, point.weights), point.share});
     f(setup.materials.at(curved->body), std::span<const CellPoint<Dim>>(points));
@@ -56,7 +59,7 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>
   data.x = state.history.x[0].head(Dim * bodies);
   data.v = state.history.v[0].head(Dim * bodies);
   const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
-  for_each_cell_in_order<Dim>(cells, data.x, setup(), [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+  for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup(), [&](const Material& material, auto points) {
     double mean = 0;
     for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
     data.elastic_density.push_back(mean);
@@ -107,9 +110,9 @@ double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Ve
 }
 
 template <int Dim>
-CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Setup<Dim>& setup) {
+CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels, const Setup<Dim>& setup) {
   CellStress stress;
-  for_each_cell_in_order<Dim>(cells, x, setup, [&](const Material& material, std::span<const CellPoint<Dim>> points) {
+  for_each_cell_in_order<Dim>(cells, x, levels, setup, [&](const Material& material, auto points) {
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
     for (const auto& [F, X, share] : points) {
@@ -130,7 +133,7 @@ template <int Dim>
 CellStress cell_stress(const Simulation<Dim>& simulation) {
   const State<Dim>& state = simulation.state();
   const VectorX x = state.history.x[0].head(Dim * num_nodes(state.mesh, state.space));
-  return stress_of<Dim>(whole_mesh(state.mesh, {}, state.space), x, simulation.setup());
+  return stress_of<Dim>(whole_mesh(state.mesh, {}, state.space), x, state.quadrature, simulation.setup());
 }
 
 template CellStress cell_stress(const Simulation<2>&);
@@ -148,7 +151,7 @@ void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, const State<Dim>& sta
   for (const ForceTarget& target : options.curves)
     asked.curves.push_back(curve_point(force_sums(state, all, target), target.name));
   if (options.von_mises || options.stress) {
-    CellStress stress = stress_of<Dim>(cells, data.x, setup());
+    CellStress stress = stress_of<Dim>(cells, data.x, state.quadrature, setup());
     if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
     if (options.stress) asked.stress = std::move(stress.cauchy);
   }

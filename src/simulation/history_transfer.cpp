@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/history_transfer.hpp"
+#include "simulation/history_transfer.hpp"
 
-#include "itr/projection/safe_projection.hpp"
-#include "itr/projection/transfer_patch.hpp"
+#include "projection/safe_projection.hpp"
+#include "projection/transfer_patch.hpp"
 #include "simulation/patch_surface.hpp"
 
 namespace itr {
@@ -42,8 +42,9 @@ class HistoryTransfer {
     for (std::size_t i = 0; i < n; ++i) {
       const int v = patch_.new_cells.vertices[i];
       if (v >= mesh.vertex_slots()) {
-        for (const FacetId f : mesh.facets_of_edge(space.curved_edges()[v - mesh.vertex_slots()]))
-          hold(i, mesh.facet_tag(f));
+        const EdgeKey& edge = space.curved_edges()[v - mesh.vertex_slots()];
+        for (const FacetId f : mesh.facets_of_edge(edge)) hold(i, mesh.facet_tag(f));
+        if (const int tag = mesh.edge_tag(edge); tag != kNoTag) hold(i, tag);
         continue;
       }
       for (const FacetId f : mesh.facets_of(v)) hold(i, mesh.facet_tag(f));

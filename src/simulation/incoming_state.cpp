@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "itr/core/error.hpp"
-#include "itr/mesh/validate.hpp"
-#include "itr/simulation/invariants.hpp"
+#include "mesh/validate.hpp"
+#include "simulation/invariants.hpp"
 
 namespace itr {
 

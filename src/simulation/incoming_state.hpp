@@ -3,7 +3,7 @@
 #pragma once
 
 #include "itr/simulation/setup.hpp"
-#include "itr/simulation/step.hpp"
+#include "simulation/step.hpp"
 
 namespace itr {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/invariants.hpp"
+#include "simulation/invariants.hpp"
 
 #include "itr/fem/cell_set.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
-#include "itr/mesh/validate.hpp"
-#include "itr/simulation/contact_surface.hpp"
+#include "mesh/validate.hpp"
+#include "simulation/contact_surface.hpp"
 
 namespace itr {
 

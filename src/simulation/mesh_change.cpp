@@ -3,8 +3,8 @@
 
 #include <limits>
 
-#include "itr/fem/locator.hpp"
-#include "itr/geometry/bvh.hpp"
+#include "fem/locator.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 
 namespace itr {

@@ -5,7 +5,7 @@
 #include <span>
 #include <unordered_map>
 
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 
 namespace itr {
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "itr/energy/contact/surface.hpp"
-#include "itr/projection/transfer_patch.hpp"
 #include "itr/simulation/setup.hpp"
+#include "projection/transfer_patch.hpp"
 
 namespace itr {
 

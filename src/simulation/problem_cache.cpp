@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/problem_cache.hpp"
+#include "simulation/problem_cache.hpp"
 
 #include <algorithm>
 
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 namespace itr {
 

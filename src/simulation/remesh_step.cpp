@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/remesh_step.hpp"
+#include "simulation/remesh_step.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "itr/core/timer.hpp"
+#include "core/timer.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/energy/point_forces.hpp"
-#include "itr/geometry/bvh.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "itr/simulation/history_transfer.hpp"
 #include "itr/time/integrator.hpp"
+#include "simulation/history_transfer.hpp"
 
 namespace itr {
 

@@ -9,12 +9,12 @@
 #include <string>
 #include <utility>
 
+#include "core/process.hpp"
 #include "incoming_state.hpp"
 #include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/process.hpp"
-#include "itr/linear/choice.hpp"
-#include "itr/simulation/step.hpp"
+#include "linear/choice.hpp"
+#include "simulation/step.hpp"
 #include "unsupported.hpp"
 #include "watch.hpp"
 
@@ -72,8 +72,8 @@ struct Simulation<Dim>::Impl {
       throw InputError({"", what, "a call from inside of a listener of mesh changes", "one between steps"});
   }
 
-  /// The only way in which the state changes. What snapshots share stays; else a reference to state() stays good. Returns
-  /// the state before.
+  /// How steps change the state. What snapshots share stays; else a reference to state() stays good, until a snapshot is
+  /// restored. Returns the state before.
   std::shared_ptr<const State<Dim>> change_to(std::shared_ptr<State<Dim>> end) {
     if (state.use_count() > 1) return std::exchange(state, std::move(end));
     std::swap(*state, *end);
@@ -128,6 +128,14 @@ struct Simulation<Dim>::Impl {
     made.min_volume_ratio = min_volume_ratio(problem.cells(), x);
     made.peak_rss_mb = peak_rss_mb();
     return made;
+  }
+
+  /// Remeshing may have been switched on since the simulation was made: its tolerances are chosen then.
+  void complete_conditions() {
+    if (!setup.remesh.enabled || setup.remesh.split.acceptance_tolerance) return;
+    refuse_unsupported(setup);
+    setup.validate();
+    for (const std::string& chosen : setup.choose_defaults()) logger.info(chosen);
   }
 
   /// Steps from now on have this length. Returns the state before where its history was cut.
@@ -208,6 +216,7 @@ const StepReport& Simulation<Dim>::report() const {
 template <int Dim>
 StepResult Simulation<Dim>::adapt(double dt) {
   impl_->refuse_in_callback("adapt");
+  impl_->complete_conditions();
   if (impl_->setup.on_iteration) report();  // which it may ask for
   std::shared_ptr<const State<Dim>> before;
   StepResult result = impl_->with_step(dt, [&] {
@@ -231,6 +240,7 @@ StepResult Simulation<Dim>::adapt(double dt) {
 template <int Dim>
 StepResult Simulation<Dim>::advance() {
   impl_->refuse_in_callback("step");
+  impl_->complete_conditions();
   if (impl_->setup.on_iteration) report();
   StepResult result;
   std::shared_ptr<const State<Dim>> before;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // One time step: solve -> remesh -> project the history -> solve again (paper Algorithm 1).
-#include "itr/simulation/step.hpp"
+#include "simulation/step.hpp"
 
 #include <fmt/format.h>
 
@@ -9,13 +9,13 @@
 #include <limits>
 #include <string>
 
-#include "itr/core/check.hpp"
-#include "itr/core/process.hpp"
-#include "itr/core/timer.hpp"
-#include "itr/simulation/energy_guard.hpp"
-#include "itr/simulation/invariants.hpp"
-#include "itr/simulation/remesh_step.hpp"
+#include "core/check.hpp"
+#include "core/process.hpp"
+#include "core/timer.hpp"
 #include "newton/round_off.hpp"
+#include "simulation/energy_guard.hpp"
+#include "simulation/invariants.hpp"
+#include "simulation/remesh_step.hpp"
 #include "watch.hpp"
 
 namespace itr {
@@ -207,7 +207,7 @@ class StepAttempt {
       start->step = before_.step;
       start->t = before_.t;
       start->stiffness = before_.stiffness;
-      start->quadrature = before_.quadrature;
+      if (renumbering_.empty()) start->quadrature = before_.quadrature;  // else that of the new cells
       start->created_energy = before_.created_energy;
       start->stored_energy = before_.stored_energy;
       start->history.damp_next = before_.history.damp_next;

@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-#include "itr/simulation/step.hpp"
+#include "simulation/step.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 #include <fmt/format.h>
 
@@ -11,9 +11,9 @@
 #include <optional>
 #include <utility>
 
+#include "core/timer.hpp"
 #include "diagnosis.hpp"
-#include "itr/core/timer.hpp"
-#include "itr/energy/follower.hpp"
+#include "energy/follower.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr {
@@ -112,6 +112,10 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
   for (const auto* condition : by_tag)
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
       if (mesh.vertex_tag(v) != kNoTag && mesh.vertex_tag(v) == condition->tag) hold(v, *condition);
+  for (const auto* condition : by_tag)
+    for (int edge = 0; edge < space.num_curved(); ++edge)
+      if (const int tag = mesh.edge_tag(space.curved_edges()[edge]); tag != kNoTag && tag == condition->tag)
+        hold(mesh.vertex_slots() + edge, *condition);
   for (int o = 0; o < total - bodies; ++o) {
     const Vec<Dim>& X = setup.obstacles.rest[o];
     const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
@@ -292,8 +296,8 @@ bool StepProblem<Dim>::has_lagged_loads() const {
   return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_));
 }
 
-/// By how much of themselves terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in their forces on
-/// unknowns at x.
+/// By which share of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in
+/// their forces on unknowns at x.
 template <int Dim>
 template <typename F>
 double StepProblem<Dim>::change_of(const VectorX& x, const Lagged& now, const F& is_asked) {
@@ -306,9 +310,10 @@ double StepProblem<Dim>::change_of(const VectorX& x, const Lagged& now, const F&
       if (dofs_.unknown[i] == kNone) gradient[i] = 0;
     return gradient;
   };
-  const VectorX after = gradient_of(now);
-  const double size = after.norm();
-  return size > 0 ? (after - gradient_of(lagged_)).norm() / size : 0;
+  const VectorX after = gradient_of(now), before = gradient_of(lagged_);
+  const double size = std::max(after.norm(), before.norm()), change = (after - before).norm();
+  if (!std::isfinite(change)) return std::numeric_limits<double>::infinity();
+  return size > 0 ? change / size : 0;
 }
 
 /// What a step is to say, or to fail for, where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "itr/geometry/bvh.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "geometry/bvh.hpp"
+#include "simulation/step_problem.hpp"
 
 namespace itr {
 

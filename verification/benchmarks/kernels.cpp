@@ -8,15 +8,15 @@
 #include <algorithm>
 #include <random>
 
+#include "geometry/ccd.hpp"
+#include "geometry/intersection.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
-#include "itr/geometry/ccd.hpp"
-#include "itr/geometry/intersection.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/newton/newton.hpp"
-#include "itr/projection/transfer_patch.hpp"
+#include "projection/transfer_patch.hpp"
 
 namespace {
 

@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "cli/ranks.hpp"
+#include "core/timer.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/timer.hpp"
-#include "itr/linear/dump.hpp"
 #include "itr/linear/registry.hpp"
+#include "linear/dump.hpp"
 
 namespace {
 

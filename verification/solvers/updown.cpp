@@ -15,12 +15,12 @@
 #include <string>
 #include <vector>
 
+#include "core/timer.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/timer.hpp"
 #include "itr/core/types.hpp"
-#include "itr/linear/dump.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/linear/reuse.hpp"
+#include "linear/dump.hpp"
 
 namespace {
 

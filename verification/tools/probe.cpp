@@ -18,7 +18,7 @@
 #include "itr/energy/load.hpp"
 #include "itr/projection/transfer.hpp"
 #include "itr/scene/scene.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 namespace {
 

@@ -79,7 +79,6 @@ class IncrementalPotential {
   /// Null where the scene has no such term.
   const std::shared_ptr<InertiaEnergy<Dim>>& inertia() const { return inertia_; }
   const std::shared_ptr<ElasticEnergy<Dim>>& elastic() const { return elastic_; }
-  const std::shared_ptr<LoadEnergy<Dim>>& loads() const { return loads_; }
   const std::shared_ptr<ContactEnergy<Dim>>& contact() const { return contact_; }  ///< over the surface's vertices
   const std::shared_ptr<const Energy>& contact_of_cells() const { return contact_of_cells_; }  ///< over the cells' vertices
 

@@ -43,9 +43,10 @@ struct SolveCounts {
 /// where they take too long or meet a direction of no positive curvature, the matrix is factorised.
 ///
 /// What is tried depends on counts (flops of a factorisation, entries of a factor, iterations), never on time. A matrix
-/// that iterations solved to 1e-8 is positive definite: they start from an error with a part in every direction, and with
-/// positive curvatures throughout, the part in a direction of negative curvature could not have shrunk. (The residual does
-/// not show one whose curvature is below some 1e-4 of the factor's; after looser solves it shows less.)
+/// that iterations solved to 1e-8 is positive definite: the factor is (none of an indefinite matrix is kept), they start
+/// from an error with a part in every direction, and with positive curvatures throughout, the part in a direction of
+/// negative curvature could not have shrunk. (The residual does not show one whose curvature is below some 1e-4 of the
+/// factor's; after looser solves it shows less.)
 ///
 /// Over an iterative solver it only counts.
 class ReusingSolver final : public Solver {

@@ -86,7 +86,7 @@ struct Edit {
   };
 
   Kind kind;
-  EdgeKey edge{kNone, kNone};  ///< the edge; of a 2-3 swap the one it makes; for a smooth {vertex, kNone}
+  EdgeKey edge{kNone, kNone};  ///< the edge; of a 2-3 swap the one it makes; of a smooth none
   std::vector<CellId> removed_cells{};
   std::vector<NewCell> inserted_cells{};
   std::vector<FacetId> removed_facets{};
@@ -160,6 +160,11 @@ class Mesh {
   /// and tag what they put on a boundary edge between two of one tag.
   int vertex_tag(VertexId v) const { return vertex_tag_[v]; }
   void set_vertex_tag(VertexId v, int tag) { vertex_tag_[v] = tag; }
+  /// The tag of both ends of an edge of the surface, all of which conditions with that tag hold; else kNoTag.
+  int edge_tag(const EdgeKey& edge) const {
+    const int tag = vertex_tag_[edge[0]];
+    return tag != kNoTag && tag == vertex_tag_[edge[1]] && !facets_of_edge(edge).empty() ? tag : kNoTag;
+  }
   std::span<const CellId> cells_of(VertexId v) const { return cells_of_[v]; }
   std::span<const FacetId> facets_of(VertexId v) const { return facets_of_[v]; }
   bool is_boundary(VertexId v) const { return !facets_of_[v].empty(); }

@@ -4,10 +4,11 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/remesh/place.hpp"
 
 namespace itr {
 
@@ -23,12 +24,19 @@ struct RemeshMemory {
     }
   };
   struct Entry {
-    EdgeKey edge;  ///< smaller vertex first; {vertex, kNone} of a vertex that was not moved
+    Place place;
     SignalRange range;
   };
   enum Kind { split, collapse, swap, smooth, reshape, curve, straighten };
   static constexpr int kKinds = 7;
-  std::array<std::vector<Entry>, kKinds> refusals;  ///< by Kind; ascending by edge
+  using Refusals = std::array<std::vector<Entry>, kKinds>;
+  Refusals refusals;  ///< by Kind; ascending by place
+  /// By Kind, the strictest that a refusal was given under [J]; none before the first.
+  std::array<std::optional<double>, kKinds> tolerances{};
+
+  /// To be called before operations with these tolerances. Refusals of a kind are forgotten where its tolerance accepts
+  /// clearly more than the one that they were given under.
+  void begin(const std::array<double, kKinds>& present);
 
   /// With the vertex numbers of a compacted mesh; `number` has kNone for vertices that are gone.
   void renumber(std::span<const VertexId> number);

@@ -30,7 +30,7 @@ struct OperationCount {
 struct RemeshReport {
   OperationCount splits, curves, straightens, collapses, swaps, smooths;
   double trial_seconds = 0;      ///< median over the trials; 0 where there were none
-  double best_refused_gain = 0;  ///< most that a refused split or curve would have gained [J s^2]
+  double best_refused_gain = 0;  ///< most that a refused split would have gained, as it was predicted or found [J s^2]
 
   int accepted() const { return splits.accepted + curves.accepted + coarsenings(); }
   bool changed() const { return accepted() > 0; }

@@ -44,7 +44,7 @@ struct StepReport {
   int bound_by_dhat = 0;          ///< surface edges that were not split because the halves would be below dhat
   int reverted_remeshes = 0;      ///< all of a step's operations were dropped, as the state on the new mesh failed
   double split_tolerance = 0;     ///< of this step [J]; 0: no remeshing
-  double best_refused_split = 0;  ///< largest gain of a refused split or curve, where its patch was relaxed [J]
+  double best_refused_split = 0;  ///< largest gain of a refused split, as it was predicted or found [J]
   double residual_worth = 0;      ///< gain of one more Newton iteration at the end, by the quadratic model [J]
   double trial_seconds = 0;       ///< median over the trials of these operations; 0 where there were none
   int refined_quadrature = 0;     ///< cells with curved edges whose elastic energy has a finer quadrature

@@ -12,8 +12,8 @@
 #include <cstring>
 #include <thread>
 
+#include "core/timer.hpp"
 #include "itr/core/error.hpp"
-#include "itr/core/timer.hpp"
 
 namespace itr::cli::study {
 

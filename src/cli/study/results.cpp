@@ -11,8 +11,8 @@
 #include <set>
 
 #include "itr/core/error.hpp"
-#include "itr/output/certify.hpp"
-#include "itr/output/distance.hpp"
+#include "output/certify.hpp"
+#include "output/distance.hpp"
 
 namespace itr::cli::study {
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/bvh.hpp"
 #include "itr/energy/contact/surface.hpp"
-#include "itr/geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 
 namespace itr {

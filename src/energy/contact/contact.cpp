@@ -9,9 +9,9 @@
 #include <limits>
 
 #include "candidates.hpp"
+#include "core/parallel_reduce.hpp"
+#include "geometry/ccd.hpp"
 #include "itr/core/kept_vector.hpp"
-#include "itr/core/parallel_reduce.hpp"
-#include "itr/geometry/ccd.hpp"
 #include "pairs.hpp"
 #include "planar_bounds.hpp"
 

@@ -4,8 +4,8 @@
 
 #include <array>
 
+#include "geometry/bvh.hpp"
 #include "itr/energy/contact/surface.hpp"
-#include "itr/geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 
 namespace itr {

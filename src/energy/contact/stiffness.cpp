@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 
 namespace itr {
 

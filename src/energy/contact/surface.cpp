@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "itr/mesh/validate.hpp"
+#include "mesh/validate.hpp"
 
 namespace itr {
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/core/check.hpp"
-#include "itr/core/parallel_reduce.hpp"
-#include "itr/geometry/measures.hpp"
+#include "core/check.hpp"
+#include "core/parallel_reduce.hpp"
+#include "geometry/measures.hpp"
 #include "point.hpp"
 #include "quadratic.hpp"
 

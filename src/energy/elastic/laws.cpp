@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/check.hpp"
 #include "isotropic.hpp"
-#include "itr/core/check.hpp"
 
 namespace itr {
 

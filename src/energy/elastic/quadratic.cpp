@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/core/parallel_reduce.hpp"
+#include "core/parallel_reduce.hpp"
 #include "itr/energy/elastic/neo_hookean.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 

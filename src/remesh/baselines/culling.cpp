@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "culling.hpp"
-
 #include <algorithm>
 
+#include "baseline.hpp"
 #include "energy/elastic/point.hpp"
 #include "fem/chords.hpp"
+#include "remesh/decide/queries.hpp"
 
 namespace itr {
 
@@ -75,7 +75,7 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
 
 /// Thresholds of one energy field over the edges, and ranks by them.
 template <int Dim>
-class Culling<Dim>::Thresholds {
+class Baseline<Dim>::Thresholds {
  public:
   Thresholds(std::vector<double> energies, const RemeshOptions& options) {
     if (energies.empty()) return;
@@ -94,9 +94,15 @@ class Culling<Dim>::Thresholds {
 };
 
 template <int Dim>
-void Culling<Dim>::rank(const RemeshQueries<Dim>& ask) {
-  is_on_ = ask.options().screening == Screening::energy_percentile;
-  if (!is_on_) return;
+std::unique_ptr<Baseline<Dim>> Baseline<Dim>::chosen_by(const RemeshOptions& options) {
+  const bool chosen = options.sizing_field.enabled || options.screening != Screening::bounds ||
+                      options.history != HistoryRule::function || options.local.relative_volume > 0;
+  return chosen ? std::make_unique<Baseline>(options) : nullptr;
+}
+
+template <int Dim>
+void Baseline<Dim>::rank(const RemeshQueries<Dim>& ask) {
+  if (!culls()) return;
   const Mesh<Dim>& mesh = ask.mesh();
   const auto edges = mesh.edges();
   const auto of_cells = cell_energies(mesh, ask.fields(), ask.context());
@@ -125,7 +131,7 @@ void Culling<Dim>::rank(const RemeshQueries<Dim>& ask) {
   }
 }
 
-template class Culling<2>;
-template class Culling<3>;
+template class Baseline<2>;
+template class Baseline<3>;
 
 }  // namespace itr

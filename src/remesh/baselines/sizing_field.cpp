@@ -29,7 +29,7 @@ class SizingField {
     OperationCount& count = session_.report().splits;
     for (const EdgeKey& edge : ask_.mesh().edges()) push_split(edge);
     while (const auto entry = queue_.pop()) {
-      const EdgeKey& edge = entry->edge;
+      const EdgeKey edge = entry->place.edge();
       if (ask_.is_cancelled()) return;
       Refusal refusal = ask_.refuse_split(edge);
       if (refusal == Refusal::none && ask_.rest_length(edge) < least) refusal = Refusal::length;
@@ -46,7 +46,7 @@ class SizingField {
     OperationCount& count = session_.report().collapses;
     for (const EdgeKey& edge : ask_.mesh().edges()) push_collapse(edge);
     while (const auto entry = queue_.pop()) {
-      const EdgeKey& edge = entry->edge;
+      const EdgeKey edge = entry->place.edge();
       if (ask_.is_cancelled()) return;
       const Refusal refusal = ask_.refuse_collapse(edge);
       count.note(refusal);
@@ -187,7 +187,7 @@ class SizingField {
 
   RemeshSession<Dim>& session_;
   const RemeshQueries<Dim>& ask_;
-  EdgeQueue queue_;
+  PlaceQueue queue_;
 };
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "contact_reach.hpp"
-#include "itr/geometry/predicates.hpp"
+#include "geometry/predicates.hpp"
 #include "remesh/curved_cell.hpp"
 
 namespace itr {

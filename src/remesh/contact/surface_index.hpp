@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/geometry/dynamic_tree.hpp"
+#include "geometry/dynamic_tree.hpp"
 #include "itr/remesh/fields.hpp"
 #include "surface_piece.hpp"
 

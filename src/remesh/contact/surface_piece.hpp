@@ -7,7 +7,7 @@
 #include <compare>
 
 #include <boost/container/static_vector.hpp>
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 #include "itr/mesh/mesh.hpp"
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/geometry/measures.hpp"
-#include "itr/projection/forgotten_history.hpp"
+#include "geometry/measures.hpp"
+#include "projection/forgotten_history.hpp"
 #include "remesh/curved_cell.hpp"
 
 namespace itr {
@@ -256,22 +256,34 @@ void LocalProblem<Dim>::add_loaded_facets() {
   for (const auto& facet : edit_.inserted_facets) add_loaded_facet(facet.vertices, facet.tag);
 }
 
-/// Holds the node of an edge as held_dofs() does: by the facets at the edge, after the edit those that it has then.
+/// Holds the node of an edge as held_dofs() does: by the facets at the edge, after the edit those that it has then, and by
+/// the tag of both ends.
 template <int Dim>
 template <typename Hold>
 void LocalProblem<Dim>::hold_node(std::size_t i, const EdgeKey& edge, const Hold& hold_components) {
   const auto holds = [](const auto& ids, const EdgeKey& ends) {
     return std::all_of(ends.begin(), ends.end(), [&](int v) { return std::find(ids.begin(), ids.end(), v) != ids.end(); });
   };
+  bool is_on_surface = false;
+  const auto hold_by_facet = [&](int tag) {
+    is_on_surface = true;
+    hold_components(i, tag);
+  };
+  const auto hold_by_ends = [&] {
+    const auto tag_of = [&](VertexId v) { return v == kNewVertex ? edit_.value->tag : mesh_.vertex_tag(v); };
+    const int tag = tag_of(edge[0]);
+    if (is_on_surface && tag != kNoTag && tag == tag_of(edge[1])) hold_components(i, tag);
+  };
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets)
-      if (holds(facet.vertices, edge)) hold_components(i, facet.tag);
-  if (edge[1] == kNewVertex) return;
+      if (holds(facet.vertices, edge)) hold_by_facet(facet.tag);
+  if (edge[1] == kNewVertex) return hold_by_ends();
   const auto around = mesh_.cells_of_edge(edge);
   if (!std::all_of(around.begin(), around.end(), [&](CellId c) { return scratch_.cells[c]; }))
     std::fill_n(storage_->held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
   for (const FacetId f : mesh_.facets_of_edge(edge))
-    if (!is_removed(f)) hold_components(i, mesh_.facet_tag(f));
+    if (!is_removed(f)) hold_by_facet(mesh_.facet_tag(f));
+  hold_by_ends();
 }
 
 template <int Dim>
@@ -447,10 +459,14 @@ template <int Dim>
 void LocalProblem<Dim>::set_quadrature(ConstVectorView x) {
   ElasticEnergy<Dim>& elastic = *storage_->potential->elastic();
   if (!state_.fields.levels.empty()) {
-    const std::uint8_t of_new = is_after_ ? state_.fields.level_of_new_cells(edit_) : std::uint8_t{0};
     QuadratureLevels levels;
+    std::size_t next = 0;  // of the edit's cells, of which the curved ones are here
+    const auto level_of_next = [&] {
+      while (curved_cell_after<Dim>(mesh_, edit_, edit_.inserted_cells[next].vertices).edges == 0) ++next;
+      return state_.fields.level_of_new_cell(edit_, next++);
+    };
     for (const auto& element : cells_.curved_elements)
-      levels.push_back(element.cell == kNone ? of_new : state_.fields.levels[element.cell]);
+      levels.push_back(element.cell == kNone ? level_of_next() : state_.fields.levels[element.cell]);
     elastic.set_quadrature_levels(levels);
   }
   elastic.refine_quadrature(x);

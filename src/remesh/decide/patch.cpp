@@ -8,7 +8,7 @@
 namespace itr {
 
 template <int Dim>
-void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, double total_volume,
+void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, double least_volume,
                   Marks& marks, std::vector<CellId>& patch) {
   marks.clear(mesh.cell_slots());
   patch.clear();
@@ -26,7 +26,7 @@ void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelax
         for (const CellId c : mesh.cells_of(v)) add(c);
     ring_begin = ring_end;
   }
-  if (options.relative_volume > 0) grow_to_volume(mesh, edit, options.relative_volume * total_volume, marks, patch);
+  if (least_volume > 0) grow_to_volume(mesh, edit, least_volume, marks, patch);
   std::sort(patch.begin(), patch.end());
 }
 

@@ -10,16 +10,16 @@
 namespace itr {
 
 /// The support of a trial, ascending: `options.rings` rings around the cells that the edit removes, as many whole rings as
-/// stay below `options.max_cells`; with a `relative_volume` at least that share of `total_volume` [m^Dim]. Both sides of a
+/// stay below `options.max_cells`; at least of `least_volume` [m^Dim] at rest. Both sides of a
 /// comparison use it.
 template <int Dim>
-void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, double total_volume,
+void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, double least_volume,
                   Marks& marks, std::vector<CellId>& patch);
 template <int Dim>
 std::vector<CellId> select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options,
-                                 double total_volume, Marks& marks) {
+                                 double least_volume, Marks& marks) {
   std::vector<CellId> patch;
-  select_patch(mesh, edit, options, total_volume, marks, patch);
+  select_patch(mesh, edit, options, least_volume, marks, patch);
   return patch;
 }
 

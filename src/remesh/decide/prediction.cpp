@@ -13,10 +13,10 @@
 #include <boost/container/small_vector.hpp>
 #include "energy/elastic/point.hpp"
 #include "energy/load_points.hpp"
+#include "geometry/measures.hpp"
 #include "itr/fem/mass.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/remesh/edits.hpp"
 #include "remesh/curved_cell.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 
@@ -421,7 +421,7 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!is_predictable(context)) return kUnknown;
+  if (!is_predictable(context)) return kCannotTell;
   const auto around = mesh.cells_of_edge(edge);
   const auto is_hard = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
   if (context.mass == MassKind::lumped || std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
@@ -437,12 +437,16 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   }
   const Vec<Dim> middle = (mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2;
   std::array<bool, Dim> held{};
+  const auto hold_by = [&](int tag) {
+    if (const auto it = context.held_components.find(tag); it != context.held_components.end())
+      for (int c = 0; c < Dim; ++c) held[c] = held[c] || it->second[c];
+  };
+  if (const int tag = mesh.edge_tag(edge); tag != kNoTag) hold_by(tag);
   for (const FacetId f : mesh.facets_of_edge(edge)) {
     std::array<Vec<Dim>, Dim> rest;
     for (int k = 0; k < Dim; ++k) rest[k] = mesh.rest(mesh.facet(f)[k]);
     model.add_curved_facet(rest, middle, mesh.facet_tag(f));
-    if (const auto it = context.held_components.find(mesh.facet_tag(f)); it != context.held_components.end())
-      for (int c = 0; c < Dim; ++c) held[c] = held[c] || it->second[c];
+    hold_by(mesh.facet_tag(f));
   }
   return -model.relaxed(held);
 }

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include <boost/container/small_vector.hpp>
-#include "itr/core/timer.hpp"
-#include "itr/remesh/edits.hpp"
+#include "core/timer.hpp"
 #include "prospect.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 
@@ -97,6 +97,9 @@ double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<
 template <int Dim>
 double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
   const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
+  // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
+  if ((options_.curve.enabled || mesh_.has_nodes()) && !is_predictable(context_))
+    return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch);
   if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
   const auto around = mesh_.cells_of_edge(edge);
   if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
@@ -127,10 +130,11 @@ void RemeshQueries<Dim>::find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scra
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::roughness(const EdgeKey& edge) const {
+double RemeshQueries<Dim>::roughness(const Place& place) const {
+  const auto edge = place.vertices();
   const auto& at_first = mesh_.cells_of(edge[0]);
   boost::container::small_vector<CellId, Dim == 2 ? 16 : 64> around(at_first.begin(), at_first.end());
-  if (edge[1] != kNone)
+  if (!place.is_vertex())
     for (const CellId c : mesh_.cells_of(edge[1]))
       if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around.push_back(c);
   const auto variation = [&](const VectorX& field, auto&& weight) {
@@ -149,7 +153,7 @@ double RemeshQueries<Dim>::roughness(const EdgeKey& edge) const {
   double result = context_.scaling * variation(fields_.x, stiffness);
   if (context_.has_inertia) {
     const double size =
-        edge[1] == kNone ? mesh_.volume(around[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
+        place.is_vertex() ? mesh_.volume(around[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
     const auto mass = [&](CellId c) { return size * mesh_.volume(c) * context_.materials.at(mesh_.body(c)).density; };
     result += variation(fields_.predictor, mass);
   }
@@ -169,8 +173,10 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
   const ScopedTimer timer(trial.seconds);
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
-  TrialOptions options{.required = context_.scaling * tolerance, .total_volume = total_volume_, .local = local};
-  if (options_.screening == Screening::bounds && edit.kind != Edit<Dim>::Kind::smooth &&
+  const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
+  TrialOptions options{.required = context_.scaling * tolerance, .local = local};
+  if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
+  if ((!baseline_ || baseline_->has_bounds()) && !moves &&
       (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   trial.is_asked = trial.was_previewed = true;

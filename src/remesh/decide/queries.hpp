@@ -8,12 +8,10 @@
 #include <vector>
 
 #include "prediction.hpp"
+#include "remesh/baselines/baseline.hpp"
 #include "trial.hpp"
 
 namespace itr {
-
-/// Whether predictions may leave out trials.
-inline bool screens(const RemeshOptions& options) { return options.screening != Screening::none; }
 
 /// Edges of those cells that are alive, ascending.
 template <int Dim>
@@ -23,13 +21,15 @@ template <int Dim>
 class RemeshQueries {
  public:
   RemeshQueries(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
-                const RemeshOptions& options, const Strata<Dim>& strata, const Gate<Dim>& gate)
+                const RemeshOptions& options, const Strata<Dim>& strata, const Gate<Dim>& gate,
+                const Baseline<Dim>* baseline)
       : mesh_(mesh),
         fields_(fields),
         context_(context),
         options_(options),
         strata_(strata),
         gate_(gate),
+        baseline_(baseline),
         total_volume_(mesh.total_volume()) {}
 
   const Mesh<Dim>& mesh() const { return mesh_; }
@@ -42,8 +42,9 @@ class RemeshQueries {
   bool is_cancelled() const { return context_.newton.is_cancelled(); }
 
   double rest_length(const EdgeKey& e) const { return (mesh_.rest(e[0]) - mesh_.rest(e[1])).norm(); }
-  bool exists(const EdgeKey& e) const {  ///< also of a vertex {v, kNone}
-    if (e[1] == kNone) return mesh_.is_vertex_alive(e[0]);
+  bool exists(const Place& place) const {
+    const auto e = place.vertices();
+    if (place.is_vertex()) return mesh_.is_vertex_alive(e[0]);
     return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && mesh_.are_joined(e[0], e[1]);
   }
   bool is_surface(const EdgeKey& e) const {
@@ -59,11 +60,12 @@ class RemeshQueries {
   bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
   /// The same of a trial's edge.
   void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;
-  /// How much the deformation and the history vary over the cells around an edge (a vertex {v, kNone}). No edit gains or
+  /// How much the deformation and the history vary over the cells around an edge or a vertex. No edit gains or
   /// loses energy where both are linear. [J, times the scaling, up to a factor]
-  double roughness(const EdgeKey& edge) const;
+  double roughness(const Place& place) const;
 
-  bool screens() const { return itr::screens(options_); }
+  /// Whether predictions may leave out trials.
+  bool screens() const { return !baseline_ || baseline_->predicts(); }
   /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
   double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance.value() : 0; }
   /// See prediction.hpp.
@@ -95,7 +97,9 @@ class RemeshQueries {
   bool has_short_halves(const EdgeKey& e) const;
   /// The same of the chords that the split of an edge would bring to the surface beside those halves.
   bool makes_short_chords(const EdgeKey& e) const;
-  RemeshState<Dim> state() const { return {mesh_, fields_, context_, gate_.present(), options_.history}; }
+  RemeshState<Dim> state() const {
+    return {mesh_, fields_, context_, gate_.present(), baseline_ ? baseline_->history() : HistoryRule::function};
+  }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
 
   const Mesh<Dim>& mesh_;
@@ -104,6 +108,7 @@ class RemeshQueries {
   const RemeshOptions& options_;
   const Strata<Dim>& strata_;
   const Gate<Dim>& gate_;
+  const Baseline<Dim>* baseline_;  ///< or null
   double total_volume_;
 };
 

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "itr/remesh/edits.hpp"
 #include "local_problem.hpp"
 #include "remesh/contact/gate.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/queue.hpp"
 
 namespace itr {
@@ -35,7 +35,7 @@ struct Verdict {
 /// What was found about a candidate on the mesh as it was when its wave began.
 template <int Dim>
 struct Trial {
-  EdgeQueue::Entry candidate;
+  PlaceQueue::Entry candidate;
   std::optional<Edit<Dim>> edit{};
   double signal = 0;  ///< see RemeshMemory
   bool in_contact = false;
@@ -45,7 +45,7 @@ struct Trial {
   double seconds = 0;       ///< of the preview
   Verdict<Dim> verdict{};
 
-  const EdgeKey& edge() const { return candidate.edge; }
+  EdgeKey edge() const { return candidate.place.edge(); }
   void refuse(Refusal reason) { verdict.refusal = reason; }
   /// Takes the edit of a proposal, or the reason why there is none. Returns whether there is one.
   bool take(Proposal<Dim> proposal) {
@@ -63,7 +63,7 @@ struct Trial {
 struct TrialOptions {
   double required = 0;           ///< least gain [J, times the scaling]
   double patch_over_vertex = 0;  ///< see prediction.hpp; 0: bounds decide nothing
-  double total_volume = 0;       ///< of the bodies at rest [m^Dim]
+  double least_volume = 0;       ///< of the patch at rest [m^Dim]
   LocalRelaxationOptions local;
 };
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <limits>
 
-#include "itr/geometry/measures.hpp"
-#include "itr/geometry/predicates.hpp"
-#include "itr/remesh/edits.hpp"
+#include "geometry/measures.hpp"
+#include "geometry/predicates.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 

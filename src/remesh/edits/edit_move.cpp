@@ -142,7 +142,7 @@ Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, Ver
   const Vec<Dim>& from = mesh.rest(vertex);
   const Vec<Dim> place =
       stratum == Stratum::volume ? target : Vec<Dim>(from + strata.tangent_projector(mesh, vertex) * (target - from));
-  Edit<Dim> edit{.kind = Edit<Dim>::Kind::smooth, .edge = {vertex, kNone}};
+  Edit<Dim> edit{.kind = Edit<Dim>::Kind::smooth};
   typename Edit<Dim>::Value value{vertex, place};
   if (!find_parents(mesh, vertex, place, value)) return refused<Dim>(Refusal::outside);
   const auto around = mesh.cells_of(vertex);

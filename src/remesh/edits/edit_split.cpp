@@ -105,27 +105,11 @@ Edit<Dim> make_straighten(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   return edit;
 }
 
-template <int Dim>
-Proposal<Dim> propose_split(const Mesh<Dim>& mesh, const EdgeKey& edge, const QualityRule& rule) {
-  const auto cells = mesh.cells_of_edge(edge);
-  if (cells.empty()) return refused<Dim>(Refusal::gone);
-  const double least = rule.least(worst_quality<Dim>(mesh, cells));
-  const Vec<Dim> middle = 0.5 * (mesh.rest(edge[0]) + mesh.rest(edge[1]));
-  for (const CellId c : cells)
-    for (const int end : edge) {
-      const double quality = quality_with<Dim>(mesh, mesh.cell(c), end, middle);
-      if (!(quality > 0 && quality >= least)) return refused<Dim>(Refusal::shape);
-    }
-  return {.edit = make_split(mesh, edge)};
-}
-
 template Edit<2> make_split<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_split<3>(const Mesh<3>&, const EdgeKey&);
 template Edit<2> make_curve<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_curve<3>(const Mesh<3>&, const EdgeKey&);
 template Edit<2> make_straighten<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_straighten<3>(const Mesh<3>&, const EdgeKey&);
-template Proposal<2> propose_split<2>(const Mesh<2>&, const EdgeKey&, const QualityRule&);
-template Proposal<3> propose_split<3>(const Mesh<3>&, const EdgeKey&, const QualityRule&);
 
 }  // namespace itr

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "edit_checks.hpp"
-#include "itr/mesh/edge_ring.hpp"
+#include "mesh/edge_ring.hpp"
 
 namespace itr {
 
@@ -149,7 +149,6 @@ Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, c
   if (ring->vertices.size() > kLongestRing) return refused<3>(Refusal::long_ring);
   const double least = rule.least(worst_quality<3>(mesh, ring->cells));
 
-  Proposal<3> proposal;
   Edit<3> edit{.kind = Edit<3>::Kind::swap, .edge = edge, .removed_cells = ring->cells};
   const auto polygons = polygons_of(mesh, *ring);
   for (const Polygon& polygon : polygons) {
@@ -159,7 +158,6 @@ Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, c
     for (const auto& [u, v] : cut.diagonals())
       if (mesh.are_joined(u, v)) return refused<3>(Refusal::exists);
     cut.append_cells(edit.inserted_cells);
-    proposal.cost += cut.cost();
   }
   if (along == Stratum::surface) {
     const auto& closing = polygons[0].vertices;
@@ -167,8 +165,7 @@ Proposal<3> propose_edge_removal(const Mesh<3>& mesh, const Strata<3>& strata, c
     if (has_tag(mesh, edge) || has_tag<3>(mesh, {closing.front(), closing.back()})) return refused<3>(Refusal::held);
     swap_facets(mesh, strata, *ring, edit);
   }
-  proposal.edit = std::move(edit);
-  return proposal;
+  return {.edit = std::move(edit)};
 }
 
 Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet& facet, const QualityRule& rule) {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
 namespace itr {
@@ -20,13 +20,15 @@ class Collapser {
         tolerance_(options_.acceptance_tolerance.value()) {}
 
   /// Shortest first.
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
-    if (!session_.culling().may_collapse(edge) || ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
-    return EdgeQueue::Entry{.edge = edge, .priority = -ask_.rest_length(edge)};
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
+    const EdgeKey edge = place.edge();
+    if (const auto* baseline = session_.baseline(); baseline && !baseline->may_collapse(edge)) return std::nullopt;
+    if (ask_.refuse_collapse(edge) != Refusal::none) return std::nullopt;
+    return PlaceQueue::Entry{.place = place, .priority = -ask_.rest_length(edge)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey& edge = trial.edge();
+    const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_collapse(edge); refusal != Refusal::none) return trial.refuse(refusal);
     if (session_.memory().depth(edge) >= options_.max_depth) return trial.refuse(Refusal::depth);
     trial.signal = ask_.roughness(edge);
@@ -39,7 +41,7 @@ class Collapser {
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+  void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
     OperationCount& count = session_.report().collapses;
     count.note(trial.verdict.refusal);
     if (!trial.is_asked) return;
@@ -72,7 +74,7 @@ class Collapser {
 template <int Dim>
 void collapse_edges(RemeshSession<Dim>& session) {
   Collapser<Dim> collapser(session);
-  run_waves(session, collapser, session.ask().mesh().edges());
+  run_waves(session, collapser, places(session.ask().mesh().edges()));
   session.memory().forget_depths();
 }
 

@@ -6,9 +6,9 @@
 #include <limits>
 #include <optional>
 
+#include "geometry/measures.hpp"
 #include "itr/energy/elastic/laws.hpp"
-#include "itr/geometry/measures.hpp"
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
 namespace itr {
@@ -74,13 +74,12 @@ class Mover {
         tolerance_(ask_.options().smooth.acceptance_tolerance.value()),
         one_ring_(ask_.options().local) {
     one_ring_.rings = 1;
-    one_ring_.relative_volume = 0;
   }
 
  protected:
   bool may_move(VertexId v) const { return mesh_.is_vertex_alive(v) && !mesh_.is_boundary(v); }
   void judge(Trial<Dim>& trial, const Vec<Dim>& target, double tolerance, LocalScratch<Dim>& scratch) const {
-    if (!trial.take(propose_move<Dim>(mesh_, ask_.strata(), trial.edge()[0], target))) return;
+    if (!trial.take(propose_move<Dim>(mesh_, ask_.strata(), trial.candidate.place.vertex(), target))) return;
     if (ask_.is_hopeless(trial.edit->removed_cells, ask_.predict(*trial.edit), tolerance))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, tolerance, one_ring_, scratch);
@@ -90,7 +89,7 @@ class Mover {
     OperationCount& count = session_.report().smooths;
     count.note(trial.verdict.refusal);
     if (!trial.is_asked || (trial.was_previewed && session_.commits().commit(trial, count))) return;
-    session_.memory().remember(kind, trial.edge(), {trial.signal / same, trial.signal * same, false});
+    session_.memory().remember(kind, trial.candidate.place, {trial.signal / same, trial.signal * same, false});
   }
 
   RemeshSession<Dim>& session_;
@@ -109,26 +108,26 @@ class ForceFollower : Mover<Dim> {
         worthwhile_(std::max(this->tolerance_, this->ask_.least_worthwhile())),
         least_promise_(this->ask_.screens() ? this->ask_.context().scaling * worthwhile_ : 0) {}
 
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
-    const VertexId v = vertex[0];
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
+    const VertexId v = place.vertex();
     if (!this->may_move(v)) return std::nullopt;
     const double promise = configurational_gradient(this->ask_, v).norm() * length(v);
-    return promise > least_promise_ ? std::optional(EdgeQueue::Entry{.edge = vertex, .priority = promise}) : std::nullopt;
+    return promise > least_promise_ ? std::optional(PlaceQueue::Entry{.place = place, .priority = promise}) : std::nullopt;
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const VertexId v = trial.edge()[0];
+    const VertexId v = trial.candidate.place.vertex();
     const Vec<Dim> gradient = configurational_gradient(this->ask_, v);
     const double force = gradient.norm();
     if (force * length(v) <= least_promise_ ||
-        this->session_.memory().was_refused(RemeshMemory::smooth, trial.edge(), force, false))
+        this->session_.memory().was_refused(RemeshMemory::smooth, trial.candidate.place, force, false))
       return;
     trial.signal = force;
     trial.is_asked = true;
     this->judge(trial, this->mesh_.rest(v) - length(v) / force * gradient, worthwhile_, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>&) { Mover<Dim>::settle(trial, RemeshMemory::smooth, kSameForce); }
+  void settle(Trial<Dim>& trial, std::vector<Place>&) { Mover<Dim>::settle(trial, RemeshMemory::smooth, kSameForce); }
 
  private:
   double length(VertexId v) const { return kStep * shortest_edge(this->mesh_, v); }
@@ -143,17 +142,18 @@ class ShapeBetterer : Mover<Dim> {
  public:
   explicit ShapeBetterer(RemeshSession<Dim>& session) : Mover<Dim>(session) {}
 
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& vertex, LocalScratch<Dim>&) const {
-    if (!this->may_move(vertex[0]) || worst_shape(this->mesh_, vertex[0]) < kBadShape) return std::nullopt;
-    if (!this->session_.shape_matters(vertex, this->ask_.roughness(vertex))) return std::nullopt;
-    return EdgeQueue::Entry{.edge = vertex, .priority = -static_cast<double>(vertex[0])};
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
+    const VertexId v = place.vertex();
+    if (!this->may_move(v) || worst_shape(this->mesh_, v) < kBadShape) return std::nullopt;
+    if (!this->session_.shape_matters(place, this->ask_.roughness(place))) return std::nullopt;
+    return PlaceQueue::Entry{.place = place, .priority = -static_cast<double>(v)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const VertexId v = trial.edge()[0];
+    const VertexId v = trial.candidate.place.vertex();
     trial.signal = worst_shape(this->mesh_, v);
     if (trial.signal < kBadShape ||
-        this->session_.memory().was_refused(RemeshMemory::reshape, trial.edge(), trial.signal, false))
+        this->session_.memory().was_refused(RemeshMemory::reshape, trial.candidate.place, trial.signal, false))
       return;
     trial.is_asked = true;
     const Vec<Dim> target = best_shaped_position<Dim>(this->mesh_, this->ask_.strata(), v, kShapeIterations);
@@ -163,15 +163,15 @@ class ShapeBetterer : Mover<Dim> {
       this->judge(trial, target, this->tolerance_, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>&) { Mover<Dim>::settle(trial, RemeshMemory::reshape, kSameShape); }
+  void settle(Trial<Dim>& trial, std::vector<Place>&) { Mover<Dim>::settle(trial, RemeshMemory::reshape, kSameShape); }
 };
 
 }  // namespace
 
 template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session) {
-  std::vector<EdgeKey> vertices;
-  for (VertexId v = 0; v < session.ask().mesh().vertex_slots(); ++v) vertices.push_back({v, kNone});
+  std::vector<Place> vertices;
+  for (VertexId v = 0; v < session.ask().mesh().vertex_slots(); ++v) vertices.push_back(Place::at_vertex(v));
   for (int round = 0; round < session.ask().options().smooth.max_iterations; ++round) {
     ForceFollower<Dim> follower(session);
     run_waves(session, follower, vertices);

@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <span>
 
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
 namespace itr {
 
 namespace {
-
-/// An edge to be curved stands in the queue with its larger vertex first, one to be split with the smaller.
-EdgeKey reversed(const EdgeKey& edge) { return {edge[1], edge[0]}; }
-bool is_to_be_curved(const EdgeKey& key) { return key[0] > key[1]; }
 
 template <int Dim>
 class Refiner {
@@ -25,33 +21,35 @@ class Refiner {
         curve_tolerance_(ask_.options().curve.acceptance_tolerance.value_or(tolerance_)) {}
 
   /// What there is to ask of these edges.
-  std::vector<EdgeKey> candidates(std::vector<EdgeKey> edges) const {
-    if (!ask_.options().curve.enabled) return edges;
-    std::vector<EdgeKey> keys;
-    keys.reserve(2 * edges.size());
-    if (options_.enabled) keys = edges;
-    for (const EdgeKey& edge : edges) keys.push_back(reversed(edge));
-    return keys;
+  std::vector<Place> candidates(const std::vector<EdgeKey>& edges) const {
+    const bool curves = ask_.options().curve.enabled;
+    std::vector<Place> found;
+    found.reserve(curves ? 2 * edges.size() : edges.size());
+    if (options_.enabled || !curves) found.assign(edges.begin(), edges.end());
+    if (curves)
+      for (const EdgeKey& edge : edges) found.push_back(Place::to_curve(edge));
+    return found;
   }
 
   // Most promising first. (The paper orders by energy density; this gains a fifth more with the same tolerance, or the same
   // with fewer vertices: verification/paper.)
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
-    if (is_to_be_curved(edge)) return rank_curve(edge, scratch);
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>& scratch) const {
+    const EdgeKey edge = place.edge();
+    if (place.is_to_curve()) return rank_curve(edge, scratch);
     if (session_.memory().depth(edge) >= options_.max_depth) return std::nullopt;
-    if (!session_.culling().may_split(edge)) return std::nullopt;
+    if (const auto* baseline = session_.baseline(); baseline && !baseline->may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_split(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
-    return EdgeQueue::Entry{
-        .edge = edge,
+    return PlaceQueue::Entry{
+        .place = place,
         .priority = gain / nodes_of_split(edge),
         .is_hopeless = !in_contact && ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, tolerance_)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey& edge = trial.edge();
-    if (is_to_be_curved(edge)) return look_at_curve(trial, scratch);
+    const EdgeKey edge = trial.edge();
+    if (trial.candidate.place.is_to_curve()) return look_at_curve(trial, scratch);
     if (const Refusal refusal = refuse(edge); refusal != Refusal::none) return trial.refuse(refusal);
     ask_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
@@ -63,13 +61,16 @@ class Refiner {
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
-    const bool curves = is_to_be_curved(trial.edge());
+  void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
+    const bool curves = trial.candidate.place.is_to_curve();
     OperationCount& count = curves ? session_.report().curves : session_.report().splits;
     count.note(trial.verdict.refusal);
-    if (!trial.is_asked) return note_refused(trial.signal);
+    if (!trial.is_asked) {
+      if (!curves) note_refused(trial.signal);
+      return;
+    }
     if (!session_.commits().commit(trial, count)) {
-      note_refused(trial.verdict.gain);
+      if (!curves) note_refused(trial.verdict.gain);
       return remember(trial, curves);
     }
     auto changed = std::span<const CellId>(trial.verdict.patch).last(trial.edit->inserted_cells.size());
@@ -83,31 +84,31 @@ class Refiner {
   }
 
   /// Counts what look would have: in free flight all edges are hopeless, and nothing is asked.
-  void pass_over(std::span<const EdgeQueue::Entry> entries) {
-    for (const EdgeQueue::Entry& entry : entries) {
-      const bool curves = is_to_be_curved(entry.edge);
-      const Refusal refusal = curves ? ask_.refuse_curve(reversed(entry.edge)) : refuse(entry.edge);
+  void pass_over(std::span<const PlaceQueue::Entry> entries) {
+    for (const PlaceQueue::Entry& entry : entries) {
+      const bool curves = entry.place.is_to_curve();
+      const Refusal refusal = curves ? ask_.refuse_curve(entry.place.edge()) : refuse(entry.place.edge());
       OperationCount& count = curves ? session_.report().curves : session_.report().splits;
       count.note(refusal == Refusal::none ? Refusal::prediction : refusal);
-      note_refused(entry.priority);
+      if (!curves) note_refused(entry.priority * nodes_of_split(entry.place.edge()));
     }
   }
 
  private:
-  std::optional<EdgeQueue::Entry> rank_curve(const EdgeKey& key, LocalScratch<Dim>& scratch) const {
-    const EdgeKey edge = reversed(key);
+  std::optional<PlaceQueue::Entry> rank_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
     if (ask_.refuse_curve(edge) != Refusal::none) return std::nullopt;
+    if (const auto* baseline = session_.baseline(); baseline && !baseline->may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_curve(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::curve, edge, gain, in_contact)) return std::nullopt;
-    return EdgeQueue::Entry{
-        .edge = key,
+    return PlaceQueue::Entry{
+        .place = Place::to_curve(edge),
         .priority = gain,
         .is_hopeless = !in_contact && ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, curve_tolerance_)};
   }
 
   void look_at_curve(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey edge = reversed(trial.edge());
+    const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_curve(edge); refusal != Refusal::none) return trial.refuse(refusal);
     ask_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
@@ -136,6 +137,7 @@ class Refiner {
 
   /// Bulk terms alone tell when a refused split can have become worthwhile; in contact any change may have done it.
   void remember(const Trial<Dim>& trial, bool curves) {
+    if (trial.verdict.refusal == Refusal::invalid) return;  // the history decided
     const double tolerance = curves ? curve_tolerance_ : tolerance_;
     const double signal = trial.signal, gain = trial.verdict.gain;
     RemeshMemory::SignalRange range{signal / kSameSignal, signal * kSameSignal, trial.in_contact};
@@ -144,8 +146,7 @@ class Refiner {
       range.least = 0;
       if (gain > 0) range.most = signal * std::max(kSameSignal, ask_.context().scaling * tolerance / (kMargin * gain));
     }
-    session_.memory().remember(curves ? RemeshMemory::curve : RemeshMemory::split,
-                               curves ? reversed(trial.edge()) : trial.edge(), range);
+    session_.memory().remember(curves ? RemeshMemory::curve : RemeshMemory::split, trial.edge(), range);
   }
 
   /// Rank and depth of the edges at the new vertex.
@@ -154,7 +155,7 @@ class Refiner {
     const auto ring = ask_.mesh().cells_of(created);
     for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ring)) {
       if (near[0] != created && near[1] != created) continue;
-      session_.culling().inherit(edge, near);
+      if (session_.baseline()) session_.baseline()->inherit(edge, near);
       session_.memory().set_depth(near, generation);
     }
   }

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/remesh/edits.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/wave.hpp"
 
 namespace itr {
@@ -21,16 +21,17 @@ class Straightener {
         count_(session.report().straightens) {}
 
   /// The cheapest first.
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>& scratch) const {
+    const EdgeKey edge = place.edge();
     if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_straighten(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact)) return std::nullopt;
-    return EdgeQueue::Entry{.edge = edge, .priority = gain};
+    return PlaceQueue::Entry{.place = place, .priority = gain};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey& edge = trial.edge();
+    const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_straighten(edge); refusal != Refusal::none) return trial.refuse(refusal);
     ask_.find_contact(trial, scratch);
     const double gain =
@@ -42,7 +43,7 @@ class Straightener {
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+  void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
     count_.note(trial.verdict.refusal);
     if (!trial.is_asked) return;
     if (session_.commits().commit(trial, count_)) {
@@ -51,6 +52,7 @@ class Straightener {
       fresh.insert(fresh.end(), near.begin(), near.end());
       return;
     }
+    if (trial.verdict.refusal == Refusal::invalid) return;              // the history decided
     constexpr double kNever = std::numeric_limits<double>::infinity();  // a rounder edge loses more
     session_.memory().remember(
         RemeshMemory::straighten, trial.edge(),
@@ -69,8 +71,8 @@ class Straightener {
 template <int Dim>
 void straighten_edges(RemeshSession<Dim>& session) {
   Straightener<Dim> straightener(session);
-  std::vector<EdgeKey> edges;
-  for (const auto& [edge, node] : session.ask().mesh().nodes()) edges.push_back(edge);
+  std::vector<Place> edges;
+  for (const auto& [edge, node] : session.ask().mesh().nodes()) edges.emplace_back(edge);
   run_waves(session, straightener, std::move(edges));
 }
 

@@ -84,13 +84,14 @@ class Swapper {
   explicit Swapper(RemeshSession<Dim>& session)
       : session_(session), ask_(session.ask()), options_(ask_.options().swap), policy_{ask_} {}
 
-  std::optional<EdgeQueue::Entry> rank(const EdgeKey& edge, LocalScratch<Dim>&) const {
+  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
+    const EdgeKey edge = place.edge();
     if (!policy_.may_go(edge) || (has_begun_ && !policy_.is_worth_asking_again(edge))) return std::nullopt;
-    return EdgeQueue::Entry{.edge = edge, .priority = policy_.priority(edge)};
+    return PlaceQueue::Entry{.place = place, .priority = policy_.priority(edge)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey& edge = trial.edge();
+    const EdgeKey edge = trial.edge();
     if (const auto it = tries_.find(edge); it != tries_.end() && it->second >= options_.max_depth)
       return trial.refuse(Refusal::depth);
     if (!ask_.exists(edge)) return trial.refuse(Refusal::gone);
@@ -106,7 +107,7 @@ class Swapper {
     ask_.judge(trial, least, ask_.options().local, scratch);
   }
 
-  void settle(Trial<Dim>& trial, std::vector<EdgeKey>& fresh) {
+  void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
     has_begun_ = true;
     OperationCount& count = session_.report().swaps;
     count.note(trial.verdict.refusal);
@@ -148,7 +149,7 @@ void remove_facets(RemeshSession<3>& session) {
       const auto& cells = proposal.edit->removed_cells;
       if (std::min(cells[0], cells[1]) != c || shape_gain(mesh, *proposal.edit) < 1 / kBetter) continue;
       if (!is_promising(ask, *proposal.edit, least)) continue;
-      Trial<3> trial{.candidate = {.edge = proposal.edit->edge, .priority = 0}, .edit = std::move(proposal.edit)};
+      Trial<3> trial{.candidate = {.place = proposal.edit->edge, .priority = 0}, .edit = std::move(proposal.edit)};
       session.commits().begin_wave();
       ask.judge(trial, least, ask.options().local, session.scratch());
       session.report().swaps.note(trial.verdict.refusal);
@@ -160,12 +161,12 @@ void remove_facets(RemeshSession<3>& session) {
 
 void swap_edges(RemeshSession<2>& session) {
   Swapper<2, DiagonalSwap> swapper(session);
-  run_waves(session, swapper, session.ask().mesh().edges());
+  run_waves(session, swapper, places(session.ask().mesh().edges()));
 }
 
 void swap_edges(RemeshSession<3>& session) {
   Swapper<3, EdgeRemoval> swapper(session);
-  run_waves(session, swapper, session.ask().mesh().edges());
+  run_waves(session, swapper, places(session.ask().mesh().edges()));
   remove_facets(session);
 }
 

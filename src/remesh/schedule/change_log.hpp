@@ -2,11 +2,13 @@
 // One record of what commits have changed, and the one place where an edit is applied: what follows the mesh registers here.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "itr/remesh/place.hpp"
 #include "remesh/decide/local_problem.hpp"
 
 namespace itr {
@@ -37,14 +39,14 @@ class ChangeLog {
 
   /// Number of the last commit.
   unsigned now() const { return static_cast<unsigned>(surfaces_.size()); }
-  /// Whether a commit after `since` replaced cells at an edge (a vertex {v, kNone}) or moved a vertex of these.
-  bool has_changed_around(const EdgeKey& e, unsigned since) const {
-    return touched_[e[0]].last_around > since || (e[1] != kNone && touched_[e[1]].last_around > since);
+  /// Whether a commit after `since` replaced cells at an edge or a vertex, or moved a vertex of these.
+  bool has_changed_around(const Place& place, unsigned since) const {
+    return std::ranges::any_of(place.vertices(), [&](VertexId v) { return touched_[v].last_around > since; });
   }
   /// Whether the first commit that did so was one up to `until`.
-  bool had_changed_around(const EdgeKey& e, unsigned until) const {
+  bool had_changed_around(const Place& place, unsigned until) const {
     const auto had = [&](VertexId v) { return touched_[v].first_around > 0 && touched_[v].first_around <= until; };
-    return had(e[0]) || (e[1] != kNone && had(e[1]));
+    return std::ranges::any_of(place.vertices(), had);
   }
   /// Whether one moved a vertex or gave it other cells.
   bool was_written(VertexId v, unsigned since) const { return touched_[v].written > since; }

@@ -17,9 +17,9 @@ class Committer {
 
   /// Begins a wave: the next two functions answer for commits after this call.
   void begin_wave() { wave_began_ = log_.now(); }
-  /// Whether a commit of this wave replaced cells at an edge (a vertex {v, kNone}) or moved their vertices. All trials of
-  /// the edge depend on these.
-  bool has_changed_around(const EdgeKey& e) const { return log_.has_changed_around(e, wave_began_); }
+  /// Whether a commit of this wave replaced cells at an edge or a vertex, or moved their vertices. All trials of
+  /// the place depend on these.
+  bool has_changed_around(const Place& place) const { return log_.has_changed_around(place, wave_began_); }
   /// Whether something else that a trial of the wave read has changed.
   bool was_overtaken(const Trial<Dim>& trial) const;
   /// Counts a judged trial, and commits it where it was accepted; the verdict's patch then has the new cells too. Returns

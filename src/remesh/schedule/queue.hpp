@@ -7,23 +7,23 @@
 #include <unordered_map>
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/remesh/place.hpp"
 
 namespace itr {
 
-/// Edges (a vertex v is {v, kNone}) in order of descending priority, ties by key. One that is pushed again moves. Priorities
+/// Places in order of descending priority, ties by their own. One that is pushed again moves. Priorities
 /// count to four digits: those of mirror images differ by the round-off of a solve, which is not to decide what is done
 /// first.
-class EdgeQueue {
+class PlaceQueue {
  public:
   struct Entry {
-    EdgeKey edge;
+    Place place;
     double priority;
     unsigned since = 0;        ///< commit after which that was found
     bool is_hopeless = false;  ///< nothing to gain, then
   };
 
-  /// Several at once, each edge once.
+  /// Several at once, each place once.
   void push(std::vector<Entry> entries) {
     if (!heap_.empty() || !last_.empty()) {
       for (const Entry& entry : entries) push(entry);
@@ -35,7 +35,7 @@ class EdgeQueue {
   }
   void push(Entry entry) {
     entry.priority = rounded(entry.priority);
-    last_[entry.edge] = entry.priority;
+    last_[entry.place] = entry.priority;
     heap_.push_back(entry);
     std::push_heap(heap_.begin(), heap_.end(), is_after);
   }
@@ -46,7 +46,7 @@ class EdgeQueue {
       const Entry entry = heap_.back();
       heap_.pop_back();
       if (last_.empty()) return entry;
-      const auto it = last_.find(entry.edge);
+      const auto it = last_.find(entry.place);
       if (it == last_.end()) return entry;
       if (it->second != entry.priority) continue;  // moved, or popped since
       it->second.reset();
@@ -62,11 +62,11 @@ class EdgeQueue {
     return std::isfinite(priority) ? std::ldexp(std::round(fraction * 16384), exponent - 14) : priority;
   }
   static bool is_after(const Entry& a, const Entry& b) {
-    return a.priority != b.priority ? a.priority < b.priority : a.edge > b.edge;
+    return a.priority != b.priority ? a.priority < b.priority : a.place > b.place;
   }
   std::vector<Entry> heap_;
-  /// Priorities of edges that did not come first; none: popped.
-  std::unordered_map<EdgeKey, std::optional<double>, EdgeKeyHash> last_;
+  /// Priorities of places that did not come first; none: popped.
+  std::unordered_map<Place, std::optional<double>, Place::Hash> last_;
 };
 
 }  // namespace itr

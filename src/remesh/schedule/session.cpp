@@ -3,19 +3,44 @@
 
 #include <algorithm>
 
-#include "itr/core/check.hpp"
-#include "itr/mesh/validate.hpp"
-#include "itr/remesh/edits.hpp"
+#include "core/check.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
+#include "mesh/validate.hpp"
+#include "remesh/curved_cell.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 
+namespace {
+
+/// A cell that is inverted somewhere, now or in the history, on a mesh with curved edges.
+template <int Dim>
+[[maybe_unused]] CellId find_inverted_curved(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields) {
+  const Edit<Dim> none;
+  const auto is_inverted = [&](CellId c, const VectorX& x) {
+    const auto cell = curved_cell_after<Dim>(mesh, none, mesh.cell(c));
+    return !is_positive_everywhere_exact<Dim>(cell.values(x, none));
+  };
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    if (is_inverted(c, fields.x)) return c;
+    for (const VectorX& past : fields.past_positions)
+      if (is_inverted(c, past)) return c;
+  }
+  return kNone;
+}
+
+}  // namespace
+
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
-                                  const RemeshOptions& options, const RemeshMemory& memory, Strata<Dim>& strata)
-    : gate_(mesh, fields, context),
+                                  const RemeshOptions& options, std::unique_ptr<Baseline<Dim>> baseline,
+                                  const RemeshMemory& memory, Strata<Dim>& strata)
+    : baseline_(std::move(baseline)),
+      gate_(mesh, fields, context),
       log_(mesh, fields.x, context.contact.enabled),
-      ask_(mesh, fields, context, options, strata, gate_),
-      memory_(memory, options.screening, log_),
+      ask_(mesh, fields, context, options, strata, gate_, baseline_.get()),
+      memory_(memory, !baseline_ || baseline_->has_bounds(), log_),
       commits_(mesh, gate_, log_),
       lanes_(context.host.empty() ? num_threads() : 1) {  // terms of the program may not be for several threads
   if (strata.empty()) strata = Strata<Dim>(mesh);
@@ -35,17 +60,19 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   log_.add_follower([&](const Change<Dim>&) {
     ITR_AUDIT(mesh.find_defect().empty(), mesh.find_defect());
     ITR_AUDIT(mesh.has_nodes() || find_inverted<Dim>(mesh, fields.x) == kNone);
+    ITR_AUDIT(!mesh.has_nodes() || find_inverted_curved(mesh, fields) == kNone);
   });
 }
 
 template <int Dim>
-bool RemeshSession<Dim>::shape_matters(const EdgeKey& e, double roughness) const {
-  if (!ask_.screens() || roughness >= ask_.context().scaling * ask_.least_worthwhile() || memory_.was_gain(e)) return true;
+bool RemeshSession<Dim>::shape_matters(const Place& place, double roughness) const {
+  if (!ask_.screens() || roughness >= ask_.context().scaling * ask_.least_worthwhile() || memory_.was_gain(place))
+    return true;
   const Mesh<Dim>& mesh = ask_.mesh();
-  const auto around = mesh.cells_of(e[0]);
+  const auto around = mesh.cells_of(place.vertices().front());
   return std::any_of(around.begin(), around.end(), [&](CellId c) {
     const auto& cell = mesh.cell(c);
-    return (e[1] == kNone || std::find(cell.begin(), cell.end(), e[1]) != cell.end()) &&
+    return std::find(cell.begin(), cell.end(), place.vertices().back()) != cell.end() &&
            mesh.quality(c) < QualityRule{}.floor;
   });
 }

@@ -4,13 +4,14 @@
 
 #include <atomic>
 #include <deque>
+#include <memory>
 #include <vector>
 
 #include "committer.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "remesh/baselines/culling.hpp"
+#include "remesh/baselines/baseline.hpp"
 #include "remesh/decide/queries.hpp"
 #include "session_memory.hpp"
 
@@ -20,7 +21,7 @@ template <int Dim>
 class RemeshSession {
  public:
   RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context, const RemeshOptions& options,
-                const RemeshMemory& memory, Strata<Dim>& strata);
+                std::unique_ptr<Baseline<Dim>> baseline, const RemeshMemory& memory, Strata<Dim>& strata);
   RemeshSession(const RemeshSession&) = delete;
   RemeshSession& operator=(const RemeshSession&) = delete;
 
@@ -28,17 +29,18 @@ class RemeshSession {
   SessionMemory<Dim>& memory() { return memory_; }
   const SessionMemory<Dim>& memory() const { return memory_; }
   Committer<Dim>& commits() { return commits_; }
-  Culling<Dim>& culling() { return culling_; }
-  const Culling<Dim>& culling() const { return culling_; }
+  /// Null where options choose none.
+  Baseline<Dim>* baseline() { return baseline_.get(); }
+  const Baseline<Dim>* baseline() const { return baseline_.get(); }
   RemeshReport& report() { return report_; }
 
-  /// Whether badly shaped cells at an edge (a vertex {v, kNone}) do harm. They do where the fields vary enough, where an
+  /// Whether badly shaped cells at an edge or a vertex do harm. They do where the fields vary enough, where an
   /// edit nearby gained energy, and where a shape is so bad that rules only allow it to improve. Elsewhere swaps and moves
   /// for better shapes would be wasted work.
-  bool shape_matters(const EdgeKey& e, double roughness) const;
-  /// Whether bulk terms at an entry's edge are as they were when it was stamped.
-  bool is_unchanged(const EdgeQueue::Entry& entry) const { return !log_.has_changed_around(entry.edge, entry.since); }
-  EdgeQueue::Entry stamped(EdgeQueue::Entry entry) const {
+  bool shape_matters(const Place& place, double roughness) const;
+  /// Whether bulk terms at an entry's place are as they were when it was stamped.
+  bool is_unchanged(const PlaceQueue::Entry& entry) const { return !log_.has_changed_around(entry.place, entry.since); }
+  PlaceQueue::Entry stamped(PlaceQueue::Entry entry) const {
     entry.since = log_.now();
     return entry;
   }
@@ -57,12 +59,12 @@ class RemeshSession {
   LocalScratch<Dim>& scratch() { return lanes_.front(); }
 
  private:
+  std::unique_ptr<Baseline<Dim>> baseline_;
   Gate<Dim> gate_;
   ChangeLog<Dim> log_;
   RemeshQueries<Dim> ask_;
   SessionMemory<Dim> memory_;
   Committer<Dim> commits_;
-  Culling<Dim> culling_;
   std::deque<LocalScratch<Dim>> lanes_;
   RemeshReport report_;
 };

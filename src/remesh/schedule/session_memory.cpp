@@ -6,11 +6,11 @@
 namespace itr {
 
 template <int Dim>
-SessionMemory<Dim>::SessionMemory(const RemeshMemory& memory, Screening screening, const ChangeLog<Dim>& log)
-    : log_(log), remembers_(screening == Screening::bounds) {
+SessionMemory<Dim>::SessionMemory(const RemeshMemory& memory, bool remembers, const ChangeLog<Dim>& log)
+    : log_(log), remembers_(remembers) {
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
     refused_[kind].reserve(2 * memory.refusals[kind].size());
-    for (const auto& [edge, range] : memory.refusals[kind]) refused_[kind][edge] = range;
+    for (const auto& [place, range] : memory.refusals[kind]) refused_[kind].emplace(place, range);
   }
 }
 
@@ -21,15 +21,15 @@ void SessionMemory<Dim>::follow(const Mesh<Dim>& mesh, const Change<Dim>& change
 }
 
 template <int Dim>
-RemeshMemory SessionMemory<Dim>::remembered(const RemeshQueries<Dim>& ask) const {
-  RemeshMemory memory;
+RemeshMemory::Refusals SessionMemory<Dim>::remembered(const RemeshQueries<Dim>& ask) const {
+  RemeshMemory::Refusals refusals;
   for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
-    auto& list = memory.refusals[kind];
-    for (const auto& [edge, range] : refused_[kind])
-      if (ask.exists(edge)) list.push_back({edge, range});
-    std::sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.edge < y.edge; });
+    auto& list = refusals[kind];
+    for (const auto& [place, range] : refused_[kind])
+      if (ask.exists(place)) list.push_back({place, range});
+    std::sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.place < y.place; });
   }
-  return memory;
+  return refusals;
 }
 
 template class SessionMemory<2>;

@@ -17,21 +17,21 @@ inline constexpr double kSameSignal = 1.2;
 template <int Dim>
 class SessionMemory {
  public:
-  /// Remembers refusals only with screening by bounds.
-  SessionMemory(const RemeshMemory& memory, Screening screening, const ChangeLog<Dim>& log);
+  /// `remembers`: refusals.
+  SessionMemory(const RemeshMemory& memory, bool remembers, const ChangeLog<Dim>& log);
   /// Forgets refusals of the edges of new cells.
   void follow(const Mesh<Dim>& mesh, const Change<Dim>& change);
   /// Refusals of edges that are still there.
-  RemeshMemory remembered(const RemeshQueries<Dim>& ask) const;
+  RemeshMemory::Refusals remembered(const RemeshQueries<Dim>& ask) const;
 
   /// Whether the same edit was refused before and its signal is still in the refusal's range.
-  bool was_refused(RemeshMemory::Kind kind, const EdgeKey& edge, double signal, bool in_contact) const {
+  bool was_refused(RemeshMemory::Kind kind, const Place& place, double signal, bool in_contact) const {
     if (!remembers_) return false;
-    const auto it = refused_[kind].find(edge);
+    const auto it = refused_[kind].find(place);
     return it != refused_[kind].end() && it->second.holds(signal, in_contact);
   }
-  void remember(RemeshMemory::Kind kind, const EdgeKey& edge, const RemeshMemory::SignalRange& range) {
-    if (remembers_) refused_[kind][edge] = range;
+  void remember(RemeshMemory::Kind kind, const Place& place, const RemeshMemory::SignalRange& range) {
+    if (remembers_) refused_[kind][place] = range;
   }
 
   /// Generations of an edge in this pass.
@@ -44,12 +44,12 @@ class SessionMemory {
 
   /// Marks the places of all commits so far as gains: cells there may be badly shaped.
   void mark_gains() { gains_until_ = log_.now(); }
-  bool was_gain(const EdgeKey& e) const { return log_.had_changed_around(e, gains_until_); }
+  bool was_gain(const Place& place) const { return log_.had_changed_around(place, gains_until_); }
 
  private:
   const ChangeLog<Dim>& log_;
   bool remembers_;
-  std::array<std::unordered_map<EdgeKey, RemeshMemory::SignalRange, EdgeKeyHash>, RemeshMemory::kKinds> refused_;
+  std::array<std::unordered_map<Place, RemeshMemory::SignalRange, Place::Hash>, RemeshMemory::kKinds> refused_;
   std::unordered_map<EdgeKey, int, EdgeKeyHash> depth_;
   unsigned gains_until_ = 0;
 };

@@ -21,26 +21,28 @@ inline constexpr int kSmallestWave = 8, kLargestWave = 256;
 inline constexpr double kTolerableWaste = 0.1;
 
 /// What waves are made for. `rank` gives a candidate its place in the queue, or leaves it out. `look` examines one and may
-/// preview an edit. `settle` may commit it, and adds edges to `fresh` that are to be ranked (again).
+/// preview an edit. `settle` may commit it, and adds places to `fresh` that are to be ranked (again).
 template <typename T, int Dim>
-concept Operation = requires(const T& asked, T& settled, const EdgeKey& edge, Trial<Dim>& trial, LocalScratch<Dim>& scratch,
-                             std::vector<EdgeKey>& fresh) {
-  { asked.rank(edge, scratch) } -> std::same_as<std::optional<EdgeQueue::Entry>>;
+concept Operation = requires(const T& asked, T& settled, const Place& place, Trial<Dim>& trial, LocalScratch<Dim>& scratch,
+                             std::vector<Place>& fresh) {
+  { asked.rank(place, scratch) } -> std::same_as<std::optional<PlaceQueue::Entry>>;
   { asked.look(trial, scratch) } -> std::same_as<void>;
   { settled.settle(trial, fresh) } -> std::same_as<void>;
 };
 /// One that calls candidates hopeless also counts them where there are no others.
 template <typename T, int Dim>
-concept PassingOperation = Operation<T, Dim> && requires(T& operation, std::span<const EdgeQueue::Entry> hopeless) {
+concept PassingOperation = Operation<T, Dim> && requires(T& operation, std::span<const PlaceQueue::Entry> hopeless) {
   { operation.pass_over(hopeless) } -> std::same_as<void>;
 };
 
-/// Settles candidates of an operation until there are none. `fresh` are edges (a vertex v is {v, kNone}) to be ranked: at
-/// first these, each once.
+/// Edges as places.
+inline std::vector<Place> places(const std::vector<EdgeKey>& edges) { return {edges.begin(), edges.end()}; }
+
+/// Settles candidates of an operation until there are none. `fresh` are to be ranked: at first these, each once.
 template <int Dim, Operation<Dim> T>
-void run_waves(RemeshSession<Dim>& session, T& operation, std::vector<EdgeKey> fresh) {
-  EdgeQueue queue;
-  std::vector<std::optional<EdgeQueue::Entry>> ranked;
+void run_waves(RemeshSession<Dim>& session, T& operation, std::vector<Place> fresh) {
+  PlaceQueue queue;
+  std::vector<std::optional<PlaceQueue::Entry>> ranked;
   std::vector<Trial<Dim>> wave(kLargestWave);
   int size = kSmallestWave;
   // A single thread previews each candidate at its turn, and leaves out those that are lost by then. This finds the same.
@@ -67,11 +69,11 @@ void run_waves(RemeshSession<Dim>& session, T& operation, std::vector<EdgeKey> f
       for (std::size_t i = first; i < std::min(fresh.size(), first + kChunk); ++i)
         if (session.ask().exists(fresh[i])) ranked[i] = operation.rank(fresh[i], scratch);
     });
-    std::vector<EdgeQueue::Entry> entries;
+    std::vector<PlaceQueue::Entry> entries;
     for (const auto& entry : ranked)
       if (entry) entries.push_back(session.stamped(*entry));
     if constexpr (PassingOperation<T, Dim>) {
-      const auto is_hopeless = [](const EdgeQueue::Entry& entry) { return entry.is_hopeless; };
+      const auto is_hopeless = [](const PlaceQueue::Entry& entry) { return entry.is_hopeless; };
       if (count == 0 && std::all_of(entries.begin(), entries.end(), is_hopeless)) return operation.pass_over(entries);
     }
     queue.push(std::move(entries));
@@ -80,7 +82,7 @@ void run_waves(RemeshSession<Dim>& session, T& operation, std::vector<EdgeKey> f
     session.commits().begin_wave();
     int wasted = 0;
     for (Trial<Dim>& trial : std::span(wave).first(count)) {
-      bool is_lost = session.commits().has_changed_around(trial.edge());
+      bool is_lost = session.commits().has_changed_around(trial.candidate.place);
       if (is_alone && !is_lost) look(trial, session.scratch());
       is_lost = is_lost || session.commits().was_overtaken(trial);
       if (is_lost)

@@ -2,7 +2,7 @@
 // The middle of a time step: remesh where that lowers the step's energy, carry the state over to the new mesh.
 #pragma once
 
-#include "itr/simulation/step.hpp"
+#include "simulation/step.hpp"
 
 namespace itr {
 

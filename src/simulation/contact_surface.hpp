@@ -4,10 +4,10 @@
 #include <memory>
 #include <vector>
 
+#include "geometry/closed_surface.hpp"
 #include "itr/energy/contact/surface.hpp"
 #include "itr/fem/space.hpp"
 #include "itr/fem/vertex_map.hpp"
-#include "itr/geometry/closed_surface.hpp"
 #include "itr/simulation/setup.hpp"
 
 namespace itr {

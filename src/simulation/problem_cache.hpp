@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "itr/newton/newton.hpp"
-#include "itr/simulation/contact_surface.hpp"
+#include "simulation/contact_surface.hpp"
 
 namespace itr {
 

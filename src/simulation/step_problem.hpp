@@ -6,9 +6,9 @@
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
 #include "itr/simulation/frame.hpp"
-#include "itr/simulation/problem_cache.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/time/integrator.hpp"
+#include "simulation/problem_cache.hpp"
 
 namespace itr {
 

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "itr/geometry/closed_surface.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
@@ -26,9 +25,5 @@ bool is_positively_oriented(const typename MeshTypes<Dim>::Cell& cell, ConstVect
 /// The first cell (index among alive ids) that is not positively oriented at these positions, decided exactly; kNone: none.
 template <int Dim>
 CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView positions);
-
-/// The boundary of the mesh at these positions.
-template <int Dim>
-ClosedSurface<Dim> boundary_at(const Mesh<Dim>& mesh, ConstVectorView positions);
 
 }  // namespace itr

@@ -18,7 +18,6 @@ template <int Dim>
 struct Proposal {
   std::optional<Edit<Dim>> edit{};
   Refusal refusal = Refusal::none;
-  double cost = 0;  ///< of the inserted cells, where the operation minimised one
 
   explicit operator bool() const { return edit.has_value(); }
 };
@@ -31,17 +30,12 @@ struct QualityRule {
   double floor = 0.1;
   double least(double worst_before) const { return std::max(share * worst_before, std::min(floor, worst_before)); }
 };
-/// A split halves volumes wherever it is wanted: only needles are kept from getting worse.
-inline constexpr QualityRule kSplitRule{.share = 0, .floor = 1e-4};
 
 /// Splits an edge at its midpoint: every incident cell and boundary facet becomes two. Fields keep their values everywhere:
 /// the new vertex takes the node of its edge or the mean of the ends, halves of a curved edge are curved, and so is an edge
 /// from the new vertex along which the old functions are quadratic.
 template <int Dim>
 Edit<Dim> make_split(const Mesh<Dim>& mesh, const EdgeKey& edge);
-/// The same where the edge is there and the new cells keep the rule.
-template <int Dim>
-Proposal<Dim> propose_split(const Mesh<Dim>& mesh, const EdgeKey& edge, const QualityRule& rule = kSplitRule);
 
 /// Makes an edge curved. Its node is at the mean of the ends at rest and in all fields. The cells and boundary facets at the
 /// edge are replaced by themselves, so that whoever looks for changed ones finds them.

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "itr/simulation/simulation.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 namespace itr {
 

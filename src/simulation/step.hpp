@@ -3,7 +3,7 @@
 
 #include "itr/core/log.hpp"
 #include "itr/simulation/simulation.hpp"
-#include "itr/simulation/step_problem.hpp"
+#include "simulation/step_problem.hpp"
 
 namespace itr {
 

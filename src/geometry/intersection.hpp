@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
+#include "geometry/measures.hpp"
 #include "itr/core/types.hpp"
-#include "itr/geometry/measures.hpp"
 
 namespace itr {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/geometry/bvh.hpp"
+#include "geometry/bvh.hpp"
 
 namespace itr {
 
