@@ -113,6 +113,40 @@ TEST(CurvedHost, AStateOfAnAdaptedMeshHasItsOwnLevelsOfQuadrature) {
   EXPECT_NO_THROW(simulation.restore(std::move(state)));
 }
 
+/// A block that is squeezed until a cell with curved edges stops Newton.
+Setup<2> squeezed_block() {
+  auto setup = block<2>();
+  setup.body_acceleration = nullptr;
+  setup.time = {.dt = 0.02, .steps = 1000};
+  setup.order[1] = 2;
+  setup.materials[1].youngs_modulus = 2e4;
+  for (int f = 0; f < setup.mesh.facet_slots(); ++f) {
+    double bottom = 0;
+    for (const int v : setup.mesh.facet(f)) bottom = std::max(bottom, setup.mesh.rest(v)[1]);
+    if (bottom < 1e-9) setup.mesh.set_facet_tag(f, 4);
+  }
+  setup.dirichlet.push_back({4, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }});
+  setup.dirichlet.push_back({2, {true, true}, [](const Vec<2>&, double t) { return Vec<2>(0.3 * t, -0.3 * t); }});
+  setup.newton.step_tolerance = setup.newton.gradient_tolerance = 1e-8;
+  return setup;
+}
+
+TEST(CurvedHost, AStepThatCurvedCellsStopIsTakenAgainWithStraightEdges) {
+  auto setup = squeezed_block();
+  auto fixed = simulate(setup);
+  int steps = 0;
+  StepResult last;
+  while ((last = fixed.advance()).ok && steps < 30) std::cout << ++steps << " " << last.report.min_volume_ratio << "\n";
+  std::cout << steps << last.reason << "\n";
+  setup.remesh.enabled = true;
+  setup.remesh.collapse.enabled = false;
+  setup.remesh.split.acceptance_tolerance = 1e9;
+  auto simulation = simulate(setup);
+  steps = 0;
+  while ((last = simulation.advance()).ok && steps < 30) std::cout << ++steps << " " << last.report.min_volume_ratio << ' ' << simulation.state().space.num_curved() << "\n";
+  std::cout << steps << last.reason << "\n";
+}
+
 TEST(CurvedHost, RemeshingMayBeSwitchedOnLater) {
   auto setup = pressed_block();
   setup.remesh = {};
