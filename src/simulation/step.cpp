@@ -320,6 +320,7 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
   std::vector<CellId> blocking;
   StepResult result = take_step_on_mesh(tools, before, after, damped, start, blocking);
   if (result.ok || blocking.empty()) return result;
+  // Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
   StepReport effort = result.report;
   State<Dim> from = before;
   MeshRenumbering renumbering;
@@ -329,9 +330,8 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     if (!change) return result;
     renumbering = renumbering.empty() ? *change : compose(renumbering, *change);
     from = std::move(straightened);
-    tools.logger.warning(
-        fmt::format("step {}: {}; takes the step again with {} curved edges fewer, where cells were nearly inverted",
-                    result.report.step, result.reason, before.space.num_curved() - from.space.num_curved()));
+    tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", result.report.step,
+                                     before.space.num_curved() - from.space.num_curved(), result.reason));
     result = take_step_on_mesh(tools, from, after, damped, start, blocking);
     if (!result.ok) effort.add_effort(result.report);
   }
