@@ -331,62 +331,20 @@ class NodalModels {
     const StepContext<Dim>& context = state_.context;
     const auto cell =
         curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(state_.mesh, edit, a, b); });
-    std::array<Vec<Dim>, Dim + 1> rest;
+    PlacedCell placed{cell.edges, {}, cell.values(state_.fields.x, edit), context.materials.at(body), {}};
     for (int k = 0; k <= Dim; ++k) {
       const VertexId v = vertices[k];
-      rest[k] = edit.value && v == edit.value->vertex ? edit.value->rest : state_.mesh.rest(v);
+      placed.rest[k] = edit.value && v == edit.value->vertex ? edit.value->rest : state_.mesh.rest(v);
     }
-    const Mat<Dim> edges = edge_matrix<Dim>(rest);
-    const auto linear = barycentric_gradients<Dim>(edges.inverse());
-    const double volume = simplex_volume<Dim>(edges);
-    const Material& material = context.materials.at(body);
-    std::array<Model*, kQuadraticNodes<Dim>> models{};
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
       if (k <= Dim || cell.edges >> (k - Dim - 1) & 1) model(cell.nodes[k]);
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // all are there: none moves any more
-      if (k <= Dim || cell.edges >> (k - Dim - 1) & 1) models[k] = &model(cell.nodes[k]);
-    const auto place = [&](const auto& l) {
-      Vec<Dim> X = Vec<Dim>::Zero();
-      for (int k = 0; k <= Dim; ++k) X += l[k] * rest[k];
-      return X;
-    };
-    const QuadraticCell<Dim> x = cell.values(state_.fields.x, edit);
-    for (const auto& point : quadrature<Dim>(cell.edges ? context.quadrature_degree : 1)) {
-      const auto shapes = quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear);
-      const ElasticModuli moduli = elastic_moduli<Dim>(material, place(point.weights));
-      const Mat<Dim> F = x * shapes.transpose();
-      const ElasticPoint<Dim> response(F, moduli);
-      const double weight = context.scaling * volume * point.share;
-      energy_ += weight * response.density();
-      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
-        if (!models[k]) continue;
-        models[k]->gradient += weight * response.gradient(shapes.col(k));
-        models[k]->hessian += weight * response.hessian(shapes.col(k));
-      }
-    }
+      if (k <= Dim || cell.edges >> (k - Dim - 1) & 1) placed.models[k] = &model(cell.nodes[k]);
+    add_elasticity(placed);
     if (!context.has_inertia && !context.loads.acceleration) return;
-    QuadraticCell<Dim> way = x;
+    QuadraticCell<Dim> way = placed.x;
     if (context.has_inertia) way -= cell.values(state_.fields.predictor, edit);
-    for (const auto& point : quadrature<Dim>(cell.edges ? kMassDegree : 2)) {
-      const auto shapes = quadratic_shapes<Dim>(cell.edges, point.weights);
-      const Vec<Dim> X = place(point.weights);
-      const double weight = point.share * mass_density<Dim>(material, X) * volume;
-      Vec<Dim> force = Vec<Dim>::Zero();
-      if (context.has_inertia) {
-        force = weight * way * shapes;
-        energy_ += 0.5 / weight * force.squaredNorm();
-      }
-      if (context.loads.acceleration) {
-        const Vec<Dim> load = context.scaling * weight * context.loads.acceleration(X);
-        energy_ -= load.dot(x * shapes - X);
-        force -= load;
-      }
-      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
-        if (!models[k]) continue;
-        models[k]->gradient += shapes[k] * force;
-        if (context.has_inertia) models[k]->hessian.diagonal().array() += weight * shapes[k] * shapes[k];
-      }
-    }
+    add_mass_and_weight(placed, way);
   }
   double energy() const { return energy_; }
   const auto& models() const { return models_; }
@@ -396,12 +354,71 @@ class NodalModels {
   }
 
  private:
+  struct PlacedCell {
+    CurvedEdges edges;
+    std::array<Vec<Dim>, Dim + 1> rest;
+    QuadraticCell<Dim> x;
+    const Material& material;
+    std::array<Model*, kQuadraticNodes<Dim>> models;  ///< null at straight edges
+    Vec<Dim> place(const std::array<double, Dim + 1>& l) const {
+      Vec<Dim> X = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) X += l[k] * rest[k];
+      return X;
+    }
+  };
+
   Model& model(VertexId id) {
     const auto it = std::find_if(models_.begin(), models_.end(), [&](const Model& model) { return model.id == id; });
     if (it != models_.end()) return *it;
     models_.push_back({id});
     return models_.back();
   }
+
+  void add_elasticity(const PlacedCell& cell) {
+    const Mat<Dim> edges = edge_matrix<Dim>(cell.rest);
+    const auto linear = barycentric_gradients<Dim>(edges.inverse());
+    const double volume = simplex_volume<Dim>(edges);
+    for (const auto& point : quadrature<Dim>(cell.edges ? state_.context.quadrature_degree : 1)) {
+      const auto shapes = quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear);
+      const ElasticModuli moduli = elastic_moduli<Dim>(cell.material, cell.place(point.weights));
+      const Mat<Dim> F = cell.x * shapes.transpose();
+      const ElasticPoint<Dim> response(F, moduli);
+      const double weight = state_.context.scaling * volume * point.share;
+      energy_ += weight * response.density();
+      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
+        if (!cell.models[k]) continue;
+        cell.models[k]->gradient += weight * response.gradient(shapes.col(k));
+        cell.models[k]->hessian += weight * response.hessian(shapes.col(k));
+      }
+    }
+  }
+
+  /// `way`: from the predictor, where there is inertia.
+  void add_mass_and_weight(const PlacedCell& cell, const QuadraticCell<Dim>& way) {
+    const StepContext<Dim>& context = state_.context;
+    const double volume = simplex_volume<Dim>(edge_matrix<Dim>(cell.rest));
+    for (const auto& point : quadrature<Dim>(cell.edges ? kMassDegree : 2)) {
+      const auto shapes = quadratic_shapes<Dim>(cell.edges, point.weights);
+      const Vec<Dim> X = cell.place(point.weights);
+      const double weight = point.share * mass_density<Dim>(cell.material, X) * volume;
+      Vec<Dim> force = Vec<Dim>::Zero();
+      if (context.has_inertia) {
+        force = weight * way * shapes;
+        energy_ += 0.5 / weight * force.squaredNorm();
+      }
+      if (context.loads.acceleration) {
+        const Vec<Dim> load = context.scaling * weight * context.loads.acceleration(X);
+        energy_ -= load.dot(cell.x * shapes - X);
+        force -= load;
+      }
+      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
+        if (!cell.models[k]) continue;
+        cell.models[k]->gradient += shapes[k] * force;
+        if (context.has_inertia) cell.models[k]->hessian.diagonal().array() += weight * shapes[k] * shapes[k];
+      }
+    }
+  }
+
   const RemeshState<Dim>& state_;
   const Edit<Dim>& edit_;
   double energy_ = 0;
