@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "curved_run.hpp"
 #include "curved_scene.hpp"
 #include "geometry/intersection.hpp"
 #include "itr/core/parallel.hpp"
@@ -481,41 +482,6 @@ Setup<Dim> bar() {
   setup.remesh.collapse.rel_max_edge_length = 2;
   setup.remesh.swap.enabled = setup.remesh.smooth.enabled = true;
   return setup;
-}
-
-template <int Dim>
-struct Run {
-  int splits = 0, curves = 0, collapses = 0;
-  State<Dim> state;
-};
-
-template <int Dim>
-Run<Dim> run(Setup<Dim> setup) {
-  setup.choose_defaults();
-  linear::Registry registry;
-  Simulation<Dim> simulation(setup, registry);
-  Run<Dim> result;
-  while (!simulation.finished()) {
-    const StepResult step = simulation.advance();
-    EXPECT_TRUE(step.ok) << step.reason;
-    if (!step.ok) break;
-    result.splits += step.report.splits.accepted;
-    result.curves += step.report.curves.accepted;
-    result.collapses += step.report.collapses.accepted;
-    EXPECT_EQ(step.report.reverted_remeshes, 0);
-    const State<Dim>& state = simulation.state();
-    for (const VectorX& x : state.history.x) EXPECT_EQ(find_violation(setup, state.mesh, x, state.space), "");
-  }
-  result.state = simulation.state();
-  return result;
-}
-
-template <int Dim>
-void expect_same(const State<Dim>& a, const State<Dim>& b) {
-  ASSERT_EQ(a.mesh.vertex_slots(), b.mesh.vertex_slots());
-  EXPECT_TRUE(a.space == b.space);
-  EXPECT_EQ(a.history.x[0], b.history.x[0]);
-  EXPECT_EQ(a.history.v[0], b.history.v[0]);
 }
 
 TYPED_TEST(Curved, RunsChooseTheOrderToo) {
