@@ -7,7 +7,8 @@ usage: render.py RESULTS [-o out.png] [--frames i,j,k] [--animation out.gif] [--
        render.py RESULTS --forces [NAME,...] [-o out.png]
 
 Without --frames: the first stored step, the one with the largest elastic energy, and the last. NAME is any dataset of the
-frames' /fields: of vectors and tensors the magnitude counts, of fields on vertices the mean of a cell's. Default:
+frames' /fields: of vectors and tensors the magnitude counts, of fields on vertices the mean of a cell's; or order, which is 1
+where all edges of a cell are straight and 2 where all are curved. Default:
 elastic_density, on a logarithmic scale; other colours span the 1st to the 99th percentile, or --range. Solid bodies are drawn
 by VTK (solid_images.py), obstacles translucent. --forces plots forces.csv over time, of all curves or of those that are named.
 """
@@ -35,6 +36,7 @@ MAX_ANIMATION_FRAMES = 150
 ANIMATION_DPI = 90
 PANEL_PIXELS = 900
 COLOURS = "YlOrRd"
+ORDER = "order"  # what --field may ask for beside /fields
 
 
 def units_of(file):
@@ -62,24 +64,32 @@ class Frame:
 
     def __init__(self, path, field="elastic_density"):
         with h5py.File(path, "r") as file:
-            if field not in file["/fields"]:
+            if field != ORDER and field not in file["/fields"]:
                 raise SystemExit(f"{path}: no field {field}; there are {', '.join(file['/fields'])} (SCENES.md, "
                                  "/output/paraview/options, says how to ask for others)")
             self.step, self.t = int(file.attrs["step"]), float(file.attrs["t"])
             self.x, self.rest = file["/fields/x"][:], file["/mesh/rest"][:]
             self.cells = file["/mesh/simplices"][:]
             curved = file["/mesh/curved_edges"][:] if "/mesh/curved_edges" in file else np.empty((0, 2), int)
-            values = file["/fields"][field][:]
-            self.unit = file["/fields"][field].attrs.get("unit", "")
+            values = np.empty(0) if field == ORDER else file["/fields"][field][:]
+            self.unit = "" if field == ORDER else file["/fields"][field].attrs.get("unit", "")
             self.time_unit = units_of(file)[2]
             self.obstacle_x = file["/obstacles/x"][:]
             self.obstacle_edges = file["/obstacles/edges"][:]
             self.obstacle_faces = file["/obstacles/faces"][:]
         self.dim = self.x.shape[1]
-        values = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
-        self.values = values if len(values) == len(self.cells) else values[self.cells].mean(axis=1)
         self.num_vertices = len(self.x) - len(curved)
         self.middles = {tuple(edge): self.num_vertices + i for i, edge in enumerate(curved.tolist())}
+        if field == ORDER:
+            self.values = np.array([self.order(cell) for cell in self.cells.tolist()])
+            return
+        values = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
+        self.values = values if len(values) == len(self.cells) else values[self.cells].mean(axis=1)
+
+    def order(self, cell):
+        """1 where all edges are straight, 2 where all are curved."""
+        edges = [(min(a, b), max(a, b)) for i, a in enumerate(cell) for b in cell[i + 1:]]
+        return 1 + sum(edge in self.middles for edge in edges) / len(edges)
 
     def nodes(self):
         curved = f", {len(self.middles)} curved edges" if self.middles else ""

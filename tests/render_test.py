@@ -50,6 +50,17 @@ def check_units(folder):
     assert any(" ms: " in text for text in texts), texts
 
 
+def check_orders(itr, examples, folder):
+    """Order is 1 of cells with straight edges, 2 where all are curved."""
+    from render import Frame
+
+    for order in (1, 2):
+        run = folder / f"order{order}"
+        subprocess.run([itr, "run", examples / "cantilever.json", "-o", run, "--set", "/space/remesh/enabled=false", "--set",
+                        f"/space/discr_order={order}", "--set", "/time/tend=0.1"], check=True, capture_output=True)
+        assert set(Frame(sorted((run / "frames").glob("*.h5"))[-1], "order").values) == {order}
+
+
 SCALE_CHECK = """
 import sys, types
 import numpy
@@ -97,6 +108,7 @@ def main():
         subprocess.run([*command[:4], folder / "units", *command[5:], "--set", '/units={"mass": "g", "length": "m", "time": "ms"}', "--set",
                         "/time/dt=0.01", "--set", "/time/tend=0.02", "--set", "/initial_conditions/velocity/0/value=[0.067, 0]"], check=True, capture_output=True)
         check_units(folder / "units")
+        check_orders(itr, examples, folder)
         check_lengths_in_space(examples, folder)
 
         def render(*arguments, status=0):

@@ -16,6 +16,7 @@ PAPER = ROOT / "verification/paper"
 STORED = {
     "verification/report/results.json": CODE,
     "verification/paper/results.csv": CODE,
+    "verification/paper/curves.csv": CODE,
     "verification/newton/results.csv": ("src/newton", "include/itr/newton"),
     "verification/newton/squeeze.csv": ("src/newton", "include/itr/newton", "src/energy", "include/itr/energy", "src/geometry"),
     "verification/scaling/results.csv": LINEAR,
