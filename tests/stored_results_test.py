@@ -112,11 +112,12 @@ class Stored(unittest.TestCase):
 
     def test_pages_show_what_is_stored(self):
         folder = SOURCE / "verification"
-        with open(folder / "paper/results.csv", newline="") as file:
-            rows = [paper.typed(row) for row in csv.DictReader(file)]
         page = (folder / "paper/README.md").read_text()
-        for line in paper.table(rows).splitlines():
-            self.assertIn(line, page)
+        for name, table in (("results", paper.table), ("curves", paper.curves_table)):
+            with open(folder / f"paper/{name}.csv", newline="") as file:
+                rows = [paper.typed(row) for row in csv.DictReader(file)]
+            for line in table(rows).splitlines():
+                self.assertIn(line, page)
         content = json.loads((folder / "report/results.json").read_text())
         blocks = list(report.blocks(content["cases"], content["overview"]))
         self.assertEqual((folder / "report/report.md").read_text(), report.markdown(blocks))

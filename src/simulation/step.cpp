@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/check.hpp"
 #include "core/process.hpp"
@@ -289,10 +291,6 @@ class StepAttempt {
   double start_ = seconds_now(), processor_start_ = processor_seconds_now();
 };
 
-}  // namespace
-
-namespace {
-
 /// By the setup's integrator, or by implicit Euler where that would create energy.
 template <int Dim>
 StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
@@ -305,7 +303,9 @@ StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& befo
       fmt::format("step {}: Newmark would create energy here, implicit Euler takes this step", result.report.step));
   StepReport effort = result.report;
   effort.forget_operations();
-  result = StepAttempt<Dim>(tools, before, true).run(after, start);
+  StepAttempt<Dim> with_euler(tools, before, true);
+  result = with_euler.run(after, start);
+  blocking = with_euler.blocking_cells();
   result.report.add_effort(effort);
   result.report.damped_steps = 1;
   return result;
@@ -333,10 +333,10 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", result.report.step,
                                      before.space.num_curved() - from.space.num_curved(), result.reason));
     result = take_step_on_mesh(tools, from, after, damped, start, blocking);
-    if (!result.ok) effort.add_effort(result.report);
+    result.report.add_effort(std::exchange(effort, {}));
+    if (!result.ok) effort = result.report;
   }
   if (!result.ok) return result;
-  result.report.add_effort(effort);
   result.renumbering = result.renumbering.empty() ? std::move(renumbering) : compose(renumbering, result.renumbering);
   return result;
 }
