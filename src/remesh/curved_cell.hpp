@@ -2,6 +2,7 @@
 // Nodes of a cell of the mesh as an edit would make it, or as it is.
 #pragma once
 
+#include <Eigen/LU>
 #include <algorithm>
 
 #include "fem/chords.hpp"
