@@ -38,7 +38,8 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 template <int Dim>
 double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge);
 
-/// The same of making an edge curved, by the new node alone: ½ r^T A^-1 r. NaN where moduli vary in space or mass is lumped.
+/// The decrease of energy by making an edge curved, by the new node alone: ½ r^T A^-1 r. NaN where moduli vary in space or
+/// mass is lumped.
 template <int Dim>
 double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge);
 

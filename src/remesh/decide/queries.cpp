@@ -199,7 +199,7 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
   const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
   TrialOptions options{.required = context_.scaling * tolerance, .local = local};
   if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
-  // Of a move or a swap, the nodes that it sets do not tell what the vertices around them gain.
+  // The vertex or nodes that a move or a swap sets do not tell what the vertices around gain.
   if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap &&
       (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
     options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));

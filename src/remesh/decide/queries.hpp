@@ -60,7 +60,7 @@ class RemeshQueries {
   bool is_distorted(std::span<const CellId> cells) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
   bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
-  /// The same of a trial's edge.
+  /// The same question about a trial's edge.
   void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;
   /// How much the deformation and the history vary over the cells around an edge or a vertex. No edit gains or
   /// loses energy where both are linear. [J, times the scaling, up to a factor]
@@ -99,7 +99,7 @@ class RemeshQueries {
   }
   /// Whether halves of an edge would be shorter than dhat, at rest or now.
   bool has_short_halves(const EdgeKey& e) const;
-  /// The same of the chords that the split of an edge would bring to the surface beside those halves.
+  /// The same question about the chords that the split of an edge would bring to the surface beside those halves.
   bool makes_short_chords(const EdgeKey& e) const;
   RemeshState<Dim> state() const {
     return {mesh_, fields_, context_, gate_.present(), baseline_ ? baseline_->history() : HistoryRule::function};
