@@ -7,9 +7,36 @@
 #include <algorithm>
 
 #include "itr/simulation/simulation.hpp"
+#include "random_tets.hpp"
 #include "simulation/invariants.hpp"
+#include "square_mesh.hpp"
 
 namespace itr {
+
+/// A bar of 4 x 1, clamped at x = 0, which weighs so much [m/s^2].
+template <int Dim>
+Setup<Dim> make_bar(double gravity) {
+  Setup<Dim> setup;
+  if constexpr (Dim == 2) {
+    const Grid grid = make_grid(
+        4, [](int i, int j) { return Vec<2>(i, 0.25 * j); }, [](int i, int j) { return (i + j) % 2; });
+    setup.mesh = Mesh<2>(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
+  } else {
+    setup.mesh = make_cubes(
+        2, [](int i, int j, int k) { return Vec<3>(2 * i, 0.5 * j, 0.5 * k); }, [](int, int, int) { return 1; });
+  }
+  for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f) {
+    const auto& facet = setup.mesh.facet(f);
+    const bool at_wall = std::all_of(facet.begin(), facet.end(), [&](int v) { return setup.mesh.rest(v)[0] == 0; });
+    setup.mesh.set_facet_tag(f, at_wall ? 7 : kNoTag);
+  }
+  std::array<bool, Dim> all;
+  all.fill(true);
+  setup.dirichlet = {{7, all, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); }}};
+  setup.materials[1] = {.youngs_modulus = 1e5, .poisson_ratio = 0.3, .density = 1000};
+  setup.body_acceleration = [gravity](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Unit(1) * -gravity); };
+  return setup;
+}
 
 template <int Dim>
 struct Run {

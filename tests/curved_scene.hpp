@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "apply_edit.hpp"
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 #include "remesh/curved_cell.hpp"
@@ -80,13 +81,7 @@ struct CurvedScene {
     fields.for_each([&](const VectorX& field) { probe.values.push_back(value_at<Dim>(mesh, field, c, l)); });
     probes.push_back(probe);
   }
-  void apply(const Edit<Dim>& edit) {
-    const VertexId created = mesh.apply(edit);
-    fields.follow(edit, created, mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size()));
-    strata.follow(edit, created);
-    ASSERT_EQ(mesh.find_defect(), "");
-    ASSERT_EQ(strata.find_misfit(mesh), "");
-  }
+  void apply(const Edit<Dim>& edit) { apply_edit(edit, mesh, fields, strata); }
   EdgeKey edge() {
     const auto edges = mesh.edges();
     return edges[random() % edges.size()];

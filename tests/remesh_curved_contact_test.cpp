@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "apply_edit.hpp"
 #include "curved_run.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/remesh/remesher.hpp"
@@ -73,13 +74,7 @@ struct Scene {
     if (random() % 2) return make_split(mesh, e);
     return is_curved ? make_straighten(mesh, e) : make_curve(mesh, e);
   }
-  void apply(const Edit<Dim>& edit) {
-    const VertexId created = mesh.apply(edit);
-    fields.follow(edit, created, mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size()));
-    strata.follow(edit, created);
-    ASSERT_EQ(mesh.find_defect(), "");
-    ASSERT_EQ(strata.find_misfit(mesh), "");
-  }
+  void apply(const Edit<Dim>& edit) { apply_edit(edit, mesh, fields, strata); }
 };
 
 /// The mesh without slots of nodes, fields in the numbering of its space.
@@ -337,33 +332,17 @@ TEST(CurvedGate, CoversWhatStraighteningSweeps) {
 /// A bar that is pressed onto obstacles.
 template <int Dim>
 Setup<Dim> pressed_bar() {
-  Setup<Dim> setup;
+  Setup<Dim> setup = make_bar<Dim>(10);
   if constexpr (Dim == 2) {
-    const Grid grid = make_grid(
-        4, [](int i, int j) { return Vec<2>(i, 0.25 * j); }, [](int i, int j) { return (i + j) % 2; });
-    setup.mesh = Mesh<2>(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
-    setup.obstacles.motion.assign(5, kNone);
     setup.obstacles.rest = {{1.6, -0.4}, {2.1, -0.03}, {2.6, -0.4}, {-1, -0.5}, {5, -0.5}};
     setup.obstacles.edges = {{0, 1}, {1, 2}, {3, 4}};
   } else {
-    setup.mesh = make_cubes(
-        2, [](int i, int j, int k) { return Vec<3>(2 * i, 0.5 * j, 0.5 * k); }, [](int, int, int) { return 1; });
-    setup.obstacles.motion.assign(6, kNone);
     setup.obstacles.rest = {{1.5, -0.4, -1}, {2.2, -0.03, -1}, {2.9, -0.4, -1},
                             {1.5, -0.4, 3},  {2.1, -0.03, 3},  {2.9, -0.4, 3}};
     setup.obstacles.triangles = {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}};
     setup.obstacles.edges = {{0, 1}, {1, 4}, {0, 4}, {4, 3}, {0, 3}, {1, 2}, {2, 5}, {1, 5}, {4, 5}};
   }
-  for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f) {
-    const auto& facet = setup.mesh.facet(f);
-    const bool at_wall = std::all_of(facet.begin(), facet.end(), [&](int v) { return setup.mesh.rest(v)[0] == 0; });
-    setup.mesh.set_facet_tag(f, at_wall ? 7 : kNoTag);
-  }
-  std::array<bool, Dim> all;
-  all.fill(true);
-  setup.dirichlet = {{7, all, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); }}};
-  setup.materials[1] = {.youngs_modulus = 1e5, .poisson_ratio = 0.3, .density = 1000};
-  setup.body_acceleration = [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Unit(1) * -10); };
+  setup.obstacles.motion.assign(setup.obstacles.rest.size(), kNone);
   setup.time.dt = 0.05;
   setup.time.steps = Dim == 2 ? 8 : 6;
   setup.contact.enabled = true;

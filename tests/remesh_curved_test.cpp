@@ -456,25 +456,7 @@ TYPED_TEST(Curved, PredictionOfACurveIsWhatItsNodeGains) {
 /// A bending bar without contact.
 template <int Dim>
 Setup<Dim> bar() {
-  Setup<Dim> setup;
-  if constexpr (Dim == 2) {
-    const Grid grid = make_grid(
-        4, [](int i, int j) { return Vec<2>(i, 0.25 * j); }, [](int i, int j) { return (i + j) % 2; });
-    setup.mesh = Mesh<2>(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
-  } else {
-    setup.mesh = make_cubes(
-        2, [](int i, int j, int k) { return Vec<3>(2 * i, 0.5 * j, 0.5 * k); }, [](int, int, int) { return 1; });
-  }
-  for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f) {
-    const auto& facet = setup.mesh.facet(f);
-    const bool at_wall = std::all_of(facet.begin(), facet.end(), [&](int v) { return setup.mesh.rest(v)[0] == 0; });
-    setup.mesh.set_facet_tag(f, at_wall ? 7 : kNoTag);
-  }
-  std::array<bool, Dim> all;
-  all.fill(true);
-  setup.dirichlet = {{7, all, [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); }}};
-  setup.materials[1] = {.youngs_modulus = 1e5, .poisson_ratio = 0.3, .density = 1000};
-  setup.body_acceleration = [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Unit(1) * -2); };
+  Setup<Dim> setup = make_bar<Dim>(2);
   setup.time.dt = 0.02;
   setup.time.steps = 6;
   setup.remesh.enabled = true;
