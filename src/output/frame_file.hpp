@@ -94,7 +94,7 @@ struct StoredFrame {
   StoredSurface proxy;  ///< what touches in place of the boundary
 };
 
-/// Of an open frame.
+/// Units of the numbers in an open frame.
 Units read_units(const std::filesystem::path& path, const hdf5::File& file);
 
 /// Names of what is not as it was written. Throws InputError where the file is unreadable.

@@ -228,7 +228,7 @@ void FrameEncoder::measure(const StoredFrame& frame, int cell) {
   include(longest_edges_, std::sqrt(longest));
 }
 
-/// What a page shows of one frame, and by which ids.
+/// Vertices, cells and fields of one frame that a page shows, with their ids.
 struct FrameEncoder::Shown {
   int nodes, cells, num_curved, num_vertices;
   std::vector<int> owner;  ///< of facets of the surface

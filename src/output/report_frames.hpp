@@ -108,7 +108,7 @@ class FrameEncoder {
   struct Shown;
   void start(const StoredFrame& frame, const std::vector<StoredField>& fields);
   std::array<double, 3> read_point(const std::vector<double>& from, int i) const;
-  // What lives in a frame, one kind after another, each by the ids of those before; then positions and fields by these ids.
+  // Vertices, nodes, cells and facets of a frame, in this order, each by ids of the kinds before; then positions and fields.
   void touch_vertices(const StoredFrame& frame, Shown& shown);
   void touch_cells(const StoredFrame& frame, Shown& shown);
   void touch_facets(const StoredFrame& frame, const Shown& shown);

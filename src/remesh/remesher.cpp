@@ -18,7 +18,7 @@ double least_gain_of_refining(const RemeshOptions& options) {
   return options.split.enabled ? std::min(split, curve) : curve;
 }
 
-/// Of all operations, by RemeshMemory::Kind [J].
+/// Tolerances of all operations, by RemeshMemory::Kind [J].
 std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& options) {
   const double split = options.split.acceptance_tolerance.value_or(0),
                collapse = options.collapse.acceptance_tolerance.value_or(0);

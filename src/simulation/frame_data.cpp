@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What frames show of a state: energy densities and stresses by cell, sums of forces, energy and momentum.
+// Data of a frame: energy densities and stresses by cell, sums of forces, energy and momentum.
 #include <array>
 #include <cmath>
 #include <span>
@@ -89,7 +89,8 @@ ForceCurvePoint curve_point(const ForceSums<Dim>& sums, const std::string& name)
   return point;
 }
 
-/// Of the stress in space: zero out of the plane in plane stress, what F_zz = 1 gives in plane strain.
+/// Von Mises stress of the stress in space, of which `out_of_plane` is the third
+/// normal component: zero in plane stress, that of F_zz = 1 in plane strain.
 template <int Dim>
 double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
   Mat<3> s = Mat<3>::Zero();

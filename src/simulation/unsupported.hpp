@@ -19,7 +19,7 @@ std::vector<UnsupportedCombination> unsupported_combinations();
 /// Throws InputError for the first combination that the setup has.
 template <int Dim>
 void refuse_unsupported(const Setup<Dim>& setup);
-/// The same for a state to go on from, whose edges may be curved where the setup would curve none.
+/// Refuses a state to go on from in the same way: its edges may be curved where the setup would curve none.
 template <int Dim>
 void refuse_unsupported(const Setup<Dim>& setup, const State<Dim>& state);
 

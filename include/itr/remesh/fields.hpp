@@ -41,8 +41,7 @@ struct RemeshFields {
   /// Extends or updates all fields for an edit that was just applied and created `created` (or kNone); its
   /// nodes have the slots from `first_node` on.
   void follow(const Edit<Dim>& edit, VertexId created, VertexId first_node = kNone);
-  /// What the energy of the i-th cell that an edit inserts begins with: that of the cell of which it is a part, if it is
-  /// one.
+  /// Level of quadrature of the i-th cell that an edit inserts: that of the removed cell that holds it, else 0.
   std::uint8_t level_of_new_cell(const Edit<Dim>& edit, std::size_t i) const;
   /// Makes all fields as long as so many vertices need, and longer where they grow: edits then seldom copy them.
   void make_room(int vertices);

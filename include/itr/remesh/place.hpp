@@ -10,7 +10,7 @@
 
 namespace itr {
 
-/// What an operation of remeshing asks about: an edge, the node of an edge (that it has or may get), or a vertex.
+/// An edge, the node of an edge (that the edge has or may get), or a vertex: a candidate of an operation of remeshing.
 class Place {
  public:
   Place() = default;                                                                            ///< none

@@ -26,7 +26,7 @@ bool is_large(const Results& results, const Row& row, const Measure& measure);
 /// Whether anything is recommended by these errors: no run is near the reference, or uniform refinement's order is
 /// impossible.
 bool can_recommend(const Results& results, const Measure& measure);
-/// The same of one series: its own order too.
+/// The doubts about one series, its own order among them.
 bool can_recommend(const Results& results, const Measure& measure, const std::string& series);
 
 /// In words, the gravest first; the last says what the reference is worth.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the paper does otherwise (REMESHING.md). A session has a Baseline only if its options choose any of that.
+// The paper's rules in place of ours (REMESHING.md): culling, screening, history, sizing field. A session has a Baseline
+// only if its options choose one of them.
 #pragma once
 
 #include <memory>
@@ -16,7 +17,7 @@ class RemeshQueries;
 template <int Dim>
 class Baseline {
  public:
-  /// None where the options choose nothing of it.
+  /// Null if the options choose none of these rules.
   static std::unique_ptr<Baseline> chosen_by(const RemeshOptions& options);
   explicit Baseline(const RemeshOptions& options) : options_(options) {}
 

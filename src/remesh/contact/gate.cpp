@@ -100,8 +100,8 @@ std::array<Vec<3>, 4> between_diagonals(const Mesh<3>& mesh, const SurfaceIndex<
 }
 std::array<Vec<2>, 3> between_diagonals(const Mesh<2>&, const SurfaceIndex<2>&, const Edit<2>&) { return {}; }
 
-/// What straight facets sweep over. Two vertices move on the way to the new surface, both to the target: the one that is set
-/// and the one that disappears.
+/// The simplices that straight facets sweep over. Two vertices move on the way to the new surface, both to the target: the
+/// one that is set and the one that disappears.
 template <int Dim>
 void find_swept_by_facets(const Mesh<Dim>& mesh, const SurfaceIndex<Dim>& surface, const Edit<Dim>& edit,
                           const Vec<Dim>& target, std::vector<std::array<Vec<Dim>, Dim + 1>>& swept) {
@@ -190,7 +190,7 @@ bool Gate<Dim>::is_any_removed_curved(const Edit<Dim>& edit) const {
   return is_any;
 }
 
-/// What the edit takes from the surface and what it adds.
+/// The pieces of the surface that the edit removes, and those that it inserts.
 template <int Dim>
 void Gate<Dim>::find_pieces(const Edit<Dim>& edit, const Configuration<Dim>& at, GateScratch<Dim>& scratch) const {
   const VectorX& x = *at.x;

@@ -55,7 +55,7 @@ class SurfaceIndex {
   /// The stamp of the last change of the facet itself; later than all others where it is gone.
   unsigned changed(FacetId f) const { return changed_[f]; }
   double span() const { return span_; }
-  /// Of a facet's vertices alone.
+  /// The facet as a simplex of its vertices alone, and its pieces along its nodes.
   SurfacePiece<Dim> piece(FacetId f) const;
   SurfacePieces<Dim> pieces(FacetId f) const;
   /// Holds the pieces of a facet.

@@ -24,7 +24,7 @@ class Coarsener {
         tolerance_(options_.acceptance_tolerance.value()),
         straighten_tolerance_(ask_.options().straighten.acceptance_tolerance.value_or(tolerance_)) {}
 
-  /// What there is to ask of these edges.
+  /// The collapses of `edges`, and the straightenings of those with nodes.
   std::vector<Place> candidates(const std::vector<EdgeKey>& edges) const {
     if (!straightens_) return places(edges);
     std::vector<Place> found;

@@ -20,7 +20,7 @@ class Refiner {
         tolerance_(options_.acceptance_tolerance.value()),
         curve_tolerance_(ask_.options().curve.acceptance_tolerance.value_or(tolerance_)) {}
 
-  /// What there is to ask of these edges.
+  /// These edges and, where curves are enabled, their nodes.
   std::vector<Place> candidates(const std::vector<EdgeKey>& edges) const {
     const bool curves = ask_.options().curve.enabled;
     std::vector<Place> found;

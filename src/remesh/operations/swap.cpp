@@ -44,7 +44,7 @@ double least_gain(const RemeshQueries<Dim>& ask) {
   return std::max(ask.least_worthwhile(), ask.options().swap.acceptance_tolerance.value());
 }
 
-/// What a swap has to gain beyond `least` for the nodes that it adds, as a curve does for each [J].
+/// Least gain of a swap [J]: `least`, and for each node that it adds that of a curve.
 template <int Dim>
 double with_nodes(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
   const auto added = static_cast<int>(edit.inserted_nodes.size()) - static_cast<int>(edit.removed_nodes.size());
