@@ -12,7 +12,7 @@ namespace itr::linear {
 
 namespace {
 
-constexpr const char* kVariable = "OPENBLAS_CORETYPE";
+constexpr const char *kKernels = "OPENBLAS_CORETYPE", *kThreads = "OPENBLAS_NUM_THREADS";
 
 /// Families below AVX2 that OpenBLAS falls back to.
 constexpr const char* kOld[] = {"Generic", "Prescott", "Core2", "Penryn", "Dunnington", "Nehalem", "Sandybridge"};
@@ -39,13 +39,21 @@ const char* fitting_blas_kernels() {
 #endif
 }
 
-FittingBlasKernels::FittingBlasKernels() {
-  const char* kernels = fitting_blas_kernels();
-  if (kernels && !std::getenv(kVariable) && !is_openblas_loaded()) is_set_ = setenv(kVariable, kernels, 0) == 0;
+BlasEnvironment::BlasEnvironment() {
+  if (is_openblas_loaded()) return;
+  if (const char* kernels = fitting_blas_kernels(); kernels && !std::getenv(kKernels))
+    sets_kernels_ = setenv(kKernels, kernels, 0) == 0;
+  if (const char* asked = std::getenv(kThreads)) threads_before_ = asked;
+  sets_threads_ = setenv(kThreads, "1", 1) == 0;
 }
 
-FittingBlasKernels::~FittingBlasKernels() {
-  if (is_set_) unsetenv(kVariable);
+BlasEnvironment::~BlasEnvironment() {
+  if (sets_kernels_) unsetenv(kKernels);
+  if (!sets_threads_) return;
+  if (threads_before_)
+    setenv(kThreads, threads_before_->c_str(), 1);
+  else
+    unsetenv(kThreads);
 }
 
 std::string blas_kernels(void* handle) {
@@ -56,10 +64,10 @@ std::string blas_kernels(void* handle) {
 std::string advice_on_blas_kernels(const std::string& kernels) {
   const char* fitting = fitting_blas_kernels();
   if (!fitting || std::ranges::find(kOld, kernels) == std::end(kOld)) return {};
-  const char* asked = std::getenv(kVariable);
+  const char* asked = std::getenv(kKernels);
   return "OpenBLAS takes its kernels for " + kernels + ", of older CPUs, " +
-         (asked ? "as the environment says: unset " + std::string(kVariable)
-                : "as it was loaded before: set " + std::string(kVariable) + "=" + fitting + " before the program starts");
+         (asked ? "as the environment says: unset " + std::string(kKernels)
+                : "as it was loaded before: set " + std::string(kKernels) + "=" + fitting + " before the program starts");
 }
 
 }  // namespace itr::linear

@@ -3,6 +3,7 @@
 // the oldest CPU: OpenBLAS 0.3.21 factorises with SSE3 where there is AVX512, at half the speed.
 #pragma once
 
+#include <optional>
 #include <string>
 
 namespace itr::linear {
@@ -12,17 +13,19 @@ namespace itr::linear {
 /// for models that it knows.
 const char* fitting_blas_kernels();
 
-/// While it lives, an OpenBLAS that is loaded takes the fitting kernels. Does nothing if OPENBLAS_CORETYPE is set, or
-/// OpenBLAS was loaded before. Changes the environment and restores it: no other thread may use the environment meanwhile.
-class FittingBlasKernels {
+/// While it lives, an OpenBLAS that is loaded takes the fitting kernels, unless OPENBLAS_CORETYPE is set, and starts no
+/// threads: modules pin it to one, and those that it starts wait in busy loops for some 20 ms. Does nothing if OpenBLAS was
+/// loaded before. Changes the environment and restores it: no other thread may use the environment meanwhile.
+class BlasEnvironment {
  public:
-  FittingBlasKernels();
-  ~FittingBlasKernels();
-  FittingBlasKernels(const FittingBlasKernels&) = delete;
-  FittingBlasKernels& operator=(const FittingBlasKernels&) = delete;
+  BlasEnvironment();
+  ~BlasEnvironment();
+  BlasEnvironment(const BlasEnvironment&) = delete;
+  BlasEnvironment& operator=(const BlasEnvironment&) = delete;
 
  private:
-  bool is_set_ = false;
+  bool sets_kernels_ = false, sets_threads_ = false;
+  std::optional<std::string> threads_before_;
 };
 
 /// The kernels of the OpenBLAS among the libraries of a handle of dlopen: "SkylakeX"; empty where there is none.

@@ -102,7 +102,7 @@ std::vector<std::filesystem::path> module_folders() {
 
 std::vector<ModuleRow> load_module(const std::filesystem::path& file) {
   void* handle = [&] {
-    const FittingBlasKernels choice;
+    const BlasEnvironment environment;
     return dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
   }();
   if (!handle) {
