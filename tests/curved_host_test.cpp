@@ -155,6 +155,39 @@ TEST(CurvedHost, AStepThatCurvedCellsStopIsTakenAgainWithStraightEdges) {
   for (int i = before + 1; i < 30; ++i) ASSERT_TRUE(simulation.advance().ok);
 }
 
+/// One step of the block that needs two retries, or fails for all of them, is told with all that was done.
+void expect_report_of_retries(double speed, double dt, int steps_before, bool succeeds) {
+  auto setup = hitting_block();
+  setup.time.dt = dt;
+  setup.initial_velocity[0].value = [speed](const Vec<2>&, double) { return Vec<2>(0, -speed); };
+  setup.remesh.enabled = true;
+  setup.remesh.collapse.enabled = false;
+  setup.remesh.split.acceptance_tolerance = 1e9;
+  linear::Registry registry;
+  int retries = 0;
+  Simulation<2> simulation(setup, registry, Logger([&](LogLevel level, std::string_view message) {
+                             retries += level == LogLevel::warning &&
+                                        message.find("curved edges made straight") != std::string::npos;
+                           }));
+  for (int i = 0; i < steps_before; ++i) ASSERT_TRUE(simulation.advance().ok);
+  ASSERT_EQ(retries, 0);
+  const int curved = simulation.state().space.num_curved();
+  const StepResult result = simulation.advance();
+  EXPECT_EQ(result.ok, succeeds) << result.reason;
+  EXPECT_EQ(retries, 2);
+  EXPECT_EQ(result.report.straightens.accepted, curved - simulation.state().space.num_curved());
+  EXPECT_EQ(result.report.straightens.accepted > 0, succeeds);
+  const StepSeconds& seconds = result.report.seconds;
+  EXPECT_LE(
+      seconds.assembly + seconds.linear_solve + seconds.line_search + seconds.ccd + seconds.remesh + seconds.projection,
+      seconds.total);
+}
+
+TEST(CurvedHost, RetriesAreToldTogether) {
+  expect_report_of_retries(130, 0.002, 1, true);
+  expect_report_of_retries(80, 0.001, 3, false);
+}
+
 TEST(CurvedHost, RemeshingMayBeSwitchedOnLater) {
   auto setup = pressed_block();
   setup.remesh = {};
@@ -166,6 +199,18 @@ TEST(CurvedHost, RemeshingMayBeSwitchedOnLater) {
   simulation.conditions().remesh.split.acceptance_tolerance.reset();
   simulation.conditions().lump_mass = simulation.conditions().remesh.curve.enabled = true;
   EXPECT_THROW(simulation.advance(), InputError);
+}
+
+TEST(CurvedHost, RemeshingMayBeSwitchedOnLaterWithAToleranceOfItsOwn) {
+  auto setup = pressed_block();
+  setup.remesh = {};
+  setup.remesh.split.acceptance_tolerance = 1e-3;
+  auto simulation = simulate(setup);
+  simulation.conditions().remesh.enabled = true;
+  ASSERT_TRUE(simulation.advance().ok);
+  const RemeshOptions& remesh = simulation.setup().remesh;
+  EXPECT_EQ(remesh.split.acceptance_tolerance, 1e-3);
+  EXPECT_TRUE(remesh.collapse.acceptance_tolerance && remesh.split.min_edge_length);
 }
 
 TEST(Memory, ForgetsRefusalsByStricterTolerances) {

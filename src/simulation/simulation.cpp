@@ -25,6 +25,15 @@ namespace {
 /// Where a simulation is when it calls the program.
 enum class Phase { between_steps, in_step, after_mesh_change };
 
+/// Chooses what the setup leaves open; refuses what it may not ask for.
+template <int Dim>
+void complete(Setup<Dim>& setup, const Logger& logger) {
+  refuse_unsupported(setup);
+  setup.validate();
+  for (const std::string& chosen : setup.choose_defaults()) logger.info(chosen);
+  setup.validate();  // what was chosen too
+}
+
 }  // namespace
 
 template <int Dim>
@@ -41,6 +50,7 @@ struct Simulation<Dim>::Impl {
   EdgeLengths initial_edges;
   NodalForces forces;                        ///< of the last step
   mutable std::optional<StepReport> report;  ///< empty: of the state as it stands, not made yet
+  bool remeshing_is_complete = false;        ///< its tolerances are chosen
   double first_dt = 1;                       ///< what the setup's tolerances are for [s]
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
@@ -132,10 +142,10 @@ struct Simulation<Dim>::Impl {
 
   /// Remeshing may have been switched on since the simulation was made: its tolerances are chosen then.
   void complete_conditions() {
-    if (!setup.remesh.enabled || setup.remesh.split.acceptance_tolerance) return;
-    refuse_unsupported(setup);
-    setup.validate();
-    for (const std::string& chosen : setup.choose_defaults()) logger.info(chosen);
+    const RemeshOptions& remesh = setup.remesh;
+    if (!remesh.enabled || (remeshing_is_complete && remesh.split.acceptance_tolerance)) return;
+    complete(setup, logger);
+    remeshing_is_complete = true;
   }
 
   /// Steps from now on have this length. Returns the state before where its history was cut.
@@ -176,10 +186,8 @@ struct Simulation<Dim>::Impl {
 template <int Dim>
 // It is moved: NOLINTNEXTLINE(performance-unnecessary-value-param)
 Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger) : impl_(std::make_unique<Impl>()) {
-  refuse_unsupported(setup);
-  setup.validate();
-  for (const std::string& chosen : setup.choose_defaults()) logger.info(chosen);
-  setup.validate();  // what was chosen too
+  complete(setup, logger);
+  impl_->remeshing_is_complete = setup.remesh.enabled;
   impl_->setup = std::move(setup);
   impl_->logger = std::move(logger);
   const LinearOptions& linear = impl_->setup.linear;

@@ -74,7 +74,7 @@ std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state,
 
 /// Curved cells where det F is small somewhere, and those that share a vertex with one.
 template <int Dim>
-std::vector<CellId> nearly_inverted(const State<Dim>& state, const VectorX& x) {
+std::vector<CellId> find_nearly_inverted(const State<Dim>& state, const VectorX& x) {
   constexpr double kSmall = 0.1, kTolerance = 0.1;
   const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
   std::vector<CellId> found;
@@ -90,6 +90,23 @@ std::vector<CellId> nearly_inverted(const State<Dim>& state, const VectorX& x) {
   found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
+
+/// The time and the linear solves since it was made.
+class EffortClock {
+ public:
+  explicit EffortClock(const linear::ReusingSolver& solver) : solver_(solver) {}
+
+  void tell(StepReport& report) const {
+    add_solves(solves_before_, solver_.counts(), report);
+    report.seconds.total = seconds_now() - start_;
+    report.processor_seconds = processor_seconds_now() - processor_start_;
+  }
+
+ private:
+  const linear::ReusingSolver& solver_;
+  linear::SolveCounts solves_before_ = solver_.counts();
+  double start_ = seconds_now(), processor_start_ = processor_seconds_now();
+};
 
 /// A step by one integrator: that of the setup or, `damped`, implicit Euler.
 template <int Dim>
@@ -115,7 +132,8 @@ class StepAttempt {
     NewtonSummary summary = solve(expected());
     const std::string jump = jumped();
     if (!summary.converged()) {
-      if (summary.termination == Termination::no_descent && setup_.remesh.enabled) blocking_ = nearly_inverted(next_, x_);
+      if (summary.termination == Termination::no_descent && setup_.remesh.enabled)
+        nearly_inverted_ = find_nearly_inverted(next_, x_);
       return failed(summary, jump);
     }
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
@@ -134,8 +152,8 @@ class StepAttempt {
 
   /// Whether EnergyGuard was the one that ended it.
   bool creates_energy() const { return creates_energy_; }
-  /// Cells with curved edges that stopped the first solve, by the numbers of the state before.
-  const std::vector<CellId>& blocking_cells() const { return blocking_; }
+  /// If the first solve found no step: curved cells that were nearly inverted then, by the numbers of the state before.
+  const std::vector<CellId>& nearly_inverted_cells() const { return nearly_inverted_; }
 
  private:
   void make_problem() {
@@ -243,7 +261,7 @@ class StepAttempt {
     if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     TimeIntegrator(setup_.time).push(std::move(x_), next_.history);
     after = std::move(next_);  // before_ may be the same, and is not needed any more
-    stop_clocks();
+    clock_.tell(report_);
     report_.peak_rss_mb = peak_rss_mb();
     result.report = report_;
     result.renumbering = std::move(renumbering_);
@@ -262,7 +280,7 @@ class StepAttempt {
     return result;
   }
   StepResult failed(std::string reason) {
-    stop_clocks();
+    clock_.tell(report_);
     return {.ok = false, .reason = std::move(reason), .report = report_, .forces = {}, .renumbering = {}};
   }
   StepResult forbidden() {
@@ -270,11 +288,6 @@ class StepAttempt {
     return failed("it would create energy");
   }
 
-  void stop_clocks() {
-    add_solves(solves_before_, tools_.solver.counts(), report_);
-    report_.seconds.total = seconds_now() - start_;
-    report_.processor_seconds = processor_seconds_now() - processor_start_;
-  }
   void warn(const std::string& what) const { tools_.logger.warning(fmt::format("step {}: {}", next_.step, what)); }
 
   const StepTools<Dim>& tools_;
@@ -287,18 +300,18 @@ class StepAttempt {
   MeshRenumbering renumbering_;
   StepReport report_;
   bool creates_energy_ = false;
-  std::vector<CellId> blocking_;
-  linear::SolveCounts solves_before_ = tools_.solver.counts();
-  double start_ = seconds_now(), processor_start_ = processor_seconds_now();
+  std::vector<CellId> nearly_inverted_;
+  EffortClock clock_{tools_.solver};
 };
 
-/// By the setup's integrator, or by implicit Euler where that would create energy.
+/// By the setup's integrator, or by implicit Euler where that would create energy. `nearly_inverted`: if the first solve
+/// found no step, the curved cells that may be why.
 template <int Dim>
 StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
-                             State<Dim>* start, std::vector<CellId>& blocking) {
+                             State<Dim>* start, std::vector<CellId>& nearly_inverted) {
   StepAttempt<Dim> attempt(tools, before, damped);
   StepResult result = attempt.run(after, start);
-  blocking = attempt.blocking_cells();
+  nearly_inverted = attempt.nearly_inverted_cells();
   if (!attempt.creates_energy()) return result;
   tools.logger.warning(
       fmt::format("step {}: Newmark would create energy here, implicit Euler takes this step", result.report.step));
@@ -306,7 +319,7 @@ StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& befo
   effort.forget_operations();
   StepAttempt<Dim> with_euler(tools, before, true);
   result = with_euler.run(after, start);
-  blocking = with_euler.blocking_cells();
+  nearly_inverted = with_euler.nearly_inverted_cells();
   result.report.add_effort(effort);
   result.report.damped_steps = 1;
   return result;
@@ -318,27 +331,32 @@ template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
                      State<Dim>* start) {
   constexpr int kMostRetries = 3;
-  std::vector<CellId> blocking;
-  StepResult result = take_step_on_mesh(tools, before, after, damped, start, blocking);
-  if (result.ok || blocking.empty()) return result;
+  std::vector<CellId> nearly_inverted;
+  StepResult result = take_step_on_mesh(tools, before, after, damped, start, nearly_inverted);
   // Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
-  StepReport effort = result.report;
-  State<Dim> from = before;
+  State<Dim> from;
   MeshRenumbering renumbering;
-  for (int retry = 0; retry < kMostRetries && !result.ok && !blocking.empty(); ++retry) {
+  for (int retry = 0; retry < kMostRetries && !result.ok && !nearly_inverted.empty(); ++retry) {
     State<Dim> straightened;
-    const auto change = straighten_and_project<Dim>(tools, blocking, from, straightened, effort);
-    if (!change) return result;
+    StepReport effort;
+    const EffortClock clock(tools.solver);
+    const auto change =
+        straighten_and_project<Dim>(tools, nearly_inverted, retry == 0 ? before : from, straightened, effort);
+    clock.tell(effort);
+    result.report.add_effort(effort);
+    if (!change) break;
     renumbering = renumbering.empty() ? *change : compose(renumbering, *change);
     from = std::move(straightened);
     tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", result.report.step,
                                      before.space.num_curved() - from.space.num_curved(), result.reason));
-    result = take_step_on_mesh(tools, from, after, damped, start, blocking);
-    result.report.add_effort(std::exchange(effort, {}));
-    if (!result.ok) effort = result.report;
+    effort = result.report;
+    result = take_step_on_mesh(tools, from, after, damped, start, nearly_inverted);
+    result.report.add_effort(effort);
   }
-  if (!result.ok) return result;
-  result.renumbering = result.renumbering.empty() ? std::move(renumbering) : compose(renumbering, result.renumbering);
+  if (!result.ok)
+    result.report.forget_operations();  // the state that they led to is gone
+  else if (!renumbering.empty())
+    result.renumbering = result.renumbering.empty() ? std::move(renumbering) : compose(renumbering, result.renumbering);
   return result;
 }
 
