@@ -201,6 +201,16 @@ TEST(CurvedHost, RemeshingMayBeSwitchedOnLater) {
   EXPECT_THROW(simulation.advance(), InputError);
 }
 
+TEST(CurvedHost, ASizingFieldMeasuresStraightFacetsAlone) {
+  auto setup = pressed_block();
+  setup.remesh.sizing_field.enabled = true;
+  setup.remesh.curve.enabled = false;
+  setup.order.clear();
+  EXPECT_NO_THROW(simulate(setup));
+  setup.order[1] = 2;
+  EXPECT_THROW(simulate(setup), InputError);
+}
+
 TEST(CurvedHost, RemeshingMayBeSwitchedOnLaterWithAToleranceOfItsOwn) {
   auto setup = pressed_block();
   setup.remesh = {};

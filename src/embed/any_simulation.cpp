@@ -86,10 +86,10 @@ struct AnySimulation::Impl {
 
     const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
     const Space& space() const { return simulation.state().space; }
-    /// Also what remeshing may curve later, be the mesh frozen now or not.
-    void refuse_curved(const std::string& place) const {
+    /// Also what a simulation that `remeshes` may curve later, be its mesh frozen now or not.
+    void refuse_curved(const std::string& place, bool remeshes) const {
       if (!space().is_linear()) refuse(place, "curved edges", "a mesh with straight edges alone (discr_order 1)");
-      if (simulation.setup().remesh.curve.enabled)
+      if (remeshes && simulation.setup().remesh.curve.enabled)
         refuse(place, "/space/remesh/curve/enabled", "a mesh of which the edges stay straight");
     }
     /// Of values by vertex linear on the cells of the present mesh, of values by node quadratic along its curved edges.
@@ -365,14 +365,14 @@ void AnySimulation::set_term(const std::string& name, HostTerm term) {
   if (!is_null && !(term.energy && term.add_gradient && term.add_hessian))
     refuse("term '" + name + "'", "only some of its functions", "energy, gradient and Hessian");
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    if (!is_null) d.refuse_curved("term '" + name + "'");
+    if (!is_null) d.refuse_curved("term '" + name + "'", impl_->remeshes);
     d.set_term(name, is_null ? nullptr : as_factory<Dim>(std::make_shared<const HostTerm>(std::move(term)), name));
   });
 }
 
 void AnySimulation::set_follower_forces(ForceFunction forces, StiffnessFunction stiffness) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    if (forces) d.refuse_curved("follower forces");
+    if (forces) d.refuse_curved("follower forces", impl_->remeshes);
     FollowerForces<Dim>& follower = d.simulation.conditions().follower;
     follower = {};
     if (forces)

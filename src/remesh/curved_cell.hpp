@@ -73,7 +73,7 @@ template <int Dim, typename F>
 void for_each_gradient(const CurvedCell<Dim>& cell, const Mat<Dim>& inverse_edges, const VectorX& field, const F& f) {
   const auto linear = barycentric_gradients<Dim>(inverse_edges);
   const auto values = at_nodes<Dim>(cell.nodes, field);
-  for (const auto& point : quadrature<Dim>(2))
+  for (const auto& point : quadrature<Dim>(Dim))
     f(Mat<Dim>(values * quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear).transpose()), point.share);
 }
 

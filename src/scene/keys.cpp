@@ -287,8 +287,7 @@ constexpr Key kKeys[] = {
 
     {"/space/discr_order", read, "order", "1", "",
      "1: linear elements, 2: quadratic ones (curved edges); or a list by body, [{\"id\": 2, \"order\": 2}], bodies that are "
-     "not "
-     "listed are linear. An edge has the least order of the cells at it",
+     "not listed are linear. An edge has the least order of the cells at it",
      basic},
     {"/space/advanced/quadrature_order", read, "integer", "-1", "",
      "degree of elasticity's quadrature on quadratic elements, 1 to 5; -1: 2, and the mass' is exact"},
@@ -325,7 +324,8 @@ constexpr Key kKeys[] = {
     {"/space/remesh/curve/acceptance_tolerance", read, "positive", "(that of splits)", "J",
      "least decrease of energy by making an edge curved"},
     {"/space/remesh/straighten/enabled", read, "boolean", "(that of curve)", "",
-     "curved edges become straight again where that costs next to nothing"},
+     "curved edges become straight again where that costs next to nothing; a step that distorted curved cells stop is taken "
+     "again with straight ones in any case"},
     {"/space/remesh/straighten/acceptance_tolerance", read, "number", "(that of collapses)", "J",
      "negative: increase of energy that straightening an edge may cost"},
     {"/space/remesh/collapse/enabled", read, "boolean", "true", "", ""},

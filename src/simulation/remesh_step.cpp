@@ -185,10 +185,6 @@ void tell(const HistoryTransferReport& transfer, double extent, int step, const 
         fmt::format("step {}: the new mesh loses {:.2e} kg m of the integral of rho x", step, transfer.lost_positions));
 }
 
-}  // namespace
-
-namespace {
-
 /// `operate(mesh, fields, context, options, memory, strata)` on the state's mesh, and carries the state over.
 template <int Dim, typename Operate>
 std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,

@@ -31,8 +31,8 @@ constexpr Check<Dim> kChecks[] = {
       "lumped mass with remeshing of quadratic elements (discr_order 2 or curve/enabled)"},
      [](const Setup<Dim>& setup, bool curves) { return setup.remesh.enabled && curves && setup.lump_mass; }},
     {{"/space/remesh/curve/enabled", "curved edges with a sizing field"},
-     [](const Setup<Dim>& setup, bool) {
-       return setup.remesh.enabled && setup.remesh.curve.enabled && setup.remesh.sizing_field.enabled;
+     [](const Setup<Dim>& setup, bool curves) {
+       return setup.remesh.enabled && curves && setup.remesh.sizing_field.enabled;
      }},
     {{"terms", "terms of a program's own on quadratic elements"},
      [](const Setup<Dim>& setup, bool curves) { return (!setup.terms.empty() || setup.follower.forces) && curves; }},

@@ -115,8 +115,9 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   }
   const auto found = compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
                                   options.local.max_contact_iterations, scratch, accept);
-  const Refusal otherwise = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
-  note(found, verdict.accepted() ? Refusal::none : otherwise);
+  const bool was_refused_by_energy = verdict.refusal == Refusal::invalid || verdict.refusal == Refusal::bound;
+  const Refusal by_energy = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
+  note(found, was_refused_by_energy ? by_energy : verdict.refusal);
   verdict.was_relaxed = true;
 }
 

@@ -135,7 +135,7 @@ class Refiner {
     const double tolerance = curves ? curve_tolerance_ : tolerance_;
     const double signal = trial.signal, gain = trial.verdict.gain;
     RemeshMemory::SignalRange range{signal / kSameSignal, signal * kSameSignal, trial.in_contact};
-    if (!trial.in_contact) {
+    if (!trial.in_contact && trial.verdict.refusal != Refusal::shape) {  // another function may be less distorted
       constexpr double kMargin = 1.3;
       range.least = 0;
       if (gain > 0) range.most = signal * std::max(kSameSignal, ask_.context().scaling * tolerance / (kMargin * gain));
