@@ -47,6 +47,14 @@ std::string about_flights(const Results& results) {
       farthest, listed(names));
 }
 
+std::string about_missing(const Results& results, const char* what, const char* option, const char* measure,
+                          double Errors::*value) {
+  const auto is_missing = [&](const Row& row) { return row.errors && std::isnan((*row.errors).*value); };
+  if (std::none_of(results.rows.begin(), results.rows.end(), is_missing)) return "";
+  return fmt::format("Frames of the reference have no {} (/output/paraview/options/{}): of the {} no errors are told.", what,
+                     option, measure);
+}
+
 std::string about_large_errors(const Results& results, const Measure& measure) {
   std::vector<std::string> names;
   for (const auto& point : points(results, {}, measure, costs()[0]))
@@ -128,10 +136,8 @@ std::vector<std::string> doubts(const Results& results) {
     if (!sentence.empty()) sentences.push_back(std::move(sentence));
   };
   add(about_flights(results));
-  if (std::any_of(results.rows.begin(), results.rows.end(),
-                  [](const Row& row) { return row.errors && std::isnan(row.errors->energy); }))
-    add("Frames of the reference have no kinetic energy (/output/paraview/options/kinetic_energy, momentum): of energy and "
-        "momentum no errors are told.");
+  add(about_missing(results, "kinetic energy", "kinetic_energy", "energy", &Errors::energy));
+  add(about_missing(results, "momentum", "momentum", "momentum", &Errors::momentum));
   for (const auto& measure : measures()) {
     if (!is_judged(measure)) continue;
     const double least = nearest(results, measure);

@@ -221,17 +221,19 @@ class Planner {
     plan_.finest = fmt::format("uniform-{}", levels_);
     plan_.coarser = fmt::format("uniform-{}", levels_ - 1);
     if (options_.reference.empty()) add_references();
-    for (const auto& series : all_series()) {
-      const auto& asked = options_.series;
-      const bool is_asked = asked.empty() ? series.is_default
-                                          : std::find(asked.begin(), asked.end(), series.name) != asked.end() ||
-                                                std::find(asked.begin(), asked.end(), "all") != asked.end();
-      if (is_asked) add(series);
-    }
+    for (const auto& series : all_series())
+      if (is_asked(series)) add(series);
     return std::move(plan_);
   }
 
  private:
+  bool is_asked(const Series& series) const {
+    const auto& asked = options_.series;
+    if (asked.empty()) return series.is_default;
+    const auto has = [&](const std::string& name) { return std::find(asked.begin(), asked.end(), name) != asked.end(); };
+    return has(series.name) || has("all");
+  }
+
   PlannedRun complete(PlannedRun run) const {
     if (!source_.units.is_si()) run.overrides.insert(run.overrides.begin(), {"/output/units", "\"SI\""});
     run.overrides.insert(run.overrides.begin(), {{"/output/paraview/skip_frame", std::to_string(skip_)},
@@ -246,24 +248,36 @@ class Planner {
   void add(PlannedRun run) { plan_.runs.push_back(complete(std::move(run))); }
 
   /// The finest level, split on where that gains least of all, and never coarsened: its space has all of the uniform ones.
-  /// What it is worth says one that is coarser by a level and by its tolerance.
+  /// Beside series with quadratic functions it has them too. A second one, coarser by a level and by its tolerance, tells
+  /// what it is worth.
   void add_references() {
-    static const Series series = {kReference, Kind::levels, true, "what the others are compared with",
-                                  remeshed({{"/space/remesh/collapse/enabled", "false"}})};
+    static const scene::Override keep = {"/space/remesh/collapse/enabled", "false"};
+    static const char* const what = "what the others are compared with";
+    static const Series linear_series = {kReference, Kind::levels, true, what, remeshed({keep})};
+    // Only what is distorted becomes straight.
+    static const scene::Override at_no_gain = {"/space/remesh/straighten/acceptance_tolerance", "1e100"};
+    static const Series quadratic_series = {kReference, Kind::levels, true, what,
+                                            remeshed({keep, kQuadratic, kCurve, kStraighten, at_no_gain})};
+    const auto has_curves = [&](const Series& one) {
+      return is_asked(one) && one.kind == Kind::tolerances && (contains(one.overrides, kCurve) || is_quadratic(one));
+    };
+    const bool curves = std::any_of(all_series().begin(), all_series().end(), has_curves);
+    const Series& series = curves ? quadratic_series : linear_series;
     const double asked = options_.reference_tolerance;
     const double tolerance = asked > 0 ? asked : kReferenceShare * tolerances_.back();
     const auto split_on = [&](std::string name, int level, double by) {
       return PlannedRun{std::move(name),
                         &series,
-                        fmt::format("{}, split on to {:g} J", source_.level_label(level), by),
-                        linear(series.overrides) + source_.refined(level) + with_tolerance(source_, series, by),
+                        fmt::format("{}{}, split on to {:g} J", curves ? "order 2, " : "", source_.level_label(level), by),
+                        of_order(series) + source_.refined(level) + with_tolerance(source_, series, by),
                         "",
                         ""};
     };
-    plan_.references.push_back(complete(split_on(kReference, levels_, tolerance)));
+    const int finest = levels_ - curves;
+    plan_.references.push_back(complete(split_on(kReference, finest, tolerance)));
     for (double next = tolerance * kNextTry; asked == 0 && plan_.references.size() < kReferenceTries; next *= kNextTry)
-      plan_.references.push_back(complete(split_on(fmt::format("{}-{:g}", kReference, next), levels_, next)));
-    PlannedRun second = split_on(kSecondReference, levels_ - 1, kSecondShare * tolerance);
+      plan_.references.push_back(complete(split_on(fmt::format("{}-{:g}", kReference, next), finest, next)));
+    PlannedRun second = split_on(kSecondReference, std::max(finest - 1, 0), kSecondShare * tolerance);
     second.reference = kReference;
     add(std::move(second));
   }
@@ -273,6 +287,11 @@ class Planner {
   /// Where the scene asks for quadratic elements, linear ones.
   Overrides linear(const Overrides& overrides) const {
     return source_.has("/space/discr_order") ? overrides + Overrides{{"/space/discr_order", "1"}} : overrides;
+  }
+
+  /// A series' overrides, with the order of its elements.
+  Overrides of_order(const Series& series) const {
+    return is_quadratic(series) ? series.overrides : linear(series.overrides);
   }
 
   /// A run for each level by about as many cells in rows, where the bodies are one box.
@@ -300,8 +319,7 @@ class Planner {
         // A level of quadratic elements has about as many unknowns as the next one of linear elements.
         for (int level = 0; level <= levels_ - is_quadratic(series); ++level)
           add({fmt::format("{}-{}", series.name, level), &series, source_.level_label(level),
-               (is_quadratic(series) ? series.overrides : linear(series.overrides)) + source_.refined(level), "",
-               kReference});
+               of_order(series) + source_.refined(level), "", kReference});
         return;
       case Kind::rows:
         add_rows(series);
@@ -327,10 +345,8 @@ class Planner {
   void add_remeshed(const Series& series, int start, double tolerance) {
     std::string name = fmt::format("{}-{:g}", series.name, tolerance), label = fmt::format("tolerance {:g} J", tolerance);
     if (start > 0) name += fmt::format("-from-{}", start), label += ", from " + source_.level_label(start);
-    add({name, &series, label,
-         (is_quadratic(series) ? series.overrides : linear(series.overrides)) + source_.refined(start) +
-             with_tolerance(source_, series, tolerance),
-         "", kReference});
+    add({name, &series, label, of_order(series) + source_.refined(start) + with_tolerance(source_, series, tolerance), "",
+         kReference});
   }
 
   const Options& options_;
@@ -352,6 +368,8 @@ const std::vector<Series>& all_series() {
       {"swaps", Kind::tolerances, true, "splits, collapses and swaps", remeshed({kSwap})},
       {"smoothing", Kind::tolerances, true, "splits, collapses, swaps and smoothing", remeshed({kSwap, kSmooth})},
       {"hp", Kind::tolerances, false, "splits, curved edges and collapses", remeshed({kCurve, kStraighten})},
+      {"hp-smoothing", Kind::tolerances, false, "`hp`, swaps and smoothing",
+       remeshed({kCurve, kStraighten, kSwap, kSmooth})},
       {"p", Kind::tolerances, false, "curved edges alone",
        remeshed({kCurve, kStraighten, {"/space/remesh/split/enabled", "false"}})},
       {"splits-p2", Kind::tolerances, false, "splits of quadratic elements", remeshed({kQuadratic})},
