@@ -46,7 +46,7 @@ struct Run {
   State<Dim> state;
 };
 
-/// To its end; expects that each step succeeds, keeps its mesh and is valid.
+/// To its end; expects that each step succeeds, keeps its remeshing and is valid.
 template <int Dim>
 Run<Dim> run(Setup<Dim> setup) {
   setup.choose_defaults();

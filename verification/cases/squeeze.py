@@ -8,7 +8,7 @@ TITLE = "Newton iterations in hard contact"
 QUANTITY = "counts missed of iterations, factorisations and the worst step; finished and certified"
 REFERENCE = "verification/newton/squeeze.csv"
 TOLERANCE = "15 % more iterations or factorisations, half as many again in the worst step"
-NEEDS = ()
+NEEDS = ("numpy", "meshio")
 
 
 def results(context):

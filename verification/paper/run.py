@@ -106,6 +106,7 @@ WAYS = [(f"uniform {k}", ["/space/remesh/enabled=false", f"/geometry/0/n_refs={k
 
 # Each as it is, and with curved edges by the same tolerance.
 SWAPS = ["/space/remesh/swap/enabled=true", "/space/remesh/smooth/enabled=true"]
+NO_SWAPS = [assignment.replace("true", "false") for assignment in SWAPS]
 CURVES = [("cantilever", "cantilever/cantilever.json", []),
           ("masticator 2D to t=3", "masticator/h=0.1.json", ["/time/tend=3"]),
           ("ball-wall 2D to t=0.0024", "ball-wall/2D.json", ["/time/tend=0.0024"]),
@@ -119,8 +120,10 @@ CURVES = [("cantilever", "cantilever/cantilever.json", []),
            ["/time/tend=0.2", "/space/remesh/split/acceptance_tolerance=10"]),
           ("rollers to t=0.1", "rollers/monkey-soft-hard.json", ["/time/tend=0.1"]),
           ("spikes3d to t=0.3", "spikes3d/drop-ball.json", ["/time/tend=0.3"])]
-CURVE_WAYS = [("linear", []), ("curved", ["/space/remesh/curve/enabled=true"]),
+# Scenes may have swaps and smoothing themselves.
+CURVE_WAYS = [("linear", NO_SWAPS), ("linear, swaps and smoothing", SWAPS), ("curved", ["/space/remesh/curve/enabled=true", *NO_SWAPS]),
               ("curved, swaps and smoothing", ["/space/remesh/curve/enabled=true", *SWAPS])]
+OPERATIONS = ("splits", "curves", "straightens", "collapses", "swaps", "smooths")
 
 # What a case has to reach: least gain [J] (0.8 of the reference's); energy of the last step [J], at most or (value, relative
 # deviation); most vertices there; and most processor seconds a step over those of another case, which neither a slow machine
@@ -177,7 +180,7 @@ def check(itr, shared, results):
 
 def median_trial(steps):
     """Of the steps' medians, each counted as often as the step tried something [s]; 0 where nothing was tried."""
-    tried = sorted((s["trial_seconds"], sum(s[k]["tried"] for k in ("splits", "collapses", "swaps", "smooths"))) for s in steps)
+    tried = sorted((s["trial_seconds"], sum(s[k]["tried"] for k in OPERATIONS)) for s in steps)
     half, so_far = sum(count for _, count in tried) / 2, 0
     for seconds, count in tried:
         so_far += count
@@ -213,14 +216,14 @@ def run(case, options):
         # What the projection forgot is lower energy, too, but nothing gained.
         "gain": sum(s["energy_before_remesh"] - s["energy"]["total"] - s["history_loss"] for s in steps),
         "history_loss": sum(s["history_loss"] for s in steps),
-        "trials": sum(s[k]["relaxed"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
-        "accepted": sum(s[k]["accepted"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
+        "trials": sum(s[k]["relaxed"] for s in steps for k in OPERATIONS),
+        "accepted": sum(s[k]["accepted"] for s in steps for k in OPERATIONS),
         "microseconds_per_trial": 1e6 * median_trial(steps),
         "peak_rss_mb": last["peak_rss_mb"],
         "linear_share": sum(s["seconds"]["linear_solve"] for s in steps) / total,
         "unknowns_mean": sum(s["unknowns"] for s in steps) / len(steps), "unknowns_max": max(s["unknowns"] for s in steps),
         "curved": sum(s["curves"]["accepted"] for s in steps), "straightened": sum(s["straightens"]["accepted"] for s in steps),
-        "tried": sum(s[k]["tried"] for s in steps for k in ("splits", "collapses", "swaps", "smooths")),
+        "tried": sum(s[k]["tried"] for s in steps for k in OPERATIONS),
         "reference_seconds": reference[0] if reference else None, "reference_gain": reference[1] if reference else None,
         "reference_mb": reference[2] if reference else None, "commit": stored.made("verification/paper/results.csv"),
     }
