@@ -4,6 +4,7 @@
 #include "baseline.hpp"
 #include "energy/elastic/point.hpp"
 #include "fem/chords.hpp"
+#include "remesh/curved_cell.hpp"
 #include "remesh/decide/queries.hpp"
 
 namespace itr {
@@ -18,7 +19,13 @@ std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>
     if (!mesh.is_cell_alive(c)) continue;
     const Material& material = context.materials.at(mesh.body(c));
     const auto moduli = elastic_moduli<Dim>(material, rest_barycenter(mesh, c));
-    energies[c] = context.scaling * elastic_energy<Dim>(element_of(mesh, c), fields.x, moduli);
+    const auto element = element_of(mesh, c);
+    if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
+      for_each_gradient<Dim>(curved, element.inverse_edges, fields.x, [&](const Mat<Dim>& F, double share) {
+        energies[c] += context.scaling * element.volume * share * elastic_density<Dim>(F, moduli);
+      });
+    else
+      energies[c] = context.scaling * elastic_energy<Dim>(element, fields.x, moduli);
   }
   return energies;
 }
