@@ -452,6 +452,35 @@ TYPED_TEST(Curved, PredictionOfASwapHasWhatItsNodeGains) {
   EXPECT_GT(compared, 5);
 }
 
+/// With a quadratic energy the prediction of a split at curved edges is what its nodes gain together.
+TYPED_TEST(Curved, PredictionOfASplitIsWhatItsNodesGain) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0, left_out = 0;
+  for (unsigned seed = 0; seed < 120; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.2 * (seed % 6), seed % 2 ? 0.001 : 0.02);
+    const StepContext<Dim> context = context_of<Dim>(3 * seed + 1);
+    View<Dim> view(scene, context);
+    for (int i = 0; i < 5; ++i) {
+      const EdgeKey edge = scene.edge();
+      const Edit<Dim> edit = make_split(scene.mesh, edge);
+      LocalProblem<Dim> after(view.state, edit.removed_cells, edit, true, view.scratch);
+      std::vector<typename LocalProblem<Dim>::Position> free;
+      after.get_positions(free);
+      if (std::any_of(free.begin(), free.end(), [](const auto& at) { return at.vertex < kNewVertex - 1000; })) continue;
+      const double predicted = predict_split_at_curves<Dim>(view.state, edge);
+      if (std::isnan(predicted)) {
+        ++left_out;
+        continue;
+      }
+      const double before = LocalProblem<Dim>(view.state, edit.removed_cells, edit, false, view.scratch).value();
+      EXPECT_NEAR(predicted, before - after.relax(1).energy, 1e-9 * std::abs(before)) << "seed " << seed;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 50);
+  EXPECT_GT(left_out, 5);  // at loaded facets
+}
+
 /// With a quadratic energy the prediction of a curve is what the new node alone gains.
 TYPED_TEST(Curved, PredictionOfACurveIsWhatItsNodeGains) {
   constexpr int Dim = TypeParam::value;

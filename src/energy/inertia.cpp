@@ -38,7 +38,9 @@ template <int Dim>
 void InertiaEnergy<Dim>::renew_curved(const std::map<int, Material>& materials) {
   matrices_.clear();
   curved_mass_.clear();
-  std::map<CurvedEdges, std::size_t> matrix_of;
+  constexpr std::size_t kAbsent = kAllCurved<Dim> + 1;
+  std::array<std::size_t, kAllCurved<Dim> + 1> matrix_of;
+  matrix_of.fill(kAbsent);
   for (const auto& element : cells_.curved_elements) {
     const Material& material = materials.at(element.body);
     if (material.density_at) {
@@ -49,9 +51,12 @@ void InertiaEnergy<Dim>::renew_curved(const std::map<int, Material>& materials) 
       matrices_.push_back(quadratic_mass<Dim>(kind_, element.curved, density));
       continue;
     }
-    const auto [entry, is_new] = matrix_of.try_emplace(element.curved, matrices_.size());
-    if (is_new) matrices_.push_back(quadratic_mass<Dim>(kind_, element.curved));
-    curved_mass_.push_back({material.density * element.volume, entry->second});
+    std::size_t& matrix = matrix_of[element.curved];
+    if (matrix == kAbsent) {
+      matrix = matrices_.size();
+      matrices_.push_back(constant_quadratic_mass<Dim>(kind_, element.curved));
+    }
+    curved_mass_.push_back({material.density * element.volume, matrix});
   }
 }
 
@@ -138,7 +143,7 @@ void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal) {
     for (const int v : element.vertices)
       diagonal.segment<Dim>(Dim * v).array() += 2 * element.volume / ((Dim + 1) * (Dim + 2));
   for (const auto& element : cells.curved_elements) {
-    const auto mass = quadratic_mass<Dim>(MassKind::consistent, element.curved).diagonal().eval();
+    const auto mass = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).diagonal();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
       diagonal.segment<Dim>(Dim * element.nodes[k]).array() += element.volume * mass[k];
   }

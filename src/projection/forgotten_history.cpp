@@ -28,7 +28,7 @@ VectorX lumped_masses(const TransferMesh<Dim>& mesh) {
       for (const int v : mesh.cells[c]) masses[v] += mass / (Dim + 1);
     else  // 0 at straight edges
       for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-        masses[mesh.nodes[c][k]] += mass * quadratic_mass<Dim>(MassKind::lumped, curved)(k, k);
+        masses[mesh.nodes[c][k]] += mass * constant_quadratic_mass<Dim>(MassKind::lumped, curved)(k, k);
   }
   return masses;
 }

@@ -115,7 +115,7 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem, co
     for (const int v : element.vertices)
       masses[v] += problem.materials.at(element.body).density * element.volume / (Dim + 1);
   for (const auto& element : problem.cells.curved_elements) {
-    const auto shares = quadratic_mass<Dim>(MassKind::consistent, element.curved).rowwise().sum().eval();
+    const auto shares = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).rowwise().sum().eval();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // 0 at straight edges
       masses[element.nodes[k]] += problem.materials.at(element.body).density * element.volume * shares[k];
   }

@@ -104,8 +104,8 @@ class ConstrainedMass {
     for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
       const double mass = cell_mass(mesh, static_cast<int>(c));
       if (const CurvedEdges curved = mesh.curved_edges(c)) {
-        const auto matrix = quadratic_mass<Dim>(MassKind::consistent, curved);
-        const auto diagonal = quadratic_mass<Dim>(MassKind::lumped, curved);
+        const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, curved);
+        const auto& diagonal = constant_quadratic_mass<Dim>(MassKind::lumped, curved);
         for (int i = 0; i < kQuadraticNodes<Dim>; ++i) {
           if (!is_node<Dim>(curved, i)) continue;
           lumped[mesh.nodes[c][i]] += mass * diagonal(i, i);
@@ -334,7 +334,7 @@ VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d) {
       ElementMass<Dim>(MassKind::consistent, mass).add_product(mesh.cells[c], d, product);
       continue;
     }
-    const auto matrix = quadratic_mass<Dim>(MassKind::consistent, curved);
+    const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, curved);
     for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
       for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
         if (is_node<Dim>(curved, i) && is_node<Dim>(curved, j))

@@ -57,4 +57,18 @@ Mat<kQuadraticNodes<Dim>> quadratic_mass(MassKind kind, CurvedEdges curved, std:
   return Mat<kQuadraticNodes<Dim>>((total / diagonal.sum() * diagonal).asDiagonal());
 }
 
+/// The same of constant density, integrated once in a program.
+template <int Dim>
+const Mat<kQuadraticNodes<Dim>>& constant_quadratic_mass(MassKind kind, CurvedEdges curved) {
+  using Matrices = std::array<Mat<kQuadraticNodes<Dim>>, kAllCurved<Dim> + 1>;
+  const auto integrate = [](MassKind of_kind) {
+    Matrices all;
+    for (int edges = 0; edges <= kAllCurved<Dim>; ++edges)
+      all[edges] = quadratic_mass<Dim>(of_kind, static_cast<CurvedEdges>(edges));
+    return all;
+  };
+  static const Matrices consistent = integrate(MassKind::consistent), lumped = integrate(MassKind::lumped);
+  return (kind == MassKind::consistent ? consistent : lumped)[curved];
+}
+
 }  // namespace itr

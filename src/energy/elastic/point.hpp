@@ -73,6 +73,20 @@ class ElasticPoint {
   double density() const { return density_; }
   /// On a vertex whose shape function has this gradient, by volume.
   Vec<Dim> gradient(const Vec<Dim>& shape) const { return stress_ * shape; }
+  /// Between two vertices.
+  Mat<Dim> hessian(const Vec<Dim>& of_row, const Vec<Dim>& of_column) const {
+    Mat<Dim> sum = Mat<Dim>::Zero();
+    if (is_neo_hookean_) {
+      const Vec<Dim> h_row = inverse_.transpose() * of_row, h_column = inverse_.transpose() * of_column;
+      for (int b = 0; b < Dim; ++b)
+        for (int a = 0; a < Dim; ++a) sum(a, b) = stiffness_(h_row, h_column, a, b);
+      sum.diagonal().array() += stiffness_.diagonal(of_row, of_column);
+      return sum;
+    }
+    for (std::size_t k = 0; k < system_.values.size(); ++k)
+      sum += system_.values[k] * (system_.modes[k] * of_row) * (system_.modes[k] * of_column).transpose();
+    return sum;
+  }
   Mat<Dim> hessian(const Vec<Dim>& shape) const {
     Mat<Dim> sum = Mat<Dim>::Zero();
     if (is_neo_hookean_) {

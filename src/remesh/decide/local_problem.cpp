@@ -425,7 +425,7 @@ void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
   for (const CellId c : edit_.removed_cells) {
     const auto cell = curved_cell<Dim>(mesh_.cell(c), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); });
     const double mass = state_.context.materials.at(mesh_.body(c)).density * mesh_.volume(c);
-    const auto matrix = quadratic_mass<Dim>(MassKind::consistent, cell.edges);
+    const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
     const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
       if (k != n && (k <= Dim || cell.edges >> (k - Dim - 1) & 1)) add(cell.nodes[k], mass * matrix(k, n));

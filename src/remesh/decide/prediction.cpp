@@ -12,6 +12,7 @@
 #include "nodal_models.hpp"
 #include "quadratic_model.hpp"
 #include "remesh/edits.hpp"
+#include "split_model.hpp"
 
 namespace itr {
 
@@ -187,6 +188,22 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
 }
 
 template <int Dim>
+double predict_split_at_curves(const RemeshState<Dim>& state, const EdgeKey& edge) {
+  constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
+  const StepContext<Dim>& context = state.context;
+  const Mesh<Dim>& mesh = state.mesh;
+  if (!is_predictable(context) || context.mass == MassKind::lumped) return kCannotTell;
+  const auto is_hard = [&](CellId c) {
+    const Material& material = context.materials.at(mesh.body(c));
+    return material.has_varying_moduli() || material.density_at;
+  };
+  const auto around = mesh.cells_of_edge(edge);
+  if (std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
+  if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return kCannotTell;
+  return SplitModel<Dim>(state, edge).gain();
+}
+
+template <int Dim>
 double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
   const StepContext<Dim>& context = state.context;
@@ -240,6 +257,8 @@ template double least_forgotten(const RemeshState<2>&, const Edit<2>&);
 template double least_forgotten(const RemeshState<3>&, const Edit<3>&);
 template double predict_split(const RemeshState<2>&, const EdgeKey&);
 template double predict_split(const RemeshState<3>&, const EdgeKey&);
+template double predict_split_at_curves(const RemeshState<2>&, const EdgeKey&);
+template double predict_split_at_curves(const RemeshState<3>&, const EdgeKey&);
 template double predict_curve(const RemeshState<2>&, const EdgeKey&);
 template double predict_curve(const RemeshState<3>&, const EdgeKey&);
 template double cell_energy<2>(const RemeshState<2>&, const MeshTypes<2>::Cell&, int, const Edit<2>&);

@@ -38,6 +38,12 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 template <int Dim>
 double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge);
 
+/// The same at cells with curved edges, by the vertex and the nodes that the split adds, together: ½ r^T A^-1 r, and what
+/// finer quadrature changes. NaN where moduli or density vary in space, mass is lumped, a facet is loaded or A is
+/// indefinite.
+template <int Dim>
+double predict_split_at_curves(const RemeshState<Dim>& state, const EdgeKey& edge);
+
 /// The decrease of energy by making an edge curved, by the new node alone: ½ r^T A^-1 r. NaN where moduli vary in space or
 /// mass is lumped.
 template <int Dim>

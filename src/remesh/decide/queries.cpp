@@ -119,7 +119,8 @@ double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>&
   if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
   const auto around = mesh_.cells_of_edge(edge);
   if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
-  return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch);
+  const double gain = itr::predict_split_at_curves<Dim>(state(), edge);
+  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch) : gain;
 }
 
 template <int Dim>
