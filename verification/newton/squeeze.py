@@ -3,12 +3,13 @@
 """Hard-squeeze set: counts Newton iterations, factorisations and the worst step of bodies that are squeezed in contact.
 
 python3 verification/newton/squeeze.py [--check] [--dry] [--large] [--itr PATH] [--shared ../shared] [--case PART-OF-NAME]...
-                                       [--set /KEY=VALUE]... [--jobs N]
+                                       [--set /KEY=VALUE]... [--spread N] [--jobs N]
 
 Writes squeeze.csv and prints the table of README.md; each run is certified. With --check it stores nothing and compares with
 squeeze.csv: the exit status is 1 if a case does not end, is not certified, or takes more than the stored counts allow
 (MARGIN). Counts depend neither on how busy the machine is nor on the number of threads. --large adds the scenes that
-take minutes, --set changes a key in all of them (a variant), and nothing is stored then, nor with --dry.
+take minutes, --set changes a key in all of them (a variant), and nothing is stored then, nor with --dry. --spread runs each
+case N more times, with a barrier's reach that is larger by 0.1 %, 0.2 %, ...: a variant has to gain more than these differ.
 """
 import argparse
 import concurrent.futures
@@ -52,14 +53,27 @@ CASES = [
 # Of stored counts. Round-off of another compiler sends a squeezed body another way: the bound is no tighter than that.
 MARGIN = {"iterations": 1.15, "factorizations": 1.15, "worst": 1.5}
 
+REACH = 1e-3  # [m], a scene's default of /contact/dhat
+STEP_OF_REACH = 1e-3
 
-def run(case, options):
+
+def reach(path):
+    """d̂ of a scene file or of the file it has in common with others."""
+    scene = json.loads(path.read_text())
+    if "dhat" in scene.get("contact", {}):
+        return scene["contact"]["dhat"]
+    return reach(path.parent / scene["common"]) if "common" in scene else REACH
+
+
+def run(case, options, nth=0):
+    """The nth run of --spread; 0 is the scene as it is."""
     name, scene, sets, is_large = case
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch) / "out"
         path = options.shared / "paper-scenes/scripts" / scene if scene else bodies.build(name, scratch)
         command = [str(options.itr), "run", str(path), "-o", str(folder), "--threads", "1"]
-        for assignment in sets + options.set:
+        spread = [f"/contact/dhat={reach(path) * (1 + STEP_OF_REACH * nth)!r}"] if nth else []
+        for assignment in sets + spread + options.set:
             command += ["--set", assignment]
         done = subprocess.run(command, capture_output=True, text=True)
         if not (folder / "steps.jsonl").exists():
@@ -107,6 +121,28 @@ def run_all(cases, options):
         return list(pool.map(lambda case: run(case, options), cases))
 
 
+FORMS = {"iterations": "d", "worst": "d", "factorizations": "d", "processor_seconds": ".1f", "energy": ".6g"}
+
+
+def spread_table(cases, options):
+    """Means over the runs of each case, and the least and the largest of the single runs."""
+    runs = [(case, nth) for case in cases for nth in range(options.spread + 1)]
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        rows = list(pool.map(lambda one: run(one[0], options, one[1]), runs))
+    lines = ["| scene | iterations | worst step | factorisations | processor seconds | energy, last step [J] |",
+             "|---|---|---|---|---|---|"]
+    for case in cases:
+        own = [row for row in rows if row["case"] == case[0]]
+        cells = []
+        for key, form in FORMS.items():
+            values = [row[key] for row in own]
+            mean = sum(values) / len(values)
+            cells.append(f"{mean:{form.replace('d', '.0f')}} ({min(values):{form}} to {max(values):{form}})")
+        failed = "" if all(row["ended"] and row["certified"] for row in own) else ", NOT ALL ENDED CERTIFIED"
+        lines.append(f"| {case[0]}{failed} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def check(itr, shared, large=False, jobs=1):
     """Runs the cases; of each its row and what it misses."""
     options = argparse.Namespace(itr=itr, shared=shared, set=[], jobs=jobs)
@@ -122,6 +158,7 @@ def main():
     parser.add_argument("--large", action="store_true")
     parser.add_argument("--case", action="append")
     parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--spread", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--itr", type=pathlib.Path, default=ROOT / "build/release/bin/itr")
     parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared")
@@ -131,7 +168,11 @@ def main():
         for row, missing in found:
             print(f"{row['case']}: {'; '.join(missing) or 'as stored or fewer'}")
         sys.exit(any(missing for _, missing in found))
-    cases = [case for case in CASES if (options.large or not case[3]) and (not options.case or any(part in case[0] for part in options.case))]
+    is_asked = lambda case: not options.case or any(part in case[0] for part in options.case)  # noqa: E731
+    cases = [case for case in CASES if (options.large or not case[3]) and is_asked(case)]
+    if options.spread:
+        print(spread_table(cases, options))
+        return
     rows = run_all(cases, options)
     print(table(rows))
     if options.set or options.dry:
