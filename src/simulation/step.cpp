@@ -115,7 +115,9 @@ class StepAttempt {
     NewtonSummary summary = solve(expected());
     const std::string jump = jumped();
     if (!summary.converged()) {
-      if (summary.termination == Termination::no_descent && setup_.remesh.enabled) blocking_ = nearly_inverted(next_, x_);
+      const bool is_stuck =
+          summary.termination == Termination::no_descent || summary.termination == Termination::iterations;
+      if (is_stuck && setup_.remesh.enabled) blocking_ = nearly_inverted(next_, x_);
       return failed(summary, jump);
     }
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
