@@ -18,7 +18,7 @@ inline Vec<3> unit_normal(const std::array<Vec<3>, 3>& p) { return (p[1] - p[0])
 /// How far the curve over a node between the corners i and j of a facet leaves its two chords, across the surface there [m].
 /// Contact acts on the chords.
 template <int Dim>
-double overhang(const std::array<Vec<Dim>, Dim>& facet, int i, int j, const Vec<Dim>& node) {
+double distance_from_chords(const std::array<Vec<Dim>, Dim>& facet, int i, int j, const Vec<Dim>& node) {
   const Vec<Dim> bulge = node - (facet[i] + facet[j]) / 2;
   double largest = 0;
   for (const int k : {i, j}) {

@@ -332,7 +332,7 @@ void measure_overhangs(const StoredFrame& frame, const Surface<Dim>& surface, Ce
       const int node = num_vertices(frame) + at;
       std::array<Vec<Dim>, Dim> corners;
       for (int i = 0; i < Dim; ++i) corners[i] = x[facet[i]];
-      const double height = overhang<Dim>(corners, k, (k + 1) % Dim, x[node]);
+      const double height = distance_from_chords<Dim>(corners, k, (k + 1) % Dim, x[node]);
       certificate.overhang = std::max(certificate.overhang, height);
       if (height <= certificate.blocked_overhang) continue;
       Box<Dim> box;

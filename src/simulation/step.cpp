@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -115,8 +116,7 @@ class StepAttempt {
     NewtonSummary summary = solve(expected());
     const std::string jump = jumped();
     if (!summary.converged()) {
-      const bool is_stuck =
-          summary.termination == Termination::no_descent || summary.termination == Termination::iterations;
+      const bool is_stuck = summary.termination == Termination::no_descent || summary.termination == Termination::iterations;
       if (is_stuck && setup_.remesh.enabled) blocking_ = nearly_inverted(next_, x_);
       return failed(summary, jump);
     }
@@ -329,6 +329,10 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
   MeshRenumbering renumbering;
   for (int retry = 0; retry < kMostRetries && !result.ok && !blocking.empty(); ++retry) {
     State<Dim> straightened;
+    if (retry > 0) {  // what is around those cells has not helped
+      blocking.resize(from.mesh.cell_slots());
+      std::iota(blocking.begin(), blocking.end(), 0);
+    }
     const auto change = straighten_and_project<Dim>(tools, blocking, from, straightened, effort);
     if (!change) return result;
     renumbering = renumbering.empty() ? *change : compose(renumbering, *change);

@@ -111,7 +111,7 @@ double RemeshQueries<Dim>::overhang(const EdgeKey& e) const {
     };
     std::array<Vec<Dim>, Dim> corners;
     for (int k = 0; k < Dim; ++k) corners[k] = at(facet[k]);
-    largest = std::max(largest, itr::overhang<Dim>(corners, index(e[0]), index(e[1]), at(node)));
+    largest = std::max(largest, distance_from_chords<Dim>(corners, index(e[0]), index(e[1]), at(node)));
     return false;
   });
   return largest;
