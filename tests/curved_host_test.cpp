@@ -150,8 +150,9 @@ TEST(CurvedHost, AStepThatCurvedCellsStopIsTakenAgainWithStraightEdges) {
   ASSERT_TRUE(result.ok) << result.reason;
   EXPECT_EQ(again, 1);
   EXPECT_EQ(changes, 1);
-  EXPECT_EQ(curved - simulation.state().space.num_curved(), result.report.straightens.accepted);
-  EXPECT_GT(result.report.straightens.accepted, 0);
+  EXPECT_LT(simulation.state().space.num_curved(), curved);
+  // Chords bring edges between them that become straight, too.
+  EXPECT_GE(result.report.straightens.accepted, curved - simulation.state().space.num_curved());
   for (int i = before + 1; i < 30; ++i) ASSERT_TRUE(simulation.advance().ok);
 }
 

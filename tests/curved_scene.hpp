@@ -148,6 +148,7 @@ Proposal<Dim> propose_any(CurvedScene<Dim>& scene, const QualityRule& rule = {.s
     case 0:
       return propose_split(scene.mesh, edge);
     case 1:
+      if (is_curved && scene.random() % 2) return {.edit = make_chords(scene.mesh, edge)};
       return {.edit = is_curved ? make_straighten(scene.mesh, edge) : make_curve(scene.mesh, edge)};
     case 2:
     case 3:

@@ -22,14 +22,15 @@ class Recording final : public NewtonSystem {
     projections.push_back(psd);
     exact_.assemble(energy, x, psd, dofs, motion, workspace);
   }
-  linear::SystemReport solve(double shift, ConstVectorView rhs, const linear::Asked& asked, VectorView solution) override {
+  linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
+                             VectorView solution) override {
     shifts.push_back(shift);
     this->asked.push_back(asked);
     linear::SystemReport report = NewtonSystem::solve(shift, rhs, asked, solution);
     if (report.outcome == linear::Outcome::ok) report.residual = asked.loose;
     return report;
   }
-  linear::SystemReport factorize(double shift) override {
+  linear::SystemReport factorize(const Shift& shift) override {
     ++factorizations;
     return exact_.factorize(shift);
   }
@@ -38,9 +39,10 @@ class Recording final : public NewtonSystem {
   }
   std::string message() const override { return "recording"; }
   double diagonal_scale() const override { return exact_.diagonal_scale(); }
+  double curvature_of(const Shift& shift, ConstVectorView step) const override { return exact_.curvature_of(shift, step); }
 
   std::vector<PsdProjection> projections;
-  std::vector<double> shifts;
+  std::vector<Shift> shifts;
   std::vector<linear::Asked> asked;
   int factorizations = 0;
 
@@ -315,10 +317,13 @@ TEST(Direction, IsShiftedWhereItIsNotProjected) {
   options.project_to_psd = false;
   Parts parts(energy, Vec<2>(0.1, 0.1), options);
   ASSERT_TRUE(parts.direction->find());
-  EXPECT_EQ(parts.system.shifts.front(), 0);
-  for (std::size_t i = 2; i < parts.system.shifts.size(); ++i)
-    EXPECT_DOUBLE_EQ(parts.system.shifts[i], 10 * parts.system.shifts[i - 1]);
-  EXPECT_GT(parts.system.shifts.back(), 0.97);
+  const auto& shifts = parts.system.shifts;
+  EXPECT_EQ(shifts.front().value, 0);
+  for (std::size_t i = 2; i < shifts.size(); ++i)
+    if (shifts[i].is_share == shifts[i - 1].is_share) EXPECT_NEAR(shifts[i].value / shifts[i - 1].value, 10, 1e-12);
+  EXPECT_TRUE(shifts[1].is_share);
+  EXPECT_FALSE(shifts.back().is_share) << "shares of a negative entry do not make it positive";
+  EXPECT_GT(shifts.back().value, 0.97);
   EXPECT_LT(parts.direction->step().way.dot(parts.at->gradient()), 0);
 }
 

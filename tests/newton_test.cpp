@@ -150,18 +150,20 @@ class ShortSighted final : public NewtonSystem {
     curvature_ = 3 * x[1] * x[1] - c_;
     exact_.assemble(energy, x, psd, dofs, motion, workspace);
   }
-  linear::SystemReport solve(double shift, ConstVectorView rhs, const linear::Asked& asked, VectorView solution) override {
+  linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
+                             VectorView solution) override {
     if (!(asked.loose > kTightResidual && curvature_ > 0)) return exact_.solve(shift, rhs, asked, solution);
     ++loose;
     solution = Vec<2>(0, rhs[1] / curvature_);
     return {linear::Outcome::ok, asked.loose, linear::Definiteness::positive};
   }
-  linear::SystemReport factorize(double shift) override { return exact_.factorize(shift); }
+  linear::SystemReport factorize(const Shift& shift) override { return exact_.factorize(shift); }
   linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override {
     return exact_.solve_again(rhs, solution);
   }
   std::string message() const override { return "short-sighted"; }
   double diagonal_scale() const override { return exact_.diagonal_scale(); }
+  double curvature_of(const Shift& shift, ConstVectorView step) const override { return exact_.curvature_of(shift, step); }
   int loose = 0;  ///< solves
 
  private:
@@ -380,6 +382,58 @@ class Pull final : public Energy {
 };
 
 /// Points fall on a floor from heights that differ by a factor of a thousand: each is stopped on its own.
+/// Two coordinates on a spring so stiff that the Hessian is singular in floating point, and two that are soft; all go to 1.
+class StiffPair final : public Energy {
+ public:
+  std::string_view name() const override { return "stiff pair"; }
+  double value(ConstVectorView x, Workspace&) const override {
+    return kStiff / 2 * std::pow(x[0] - x[1], 2) + kSoft / 2 * (x.array() - 1).square().sum();
+  }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
+    const double force = kStiff * (x[0] - x[1]);
+    gradient[0] += force;
+    gradient[1] -= force;
+    gradient.array() += kSoft * (x.array() - 1);
+  }
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const override {
+    Mat<2> pair = kSoft * Mat<2>::Identity(), soft = pair;
+    pair(0, 0) += kStiff, pair(1, 1) += kStiff, pair(0, 1) -= kStiff, pair(1, 0) -= kStiff;
+    sink.add<2>(std::array{0}, pair.data());
+    sink.add<2>(std::array{1}, soft.data());
+  }
+
+ private:
+  static constexpr double kStiff = 0x1p58, kSoft = 1e-3;
+};
+
+TEST(Newton, WhatIsStiffHoldsNothingElse) {
+  NewtonOptions options;
+  options.step_tolerance = 1e-6;
+  options.extend_steps = false;
+  VectorX x = VectorX::Zero(4);
+  x[0] = x[1] = 1;
+  DenseSystem system;
+  Workspace workspace;
+  const auto summary =
+      minimize(StiffPair(), x, DofMap::from_held(std::vector<char>(4, 0)), VectorX(), system, options, workspace);
+  EXPECT_TRUE(summary.converged());
+  EXPECT_NEAR(x[2], 1, 1e-6);
+  EXPECT_NEAR(x[3], 1, 1e-6);
+}
+
+TEST(Newton, StepsThatAShiftMakesShortAreNoEnd) {
+  NewtonOptions options;
+  options.step_tolerance = 1e-6;
+  options.extend_steps = false;
+  options.max_iterations = 30;
+  VectorX x = VectorX::Zero(4);
+  DenseSystem system;
+  Workspace workspace;
+  const auto summary =
+      minimize(StiffPair(), x, DofMap::from_held(std::vector<char>(4, 0)), VectorX(), system, options, workspace);
+  EXPECT_EQ(summary.termination, Termination::iterations) << x.transpose();
+}
+
 TEST(Newton, ContactOfOneVertexStopsNoOther) {
   constexpr int n = 20;
   std::vector<Vec<2>> rest;

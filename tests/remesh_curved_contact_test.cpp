@@ -72,6 +72,7 @@ struct Scene {
     const EdgeKey e = edge(of_surface);
     const bool is_curved = mesh.node_of(e[0], e[1]) != kNone;
     if (random() % 2) return make_split(mesh, e);
+    if (is_curved && random() % 2) return make_chords(mesh, e);
     return is_curved ? make_straighten(mesh, e) : make_curve(mesh, e);
   }
   void apply(const Edit<Dim>& edit) { apply_edit(edit, mesh, fields, strata); }
@@ -198,7 +199,7 @@ TYPED_TEST(CurvedContact, PatchesSeeWhatTheWholeMeshSees) {
   EXPECT_GT(compared, 100);
   EXPECT_GT(in_contact, 30);
   EXPECT_GT(moved_nodes, 30);
-  EXPECT_EQ(kinds.size(), 3u);
+  EXPECT_EQ(kinds.size(), 4u);
 }
 
 /// Adds obstacle points near the surface, outside of bodies.
@@ -329,6 +330,12 @@ TEST(CurvedGate, CoversWhatStraighteningSweeps) {
   }
 }
 
+TEST(CurvedGate, LetsChordsReplaceTheirCurveBesideAnything) {
+  const Bulge bulge(0.1, Vec<2>(0.25, 1.06));  // between a chord and the curve
+  EXPECT_TRUE(bulge.passes(make_chords(bulge.mesh, bulge.top)));
+  EXPECT_FALSE(Bulge(0.1, Vec<2>(0.25, 1.04)).passes(make_straighten(bulge.mesh, bulge.top)));
+}
+
 /// A bar that is pressed onto obstacles.
 template <int Dim>
 Setup<Dim> pressed_bar() {
@@ -374,6 +381,38 @@ TYPED_TEST(CurvedContact, RunsStayValidOnAnyNumberOfThreads) {
     const State<Dim> again = run<Dim>(setup).state;
     expect_same(again, first.state);
   }
+}
+
+/// How deep samples of the curves of a state are in the tent of pressed_bar [m].
+double depth_in_tent(const State<2>& state) {
+  const VectorX& x = state.history.x[0];
+  double deepest = 0;
+  for (int i = 0; i < state.space.num_curved(); ++i) {
+    const EdgeKey& edge = state.space.curved_edges()[i];
+    if (state.mesh.facets_of_edge(edge).empty()) continue;
+    for (double t = 0; t <= 1; t += 1.0 / 64) {
+      const Vec<2> p = (1 - t) * (1 - 2 * t) * vertex_of<2>(x, edge[0]) + t * (2 * t - 1) * vertex_of<2>(x, edge[1]) +
+                       4 * t * (1 - t) * vertex_of<2>(x, state.mesh.vertex_slots() + i);
+      const double roof = p[0] < 2.1 ? -0.4 + 0.74 * (p[0] - 1.6) : -0.4 + 0.74 * (2.6 - p[0]);
+      if (p[1] > -0.4) deepest = std::max(deepest, roof - p[1]);
+    }
+  }
+  return deepest;
+}
+
+TEST(CurvedSurface, OfARunOverlapsNothing) {
+  itr::Setup<2> setup = pressed_bar<2>();
+  setup.contact.activation_distance = 1e-3;
+  setup.contact.barrier_stiffness = 1e6;
+  setup.choose_defaults();
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  double deepest = 0;
+  while (!simulation.finished()) {
+    ASSERT_TRUE(simulation.advance().ok);
+    deepest = std::max(deepest, depth_in_tent(simulation.state()));
+  }
+  EXPECT_EQ(deepest, 0);
 }
 
 /// A scene of order 2, its surface curved from the start.

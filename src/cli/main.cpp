@@ -65,6 +65,11 @@ int certify(const std::string& directory) {
   for (const auto& violation : certificate.violations) fmt::print("{}\n", violation);
   fmt::print("{} frames, each by itself: {}\n", certificate.frames,
              certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
+  if (certificate.overhang > 0)
+    fmt::print(
+        "curved edges of the surface leave their chords, which are what is checked, by at most {:.2g} m, and by {:.2g} m "
+        "where something else is nearer than that\n",
+        certificate.overhang, certificate.blocked_overhang);
   return certificate.passed() ? cli::done : cli::certificate_failed;
 }
 

@@ -1,9 +1,33 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
+
+/// Of a facet with these corners; 0 where it has no area.
+inline Vec<2> unit_normal(const std::array<Vec<2>, 2>& p) {
+  return Vec<2>(p[1][1] - p[0][1], p[0][0] - p[1][0]).stableNormalized();
+}
+inline Vec<3> unit_normal(const std::array<Vec<3>, 3>& p) { return (p[1] - p[0]).cross(p[2] - p[0]).stableNormalized(); }
+
+/// How far the curve over a node between the corners i and j of a facet leaves its two chords, across the surface there [m].
+/// Contact acts on the chords.
+template <int Dim>
+double distance_from_chords(const std::array<Vec<Dim>, Dim>& facet, int i, int j, const Vec<Dim>& node) {
+  const Vec<Dim> bulge = node - (facet[i] + facet[j]) / 2;
+  double largest = 0;
+  for (const int k : {i, j}) {
+    auto half = facet;
+    half[k] = node;
+    largest = std::max(largest, std::abs(bulge.dot(unit_normal(half))));
+  }
+  return largest / 4;
+}
 
 /// Calls add(ids) for the simplices through all nodes of a boundary facet, oriented as the facet (see add_chord_facets).
 /// `node_of(a, b)`: the node of an edge, or kNone where it is straight.

@@ -39,6 +39,10 @@ std::optional<Termination> Convergence::test(const Step& step) {
     unresolved_ = 0;
     return {};
   }
+  if (step.is_of_shift) {
+    unresolved_ = 0;
+    return {};
+  }
   if (has_small_step(step)) return Termination::step;
   if (at_.decrement_of(step) < task_.options.decrement_tolerance) return Termination::decrement;
   if (is_lost_in_round_off(step)) return Termination::round_off;
@@ -56,6 +60,7 @@ bool Convergence::is_lost_in_round_off(const Step& step) {
 }
 
 bool Convergence::is_at_round_off(const Step& step) const {
+  if (step.is_of_shift) return false;
   return at_.is_unresolved(step) || at_.decrement_of(step) < kUnresolved * std::abs(at_.first_value());
 }
 

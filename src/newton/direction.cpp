@@ -12,8 +12,11 @@ namespace {
 
 constexpr double kLoosest = 1e-4;      ///< residual of a direction
 constexpr int kMostLoose = 8;          ///< iterations of a solve that may be loose
-constexpr double kFirstShift = 1e-10;  ///< of the diagonal
-constexpr int kMostShifts = 12;        ///< each ten times the one before
+constexpr double kFirstShare = 1e-13;  ///< of each diagonal entry
+constexpr int kMostShares = 12;        ///< each ten times the one before
+constexpr double kFirstShift = 1e-10;  ///< of the largest: where an entry is 0 or below
+constexpr int kMostShifts = 12;
+constexpr double kMostOfShift = 0.1;  ///< of the curvature along a step that may be the last
 
 /// Whether a shift of the Hessian may help.
 bool is_curable(linear::Outcome outcome) {
@@ -45,9 +48,11 @@ bool Direction::find() {
     is_projected_ = true;
     if (find_with(PsdProjection::clamp)) return true;
   }
-  double shift = kFirstShift * std::max(task_.system.diagonal_scale(), 1e-300);
-  for (int attempt = 0; attempt < kMostShifts && is_curable(solved_.outcome); ++attempt, shift *= 10)
-    if (solve(shift)) return true;
+  for (int attempt = 0; attempt < kMostShares && is_curable(solved_.outcome); ++attempt)
+    if (solve(Shift::share_of_diagonal(kFirstShare * std::pow(10, attempt)))) return true;
+  const double scale = std::max(task_.system.diagonal_scale(), 1e-300);
+  for (int attempt = 0; attempt < kMostShifts && is_curable(solved_.outcome); ++attempt)
+    if (solve(kFirstShift * std::pow(10, attempt) * scale)) return true;
   return false;
 }
 
@@ -62,7 +67,7 @@ bool Direction::tighten() {
   is_tight_ = true;
   asked_ = kTightResidual;
   const bool found = solve(shift_, true);
-  if (!is_projected_ && shift_ == 0) note_definiteness();
+  if (!is_projected_ && shift_.value == 0) note_definiteness();
   return found || find();
 }
 
@@ -120,7 +125,7 @@ ConstVectorView Direction::right_hand_side() {
 }
 
 /// Solves for the full step; true where it is one of descent. `goes_on`: from the solution that is there.
-bool Direction::solve(double shift, bool goes_on) {
+bool Direction::solve(const Shift& shift, bool goes_on) {
   shift_ = shift;
   is_loose_ = false;
   const ScopedTimer timer(task_.summary.linear_seconds);
@@ -143,7 +148,9 @@ bool Direction::solve(double shift, bool goes_on) {
     return fail(std::string(to_string(solved_.outcome)) + ", " + task_.system.message());
   is_loose_ = solved_.residual > kTightResidual && solved_.residual <= asked_;
   if (!is_loose_) task_.summary.linear_residual = std::max(task_.summary.linear_residual, solved_.residual);
-  return set_step(rhs, solution);
+  if (!set_step(rhs, solution)) return false;
+  step_.is_of_shift = shift.value > 0 && task_.system.curvature_of(shift, solution) > kMostOfShift * solution.dot(rhs);
+  return true;
 }
 
 bool Direction::set_step(ConstVectorView rhs, ConstVectorView solution) {
@@ -164,6 +171,7 @@ bool Direction::set_step(ConstVectorView rhs, ConstVectorView solution) {
 /// Sets the step to the prescribed motion of the held dofs, and to zero elsewhere.
 void Direction::begin_step() {
   step_.is_set = true;
+  step_.is_of_shift = false;
   if (held_.is_advancing())
     step_.way = held_.motion().step;
   else

@@ -37,7 +37,7 @@ class Direction {
   };
   double digits_to_ask() const;
   bool find_with(PsdProjection psd);
-  bool solve(double shift, bool goes_on = false);
+  bool solve(const Shift& shift, bool goes_on = false);
   bool set_step(ConstVectorView rhs, ConstVectorView solution);
   void begin_step();
   ConstVectorView right_hand_side();
@@ -55,7 +55,7 @@ class Direction {
 
   bool is_projected_ = false;     ///< the step is of the projected Hessian
   int projected_iterations_ = 0;  ///< that are still to come before the true one is tried again
-  double shift_ = 0;              ///< of the step's Hessian
+  Shift shift_;                   ///< of the step's Hessian
 
   double asked_ = kTightResidual;  ///< residual of the step
   double gradient_before_ = 0;     ///< norm, when the step before was asked for

@@ -7,7 +7,7 @@
 
 namespace itr {
 
-linear::SystemReport NewtonSystem::solve(double shift, ConstVectorView rhs, const linear::Asked& asked,
+linear::SystemReport NewtonSystem::solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                                          VectorView solution) {
   const linear::SystemReport report = factorize(shift);
   if (solution.size() == 0) return report;
@@ -30,10 +30,11 @@ void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjectio
   energy.add_hessian(x, psd, sink, workspace);
 }
 
-linear::SystemReport DenseSystem::factorize(double shift) {
+linear::SystemReport DenseSystem::factorize(const Shift& shift) {
   factor_.resize(order_ * order_) = hessian_.view();
   Eigen::Ref<MatrixX> factor = factor_.matrix(order_);
-  if (shift != 0) factor.diagonal().array() += shift;
+  if (shift.value != 0)
+    for (Eigen::Index i = 0; i < order_; ++i) factor(i, i) += shift.of(factor(i, i));
   const Eigen::LLT<Eigen::Ref<MatrixX>, Eigen::Lower> llt(factor);  // in place
   if (llt.info() != Eigen::Success)
     return {.outcome = linear::Outcome::not_positive_definite, .definiteness = linear::Definiteness::indefinite};
@@ -52,6 +53,12 @@ double DenseSystem::diagonal_scale() const {
   double scale = 0;
   for (Eigen::Index i = 0; i < order_; ++i) scale = std::max(scale, std::abs(hessian_.view()[(order_ + 1) * i]));
   return scale;
+}
+
+double DenseSystem::curvature_of(const Shift& shift, ConstVectorView step) const {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < order_; ++i) sum += shift.of(hessian_.view()[(order_ + 1) * i]) * step[i] * step[i];
+  return sum;
 }
 
 void SparseSystem::reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils) {
@@ -91,21 +98,24 @@ linear::Outcome SparseSystem::analyze() {
   return outcome;
 }
 
-void SparseSystem::shift_by(double shift) {
+void SparseSystem::shift_by(const Shift& shift) {
   matrix_ = assembler_.values();
-  if (shift == 0) return;
+  if (shift.value == 0) return;
   shifted_.assign(matrix_.begin(), matrix_.end());
-  for (int j = 0; j < assembler_.pattern().order; ++j) shifted_[assembler_.pattern().column_starts[j]] += shift;
+  for (int j = 0; j < assembler_.pattern().order; ++j) {
+    double& entry = shifted_[assembler_.pattern().column_starts[j]];
+    entry += shift.of(entry);
+  }
   matrix_ = shifted_;
 }
 
-linear::SystemReport SparseSystem::factorize(double shift) {
+linear::SystemReport SparseSystem::factorize(const Shift& shift) {
   if (const auto outcome = analyze(); outcome != linear::Outcome::ok) return {.outcome = outcome};
   shift_by(shift);
   return linear::describe(solver_.factorize(matrix_), solver_);
 }
 
-linear::SystemReport SparseSystem::solve(double shift, ConstVectorView rhs, const linear::Asked& asked,
+linear::SystemReport SparseSystem::solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                                          VectorView solution) {
   if (!reusing_) return NewtonSystem::solve(shift, rhs, asked, solution);
   if (const auto outcome = analyze(); outcome != linear::Outcome::ok) return {.outcome = outcome};
@@ -141,6 +151,13 @@ double SparseSystem::diagonal_scale() const {
   for (int j = 0; j < assembler_.pattern().order; ++j)
     scale = std::max(scale, std::abs(assembler_.values()[assembler_.pattern().column_starts[j]]));
   return scale;
+}
+
+double SparseSystem::curvature_of(const Shift& shift, ConstVectorView step) const {
+  double sum = 0;
+  for (int j = 0; j < assembler_.pattern().order; ++j)
+    sum += shift.of(assembler_.values()[assembler_.pattern().column_starts[j]]) * step[j] * step[j];
+  return sum;
 }
 
 }  // namespace itr

@@ -22,10 +22,11 @@ struct Task {
 
 /// A full step, and what the quadratic model says of it.
 struct Step {
-  VectorView way;        ///< over all dofs
-  bool is_set = false;   ///< `way` holds a step
-  double norm = 0;       ///< of the options
-  double curvature = 0;  ///< way^T H way
+  VectorView way;            ///< over all dofs
+  bool is_set = false;       ///< `way` holds a step
+  double norm = 0;           ///< of the options
+  double curvature = 0;      ///< way^T H way
+  bool is_of_shift = false;  ///< it is short because the Hessian was shifted, not because the end is near
 };
 
 }  // namespace itr

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <optional>
 
+#include "fem/chords.hpp"
 #include "frame_file.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/closed_surface.hpp"
@@ -19,6 +20,7 @@
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
 #include "itr/fem/space.hpp"
+#include "itr/geometry/distance.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr::output {
@@ -300,8 +302,59 @@ void check_insides(const Surface<Dim>& surface, const std::string& name, std::ve
         fmt::format("{}: the part of the boundary at vertex {} is inside of a body", name, surface.name(v)));
 }
 
+bool is_nearer(const Vec<2>& a, const Vec<2>& b, const Surface<2>& surface, int primitive, double distance) {
+  const auto [p, q] = surface.edges[primitive];
+  const Vec<2>&c = surface.x[p], &d = surface.x[q];
+  return std::min({point_edge_distance_squared<2>(a, c, d), point_edge_distance_squared<2>(b, c, d),
+                   point_edge_distance_squared<2>(c, a, b), point_edge_distance_squared<2>(d, a, b)}) < distance * distance;
+}
+bool is_nearer(const Vec<3>& a, const Vec<3>& b, const Surface<3>& surface, int primitive, double distance) {
+  const auto [p, q, r] = surface.triangles[primitive];
+  const Vec<3>&c = surface.x[p], &d = surface.x[q], &e = surface.x[r];
+  return std::min({point_triangle_distance_squared(a, c, d, e), point_triangle_distance_squared(b, c, d, e),
+                   edge_edge_distance_squared(a, b, c, d), edge_edge_distance_squared(a, b, d, e),
+                   edge_edge_distance_squared(a, b, e, c)}) < distance * distance;
+}
+
+/// Fills in what curved edges do beyond their chords. Pieces of the surface around an edge do not count as something else.
 template <int Dim>
-void check_frame(const StoredFrame& frame, const std::string& name, std::vector<std::string>& violations) {
+void measure_overhangs(const StoredFrame& frame, const Surface<Dim>& surface, Certificate& certificate) {
+  const Space space = space_of(frame);
+  if (space.is_linear() || surface.has_proxy) return;
+  const auto& primitives = facets_of(surface);
+  const Bvh<Dim> tree(boxes_of<Dim>(surface.x, primitives));
+  const auto& x = surface.x;
+  std::vector<int> hits;
+  for (const auto& facet : boundary_facets<Dim>(frame.simplices))
+    for (int k = 0; k < (Dim == 2 ? 1 : 3); ++k) {
+      const int a = facet[k], b = facet[(k + 1) % Dim], at = space.find(a, b);
+      if (at == kNone) continue;
+      const int node = num_vertices(frame) + at;
+      std::array<Vec<Dim>, Dim> corners;
+      for (int i = 0; i < Dim; ++i) corners[i] = x[facet[i]];
+      const double height = distance_from_chords<Dim>(corners, k, (k + 1) % Dim, x[node]);
+      certificate.overhang = std::max(certificate.overhang, height);
+      if (height <= certificate.blocked_overhang) continue;
+      Box<Dim> box;
+      for (const int v : {a, b, node}) box.include(x[v]);
+      hits.clear();
+      tree.query(box.inflated(height), hits);
+      std::vector<int> around;
+      for (const int i : hits)
+        if (num_shared(primitives[i], std::array{a, b, node}) > 0)
+          around.insert(around.end(), primitives[i].begin(), primitives[i].end());
+      const auto is_around = [&](int v) { return std::find(around.begin(), around.end(), v) != around.end(); };
+      if (std::any_of(hits.begin(), hits.end(), [&](int i) {
+            return std::none_of(primitives[i].begin(), primitives[i].end(), is_around) &&
+                   (is_nearer(x[a], x[node], surface, i, height) || is_nearer(x[node], x[b], surface, i, height));
+          }))
+        certificate.blocked_overhang = height;
+    }
+}
+
+template <int Dim>
+void check_frame(const StoredFrame& frame, const std::string& name, Certificate& certificate) {
+  std::vector<std::string>& violations = certificate.violations;
   // What is not a number compares false with everything, and every predicate after it would pass.
   const auto is_finite = [](double value) { return std::isfinite(value); };
   for (const auto* x : {&frame.rest, &frame.x, &frame.obstacles.x, &frame.proxy.x}) {
@@ -315,6 +368,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, std::vector<
   const Surface<Dim> surface = make_surface<Dim>(frame);
   check_surface(surface, name, violations);
   if (violations.size() == before) check_insides(surface, name, violations);
+  measure_overhangs(frame, surface, certificate);
 }
 
 std::vector<fs::path> frame_files(const fs::path& directory) {
@@ -337,9 +391,9 @@ Certificate certify(const fs::path& directory) {
     }
     const StoredFrame frame = read_frame(file);
     if (frame.dim == 2) {
-      check_frame<2>(frame, name, certificate.violations);
+      check_frame<2>(frame, name, certificate);
     } else {
-      check_frame<3>(frame, name, certificate.violations);
+      check_frame<3>(frame, name, certificate);
     }
   }
   return certificate;

@@ -75,7 +75,7 @@ class PenalisedSystem final : public NewtonSystem {
                 Workspace& workspace) override {
     system_.assemble(energy, x, psd, dofs, motion, workspace);
   }
-  linear::SystemReport factorize(double shift) override {
+  linear::SystemReport factorize(const Shift& shift) override {
     linear::SystemReport report = system_.factorize(shift);
     if (report.outcome != linear::Outcome::ok) return report;
     solved_.resize(columns_.rows(), columns_.cols());
@@ -98,6 +98,7 @@ class PenalisedSystem final : public NewtonSystem {
   std::string message() const override { return system_.message(); }
   bool tells_definiteness() const override { return system_.tells_definiteness(); }
   double diagonal_scale() const override { return system_.diagonal_scale(); }
+  double curvature_of(const Shift& shift, ConstVectorView step) const override { return system_.curvature_of(shift, step); }
 
  private:
   SparseSystem& system_;

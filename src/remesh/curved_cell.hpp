@@ -102,11 +102,9 @@ void for_each_node_on(const typename MeshTypes<Dim>::Facet& facet, const NodeOf&
     if (const VertexId node = node_of(facet[k], facet[(k + 1) % Dim]); node != kNone) visit(node);
 }
 
-/// The least det dx/dxi in a cell over its mean: 1 where the cell is affine. Where it is small, the cell's quadratic
-/// function oscillates, as it does in shocks and at singular corners, more than its energy tells.
+/// The mean of det dx/dxi over a cell.
 template <int Dim>
-double relative_jacobian(const QuadraticCell<Dim>& x) {
-  constexpr double kTolerance = 0.1;
+double mean_jacobian(const QuadraticCell<Dim>& x) {
   Eigen::Matrix<double, Dim, Dim + 1> unit;
   unit.col(0).setConstant(-1);
   unit.template rightCols<Dim>().setIdentity();
@@ -114,7 +112,15 @@ double relative_jacobian(const QuadraticCell<Dim>& x) {
   for (const auto& point : quadrature<Dim>(2))
     mean +=
         point.share * (x * quadratic_gradients<Dim, Dim>(kAllCurved<Dim>, point.weights, unit).transpose()).determinant();
-  return min_jacobian_bound<Dim>(x, kTolerance) / mean;
+  return mean;
+}
+
+/// The least det dx/dxi in a cell over its mean: 1 where the cell is affine. Where it is small, the cell's quadratic
+/// function oscillates, as it does in shocks and at singular corners, more than its energy tells.
+template <int Dim>
+double relative_jacobian(const QuadraticCell<Dim>& x) {
+  constexpr double kTolerance = 0.1;
+  return min_jacobian_bound<Dim>(x, kTolerance) / mean_jacobian<Dim>(x);
 }
 inline constexpr double kLeastRelativeJacobian = 0.2;  ///< below, a cell is distorted
 

@@ -50,6 +50,11 @@ Edit<Dim> make_curve(const Mesh<Dim>& mesh, const EdgeKey& edge);
 template <int Dim>
 Edit<Dim> make_straighten(const Mesh<Dim>& mesh, const EdgeKey& edge);
 
+/// Replaces a curved edge by its chords: a split with the node as the new vertex and straight halves. All that it inserts
+/// beside them is that of the split.
+template <int Dim>
+Edit<Dim> make_chords(const Mesh<Dim>& mesh, const EdgeKey& edge);
+
 // Operations below replace edges. A new edge takes over whether it is curved from those that it replaces. Its node has what
 // the old functions have at its place, so that fields are their interpolants. Edges that are there before and after, with
 // both ends where they were, keep their nodes.

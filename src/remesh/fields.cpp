@@ -26,7 +26,7 @@ template <int Dim>
 std::uint8_t RemeshFields<Dim>::level_of_new_cell(const Edit<Dim>& edit, std::size_t i) const {
   using Kind = typename Edit<Dim>::Kind;
   if (levels.empty()) return 0;
-  if (edit.kind == Kind::split) return levels[edit.removed_cells[i / 2]];
+  if (edit.kind == Kind::split || edit.kind == Kind::chords) return levels[edit.removed_cells[i / 2]];
   return edit.kind == Kind::curve || edit.kind == Kind::straighten ? levels[edit.removed_cells[i]] : std::uint8_t{0};
 }
 

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "itr/remesh/remesher.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <iterator>
+#include <limits>
 
+#include "geometry/measures.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
+#include "remesh/curved_cell.hpp"
 #include "remesh/decide/prospect.hpp"
+#include "remesh/edits.hpp"
 #include "remesh/schedule/session.hpp"
 
 namespace itr {
@@ -31,6 +38,29 @@ std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& opti
           smooth,
           options.curve.acceptance_tolerance.value_or(split),
           options.straighten.acceptance_tolerance.value_or(collapse)};
+}
+
+/// Whether an edit makes no cell that is much more compressed somewhere, now or in the past, than those that it replaces.
+template <int Dim>
+bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit) {
+  constexpr double kLeast = 0.2, kTolerance = 0.1;
+  const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
+  const auto node_before = [&](VertexId a, VertexId b) { return mesh.node_of(a, b); };
+  const auto node_later = [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); };
+  const auto keeps = [&](const VectorX& x) {
+    double before = std::numeric_limits<double>::infinity();
+    for (const CellId c : edit.removed_cells)
+      before = std::min(before, mean_jacobian<Dim>(curved_cell<Dim>(mesh.cell(c), node_before).values(x, none)) *
+                                    mesh.inverse_rest_edges(c).determinant());
+    return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
+      std::array<Vec<Dim>, Dim + 1> rest;
+      for (int k = 0; k <= Dim; ++k)
+        rest[k] = cell.vertices[k] == kNewVertex ? edit.value->rest : mesh.rest(cell.vertices[k]);
+      const auto nodes = curved_cell<Dim>(cell.vertices, node_later).values(x, edit);
+      return min_jacobian_bound<Dim>(nodes, kTolerance) >= kLeast * before * edge_matrix<Dim>(rest).determinant();
+    });
+  };
+  return keeps(fields.x) && std::all_of(fields.past_positions.begin(), fields.past_positions.end(), keeps);
 }
 
 }  // namespace
@@ -77,9 +107,24 @@ RemeshReport straighten_cells(std::span<const CellId> cells, Mesh<Dim>& mesh, Re
                               const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
                               Strata<Dim>& strata) {
   RemeshSession<Dim> session(mesh, fields, context, options, nullptr, memory, strata);
-  for (const EdgeKey& edge : edges_of<Dim>(mesh, cells))
-    if (mesh.node_of(edge[0], edge[1]) != kNone)
-      session.commits().commit_unjudged(make_straighten(mesh, edge), session.scratch().gate, session.report().straightens);
+  const auto commit = [&](const Edit<Dim>& edit) {
+    return keeps_volumes(mesh, fields, edit) &&
+           session.commits().commit_unjudged(edit, session.scratch().gate, session.report().straightens);
+  };
+  const CellId first_new = mesh.cell_slots();
+  const auto curved = [&mesh](const std::vector<EdgeKey>& edges) {
+    std::vector<EdgeKey> found;
+    std::copy_if(edges.begin(), edges.end(), std::back_inserter(found),
+                 [&mesh](const EdgeKey& edge) { return mesh.node_of(edge[0], edge[1]) != kNone; });
+    return found;
+  };
+  // Chords keep what the curves are; what lies between them is nearly straight.
+  for (const EdgeKey& edge : curved(edges_of<Dim>(mesh, cells)))
+    if (session.ask().refuse_chords(edge) != Refusal::none || !commit(make_chords(mesh, edge)))
+      commit(make_straighten(mesh, edge));
+  std::vector<CellId> made;
+  for (CellId c = first_new; c < mesh.cell_slots(); ++c) made.push_back(c);
+  for (const EdgeKey& edge : curved(edges_of<Dim>(mesh, made))) commit(make_straighten(mesh, edge));
   fields.trim(mesh.vertex_slots());
   memory.refusals = session.memory().remembered(session.ask());
   return session.report();

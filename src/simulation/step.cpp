@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -132,8 +133,8 @@ class StepAttempt {
     NewtonSummary summary = solve(expected());
     const std::string jump = jumped();
     if (!summary.converged()) {
-      if (summary.termination == Termination::no_descent && setup_.remesh.enabled)
-        nearly_inverted_ = find_nearly_inverted(next_, x_);
+      const bool is_stuck = summary.termination == Termination::no_descent || summary.termination == Termination::iterations;
+      if (is_stuck && setup_.remesh.enabled) nearly_inverted_ = find_nearly_inverted(next_, x_);
       return failed(summary, jump);
     }
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
@@ -338,6 +339,10 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
   MeshRenumbering renumbering;
   for (int retry = 0; retry < kMostRetries && !result.ok && !nearly_inverted.empty(); ++retry) {
     State<Dim> straightened;
+    if (retry > 0) {  // what is around those cells has not helped
+      nearly_inverted.resize(from.mesh.cell_slots());
+      std::iota(nearly_inverted.begin(), nearly_inverted.end(), 0);
+    }
     StepReport effort;
     const EffortClock clock(tools.solver);
     const auto change =

@@ -47,7 +47,7 @@ template <int Dim>
 struct Edit {
   using Cell = typename MeshTypes<Dim>::Cell;
   using Facet = typename MeshTypes<Dim>::Facet;
-  enum class Kind { split, collapse, swap, smooth, curve, straighten };
+  enum class Kind { split, collapse, swap, smooth, curve, straighten, chords };
 
   struct NewCell {
     Cell vertices;

@@ -18,6 +18,21 @@ namespace itr {
 /// costs solves.
 constexpr double kTightResidual = 1e-8;
 
+/// What is added to the diagonal of a Hessian: a number, or a share of each entry. A number that counts for the stiffest
+/// entry stops all others.
+struct Shift {
+  double value = 0;
+  bool is_share = false;
+  Shift() = default;
+  Shift(double number) : value(number) {}  // NOLINT: a number is one
+  static Shift share_of_diagonal(double share) {
+    Shift shift(share);
+    shift.is_share = true;
+    return shift;
+  }
+  double of(double entry) const { return is_share ? value * std::abs(entry) : value; }
+};
+
 /// Assembles and solves the Newton system of one solve.
 class NewtonSystem {
  public:
@@ -25,11 +40,12 @@ class NewtonSystem {
   /// Assembles the Hessian over the unknowns of `dofs`, and what `motion` of the held dofs does to it.
   virtual void assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                         PrescribedMotion& motion, Workspace& workspace) = 0;
-  /// Solves (Hessian + shift * I) solution = rhs, by a factorisation unless a system knows better. If `solution` is empty,
+  /// Solves (Hessian + shift) solution = rhs, by a factorisation unless a system knows better. If `solution` is empty,
   /// only what the matrix is is found out.
-  virtual linear::SystemReport solve(double shift, ConstVectorView rhs, const linear::Asked& asked, VectorView solution);
-  /// Factorises Hessian + shift * I.
-  virtual linear::SystemReport factorize(double shift) = 0;
+  virtual linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
+                                     VectorView solution);
+  /// Factorises Hessian + shift.
+  virtual linear::SystemReport factorize(const Shift& shift) = 0;
   /// Solves with the matrix that was given last.
   virtual linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) = 0;
   /// The same for every column of B, each on its own unless a system knows better. False where one fails.
@@ -40,16 +56,19 @@ class NewtonSystem {
   virtual std::string message() const = 0;
   /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
   virtual double diagonal_scale() const = 0;
+  /// The curvature that a shift adds along a step of the unknowns.
+  virtual double curvature_of(const Shift& shift, ConstVectorView step) const = 0;
 };
 
 /// For patches of up to some hundred unknowns. Keeps its memory.
 class DenseSystem final : public NewtonSystem {
  public:
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
-  linear::SystemReport factorize(double shift) override;
+  linear::SystemReport factorize(const Shift& shift) override;
   linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override;
   std::string message() const override { return "dense Cholesky"; }
   double diagonal_scale() const override;
+  double curvature_of(const Shift& shift, ConstVectorView step) const override;
 
  private:
   Eigen::Index order_ = 0;
@@ -68,17 +87,19 @@ class SparseSystem final : public NewtonSystem {
   void reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils);
   linear::Solver& solver() { return solver_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
-  linear::SystemReport solve(double shift, ConstVectorView rhs, const linear::Asked& asked, VectorView solution) override;
-  linear::SystemReport factorize(double shift) override;
+  linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
+                             VectorView solution) override;
+  linear::SystemReport factorize(const Shift& shift) override;
   linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override;
   bool solve_columns(const MatrixX& B, MatrixX& X) override;
   bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
   std::string message() const override;
   double diagonal_scale() const override;
+  double curvature_of(const Shift& shift, ConstVectorView step) const override;
 
  private:
   linear::Outcome analyze();
-  void shift_by(double shift);
+  void shift_by(const Shift& shift);
   bool has_factor();
 
   linear::Solver& solver_;

@@ -23,6 +23,7 @@ enum class Refusal : char {
   exists,     ///< the edge that a swap makes is there already
   long_ring,  ///< an edge to be removed has too many cells around it
   shape,      ///< a cell would be inverted, flat, or much worse than the worst that is there now
+  overhang,   ///< a surface edge that touches would be farther out than its chords
   outside,    ///< the target of a move lies outside of the cells around
   cost,       ///< infinite cost of each triangulation of the ring
   // A trial refused the edit.

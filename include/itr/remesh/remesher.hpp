@@ -13,14 +13,16 @@
 namespace itr {
 
 /// Remeshes in place. On entry x is the solution on the mesh. On return x is feasible, and its energy exceeds that on entry
-/// by at most the tolerances of the accepted operations. Patches relax x; all other fields are interpolated at the vertices
+/// by at most the tolerances of the accepted operations and by what curved edges that touch had gained beyond their chords.
+/// Patches relax x; all other fields are interpolated at the vertices
 /// that edits set. A living cell whose id is below the entry's cell_slots() was not touched. `memory` holds earlier refusals
 /// and is updated. So are the `strata` of the mesh, which are found first if they are empty.
 template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata);
 
-/// Makes all curved edges of these cells straight where that inverts and meets nothing, whatever it costs; else as `remesh`.
+/// Replaces curved edges of these cells by their chords or makes them straight, whatever it costs, where that inverts, meets
+/// and much compresses nothing; else as `remesh`.
 template <int Dim>
 RemeshReport straighten_cells(std::span<const CellId> cells, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
                               const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,

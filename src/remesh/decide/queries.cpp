@@ -6,6 +6,7 @@
 
 #include <boost/container/small_vector.hpp>
 #include "core/timer.hpp"
+#include "fem/chords.hpp"
 #include "prospect.hpp"
 #include "remesh/curved_cell.hpp"
 #include "remesh/edits.hpp"
@@ -76,16 +77,59 @@ Refusal RemeshQueries<Dim>::refuse_collapse(const EdgeKey& e) const {
 }
 
 template <int Dim>
-Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e) const {
+Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
   if (!exists(e)) return Refusal::gone;
   if (mesh_.node_of(e[0], e[1]) != kNone) return Refusal::not_asked;
-  return has_contact() && is_surface(e) && has_short_halves(e) ? Refusal::dhat : Refusal::none;
+  if (!has_contact() || !is_surface(e)) return Refusal::none;
+  if (has_short_halves(e)) return Refusal::dhat;
+  return touches_within(e, reach(e), scratch) ? Refusal::overhang : Refusal::none;
 }
 
 template <int Dim>
 Refusal RemeshQueries<Dim>::refuse_straighten(const EdgeKey& e) const {
   if (!exists(e)) return Refusal::gone;
   return mesh_.node_of(e[0], e[1]) == kNone ? Refusal::not_asked : Refusal::none;
+}
+
+template <int Dim>
+Refusal RemeshQueries<Dim>::refuse_chords(const EdgeKey& e) const {
+  if (!options_.split.enabled) return Refusal::not_asked;
+  if (rest_length(e) < options_.split.min_edge_length.value()) return Refusal::length;
+  return has_short_halves(e) ? Refusal::dhat : Refusal::none;
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::overhang(const EdgeKey& e) const {
+  const VertexId node = has_contact() ? mesh_.node_of(e[0], e[1]) : kNone;
+  double largest = 0;
+  if (node == kNone) return largest;
+  const auto at = [&](VertexId v) -> Vec<Dim> { return fields_.x.template segment<Dim>(Dim * v); };
+  any_facet_at(e, [&](FacetId f) {
+    const auto& facet = mesh_.facet(f);
+    const auto index = [&](VertexId v) {
+      return static_cast<int>(std::find(facet.begin(), facet.end(), v) - facet.begin());
+    };
+    std::array<Vec<Dim>, Dim> corners;
+    for (int k = 0; k < Dim; ++k) corners[k] = at(facet[k]);
+    largest = std::max(largest, distance_from_chords<Dim>(corners, index(e[0]), index(e[1]), at(node)));
+    return false;
+  });
+  return largest;
+}
+
+template <int Dim>
+double RemeshQueries<Dim>::reach(const EdgeKey& e) const {
+  const auto at = [](const VectorX& field, VertexId v) { return field.segment<Dim>(Dim * v); };
+  double motion = 0;
+  if (!fields_.past_positions.empty() && context_.has_inertia)
+    for (const VertexId v : e) motion = std::max(motion, (at(fields_.x, v) - at(fields_.past_positions[0], v)).norm());
+  return context_.contact.activation_distance + motion;
+}
+
+template <int Dim>
+bool RemeshQueries<Dim>::overhangs(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
+  const double height = overhang(e);
+  return height > kMostOverhang * context_.contact.activation_distance && touches_within(e, reach(e) + height, scratch);
 }
 
 template <int Dim>
@@ -131,19 +175,27 @@ double RemeshQueries<Dim>::predict_curve(const EdgeKey& edge, LocalScratch<Dim>&
 
 template <int Dim>
 bool RemeshQueries<Dim>::is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
-  if (!has_contact()) return false;
-  const double dhat = context_.contact.activation_distance;
+  return has_contact() && touches_within(e, context_.contact.activation_distance, scratch);
+}
+
+template <int Dim>
+bool RemeshQueries<Dim>::touches_within(const EdgeKey& e, double distance, LocalScratch<Dim>& scratch) const {
+  const double seen = std::min(distance, gate_.present().span());
   return any_facet_at(
-      e, [&](FacetId f) { return scratch.neighbourhoods.is_in_contact(gate_.present(), f, dhat, scratch.hits); });
+      e, [&](FacetId f) { return scratch.neighbourhoods.is_in_contact(gate_.present(), f, seen, scratch.hits); });
 }
 
 template <int Dim>
 void RemeshQueries<Dim>::find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
   trial.in_contact = is_in_contact(trial.edge(), scratch);
-  if (!has_contact() || !is_surface(trial.edge())) return;
+  if (has_contact() && is_surface(trial.edge())) note_read(trial);
+}
+
+template <int Dim>
+void RemeshQueries<Dim>::note_read(Trial<Dim>& trial) const {
   Box<Dim> edge;
   for (const FacetId f : mesh_.facets_of(trial.edge()[0])) edge.include(gate_.present().box_of(f));
-  trial.surface_read.include(edge.inflated(context_.contact.activation_distance));
+  trial.surface_read.include(edge.inflated(reach(trial.edge()) + overhang(trial.edge())));
 }
 
 template <int Dim>

@@ -13,6 +13,9 @@
 
 namespace itr {
 
+/// How far a curved edge that touches may leave its chords, in dhat.
+inline constexpr double kMostOverhang = 0.25;
+
 /// Edges of those cells that are alive, ascending.
 template <int Dim>
 std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cells);
@@ -54,8 +57,14 @@ class RemeshQueries {
   Refusal refuse_split(const EdgeKey& e) const;
   Refusal refuse_collapse(const EdgeKey& e) const;
   /// Why an edge cannot be curved.
-  Refusal refuse_curve(const EdgeKey& e) const;
+  Refusal refuse_curve(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
   Refusal refuse_straighten(const EdgeKey& e) const;
+  /// Why a curved edge cannot be replaced by its chords.
+  Refusal refuse_chords(const EdgeKey& e) const;
+  /// How far a curved edge of the surface leaves its chords [m]; 0 where it is straight or nothing can touch it.
+  double overhang(const EdgeKey& e) const;
+  /// Whether that is too much for what is near.
+  bool overhangs(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
   /// Whether one of these cells is curved and distorted.
   bool is_distorted(std::span<const CellId> cells) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
@@ -97,6 +106,12 @@ class RemeshQueries {
       return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() && holds(f);
     });
   }
+  /// Whether the surface at an edge of it is nearer than that to something else.
+  bool touches_within(const EdgeKey& e, double distance, LocalScratch<Dim>& scratch) const;
+  /// How near the surface at an edge comes within a step to what stands still [m].
+  double reach(const EdgeKey& e) const;
+  /// That the surface around a trial's edge was read.
+  void note_read(Trial<Dim>& trial) const;
   /// Whether halves of an edge would be shorter than dhat, at rest or now.
   bool has_short_halves(const EdgeKey& e) const;
   /// The same question about the chords that the split of an edge would bring to the surface beside those halves.

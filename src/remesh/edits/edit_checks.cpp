@@ -6,9 +6,10 @@
 namespace itr {
 
 std::string_view name(Refusal refusal) {
-  static constexpr std::string_view kNames[] = {
-      "none",   "not_asked", "depth", "length",  "dhat", "prediction", "gone",  "non_manifold", "held",       "link",
-      "exists", "long_ring", "shape", "outside", "cost", "invalid",    "bound", "energy",       "no_unknowns"};
+  static constexpr std::string_view kNames[] = {"none",       "not_asked", "depth",        "length",   "dhat",
+                                                "prediction", "gone",      "non_manifold", "held",     "link",
+                                                "exists",     "long_ring", "shape",        "overhang", "outside",
+                                                "cost",       "invalid",   "bound",        "energy",   "no_unknowns"};
   static_assert(std::size(kNames) == kRefusals);
   return kNames[static_cast<int>(refusal)];
 }

@@ -124,6 +124,16 @@ Edit<Dim> make_straighten(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   return edit;
 }
 
+template <int Dim>
+Edit<Dim> make_chords(const Mesh<Dim>& mesh, const EdgeKey& edge) {
+  Edit<Dim> edit = make_split(mesh, edge);
+  edit.kind = Edit<Dim>::Kind::chords;
+  std::erase_if(edit.inserted_nodes, [&](const auto& node) {
+    return node.edge == key_of(edge[0], kNewVertex) || node.edge == key_of(edge[1], kNewVertex);
+  });
+  return edit;
+}
+
 template Edit<2> make_split<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_split<3>(const Mesh<3>&, const EdgeKey&);
 template int nodes_of_split<2>(const Mesh<2>&, const EdgeKey&);
@@ -132,5 +142,7 @@ template Edit<2> make_curve<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_curve<3>(const Mesh<3>&, const EdgeKey&);
 template Edit<2> make_straighten<2>(const Mesh<2>&, const EdgeKey&);
 template Edit<3> make_straighten<3>(const Mesh<3>&, const EdgeKey&);
+template Edit<2> make_chords<2>(const Mesh<2>&, const EdgeKey&);
+template Edit<3> make_chords<3>(const Mesh<3>&, const EdgeKey&);
 
 }  // namespace itr

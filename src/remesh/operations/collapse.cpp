@@ -13,6 +13,9 @@ namespace itr {
 
 namespace {
 
+/// What a curved edge that touches gains beyond its chords, contact does not know of: it is no energy to keep.
+constexpr double kMostForChords = 1e6;
+
 template <int Dim>
 class Coarsener {
  public:
@@ -92,7 +95,9 @@ class Coarsener {
     if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_straighten(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
-    if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact)) return std::nullopt;
+    if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact) &&
+        !ask_.overhangs(edge, scratch))
+      return std::nullopt;
     return PlaceQueue::Entry{.place = Place::node_of(edge), .priority = gain};
   }
 
@@ -104,12 +109,16 @@ class Coarsener {
         session_.is_unchanged(trial.candidate) ? trial.candidate.priority : ask_.predict_straighten(edge, scratch);
     trial.signal = std::abs(gain);
     trial.edit = make_straighten(ask_.mesh(), edge);
-    const double tolerance = ask_.is_distorted(trial.edit->removed_cells)
+    const bool overhangs = ask_.overhangs(edge, scratch);
+    const double tolerance = overhangs || ask_.is_distorted(trial.edit->removed_cells)
                                  ? std::min(straighten_tolerance_, -ask_.options().split.acceptance_tolerance.value())
                                  : straighten_tolerance_;
-    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, tolerance))
+    if (!overhangs && !trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, tolerance))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, tolerance, ask_.options().local, scratch);
+    if (!overhangs || trial.verdict.accepted() || ask_.refuse_chords(edge) != Refusal::none) return;
+    trial.edit = make_chords(ask_.mesh(), edge);
+    ask_.judge(trial, kMostForChords * tolerance, ask_.options().local, scratch);
   }
 
   void add(const std::vector<EdgeKey>& edges, std::vector<Place>& fresh) const {

@@ -88,7 +88,8 @@ class Refiner {
   void pass_over(std::span<const PlaceQueue::Entry> entries) {
     for (const PlaceQueue::Entry& entry : entries) {
       const bool curves = entry.place.is_node();
-      const Refusal refusal = curves ? ask_.refuse_curve(entry.place.edge()) : refuse(entry.place.edge());
+      const Refusal refusal =
+          curves ? ask_.refuse_curve(entry.place.edge(), session_.scratch()) : refuse(entry.place.edge());
       OperationCount& count = curves ? session_.report().curves : session_.report().splits;
       count.note(refusal == Refusal::none ? Refusal::prediction : refusal);
       if (!curves) note_refused(entry.priority * nodes_of_split(ask_.mesh(), entry.place.edge()));
@@ -97,7 +98,7 @@ class Refiner {
 
  private:
   std::optional<PlaceQueue::Entry> rank_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
-    if (ask_.refuse_curve(edge) != Refusal::none) return std::nullopt;
+    if (ask_.refuse_curve(edge, scratch) != Refusal::none) return std::nullopt;
     if (const auto* baseline = session_.baseline(); baseline && !baseline->may_split(edge)) return std::nullopt;
     const double gain = ask_.predict_curve(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
@@ -110,8 +111,9 @@ class Refiner {
 
   void look_at_curve(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = trial.edge();
-    if (const Refusal refusal = ask_.refuse_curve(edge); refusal != Refusal::none) return trial.refuse(refusal);
-    ask_.find_contact(trial, scratch);
+    if (!ask_.exists(edge)) return trial.refuse(Refusal::gone);
+    ask_.find_contact(trial, scratch);  // first: the refusal reads the surface, too
+    if (const Refusal refusal = ask_.refuse_curve(edge, scratch); refusal != Refusal::none) return trial.refuse(refusal);
     const bool is_known = session_.is_unchanged(trial.candidate);
     if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return trial.refuse(Refusal::prediction);
     trial.signal = is_known ? trial.candidate.priority : ask_.predict_curve(edge, scratch);
