@@ -50,6 +50,27 @@ TYPED_TEST(Quadratic, ValidityIsNeverClaimedFalsely) {
   EXPECT_LE(doubtful, kCells / 1000);  // valid, but not proven in floating point
 }
 
+TYPED_TEST(Quadratic, QuickBoundsTellWhatFullOnesDo) {
+  constexpr int Dim = TypeParam::value;
+  std::mt19937 random(4);
+  int less = 0, varying_little = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.02 * (i % 16));
+    const double bound = min_jacobian_bound<Dim>(x, 0.1);
+    for (const double share : {0.2, 0.9, 1.1, 3.0, -1.0}) {
+      const double enough = share * std::abs(bound);
+      EXPECT_EQ(min_jacobian_bound<Dim>(x, 0.1, enough) < enough, bound < enough) << i << ", " << share;
+      less += bound < enough;
+    }
+    constexpr double kMost = 0.2;
+    if (!varies_little<Dim>(x, kMost)) continue;
+    EXPECT_GT(bound, 0.9 * std::pow((1 - kMost) / (1 + kMost), Dim) * least_sampled<Dim>(x, random, 10)) << i;
+    ++varying_little;
+  }
+  EXPECT_GT(less, 1000);
+  EXPECT_GT(varying_little, 50);
+}
+
 TYPED_TEST(Quadratic, ValidityDoesNotDependOnScaleAndPlace) {
   constexpr int Dim = TypeParam::value;
   std::mt19937 random(5);

@@ -202,6 +202,50 @@ TYPED_TEST(CurvedContact, PatchesSeeWhatTheWholeMeshSees) {
   EXPECT_EQ(kinds.size(), 4u);
 }
 
+/// Where a reach leaves contact out for less room, nothing comes nearer than dhat there; else it is as ever.
+TYPED_TEST(CurvedContact, NothingTouchesInTheRoomThatAReachGivesWayTo) {
+  constexpr int Dim = TypeParam::value;
+  int gave_way = 0, kept = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    Scene<Dim> scene(seed, 0.4, 0.002);
+    if (!is_valid(scene)) continue;
+    scene.context.contact.activation_distance *= 0.02 * (1 + seed % 40);
+    View<Dim> view(scene);
+    const SurfaceIndex<Dim>& surface = view.state.surface;
+    const double dhat = scene.context.contact.activation_distance;
+    for (VertexId v = 0; v < scene.mesh.vertex_slots(); ++v) {
+      if (!scene.mesh.is_vertex_alive(v) || !scene.mesh.is_boundary(v)) continue;
+      ContactReach<Dim> usual, yielding;
+      for (auto* reach : {&usual, &yielding}) {
+        reach->clear(scene.mesh.facet_slots());
+        for (const FacetId f : scene.mesh.facets_of(v))
+          for (const auto& piece : surface.pieces(f)) reach->add(piece, f, true);
+        reach->find(surface, view.scratch.neighbourhoods, dhat, view.scratch.hits, reach == &yielding,
+                    [](FacetId) { return false; });
+      }
+      if (usual.touching().empty() || !yielding.touching().empty()) {
+        EXPECT_EQ(yielding.touching(), usual.touching());
+        EXPECT_EQ(yielding.room(), usual.room());
+        ++kept;
+        continue;
+      }
+      ++gave_way;
+      const auto facets = scene.mesh.facets_of(v);
+      const auto check = [&](const SurfacePiece<Dim>& other, bool moves) {
+        const double reach = dhat + (1 + moves) * yielding.room();
+        for (const FacetId f : facets)
+          for (const auto& piece : surface.pieces(f))
+            EXPECT_GE(distance_below(piece, other, 2 * reach), (1 - 1e-12) * reach) << "seed " << seed;
+      };
+      for (FacetId f = 0; f < scene.mesh.facet_slots(); ++f)
+        for (const auto& piece : surface.pieces(f)) check(piece, std::find(facets.begin(), facets.end(), f) != facets.end());
+      for (int i = 0; i < static_cast<int>(surface.primitives().all.size()); ++i) check(surface.obstacle_piece(i), false);
+    }
+  }
+  EXPECT_GT(gave_way, 20);
+  EXPECT_GT(kept, 20);
+}
+
 /// Adds obstacle points near the surface, outside of bodies.
 template <int Dim>
 void scatter_points(Scene<Dim>& scene, int count) {

@@ -18,6 +18,7 @@
 #include "itr/simulation/simulation.hpp"
 #include "remesh/baselines/baseline.hpp"
 #include "remesh/decide/prediction.hpp"
+#include "remesh/decide/prospect.hpp"
 #include "remesh/decide/queries.hpp"
 #include "remesh_options.hpp"
 #include "simulation/invariants.hpp"
@@ -494,6 +495,44 @@ TYPED_TEST(Curved, PredictionOfASwapHasWhatItsNodeGains) {
     }
   }
   EXPECT_GT(compared, 5);
+}
+
+TYPED_TEST(Curved, NoSplitGainsMoreThanIsAvailable) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0;
+  for (unsigned seed = 0; seed < 30; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.2 * (seed % 6), seed % 2 ? 0.001 : 0.02);
+    StepContext<Dim> context = context_of<Dim>(2 * seed);
+    context.loads.tractions.clear();
+    context.coupling = 0;
+    View<Dim> view(scene, context);
+    const double available = available_energy(scene.mesh, scene.fields, context);
+    for (int i = 0; i < 5; ++i) {
+      const Edit<Dim> edit = make_split(scene.mesh, scene.edge());
+      LocalProblem<Dim> before(view.state, edit.removed_cells, edit, false, view.scratch),
+          after(view.state, edit.removed_cells, edit, true, view.scratch);
+      if (!after.has_unknowns() || !std::isfinite(before.value())) continue;
+      EXPECT_LE(before.value() - after.relax(20).energy, available) << "seed " << seed;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 50);
+}
+
+/// What is available is the same on a mesh whose edges are curved and have their nodes at the middle.
+TYPED_TEST(Curved, AvailableEnergyIsOfTheFunctions) {
+  constexpr int Dim = TypeParam::value;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    CurvedScene<Dim> scene(seed, 0, 0.01);
+    StepContext<Dim> context = context_of<Dim>(2 * seed);
+    context.loads.tractions.clear();
+    context.coupling = 0.5;
+    const double straight = available_energy(scene.mesh, scene.fields, context);
+    for (int i = 0; i < 10; ++i)
+      if (const EdgeKey edge = scene.edge(); scene.mesh.node_of(edge[0], edge[1]) == kNone)
+        scene.apply(make_curve(scene.mesh, edge));
+    EXPECT_NEAR(available_energy(scene.mesh, scene.fields, context), straight, 1e-12 * straight) << "seed " << seed;
+  }
 }
 
 /// With a quadratic energy the prediction of a split at curved edges is what its nodes gain together.

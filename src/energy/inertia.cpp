@@ -127,13 +127,8 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
   std::vector<double> factors;  // and what else the blocks follow from, beside their stencils
   for (const CurvedMass& curved : curved_mass_) factors.push_back(curved.mass);
   const std::span kept(matrices_.front().data(), static_cast<std::size_t>(matrices_.size() * matrices_.front().size()));
-  sink.add_curved_constant<Dim>(cells_, factors, kept, [&](std::size_t e, Mat<Dim * kQuadraticNodes<Dim>>& block) {
-    const Mat<kQuadraticNodes<Dim>>& mass = matrices_[curved_mass_[e].matrix];
-    block.setZero();
-    for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
-      for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
-        block.template block<Dim, Dim>(Dim * i, Dim * j).diagonal().setConstant(curved_mass_[e].mass * mass(i, j));
-  });
+  sink.add_curved_multiples<Dim>(
+      cells_, factors, kept, [&](std::size_t e) -> const auto& { return matrices_[curved_mass_[e].matrix]; });
 }
 
 template <int Dim>

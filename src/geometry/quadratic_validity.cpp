@@ -46,7 +46,7 @@ double round_off(const JacobianCorners<double, Dim, Times>& corners, double offs
 }
 
 template <int Dim>
-double bound_below(const JacobianCorners<double, Dim, 1>& corners, double tolerance, int depth) {
+double bound_below(const JacobianCorners<double, Dim, 1>& corners, double tolerance, double enough, int depth) {
   double least = std::numeric_limits<double>::infinity(), at_corner = least;
   for (const auto& coefficient : BernsteinTable<Dim, 1>::get().coefficients) {
     const double value =
@@ -54,13 +54,23 @@ double bound_below(const JacobianCorners<double, Dim, 1>& corners, double tolera
     least = std::min(least, value);
     if (coefficient.is_value) at_corner = std::min(at_corner, value);
   }
-  if (depth == 0 || at_corner - least <= tolerance * std::abs(at_corner)) return least;
+  if (depth == 0 || least >= enough || at_corner - least <= tolerance * std::abs(at_corner)) return least;
+  const bool has_enough = enough < std::numeric_limits<double>::infinity();
+  if (has_enough && at_corner < enough) return at_corner;
   double bound = at_corner;
   for_each_child<double, Dim, 1>(corners, [&](const auto& part) {
-    bound = std::min(bound, bound_below<Dim>(part, tolerance, depth - 1));
+    bound = std::min(bound, bound_below<Dim>(part, tolerance, enough, depth - 1));
     return true;
   });
   return bound;
+}
+
+template <int Dim>
+Mat<Dim> as_matrix(const Jacobian<double, Dim>& J) {
+  Mat<Dim> result;
+  for (int d = 0; d < Dim; ++d)
+    for (int c = 0; c < Dim; ++c) result(c, d) = J[d][c];
+  return result;
 }
 
 /// A cheap proof for what moves little: J = J0 (I + E), and det (I + E) > 0 while |E| < 1. E is linear in place and in time,
@@ -68,20 +78,14 @@ double bound_below(const JacobianCorners<double, Dim, 1>& corners, double tolera
 template <int Dim>
 bool varies_little(const JacobianCorners<double, Dim, 2>& way, double offset) {
   constexpr double kMost = 0.9, kMostRoundOff = 0.01;
-  const auto matrix = [](const auto& J) {
-    Mat<Dim> result;
-    for (int d = 0; d < Dim; ++d)
-      for (int c = 0; c < Dim; ++c) result(c, d) = J[d][c];
-    return result;
-  };
   Mat<Dim> middle = Mat<Dim>::Zero();
-  for (const auto& J : way[0]) middle += matrix(J) / (Dim + 1);
+  for (const auto& J : way[0]) middle += as_matrix<Dim>(J) / (Dim + 1);
   if (!(middle.determinant() > 0)) return false;
   const Mat<Dim> inverse = middle.inverse();
   if (!(inverse.norm() * offset * kUnits < kMostRoundOff)) return false;
   for (const auto& at_time : way)
     for (const auto& J : at_time)
-      if (!((inverse * (matrix(J) - middle)).squaredNorm() < kMost * kMost)) return false;
+      if (!((inverse * (as_matrix<Dim>(J) - middle)).squaredNorm() < kMost * kMost)) return false;
   return true;
 }
 
@@ -94,9 +98,21 @@ bool is_positive_everywhere(const QuadraticCell<Dim>& x) {
 }
 
 template <int Dim>
-double min_jacobian_bound(const QuadraticCell<Dim>& x, double relative_tolerance) {
+double min_jacobian_bound(const QuadraticCell<Dim>& x, double relative_tolerance, double enough) {
   const JacobianCorners<double, Dim, 1> corners{jacobians<double, Dim>(x)};
-  return bound_below<Dim>(corners, relative_tolerance, kDepth) - round_off<Dim, 1>(corners, largest_offset<Dim>(x));
+  const double error = round_off<Dim, 1>(corners, largest_offset<Dim>(x));
+  return bound_below<Dim>(corners, relative_tolerance, enough + error, kDepth) - error;
+}
+
+template <int Dim>
+bool varies_little(const QuadraticCell<Dim>& x, double most) {
+  const auto corners = jacobians<double, Dim>(x);
+  Mat<Dim> middle = Mat<Dim>::Zero();
+  for (const auto& J : corners) middle += as_matrix<Dim>(J) / (Dim + 1);
+  if (!(middle.determinant() > 0)) return false;
+  const Mat<Dim> inverse = middle.inverse();
+  return std::all_of(corners.begin(), corners.end(),
+                     [&](const auto& J) { return (inverse * (as_matrix<Dim>(J) - middle)).squaredNorm() < most * most; });
 }
 
 template <int Dim>
@@ -127,9 +143,10 @@ double max_positive_step(const QuadraticCell<Dim>& x, const QuadraticCell<Dim>& 
   return proven;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                  \
-  template bool is_positive_everywhere<Dim>(const QuadraticCell<Dim>&);       \
-  template double min_jacobian_bound<Dim>(const QuadraticCell<Dim>&, double); \
+#define ITR_INSTANTIATE(Dim)                                                          \
+  template bool is_positive_everywhere<Dim>(const QuadraticCell<Dim>&);               \
+  template double min_jacobian_bound<Dim>(const QuadraticCell<Dim>&, double, double); \
+  template bool varies_little<Dim>(const QuadraticCell<Dim>&, double);                \
   template double max_positive_step<Dim>(const QuadraticCell<Dim>&, const QuadraticCell<Dim>&, double);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -215,9 +215,12 @@ bool Mesh<Dim>::is_curved(CellId c) const {
 template <int Dim>
 VertexId Mesh<Dim>::add_node(const EdgeKey& edge) {
   const VertexId node = vertex_slots();
-  const bool is_new = node_of_edge_.try_emplace(edge, node).second;
-  ITR_CHECK(is_new && edge[0] < edge[1], edge[0], edge[1]);
+  ITR_CHECK(edge[0] < edge[1] && node_of(edge[0], edge[1]) == kNone, edge[0], edge[1]);
+  if (static_cast<int>(nodes_from_.size()) <= edge[0]) nodes_from_.resize(edge[0] + 1);
+  nodes_from_[edge[0]].emplace_back(edge[1], node);
+  edge_of_node_.resize(node + 1, {kNone, kNone});
   edge_of_node_[node] = edge;
+  ++num_nodes_;
   rest_.push_back((rest_[edge[0]] + rest_[edge[1]]) / 2);
   vertex_alive_.push_back(0);
   vertex_tag_.push_back(kNoTag);
@@ -228,7 +231,10 @@ VertexId Mesh<Dim>::add_node(const EdgeKey& edge) {
 
 template <int Dim>
 std::vector<std::pair<EdgeKey, VertexId>> Mesh<Dim>::nodes() const {
-  std::vector<std::pair<EdgeKey, VertexId>> all(node_of_edge_.begin(), node_of_edge_.end());
+  std::vector<std::pair<EdgeKey, VertexId>> all;
+  all.reserve(num_nodes_);
+  for (std::size_t a = 0; a < nodes_from_.size(); ++a)
+    for (const auto& [b, node] : nodes_from_[a]) all.push_back({{static_cast<VertexId>(a), b}, node});
   std::sort(all.begin(), all.end());
   return all;
 }
@@ -266,10 +272,11 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
     --num_vertices_;
   }
   for (const EdgeKey& curved : edit.removed_nodes) {
-    const auto it = node_of_edge_.find(curved);
-    ITR_CHECK(it != node_of_edge_.end(), curved[0], curved[1]);
-    edge_of_node_.erase(it->second);
-    node_of_edge_.erase(it);
+    const VertexId node = node_of(curved[0], curved[1]);
+    ITR_CHECK(node != kNone, curved[0], curved[1]);
+    edge_of_node_[node] = {kNone, kNone};
+    std::erase_if(nodes_from_[std::min(curved[0], curved[1])], [&](const auto& entry) { return entry.second == node; });
+    --num_nodes_;
   }
   for (const auto& node : edit.inserted_nodes) {
     const EdgeKey ends = resolve(node.edge);
@@ -312,7 +319,8 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
     facet_tag_[to] = facet_tag_[f];
     for (const int v : facets_[to]) facets_of_[v].push_back(to);
   }
-  node_of_edge_.clear();
+  num_nodes_ = 0;
+  nodes_from_.clear();
   edge_of_node_.clear();
   rest_.resize(vertices);
   vertex_alive_.assign(vertices, 1);
@@ -355,8 +363,11 @@ std::string Mesh<Dim>::find_defect() const {
     if (is_even(facets_[f]) != is_even(entry.second)) return "facet " + std::to_string(f) + " is oriented inward";
   }
   if (boundary != num_facets_) return "a facet that is not on the boundary";
-  if (node_of_edge_.size() != edge_of_node_.size()) return "wrong number of nodes";
-  for (const auto& [edge, node] : node_of_edge_) {
+  const auto is_node = [](const EdgeKey& edge) { return edge[0] != kNone; };
+  if (std::count_if(edge_of_node_.begin(), edge_of_node_.end(), is_node) != num_nodes_) return "wrong number of nodes";
+  const auto all = nodes();
+  if (static_cast<int>(all.size()) != num_nodes_) return "wrong number of curved edges";
+  for (const auto& [edge, node] : all) {
     if (!vertex_alive_[edge[0]] || !vertex_alive_[edge[1]] || !are_joined(edge[0], edge[1]))
       return "node " + std::to_string(node) + " of an edge that is gone";
     if (vertex_alive_[node] || edge_of_node(node) != edge) return "node " + std::to_string(node) + " is of two edges";

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <utility>
@@ -101,6 +102,20 @@ struct PrescribedMotion {
 /// Takes blocks (column-major) as they come, over all dofs.
 using BlockReceiver = std::function<void(std::span<const int> vertices, const double* block)>;
 
+/// Some of the nodes of a curved element, a bit each.
+using NodeSet = std::uint16_t;
+/// Those that it has, whose edges are curved.
+template <int Dim>
+NodeSet all_nodes(CurvedEdges curved) {
+  return static_cast<NodeSet>(((1 << (Dim + 1)) - 1) | curved << (Dim + 1));
+}
+/// Calls f(k) for each of them.
+template <int Dim, typename F>
+void for_each_node(NodeSet nodes, const F& f) {
+  for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+    if (nodes >> k & 1) f(k);
+}
+
 class HessianSink {
  public:
   /// `dense` must outlive this.
@@ -126,10 +141,21 @@ class HessianSink {
   void add_elements(const CellSet<Dim>& cells, const Fill& fill) {
     add_blocks<Dim>(kStraight, cells.elements, fill);
   }
-  /// The same for each curved element.
+  /// The same for each curved element, by `fill(e, nodes, block)`: only entries of these nodes count, the others are zero.
   template <int Dim, typename Fill>
   void add_curved_elements(const CellSet<Dim>& cells, const Fill& fill) {
-    if (!cells.curved_elements.empty()) add_blocks<Dim>(kCurved, cells.curved_elements, fill);
+    const auto& elements = cells.curved_elements;
+    if (elements.empty()) return;
+    if (!is_patch())
+      return add_blocks<Dim>(kCurved, elements,
+                             [&](std::size_t e, auto& block) { fill(e, all_nodes<Dim>(elements[e].curved), block); });
+    Mat<Dim * kQuadraticNodes<Dim>> block;
+    for (std::size_t e = 0; e < elements.size(); ++e) {
+      const NodeSet nodes = free_nodes<Dim>(elements[e]);
+      if (nodes == 0) continue;
+      fill(e, nodes, block);
+      for_each_free_pair<Dim>(elements[e], nodes, [&](int row, int column, double& sum) { sum += block(row, column); });
+    }
   }
   /// One block times a factor for each straight element: a sum that is kept, and made anew only where it changes.
   template <int Dim>
@@ -137,15 +163,66 @@ class HessianSink {
     const auto fill = [&](std::size_t e, Mat<Dim*(Dim + 1)>& multiple) { multiple = factors[e] * block; };
     add_constant<Dim>(kStraight, cells.elements, factors, {block.data(), static_cast<std::size_t>(block.size())}, fill);
   }
-  /// Blocks of curved elements that follow from `factors` and `block` alone, kept in the same way.
-  template <int Dim, typename Fill>
-  void add_curved_constant(const CellSet<Dim>& cells, std::span<const double> factors, std::span<const double> block,
-                           const Fill& fill) {
-    if (!cells.curved_elements.empty()) add_constant<Dim>(kCurved, cells.curved_elements, factors, block, fill);
+  /// A factor times a matrix `of(e)` by nodes for each curved element, the same in all directions. The sum is kept in the
+  /// same way; `matrices` are all that there are.
+  template <int Dim, typename Of>
+  void add_curved_multiples(const CellSet<Dim>& cells, std::span<const double> factors, std::span<const double> matrices,
+                            const Of& of) {
+    const auto& elements = cells.curved_elements;
+    if (elements.empty()) return;
+    constexpr int kNodes = kQuadraticNodes<Dim>;
+    if (is_patch()) {
+      for (std::size_t e = 0; e < elements.size(); ++e) {
+        const Mat<kNodes>& matrix = of(e);
+        for_each_free_pair<Dim>(elements[e], free_nodes<Dim>(elements[e]), [&](int row, int column, double& sum) {
+          if (row % Dim == column % Dim) sum += factors[e] * matrix(row / Dim, column / Dim);
+        });
+      }
+      return;
+    }
+    add_constant<Dim>(kCurved, elements, factors, matrices, [&](std::size_t e, Mat<Dim * kNodes>& block) {
+      const Mat<kNodes>& matrix = of(e);
+      block.setZero();
+      for (int i = 0; i < kNodes; ++i)
+        for (int j = 0; j < kNodes; ++j)
+          block.template block<Dim, Dim>(Dim * i, Dim * j).diagonal().setConstant(factors[e] * matrix(i, j));
+    });
   }
 
  private:
   static constexpr std::size_t kElementsPerTask = 64;
+
+  bool is_patch() const { return dense_ && !motion_; }
+  /// Those with a component that is an unknown.
+  template <int Dim>
+  NodeSet free_nodes(const typename CellSet<Dim>::CurvedElement& element) const {
+    NodeSet free = 0;
+    for_each_node<Dim>(all_nodes<Dim>(element.curved), [&](int k) {
+      for (int c = 0; c < Dim; ++c)
+        if (dofs_->unknown[Dim * element.nodes[k] + c] != kNone) free = static_cast<NodeSet>(free | 1 << k);
+    });
+    return free;
+  }
+  /// Calls f(row, column, entry) for the rows and columns of a block of the element, of these nodes, that are unknowns in
+  /// the lower triangle of the dense matrix.
+  template <int Dim, typename F>
+  void for_each_free_pair(const typename CellSet<Dim>::CurvedElement& element, NodeSet nodes, const F& f) {
+    std::array<int, Dim * kQuadraticNodes<Dim>> local, unknown;
+    int count = 0;
+    for_each_node<Dim>(nodes, [&](int k) {
+      for (int c = 0; c < Dim; ++c) {
+        const int number = dofs_->unknown[Dim * element.nodes[k] + c];
+        if (number == kNone) continue;
+        local[count] = Dim * k + c;
+        unknown[count++] = number;
+      }
+    });
+    for (int j = 0; j < count; ++j) {
+      double* const column = dense_ + dense_stride_ * unknown[j];
+      for (int i = 0; i < count; ++i)
+        if (unknown[i] >= unknown[j]) f(local[i], local[j], column[unknown[i]]);
+    }
+  }
 
   template <int Dim>
   static const auto& nodes_of(const typename CellSet<Dim>::Element& element) {

@@ -4,6 +4,8 @@
 // (Johnen, Remacle and Geuzaine 2013); subdivision decides where they do not.
 #pragma once
 
+#include <limits>
+
 #include "itr/core/types.hpp"
 
 namespace itr {
@@ -21,9 +23,14 @@ template <int Dim>
 bool is_positive_everywhere(const QuadraticCell<Dim>& x);
 
 /// A lower bound of det dx/dxi over the simplex, nearer to the minimum than `relative_tolerance` times it where few
-/// subdivisions suffice.
+/// subdivisions suffice. Where `enough` is given: some number that is less than `enough` if and only if the bound is.
 template <int Dim>
-double min_jacobian_bound(const QuadraticCell<Dim>& x, double relative_tolerance);
+double min_jacobian_bound(const QuadraticCell<Dim>& x, double relative_tolerance,
+                          double enough = std::numeric_limits<double>::infinity());
+
+/// Whether dx/dxi is J (I + E) with |E| < `most` all over the simplex, J its mean over the corners.
+template <int Dim>
+bool varies_little(const QuadraticCell<Dim>& x, double most);
 
 /// A t in [0, 1] such that x + s dx is proven positive everywhere for all s in [0, t]: 1, or nearer to the largest one than
 /// `tolerance` times it where few subdivisions suffice; 0 where x is not positive.

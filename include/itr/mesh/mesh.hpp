@@ -14,7 +14,6 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -184,17 +183,20 @@ class Mesh {
   double total_volume() const;
 
   /// Whether any edge is curved.
-  bool has_nodes() const { return !node_of_edge_.empty(); }
+  bool has_nodes() const { return num_nodes_ > 0; }
   /// The slot of the edge's node; kNone where it is straight.
   VertexId node_of(VertexId a, VertexId b) const {
-    if (node_of_edge_.empty()) return kNone;
-    const auto it = node_of_edge_.find({std::min(a, b), std::max(a, b)});
-    return it == node_of_edge_.end() ? kNone : it->second;
+    const auto lower = static_cast<std::size_t>(std::min(a, b));
+    if (lower >= nodes_from_.size()) return kNone;
+    const VertexId upper = std::max(a, b);
+    for (const auto& [end, node] : nodes_from_[lower])
+      if (end == upper) return node;
+    return kNone;
   }
   /// The edge of which the slot is the node; {kNone, kNone} of a vertex.
   EdgeKey edge_of_node(VertexId node) const {
-    const auto it = edge_of_node_.find(node);
-    return it == edge_of_node_.end() ? EdgeKey{kNone, kNone} : it->second;
+    const auto slot = static_cast<std::size_t>(node);
+    return slot < edge_of_node_.size() ? edge_of_node_[slot] : EdgeKey{kNone, kNone};
   }
   /// Whether an edge of the cell is curved.
   bool is_curved(CellId c) const;
@@ -238,8 +240,9 @@ class Mesh {
   std::vector<int> facet_tag_;
   std::vector<std::vector<CellId>> cells_of_;
   std::vector<std::vector<FacetId>> facets_of_;
-  std::unordered_map<EdgeKey, VertexId, EdgeKeyHash> node_of_edge_;
-  std::unordered_map<VertexId, EdgeKey> edge_of_node_;
+  int num_nodes_ = 0;
+  std::vector<std::vector<std::pair<VertexId, VertexId>>> nodes_from_;  ///< by lower end: upper end and node of each
+  std::vector<EdgeKey> edge_of_node_;                                   ///< by slot, as far as there are nodes
 };
 
 extern template class Mesh<2>;

@@ -17,6 +17,8 @@ constexpr std::size_t kBlock = 64;
 constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
 constexpr double kBlindShare = 0.2;       ///< of det F at quadrature points: where it is less, they do not see it
 constexpr double kBlindTolerance = 0.1;   ///< relative, of the bound that tells
+/// Where the Jacobian varies less, det F is anywhere at least ((1 - 0.2) / (1 + 0.2))^3 of what points see, 0.29.
+constexpr double kSeen = 0.2;
 
 template <int Dim>
 using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
@@ -65,14 +67,22 @@ class ModalSum {
 template <int Dim>
 class NeoHookeanSum {
  public:
+  explicit NeoHookeanSum(NodeSet nodes) {
+    for_each_node<Dim>(nodes, [&](int k) { nodes_[count_++] = k; });
+    padded_ = (count_ + 3) / 4 * 4;
+    for (int b = 0; b < count_; ++b) {
+      std::fill_n(same_[b], padded_, 0.0);
+      for (auto& pair : pairs_) std::fill_n(pair[b], padded_, 0.0);
+    }
+  }
   void add(const Mat<Dim>& F, const Nodal<Dim>& gradients, const LameParameters& lame, double weight) {
     const double c = weight * (lame.mu - lame.lambda * std::log(F.determinant()));
     const double lambda = weight * lame.lambda, mu = weight * lame.mu;
     const Nodal<Dim> transformed = F.inverse().transpose() * gradients;
     double h[Dim][kPadded] = {}, g[Dim][kPadded] = {};
     for (int i = 0; i < Dim; ++i)
-      for (int a = 0; a < kNodes; ++a) h[i][a] = transformed(i, a), g[i][a] = gradients(i, a);
-    for (int b = 0; b < kNodes; ++b) {
+      for (int a = 0; a < count_; ++a) h[i][a] = transformed(i, nodes_[a]), g[i][a] = gradients(i, nodes_[a]);
+    for (int b = 0; b < count_; ++b) {
       int pair = 0;
       for (int i = 0; i < Dim; ++i) {
         add_column(mu * g[i][b], g[i], same_[b]);
@@ -86,14 +96,15 @@ class NeoHookeanSum {
   }
 
   void add_to(Mat<Dim * kQuadraticNodes<Dim>>& block) const {
-    for (int b = 0; b < kNodes; ++b)
-      for (int a = 0; a < kNodes; ++a)
+    for (int b = 0; b < count_; ++b)
+      for (int a = 0; a < count_; ++a)
         for (int i = 0, pair = 0; i < Dim; ++i) {
           const int low = std::min(a, b), high = std::max(a, b);  // the two halves have the same bits
-          block(Dim * a + i, Dim * b + i) += same_[low][high] + pairs_[pair++][low][high];
+          const int row = Dim * nodes_[a], column = Dim * nodes_[b];
+          block(row + i, column + i) += same_[low][high] + pairs_[pair++][low][high];
           for (int j = i + 1; j < Dim; ++j, ++pair) {
-            block(Dim * a + i, Dim * b + j) += pairs_[pair][b][a];
-            block(Dim * b + j, Dim * a + i) += pairs_[pair][b][a];
+            block(row + i, column + j) += pairs_[pair][b][a];
+            block(column + j, row + i) += pairs_[pair][b][a];
           }
         }
   }
@@ -101,12 +112,15 @@ class NeoHookeanSum {
  private:
   static constexpr int kNodes = kQuadraticNodes<Dim>, kPadded = (kNodes + 3) / 4 * 4;
 
-  static void add_column(double factor, const double* values, double* sum) {
-    for (int a = 0; a < kPadded; ++a) sum[a] += factor * values[a];
+  void add_column(double factor, const double* values, double* sum) const {
+    for (int first = 0; first < padded_; first += 4)
+      for (int a = first; a < first + 4; ++a) sum[a] += factor * values[a];
   }
 
-  double same_[kNodes][kPadded] = {};                        ///< of mu, for i == j
-  double pairs_[Dim * (Dim + 1) / 2][kNodes][kPadded] = {};  ///< of i <= j; columns of b
+  int nodes_[kNodes];  ///< of the cell; the others have no entries
+  int count_ = 0, padded_ = 0;
+  double same_[kNodes][kPadded];                        ///< of mu, for i == j
+  double pairs_[Dim * (Dim + 1) / 2][kNodes][kPadded];  ///< of i <= j; columns of b
 };
 
 template <int Dim>
@@ -156,12 +170,14 @@ void QuadraticElasticity<Dim>::set_levels(const QuadratureLevels& levels) {
 template <int Dim>
 bool QuadraticElasticity<Dim>::is_blind(std::size_t e, ConstVectorView x) const {
   const Element& element = cells_.curved_elements[e];
+  const QuadraticCell<Dim> all = at_all_nodes<Dim>(element, x);
+  if (varies_little<Dim>(all, kSeen)) return false;
   const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
   double seen = std::numeric_limits<double>::infinity();
   for (const auto& point : rule(e))
     seen = std::min(seen, (positions * shape_gradients<Dim>(element, point.weights).transpose()).determinant());
-  const double least = min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kBlindTolerance);
-  return least * element.inverse_edges.determinant() < kBlindShare * seen;
+  const double enough = kBlindShare * seen / element.inverse_edges.determinant();
+  return min_jacobian_bound<Dim>(all, kBlindTolerance, enough) < enough;
 }
 
 template <int Dim>
@@ -220,13 +236,13 @@ void QuadraticElasticity<Dim>::add_gradient(ConstVectorView x, VectorView gradie
 
 template <int Dim>
 void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const {
-  sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, Mat<Dim * kNodes>& block) {
+  sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
     const Element& element = cells_.curved_elements[e];
     const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
     const auto& rule = this->rule(e);
     block.setZero();
     ModalSum<Dim> modes(block);
-    NeoHookeanSum<Dim> exact;
+    NeoHookeanSum<Dim> exact(nodes);
     const bool is_neo_hookean = by_element_[e]->law == MaterialLaw::neo_hookean;
     for (std::size_t q = 0; q < rule.size(); ++q) {
       const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);

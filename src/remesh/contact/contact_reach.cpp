@@ -10,6 +10,8 @@ namespace {
 
 /// How far vertices may move, at least: in longest edges of what moves, and in activation distances.
 constexpr double kRoomInEdges = 0.1, kRoomInDistances = 2;
+/// Of this, what is enough where contact can be left out for it.
+constexpr double kLeastRoom = 0.25;
 
 template <int Dim>
 double longest_edge(const SurfacePiece<Dim>& piece) {
@@ -109,6 +111,13 @@ void ContactReach<Dim>::choose_room(double dhat, double span) {
     if (own.moves) longest = std::max(longest, longest_edge(own.piece));
   dhat_ = dhat;
   room_ = std::min(room_for(longest, dhat), (span - dhat) / 2);  // no more is known
+}
+
+template <int Dim>
+bool ContactReach<Dim>::gives_way() {
+  if (touching_.empty() || !(free_room_ >= kLeastRoom * room_)) return false;
+  room_ = free_room_;
+  return true;
 }
 
 template <int Dim>

@@ -50,11 +50,13 @@ class ContactReach {
   /// nodes is free. `facet` is its id, or kNone if the edit inserts it.
   void add(const SurfacePiece<Dim>& piece, FacetId facet, bool moves);
   /// Finds everything that the added facets could touch, also each other, as long as no vertex moves further than room().
-  /// Leaves out facets that are gone (`is_gone(facet)`). `dhat` [m].
+  /// Leaves out facets that are gone (`is_gone(facet)`). `may_give_way`: where there is less room, but not much less, in
+  /// which nothing can touch, that is the room. `dhat` [m].
   template <typename IsGone>
   void find(const SurfaceIndex<Dim>& surface, Neighbourhoods<Dim>& neighbourhoods, double dhat, Hits& hits,
-            const IsGone& is_gone) {
+            bool may_give_way, const IsGone& is_gone) {
     choose_room(dhat, surface.span());
+    free_room_ = may_give_way ? room_ : 0;
     for (const Own& own : own_) read_.include(own.piece.box.inflated(dhat_ + 2 * room_));
     for (std::size_t i = 0; i < own_.size(); ++i) {
       if (own_[i].facet == kNone) {
@@ -65,7 +67,9 @@ class ContactReach {
       for (const auto& [other, distance] : neighbourhoods.near(surface, own_[i].facet, dhat + 2 * room_, hits)) {
         const bool is_facet = !other.is_of_obstacle();
         const int number = other.number();
-        if ((is_facet && is_gone(number)) || distance >= reach(own_[i].moves, is_facet && moves(number))) continue;
+        const bool other_moves = is_facet && moves(number);
+        if ((is_facet && is_gone(number)) || distance >= reach(own_[i].moves, other_moves)) continue;
+        note(distance, own_[i].moves, other_moves);
         for (const auto& piece : surface.pieces(own_[i].facet)) mark(piece);
         if (is_facet)
           for (const auto& piece : surface.pieces(number)) mark(piece);
@@ -73,7 +77,10 @@ class ContactReach {
           mark(surface.obstacle_piece(number));
       }
     }
-    sort();
+    if (gives_way())
+      touching_.clear();
+    else
+      sort();
   }
   /// How far vertices may move [m].
   double room() const { return room_; }
@@ -90,10 +97,23 @@ class ContactReach {
     bool moves;
   };
   void choose_room(double dhat, double span);
+  /// Takes in how far apart two pieces are that could touch.
+  void note(double distance, bool first_moves, bool second_moves) {
+    const int movers = first_moves + second_moves;
+    free_room_ = movers == 0 ? 0 : std::min(free_room_, (distance - dhat_) / movers);
+  }
+  bool gives_way();
   bool moves(FacetId f) const { return known_[f] && own_[own_of_[f]].moves; }
   double reach(bool first_moves, bool second_moves) const { return dhat_ + (first_moves + second_moves) * room_; }
   void compare(int own, const SurfacePiece<Dim>& other, bool other_moves) {
-    if (!come_near(own_[own].piece, other, reach(own_[own].moves, other_moves))) return;
+    const double least = reach(own_[own].moves, other_moves);
+    if (free_room_ > 0) {
+      const double distance = distance_below(own_[own].piece, other, least);
+      if (distance >= least) return;
+      note(distance, own_[own].moves, other_moves);
+    } else if (!come_near(own_[own].piece, other, least)) {
+      return;
+    }
     mark(own_[own].piece);
     mark(other);
   }
@@ -118,6 +138,7 @@ class ContactReach {
   std::vector<int> own_of_;  ///< by facet, where it is known
   std::vector<SurfaceId> touching_;
   double dhat_ = 0, room_ = 0;
+  double free_room_ = 0;  ///< in which nothing can touch, of what is known so far
   Box<Dim> read_;
 };
 

@@ -57,8 +57,9 @@ void LocalProblem<Dim>::find_contacts() {
   }
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets) add(facet.vertices, kNone);
+  // Chords are short beside the edges of their facets, which give the room, so that most of them could touch some.
   reach.find(state_.surface, scratch_.neighbourhoods, state_.context.contact.activation_distance, scratch_.hits,
-             [&](FacetId f) { return is_removed(f); });
+             mesh_.has_nodes(), [&](FacetId f) { return is_removed(f); });
 }
 
 /// What stands around the vertices of what can touch, ascending: facets that stay and primitives of obstacles.

@@ -9,6 +9,7 @@
 #include "energy/elastic/point.hpp"
 #include "itr/fem/mass.hpp"
 #include "mesh/connected_parts.hpp"
+#include "remesh/curved_cell.hpp"
 
 namespace itr {
 
@@ -38,6 +39,27 @@ std::vector<int> parts_of(const Mesh<Dim>& mesh) {
   return connected_parts<Dim + 1>(mesh.vertex_slots(), cells);
 }
 
+/// Elastic energy and inertia of a cell with curved edges, by the rules of quadrature that the step has.
+template <int Dim>
+double energy_at_curves(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context, CellId c,
+                        const CurvedCell<Dim>& cell, const Vec<Dim>& fall) {
+  const Material& material = context.materials.at(mesh.body(c));
+  const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
+  const auto moduli = elastic_moduli<Dim>(material, mesh.rest(cell.nodes[0]));
+  const auto x = at_nodes<Dim>(cell.nodes, fields.x);
+  const int level = fields.levels.empty() ? 0 : fields.levels[c];
+  double density = 0;
+  for (const auto& point : level == 0 ? quadrature<Dim>(context.quadrature_degree) : closed_quadrature<Dim>(level))
+    density += point.share * elastic_density<Dim>(
+                                 x * quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear).transpose(), moduli);
+  double energy = context.scaling * mesh.volume(c) * density;
+  if (!context.has_inertia) return energy;
+  const QuadraticCell<Dim> way = (x - at_nodes<Dim>(cell.nodes, fields.predictor)).colwise() - fall;
+  const auto& mass = constant_quadratic_mass<Dim>(context.mass, cell.edges);
+  energy += 0.5 * material.density * mesh.volume(c) * (way * mass).cwiseProduct(way).sum();
+  return energy;
+}
+
 /// Of a cell whose edges are so long: isosceles and right-angled in 2D, regular in 3D.
 template <int Dim>
 double volume_of(double length) {
@@ -49,7 +71,7 @@ double volume_of(double length) {
 template <int Dim>
 double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  if (!is_bounded<Dim>(context) || !std::isfinite(context.coupling) || mesh.has_nodes()) return kUnknown;
+  if (!is_bounded<Dim>(context) || !std::isfinite(context.coupling)) return kUnknown;
   const auto acceleration = uniform_acceleration(mesh, context.loads);
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;
@@ -57,6 +79,10 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   std::vector<double> energy(mesh.vertex_slots(), context.coupling);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
+    if (const CurvedCell<Dim> cell = cell_before(mesh, c); cell.edges) {
+      energy[parts[cell.nodes[0]]] += energy_at_curves(mesh, fields, context, c, cell, fall);
+      continue;
+    }
     const auto element = element_of(mesh, c);
     const Material& material = context.materials.at(element.body);
     const auto moduli = elastic_moduli<Dim>(material, mesh.rest(element.vertices[0]));

@@ -95,6 +95,13 @@ class RemeshQueries {
     return screens() &&
            at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
   }
+  /// The same of a split or a curve that may be in contact, of which the prediction knows nothing. There trials tell, where
+  /// edges are curved unless far too little is promised: their chords bring many edges into contact.
+  bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance, bool in_contact) const {
+    if (!in_contact) return is_hopeless(cells, predicted, tolerance);
+    return screens() && (options_.curve.enabled || mesh_.has_nodes()) &&
+           at_most(predicted, kPatchOverPredictionInContact<Dim>) < context_.scaling * tolerance;
+  }
   /// Decides about the edit of a trial that has to gain `tolerance` [J].
   void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
 

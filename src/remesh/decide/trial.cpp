@@ -14,6 +14,7 @@ namespace itr {
 namespace {
 
 constexpr int kIterationsAfterAcceptance = 100;
+constexpr double kSurelyTooLittle = 0.9;                          ///< share of the required gain, as a prediction
 constexpr int kBoundIterations = 1, kBoundContactIterations = 2;  ///< of Newton, for a vertex alone
 
 /// Both sides of a comparison on one support.
@@ -90,7 +91,10 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
     after.get_positions(verdict.positions);
   };
   bool is_enough = false;
-  if (options.patch_over_vertex > 0) {
+  // The bound is not asked where it is known to decide nothing.
+  const bool is_bound_open = options.predicted && *options.predicted < kSurelyTooLittle * options.required &&
+                             at_most(*options.predicted, options.patch_over_vertex) >= options.required;
+  if (options.patch_over_vertex > 0 && !is_bound_open) {
     find_star(state.mesh, edit, scratch.star);
     // History that the new mesh cannot represent takes the longest to find, so the first of two checks leaves it out.
     const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;

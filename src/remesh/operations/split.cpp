@@ -41,10 +41,9 @@ class Refiner {
     const double gain = ask_.predict_split(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
     if (session_.memory().was_refused(RemeshMemory::split, edge, gain, in_contact)) return std::nullopt;
-    return PlaceQueue::Entry{
-        .place = place,
-        .priority = gain / nodes_of_split(ask_.mesh(), edge),
-        .is_hopeless = !in_contact && ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, tolerance_)};
+    return PlaceQueue::Entry{.place = place,
+                             .priority = gain / nodes_of_split(ask_.mesh(), edge),
+                             .is_hopeless = ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, tolerance_, in_contact)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
@@ -53,11 +52,11 @@ class Refiner {
     if (const Refusal refusal = refuse(edge); refusal != Refusal::none) return trial.refuse(refusal);
     ask_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
-    if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return trial.refuse(Refusal::prediction);
+    if (is_known && trial.candidate.is_hopeless) return trial.refuse(Refusal::prediction);
     trial.signal =
         is_known ? trial.candidate.priority * nodes_of_split(ask_.mesh(), edge) : ask_.predict_split(edge, scratch);
     trial.edit = make_split(ask_.mesh(), edge);
-    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, trial.signal, tolerance_))  // there trials tell
+    if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, tolerance_, trial.in_contact))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
   }
@@ -106,7 +105,7 @@ class Refiner {
     return PlaceQueue::Entry{
         .place = Place::node_of(edge),
         .priority = gain,
-        .is_hopeless = !in_contact && ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, curve_tolerance_)};
+        .is_hopeless = ask_.is_hopeless(ask_.mesh().cells_of_edge(edge), gain, curve_tolerance_, in_contact)};
   }
 
   void look_at_curve(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
@@ -115,10 +114,10 @@ class Refiner {
     ask_.find_contact(trial, scratch);  // first: the refusal reads the surface, too
     if (const Refusal refusal = ask_.refuse_curve(edge, scratch); refusal != Refusal::none) return trial.refuse(refusal);
     const bool is_known = session_.is_unchanged(trial.candidate);
-    if (is_known && trial.candidate.is_hopeless && !trial.in_contact) return trial.refuse(Refusal::prediction);
+    if (is_known && trial.candidate.is_hopeless) return trial.refuse(Refusal::prediction);
     trial.signal = is_known ? trial.candidate.priority : ask_.predict_curve(edge, scratch);
     trial.edit = make_curve(ask_.mesh(), edge);
-    if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_))
+    if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_, trial.in_contact))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, curve_tolerance_, ask_.options().local, scratch);
   }
