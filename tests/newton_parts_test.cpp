@@ -320,7 +320,9 @@ TEST(Direction, IsShiftedWhereItIsNotProjected) {
   const auto& shifts = parts.system.shifts;
   EXPECT_EQ(shifts.front().value, 0);
   for (std::size_t i = 2; i < shifts.size(); ++i)
-    if (shifts[i].is_share == shifts[i - 1].is_share) EXPECT_NEAR(shifts[i].value / shifts[i - 1].value, 10, 1e-12);
+    if (shifts[i].is_share == shifts[i - 1].is_share) {
+      EXPECT_NEAR(shifts[i].value / shifts[i - 1].value, 10, 1e-12);
+    }
   EXPECT_TRUE(shifts[1].is_share);
   EXPECT_FALSE(shifts.back().is_share) << "shares of a negative entry do not make it positive";
   EXPECT_GT(shifts.back().value, 0.97);

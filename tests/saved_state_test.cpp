@@ -193,7 +193,9 @@ TEST_P(CurvedRunTest, KeepsItsCurvedEdgesWhereRemeshingChanges) {
   EXPECT_TRUE(std::equal(lines.begin(), lines.end(), longer.begin()));
   const StoredFrame last = read_frame(stored_frames(run).back());
   EXPECT_GT(last.curved_edges.size(), edges / 2);
-  if (GetParam() == std::string("/space/remesh/enabled=false")) EXPECT_EQ(last.curved_edges.size(), edges);
+  if (GetParam() == std::string("/space/remesh/enabled=false")) {
+    EXPECT_EQ(last.curved_edges.size(), edges);
+  }
   EXPECT_TRUE(certify(run).passed());
 }
 
