@@ -13,7 +13,8 @@ namespace itr::output {
 struct Certificate {
   int frames = 0;
   std::vector<std::string> violations;  ///< one line each: frame, what, which ids; also of arrays that are damaged
-  /// How far curved edges of the surface leave their chords, which is what is checked, and how far where something else is nearer to these chords than that [m].
+  /// How far curved edges of the surface leave their chords, which is what is checked, and how far where something else is
+  /// nearer to these chords than that [m].
   double overhang = 0, blocked_overhang = 0;
   bool passed() const { return violations.empty() && frames > 0; }
 };
