@@ -142,8 +142,9 @@ bool RemeshQueries<Dim>::is_distorted(std::span<const CellId> cells) const {
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
-  return gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch);
+double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch,
+                                              Box<Dim>* surface_read) const {
+  return gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch, surface_read);
 }
 
 template <int Dim>
@@ -155,22 +156,22 @@ double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, LocalScratch<
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read) const {
   const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
   // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
   if ((options_.curve.enabled || mesh_.has_nodes()) && !is_predictable(context_))
-    return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch);
+    return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read);
   if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
   const auto around = mesh_.cells_of_edge(edge);
   if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
   const double gain = itr::predict_split_at_curves<Dim>(state(), edge);
-  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch) : gain;
+  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read) : gain;
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
+double RemeshQueries<Dim>::predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read) const {
   const double gain = itr::predict_curve<Dim>(state(), edge);
-  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_curve(mesh_, edge), scratch) : gain;
+  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_curve(mesh_, edge), scratch, surface_read) : gain;
 }
 
 template <int Dim>

@@ -81,9 +81,11 @@ class RemeshQueries {
   double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance.value() : 0; }
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
-  double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
-  double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
-  double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const;
+  /// `surface_read`, unless null, grows by what was read of the surface: what was looked at beside edits that move it there
+  /// is looked at again.
+  double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
+  double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
+  double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   /// At curved edges by what the vertex and the nodes that it sets gain together, history included.
   double predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const;
   /// Energy of a cell, which need not be in the mesh, on the nodes of an edit at present positions. [J, times the scaling]

@@ -62,11 +62,14 @@ void find_star(const Mesh<Dim>& mesh, const Edit<Dim>& edit, std::vector<CellId>
 }  // namespace
 
 template <int Dim>
-double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch) {
+double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch,
+                      Box<Dim>* surface_read) {
   find_star(state.mesh, edit, scratch.star);
   constexpr double kNever = std::numeric_limits<double>::infinity();
-  return compare<Dim>(state, scratch.star, edit, kNever, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {})
-      .gain;
+  const auto found =
+      compare<Dim>(state, scratch.star, edit, kNever, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {});
+  if (surface_read) surface_read->include(found.surface_read);
+  return found.gain;
 }
 
 template <int Dim>
@@ -125,9 +128,9 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   verdict.was_relaxed = true;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                   \
-  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&);          \
-  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const TrialOptions&, \
+#define ITR_INSTANTIATE(Dim)                                                                                     \
+  template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&, Box<Dim>*); \
+  template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const TrialOptions&,   \
                              LocalScratch<Dim>&, Verdict<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -78,8 +78,10 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
              LocalScratch<Dim>& scratch, Verdict<Dim>& verdict);
 
 /// Returns only the lower bound: the gain of the edit if the only vertices that move have all their cells among the edit's
-/// own or around the vertex that it sets. [J, times the scaling]
+/// own or around the vertex that it sets. `surface_read`, unless null, grows by what was read of the surface.
+/// [J, times the scaling]
 template <int Dim>
-double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch);
+double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, LocalScratch<Dim>& scratch,
+                      Box<Dim>* surface_read = nullptr);
 
 }  // namespace itr

@@ -105,8 +105,8 @@ class Coarsener {
     const EdgeKey edge = trial.edge();
     if (const Refusal refusal = ask_.refuse_straighten(edge); refusal != Refusal::none) return trial.refuse(refusal);
     ask_.find_contact(trial, scratch);
-    const double gain =
-        session_.is_unchanged(trial.candidate) ? trial.candidate.priority : ask_.predict_straighten(edge, scratch);
+    const double gain = session_.is_unchanged(trial.candidate) ? trial.candidate.priority
+                                                               : ask_.predict_straighten(edge, scratch, &trial.surface_read);
     trial.signal = std::abs(gain);
     trial.edit = make_straighten(ask_.mesh(), edge);
     const bool overhangs = ask_.overhangs(edge, scratch);
