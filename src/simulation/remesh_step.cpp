@@ -251,17 +251,21 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
 template <int Dim>
 std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                  StepReport& report) {
+                                                  StepReport& report, bool may_curve) {
   return change_and_project(tools, problem, before, state, x, report,
-                            [](auto&&... all) { return remesh<Dim>(std::forward<decltype(all)>(all)...); });
+                            [may_curve](auto& mesh, auto& fields, const auto& context, RemeshOptions options, auto&... all) {
+                              options.curve.enabled &= may_curve;
+                              return remesh<Dim>(mesh, fields, context, options, all...);
+                            });
 }
 
 template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
-                                                      const State<Dim>& before, State<Dim>& state, StepReport& report) {
+                                                      const State<Dim>& before, State<Dim>& state, VectorX& x,
+                                                      StepReport& report) {
   const StepProblem<Dim> problem(tools.setup, before.mesh, before.space, before.history, before.t, tools.cache,
                                  before.stiffness, before.quadrature);
-  VectorX x = before.history.x[0];
+  x = before.history.x[0];
   state = before;
   auto renumbering = change_and_project(tools, problem, before, state, x, report, [&](auto&&... all) {
     return straighten_cells<Dim>(cells, std::forward<decltype(all)>(all)...);
@@ -270,11 +274,11 @@ std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tool
   return renumbering;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                              \
-  template std::optional<MeshRenumbering> remesh_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&,         \
-                                                                  const State<Dim>&, State<Dim>&, VectorX&, StepReport&); \
-  template std::optional<MeshRenumbering> straighten_and_project<Dim>(const StepTools<Dim>&, std::span<const CellId>,     \
-                                                                      const State<Dim>&, State<Dim>&, StepReport&);
+#define ITR_INSTANTIATE(Dim)                                                                                        \
+  template std::optional<MeshRenumbering> remesh_and_project<Dim>(                                                  \
+      const StepTools<Dim>&, const StepProblem<Dim>&, const State<Dim>&, State<Dim>&, VectorX&, StepReport&, bool); \
+  template std::optional<MeshRenumbering> straighten_and_project<Dim>(                                              \
+      const StepTools<Dim>&, std::span<const CellId>, const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -12,15 +12,18 @@ inline constexpr double kStoredShare = 0.1;
 
 /// Remeshes state.mesh, around the solution x of `problem`, and carries state.history and x over to the new mesh; `before`
 /// is the state as it is, at the end of the step but for x. Returns what became of its ids; nothing where nothing changed.
-/// `report` has the energies of x; it gets operations, forgotten history and seconds.
+/// `report` has the energies of x; it gets operations, forgotten history and seconds. No edge is curved unless `may_curve`.
 template <int Dim>
 std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                  StepReport& report);
+                                                  StepReport& report, bool may_curve);
 
-/// Makes the curved edges of cells straight in the state between two steps, whatever it costs, and carries it over.
+/// Makes the curved edges of cells straight in the state between two steps, whatever it costs, and carries it over. `x` gets
+/// its positions interpolated on the new mesh: those that are projected may be nearly inverted, and no solve can start
+/// there.
 template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
-                                                      const State<Dim>& before, State<Dim>& state, StepReport& report);
+                                                      const State<Dim>& before, State<Dim>& state, VectorX& x,
+                                                      StepReport& report);
 
 }  // namespace itr

@@ -122,9 +122,10 @@ class StepAttempt {
     report_.t = next_.t;
   }
 
-  /// On success `after` is the state after the step, and `start` (unless null) that before it, on its mesh.
-  StepResult run(State<Dim>& after, State<Dim>* start) {
-    x_ = next_.history.x[0];
+  /// On success `after` is the state after the step, and `start` (unless null) that before it, on its mesh. The first solve
+  /// starts at `x_start`; empty: at the positions before.
+  StepResult run(State<Dim>& after, State<Dim>* start, const VectorX& x_start) {
+    x_ = x_start.size() > 0 ? x_start : next_.history.x[0];
     {
       const ScopedTimer timer(report_.seconds.linear_solve);
       tools_.solver.restore(before_.factor);
@@ -197,8 +198,8 @@ class StepAttempt {
     return summary;
   }
 
-  /// Remeshes, carries the history over and solves again; where that fails the mesh stays as it was. The second solve, if it
-  /// was cancelled.
+  /// Remeshes, carries the history over and solves again; where that fails, without new curved edges; where that fails too,
+  /// the mesh stays as it was. The second solve, if it was cancelled.
   std::optional<NewtonSummary> remesh() {
     {
       const ScopedTimer timer(report_.seconds.assembly);
@@ -209,22 +210,33 @@ class StepAttempt {
     next_.quadrature = problem_->quadrature_levels();
     const State<Dim> unchanged = next_;
     const VectorX solution = x_;
-    auto renumbering = remesh_and_project(tools_, *problem_, unchanged, next_, x_, report_);
-    if (!renumbering) return std::nullopt;
-    renumbering_ = std::move(*renumbering);
     auto problem_before = std::move(problem_);
-    make_problem();
-    const NewtonSummary summary = solve();
-    if (summary.termination == Termination::cancelled) return summary;
-    const std::string failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
-    if (failure.empty()) return std::nullopt;
-    warn("keeping the mesh as it was, the remeshed step failed: " + failure);
-    next_ = unchanged;
-    x_ = solution;
+    const auto undo = [&] {
+      next_ = unchanged;
+      x_ = solution;
+      report_.forget_operations();
+      renumbering_ = {};
+    };
+    for (bool may_curve = setup_.remesh.curve.enabled;; may_curve = false) {
+      auto renumbering = remesh_and_project(tools_, *problem_before, unchanged, next_, x_, report_, may_curve);
+      if (!renumbering) break;
+      renumbering_ = std::move(*renumbering);
+      make_problem();
+      const NewtonSummary summary = solve();
+      if (summary.termination == Termination::cancelled) return summary;
+      const std::string failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
+      if (failure.empty()) return std::nullopt;
+      const bool was_curved = report_.curves.accepted > 0;
+      undo();
+      if (was_curved) {
+        warn("remeshed again without curving edges, the remeshed step failed: " + failure);
+        continue;
+      }
+      warn("keeping the mesh as it was, the remeshed step failed: " + failure);
+      ++report_.reverted_remeshes;
+      break;
+    }
     problem_ = std::move(problem_before);
-    report_.forget_operations();
-    ++report_.reverted_remeshes;
-    renumbering_ = {};
     return std::nullopt;
   }
 
@@ -308,10 +320,10 @@ class StepAttempt {
 /// By the setup's integrator, or by implicit Euler where that would create energy. `nearly_inverted`: if the first solve
 /// found no step, the curved cells that may be why.
 template <int Dim>
-StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
-                             State<Dim>* start, std::vector<CellId>& nearly_inverted) {
+StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& before, const VectorX& x_start,
+                             State<Dim>& after, bool damped, State<Dim>* start, std::vector<CellId>& nearly_inverted) {
   StepAttempt<Dim> attempt(tools, before, damped);
-  StepResult result = attempt.run(after, start);
+  StepResult result = attempt.run(after, start, x_start);
   nearly_inverted = attempt.nearly_inverted_cells();
   if (!attempt.creates_energy()) return result;
   tools.logger.warning(
@@ -319,7 +331,7 @@ StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& befo
   StepReport effort = result.report;
   effort.forget_operations();
   StepAttempt<Dim> with_euler(tools, before, true);
-  result = with_euler.run(after, start);
+  result = with_euler.run(after, start, x_start);
   nearly_inverted = with_euler.nearly_inverted_cells();
   result.report.add_effort(effort);
   result.report.damped_steps = 1;
@@ -331,37 +343,34 @@ StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& befo
 template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
                      State<Dim>* start) {
-  constexpr int kMostRetries = 3;
+  constexpr int kMostRetries = 2;
   std::vector<CellId> nearly_inverted;
-  StepResult result = take_step_on_mesh(tools, before, after, damped, start, nearly_inverted);
+  StepResult result = take_step_on_mesh(tools, before, VectorX(), after, damped, start, nearly_inverted);
   // Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
-  State<Dim> from;
-  MeshRenumbering renumbering;
+  std::optional<MeshRenumbering> renumbering;
   for (int retry = 0; retry < kMostRetries && !result.ok && !nearly_inverted.empty(); ++retry) {
-    State<Dim> straightened;
     if (retry > 0) {  // what is around those cells has not helped
-      nearly_inverted.resize(from.mesh.cell_slots());
+      nearly_inverted.resize(before.mesh.cell_slots());
       std::iota(nearly_inverted.begin(), nearly_inverted.end(), 0);
     }
+    State<Dim> straightened;
+    VectorX x;
     StepReport effort;
     const EffortClock clock(tools.solver);
-    const auto change =
-        straighten_and_project<Dim>(tools, nearly_inverted, retry == 0 ? before : from, straightened, effort);
+    renumbering = straighten_and_project<Dim>(tools, nearly_inverted, before, straightened, x, effort);
     clock.tell(effort);
     result.report.add_effort(effort);
-    if (!change) break;
-    renumbering = renumbering.empty() ? *change : compose(renumbering, *change);
-    from = std::move(straightened);
+    if (!renumbering) break;
     tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", result.report.step,
-                                     before.space.num_curved() - from.space.num_curved(), result.reason));
+                                     before.space.num_curved() - straightened.space.num_curved(), result.reason));
     effort = result.report;
-    result = take_step_on_mesh(tools, from, after, damped, start, nearly_inverted);
+    result = take_step_on_mesh(tools, straightened, x, after, damped, start, nearly_inverted);
     result.report.add_effort(effort);
   }
   if (!result.ok)
     result.report.forget_operations();  // the state that they led to is gone
-  else if (!renumbering.empty())
-    result.renumbering = result.renumbering.empty() ? std::move(renumbering) : compose(renumbering, result.renumbering);
+  else if (renumbering)
+    result.renumbering = result.renumbering.empty() ? std::move(*renumbering) : compose(*renumbering, result.renumbering);
   return result;
 }
 
