@@ -149,12 +149,21 @@ double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const C
   return 0.5 * reach + share * motion;
 }
 
+/// Room around the motion of one vertex: that of all, or less where it hardly moves and another search would be small.
 template <int Dim>
-void ContactCandidates<Dim>::find_strays(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx) {
+double ContactCandidates<Dim>::room_of(int v, const ConstVectorView* dx, double reach, double room) const {
+  return dx && has_trees_ ? std::min(room, 0.5 * reach + at<Dim>(*dx, v).norm()) : room;
+}
+
+template <int Dim>
+void ContactCandidates<Dim>::find_strays(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
+                                         double reach, double room) {
   strays_.clear();
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    const Vec<Dim> p = at<Dim>(x, surface.vertices[i]);
-    if (!boxes_[i].contains(p) || (dx && !boxes_[i].contains(p + at<Dim>(*dx, surface.vertices[i]))))
+    const int v = surface.vertices[i];
+    const Vec<Dim> p = at<Dim>(x, v);
+    const bool is_wasteful = dx && rooms_[i] > kWasteful * room_of(v, dx, reach, room);
+    if (is_wasteful || !boxes_[i].contains(p) || (dx && !boxes_[i].contains(p + at<Dim>(*dx, v))))
       strays_.push_back(static_cast<int>(i));
   }
 }
@@ -162,10 +171,11 @@ void ContactCandidates<Dim>::find_strays(const CollisionSurface& surface, ConstV
 template <int Dim>
 void ContactCandidates<Dim>::build_box(std::size_t i, int v, ConstVectorView x, const ConstVectorView* dx, double reach,
                                        double room) {
+  rooms_[i] = room_of(v, dx, reach, room);
   boxes_[i] = {};
   boxes_[i].include(at<Dim>(x, v));
   if (dx) boxes_[i].include(at<Dim>(x, v) + at<Dim>(*dx, v));
-  boxes_[i] = boxes_[i].inflated(room);
+  boxes_[i] = boxes_[i].inflated(rooms_[i]);
   reach_[v] = boxes_[i].inflated(reach / 2);
 }
 
@@ -174,14 +184,11 @@ void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVector
                                     double reach) {
   const bool is_known = surface_ == &surface && revision_ == surface.revision && boxes_.size() == surface.vertices.size() &&
                         searched_ == reach;
+  if (!is_known) return search(surface, x, dx, reach, kUnforeseen);
   const double room = room_for(surface, dx, reach, kUnforeseen);
-  if (!is_known || (dx && room_ > kWasteful * room)) return search(surface, x, dx, reach, kUnforeseen);
-  find_strays(surface, x, dx);
+  find_strays(surface, x, dx, reach, room);
   if (strays_.empty()) return;
-  // Few pairs have no trees.
-  if (Dim == 2 || kFewStrays * strays_.size() > boxes_.size() || are_few(surface, surface.triangles) ||
-      are_few_edge_pairs(surface))
-    return search(surface, x, dx, reach, kUnforeseen);
+  if (!has_trees_ || kFewStrays * strays_.size() > boxes_.size()) return search(surface, x, dx, reach, kUnforeseen);
   for (const int i : strays_) build_box(i, surface.vertices[i], x, dx, reach, room);
   replace_pairs_of_strays(surface);
 }
@@ -258,10 +265,14 @@ template <int Dim>
 void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
                                     double reach, double share) {
   const bool keep_trees = surface_ == &surface && revision_ == surface.revision;
-  room_ = room_for(surface, dx, reach, share);
+  const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
+  const bool few_triangles = are_few(surface, surface.triangles);
+  has_trees_ = Dim == 3 && !few_edges && !few_triangles;
+  const double room = room_for(surface, dx, reach, share);
   boxes_.resize(surface.vertices.size());
+  rooms_.resize(surface.vertices.size());
   reach_.resize(surface.area.size());
-  for (std::size_t i = 0; i < boxes_.size(); ++i) build_box(i, surface.vertices[i], x, dx, reach, room_);
+  for (std::size_t i = 0; i < boxes_.size(); ++i) build_box(i, surface.vertices[i], x, dx, reach, room);
   surface_ = &surface;
   revision_ = surface.revision;
   searched_ = reach;
@@ -274,12 +285,11 @@ void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVector
     else
       tree.build(boxes);
   };
-  const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
   parallel_blocks(2, 1, [&](std::size_t task, std::size_t) {
     if (task == 0)
       update_tree(edge_boxes_, few_edges, edge_tree_);
     else
-      update_tree(triangle_boxes_, are_few(surface, surface.triangles), triangle_tree_);
+      update_tree(triangle_boxes_, few_triangles, triangle_tree_);
   });
   if constexpr (Dim == 2) {
     find_vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes_, edge_tree_, table_, vertex_edges_);
