@@ -16,7 +16,7 @@ namespace {
 
 // Rates of present machines, a second on one core (verification/solvers): flops of a factorisation, its entries beside their
 // flops, and memory that a solve streams. Only their ratios matter.
-constexpr double kFlops = 3e10, kEntries = 1e8, kBytes = 1.5e10;
+constexpr double kFlops = 3e10, kEntries = 1e8, kBytes = 2.5e10;
 
 constexpr double kWorthTrying = 0.7;  ///< share of a factorisation that iterations may cost
 constexpr int kFewest = 4;            ///< iterations without which none is tried
