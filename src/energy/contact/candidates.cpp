@@ -138,6 +138,40 @@ void find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>
   collect(edges.size(), find, pairs);
 }
 
+template <std::size_t N>
+bool has_any(const std::array<int, N>& primitive, const std::vector<char>& is_stray) {
+  return std::any_of(primitive.begin(), primitive.end(), [&](int v) { return is_stray[v] != 0; });
+}
+
+/// Makes the boxes of primitives with strays anew, and the tree of all; returns which these are.
+template <int Dim, std::size_t N>
+std::vector<int> move_boxes(const std::vector<std::array<int, N>>& primitives, const std::vector<char>& is_stray,
+                            const std::vector<Box<Dim>>& vertex_boxes, std::vector<Box<Dim>>& boxes, Bvh<Dim>& tree) {
+  std::vector<int> moved;
+  for (std::size_t i = 0; i < primitives.size(); ++i) {
+    if (!has_any(primitives[i], is_stray)) continue;
+    moved.push_back(static_cast<int>(i));
+    boxes[i] = {};
+    for (const int v : primitives[i]) boxes[i].include(vertex_boxes[v]);
+  }
+  tree.refit(boxes);
+  return moved;
+}
+
+/// Puts `found` in the place of what `is_old`, in the order of a whole search, which `key` tells.
+template <typename IsOld, typename Key>
+void replace(std::vector<std::array<int, 2>>& pairs, std::vector<std::array<int, 2>>& found, const IsOld& is_old,
+             const Key& key) {
+  const auto is_less = [&](const auto& a, const auto& b) { return key(a) < key(b); };
+  std::sort(found.begin(), found.end(), is_less);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  std::erase_if(pairs, is_old);
+  std::vector<std::array<int, 2>> merged(pairs.size() + found.size());
+  std::merge(pairs.begin(), pairs.end(), found.begin(), found.end(), merged.begin(), is_less);
+  pairs.swap(merged);
+  found.clear();
+}
+
 }  // namespace
 
 template <int Dim>
@@ -197,36 +231,11 @@ template <int Dim>
 void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& surface) {
   is_stray_.assign(surface.area.size(), 0);
   for (const int i : strays_) is_stray_[surface.vertices[i]] = 1;
-  const auto has_stray = [&](const auto& primitive) {
-    return std::any_of(primitive.begin(), primitive.end(), [&](int v) { return is_stray_[v] != 0; });
-  };
-  const auto move_boxes = [&](const auto& primitives, std::vector<Box<Dim>>& boxes, Bvh<Dim>& tree) {
-    std::vector<int> moved;
-    for (std::size_t i = 0; i < primitives.size(); ++i) {
-      if (!has_stray(primitives[i])) continue;
-      moved.push_back(static_cast<int>(i));
-      boxes[i] = {};
-      for (const int v : primitives[i]) boxes[i].include(reach_[v]);
-    }
-    tree.refit(boxes);
-    return moved;
-  };
-  // Puts `found` in the place of what `is_old`, in the order of a whole search, which `key` tells.
   Pairs found;
-  const auto replace = [&](Pairs& pairs, const auto& is_old, const auto& key) {
-    const auto is_less = [&](const auto& a, const auto& b) { return key(a) < key(b); };
-    std::sort(found.begin(), found.end(), is_less);
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    std::erase_if(pairs, is_old);
-    merged_.resize(pairs.size() + found.size());
-    std::merge(pairs.begin(), pairs.end(), found.begin(), found.end(), merged_.begin(), is_less);
-    pairs.swap(merged_);
-    found.clear();
-  };
   std::vector<int> hits;
   const auto& [vertices, edges, triangles] = std::tie(surface.vertices, surface.edges, surface.triangles);
 
-  const std::vector<int> moved_triangles = move_boxes(triangles, triangle_boxes_, triangle_tree_);
+  const std::vector<int> moved_triangles = move_boxes(triangles, is_stray_, reach_, triangle_boxes_, triangle_tree_);
   const auto add_overlaps = [&](int v, const Bvh<Dim>& tree, const auto& triangle_of) {
     hits.clear();
     tree.query(reach_[v], hits);
@@ -245,17 +254,19 @@ void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& sur
     if (is_stray_[v] == 0 && reach_[v].overlaps(around))
       add_overlaps(v, moved_tree, [&](int hit) { return moved_triangles[hit]; });
   replace(
-      vertex_triangles_, [&](const auto& pair) { return is_stray_[pair[0]] != 0 || has_stray(triangles[pair[1]]); },
+      vertex_triangles_, found,
+      [&](const auto& pair) { return is_stray_[pair[0]] != 0 || has_any(triangles[pair[1]], is_stray_); },
       [](const auto& pair) { return pair; });
 
-  for (const int e : move_boxes(edges, edge_boxes_, edge_tree_)) {
+  for (const int e : move_boxes(edges, is_stray_, reach_, edge_boxes_, edge_tree_)) {
     hits.clear();
     edge_tree_.query(edge_boxes_[e], hits);
     for (const int f : hits)
       if (matters(surface, edges[e], edges[f])) found.push_back({std::min(e, f), std::max(e, f)});
   }
   replace(
-      edge_edges_, [&](const auto& pair) { return has_stray(edges[pair[0]]) || has_stray(edges[pair[1]]); },
+      edge_edges_, found,
+      [&](const auto& pair) { return has_any(edges[pair[0]], is_stray_) || has_any(edges[pair[1]], is_stray_); },
       [&](const auto& pair) {  // a whole search looks around edges that count
         return counts(surface, edges[pair[0]]) ? pair : std::array{pair[1], pair[0]};
       });

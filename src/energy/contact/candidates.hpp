@@ -102,7 +102,6 @@ class ContactCandidates {
   Pairs vertex_edges_, vertex_triangles_, edge_edges_;
   std::vector<Box<Dim>> edge_boxes_, triangle_boxes_;
   BoxTable<Dim> table_;
-  Pairs merged_;  ///< scratch
 };
 
 }  // namespace itr
