@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <numeric>
 #include <string_view>
 #include <vector>
 
@@ -79,9 +80,16 @@ class Cholmod {
   }
 
   int factorize(const double* values, size_t count) {
-    std::copy(values, values + count, values_.begin());
     const itr::backends::OneOpenMpThread one_thread;
-    cholmod_factorize(&matrix_, factor_, &common_);
+    if (factor_ && factor_->is_super) {
+      if (sources_.empty()) permute_pattern();
+      for (size_t k = 0; k < count; ++k) permuted_values_[k] = values[sources_[k]];
+      double shift[2] = {0, 0};
+      cholmod_super_numeric(&permuted_, nullptr, shift, factor_, &common_);
+    } else {
+      std::copy(values, values + count, values_.begin());
+      cholmod_factorize(&matrix_, factor_, &common_);
+    }
     if (common_.status == CHOLMOD_NOT_POSDEF || (factor_ && factor_->minor < factor_->n)) {
       common_.status = CHOLMOD_OK;
       std::snprintf(text_.data(), text_.size(), "not positive definite at pivot %zu of %zu", factor_ ? factor_->minor : 0,
@@ -119,9 +127,40 @@ class Cholmod {
  private:
   void analyze_by(int ordering) {
     cholmod_free_factor(&factor_, &common_);
+    sources_.clear();
     common_.method[0].ordering = ordering;
     int* const given = ordering == CHOLMOD_GIVEN ? order_.permutation() : nullptr;
     factor_ = cholmod_analyze_p(&matrix_, given, nullptr, 0, &common_);
+  }
+
+  /// The lower triangle in the factor's order. cholmod_factorize would find it anew each time, by two transpositions.
+  void permute_pattern() {
+    const int n = static_cast<int>(matrix_.nrow);
+    const auto* order = static_cast<const int*>(factor_->Perm);
+    std::vector<int> place(n);
+    for (int k = 0; k < n; ++k) place[order[k]] = k;
+    permuted_starts_.assign(n + 1, 0);
+    const auto visit = [&](auto&& use) {
+      for (int j = 0; j < n; ++j)
+        for (int p = starts_[j]; p < starts_[j + 1]; ++p)
+          use(p, std::max(place[rows_[p]], place[j]), std::min(place[rows_[p]], place[j]));
+    };
+    visit([&](int, int, int column) { ++permuted_starts_[column + 1]; });
+    std::partial_sum(permuted_starts_.begin(), permuted_starts_.end(), permuted_starts_.begin());
+    std::vector<int> next(permuted_starts_.begin(), permuted_starts_.end() - 1);
+    sources_.resize(rows_.size());
+    permuted_rows_.resize(rows_.size());
+    permuted_values_.resize(rows_.size());
+    visit([&](int p, int row, int column) {
+      const int at = next[column]++;
+      sources_[at] = p;
+      permuted_rows_[at] = row;
+    });
+    permuted_ = matrix_;
+    permuted_.sorted = 0;
+    permuted_.p = permuted_starts_.data();
+    permuted_.i = permuted_rows_.data();
+    permuted_.x = permuted_values_.data();
   }
 
   int status() {
@@ -144,6 +183,9 @@ class Cholmod {
   cholmod_dense *workspace_y_ = nullptr, *workspace_e_ = nullptr;
   std::vector<int> starts_, rows_;
   std::vector<double> values_;
+  cholmod_sparse permuted_{};                                   ///< of supernodal factors
+  std::vector<int> permuted_starts_, permuted_rows_, sources_;  ///< where in `values` an entry comes from
+  std::vector<double> permuted_values_;
   std::array<char, 96> text_{};
 };
 

@@ -19,6 +19,7 @@ namespace {
 constexpr double kVolumeActivation = 1e-2;   ///< most volume ratio below which the barrier acts
 constexpr double kRelativeTolerance = 1e-9;  ///< of the way from the interpolant to the unconstrained minimiser
 constexpr double kNearEnd = 1e-2;            ///< of the same way
+constexpr double kHardlyNearer = 1e-3;       ///< of the same way: what is left of it, by the model, where a solve ends
 constexpr double kPenalty = 1e8;             ///< of an integral's change by that of the inertia
 
 /// An integral sum_i m_i (x_i - goal_i) over the free dofs of one part and one axis, which is to vanish.
@@ -268,7 +269,10 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   const std::vector<Integral> integrals = integrals_of(problem, held);
   const DofMap dofs = DofMap::from_held(held);
   EnergySum energy;
-  energy.add(std::make_shared<InertiaEnergy<Dim>>(problem.cells, problem.materials, MassKind::consistent, projected));
+  const auto distance =
+      std::make_shared<InertiaEnergy<Dim>>(problem.cells, problem.materials, MassKind::consistent, projected);
+  const double whole = distance->value(interpolant, workspace);
+  energy.add(distance);
   energy.add(barriers.volume);
   if (!problem.cells.curved_elements.empty()) energy.add(std::make_shared<InversionGuard<Dim>>(barriers.inversion));
   if (barriers.distance) energy.add(barriers.distance);
@@ -279,10 +283,12 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   options.gradient_tolerance = options.first_gradient_tolerance = 0;
   // Integrals bind all vertices together, so that what stops one stops all: first without, near to the end.
   options.step_tolerance = kNearEnd * way.norm();
+  options.decrement_tolerance = std::pow(kNearEnd, 2) * whole;
   report.iterations = minimize(energy, x, dofs, VectorX(), sparse, options, workspace).iterations;
   energy.add(std::make_shared<IntegralPenalty>(integrals, projected));
   PenalisedSystem system(sparse, integrals, dofs);
   options.step_tolerance = kRelativeTolerance * way.norm();
+  options.decrement_tolerance = std::pow(kHardlyNearer, 2) * whole;
   const NewtonSummary summary = minimize(energy, x, dofs, VectorX(), system, options, workspace);
   report.converged = summary.converged();
   report.iterations += summary.iterations;

@@ -2,6 +2,7 @@
 #include "candidates.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 #include "itr/core/parallel.hpp"
 
@@ -11,6 +12,7 @@ namespace {
 
 constexpr std::size_t kBlock = 128;
 constexpr double kWasteful = 4;           ///< boxes this much roomier than a motion needs are made anew
+constexpr std::size_t kFewStrays = 8;     ///< a part of the vertices from which on all pairs are searched for anew
 constexpr std::size_t kFewPairs = 16384;  ///< so many are looked at one by one: cheaper than a tree
 
 template <int Dim>
@@ -56,6 +58,15 @@ bool contains(const std::array<int, N>& primitive, int v) {
   return std::find(primitive.begin(), primitive.end(), v) != primitive.end();
 }
 
+/// Whether the pair of a vertex and a primitive, or of two edges, can act.
+template <std::size_t N>
+bool matters(const CollisionSurface& surface, int v, const std::array<int, N>& primitive) {
+  return !contains(primitive, v) && (counts(surface, v) || counts(surface, primitive));
+}
+bool matters(const CollisionSurface& surface, const std::array<int, 2>& e, const std::array<int, 2>& f) {
+  return !contains(e, f[0]) && !contains(e, f[1]) && (counts(surface, e) || counts(surface, f));
+}
+
 /// How many of these count.
 template <typename Primitives>
 std::size_t number_that_counts(const CollisionSurface& surface, const Primitives& primitives) {
@@ -81,9 +92,6 @@ void find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::a
                        const std::vector<Box<Dim>>& vertex_boxes, const std::vector<Box<Dim>>& boxes, const Bvh<Dim>& tree,
                        BoxTable<Dim>& table, std::vector<std::array<int, 2>>& pairs) {
   pairs.clear();
-  const auto matters = [&](int v, int i) {
-    return !contains(primitives[i], v) && (counts(surface, v) || counts(surface, primitives[i]));
-  };
   Box<Dim> counting;  // what does not count only meets what does
   for (std::size_t i = 0; i < primitives.size(); ++i)
     if (counts(surface, primitives[i])) counting.include(boxes[i]);
@@ -92,7 +100,7 @@ void find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::a
     for (const int v : surface.vertices)
       if (counts(surface, v) || vertex_boxes[v].overlaps(counting))
         table.visit_overlaps(vertex_boxes[v], [&](int i) {
-          if (matters(v, i)) pairs.push_back({v, i});
+          if (matters(surface, v, primitives[i])) pairs.push_back({v, i});
         });
     return;
   }
@@ -101,7 +109,7 @@ void find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::a
     if (!counts(surface, v) && !vertex_boxes[v].overlaps(counting)) return;
     find_overlaps(tree, vertex_boxes[v], hits);
     for (const int i : hits)
-      if (matters(v, i)) found.push_back({v, i});
+      if (matters(surface, v, primitives[i])) found.push_back({v, i});
   };
   collect(surface.vertices.size(), find, pairs);
 }
@@ -114,8 +122,7 @@ void find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>
   const auto consider = [&](int e, int f, std::vector<std::array<int, 2>>& found) {
     const bool both = counts(surface, edges[f]);
     if (both ? f <= e : f == e) return;
-    if (contains(edges[e], edges[f][0]) || contains(edges[e], edges[f][1])) return;
-    found.push_back({std::min(e, f), std::max(e, f)});
+    if (matters(surface, edges[e], edges[f])) found.push_back({std::min(e, f), std::max(e, f)});
   };
   if (are_few_edge_pairs(surface)) {
     table.reset(boxes);
@@ -131,6 +138,40 @@ void find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>
   collect(edges.size(), find, pairs);
 }
 
+template <std::size_t N>
+bool has_any(const std::array<int, N>& primitive, const std::vector<char>& is_stray) {
+  return std::any_of(primitive.begin(), primitive.end(), [&](int v) { return is_stray[v] != 0; });
+}
+
+/// Makes the boxes of primitives with strays anew, and the tree of all; returns which these are.
+template <int Dim, std::size_t N>
+std::vector<int> move_boxes(const std::vector<std::array<int, N>>& primitives, const std::vector<char>& is_stray,
+                            const std::vector<Box<Dim>>& vertex_boxes, std::vector<Box<Dim>>& boxes, Bvh<Dim>& tree) {
+  std::vector<int> moved;
+  for (std::size_t i = 0; i < primitives.size(); ++i) {
+    if (!has_any(primitives[i], is_stray)) continue;
+    moved.push_back(static_cast<int>(i));
+    boxes[i] = {};
+    for (const int v : primitives[i]) boxes[i].include(vertex_boxes[v]);
+  }
+  tree.refit(boxes);
+  return moved;
+}
+
+/// Puts `found` in the place of what `is_old`, in the order of a whole search, which `key` tells.
+template <typename IsOld, typename Key>
+void replace(std::vector<std::array<int, 2>>& pairs, std::vector<std::array<int, 2>>& found, const IsOld& is_old,
+             const Key& key) {
+  const auto is_less = [&](const auto& a, const auto& b) { return key(a) < key(b); };
+  std::sort(found.begin(), found.end(), is_less);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  std::erase_if(pairs, is_old);
+  std::vector<std::array<int, 2>> merged(pairs.size() + found.size());
+  std::merge(pairs.begin(), pairs.end(), found.begin(), found.end(), merged.begin(), is_less);
+  pairs.swap(merged);
+  found.clear();
+}
+
 }  // namespace
 
 template <int Dim>
@@ -142,46 +183,107 @@ double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const C
   return 0.5 * reach + share * motion;
 }
 
+/// Room around the motion of one vertex: that of all, or less where it hardly moves and another search would be small.
 template <int Dim>
-bool ContactCandidates<Dim>::holds(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
-                                   double reach, double room) const {
-  if (surface_ != &surface || revision_ != surface.revision || boxes_.size() != surface.vertices.size()) return false;
-  if (searched_ != reach) return false;
-  if (dx && room_ > kWasteful * room) return false;
-  for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    const Vec<Dim> p = at<Dim>(x, surface.vertices[i]);
-    if (!boxes_[i].contains(p)) return false;
-    if (dx && !boxes_[i].contains(p + at<Dim>(*dx, surface.vertices[i]))) return false;
-  }
-  return true;
+double ContactCandidates<Dim>::room_of(int v, const ConstVectorView* dx, double reach, double room) const {
+  return dx && has_trees_ ? std::min(room, 0.5 * reach + at<Dim>(*dx, v).norm()) : room;
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::build_boxes(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
-                                         double reach, double share) {
-  room_ = room_for(surface, dx, reach, share);
-  boxes_.assign(surface.vertices.size(), {});
-  reach_.resize(surface.area.size());
+void ContactCandidates<Dim>::find_strays(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
+                                         double reach, double room) {
+  strays_.clear();
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
     const int v = surface.vertices[i];
-    boxes_[i].include(at<Dim>(x, v));
-    if (dx) boxes_[i].include(at<Dim>(x, v) + at<Dim>(*dx, v));
-    boxes_[i] = boxes_[i].inflated(room_);
-    reach_[v] = boxes_[i].inflated(reach / 2);
+    const Vec<Dim> p = at<Dim>(x, v);
+    const bool is_wasteful = dx && rooms_[i] > kWasteful * room_of(v, dx, reach, room);
+    if (is_wasteful || !boxes_[i].contains(p) || (dx && !boxes_[i].contains(p + at<Dim>(*dx, v))))
+      strays_.push_back(static_cast<int>(i));
   }
+}
+
+template <int Dim>
+void ContactCandidates<Dim>::build_box(std::size_t i, int v, ConstVectorView x, const ConstVectorView* dx, double reach,
+                                       double room) {
+  rooms_[i] = room_of(v, dx, reach, room);
+  boxes_[i] = {};
+  boxes_[i].include(at<Dim>(x, v));
+  if (dx) boxes_[i].include(at<Dim>(x, v) + at<Dim>(*dx, v));
+  boxes_[i] = boxes_[i].inflated(rooms_[i]);
+  reach_[v] = boxes_[i].inflated(reach / 2);
 }
 
 template <int Dim>
 void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
                                     double reach) {
-  if (!holds(surface, x, dx, reach, room_for(surface, dx, reach, kUnforeseen))) search(surface, x, dx, reach, kUnforeseen);
+  const bool is_known = surface_ == &surface && revision_ == surface.revision && boxes_.size() == surface.vertices.size() &&
+                        searched_ == reach;
+  if (!is_known) return search(surface, x, dx, reach, kUnforeseen);
+  const double room = room_for(surface, dx, reach, kUnforeseen);
+  find_strays(surface, x, dx, reach, room);
+  if (strays_.empty()) return;
+  if (!has_trees_ || kFewStrays * strays_.size() > boxes_.size()) return search(surface, x, dx, reach, kUnforeseen);
+  for (const int i : strays_) build_box(i, surface.vertices[i], x, dx, reach, room);
+  replace_pairs_of_strays(surface);
+}
+
+template <int Dim>
+void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& surface) {
+  is_stray_.assign(surface.area.size(), 0);
+  for (const int i : strays_) is_stray_[surface.vertices[i]] = 1;
+  Pairs found;
+  std::vector<int> hits;
+  const auto& [vertices, edges, triangles] = std::tie(surface.vertices, surface.edges, surface.triangles);
+
+  const std::vector<int> moved_triangles = move_boxes(triangles, is_stray_, reach_, triangle_boxes_, triangle_tree_);
+  const auto add_overlaps = [&](int v, const Bvh<Dim>& tree, const auto& triangle_of) {
+    hits.clear();
+    tree.query(reach_[v], hits);
+    for (const int hit : hits)
+      if (const int t = triangle_of(hit); matters(surface, v, triangles[t])) found.push_back({v, t});
+  };
+  for (const int i : strays_) add_overlaps(vertices[i], triangle_tree_, [](int hit) { return hit; });
+  std::vector<Box<Dim>> moved_boxes;
+  Box<Dim> around;
+  for (const int t : moved_triangles) {
+    moved_boxes.push_back(triangle_boxes_[t]);
+    around.include(triangle_boxes_[t]);
+  }
+  const Bvh<Dim> moved_tree(moved_boxes);
+  for (const int v : vertices)
+    if (is_stray_[v] == 0 && reach_[v].overlaps(around))
+      add_overlaps(v, moved_tree, [&](int hit) { return moved_triangles[hit]; });
+  replace(
+      vertex_triangles_, found,
+      [&](const auto& pair) { return is_stray_[pair[0]] != 0 || has_any(triangles[pair[1]], is_stray_); },
+      [](const auto& pair) { return pair; });
+
+  for (const int e : move_boxes(edges, is_stray_, reach_, edge_boxes_, edge_tree_)) {
+    hits.clear();
+    edge_tree_.query(edge_boxes_[e], hits);
+    for (const int f : hits)
+      if (matters(surface, edges[e], edges[f])) found.push_back({std::min(e, f), std::max(e, f)});
+  }
+  replace(
+      edge_edges_, found,
+      [&](const auto& pair) { return has_any(edges[pair[0]], is_stray_) || has_any(edges[pair[1]], is_stray_); },
+      [&](const auto& pair) {  // a whole search looks around edges that count
+        return counts(surface, edges[pair[0]]) ? pair : std::array{pair[1], pair[0]};
+      });
 }
 
 template <int Dim>
 void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
                                     double reach, double share) {
   const bool keep_trees = surface_ == &surface && revision_ == surface.revision;
-  build_boxes(surface, x, dx, reach, share);
+  const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
+  const bool few_triangles = are_few(surface, surface.triangles);
+  has_trees_ = Dim == 3 && !few_edges && !few_triangles;
+  const double room = room_for(surface, dx, reach, share);
+  boxes_.resize(surface.vertices.size());
+  rooms_.resize(surface.vertices.size());
+  reach_.resize(surface.area.size());
+  for (std::size_t i = 0; i < boxes_.size(); ++i) build_box(i, surface.vertices[i], x, dx, reach, room);
   surface_ = &surface;
   revision_ = surface.revision;
   searched_ = reach;
@@ -194,12 +296,11 @@ void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVector
     else
       tree.build(boxes);
   };
-  const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
   parallel_blocks(2, 1, [&](std::size_t task, std::size_t) {
     if (task == 0)
       update_tree(edge_boxes_, few_edges, edge_tree_);
     else
-      update_tree(triangle_boxes_, are_few(surface, surface.triangles), triangle_tree_);
+      update_tree(triangle_boxes_, few_triangles, triangle_tree_);
   });
   if constexpr (Dim == 2) {
     find_vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes_, edge_tree_, table_, vertex_edges_);

@@ -82,16 +82,22 @@ class ContactCandidates {
  private:
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
   static double room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach, double share);
-  bool holds(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double room) const;
-  void build_boxes(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach,
-                   double share);
+  double room_of(int v, const ConstVectorView* dx, double reach, double room) const;
+  /// Of boxes that are left, or much too roomy.
+  void find_strays(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double room);
+  void build_box(std::size_t i, int v, ConstVectorView x, const ConstVectorView* dx, double reach, double room);
+  /// The pairs of a whole search with the present boxes, where all but those of the strays are as they were.
+  void replace_pairs_of_strays(const CollisionSurface& surface);
 
   const CollisionSurface* surface_ = nullptr;
   int revision_ = 0;             ///< of the surface
   double searched_ = 0;          ///< reach of the last search [m]
-  double room_ = 0;              ///< around the motion of the last search [m]
   std::vector<Box<Dim>> boxes_;  ///< one a surface vertex: while it stays in there, the pairs hold
   std::vector<Box<Dim>> reach_;  ///< by problem vertex, half the reach around its box
+  std::vector<double> rooms_;    ///< around the motions in `boxes_` [m]
+  bool has_trees_ = false;       ///< of edges and triangles: a few vertices can be looked for again
+  std::vector<int> strays_;      ///< indices of surface vertices whose boxes are made anew
+  std::vector<char> is_stray_;   ///< by problem vertex
   Bvh<Dim> edge_tree_, triangle_tree_;
   Pairs vertex_edges_, vertex_triangles_, edge_edges_;
   std::vector<Box<Dim>> edge_boxes_, triangle_boxes_;
