@@ -588,6 +588,29 @@ TYPED_TEST(Curved, PredictionOfACurveIsWhatItsNodeGains) {
   EXPECT_GT(compared, 20);
 }
 
+/// The prediction of a straightening is what it costs where nothing moves, forgotten history included.
+TYPED_TEST(Curved, PredictionOfAStraighteningIsWhatItCosts) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0, left_out = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.5, seed % 5 ? 0.001 : 0.02);
+    const StepContext<Dim> context = context_of<Dim>(seed);
+    View<Dim> view(scene, context);
+    for (const auto& [edge, node] : scene.mesh.nodes()) {
+      const Edit<Dim> edit = make_straighten(scene.mesh, edge);
+      const double before = LocalProblem<Dim>(view.state, edit.removed_cells, edit, false, view.scratch).value();
+      const double after = LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, view.scratch).value();
+      const double predicted = predict_straighten<Dim>(view.state, edge);
+      left_out += std::isnan(predicted);
+      if (std::isnan(predicted) || !std::isfinite(after) || !std::isfinite(before)) continue;
+      EXPECT_NEAR(predicted, before - after, 1e-9 * std::abs(before)) << "seed " << seed << ", node " << node;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 100);
+  EXPECT_GT(left_out, 5);  // at loaded facets
+}
+
 /// A bending bar without contact.
 template <int Dim>
 Setup<Dim> bar() {

@@ -54,6 +54,12 @@ double predict_split_at_curves(const RemeshState<Dim>& state, const EdgeKey& edg
 template <int Dim>
 double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge);
 
+/// The decrease of energy, negative in most cases, if a curved edge becomes straight and nothing else moves. The new mesh pays
+/// for the motion that it forgets. NaN where moduli or density vary in space, mass is lumped, history is interpolated or a
+/// facet at the edge is loaded. Contact is left out. [J, times the scaling]
+template <int Dim>
+double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge);
+
 /// Elasticity, inertia and body forces of a cell on vertices of the mesh, whether it is there or not, at present positions.
 /// Its curved edges are those after the edit. [J, times the scaling]
 template <int Dim>

@@ -87,7 +87,11 @@ class RemeshQueries {
   double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   /// At curved edges by what the vertex and the nodes that it sets gain together, history included.
-  double predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const;
+  /// Without the history where it is hopeless, for the tolerance [J], without.
+  double predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch) const;
+  bool any_is_curved(std::span<const CellId> cells) const {
+    return mesh_.has_nodes() && std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh_.is_curved(c); });
+  }
   /// Energy of a cell, which need not be in the mesh, on the nodes of an edit at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body, const Edit<Dim>& edit) const {
     return cell_energy<Dim>(state(), cell, body, edit);
@@ -126,7 +130,10 @@ class RemeshQueries {
   /// The same question about the chords that the split of an edge would bring to the surface beside those halves.
   bool makes_short_chords(const EdgeKey& e) const;
   RemeshState<Dim> state() const {
-    return {mesh_, fields_, context_, gate_.present(), baseline_ ? baseline_->history() : HistoryRule::function};
+    return state(baseline_ ? baseline_->history() : HistoryRule::function);
+  }
+  RemeshState<Dim> state(HistoryRule history) const {
+    return {mesh_, fields_, context_, gate_.present(), history};
   }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
 
