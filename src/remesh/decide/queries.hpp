@@ -104,9 +104,9 @@ class RemeshQueries {
   /// The same of a split or a curve that may be in contact, of which the prediction knows nothing. There trials tell, where
   /// edges are curved unless far too little is promised: their chords bring many edges into contact.
   bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance, bool in_contact) const {
-    if (!in_contact) return is_hopeless(cells, predicted, tolerance);
-    return screens() && (options_.curve.enabled || mesh_.has_nodes()) &&
-           at_most(predicted, kPatchOverPredictionInContact<Dim>) < context_.scaling * tolerance;
+    if (in_contact && !may_have_curves()) return false;
+    const double factor = in_contact ? kPatchOverPredictionInContact<Dim> : patch_over_refinement(cells);
+    return screens() && at_most(predicted, factor) < context_.scaling * tolerance;
   }
   /// Decides about the edit of a trial that has to gain `tolerance` [J].
   void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
@@ -129,13 +129,15 @@ class RemeshQueries {
   bool has_short_halves(const EdgeKey& e) const;
   /// The same question about the chords that the split of an edge would bring to the surface beside those halves.
   bool makes_short_chords(const EdgeKey& e) const;
-  RemeshState<Dim> state() const {
-    return state(baseline_ ? baseline_->history() : HistoryRule::function);
-  }
-  RemeshState<Dim> state(HistoryRule history) const {
-    return {mesh_, fields_, context_, gate_.present(), history};
-  }
+  RemeshState<Dim> state() const { return state(baseline_ ? baseline_->history() : HistoryRule::function); }
+  RemeshState<Dim> state(HistoryRule history) const { return {mesh_, fields_, context_, gate_.present(), history}; }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
+  bool may_have_curves() const { return options_.curve.enabled || mesh_.has_nodes(); }
+  /// See prediction.hpp; of a split or a curve of these cells.
+  double patch_over_refinement(std::span<const CellId> cells) const {
+    const double nu = largest_poisson_ratio(cells);
+    return may_have_curves() ? patch_over_nodes<Dim>(nu) : patch_over_vertex<Dim>(nu);
+  }
 
   const Mesh<Dim>& mesh_;
   const RemeshFields<Dim>& fields_;

@@ -51,7 +51,8 @@ class Coarsener {
     if (!proposal)
       return PlaceQueue::Entry{.place = place, .priority = -std::numeric_limits<double>::max()};  // to be counted
     const Edit<Dim>& edit = *proposal.edit;
-    return PlaceQueue::Entry{.place = place, .priority = ask_.predict_collapse(edit, tolerance_, scratch) / removed_nodes(edit)};
+    return PlaceQueue::Entry{.place = place,
+                             .priority = ask_.predict_collapse(edit, tolerance_, scratch) / removed_nodes(edit)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
