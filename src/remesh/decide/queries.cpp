@@ -151,14 +151,15 @@ double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch) const {
+double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch,
+                                            Box<Dim>* surface_read) const {
   if (!any_is_curved(edit.removed_cells)) return predict(edit);
   const RemeshState<Dim> judged = state();
   if (context_.has_inertia && judged.history == HistoryRule::function) {
-    const double most = gain_of_vertex<Dim>(state(HistoryRule::interpolated), edit, scratch);
+    const double most = gain_of_vertex<Dim>(state(HistoryRule::interpolated), edit, scratch, surface_read);
     if (is_hopeless(edit.removed_cells, most, tolerance)) return most;
   }
-  return gain_of_vertex<Dim>(judged, edit, scratch);
+  return gain_of_vertex<Dim>(judged, edit, scratch, surface_read);
 }
 
 template <int Dim>

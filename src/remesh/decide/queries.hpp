@@ -88,7 +88,8 @@ class RemeshQueries {
   double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   /// At curved edges by what the vertex and the nodes that it sets gain together, history included.
   /// Without the history where it is hopeless, for the tolerance [J], without.
-  double predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch) const;
+  double predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch,
+                          Box<Dim>* surface_read = nullptr) const;
   bool any_is_curved(std::span<const CellId> cells) const {
     return mesh_.has_nodes() && std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh_.is_curved(c); });
   }

@@ -67,7 +67,7 @@ class Coarsener {
     if (!trial.take(propose_collapse(ask_.mesh(), ask_.strata(), edge))) return;
     const bool is_known = straightens_ && session_.is_unchanged(trial.candidate);
     const double gain = is_known ? trial.candidate.priority * removed_nodes(*trial.edit)
-                                 : ask_.predict_collapse(*trial.edit, tolerance_, scratch);
+                                 : ask_.predict_collapse(*trial.edit, tolerance_, scratch, &trial.surface_read);
     if (ask_.any_is_curved(trial.edit->removed_cells)) trial.predicted = gain;
     if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, tolerance_))
       return trial.refuse(Refusal::prediction);
