@@ -388,6 +388,41 @@ TYPED_TEST(Curved, CellsAreStraightenedWithoutCompressingThem) {
   EXPECT_LT(nodes_after, nodes_before / 10) << nodes_before;
 }
 
+/// A refusal of long ago, when the edge's cells were as they should be, does not keep them distorted.
+TYPED_TEST(Curved, RefusalsDoNotKeepCellsDistorted) {
+  constexpr int Dim = TypeParam::value;
+  int distorted = 0, straightened = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    CurvedScene<Dim> scene(seed, 0, 0);
+    EdgeKey edge = scene.edge();
+    while (!scene.mesh.facets_of_edge(edge).empty()) edge = scene.edge();
+    scene.apply(make_curve(scene.mesh, edge));
+    const VertexId node = scene.mesh.node_of(edge[0], edge[1]);
+    const double length = (scene.mesh.rest(edge[0]) - scene.mesh.rest(edge[1])).norm();
+    scene.fields.x.template segment<Dim>(Dim * node) +=
+        0.22 * length * (scene.mesh.rest(edge[1]) - scene.mesh.rest(edge[0])).normalized();
+    StepContext<Dim> context = context_of<Dim>(0);
+    context.has_inertia = false;
+    context.loads = {};
+    context.shortest_edge = 1e-9;
+    RemeshOptions options;
+    options.split.enabled = options.collapse.enabled = false;
+    options.straighten.enabled = true;
+    options.split.acceptance_tolerance = 1;  // also what distorted cells may cost
+    options.split.min_edge_length = 0;
+    options.collapse.acceptance_tolerance = options.straighten.acceptance_tolerance = -1e-12;
+    const Gate<Dim> gate(scene.mesh, scene.fields, context);
+    const RemeshQueries<Dim> ask(scene.mesh, scene.fields, context, options, scene.strata, gate, nullptr);
+    if (!ask.is_distorted(scene.mesh.cells_of_edge(edge))) continue;
+    ++distorted;
+    RemeshMemory memory;
+    memory.refusals[RemeshMemory::straighten] = {{edge, {0, 1e9, false}}};
+    straightened += remesh<Dim>(scene.mesh, scene.fields, context, options, memory, scene.strata).straightens.accepted;
+  }
+  EXPECT_GT(distorted, 5);
+  EXPECT_EQ(straightened, distorted);
+}
+
 /// 1/2 the integral of rho |a - b|^2, cells of both meshes cut by each other.
 template <int Dim>
 double squared_distance(const Mesh<Dim>& mesh_a, const VectorX& a, const Mesh<Dim>& mesh_b, const VectorX& b,

@@ -98,8 +98,8 @@ class Coarsener {
     if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_straighten(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
-    if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact) &&
-        !ask_.overhangs(edge, scratch))
+    const bool was_refused = session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact);
+    if (was_refused && !ask_.overhangs(edge, scratch) && !ask_.is_distorted(ask_.mesh().cells_of_edge(edge)))
       return std::nullopt;
     return PlaceQueue::Entry{.place = Place::node_of(edge), .priority = gain};
   }
