@@ -484,6 +484,98 @@ TYPED_TEST(Curved, EveryOperationIsChargedForWhatItForgets) {
     EXPECT_GT(compared[kind], 15) << static_cast<int>(kind);
 }
 
+/// The alive part of a mesh with nodes as arrays.
+template <int Dim>
+struct Arrays {
+  std::vector<Vec<Dim>> rest;
+  std::vector<std::array<int, Dim + 1>> vertices;
+  std::vector<double> density;
+  std::vector<std::array<int, kQuadraticNodes<Dim>>> nodes;
+  std::vector<CurvedEdges> curved;
+  std::vector<VertexId> slots;  ///< by row
+  std::vector<int> place;       ///< by cell slot
+
+  Arrays(const Mesh<Dim>& mesh, const std::map<int, Material>& materials) : place(mesh.cell_slots(), kNone) {
+    std::map<VertexId, int> rows;
+    for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+      if (!mesh.is_cell_alive(c)) continue;
+      place[c] = static_cast<int>(vertices.size());
+      auto cell = curved_cell<Dim>(mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
+      for (VertexId& v : cell.nodes) {
+        const auto [row, is_new] = rows.emplace(v, static_cast<int>(rows.size()));
+        if (is_new) slots.push_back(v);
+        v = row->second;
+      }
+      std::copy_n(cell.nodes.begin(), Dim + 1, vertices.emplace_back().begin());
+      density.push_back(materials.at(mesh.body(c)).density);
+      nodes.push_back(cell.nodes);
+      curved.push_back(cell.edges);
+    }
+    for (const VertexId v : slots) {
+      const EdgeKey edge = mesh.edge_of_node(v);
+      rest.push_back(edge[0] == kNone ? mesh.rest(v) : Vec<Dim>((mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2));
+    }
+  }
+  TransferMesh<Dim> view() const { return {rest, vertices, density, nodes, curved}; }
+  MatrixX rows(const VectorX& field) const {
+    MatrixX all(slots.size(), Dim);
+    for (std::size_t i = 0; i < slots.size(); ++i) all.row(i) = field.segment<Dim>(Dim * slots[i]).transpose();
+    return all;
+  }
+};
+
+/// The integrals of rho u and rho X u.
+template <int Dim>
+Eigen::Matrix<double, Dim + 1, Dim> moments(const Mesh<Dim>& mesh, const VectorX& field,
+                                            const std::map<int, Material>& materials) {
+  Eigen::Matrix<double, Dim + 1, Dim> sum = Eigen::Matrix<double, Dim + 1, Dim>::Zero();
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    for (const auto& point : quadrature<Dim>(kMassDegree)) {
+      Vec<Dim + 1> one_and_place = Vec<Dim + 1>::Unit(0);
+      for (int k = 0; k <= Dim; ++k) one_and_place.template tail<Dim>() += point.weights[k] * mesh.rest(mesh.cell(c)[k]);
+      sum += materials.at(mesh.body(c)).density * mesh.volume(c) * point.share * one_and_place *
+             value_at<Dim>(mesh, field, c, point.weights).transpose();
+    }
+  }
+  return sum;
+}
+
+/// Projected after an edit, velocities keep linear and angular momentum, chords' too.
+TYPED_TEST(Curved, EveryOperationKeepsMomentum) {
+  constexpr int Dim = TypeParam::value;
+  using Kind = typename Edit<Dim>::Kind;
+  std::map<Kind, int> done;
+  double lost_by_interpolation = 0;
+  for (unsigned seed = 0; seed < 300; ++seed) {
+    CurvedScene<Dim> scene(seed, 0.5, 0.001);
+    const auto materials = context_of<Dim>(seed).materials;
+    auto proposal = propose_any(scene);
+    while (!proposal) proposal = propose_any(scene);
+    const Mesh<Dim> old = scene.mesh;
+    const VectorX old_rates = scene.fields.past_rates[0];
+    scene.apply(*proposal.edit);
+    const Arrays<Dim> before(old, materials), after(scene.mesh, materials);
+    TouchedCells touched;
+    for (const CellId c : proposal.edit->removed_cells) touched.old_cells.push_back(before.place[c]);
+    for (CellId c = old.cell_slots(); c < scene.mesh.cell_slots(); ++c) touched.new_cells.push_back(after.place[c]);
+    VectorX& rates = scene.fields.past_rates[0];
+    const auto expected = moments<Dim>(old, old_rates, materials);
+    lost_by_interpolation = std::max(lost_by_interpolation, (moments<Dim>(scene.mesh, rates, materials) - expected).norm());
+    TransferReport report;
+    const MatrixX projected =
+        project_l2<Dim>(before.view(), after.view(), touched, before.rows(old_rates), after.rows(rates), {}, report);
+    for (std::size_t i = 0; i < after.slots.size(); ++i)
+      rates.template segment<Dim>(Dim * after.slots[i]) = projected.row(static_cast<Eigen::Index>(i)).transpose();
+    EXPECT_LE((moments<Dim>(scene.mesh, rates, materials) - expected).norm(), 1e-12 * expected.norm()) << "seed " << seed;
+    ++done[proposal.edit->kind];
+  }
+  EXPECT_GT(lost_by_interpolation, 1e-3);
+  for (const Kind kind :
+       {Kind::split, Kind::curve, Kind::collapse, Kind::straighten, Kind::chords, Kind::swap, Kind::smooth})
+    EXPECT_GT(done[kind], 5) << static_cast<int>(kind);
+}
+
 /// What edge removals minimise: the energy of the cells that an edit makes, with the nodes that it makes.
 TYPED_TEST(Curved, EnergiesOfCellsAreThoseOfPatches) {
   constexpr int Dim = TypeParam::value;
