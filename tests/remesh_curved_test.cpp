@@ -378,7 +378,7 @@ TYPED_TEST(Curved, CellsAreStraightenedWithoutCompressingThem) {
     std::iota(all.begin(), all.end(), 0);
     nodes_before += static_cast<int>(scene.mesh.nodes().size());
     const RemeshReport report =
-        straighten_cells<Dim>(all, scene.mesh, scene.fields, context_of<Dim>(seed), options, memory, scene.strata);
+        straighten_cells<Dim>(all, 0.2, scene.mesh, scene.fields, context_of<Dim>(seed), options, memory, scene.strata);
     nodes_after += static_cast<int>(scene.mesh.nodes().size());
     EXPECT_GT(least_jacobians<Dim>(scene, scene.fields.x).first, 0.05 * least_mean) << "seed " << seed;
     EXPECT_TRUE(report.coarsened());

@@ -19,8 +19,10 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
                                                   StepReport& report);
 
 /// Makes the curved edges of cells straight in the state between two steps, whatever it costs, and carries it over.
+/// `least_volume`: see straighten_cells.
 template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
-                                                      const State<Dim>& before, State<Dim>& state, StepReport& report);
+                                                      double least_volume, const State<Dim>& before, State<Dim>& state,
+                                                      StepReport& report);
 
 }  // namespace itr

@@ -332,6 +332,7 @@ template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
                      State<Dim>* start) {
   constexpr int kMostRetries = 3;
+  constexpr double kLeastVolume = 0.2;  ///< see straighten_cells; the last retry takes what it gets
   std::vector<CellId> nearly_inverted;
   StepResult result = take_step_on_mesh(tools, before, after, damped, start, nearly_inverted);
   // Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
@@ -345,8 +346,9 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     }
     StepReport effort;
     const EffortClock clock(tools.solver);
+    const double least_volume = retry + 1 < kMostRetries ? kLeastVolume : 0;
     const auto change =
-        straighten_and_project<Dim>(tools, nearly_inverted, retry == 0 ? before : from, straightened, effort);
+        straighten_and_project<Dim>(tools, nearly_inverted, least_volume, retry == 0 ? before : from, straightened, effort);
     clock.tell(effort);
     result.report.add_effort(effort);
     if (!change) break;
