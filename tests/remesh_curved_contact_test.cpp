@@ -16,6 +16,7 @@
 #include "random_mesh.hpp"
 #include "remesh/curved_cell.hpp"
 #include "remesh/decide/patch.hpp"
+#include "remesh/decide/queries.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/patch_surface.hpp"
@@ -295,6 +296,52 @@ TYPED_TEST(CurvedContact, WhatTheGateLetsPassIntersectsNothing) {
   }
   EXPECT_GT(passed, 200);
   EXPECT_GT(refused, 50);
+}
+
+/// What moves outside of the box that a prediction says to have read does not change it by a bit: else results would depend
+/// on how many threads look at edges beside edits that move the surface.
+TYPED_TEST(CurvedContact, PredictionsSayWhatTheyReadOfTheSurface) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0, read = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    Scene<Dim> scene(seed, 0.5, Dim == 2 ? 0.01 : 0.006);
+    if (!is_valid(scene)) continue;
+    const std::size_t first = scene.context.obstacles.x.size();  // those before are of edges, which are long
+    scatter_points(scene, 200);
+    for (auto& [body, material] : scene.context.materials)  // so that local solves predict
+      material.youngs_modulus_at = [](const Vec<3>& X) { return 100 * (1 + 0.1 * X[0]); };
+    RemeshOptions options;
+    options.curve.enabled = true;
+    options.split.acceptance_tolerance = 1;
+    options.split.min_edge_length = 0;
+    for (int i = 0; i < 10; ++i) {
+      const EdgeKey edge = scene.edge(true);
+      const bool is_curved = scene.mesh.node_of(edge[0], edge[1]) != kNone;
+      const auto predict = [&](Box<Dim>& box) {
+        const Gate<Dim> gate(scene.mesh, scene.fields, scene.context);
+        const RemeshQueries<Dim> ask(scene.mesh, scene.fields, scene.context, options, scene.strata, gate, nullptr);
+        LocalScratch<Dim> scratch;
+        return is_curved ? ask.predict_split(edge, scratch, &box) : ask.predict_curve(edge, scratch, &box);
+      };
+      Box<Dim> box, other;
+      const double predicted = predict(box);
+      auto& points = scene.context.obstacles.x;
+      const std::vector<Vec<Dim>> kept = points;
+      const auto move = [&](const auto& may_move) {
+        for (std::size_t o = first; o < points.size(); ++o)
+          if (may_move(points[o])) points[o] += Vec<Dim>::Constant(1e-4);
+      };
+      move([&](const Vec<Dim>& point) { return !box.inflated(1e-3).contains(point); });
+      EXPECT_EQ(predict(other), predicted) << "seed " << seed << ", edge " << i;
+      points = kept;
+      move([](const Vec<Dim>&) { return true; });
+      read += predict(other) != predicted;
+      points = kept;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 100);
+  EXPECT_GT(read, 20);
 }
 
 /// With a reach that finds everything, a projection's surface is that of the step.

@@ -40,10 +40,10 @@ std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& opti
           options.straighten.acceptance_tolerance.value_or(collapse)};
 }
 
-/// Whether an edit makes no cell that is much more compressed somewhere, now or in the past, than those that it replaces.
+/// Whether an edit makes no cell that is more compressed somewhere, now or in the past, than that share of what it replaces.
 template <int Dim>
-bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit) {
-  constexpr double kLeast = 0.2, kTolerance = 0.1;
+bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit, double least_share) {
+  constexpr double kTolerance = 0.1;
   const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
   const auto node_before = [&](VertexId a, VertexId b) { return mesh.node_of(a, b); };
   const auto node_later = [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); };
@@ -57,7 +57,7 @@ bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const
       for (int k = 0; k <= Dim; ++k)
         rest[k] = cell.vertices[k] == kNewVertex ? edit.value->rest : mesh.rest(cell.vertices[k]);
       const auto nodes = curved_cell<Dim>(cell.vertices, node_later).values(x, edit);
-      return min_jacobian_bound<Dim>(nodes, kTolerance) >= kLeast * before * edge_matrix<Dim>(rest).determinant();
+      return min_jacobian_bound<Dim>(nodes, kTolerance) >= least_share * before * edge_matrix<Dim>(rest).determinant();
     });
   };
   return keeps(fields.x) && std::all_of(fields.past_positions.begin(), fields.past_positions.end(), keeps);
@@ -103,12 +103,12 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
 }
 
 template <int Dim>
-RemeshReport straighten_cells(std::span<const CellId> cells, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
+RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
                               const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
                               Strata<Dim>& strata) {
   RemeshSession<Dim> session(mesh, fields, context, options, nullptr, memory, strata);
   const auto commit = [&](const Edit<Dim>& edit) {
-    return keeps_volumes(mesh, fields, edit) &&
+    return (least_volume == 0 || keeps_volumes(mesh, fields, edit, least_volume)) &&
            session.commits().commit_unjudged(edit, session.scratch().gate, session.report().straightens);
   };
   const CellId first_new = mesh.cell_slots();
@@ -130,9 +130,9 @@ RemeshReport straighten_cells(std::span<const CellId> cells, Mesh<Dim>& mesh, Re
   return session.report();
 }
 
-template RemeshReport straighten_cells(std::span<const CellId>, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,
+template RemeshReport straighten_cells(std::span<const CellId>, double, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,
                                        const RemeshOptions&, RemeshMemory&, Strata<2>&);
-template RemeshReport straighten_cells(std::span<const CellId>, Mesh<3>&, RemeshFields<3>&, const StepContext<3>&,
+template RemeshReport straighten_cells(std::span<const CellId>, double, Mesh<3>&, RemeshFields<3>&, const StepContext<3>&,
                                        const RemeshOptions&, RemeshMemory&, Strata<3>&);
 template RemeshReport remesh(Mesh<2>&, RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&, RemeshMemory&,
                              Strata<2>&);

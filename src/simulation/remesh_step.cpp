@@ -261,14 +261,14 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
 
 template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
-                                                      const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                      StepReport& report) {
+                                                      double least_volume, const State<Dim>& before, State<Dim>& state,
+                                                      VectorX& x, StepReport& report) {
   const StepProblem<Dim> problem(tools.setup, before.mesh, before.space, before.history, before.t, tools.cache,
                                  before.stiffness, before.quadrature);
   x = before.history.x[0];
   state = before;
   auto renumbering = change_and_project(tools, problem, before, state, x, report, [&](auto&&... all) {
-    return straighten_cells<Dim>(cells, std::forward<decltype(all)>(all)...);
+    return straighten_cells<Dim>(cells, least_volume, std::forward<decltype(all)>(all)...);
   });
   if (renumbering) state.deviation.resize(0);  // of another mesh
   return renumbering;
@@ -278,7 +278,7 @@ std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tool
   template std::optional<MeshRenumbering> remesh_and_project<Dim>(                                                  \
       const StepTools<Dim>&, const StepProblem<Dim>&, const State<Dim>&, State<Dim>&, VectorX&, StepReport&, bool); \
   template std::optional<MeshRenumbering> straighten_and_project<Dim>(                                              \
-      const StepTools<Dim>&, std::span<const CellId>, const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
+      const StepTools<Dim>&, std::span<const CellId>, double, const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

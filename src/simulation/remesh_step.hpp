@@ -20,10 +20,10 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
 
 /// Makes the curved edges of cells straight in the state between two steps, whatever it costs, and carries it over. `x` gets
 /// its positions interpolated on the new mesh: those that are projected may be nearly inverted, and no solve can start
-/// there.
+/// there. `least_volume`: see straighten_cells.
 template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
-                                                      const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                      StepReport& report);
+                                                      double least_volume, const State<Dim>& before, State<Dim>& state,
+                                                      VectorX& x, StepReport& report);
 
 }  // namespace itr

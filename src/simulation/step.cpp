@@ -343,7 +343,8 @@ StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& befo
 template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
                      State<Dim>* start) {
-  constexpr int kMostRetries = 2;
+  constexpr int kMostRetries = 3;
+  constexpr double kLeastVolume = 0.2;  ///< see straighten_cells; the last retry takes what it gets
   std::vector<CellId> nearly_inverted;
   StepResult result = take_step_on_mesh(tools, before, VectorX(), after, damped, start, nearly_inverted);
   // Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
@@ -357,7 +358,8 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     VectorX x;
     StepReport effort;
     const EffortClock clock(tools.solver);
-    renumbering = straighten_and_project<Dim>(tools, nearly_inverted, before, straightened, x, effort);
+    const double least_volume = retry + 1 < kMostRetries ? kLeastVolume : 0;
+    renumbering = straighten_and_project<Dim>(tools, nearly_inverted, least_volume, before, straightened, x, effort);
     clock.tell(effort);
     result.report.add_effort(effort);
     if (!renumbering) break;

@@ -21,10 +21,11 @@ template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata);
 
-/// Replaces curved edges of these cells by their chords or makes them straight, whatever it costs, where that inverts, meets
-/// and much compresses nothing; else as `remesh`.
+/// Replaces curved edges of these cells by their chords or makes them straight, whatever it costs, where that inverts and
+/// meets nothing; else as `remesh`. New cells keep `least_volume` everywhere, a share of the least mean volume ratio of
+/// those that they replace, now and in the past.
 template <int Dim>
-RemeshReport straighten_cells(std::span<const CellId> cells, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
+RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
                               const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
                               Strata<Dim>& strata);
 

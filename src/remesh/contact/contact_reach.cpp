@@ -92,6 +92,7 @@ void ContactReach<Dim>::clear(int facet_slots) {
   touching_.clear();
   read_ = {};
   known_.clear(facet_slots);
+  marked_.clear(facet_slots);
   own_of_.resize(facet_slots);
 }
 

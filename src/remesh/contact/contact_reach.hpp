@@ -70,9 +70,9 @@ class ContactReach {
         const bool other_moves = is_facet && moves(number);
         if ((is_facet && is_gone(number)) || distance >= reach(own_[i].moves, other_moves)) continue;
         note(distance, own_[i].moves, other_moves);
-        for (const auto& piece : surface.pieces(own_[i].facet)) mark(piece);
+        mark_facet(surface, own_[i].facet);
         if (is_facet)
-          for (const auto& piece : surface.pieces(number)) mark(piece);
+          mark_facet(surface, number);
         else
           mark(surface.obstacle_piece(number));
       }
@@ -128,6 +128,10 @@ class ContactReach {
     for (int i = 0; i < inserted; ++i)
       if (own_[i].facet == kNone) compare(inserted, own_[i].piece, own_[i].moves);
   }
+  void mark_facet(const SurfaceIndex<Dim>& surface, FacetId f) {
+    if (!marked_.mark(f)) return;
+    for (const auto& piece : surface.pieces(f)) mark(piece);
+  }
   void mark(const SurfacePiece<Dim>& piece) {
     touching_.insert(touching_.end(), piece.id.begin(), piece.id.begin() + piece.size);
   }
@@ -135,6 +139,7 @@ class ContactReach {
 
   std::vector<Own> own_;
   Marks known_;
+  Marks marked_;             ///< facets of which all pieces are in `touching_`
   std::vector<int> own_of_;  ///< by facet, where it is known
   std::vector<SurfaceId> touching_;
   double dhat_ = 0, room_ = 0;

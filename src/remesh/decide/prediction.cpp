@@ -238,6 +238,55 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   return -model.relaxed(held);
 }
 
+// Motion that the straight edge cannot carry counts as it does in the space before (rule b). There the straightened mesh has
+// the node at the mean of the ends, so that no other space is needed.
+template <int Dim>
+double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge) {
+  constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
+  const StepContext<Dim>& context = state.context;
+  const Mesh<Dim>& mesh = state.mesh;
+  if (!is_predictable(context) || context.mass == MassKind::lumped) return kCannotTell;
+  if (context.has_inertia && state.history != HistoryRule::function) return kCannotTell;
+  if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return kCannotTell;
+  const VertexId node = mesh.node_of(edge[0], edge[1]);
+  const auto at = [&](VertexId v) { return state.fields.x.template segment<Dim>(Dim * v); };
+  const Vec<Dim> middle = (at(edge[0]) + at(edge[1])) / 2, move = middle - at(node);
+  double gain = 0;
+  for (const CellId c : mesh.cells_of_edge(edge)) {
+    const Material& material = context.materials.at(mesh.body(c));
+    if (material.has_varying_moduli() || material.density_at) return kCannotTell;
+    const CurvedCell<Dim> cell = cell_before(mesh, c);
+    const auto n = std::find(cell.nodes.begin() + Dim + 1, cell.nodes.end(), node) - cell.nodes.begin();
+    const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
+    const ElasticModuli moduli = elastic_moduli<Dim>(material, mesh.rest(edge[0]));
+    const auto x = at_nodes<Dim>(cell.nodes, state.fields.x);
+    auto straight = x;
+    straight.col(n) = middle;
+    const int level = state.fields.levels.empty() ? 0 : state.fields.levels[c];
+    double density = 0;
+    for (const auto& point : level == 0 ? quadrature<Dim>(context.quadrature_degree) : closed_quadrature<Dim>(level)) {
+      const auto shapes = quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear);
+      density += point.share * (elastic_density<Dim>(x * shapes.transpose(), moduli) -
+                                elastic_density<Dim>(straight * shapes.transpose(), moduli));
+    }
+    gain += context.scaling * mesh.volume(c) * density;
+    const double mass = material.density * mesh.volume(c);
+    const auto& unit = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
+    if (context.has_inertia) {
+      const QuadraticCell<Dim> way = x - at_nodes<Dim>(cell.nodes, state.fields.predictor);
+      gain -= mass * ((way * unit.col(n)).dot(move) + 0.5 * unit(n, n) * move.squaredNorm());
+    }
+    if (!context.loads.acceleration) continue;
+    for (const auto& point : quadrature<Dim>(kMassDegree)) {
+      Vec<Dim> X = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) X += point.weights[k] * mesh.rest(cell.nodes[k]);
+      const double share = point.share * quadratic_shapes<Dim>(cell.edges, point.weights)[n];
+      gain += context.scaling * mass * share * context.loads.acceleration(X).dot(move);
+    }
+  }
+  return gain;
+}
+
 template <int Dim>
 double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body,
                    const Edit<Dim>& edit) {
@@ -261,6 +310,8 @@ template double predict_split_at_curves(const RemeshState<2>&, const EdgeKey&);
 template double predict_split_at_curves(const RemeshState<3>&, const EdgeKey&);
 template double predict_curve(const RemeshState<2>&, const EdgeKey&);
 template double predict_curve(const RemeshState<3>&, const EdgeKey&);
+template double predict_straighten(const RemeshState<2>&, const EdgeKey&);
+template double predict_straighten(const RemeshState<3>&, const EdgeKey&);
 template double cell_energy<2>(const RemeshState<2>&, const MeshTypes<2>::Cell&, int, const Edit<2>&);
 template double cell_energy<3>(const RemeshState<3>&, const MeshTypes<3>::Cell&, int, const Edit<3>&);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <boost/container/small_vector.hpp>
 #include "core/timer.hpp"
@@ -144,22 +145,28 @@ bool RemeshQueries<Dim>::is_distorted(std::span<const CellId> cells) const {
 template <int Dim>
 double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch,
                                               Box<Dim>* surface_read) const {
-  return gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch, surface_read);
+  const double gain =
+      is_in_contact(edge, scratch) ? std::numeric_limits<double>::quiet_NaN() : itr::predict_straighten<Dim>(state(), edge);
+  return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch, surface_read) : gain;
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const {
-  const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
-  if (std::any_of(edit.removed_cells.begin(), edit.removed_cells.end(), is_curved))
-    return gain_of_vertex<Dim>(state(), edit, scratch);
-  return predict(edit);
+double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch,
+                                            Box<Dim>* surface_read) const {
+  if (!any_is_curved(edit.removed_cells)) return predict(edit);
+  const RemeshState<Dim> judged = state();
+  if (context_.has_inertia && judged.history == HistoryRule::function) {
+    const double most = gain_of_vertex<Dim>(state(HistoryRule::interpolated), edit, scratch, surface_read);
+    if (is_hopeless(edit.removed_cells, most, tolerance)) return most;
+  }
+  return gain_of_vertex<Dim>(judged, edit, scratch, surface_read);
 }
 
 template <int Dim>
 double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read) const {
   const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
   // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
-  if ((options_.curve.enabled || mesh_.has_nodes()) && !is_predictable(context_))
+  if (may_have_curves() && !is_predictable(context_))
     return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read);
   if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
   const auto around = mesh_.cells_of_edge(edge);
@@ -251,15 +258,17 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
   const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
+  const bool is_refined = edit.kind == Edit<Dim>::Kind::split || edit.kind == Edit<Dim>::Kind::curve;
   TrialOptions options{.required = context_.scaling * tolerance, .local = local};
   if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
   // The vertex or nodes that a move or a swap sets do not tell what the vertices around gain.
   if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap &&
       (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
-    options.patch_over_vertex = patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
-  const bool is_refined = edit.kind == Edit<Dim>::Kind::split || edit.kind == Edit<Dim>::Kind::curve;
+    options.patch_over_vertex = is_refined && !trial.in_contact
+                                    ? patch_over_refinement(edit.removed_cells)
+                                    : patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
   const bool has_nodes = mesh_.has_nodes() || !edit.inserted_nodes.empty();
-  if (is_refined && has_nodes && !trial.in_contact) options.predicted = trial.signal;
+  if (has_nodes && !trial.in_contact) options.predicted = trial.predicted;
   trial.is_asked = trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);

@@ -87,7 +87,12 @@ class RemeshQueries {
   double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   /// At curved edges by what the vertex and the nodes that it sets gain together, history included.
-  double predict_collapse(const Edit<Dim>& edit, LocalScratch<Dim>& scratch) const;
+  /// Without the history where it is hopeless, for the tolerance [J], without.
+  double predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch,
+                          Box<Dim>* surface_read = nullptr) const;
+  bool any_is_curved(std::span<const CellId> cells) const {
+    return mesh_.has_nodes() && std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh_.is_curved(c); });
+  }
   /// Energy of a cell, which need not be in the mesh, on the nodes of an edit at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body, const Edit<Dim>& edit) const {
     return cell_energy<Dim>(state(), cell, body, edit);
@@ -100,9 +105,9 @@ class RemeshQueries {
   /// The same of a split or a curve that may be in contact, of which the prediction knows nothing. There trials tell, where
   /// edges are curved unless far too little is promised: their chords bring many edges into contact.
   bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance, bool in_contact) const {
-    if (!in_contact) return is_hopeless(cells, predicted, tolerance);
-    return screens() && (options_.curve.enabled || mesh_.has_nodes()) &&
-           at_most(predicted, kPatchOverPredictionInContact<Dim>) < context_.scaling * tolerance;
+    if (in_contact && !may_have_curves()) return false;
+    const double factor = in_contact ? kPatchOverPredictionInContact<Dim> : patch_over_refinement(cells);
+    return screens() && at_most(predicted, factor) < context_.scaling * tolerance;
   }
   /// Decides about the edit of a trial that has to gain `tolerance` [J].
   void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
@@ -125,10 +130,15 @@ class RemeshQueries {
   bool has_short_halves(const EdgeKey& e) const;
   /// The same question about the chords that the split of an edge would bring to the surface beside those halves.
   bool makes_short_chords(const EdgeKey& e) const;
-  RemeshState<Dim> state() const {
-    return {mesh_, fields_, context_, gate_.present(), baseline_ ? baseline_->history() : HistoryRule::function};
-  }
+  RemeshState<Dim> state() const { return state(baseline_ ? baseline_->history() : HistoryRule::function); }
+  RemeshState<Dim> state(HistoryRule history) const { return {mesh_, fields_, context_, gate_.present(), history}; }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
+  bool may_have_curves() const { return options_.curve.enabled || mesh_.has_nodes(); }
+  /// See prediction.hpp; of a split or a curve of these cells.
+  double patch_over_refinement(std::span<const CellId> cells) const {
+    const double nu = largest_poisson_ratio(cells);
+    return may_have_curves() ? patch_over_nodes<Dim>(nu) : patch_over_vertex<Dim>(nu);
+  }
 
   const Mesh<Dim>& mesh_;
   const RemeshFields<Dim>& fields_;

@@ -101,7 +101,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
     find_star(state.mesh, edit, scratch.star);
     // History that the new mesh cannot represent takes the longest to find, so the first of two checks leaves it out.
     const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
-    for (int check = is_nested ? 1 : 0; check < 2; ++check) {
+    for (int check = is_nested || options.predicted ? 1 : 0; check < 2; ++check) {
       const HistoryRule history = check == 0 ? HistoryRule::interpolated : state.history;
       const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
       is_enough = false;

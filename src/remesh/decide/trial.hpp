@@ -37,7 +37,8 @@ template <int Dim>
 struct Trial {
   PlaceQueue::Entry candidate;
   std::optional<Edit<Dim>> edit{};
-  double signal = 0;  ///< see RemeshMemory
+  double signal = 0;                  ///< see RemeshMemory
+  std::optional<double> predicted{};  ///< gain of the vertex and nodes that the edit sets [J, times the scaling]
   bool in_contact = false;
   bool is_asked = false;  ///< a refusal is to be remembered
   bool was_previewed = false;

@@ -51,7 +51,8 @@ class Coarsener {
     if (!proposal)
       return PlaceQueue::Entry{.place = place, .priority = -std::numeric_limits<double>::max()};  // to be counted
     const Edit<Dim>& edit = *proposal.edit;
-    return PlaceQueue::Entry{.place = place, .priority = ask_.predict_collapse(edit, scratch) / removed_nodes(edit)};
+    return PlaceQueue::Entry{.place = place,
+                             .priority = ask_.predict_collapse(edit, tolerance_, scratch) / removed_nodes(edit)};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
@@ -65,7 +66,9 @@ class Coarsener {
     trial.is_asked = true;
     if (!trial.take(propose_collapse(ask_.mesh(), ask_.strata(), edge))) return;
     const bool is_known = straightens_ && session_.is_unchanged(trial.candidate);
-    const double gain = is_known ? trial.candidate.priority * removed_nodes(*trial.edit) : ask_.predict(*trial.edit);
+    const double gain = is_known ? trial.candidate.priority * removed_nodes(*trial.edit)
+                                 : ask_.predict_collapse(*trial.edit, tolerance_, scratch, &trial.surface_read);
+    if (ask_.any_is_curved(trial.edit->removed_cells)) trial.predicted = gain;
     if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, tolerance_))
       return trial.refuse(Refusal::prediction);
     ask_.judge(trial, tolerance_, ask_.options().local, scratch);
@@ -95,8 +98,8 @@ class Coarsener {
     if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_straighten(edge, scratch);
     const bool in_contact = ask_.is_in_contact(edge, scratch);
-    if (session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact) &&
-        !ask_.overhangs(edge, scratch))
+    const bool was_refused = session_.memory().was_refused(RemeshMemory::straighten, edge, std::abs(gain), in_contact);
+    if (was_refused && !ask_.overhangs(edge, scratch) && !ask_.is_distorted(ask_.mesh().cells_of_edge(edge)))
       return std::nullopt;
     return PlaceQueue::Entry{.place = Place::node_of(edge), .priority = gain};
   }
@@ -108,6 +111,7 @@ class Coarsener {
     const double gain = session_.is_unchanged(trial.candidate) ? trial.candidate.priority
                                                                : ask_.predict_straighten(edge, scratch, &trial.surface_read);
     trial.signal = std::abs(gain);
+    trial.predicted = gain;
     trial.edit = make_straighten(ask_.mesh(), edge);
     const bool overhangs = ask_.overhangs(edge, scratch);
     const double tolerance = overhangs || ask_.is_distorted(trial.edit->removed_cells)

@@ -53,8 +53,8 @@ class Refiner {
     ask_.find_contact(trial, scratch);
     const bool is_known = session_.is_unchanged(trial.candidate);
     if (is_known && trial.candidate.is_hopeless) return trial.refuse(Refusal::prediction);
-    trial.signal = is_known ? trial.candidate.priority * nodes_of_split(ask_.mesh(), edge)
-                            : ask_.predict_split(edge, scratch, &trial.surface_read);
+    trial.predicted = trial.signal = is_known ? trial.candidate.priority * nodes_of_split(ask_.mesh(), edge)
+                                              : ask_.predict_split(edge, scratch, &trial.surface_read);
     trial.edit = make_split(ask_.mesh(), edge);
     if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, tolerance_, trial.in_contact))
       return trial.refuse(Refusal::prediction);
@@ -115,7 +115,8 @@ class Refiner {
     if (const Refusal refusal = ask_.refuse_curve(edge, scratch); refusal != Refusal::none) return trial.refuse(refusal);
     const bool is_known = session_.is_unchanged(trial.candidate);
     if (is_known && trial.candidate.is_hopeless) return trial.refuse(Refusal::prediction);
-    trial.signal = is_known ? trial.candidate.priority : ask_.predict_curve(edge, scratch, &trial.surface_read);
+    trial.predicted = trial.signal =
+        is_known ? trial.candidate.priority : ask_.predict_curve(edge, scratch, &trial.surface_read);
     trial.edit = make_curve(ask_.mesh(), edge);
     if (ask_.is_hopeless(trial.edit->removed_cells, trial.signal, curve_tolerance_, trial.in_contact))
       return trial.refuse(Refusal::prediction);
