@@ -73,7 +73,8 @@ std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state,
   return violation;
 }
 
-/// Curved cells where det F is small somewhere, and those that share a vertex with one.
+/// Curved cells where det F is small somewhere, and those that share a vertex with one. Where there are none, all cells of a
+/// mesh with curved edges: those may have stopped the linear cells beside them.
 template <int Dim>
 std::vector<CellId> find_nearly_inverted(const State<Dim>& state, const VectorX& x) {
   constexpr double kSmall = 0.1, kTolerance = 0.1;
@@ -86,6 +87,10 @@ std::vector<CellId> find_nearly_inverted(const State<Dim>& state, const VectorX&
       const auto around = state.mesh.cells_of(element.nodes[k]);
       found.insert(found.end(), around.begin(), around.end());
     }
+  }
+  if (found.empty() && !cells.curved_elements.empty()) {
+    found.resize(state.mesh.cell_slots());
+    std::iota(found.begin(), found.end(), 0);
   }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
@@ -154,7 +159,7 @@ class StepAttempt {
 
   /// Whether EnergyGuard was the one that ended it.
   bool creates_energy() const { return creates_energy_; }
-  /// If the first solve found no step: curved cells that were nearly inverted then, by the numbers of the state before.
+  /// If the first solve found no step: cells whose curved edges may be why, by the numbers of the state before.
   const std::vector<CellId>& nearly_inverted_cells() const { return nearly_inverted_; }
 
  private:
@@ -318,7 +323,7 @@ class StepAttempt {
 };
 
 /// By the setup's integrator, or by implicit Euler where that would create energy. `nearly_inverted`: if the first solve
-/// found no step, the curved cells that may be why.
+/// found no step, cells whose curved edges may be why.
 template <int Dim>
 StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& before, const VectorX& x_start,
                              State<Dim>& after, bool damped, State<Dim>* start, std::vector<CellId>& nearly_inverted) {
@@ -362,7 +367,7 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     renumbering = straighten_and_project<Dim>(tools, nearly_inverted, least_volume, before, straightened, x, effort);
     clock.tell(effort);
     result.report.add_effort(effort);
-    if (!renumbering) break;
+    if (!renumbering) continue;  // nothing could become straight: the next retry asks for less
     tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", result.report.step,
                                      before.space.num_curved() - straightened.space.num_curved(), result.reason));
     effort = result.report;

@@ -118,8 +118,8 @@ CURVES = [("cantilever", "cantilever/cantilever.json", []),
           ("masticator 3D to t=1.1", "masticator/3D.json", ["/time/tend=1.1"]),
           ("twisting-beam to t=0.2, tolerance 10", "twisting-beam/twisting-beam.json",
            ["/time/tend=0.2", "/space/remesh/split/acceptance_tolerance=10"]),
-          ("rollers to t=0.1", "rollers/monkey-soft-hard.json", ["/time/tend=0.1"]),
-          ("spikes3d to t=0.3", "spikes3d/drop-ball.json", ["/time/tend=0.3"])]
+          ("rollers to t=0.2", "rollers/monkey-soft-hard.json", ["/time/tend=0.2"]),
+          ("spikes3d to t=0.36", "spikes3d/drop-ball.json", ["/time/tend=0.36"])]
 # Scenes may have swaps and smoothing themselves.
 CURVE_WAYS = [("linear", NO_SWAPS), ("linear, swaps and smoothing", SWAPS), ("curved", ["/space/remesh/curve/enabled=true", *NO_SWAPS]),
               ("curved, swaps and smoothing", ["/space/remesh/curve/enabled=true", *SWAPS])]
