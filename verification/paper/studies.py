@@ -28,14 +28,16 @@ STUDIES = {
     # With one round of friction, as the scene has it, a fixed mesh slides 11 % too far: a remeshed step solves twice. `itr study`
     # lags friction in all runs until it does not change.
     "sliding": ("unit-tests/sliding.json",
-                ["--levels", "3", "--series", "uniform,uniform-p2,itr,smoothing,hp"],
+                ["--levels", "3", "--series", "uniform,uniform-p2,itr,smoothing"],
                 "the whole scene: 21 steps"),
     "masticator-2d": ("masticator/h=0.1.json",
                       ["--set", "/time/tend=3", "--tolerances", "0.8,0.4,0.1,0.025", "--levels", "3", "--frames", "6",
                        "--series", "uniform,uniform-p2,itr,smoothing,hp,hp-smoothing,time"], "to t = 3: later the beam buckles"),
+    # Impacts without curved edges: their reference has quadratic elements, which oscillate in shocks (0.17 % in L2 off
+    # `uniform-1`).
     "ball-wall-2d": ("ball-wall/2D.json",
                      ["--set", "/time/tend=0.0024", "--tolerances", "0.04,0.01,0.0025", "--levels", "2", "--frames", "8",
-                      "--series", "uniform,uniform-p2,itr,smoothing,hp,hp-smoothing,time"], "to t = 2.4 ms: through the impact"),
+                      "--series", "uniform,uniform-p2,itr,smoothing,time"], "to t = 2.4 ms: through the impact"),
     "shake-rod-y": ("shake-rod/shake-rod-y.json",
                     ["--set", "/time/tend=0.5", "--levels", "3", "--frames", "5", "--series", "uniform,uniform-p2,itr,smoothing,hp,time"],
                     "to t = 0.5: one shake; later small differences grow"),
@@ -55,7 +57,7 @@ STUDIES = {
                       "to t = 1.1: the first contact"),
     "ball-wall-3d": ("ball-wall/3D.json",
                      ["--set", "/time/tend=0.00132", "--tolerances", "1e-4,2.5e-5", "--reference-tolerance", "6.25e-6", "--levels", "1", "--frames", "6",
-                      "--series", "uniform,uniform-p2,itr,smoothing,hp", "--time-limit", "900"], "to t = 1.32 ms: into the impact"),
+                      "--series", "uniform,uniform-p2,itr,smoothing", "--time-limit", "900"], "to t = 1.32 ms: into the impact"),
     "spikes3d": ("spikes3d/drop-ball.json",
                  ["--set", "/time/tend=0.35", "--tolerances", "1,0.1", "--levels", "1", "--frames", "5",
                   "--series", "uniform,itr", "--time-limit", "3000"], "to t = 0.35: the ball has reached the spikes"),
@@ -121,8 +123,8 @@ def error(value, measure):
 
 def refused(content):
     """Why a study's reference is none; empty where it is one. Studies from before they judged it themselves have no word of it."""
-    if content.get("refused"):
-        return content["refused"]
+    if "refused" in content:
+        return content["refused"] or ""
     vertices = {run["run"]: run.get("vertices") for run in content["runs"]}
     levels = [name for name in vertices if name.startswith("uniform-") and name[8:].isdigit() and vertices[name]]
     finest = max(levels, key=lambda name: int(name[8:]), default=None)
