@@ -106,13 +106,13 @@ def misses(row, bar):
 
 
 def table(rows):
-    lines = ["| scene | steps | iterations | worst step | steps over 100 | factorisations | indefinite | energy, last step [J] |",
-             "|---|---|---|---|---|---|---|---|"]
+    lines = ["| scene | steps | iterations | worst step | steps over 100 | factorisations | indefinite | energy, last step [J] "
+             "| processor s |", "|" + "---|" * 9]
     for row in rows:
         end = "" if row["ended"] else ", stopped"
         end += "" if row["certified"] else ", NOT CERTIFIED"
         lines.append(f"| {row['case']} | {row['steps']}{end} | {row['iterations']} | {row['worst']} | {row['over_100']} "
-                     f"| {row['factorizations']} | {row['indefinite']} | {row['energy']:.6g} |")
+                     f"| {row['factorizations']} | {row['indefinite']} | {row['energy']:.6g} | {row['processor_seconds']:.1f} |")
     return "\n".join(lines)
 
 
