@@ -298,8 +298,8 @@ TYPED_TEST(CurvedContact, WhatTheGateLetsPassIntersectsNothing) {
   EXPECT_GT(refused, 50);
 }
 
-/// What moves outside of the box that a prediction says to have read does not change it by a bit: else results would depend
-/// on how many threads look at edges beside edits that move the surface.
+/// A prediction reports the box of the surface that it has read. Vertices that move outside of this box do not change it by
+/// a bit: else results would depend on how many threads look at edges beside edits that move the surface.
 TYPED_TEST(CurvedContact, PredictionsSayWhatTheyReadOfTheSurface) {
   constexpr int Dim = TypeParam::value;
   int compared = 0, read = 0;

@@ -646,7 +646,7 @@ TYPED_TEST(Curved, NoSplitGainsMoreThanIsAvailable) {
   EXPECT_GT(compared, 50);
 }
 
-/// What is available is the same on a mesh whose edges are curved and have their nodes at the middle.
+/// The available energy is the same on a mesh whose edges are curved and have their nodes at the middle.
 TYPED_TEST(Curved, AvailableEnergyIsOfTheFunctions) {
   constexpr int Dim = TypeParam::value;
   for (unsigned seed = 0; seed < 20; ++seed) {

@@ -104,12 +104,12 @@ using BlockReceiver = std::function<void(std::span<const int> vertices, const do
 
 /// Some of the nodes of a curved element, a bit each.
 using NodeSet = std::uint16_t;
-/// Those that it has, whose edges are curved.
+/// The nodes that an element with these curved edges has: its corners, and one on each of these edges.
 template <int Dim>
 NodeSet all_nodes(CurvedEdges curved) {
   return static_cast<NodeSet>(((1 << (Dim + 1)) - 1) | curved << (Dim + 1));
 }
-/// Calls f(k) for each of them.
+/// Calls f(k) for each node k of the set.
 template <int Dim, typename F>
 void for_each_node(NodeSet nodes, const F& f) {
   for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
@@ -193,7 +193,7 @@ class HessianSink {
   static constexpr std::size_t kElementsPerTask = 64;
 
   bool is_patch() const { return dense_ && !motion_; }
-  /// Those with a component that is an unknown.
+  /// The nodes of an element of which at least one component is an unknown.
   template <int Dim>
   NodeSet free_nodes(const typename CellSet<Dim>::CurvedElement& element) const {
     NodeSet free = 0;

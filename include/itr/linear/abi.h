@@ -21,8 +21,7 @@ extern "C" {
 /* Outcomes, as itr::linear::Outcome. */
 enum { ITR_OK, ITR_NOT_POSITIVE_DEFINITE, ITR_SINGULAR, ITR_NON_FINITE, ITR_OUT_OF_MEMORY, ITR_NOT_CONVERGED, ITR_FAILED };
 
-/* Capability bits. ITR_TELLS_DEFINITENESS: ITR_NOT_POSITIVE_DEFINITE or negative_pivots tells of every matrix that is not.
- */
+/* Capability bits. ITR_TELLS_DEFINITENESS: ITR_NOT_POSITIVE_DEFINITE or negative_pivots tells of every matrix that is not. */
 enum {
   ITR_INDEFINITE = 1,
   ITR_ITERATIVE = 2,

@@ -18,8 +18,8 @@ namespace itr {
 /// costs solves.
 constexpr double kTightResidual = 1e-8;
 
-/// What is added to the diagonal of a Hessian: a number, or a share of each entry. A number that counts for the stiffest
-/// entry stops all others.
+/// A shift of a Hessian's diagonal: a number, or a share of each entry. A number large enough for the stiffest entry stops
+/// the motion of all others.
 struct Shift {
   double value = 0;
   bool is_share = false;

@@ -13,7 +13,8 @@ namespace itr {
 
 namespace {
 
-/// What a curved edge that touches gains beyond its chords, contact does not know of: it is no energy to keep.
+/// The most energy that chords may cost, in tolerances of a split. A curved edge that touches has lower energy than its
+/// chords because contact does not act beyond them.
 constexpr double kMostForChords = 1e6;
 
 template <int Dim>
