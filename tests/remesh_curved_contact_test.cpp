@@ -9,6 +9,7 @@
 
 #include "apply_edit.hpp"
 #include "curved_run.hpp"
+#include "curved_trial.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "itr/simulation/simulation.hpp"
@@ -79,44 +80,19 @@ struct Scene {
   void apply(const Edit<Dim>& edit) { apply_edit(edit, mesh, fields, strata); }
 };
 
-/// The mesh without slots of nodes, fields in the numbering of its space.
 template <int Dim>
-struct Compact {
-  Mesh<Dim> mesh;
-  Space space;
-  Obstacles<Dim> obstacles;
-  std::vector<int> slots;  ///< by node of the space
-
-  explicit Compact(const Scene<Dim>& scene) : mesh(scene.mesh) {
-    const auto nodes = mesh.nodes();
-    const auto map = mesh.compact();
-    std::vector<EdgeKey> curved;
-    for (const auto& [edge, node] : nodes) curved.push_back({map.vertex[edge[0]], map.vertex[edge[1]]});
-    space = Space(curved);
-    slots.resize(num_nodes(mesh, space));
-    for (std::size_t v = 0; v < map.vertex.size(); ++v)
-      if (map.vertex[v] != kNone) slots[map.vertex[v]] = static_cast<int>(v);
-    for (std::size_t i = 0; i < nodes.size(); ++i) slots[mesh.vertex_slots() + i] = nodes[i].second;
-    const auto& from = scene.context.obstacles;
-    obstacles = {.rest = from.rest, .edges = from.edges, .triangles = from.triangles, .motion = {}, .motions = {}};
-  }
-  VectorX field(const VectorX& of_slots, const std::vector<Vec<Dim>>& of_obstacles) const {
-    VectorX all(Dim * static_cast<Eigen::Index>(slots.size() + of_obstacles.size()));
-    for (std::size_t i = 0; i < slots.size(); ++i)
-      all.segment<Dim>(Dim * static_cast<int>(i)) = of_slots.segment<Dim>(Dim * slots[i]);
-    for (std::size_t o = 0; o < of_obstacles.size(); ++o)
-      all.segment<Dim>(Dim * static_cast<int>(slots.size() + o)) = of_obstacles[o];
-    return all;
-  }
-};
+Obstacles<Dim> obstacles_of(const Scene<Dim>& scene) {
+  const auto& from = scene.context.obstacles;
+  return {.rest = from.rest, .edges = from.edges, .triangles = from.triangles, .motion = {}, .motions = {}};
+}
 
 /// All terms on the whole mesh, contact between the chords of the step's own surface.
 template <int Dim>
 double whole_energy(const Scene<Dim>& scene) {
-  const Compact<Dim> compact(scene);
+  const Compact<Dim> compact(scene.mesh);
   const auto& obstacles = scene.context.obstacles;
   const CellSet<Dim> cells = whole_mesh(compact.mesh, obstacles.rest, compact.space);
-  const CollisionSurface surface = collision_surface(compact.mesh, compact.obstacles, compact.space);
+  const CollisionSurface surface = collision_surface(compact.mesh, obstacles_of(scene), compact.space);
   const VectorX x = compact.field(scene.fields.x, obstacles.x);
   const VectorX predictor = compact.field(scene.fields.predictor, obstacles.x);
   const VectorX reference = compact.field(scene.fields.velocity_reference, obstacles.velocity_reference);
@@ -129,10 +105,10 @@ double whole_energy(const Scene<Dim>& scene) {
 /// Whether no chords meet, no obstacle is inside, and no cell is inverted, in a configuration.
 template <int Dim>
 std::string violation(const Scene<Dim>& scene, const VectorX& x, const std::vector<Vec<Dim>>& of_obstacles) {
-  const Compact<Dim> compact(scene);
+  const Compact<Dim> compact(scene.mesh);
   StepSetup<Dim> setup;
   setup.contact.enabled = true;
-  setup.obstacles = compact.obstacles;
+  setup.obstacles = obstacles_of(scene);
   return find_violation(setup, compact.mesh, compact.field(x, of_obstacles), compact.space);
 }
 
@@ -145,16 +121,6 @@ bool is_valid(const Scene<Dim>& scene) {
   return true;
 }
 
-template <int Dim>
-struct View {
-  Gate<Dim> gate;
-  LocalScratch<Dim> scratch;
-  RemeshState<Dim> state;
-  explicit View(const Scene<Dim>& scene)
-      : gate(scene.mesh, scene.fields, scene.context),
-        state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::interpolated} {}
-};
-
 TYPED_TEST(CurvedContact, PatchesSeeWhatTheWholeMeshSees) {
   constexpr int Dim = TypeParam::value;
   int compared = 0, in_contact = 0, moved_nodes = 0;
@@ -166,7 +132,7 @@ TYPED_TEST(CurvedContact, PatchesSeeWhatTheWholeMeshSees) {
     for (int i = 0; i < 6; ++i) {
       SCOPED_TRACE(::testing::Message() << "seed " << seed << ", edit " << i);
       const Edit<Dim> edit = scene.edit(i % 3 > 0);
-      View<Dim> view(scene);
+      View<Dim> view(scene, scene.context, HistoryRule::interpolated);
       if (!view.gate.passes(edit, view.scratch.gate)) continue;
       const double before = whole_energy(scene);
       if (!std::isfinite(before)) break;
@@ -211,7 +177,7 @@ TYPED_TEST(CurvedContact, NothingTouchesInTheRoomThatAReachGivesWayTo) {
     Scene<Dim> scene(seed, 0.4, 0.002);
     if (!is_valid(scene)) continue;
     scene.context.contact.activation_distance *= 0.02 * (1 + seed % 40);
-    View<Dim> view(scene);
+    View<Dim> view(scene, scene.context, HistoryRule::interpolated);
     const SurfaceIndex<Dim>& surface = view.state.surface;
     const double dhat = scene.context.contact.activation_distance;
     for (VertexId v = 0; v < scene.mesh.vertex_slots(); ++v) {
@@ -251,7 +217,7 @@ TYPED_TEST(CurvedContact, NothingTouchesInTheRoomThatAReachGivesWayTo) {
 template <int Dim>
 void scatter_points(Scene<Dim>& scene, int count) {
   auto& obstacles = scene.context.obstacles;
-  const Compact<Dim> compact(scene);
+  const Compact<Dim> compact(scene.mesh);
   const auto now = body_boundary(compact.mesh, compact.field(scene.fields.x, {}), compact.space);
   const auto past = body_boundary(compact.mesh, compact.field(scene.fields.past_positions[0], {}), compact.space);
   const auto is_outside = [](const ClosedSurface<Dim>& boundary, const Vec<Dim>& point) {
@@ -284,7 +250,7 @@ TYPED_TEST(CurvedContact, WhatTheGateLetsPassIntersectsNothing) {
     ASSERT_TRUE(is_valid(scene)) << "seed " << seed;
     for (int i = 0; i < 25; ++i) {
       const Edit<Dim> edit = scene.edit(true);
-      View<Dim> view(scene);
+      View<Dim> view(scene, scene.context, HistoryRule::interpolated);
       if (!view.gate.passes(edit, view.scratch.gate)) {
         ++refused;
         continue;
@@ -349,8 +315,9 @@ TYPED_TEST(CurvedContact, ProjectionsSeeTheChordsOfTheWholeSurface) {
   constexpr int Dim = TypeParam::value;
   for (unsigned seed = 0; seed < 10; ++seed) {
     const Scene<Dim> scene(seed, 0.5, 0.004);
-    const Compact<Dim> compact(scene);
-    const auto& [mesh, space, obstacles, slots] = compact;
+    const Compact<Dim> compact(scene.mesh);
+    const auto& [mesh, space, slots] = compact;
+    const Obstacles<Dim> obstacles = obstacles_of(scene);
     const VectorX x = compact.field(scene.fields.x, scene.context.obstacles.x);
     const TouchedCells touched{.old_cells = {}, .new_cells = {0, 1, 2, 3}};
     const auto patch = make_transfer_patch<Dim>(mesh, space, mesh, space, touched, scene.context.materials, 0);

@@ -187,20 +187,27 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
   return -model.relaxed();
 }
 
+namespace {
+
+/// Whether the nodes of curved edges around an edge feel only terms of constant moduli and density, and no tractions.
 template <int Dim>
-double predict_split_at_curves(const RemeshState<Dim>& state, const EdgeKey& edge) {
-  constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
+bool are_terms_constant(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!is_predictable(context) || context.mass == MassKind::lumped) return kCannotTell;
-  const auto is_hard = [&](CellId c) {
+  if (!is_predictable(context) || context.mass == MassKind::lumped) return false;
+  if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return false;
+  const auto around = mesh.cells_of_edge(edge);
+  return std::none_of(around.begin(), around.end(), [&](CellId c) {
     const Material& material = context.materials.at(mesh.body(c));
     return material.has_varying_moduli() || material.density_at;
-  };
-  const auto around = mesh.cells_of_edge(edge);
-  if (std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
-  if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return kCannotTell;
-  return SplitModel<Dim>(state, edge).gain();
+  });
+}
+
+}  // namespace
+
+template <int Dim>
+double predict_split_at_curves(const RemeshState<Dim>& state, const EdgeKey& edge) {
+  return are_terms_constant(state, edge) ? SplitModel<Dim>(state, edge).gain() : std::numeric_limits<double>::quiet_NaN();
 }
 
 template <int Dim>
@@ -245,16 +252,14 @@ double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge) {
   constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!is_predictable(context) || context.mass == MassKind::lumped) return kCannotTell;
+  if (!are_terms_constant(state, edge)) return kCannotTell;
   if (context.has_inertia && state.history != HistoryRule::function) return kCannotTell;
-  if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return kCannotTell;
   const VertexId node = mesh.node_of(edge[0], edge[1]);
   const auto at = [&](VertexId v) { return state.fields.x.template segment<Dim>(Dim * v); };
   const Vec<Dim> middle = (at(edge[0]) + at(edge[1])) / 2, move = middle - at(node);
   double gain = 0;
   for (const CellId c : mesh.cells_of_edge(edge)) {
     const Material& material = context.materials.at(mesh.body(c));
-    if (material.has_varying_moduli() || material.density_at) return kCannotTell;
     const CurvedCell<Dim> cell = cell_before(mesh, c);
     const auto n = std::find(cell.nodes.begin() + Dim + 1, cell.nodes.end(), node) - cell.nodes.begin();
     const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
