@@ -408,6 +408,49 @@ TEST(Ccd, MissesNothingThatMeetsExactly) {
   }
 }
 
+/// The positions after `times` steps of a pair that goes on towards contact, each along what is free of the motion.
+template <class Ccd>
+std::array<Vec<3>, 4> after_steps_together(std::array<Vec<3>, 4> x, const std::array<Vec<3>, 4>& motion, int times,
+                                           const Ccd& ccd) {
+  for (int i = 0; i < times; ++i) {
+    std::array<Vec<3>, 4> y;
+    for (int k = 0; k < 4; ++k) y[k] = x[k] + motion[k];
+    const double share = ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], CcdOptions{});
+    for (int k = 0; k < 4; ++k) x[k] += share * motion[k];
+  }
+  return x;
+}
+
+/// Each step may take four fifths of the distance: after twenty of them only round-off would be left to decide on the side.
+TEST(Ccd, KeepsTheSideOverHundredsOfStepsTogether) {
+  std::mt19937 random(12);
+  for (int i = 0; i < 200; ++i) {
+    std::array<Vec<3>, 4> face{random_point<3>(random), random_point<3>(random), random_point<3>(random),
+                               random_point<3>(random)};
+    const Vec<3> motion = (face[1] + face[2] + face[3]) / 3 - face[0];
+    const int side = orientation(face[0], face[1], face[2], face[3]);
+    const Vec<3> zero = Vec<3>::Zero();
+    face = after_steps_together(face, {motion, zero, zero, zero}, 300, point_triangle_ccd);
+    EXPECT_EQ(orientation(face[0], face[1], face[2], face[3]), side) << i;
+
+    std::array<Vec<3>, 4> edges{random_point<3>(random), random_point<3>(random), random_point<3>(random),
+                                random_point<3>(random)};
+    const Vec<3> together = (edges[2] + edges[3] - edges[0] - edges[1]) / 2;
+    const int turn = orientation(edges[0], edges[1], edges[2], edges[3]);
+    edges = after_steps_together(edges, {together, together, zero, zero}, 300, edge_edge_ccd);
+    EXPECT_EQ(orientation(edges[0], edges[1], edges[2], edges[3]), turn) << i;
+  }
+}
+
+TEST(Ccd, LetsPairsWithinRoundOffMoveApartOnly) {
+  const Vec<3> a(1, 0, 0), b(0, 1, 0), c(-1, -1, 0), above(0, 0, 5e-15);
+  const auto free = [&](const Vec<3>& to) { return point_triangle_ccd(above, a, b, c, to, a, b, c); };
+  EXPECT_EQ(free({0, 0, 1}), 1);
+  EXPECT_EQ(free({0.1, 0, 5e-15}), 1);
+  EXPECT_EQ(free({0, 0, 4e-15}), 0);
+  EXPECT_EQ(free({0, 0, -1}), 0);
+}
+
 /// What passes by is no collision, however near: only what comes within round-off may be called one.
 TEST(Ccd, LetsPassBy) {
   std::mt19937 random(3);

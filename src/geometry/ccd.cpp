@@ -16,7 +16,7 @@ namespace {
 constexpr double kCloseEnough = 0.1;     ///< of the gap: nearer to it than this, the contact is reached
 constexpr double kSafe = 0.9;            ///< part of what is safe that a step covers
 constexpr int kPassingIterations = 100;  ///< what takes longer to pass by counts as a collision
-constexpr double kLeastPassing = 1e-14;  ///< of the largest coordinate: nearer than this, round-off could decide
+constexpr double kLeastGap = 1e-14;      ///< of the largest coordinate: nearer than this, round-off could decide
 constexpr int kMostHalvings = 6;         ///< of the time left, when pairs are asked whether they stay apart over it
 constexpr double kRoundOff = 1e-15;      ///< of places by the largest coordinate, of rates by the speed
 constexpr double kProductRoundOff = 64 * std::numeric_limits<double>::epsilon();  ///< of areas and volumes
@@ -53,6 +53,11 @@ struct MovingPair {
     Vec<Dim> mean = Vec<Dim>::Zero();
     for (int k = 0; k < pair_size(kind); ++k) mean += motion[k] / pair_size(kind);
     for (int k = 0; k < pair_size(kind); ++k) motion[k] -= mean;
+  }
+  double farthest_start() const {
+    double farthest = 0;
+    for (int k = 0; k < pair_size(kind); ++k) farthest = std::max(farthest, start[k].cwiseAbs().maxCoeff());
+    return farthest;
   }
 };
 
@@ -167,19 +172,30 @@ double advance(const MovingPair<Dim>& pair, const Sizes& sizes, double gap, bool
   return t;
 }
 
+/// Whether primitives that are so near that round-off could decide move apart, or together, along their separation.
+template <int Dim>
+bool keeps_apart(const MovingPair<Dim>& pair, const Sizes& sizes) {
+  const Vec<Dim> direction = pair.separation(pair.start).normalized();
+  const double before = along<Dim>(pair, pair.start, direction, 0, sizes).apart;
+  return before > 0 && along<Dim>(pair, pair.at(1), direction, 0, sizes).apart >= before;
+}
+
 /// What passes by counts as free only where the whole way is: where it is not, it stops where `min_separation_ratio` says.
 template <int Dim>
 double ccd(MovingPair<Dim> pair, const CcdOptions& options) {
   pair.subtract_mean();
   const double start = std::sqrt(pair_distance_squared<Dim>(pair.kind, pair.start.data()));
   if (!(start > 0)) return 0;
-  const double gap = options.min_separation_ratio * start;
-  Sizes sizes{pair.speed(), 0};
-  if (start - gap > sizes.speed || sizes.speed == 0) return 1;
-  for (int k = 0; k < pair_size(pair.kind); ++k)
-    sizes.farthest = std::max(sizes.farthest, sizes.speed + pair.start[k].cwiseAbs().maxCoeff());
+  const double speed = pair.speed();
+  if (speed == 0) return 1;
+  const double farthest = pair.farthest_start();
+  const Sizes sizes{speed, speed + farthest};
+  const double least_gap = kLeastGap * farthest;
+  if (start <= least_gap) return keeps_apart(pair, sizes) ? 1 : 0;
+  const double gap = std::max(options.min_separation_ratio * start, least_gap);
+  if (start - gap > speed) return 1;
   const double t = advance(pair, sizes, gap, true, 0, options.max_iterations);
-  const double passing = std::max(options.passing_ratio * start, kLeastPassing * sizes.farthest);
+  const double passing = std::max(options.passing_ratio * start, kLeastGap * sizes.farthest);
   const bool passes = t < 1 && passing < gap && advance(pair, sizes, passing, false, t, kPassingIterations) == 1;
   return passes ? 1 : t;
 }

@@ -16,7 +16,8 @@ struct CcdOptions {
 
 /// 1 if the point p and the edge a b, moving from *0 to *1, keep a distance of at least `passing_ratio` of their initial
 /// one; else the largest t such that on [0, t] they keep at least `min_separation_ratio` of it. Both conservative estimates;
-/// 0 only if they touch at the start.
+/// 0 only if they touch at the start. No motion brings primitives nearer than 1e-14 of their largest coordinate, where
+/// round-off could decide on which side they are: from such a distance, 0 unless they move apart.
 template <int Dim>
 double point_edge_ccd(const Vec<Dim>& p0, const Vec<Dim>& a0, const Vec<Dim>& b0, const Vec<Dim>& p1, const Vec<Dim>& a1,
                       const Vec<Dim>& b1, const CcdOptions& options = {});
