@@ -65,12 +65,17 @@ class Cholmod {
     matrix_.xtype = CHOLMOD_REAL;
     matrix_.dtype = CHOLMOD_DOUBLE;
     matrix_.sorted = matrix_.packed = 1;
-    if (order_.recall(pattern, hints)) {
+    const bool has_order = order_.recall(pattern, hints);
+    if (!has_order) tried_metis_ = false;
+    const bool is_long = has_order && may_try_metis_ && !tried_metis_ && factorizations_ >= kManyFactorizations;
+    if (has_order && !(is_long && common_.fl > kMetisFromFlopsIfLong * n)) {
       analyze_by(CHOLMOD_GIVEN);
       if (!factor_ || order_.is_good(common_.fl)) return status();
     }
+    factorizations_ = 0;
     analyze_by(ordering_);
-    if (may_try_metis_ && factor_ && common_.fl > kMetisFromFlops * n) {
+    if (may_try_metis_ && factor_ && common_.fl > (is_long ? kMetisFromFlopsIfLong : kMetisFromFlops) * n) {
+      tried_metis_ = true;
       const double flops_by_amd = common_.fl;
       analyze_by(CHOLMOD_METIS);
       if (!factor_ || common_.fl > flops_by_amd) analyze_by(CHOLMOD_AMD);
@@ -81,6 +86,7 @@ class Cholmod {
 
   int factorize(const double* values, size_t count) {
     const itr::backends::OneOpenMpThread one_thread;
+    ++factorizations_;
     if (factor_ && factor_->is_super) {
       if (sources_.empty()) permute_pattern();
       for (size_t k = 0; k < count; ++k) permuted_values_[k] = values[sources_[k]];
@@ -172,9 +178,13 @@ class Cholmod {
   /// Flops of AMD's factorisation an unknown, from which the half of them that METIS saves pays for its 3 to 25 microseconds
   /// an unknown in the few factorisations that its order lasts (verification/scaling, verification/solvers).
   static constexpr double kMetisFromFlops = 1.5e5;
+  /// The same where an order has lasted for so many factorisations that it will last for many more.
+  static constexpr double kMetisFromFlopsIfLong = 2.5e4;
+  static constexpr int kManyFactorizations = 10;
 
   int ordering_ = CHOLMOD_AMD;
-  bool may_try_metis_ = true;
+  bool may_try_metis_ = true, tried_metis_ = false;
+  int factorizations_ = 0;  ///< in the present order
   itr::backends::KeptOrder order_;
   cholmod_common common_{};
   cholmod_sparse matrix_{};
