@@ -142,6 +142,25 @@ TEST(HistoryTransfer, BodyThatRestsFarAwayDoesNotMatter) {
   EXPECT_EQ(scene.history.x[0].tail<4>(), interpolated.x[0].tail<4>());
 }
 
+TEST(HistoryTransfer, IsLeftOutWhereNothingDependsOnThePast) {
+  using Change = void (*)(itr::Setup<2>&);
+  const Change inertia = [](itr::Setup<2>& setup) { setup.time.quasistatic = false; };
+  const Change friction = [](itr::Setup<2>& setup) { setup.contact.friction_coefficient = 0.1; };
+  const Change damping = [](itr::Setup<2>& setup) { setup.damping.push_back({.coefficient = 0.1}); };
+  const Change nothing = [](itr::Setup<2>&) {};
+  for (const Change change : {inertia, friction, damping, nothing}) {
+    Scene scene(1);
+    scene.setup.time.quasistatic = true;
+    change(scene.setup);
+    scene.bend();
+    scene.coarsen(40, [](const EdgeKey&) { return true; });
+    const History interpolated = scene.history;
+    scene.transfer();
+    EXPECT_EQ(scene.history.x[0] == interpolated.x[0], change == nothing);
+    EXPECT_EQ(scene.history.v[0] == interpolated.v[0], change == nothing);
+  }
+}
+
 /// Where bodies rest right at the touched cells, past positions are well where they are: no barrier pushes them apart.
 TEST(HistoryTransfer, RestingContactAtTheTouchedCellsPushesNothing) {
   Scene scene(2);

@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "itr/newton/newton.hpp"
 
@@ -136,11 +137,12 @@ linear::SolveReport SparseSystem::solve_again(ConstVectorView rhs, VectorView so
 }
 
 bool SparseSystem::solve_columns(const MatrixX& B, MatrixX& X) {
-  constexpr double kRough = 1e-4;  // directions are only turned by it
+  // Directions are only turned by it: a factor's solution need not be checked, at a product with the matrix a column.
+  const double asked = solver_.capabilities().iterative ? 1e-4 : std::numeric_limits<double>::infinity();
   if (!has_factor()) return false;
   X.resize(B.rows(), B.cols());
   const auto report = solver_.solve({B.data(), static_cast<std::size_t>(B.size())},
-                                    {X.data(), static_cast<std::size_t>(X.size())}, static_cast<int>(B.cols()), kRough);
+                                    {X.data(), static_cast<std::size_t>(X.size())}, static_cast<int>(B.cols()), asked);
   return report.outcome == linear::Outcome::ok && X.allFinite();
 }
 

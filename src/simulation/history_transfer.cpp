@@ -148,9 +148,17 @@ class HistoryTransfer {
 }  // namespace
 
 template <int Dim>
+bool depends_on_past(const StepSetup<Dim>& setup) {
+  const bool has_inertia = !setup.time.quasistatic && !setup.time.is_static;
+  const bool has_friction = setup.contact.enabled && setup.contact.friction_coefficient > 0;
+  return has_inertia || has_friction || !setup.damping.empty() || !setup.terms.empty();
+}
+
+template <int Dim>
 HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space,
                                        const History& old_history, const Mesh<Dim>& mesh, const Space& space,
                                        const TouchedCells& touched, linear::Solver& solver, History& history) {
+  if (!depends_on_past(setup)) return {};
   HistoryTransfer<Dim> transfer(setup, old_mesh, old_space, mesh, space, touched);
   std::vector<VectorX*> fields;
   const auto add = [&](const std::vector<VectorX>& old_fields, std::vector<VectorX>& new_fields) {
@@ -171,6 +179,7 @@ HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<D
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                                \
+  template bool depends_on_past<Dim>(const StepSetup<Dim>&);                                                                \
   template HistoryTransferReport transfer_history<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&,               \
                                                        const History&, const Mesh<Dim>&, const Space&, const TouchedCells&, \
                                                        linear::Solver&, History&);

@@ -85,7 +85,8 @@ class Solver {
   /// Factorises the matrix with `values` in the order of the analysed pattern.
   virtual Outcome factorize(std::span<const double> values) = 0;
   /// Solves A X = B for `columns` right-hand sides, stored one after another, n numbers each. Refines until the relative
-  /// residual is at most `asked_residual` or no longer falls. The report has the residual that was reached.
+  /// residual is at most `asked_residual` or no longer falls. The report has the residual that was reached, which is not
+  /// computed if infinity is asked.
   virtual SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked_residual) = 0;
   virtual Statistics statistics() const = 0;
   virtual std::string message() const = 0;  ///< details of the last outcome that was not ok

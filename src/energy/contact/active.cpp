@@ -316,7 +316,7 @@ class ActiveSet {
 template <int Dim>
 void ContactEnergy<Dim>::find_active(ConstVectorView x, Workspace& workspace, Active& active) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(*surface_, x, nullptr, dhat_);
+  candidates.update(*surface_, x, dhat_);
   ActiveSet<Dim> set(*surface_, x, dhat_, convergent_, workspace.get<ActiveLists>());
   set.find(candidates, active.stencils);
   active.least_squared = set.least_squared();

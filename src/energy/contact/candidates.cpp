@@ -2,6 +2,7 @@
 #include "candidates.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <tuple>
 
 #include "itr/core/parallel.hpp"
@@ -14,6 +15,10 @@ constexpr std::size_t kBlock = 128;
 constexpr double kWasteful = 4;           ///< boxes this much roomier than a motion needs are made anew
 constexpr std::size_t kFewStrays = 8;     ///< a part of the vertices from which on all pairs are searched for anew
 constexpr std::size_t kFewPairs = 16384;  ///< so many are looked at one by one: cheaper than a tree
+constexpr std::size_t kMostPairs = 1 << 20, kMostPairsAnEdge = 64;  ///< a sum: see most_pairs()
+constexpr std::size_t kMostOfRest = 4;                              ///< times the pairs at rest, where these are many
+/// Room around a motion, as a share of the longest: where steps of a solve lead, and where a solve is expected to go.
+constexpr double kUnforeseen = 0.25, kForeseen = 0.02;
 
 template <int Dim>
 Vec<Dim> at(ConstVectorView x, int v) {
@@ -28,15 +33,25 @@ void get_boxes(const std::vector<std::array<int, N>>& primitives, const std::vec
     for (const int v : primitives[i]) boxes[i].include(vertex_boxes[v]);
 }
 
-/// Appends to `all` what find(i, hits, pairs) for i < n appends to `pairs`, in the order of i. `hits` is scratch.
+/// Appends to `all` what find(i, hits, pairs) for i < n appends to `pairs`, in the order of i. `hits` is scratch. Returns
+/// false, and appends nothing, if these are more than `most`.
 template <typename Find>
-void collect(std::size_t n, const Find& find, std::vector<std::array<int, 2>>& all) {
+bool collect(std::size_t n, std::size_t most, const Find& find, std::vector<std::array<int, 2>>& all) {
   std::vector<std::vector<std::array<int, 2>>> found((n + kBlock - 1) / kBlock);
+  std::atomic<std::size_t> count = 0;
   parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) {
     std::vector<int> hits;
-    for (std::size_t i = begin; i < end; ++i) find(static_cast<int>(i), hits, found[begin / kBlock]);
+    auto& pairs = found[begin / kBlock];
+    for (std::size_t i = begin; i < end && count.load(std::memory_order_relaxed) <= most; ++i) {
+      const std::size_t before = pairs.size();
+      find(static_cast<int>(i), hits, pairs);
+      count.fetch_add(pairs.size() - before, std::memory_order_relaxed);
+    }
   });
+  if (count > most) return false;
+  all.reserve(count);
   for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
+  return true;
 }
 
 /// What overlaps the box, ascending: pairs, and with them the bits of CCD, do not depend on how a tree came about.
@@ -87,10 +102,11 @@ bool are_few_edge_pairs(const CollisionSurface& surface) {
 }
 
 /// (vertex, primitive) for all that overlap, share no vertex, and of which one counts. `tree` is not needed for few pairs.
+/// Returns false if there are more than `most`.
 template <int Dim, std::size_t N>
-void find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::array<int, N>>& primitives,
+bool find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::array<int, N>>& primitives,
                        const std::vector<Box<Dim>>& vertex_boxes, const std::vector<Box<Dim>>& boxes, const Bvh<Dim>& tree,
-                       BoxTable<Dim>& table, std::vector<std::array<int, 2>>& pairs) {
+                       BoxTable<Dim>& table, std::size_t most, std::vector<std::array<int, 2>>& pairs) {
   pairs.clear();
   Box<Dim> counting;  // what does not count only meets what does
   for (std::size_t i = 0; i < primitives.size(); ++i)
@@ -102,7 +118,7 @@ void find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::a
         table.visit_overlaps(vertex_boxes[v], [&](int i) {
           if (matters(surface, v, primitives[i])) pairs.push_back({v, i});
         });
-    return;
+    return true;
   }
   const auto find = [&](int k, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     const int v = surface.vertices[k];
@@ -111,12 +127,12 @@ void find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::a
     for (const int i : hits)
       if (matters(surface, v, primitives[i])) found.push_back({v, i});
   };
-  collect(surface.vertices.size(), find, pairs);
+  return collect(surface.vertices.size(), most, find, pairs);
 }
 
 template <int Dim>
-void find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes, const Bvh<Dim>& tree,
-                     BoxTable<Dim>& table, std::vector<std::array<int, 2>>& pairs) {
+bool find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>>& boxes, const Bvh<Dim>& tree,
+                     BoxTable<Dim>& table, std::size_t most, std::vector<std::array<int, 2>>& pairs) {
   pairs.clear();
   const auto& edges = surface.edges;
   const auto consider = [&](int e, int f, std::vector<std::array<int, 2>>& found) {
@@ -128,14 +144,14 @@ void find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>
     table.reset(boxes);
     for (int e = 0; e < static_cast<int>(edges.size()); ++e)
       if (counts(surface, edges[e])) table.visit_overlaps(boxes[e], [&](int f) { consider(e, f, pairs); });
-    return;
+    return true;
   }
   const auto find = [&](int e, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
     find_overlaps(tree, boxes[e], hits);
     for (const int f : hits) consider(e, f, found);
   };
-  collect(edges.size(), find, pairs);
+  return collect(edges.size(), most, find, pairs);
 }
 
 template <std::size_t N>
@@ -214,21 +230,63 @@ void ContactCandidates<Dim>::build_box(std::size_t i, int v, ConstVectorView x, 
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
-                                    double reach) {
-  const bool is_known = surface_ == &surface && revision_ == surface.revision && boxes_.size() == surface.vertices.size() &&
-                        searched_ == reach;
-  if (!is_known) return search(surface, x, dx, reach, kUnforeseen);
-  const double room = room_for(surface, dx, reach, kUnforeseen);
-  find_strays(surface, x, dx, reach, room);
-  if (strays_.empty()) return;
-  if (!has_trees_ || kFewStrays * strays_.size() > boxes_.size()) return search(surface, x, dx, reach, kUnforeseen);
-  for (const int i : strays_) build_box(i, surface.vertices[i], x, dx, reach, room);
-  replace_pairs_of_strays(surface);
+std::size_t ContactCandidates<Dim>::most_pairs(const CollisionSurface& surface) {
+  return kMostPairs + kMostPairsAnEdge * surface.edges.size();
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& surface) {
+std::size_t ContactCandidates<Dim>::most_now(const CollisionSurface& surface) const {
+  return std::max(most_pairs(surface), kMostOfRest * at_rest_);
+}
+
+template <int Dim>
+double ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach,
+                                      KeptVector& part, double longest) {
+  if (longest == 1 && hold(surface, x, &dx, reach, most_now(surface))) return 1;
+  return search_part(surface, x, dx, reach, part, std::min(longest, 0.5));
+}
+
+template <int Dim>
+void ContactCandidates<Dim>::foresee(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach,
+                                     KeptVector& part) {
+  at_rest_ = 0;
+  if (!search(surface, x, &dx, reach, kForeseen, most_now(surface))) search_part(surface, x, dx, reach, part, 0.5);
+}
+
+/// Finds the pairs of the longest of dx, dx / 2, dx / 4, ..., not longer than this share of it, that has few enough of them;
+/// returns its share. Motions beyond the extent of all bodies need not be tried. Below `reach`, pairs are those of bodies at
+/// rest, of which none can be left out.
+template <int Dim>
+double ContactCandidates<Dim>::search_part(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx,
+                                           double reach, KeptVector& part, double share) {
+  Box<Dim> around;
+  for (const int v : surface.vertices) around.include(at<Dim>(x, v));
+  const double longest = dx.lpNorm<Eigen::Infinity>(), extent = (around.max - around.min).maxCoeff();
+  while (share * longest > extent + reach) share /= 2;
+  for (;; share /= 2) {
+    const ConstVectorView way = part.resize(dx.size()) = share * dx;
+    const std::size_t most = way.lpNorm<Eigen::Infinity>() > reach ? most_now(surface) : kNoLimit;
+    if (search(surface, x, &way, reach, kForeseen, most)) return share;
+  }
+}
+
+template <int Dim>
+bool ContactCandidates<Dim>::hold(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
+                                  double reach, std::size_t most) {
+  const auto search_all = [&] { return search(surface, x, dx, reach, kUnforeseen, most); };
+  const bool is_known = holds_ && surface_ == &surface && revision_ == surface.revision &&
+                        boxes_.size() == surface.vertices.size() && searched_ == reach;
+  if (!is_known) return search_all();
+  const double room = room_for(surface, dx, reach, kUnforeseen);
+  find_strays(surface, x, dx, reach, room);
+  if (strays_.empty()) return true;
+  if (!has_trees_ || kFewStrays * strays_.size() > boxes_.size()) return search_all();
+  for (const int i : strays_) build_box(i, surface.vertices[i], x, dx, reach, room);
+  return replace_pairs_of_strays(surface, most) || search_all();
+}
+
+template <int Dim>
+bool ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& surface, std::size_t most) {
   is_stray_.assign(surface.area.size(), 0);
   for (const int i : strays_) is_stray_[surface.vertices[i]] = 1;
   Pairs found;
@@ -242,7 +300,11 @@ void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& sur
     for (const int hit : hits)
       if (const int t = triangle_of(hit); matters(surface, v, triangles[t])) found.push_back({v, t});
   };
-  for (const int i : strays_) add_overlaps(vertices[i], triangle_tree_, [](int hit) { return hit; });
+  const auto are_too_many = [&] { return found.size() / 2 > most; };  // two strays find each other twice
+  for (const int i : strays_) {
+    add_overlaps(vertices[i], triangle_tree_, [](int hit) { return hit; });
+    if (are_too_many()) return false;
+  }
   std::vector<Box<Dim>> moved_boxes;
   Box<Dim> around;
   for (const int t : moved_triangles) {
@@ -250,9 +312,11 @@ void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& sur
     around.include(triangle_boxes_[t]);
   }
   const Bvh<Dim> moved_tree(moved_boxes);
-  for (const int v : vertices)
+  for (const int v : vertices) {
     if (is_stray_[v] == 0 && reach_[v].overlaps(around))
       add_overlaps(v, moved_tree, [&](int hit) { return moved_triangles[hit]; });
+    if (are_too_many()) return false;
+  }
   replace(
       vertex_triangles_, found,
       [&](const auto& pair) { return is_stray_[pair[0]] != 0 || has_any(triangles[pair[1]], is_stray_); },
@@ -263,6 +327,7 @@ void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& sur
     edge_tree_.query(edge_boxes_[e], hits);
     for (const int f : hits)
       if (matters(surface, edges[e], edges[f])) found.push_back({std::min(e, f), std::max(e, f)});
+    if (are_too_many()) return false;
   }
   replace(
       edge_edges_, found,
@@ -270,12 +335,14 @@ void ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& sur
       [&](const auto& pair) {  // a whole search looks around edges that count
         return counts(surface, edges[pair[0]]) ? pair : std::array{pair[1], pair[0]};
       });
+  return vertex_triangles_.size() <= most && edge_edges_.size() <= most;
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
-                                    double reach, double share) {
+bool ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
+                                    double reach, double share, std::size_t most) {
   const bool keep_trees = surface_ == &surface && revision_ == surface.revision;
+  if (!keep_trees) at_rest_ = 0;
   const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
   const bool few_triangles = are_few(surface, surface.triangles);
   has_trees_ = Dim == 3 && !few_edges && !few_triangles;
@@ -303,11 +370,15 @@ void ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVector
       update_tree(triangle_boxes_, few_triangles, triangle_tree_);
   });
   if constexpr (Dim == 2) {
-    find_vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes_, edge_tree_, table_, vertex_edges_);
+    holds_ = find_vertex_pairs<Dim>(surface, surface.edges, reach_, edge_boxes_, edge_tree_, table_, most, vertex_edges_);
   } else {
-    find_vertex_pairs<Dim>(surface, surface.triangles, reach_, triangle_boxes_, triangle_tree_, table_, vertex_triangles_);
-    find_edge_pairs<Dim>(surface, edge_boxes_, edge_tree_, table_, edge_edges_);
+    holds_ = find_vertex_pairs<Dim>(surface, surface.triangles, reach_, triangle_boxes_, triangle_tree_, table_, most,
+                                    vertex_triangles_) &&
+             find_edge_pairs<Dim>(surface, edge_boxes_, edge_tree_, table_, most, edge_edges_);
   }
+  if (most == kNoLimit)
+    for (const auto& [kind, list] : all()) at_rest_ = std::max(at_rest_, list->size());
+  return holds_;
 }
 
 template class ContactCandidates<2>;

@@ -5,10 +5,12 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "geometry/bvh.hpp"
+#include "itr/core/kept_vector.hpp"
 #include "itr/energy/contact/surface.hpp"
 #include "itr/geometry/distance.hpp"
 
@@ -59,14 +61,19 @@ template <int Dim>
 class ContactCandidates {
  public:
   using Pairs = std::vector<std::array<int, 2>>;
-  /// Room around a motion, as a share of the longest: where steps of a solve lead, and where a solve is expected to go.
-  static constexpr double kUnforeseen = 0.25, kForeseen = 0.02;
-
-  /// Makes the pairs hold for x and, where it is given, for the motion by dx. `reach`: pairs that come nearer than this
-  /// count.
-  void update(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach);
-  /// That, whatever was found before, with this share of the motion for room. Search trees of the surface are used again.
-  void search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double share);
+  /// Makes the pairs hold for x. `reach`: pairs that come nearer than this count.
+  void update(const CollisionSurface& surface, ConstVectorView x, double reach) {
+    hold(surface, x, nullptr, reach, kNoLimit);
+  }
+  /// Makes the pairs hold for the motion of x by dx. Where these would be more than most_pairs(), `part` gets the longest of
+  /// dx / 2, dx / 4, ... that takes no more, or that is shorter than `reach`. Returns the share of dx that the pairs hold
+  /// for, at most `longest`.
+  double update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part,
+                double longest = 1);
+  /// That, whatever was found before, with less room around the motion. Search trees of the surface are used again.
+  void foresee(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part);
+  /// Of each kind, for a motion: far motions sweep boxes in which each primitive meets all others.
+  static std::size_t most_pairs(const CollisionSurface& surface);
 
   /// The lists that there are in this dimension, each with the kind of its pairs.
   std::array<std::pair<PairKind, const Pairs*>, Dim - 1> all() const {
@@ -80,15 +87,29 @@ class ContactCandidates {
   const Pairs& edge_edges() const { return edge_edges_; }              ///< smaller index first where both count; 3D
 
  private:
+  static constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
+  /// Makes the pairs hold for x and, where it is given, for the motion by dx. Returns false, and holds nothing, if more than
+  /// `most` pairs of a kind do.
+  bool hold(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, std::size_t most);
+  /// That by a search, whatever was found before, with this share of the motion for room.
+  bool search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double share,
+              std::size_t most);
+  /// most_pairs(), or more where bodies at rest have more than a quarter of it.
+  std::size_t most_now(const CollisionSurface& surface) const;
+  double search_part(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part,
+                     double share);
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
   static double room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach, double share);
   double room_of(int v, const ConstVectorView* dx, double reach, double room) const;
   /// Of boxes that are left, or much too roomy.
   void find_strays(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double room);
   void build_box(std::size_t i, int v, ConstVectorView x, const ConstVectorView* dx, double reach, double room);
-  /// The pairs of a whole search with the present boxes, where all but those of the strays are as they were.
-  void replace_pairs_of_strays(const CollisionSurface& surface);
+  /// The pairs of a whole search with the present boxes, where all but those of the strays are as they were. Returns false
+  /// if more than `most` pairs of a kind overlap.
+  bool replace_pairs_of_strays(const CollisionSurface& surface, std::size_t most);
 
+  bool holds_ = false;       ///< false where pairs were too many
+  std::size_t at_rest_ = 0;  ///< the most pairs of a kind that a search without a limit has found since foresee()
   const CollisionSurface* surface_ = nullptr;
   int revision_ = 0;             ///< of the surface
   double searched_ = 0;          ///< reach of the last search [m]

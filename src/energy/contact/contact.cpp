@@ -166,6 +166,36 @@ struct Shares {
   std::vector<double> of_vertex;
 };
 
+/// Memory of a way whose pairs are too many at a time.
+struct PartOfWay {
+  KeptVector way, from;
+};
+
+constexpr int kMostParts = 16;
+
+/// Walks from x along dx, part by part where its pairs are too many at a time, up to the first part that is not free.
+/// `free_share_of(x, way)` says how much of a part is. Returns the share of dx that is free, at most that of kMostParts
+/// parts.
+template <int Dim, typename FreeShare>
+double walk(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, Workspace& workspace,
+            const FreeShare& free_share_of) {
+  auto& candidates = workspace.get<ContactCandidates<Dim>>();
+  auto& [part, from] = workspace.get<PartOfWay>();
+  double length = candidates.update(surface, x, dx, reach, part);
+  if (length == 1) return free_share_of(x, dx);
+  double done = 0;
+  from = x;
+  for (int k = 0; k < kMostParts; ++k) {
+    const double share = free_share_of(from.view(), part.view());
+    if (share < 1) return done + share * length;
+    done += length;
+    if (done >= 1) break;
+    from = x + done * dx;
+    length = candidates.update(surface, from.view(), dx, reach, part, std::min(length, 1 - done));
+  }
+  return done;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -358,34 +388,38 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
 
 template <int Dim>
 double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(*surface_, x, &dx, dhat_);
-  double least = 1;
-  for (const auto& [kind, list] : candidates.all()) {
-    // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
-    // the number of threads.
-    const auto& pairs = *list;
-    const auto step_of = [&, kind = kind](std::size_t begin, std::size_t end) {
-      double step = 1;
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto vertices = vertices_of(*surface_, kind, pairs[i]);
-        const auto p = gather<Dim>(vertices, pair_size(kind), x);
-        auto q = gather<Dim>(vertices, pair_size(kind), dx);
-        for (int k = 0; k < pair_size(kind); ++k) q[k] = p[k] + step * q[k];
-        step *= free_share<Dim>(kind, p, q, {.passing_ratio = passing_ratio_});
-      }
-      return step;
-    };
-    least = std::min(least, parallel_min(pairs.size(), kBatch, step_of));
-  }
-  return least;
+  return walk<Dim>(*surface_, x, dx, dhat_, workspace, [&](ConstVectorView from, ConstVectorView way) {
+    double least = 1;
+    for (const auto& [kind, list] : workspace.get<ContactCandidates<Dim>>().all()) {
+      // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
+      // the number of threads.
+      const auto& pairs = *list;
+      const auto step_of = [&, kind = kind](std::size_t begin, std::size_t end) {
+        double step = 1;
+        for (std::size_t i = begin; i < end; ++i) {
+          const auto vertices = vertices_of(*surface_, kind, pairs[i]);
+          const auto p = gather<Dim>(vertices, pair_size(kind), from);
+          auto q = gather<Dim>(vertices, pair_size(kind), way);
+          for (int k = 0; k < pair_size(kind); ++k) q[k] = p[k] + step * q[k];
+          step *= free_share<Dim>(kind, p, q, {.passing_ratio = passing_ratio_});
+        }
+        return step;
+      };
+      least = std::min(least, parallel_min(pairs.size(), kBatch, step_of));
+    }
+    return least;
+  });
 }
 
 template <int Dim>
 bool ContactEnergy<Dim>::get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways,
                                          Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(*surface_, x, &dx, dhat_);
+  auto& part = workspace.get<PartOfWay>().way;
+  if (candidates.update(*surface_, x, dx, dhat_, part) == 1)
+    ways = dx;
+  else
+    ways = part.view();
   auto& share = workspace.get<Shares>().of_vertex;
   share.assign(surface_->area.size(), 1);
   for (const auto& [kind, list] : candidates.all()) {
@@ -393,7 +427,7 @@ bool ContactEnergy<Dim>::get_single_ways(ConstVectorView x, ConstVectorView dx, 
     const auto shares_of = [&, kind = kind](std::size_t i) {
       const auto vertices = vertices_of(*surface_, kind, pairs[i]);
       const int size = pair_size(kind);
-      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, dx), dhat_);
+      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, ways), dhat_);
     };
     const auto note = [&, kind = kind](std::size_t i, const std::array<double, 4>& shares) {
       const auto vertices = vertices_of(*surface_, kind, pairs[i]);
@@ -401,7 +435,6 @@ bool ContactEnergy<Dim>::get_single_ways(ConstVectorView x, ConstVectorView dx, 
     };
     parallel_then_ordered<std::array<double, 4>>(pairs.size(), kBlock, shares_of, note);
   }
-  ways = dx;
   for (const int v : surface_->vertices) ways.segment<Dim>(Dim * v) *= share[v];
   return true;
 }
@@ -410,7 +443,7 @@ template <int Dim>
 bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
                                        Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(*surface_, x, &dx, dhat_);
+  share = std::min(share, candidates.update(*surface_, x, dx, dhat_, workspace.get<PartOfWay>().way));
   struct Way {
     std::array<int, 4> vertices;
     Positions<Dim> from, way;
@@ -448,25 +481,24 @@ bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, do
 
 template <int Dim>
 void ContactEnergy<Dim>::foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const {
-  using Candidates = ContactCandidates<Dim>;
-  const ConstVectorView motion = dx;
-  workspace.get<Candidates>().search(*surface_, x, &motion, dhat_, Candidates::kForeseen);
+  workspace.get<ContactCandidates<Dim>>().foresee(*surface_, x, dx, dhat_, workspace.get<PartOfWay>().way);
 }
 
 template <int Dim>
 StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  const VectorX end = x + dx;
-  auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  candidates.update(*surface_, x, &dx, dhat_);
   constexpr CcdOptions kNear{.passing_ratio = 1};  // what comes near is told too: it is what holds back
   StepLimit least;
-  for (const auto& [kind, pairs] : candidates.all())
-    for (const auto& pair : *pairs) {
-      const auto vertices = vertices_of(*surface_, kind, pair);
-      const int size = pair_size(kind);
-      const double t = free_share<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, end), kNear);
-      if (t < least.step) least = {t, name_of(kind), {vertices.begin(), vertices.begin() + size}};
-    }
+  least.step = walk<Dim>(*surface_, x, dx, dhat_, workspace, [&](ConstVectorView from, ConstVectorView way) {
+    const VectorX end = from + way;
+    for (const auto& [kind, pairs] : workspace.get<ContactCandidates<Dim>>().all())
+      for (const auto& pair : *pairs) {
+        const auto vertices = vertices_of(*surface_, kind, pair);
+        const int size = pair_size(kind);
+        const double t = free_share<Dim>(kind, gather<Dim>(vertices, size, from), gather<Dim>(vertices, size, end), kNear);
+        if (t < least.step) least = {t, name_of(kind), {vertices.begin(), vertices.begin() + size}};
+      }
+    return least.step;
+  });
   return least;
 }
 
