@@ -191,7 +191,7 @@ template <int Dim>
 bool are_terms_constant(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!is_predictable(context) || context.mass == MassKind::lumped) return false;
+  if (!is_predictable(context)) return false;
   if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return false;
   const auto around = mesh.cells_of_edge(edge);
   return std::none_of(around.begin(), around.end(), [&](CellId c) {
@@ -215,7 +215,7 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   if (!is_predictable(context)) return kCannotTell;
   const auto around = mesh.cells_of_edge(edge);
   const auto is_hard = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
-  if (context.mass == MassKind::lumped || std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
+  if (std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
   QuadraticModel<Dim> model(context);
   for (const CellId c : around) {
     if (mesh.is_curved(c)) {
