@@ -208,6 +208,25 @@ TEST(CurvedHost, RemeshingMayBeSwitchedOnLater) {
   EXPECT_THROW(simulation.advance(), InputError);
 }
 
+TEST(CurvedHost, LumpedMassIsRefusedWhereRemeshingFindsCurvedEdges) {
+  auto curved = simulate(curving_block<2>());
+  while (curved.state().space.is_linear()) ASSERT_TRUE(curved.advance().ok);
+  for (const bool was_enabled : {false, true}) {
+    auto setup = curving_block<2>();
+    setup.remesh.curve.enabled = false;
+    setup.remesh.enabled = was_enabled;
+    setup.lump_mass = true;
+    auto simulation = simulate(setup);
+    ASSERT_TRUE(simulation.advance().ok);
+    simulation.conditions().remesh.enabled = false;
+    simulation.restore(State<2>(curved.state()));
+    EXPECT_TRUE(simulation.advance().ok);
+    simulation.conditions().remesh.enabled = true;
+    EXPECT_THROW(simulation.advance(), InputError);
+    EXPECT_THROW(simulation.adapt(setup.time.dt), InputError);
+  }
+}
+
 TEST(CurvedHost, ASizingFieldMeasuresStraightFacetsAlone) {
   auto setup = pressed_block();
   setup.remesh.sizing_field.enabled = true;

@@ -1,39 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "itr/fem/cell_set.hpp"
 
-#include <algorithm>
-
 namespace itr {
-
-namespace {
-
-/// Nodes of a simplex with these vertices, and which of its edges are curved.
-template <int Dim>
-CurvedEdges find_nodes(const std::array<int, Dim + 1>& vertices, const Space& space, int num_vertices,
-                       std::array<int, kQuadraticNodes<Dim>>& nodes) {
-  CurvedEdges curved = 0;
-  std::copy(vertices.begin(), vertices.end(), nodes.begin());
-  for_each_edge<Dim>([&](int edge, int i, int j) {
-    const int at = space.find(vertices[i], vertices[j]);
-    if (at != kNone) curved = static_cast<CurvedEdges>(curved | 1 << edge);
-    nodes[Dim + 1 + edge] = at == kNone ? vertices[i] : num_vertices + at;
-  });
-  return curved;
-}
-
-}  // namespace
 
 template <int Dim>
 CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra, const Space& space) {
   CellSet<Dim> set;
-  const int vertices = mesh.vertex_slots();
+  const auto node_of = [&](VertexId a, VertexId b) { return space.node_of(a, b, mesh.vertex_slots()); };
   set.rest = node_rest_positions(mesh, space);
   set.rest.insert(set.rest.end(), extra.begin(), extra.end());
   set.num_vertices = static_cast<int>(set.rest.size());
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
     typename CellSet<Dim>::CurvedElement element{{}, 0, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), c};
-    if (!space.is_linear()) element.curved = find_nodes<Dim>(mesh.cell(c), space, vertices, element.nodes);
+    if (!space.is_linear()) element.curved = find_nodes<Dim>(mesh.cell(c), node_of, element.nodes);
     if (element.curved)
       set.curved_elements.push_back(element);
     else
@@ -42,7 +22,7 @@ CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extr
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
     typename CellSet<Dim>::CurvedFacet facet{{}, 0, mesh.facet_tag(f)};
-    if (!space.is_linear()) facet.curved = find_nodes<Dim - 1>(mesh.facet(f), space, vertices, facet.nodes);
+    if (!space.is_linear()) facet.curved = find_nodes<Dim - 1>(mesh.facet(f), node_of, facet.nodes);
     if (facet.curved)
       set.curved_facets.push_back(facet);
     else

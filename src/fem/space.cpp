@@ -8,7 +8,7 @@
 namespace itr {
 
 int Space::find(VertexId a, VertexId b) const {
-  const EdgeKey edge{std::min(a, b), std::max(a, b)};
+  const EdgeKey edge = edge_key(a, b);
   const auto at = std::lower_bound(curved_.begin(), curved_.end(), edge);
   return at != curved_.end() && *at == edge ? static_cast<int>(at - curved_.begin()) : kNone;
 }
@@ -64,10 +64,7 @@ std::vector<Vec<Dim>> node_rest_positions(const Mesh<Dim>& mesh, const Space& sp
 template <int Dim>
 void add_chord_facets(const typename MeshTypes<Dim>::Facet& facet, const Space& space, int num_vertices,
                       std::vector<typename MeshTypes<Dim>::Facet>& chords) {
-  const auto node_of = [&](VertexId a, VertexId b) {
-    const int curved = space.find(a, b);
-    return curved == kNone ? kNone : num_vertices + curved;
-  };
+  const auto node_of = [&](VertexId a, VertexId b) { return space.node_of(a, b, num_vertices); };
   for_each_chord<Dim>(facet, node_of, [&](const auto& ids) { chords.push_back(ids); });
 }
 

@@ -280,7 +280,7 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
   }
   for (const auto& node : edit.inserted_nodes) {
     const EdgeKey ends = resolve(node.edge);
-    add_node({std::min(ends[0], ends[1]), std::max(ends[0], ends[1])});
+    add_node(edge_key(ends[0], ends[1]));
   }
   return created;
 }

@@ -21,7 +21,7 @@ class Midpoints {
     }
   }
 
-  VertexId operator()(VertexId a, VertexId b) const { return ids_.at({std::min(a, b), std::max(a, b)}); }
+  VertexId operator()(VertexId a, VertexId b) const { return ids_.at(edge_key(a, b)); }
 
  private:
   std::map<EdgeKey, VertexId> ids_;

@@ -350,7 +350,7 @@ std::vector<VertexId> Strata<Dim>::feature_neighbours(const Mesh<Dim>& mesh, Ver
       for (const int w : sheet.vertices)
         if (w != v && std::find(around.begin(), around.end(), w) == around.end()) around.push_back(w);
     for (const int w : around)
-      if (edge(mesh, {std::min(v, w), std::max(v, w)}) >= Stratum::feature) ends.push_back(w);
+      if (edge(mesh, edge_key(v, w)) >= Stratum::feature) ends.push_back(w);
   }
   return ends;
 }

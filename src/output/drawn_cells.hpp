@@ -49,9 +49,8 @@ DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh, const Space& space) {
     const auto& cell = mesh.cell(c);
     drawn.cells.insert(drawn.cells.end(), cell.begin(), cell.end());
     for (const auto& [i, j] : drawn_edges<Dim>()) {
-      const int curved = space.find(cell[i], cell[j]);
-      drawn.cells.push_back(curved != kNone ? mesh.vertex_slots() + curved
-                                            : num_nodes(mesh, space) + straight.find(cell[i], cell[j]));
+      const int curved = space.node_of(cell[i], cell[j], mesh.vertex_slots());
+      drawn.cells.push_back(curved != kNone ? curved : straight.node_of(cell[i], cell[j], num_nodes(mesh, space)));
     }
   }
   return drawn;

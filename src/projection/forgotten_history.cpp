@@ -23,22 +23,16 @@ VectorX lumped_masses(const TransferMesh<Dim>& mesh) {
   VectorX masses = VectorX::Zero(static_cast<Eigen::Index>(mesh.rest.size()));
   for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
     const double mass = mesh.density[c] * simplex_of(mesh, c).volume;
-    const CurvedEdges curved = mesh.curved_edges(c);
-    if (!curved)
-      for (const int v : mesh.cells[c]) masses[v] += mass / (Dim + 1);
-    else  // 0 at straight edges
-      for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-        masses[mesh.nodes[c][k]] += mass * constant_quadratic_mass<Dim>(MassKind::lumped, curved)(k, k);
+    for (const int v : mesh.cells[c]) masses[v] += mass / (Dim + 1);
   }
   return masses;
 }
 
-/// Where a point is in a mesh that covers it: nodes and weights.
+/// Where a point is in a mesh that covers it: vertices and weights.
 template <int Dim>
 struct Place {
-  static constexpr int kNodes = kQuadraticNodes<Dim>;
-  std::array<int, kNodes> vertices{};
-  Vec<kNodes> weights = Vec<kNodes>::Unit(0);
+  std::array<int, Dim + 1> vertices{};
+  Vec<Dim + 1> weights = Vec<Dim + 1>::Unit(0);
 
   Place(const TransferMesh<Dim>& mesh, const Vec<Dim>& X) {
     for (std::size_t v = 0; v < mesh.rest.size(); ++v)
@@ -51,21 +45,13 @@ struct Place {
       const Vec<Dim + 1> here = simplex_of(mesh, c).barycentric(X);
       if (here.minCoeff() <= deepest) continue;
       deepest = here.minCoeff();
-      weights.setZero();
-      if (const CurvedEdges curved = mesh.curved_edges(c)) {
-        vertices = mesh.nodes[c];
-        std::array<double, Dim + 1> l;
-        for (int k = 0; k <= Dim; ++k) l[k] = here[k];
-        weights = quadratic_shapes<Dim>(curved, l);
-      } else {
-        std::copy(mesh.cells[c].begin(), mesh.cells[c].end(), vertices.begin());
-        weights.template head<Dim + 1>() = here;
-      }
+      vertices = mesh.cells[c];
+      weights = here;
     }
   }
   Vec<Dim> value(const MatrixX& rows) const {
     Vec<Dim> sum = Vec<Dim>::Zero();
-    for (int k = 0; k < kNodes; ++k) sum += weights[k] * rows.row(vertices[k]).transpose();
+    for (int k = 0; k <= Dim; ++k) sum += weights[k] * rows.row(vertices[k]).transpose();
     return sum;
   }
 };
@@ -81,7 +67,7 @@ ForgottenHistory forgotten_by_vertices(const TransferMesh<Dim>& old_patch, const
     const Place<Dim> place(new_patch, old_patch.rest[j]);
     const Vec<Dim> gap = place.value(new_predictor) - old_predictor.row(j).transpose();
     squares += old_mass[j] * (gap.squaredNorm() + place.value(way).squaredNorm());
-    for (int k = 0; k < Place<Dim>::kNodes; ++k)
+    for (int k = 0; k <= Dim; ++k)
       forgotten.residual.row(place.vertices[k]) += place.weights[k] * old_mass[j] * gap.transpose();
   }
   forgotten.loss = squares / 2;

@@ -17,9 +17,10 @@ struct ForgottenHistory {
 
 /// `old_patch` and `new_patch` are the cells that the edit removes and inserts; `old_predictor`, `new_predictor` and the
 /// positions `new_x` from which the trial starts have a row for each of their vertices. With consistent mass norms are
-/// integrals, and an edit after which the new mesh contains the old one forgets nothing. With lumped mass norms are sums
-/// over the vertices of the old mesh, by their masses there: for both sides of the comparison, so that no edit, a split
-/// neither, gains by another rule of integration. What differs in x alone is taken at `new_x`.
+/// integrals, and an edit after which the new mesh contains the old one forgets nothing. With lumped mass, of which
+/// simulations refuse to remesh curved edges, norms are sums over the vertices of the old mesh, by their masses there: for
+/// both sides of the comparison, so that no edit, a split neither, gains by another rule of integration. What differs in x
+/// alone is taken at `new_x`.
 template <int Dim>
 ForgottenHistory forgotten_history(MassKind kind, const TransferMesh<Dim>& old_patch, const TransferMesh<Dim>& new_patch,
                                    const MatrixX& old_predictor, const MatrixX& new_predictor, const MatrixX& new_x);

@@ -37,12 +37,6 @@ double cell_mass(const TransferMesh<Dim>& mesh, int cell) {
   return mesh.density[cell] * simplex_volume<Dim>(corners<Dim>(mesh, cell));
 }
 
-/// Whether a cell with these curved edges has its i-th node.
-template <int Dim>
-bool is_node(CurvedEdges curved, int i) {
-  return i <= Dim || curved >> (i - Dim - 1) & 1;
-}
-
 /// Shape functions of all nodes of a cell at barycentric coordinates.
 template <int Dim>
 Vec<kQuadraticNodes<Dim>> shapes_at(CurvedEdges curved, const Vec<Dim + 1>& weights) {
@@ -58,7 +52,7 @@ Vec<kQuadraticNodes<Dim>> values_in(const TransferMesh<Dim>& mesh, int cell, con
   Vec<kQuadraticNodes<Dim>> values = Vec<kQuadraticNodes<Dim>>::Zero();
   for (int i = 0; i <= Dim; ++i) values[i] = u(mesh.cells[cell][i], column);
   for (int i = Dim + 1; i < kQuadraticNodes<Dim>; ++i)
-    if (is_node<Dim>(curved, i)) values[i] = u(mesh.nodes[cell][i], column);
+    if (has_node<Dim>(curved, i)) values[i] = u(mesh.nodes[cell][i], column);
   return values;
 }
 
@@ -82,7 +76,7 @@ void add_curved_difference(const TransferMesh<Dim>& old_mesh, int old_cell, cons
         const double gap = old_shapes.dot(values_in<Dim>(old_mesh, old_cell, u_old, column)) -
                            new_shapes.dot(values_in<Dim>(new_mesh, new_cell, u_bar, column));
         for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
-          if (is_node<Dim>(new_curved, i))
+          if (has_node<Dim>(new_curved, i))
             difference.residual(i <= Dim ? new_mesh.cells[new_cell][i] : new_mesh.nodes[new_cell][i], column) +=
                 weight * new_shapes[i] * gap;
         difference.squares[column] += weight * gap * gap;
@@ -107,10 +101,10 @@ class ConstrainedMass {
         const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, curved);
         const auto& diagonal = constant_quadratic_mass<Dim>(MassKind::lumped, curved);
         for (int i = 0; i < kQuadraticNodes<Dim>; ++i) {
-          if (!is_node<Dim>(curved, i)) continue;
+          if (!has_node<Dim>(curved, i)) continue;
           lumped[mesh.nodes[c][i]] += mass * diagonal(i, i);
           for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
-            if (is_node<Dim>(curved, j)) entries.emplace_back(mesh.nodes[c][i], mesh.nodes[c][j], mass * matrix(i, j));
+            if (has_node<Dim>(curved, j)) entries.emplace_back(mesh.nodes[c][i], mesh.nodes[c][j], mass * matrix(i, j));
         }
         continue;
       }
@@ -228,7 +222,7 @@ std::vector<int> parts_of(const TransferMesh<Dim>& mesh) {
   std::vector<int> part = connected_parts<Dim + 1>(mesh.rest.size(), mesh.cells);
   for (std::size_t c = 0; c < mesh.curved.size(); ++c)
     for (int i = Dim + 1; i < kQuadraticNodes<Dim>; ++i)
-      if (is_node<Dim>(mesh.curved[c], i)) part[mesh.nodes[c][i]] = part[mesh.cells[c][0]];
+      if (has_node<Dim>(mesh.curved[c], i)) part[mesh.nodes[c][i]] = part[mesh.cells[c][0]];
   std::vector<int> used(part);  // alone, each node was a part
   std::sort(used.begin(), used.end());
   used.erase(std::unique(used.begin(), used.end()), used.end());
@@ -337,7 +331,7 @@ VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d) {
     const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, curved);
     for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
       for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
-        if (is_node<Dim>(curved, i) && is_node<Dim>(curved, j))
+        if (has_node<Dim>(curved, i) && has_node<Dim>(curved, j))
           product.row(mesh.nodes[c][i]) += mass * matrix(i, j) * d.row(mesh.nodes[c][j]);
   }
   return d.cwiseProduct(product).colwise().sum().transpose();

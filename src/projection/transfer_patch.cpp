@@ -20,36 +20,25 @@ class Numbering {
       : mesh_(mesh), space_(space), materials_(materials), out_(out) {}
 
   void add(CellId c) {
-    std::array<int, Dim + 1> cell;
-    for (int k = 0; k <= Dim; ++k) cell[k] = local(mesh_.cell(c)[k]);
-    out_.cells.push_back(cell);
-    out_.density.push_back(materials_.at(mesh_.body(c)).density);
-    if (!space_.is_linear()) add_nodes(c, cell);
+    std::array<int, kQuadraticNodes<Dim>> nodes{};
+    const CurvedEdges curved = find_nodes<Dim>(
+        mesh_.cell(c), [&](VertexId a, VertexId b) { return space_.node_of(a, b, mesh_.vertex_slots()); }, nodes);
+    out_.add(mesh_.cell(c), nodes, curved, materials_.at(mesh_.body(c)).density, [&](int id) { return local(id); });
   }
 
  private:
-  int local(VertexId v) { return local(v, mesh_.rest(v)); }
-  int local(int id, const Vec<Dim>& rest) {
+  int local(int id) {
     const auto [it, is_new] = known_.try_emplace(id, static_cast<int>(out_.vertices.size()));
     if (is_new) {
       out_.vertices.push_back(id);
-      out_.rest.push_back(rest);
+      out_.rest.push_back(rest_of(id));
     }
     return it->second;
   }
-  void add_nodes(CellId c, const std::array<int, Dim + 1>& numbers) {
-    const auto& cell = mesh_.cell(c);
-    std::array<int, kQuadraticNodes<Dim>> nodes;
-    std::copy(numbers.begin(), numbers.end(), nodes.begin());
-    CurvedEdges curved = 0;
-    for_each_edge<Dim>([&](int edge, int i, int j) {
-      const int at = space_.find(cell[i], cell[j]);
-      nodes[Dim + 1 + edge] =
-          at == kNone ? numbers[i] : local(mesh_.vertex_slots() + at, (mesh_.rest(cell[i]) + mesh_.rest(cell[j])) / 2);
-      if (at != kNone) curved = static_cast<CurvedEdges>(curved | 1 << edge);
-    });
-    out_.nodes.push_back(nodes);
-    out_.curved.push_back(curved);
+  Vec<Dim> rest_of(int id) const {
+    if (id < mesh_.vertex_slots()) return mesh_.rest(id);
+    const auto& [a, b] = space_.curved_edges()[id - mesh_.vertex_slots()];
+    return (mesh_.rest(a) + mesh_.rest(b)) / 2;
   }
 
   const Mesh<Dim>& mesh_;

@@ -19,13 +19,34 @@ struct TransferCells {
   std::vector<Vec<Dim>> rest;
   std::vector<std::array<int, Dim + 1>> cells;
   std::vector<double> density;
-  std::vector<std::array<int, kQuadraticNodes<Dim>>> nodes{};  ///< of cells; this and the next empty: no cell has any
+  std::vector<std::array<int, kQuadraticNodes<Dim>>> nodes{};  ///< of curved cells; this and the next empty: there are none
   std::vector<CurvedEdges> curved{};
 
   TransferMesh<Dim> view() const { return {rest, cells, density, nodes, curved}; }
+  /// Adds a cell with these nodes, which are not read where `edges`, its curved ones, are none. `number(v)`: the number of a
+  /// vertex or node, which adds new ones to `vertices`; their rest positions are the caller's.
+  template <typename Number>
+  void add(const std::array<VertexId, Dim + 1>& of_cell, const std::array<VertexId, kQuadraticNodes<Dim>>& nodes_of_cell,
+           CurvedEdges edges, double density_of_cell, const Number& number);
   /// Rows of values at these vertices, of an interleaved field over the mesh.
   MatrixX gather(const VectorX& field) const;
 };
+
+template <int Dim>
+template <typename Number>
+void TransferCells<Dim>::add(const std::array<VertexId, Dim + 1>& of_cell,
+                             const std::array<VertexId, kQuadraticNodes<Dim>>& nodes_of_cell, CurvedEdges edges,
+                             double density_of_cell, const Number& number) {
+  auto& cell = cells.emplace_back();
+  for (std::size_t k = 0; k < cell.size(); ++k) cell[k] = number(of_cell[k]);
+  density.push_back(density_of_cell);
+  if (edges == 0 && curved.empty()) return;
+  nodes.resize(cells.size());  // zeros at the straight cells before
+  curved.resize(cells.size());
+  if (edges == 0) return;
+  for (std::size_t k = 0; k < nodes_of_cell.size(); ++k) nodes.back()[k] = number(nodes_of_cell[k]);
+  curved.back() = edges;
+}
 
 template <int Dim>
 struct TransferPatch {

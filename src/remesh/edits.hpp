@@ -22,6 +22,12 @@ struct Proposal {
   explicit operator bool() const { return edit.has_value(); }
 };
 
+/// Rest position of a vertex of the mesh after an edit.
+template <int Dim>
+Vec<Dim> rest_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit, VertexId v) {
+  return edit.sets(v) ? edit.value->rest : mesh.rest(v);
+}
+
 /// Least quality (simplex_quality of the rest shape: 1 regular, 0 flat) of a new cell, relative to the worst cell that it
 /// replaces: at least `share` of it, and where it is above `floor` not below `floor`. What is worse than `floor` may only
 /// improve, so that no sequence of edits makes a mesh worse than `floor` or what it was.

@@ -47,12 +47,8 @@ VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<
   for (int c = 0; c < mesh.cell_slots(); ++c)
     for (const auto& condition : conditions) {
       if (condition.body != mesh.body(c)) continue;
-      const auto& cell = mesh.cell(c);
-      const auto set = [&](int node) { field.segment<Dim>(Dim * node) = condition.value(rest[node], 0); };
-      for (const int v : cell) set(v);
-      for_each_edge<Dim>([&](int, int i, int j) {
-        if (const int edge = space.find(cell[i], cell[j]); edge != kNone) set(mesh.vertex_slots() + edge);
-      });
+      for_each_node(mesh.cell(c), space, mesh.vertex_slots(),
+                    [&](int node) { field.segment<Dim>(Dim * node) = condition.value(rest[node], 0); });
       break;
     }
   return field;

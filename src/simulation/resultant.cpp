@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "itr/core/error.hpp"
-#include "itr/fem/quadratic.hpp"
+#include "itr/fem/cell_set.hpp"
 
 namespace itr {
 
@@ -26,11 +26,8 @@ std::vector<char> nodes_of(const State<Dim>& state, std::span<const int> surface
   const Mesh<Dim>& mesh = state.mesh;
   std::vector<char> is_on(num_nodes(mesh, state.space), 0);
   const auto has = [](std::span<const int> list, int id) { return std::find(list.begin(), list.end(), id) != list.end(); };
-  const auto take = [&]<std::size_t N>(const std::array<int, N>& simplex) {
-    for (const int v : simplex) is_on[v] = 1;
-    for_each_edge<static_cast<int>(N) - 1>([&](int, int i, int j) {
-      if (const int edge = state.space.find(simplex[i], simplex[j]); edge != kNone) is_on[mesh.vertex_slots() + edge] = 1;
-    });
+  const auto take = [&](const auto& simplex) {
+    for_each_node(simplex, state.space, mesh.vertex_slots(), [&](int node) { is_on[node] = 1; });
   };
   if (!surfaces.empty())
     for (FacetId f = 0; f < mesh.facet_slots(); ++f)

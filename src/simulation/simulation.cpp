@@ -140,10 +140,16 @@ struct Simulation<Dim>::Impl {
     return made;
   }
 
-  /// Remeshing may have been switched on since the simulation was made: its tolerances are chosen then.
+  /// Remeshing may have been switched on since the simulation was made: its tolerances are chosen then. The state may have
+  /// got curved edges since, on which remeshing knows no lumped mass.
   void complete_conditions() {
     const RemeshOptions& remesh = setup.remesh;
-    if (!remesh.enabled || (remeshing_is_complete && remesh.split.acceptance_tolerance)) return;
+    if (!remesh.enabled) return;
+    if (setup.lump_mass) {
+      refuse_unsupported(setup);
+      refuse_unsupported(setup, *state);
+    }
+    if (remeshing_is_complete && remesh.split.acceptance_tolerance) return;
     complete(setup, logger);
     remeshing_is_complete = true;
   }

@@ -102,13 +102,8 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
   };
   for (const auto* condition : by_tag)
     for (int f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag) {
-        const auto& facet = mesh.facet(f);
-        for (const int v : facet) hold(v, *condition);
-        for_each_edge<Dim - 1>([&](int, int i, int j) {
-          if (const int edge = space.find(facet[i], facet[j]); edge != kNone) hold(mesh.vertex_slots() + edge, *condition);
-        });
-      }
+      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
+        for_each_node(mesh.facet(f), space, mesh.vertex_slots(), [&](int node) { hold(node, *condition); });
   for (const auto* condition : by_tag)
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
       if (mesh.vertex_tag(v) != kNoTag && mesh.vertex_tag(v) == condition->tag) hold(v, *condition);

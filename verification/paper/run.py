@@ -252,7 +252,7 @@ def table(rows):
         end = ("finished" if r["finished"] else "stopped") + (", certified" if r["certified"] else ", NOT CERTIFIED")
         lines.append(
             f"| {r['case']} | {r['steps']} steps, {end} | {r['seconds_per_step']:.4f} | {cell(r['reference_seconds'], '.4g')} "
-            f"| {cell(ratio, '.0f')} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
+            f"| {cell(ratio, '.0f' if ratio and ratio >= 10 else '.2g')} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
             f"| {cell(r['reference_gain'], '.4g')} | {cell(r.get('history_loss'), '.3g')} | {r['trials']} / {r['accepted']} "
             f"| {r['microseconds_per_trial'] if r['trials'] else 0:.0f} | {100 * r['remesh_share']:.0f} % "
             f"| {r['peak_rss_mb']:.0f} ({cell(r['reference_mb'], '.0f')}) |")

@@ -66,7 +66,7 @@ STUDIES = {
                     ["--set", "/time/tend=0.5", "--levels", "3", "--frames", "5", "--series", "uniform,uniform-p2,itr,smoothing,hp"],
                     "to t = 0.5; kept aside"),
     "ball-obstacle": ("unused/ball-obstacle/2D.json", ["--levels", "3", "--frames", "8", "--series", "uniform,itr,smoothing", "--time-limit", "600"],
-                      "the whole scene: 100 steps; kept aside"),
+                      "the whole scene: 100 steps; kept aside; an old study, since which runs with linear elements have come to end (REMESHING.md)"),
     "rollers": ("rollers/monkey-soft-hard.json",
                 ["--set", "/time/tend=0.1", "--tolerances", "0.01,0.001", "--reference-tolerance", "2.5e-4", "--levels", "1", "--frames", "2",
                  "--series", "uniform,itr", "--time-limit", "3000"], "to t = 0.1: the rollers turn, first contact"),
@@ -187,16 +187,44 @@ def others(name):
 def page():
     here = [name for name in STUDIES if (HERE / name / "study.json").exists()]
     lines = ["# Speed against error: the paper's scenes", "",
-             "Made by `studies.py` from the folders beside it; each has its page, table and diagram. Times are processor seconds of one",
-             "thread, by those of uniform refinement at the same error (between its levels); unknowns are means over the steps, by its",
-             "unknowns at the same error, both with linear elements; beside, the time by that with quadratic ones. Below 1, a series is ahead.",
-             "Of splits and collapses, with swaps, and with smoothing, the row has the one that is ahead at the smallest error, of those",
-             "that the study recommends. Uniform refinement with quadratic elements has a row of its own, and so has, of the series with",
-             "curved edges, the one that is ahead. Studies from before there were these say nothing of them.", "",
+             "Is remeshing faster than a fine fixed mesh? `itr study` answers this for each scene of the paper by running it on many",
+             "meshes ([STUDY.md](../../STUDY.md)). `studies.py` makes this page from the studies, which are in the folders beside it:",
+             "a click on a scene shows its page, with a diagram and all numbers.", "",
+             "Each line of the table compares one series of runs with uniform refinement by linear elements, the series `uniform`:", "",
+             "| column | meaning |", "|---|---|",
+             "| error | what is compared with a reference: displacements in the L2 or the H1 norm, relative to the reference's norm, or the energy |",
+             "| series | how the runs of the line refine: next table |",
+             "| errors reached | from the coarsest run of the series to its finest |",
+             "| time | processor seconds of the series by those of uniform refinement at the same error; below 1, the series is faster |",
+             "| by quadratic | the same by uniform refinement with quadratic elements |",
+             "| unknowns | unknowns (mean over the steps) by those of uniform refinement at the same error |",
+             "| does it pay? | whether the series is faster than the faster of both uniform refinements, `uniform-p2` than the linear one |",
+             "", "Two numbers in a cell are the least and the greatest ratio over the errors reached. A cell is empty where no two levels of",
+             "uniform refinement have an error of the series between theirs.", "",
+             "| does it pay? | says |", "|---|---|",
+             "| yes | at all errors reached |",
+             "| from 1 % | at this error and at all smaller ones reached |",
+             "| no | not at the smallest error reached that uniform refinement reaches too |",
+             "| ...; from 1 % not told | from here on the series is nearer to the reference than the finest uniform level, but took longer than that level: a finer one would tell |",
+             "| uniform levels do not tell | the same at all errors reached |",
+             "| nothing recommended | the study does not trust the errors, for a reason that is given below |", "",
+             "An error that no uniform level reaches counts as an advantage if the series took less time than the finest level.", "",
+             "| series | how its runs refine |", "|---|---|",
+             "| `itr`, `swaps`, `smoothing` | splits and collapses of edges; swaps too; moves of vertices too |",
+             "| `uniform-p2` | the whole mesh, with quadratic elements |",
+             "| `p` | curved edges alone |",
+             "| `hp`, `hp-smoothing` | splits, curved edges and collapses; swaps and moves of vertices too |",
+             "| `splits-p2` | splits of quadratic elements |", "",
+             "A scene has up to three lines for each error: the best of `itr`, `swaps` and `smoothing`, then `uniform-p2`, then the best",
+             "of the series with curved edges. The best is the one that is fastest at its smallest error. Older studies have no curved",
+             "edges.", "",
              "| scene | error | series | errors reached | time | by quadratic | unknowns | does it pay? |", "|" + "---|" * 8]
     for name in here:
         lines += ["| " + " | ".join([f"[{row[0]}]({row[0]}/study.md)", *row[1:]]) + " |" for row in rows(name)]
-    lines += ["", "## Horizons, time steps, solvers, failures", ""]
+    lines += ["", "## Horizons, time steps, solvers, failures", "",
+              "Of each scene: up to which time it was run, its reference, and what its study says beside. \"The reference is worth\" its",
+              "difference to a second, coarser reference. \"The mesh rules\" or \"the time step rules\": that error is the larger one. \"An order",
+              "which no mesh gives\": errors fall faster with the size of the cells than the elements can explain.", ""]
     for name in here:
         content = json.loads((HERE / name / "study.json").read_text())
         lines.append(f"**{name}**, {STUDIES[name][2]}; {content['reference']}; commit {content['commit'].partition(' ')[0]}.")

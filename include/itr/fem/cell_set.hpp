@@ -46,6 +46,15 @@ struct CellSet {
   std::vector<CurvedFacet> curved_facets;
 };
 
+/// Calls f(node) for the vertices of a simplex of a mesh with so many vertices, then for the nodes of its curved edges.
+template <std::size_t N, typename F>
+void for_each_node(const std::array<VertexId, N>& simplex, const Space& space, int num_vertices, const F& f) {
+  for (const VertexId v : simplex) f(v);
+  for_each_edge<static_cast<int>(N) - 1>([&](int, int i, int j) {
+    if (const int node = space.node_of(simplex[i], simplex[j], num_vertices); node != kNone) f(node);
+  });
+}
+
 /// The whole of a compact mesh with its own numbering: vertices, the nodes of curved edges, then `extra` vertices without
 /// cells.
 template <int Dim>

@@ -3,6 +3,7 @@
 // vertex i has l_i - sum over its curved edges ij of 2 l_i l_j; a straight edge has none (Lagrange's where all are curved).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -23,6 +24,27 @@ template <int Dim, typename F>
 void for_each_edge(const F& f) {
   for (int i = 0, edge = 0; i <= Dim; ++i)
     for (int j = i + 1; j <= Dim; ++j, ++edge) f(edge, i, j);
+}
+
+/// Whether a simplex with these curved edges has its k-th node: all vertices, and the nodes of curved edges.
+template <int Dim>
+bool has_node(CurvedEdges curved, int k) {
+  return k <= Dim || curved >> (k - Dim - 1) & 1;
+}
+
+/// Sets the nodes of a simplex with these vertices, at a straight edge its first vertex, and returns which edges are curved.
+/// `node_of(a, b)`: the node of an edge or kNone.
+template <int Dim, typename NodeOf>
+CurvedEdges find_nodes(const std::array<int, Dim + 1>& vertices, const NodeOf& node_of,
+                       std::array<int, kQuadraticNodes<Dim>>& nodes) {
+  CurvedEdges curved = 0;
+  std::copy(vertices.begin(), vertices.end(), nodes.begin());
+  for_each_edge<Dim>([&](int edge, int i, int j) {
+    const int node = node_of(vertices[i], vertices[j]);
+    nodes[Dim + 1 + edge] = node == kNone ? vertices[i] : node;
+    if (node != kNone) curved = static_cast<CurvedEdges>(curved | 1 << edge);
+  });
+  return curved;
 }
 
 /// Values of the shape functions at barycentric coordinates l; zero at straight edges.

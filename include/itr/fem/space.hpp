@@ -23,6 +23,11 @@ class Space {
   const std::vector<EdgeKey>& curved_edges() const { return curved_; }
   /// Place of the edge a-b among the curved ones, or kNone where it is straight.
   int find(VertexId a, VertexId b) const;
+  /// The edge's node, which comes behind so many vertices, or kNone where it is straight.
+  int node_of(VertexId a, VertexId b, int num_vertices) const {
+    const int at = find(a, b);
+    return at == kNone ? kNone : num_vertices + at;
+  }
 
   bool operator==(const Space&) const = default;
 

@@ -29,6 +29,8 @@ inline constexpr VertexId kNewVertex = std::numeric_limits<int>::max();
 /// Stands for the i-th of the nodes that an edit creates.
 constexpr VertexId new_node(int i) { return kNewVertex - 1 - i; }
 
+constexpr EdgeKey edge_key(VertexId a, VertexId b) { return a < b ? EdgeKey{a, b} : EdgeKey{b, a}; }
+
 struct EdgeKeyHash {
   std::size_t operator()(const EdgeKey& e) const {
     return static_cast<std::size_t>(e[0]) * 0x9E3779B97F4A7C15ull ^ (static_cast<std::size_t>(e[1]) * 0xC2B2AE3D27D4EB4Full);
@@ -105,6 +107,18 @@ struct Edit {
       if (inserted_nodes[i].edge == e) return new_node(static_cast<int>(i));
     return kNone;
   }
+  /// The node that the edit creates with this id, or null.
+  const NewNode* created_node(VertexId id) const {
+    const int i = new_node(id);  // its own inverse
+    return i >= 0 && i < static_cast<int>(inserted_nodes.size()) ? &inserted_nodes[i] : nullptr;
+  }
+  /// By how many nodes, vertices among them, the edit enlarges the space; below 0: makes it smaller.
+  int added_nodes() const {
+    return static_cast<int>(inserted_nodes.size()) - static_cast<int>(removed_nodes.size()) + sets(kNewVertex) -
+           (removed_vertex != kNone);
+  }
+  /// Whether the edit sets this vertex.
+  bool sets(VertexId v) const { return value && value->vertex == v; }
 };
 
 /// The facet of a positively oriented cell opposite its vertex `k`, oriented outward.

@@ -38,6 +38,12 @@ struct RemeshFields {
     for (int k = 0; k < value.num_parents; ++k) sum += value.weights[k] * field.segment<Dim>(Dim * value.parents[k]);
     return sum;
   }
+  /// Value of a field of the mesh before an edit at a vertex or node of the mesh after it.
+  static Vec<Dim> after(const VectorX& field, const Edit<Dim>& edit, VertexId v) {
+    if (edit.sets(v)) return interpolate(field, *edit.value);
+    const auto* node = edit.created_node(v);
+    return node ? interpolate(field, *node) : Vec<Dim>(field.segment<Dim>(Dim * v));
+  }
   /// Extends or updates all fields for an edit that was just applied and created `created` (or kNone); its
   /// nodes have the slots from `first_node` on.
   void follow(const Edit<Dim>& edit, VertexId created, VertexId first_node = kNone);

@@ -88,6 +88,12 @@ struct RemeshOptions {
   double relative_tolerance = 1e-4;  ///< share of the scene's energy that choose_defaults takes as tolerance of splits
   Screening screening = Screening::bounds;
   HistoryRule history = HistoryRule::function;
+
+  /// Of curves and of straightenings [J], filled in.
+  double curve_tolerance() const { return curve.acceptance_tolerance.value_or(split.acceptance_tolerance.value()); }
+  double straighten_tolerance() const {
+    return straighten.acceptance_tolerance.value_or(collapse.acceptance_tolerance.value());
+  }
 };
 
 }  // namespace itr

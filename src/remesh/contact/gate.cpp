@@ -166,16 +166,12 @@ bool Gate<Dim>::passes(const Edit<Dim>& edit, GateScratch<Dim>& scratch) const {
 
 template <int Dim>
 bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const {
-  const auto at = [&](VertexId v) {
-    return edit.value && v == edit.value->vertex ? RemeshFields<Dim>::interpolate(x, *edit.value)
-                                                 : Vec<Dim>(x.segment<Dim>(Dim * v));
-  };
   if (edit.kind == Edit<Dim>::Kind::curve) return true;  // the same functions
   return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
     if (const auto curved = curved_cell_after(mesh_, edit, cell.vertices); curved.edges)
       return is_positive_everywhere<Dim>(curved.values(x, edit));
     std::array<Vec<Dim>, Dim + 1> p;
-    for (int k = 0; k <= Dim; ++k) p[k] = at(cell.vertices[k]);
+    for (int k = 0; k <= Dim; ++k) p[k] = RemeshFields<Dim>::after(x, edit, cell.vertices[k]);
     return orientation_of<Dim>(p) > 0;
   });
 }
@@ -193,14 +189,6 @@ bool Gate<Dim>::is_any_removed_curved(const Edit<Dim>& edit) const {
 /// The pieces of the surface that the edit removes, and those that it inserts.
 template <int Dim>
 void Gate<Dim>::find_pieces(const Edit<Dim>& edit, const Configuration<Dim>& at, GateScratch<Dim>& scratch) const {
-  const VectorX& x = *at.x;
-  const auto after = [&](VertexId v) {
-    if (edit.value && v == edit.value->vertex) return RemeshFields<Dim>::interpolate(x, *edit.value);
-    const int node = kNewVertex - 1 - v;
-    if (node < static_cast<int>(edit.inserted_nodes.size()))
-      return RemeshFields<Dim>::interpolate(x, edit.inserted_nodes[node]);
-    return Vec<Dim>(x.segment<Dim>(Dim * v));
-  };
   scratch.removed.clear();
   for (const FacetId f : edit.removed_facets) {
     const auto pieces = at.surface.pieces(f);
@@ -212,7 +200,7 @@ void Gate<Dim>::find_pieces(const Edit<Dim>& edit, const Configuration<Dim>& at,
         facet.vertices, [&](VertexId a, VertexId b) { return node_after(mesh_, edit, a, b); },
         [&](const auto& ids) {
           SurfacePiece<Dim>& piece = scratch.inserted.emplace_back();
-          for (const VertexId v : ids) piece.add(after(v), v);
+          for (const VertexId v : ids) piece.add(RemeshFields<Dim>::after(*at.x, edit, v), v);
         });
 }
 

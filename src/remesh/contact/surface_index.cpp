@@ -24,12 +24,11 @@ ObstaclePrimitives ObstaclePrimitives::make(const typename StepContext<Dim>::Obs
   };
   for (const auto& t : obstacles.triangles) {
     add({t, 3});
-    for (int k = 0; k < 3; ++k) covered.push_back({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+    for (int k = 0; k < 3; ++k) covered.push_back(edge_key(t[k], t[(k + 1) % 3]));
   }
   std::sort(covered.begin(), covered.end());
   for (const auto& [a, b] : obstacles.edges)
-    if (!std::binary_search(covered.begin(), covered.end(), std::array{std::min(a, b), std::max(a, b)}))
-      add({{a, b, kNone}, 2});
+    if (!std::binary_search(covered.begin(), covered.end(), edge_key(a, b))) add({{a, b, kNone}, 2});
   for (std::size_t v = 0; v < count; ++v)
     if (!used[v]) add({{static_cast<int>(v), kNone, kNone}, 1});
   return result;

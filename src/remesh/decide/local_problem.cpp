@@ -6,45 +6,25 @@
 
 #include "geometry/measures.hpp"
 #include "projection/forgotten_history.hpp"
+#include "projection/transfer_patch.hpp"
 #include "remesh/curved_cell.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 
 namespace {
 
-/// Cells before or after an edit, in a numbering of their own.
+/// Adds a cell to one side of an edit, which has few vertices: their numbers are searched for.
 template <int Dim>
-struct CellsOfOneSide {
-  std::vector<VertexId> ids;  ///< vertices and nodes
-  std::vector<Vec<Dim>> rest;
-  std::vector<std::array<int, Dim + 1>> cells;
-  std::vector<double> density;
-  std::vector<std::array<int, kQuadraticNodes<Dim>>> nodes;
-  std::vector<CurvedEdges> curved;
-
-  void add(const std::array<VertexId, Dim + 1>& vertices, const CurvedCell<Dim>& cell, double density_of_cell) {
-    cells.push_back(numbered(vertices));
-    density.push_back(density_of_cell);
-    curved.push_back(cell.edges);
-    nodes.push_back(cell.edges ? numbered(cell.nodes) : std::array<int, kQuadraticNodes<Dim>>{});
-  }
-  TransferMesh<Dim> view() const {
-    const bool is_linear = std::all_of(curved.begin(), curved.end(), [](CurvedEdges edges) { return edges == 0; });
-    return is_linear ? TransferMesh<Dim>{rest, cells, density} : TransferMesh<Dim>{rest, cells, density, nodes, curved};
-  }
-
- private:
-  template <std::size_t N>
-  std::array<int, N> numbered(const std::array<VertexId, N>& of_mesh) {
-    std::array<int, N> numbers;
-    for (std::size_t k = 0; k < N; ++k) {
-      const auto it = std::find(ids.begin(), ids.end(), of_mesh[k]);
-      numbers[k] = static_cast<int>(it - ids.begin());
-      if (it == ids.end()) ids.push_back(of_mesh[k]);
-    }
-    return numbers;
-  }
-};
+void add_to_side(const std::array<VertexId, Dim + 1>& vertices, const CurvedCell<Dim>& cell, double density,
+                 TransferCells<Dim>& side) {
+  side.add(vertices, cell.nodes, cell.edges, density, [&side](VertexId v) {
+    const auto it = std::find(side.vertices.begin(), side.vertices.end(), v);
+    const auto number = static_cast<int>(it - side.vertices.begin());
+    if (it == side.vertices.end()) side.vertices.push_back(v);
+    return number;
+  });
+}
 
 }  // namespace
 
@@ -126,23 +106,11 @@ LocalProblem<Dim>::~LocalProblem() {
   scratch_.spare.push_back(std::move(storage_));
 }
 
-/// Whether the edit sets this vertex, after it.
-template <int Dim>
-bool LocalProblem<Dim>::is_value_vertex(const LocalVertex& v) const {
-  return is_after_ && v.kind != Kind::of_obstacle && edit_.value && edit_.value->vertex == v.id;
-}
-
-/// Of a node that the edit creates; null of others.
-template <int Dim>
-const typename Edit<Dim>::NewNode* LocalProblem<Dim>::created_node(const LocalVertex& v) const {
-  return v.kind == Kind::created && v.id != kNewVertex ? &edit_.inserted_nodes[kNewVertex - 1 - v.id] : nullptr;
-}
-
 /// The edge of which this is the node; {kNone, kNone} of a vertex.
 template <int Dim>
 EdgeKey LocalProblem<Dim>::edge_of(const LocalVertex& v) const {
   if (v.kind == Kind::of_mesh) return mesh_.edge_of_node(v.id);
-  const auto* node = created_node(v);
+  const auto* node = v.kind == Kind::created ? edit_.created_node(v.id) : nullptr;
   return node ? node->edge : EdgeKey{kNone, kNone};
 }
 
@@ -162,22 +130,17 @@ bool LocalProblem<Dim>::is_on_surface(const LocalVertex& v) const {
 template <int Dim>
 Vec<Dim> LocalProblem<Dim>::rest_position(const LocalVertex& v) const {
   if (v.kind == Kind::of_obstacle) return state_.context.obstacles.rest[v.id];
-  if (const auto* node = created_node(v)) {
-    const auto of_end = [&](VertexId end) {
-      return rest_position({end == kNewVertex ? Kind::created : Kind::of_mesh, end});
-    };
-    return (of_end(node->edge[0]) + of_end(node->edge[1])) / 2;
-  }
-  return is_value_vertex(v) ? edit_.value->rest : mesh_.rest(v.id);
+  if (!is_after_) return mesh_.rest(v.id);
+  const auto* node = edit_.created_node(v.id);
+  if (!node) return rest_after(mesh_, edit_, v.id);
+  return (rest_after(mesh_, edit_, node->edge[0]) + rest_after(mesh_, edit_, node->edge[1])) / 2;
 }
 
 template <int Dim>
 Vec<Dim> LocalProblem<Dim>::field_value(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values,
                                         const LocalVertex& v) const {
   if (v.kind == Kind::of_obstacle) return obstacle_values.empty() ? Vec<Dim>(Vec<Dim>::Zero()) : obstacle_values[v.id];
-  if (is_value_vertex(v)) return RemeshFields<Dim>::interpolate(field, *edit_.value);
-  if (const auto* node = created_node(v)) return RemeshFields<Dim>::interpolate(field, *node);
-  return field.segment<Dim>(Dim * v.id);
+  return is_after_ ? RemeshFields<Dim>::after(field, edit_, v.id) : Vec<Dim>(field.segment<Dim>(Dim * v.id));
 }
 
 template <int Dim>
@@ -428,7 +391,7 @@ void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
     const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
     const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-      if (k != n && (k <= Dim || cell.edges >> (k - Dim - 1) & 1)) add(cell.nodes[k], mass * matrix(k, n));
+      if (k != n && has_node<Dim>(cell.edges, k)) add(cell.nodes[k], mass * matrix(k, n));
     for (const VertexId end : edit_.edge) add(end, mass * matrix(n, n) / 2);  // the straight edge moves with its ends
     loss += 0.5 * mass * matrix(n, n) * gap.squaredNorm();
   }
@@ -440,19 +403,19 @@ template <int Dim>
 void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) const {
   if (edit_.kind == Edit<Dim>::Kind::straighten) return add_history_of_node(inertia);
   // Numberings of the two sides' own: the nodes of removed cells carry the functions as they were.
-  CellsOfOneSide<Dim> old_side, new_side;
+  TransferCells<Dim> old_side, new_side;
   const auto density = [&](int body) { return state_.context.materials.at(body).density; };
-  for (const CellId c : edit_.removed_cells) old_side.add(mesh_.cell(c), cell_before(mesh_, c), density(mesh_.body(c)));
+  for (const CellId c : edit_.removed_cells)
+    add_to_side<Dim>(mesh_.cell(c), cell_before(mesh_, c), density(mesh_.body(c)), old_side);
   for (const auto& cell : edit_.inserted_cells)
-    new_side.add(cell.vertices, curved_cell_after(mesh_, edit_, cell.vertices), density(cell.body));
+    add_to_side<Dim>(cell.vertices, curved_cell_after(mesh_, edit_, cell.vertices), density(cell.body), new_side);
   const auto local_vertex = [&](VertexId v) { return LocalVertex{is_created(v) ? Kind::created : Kind::of_mesh, v}; };
-  for (const VertexId v : old_side.ids) old_side.rest.push_back(mesh_.rest(v));
-  for (const VertexId v : new_side.ids) new_side.rest.push_back(rest_position(local_vertex(v)));
+  for (const VertexId v : old_side.vertices) old_side.rest.push_back(mesh_.rest(v));
+  for (const VertexId v : new_side.vertices) new_side.rest.push_back(rest_position(local_vertex(v)));
   const VectorX& predictor = state_.fields.predictor;
-  const std::vector<VertexId>&old_ids = old_side.ids, &new_ids = new_side.ids;
-  MatrixX old_predictor(old_ids.size(), Dim), new_predictor(new_ids.size(), Dim), new_x(new_ids.size(), Dim);
-  for (std::size_t i = 0; i < old_ids.size(); ++i)
-    old_predictor.row(i) = predictor.segment<Dim>(Dim * old_ids[i]).transpose();
+  const std::vector<VertexId>& new_ids = new_side.vertices;
+  const MatrixX old_predictor = old_side.gather(predictor);
+  MatrixX new_predictor(new_ids.size(), Dim), new_x(new_ids.size(), Dim);
   for (std::size_t i = 0; i < new_ids.size(); ++i) {
     new_predictor.row(i) = field_value(predictor, {}, local_vertex(new_ids[i])).transpose();
     new_x.row(i) = field_value(state_.fields.x, {}, local_vertex(new_ids[i])).transpose();

@@ -120,7 +120,6 @@ class LocalProblem {
   /// The node of an edge on the side of the comparison that this is, or kNone.
   VertexId node_of(VertexId a, VertexId b) const;
   bool is_on_surface(const LocalVertex& v) const;
-  const typename Edit<Dim>::NewNode* created_node(const LocalVertex& v) const;
   void add_cells(std::span<const CellId> patch);
   void add_loaded_facets();
   void hold_vertices();
@@ -135,7 +134,6 @@ class LocalProblem {
   void set_quadrature(ConstVectorView x);
   void add_unrepresented_history(InertiaEnergy<Dim>& inertia) const;
   void add_history_of_node(InertiaEnergy<Dim>& inertia) const;
-  bool is_value_vertex(const LocalVertex& v) const;
   Vec<Dim> rest_position(const LocalVertex& v) const;
   Vec<Dim> field_value(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, const LocalVertex& v) const;
   bool is_free(int i) const;

@@ -12,6 +12,7 @@
 #include "itr/fem/mass.hpp"
 #include "local_problem.hpp"
 #include "remesh/curved_cell.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 
@@ -34,9 +35,9 @@ class NodalModels {
         curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(state_.mesh, edit, a, b); });
     std::array<Model*, kQuadraticNodes<Dim>> models{};
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-      if (k <= Dim || cell.edges >> (k - Dim - 1) & 1) model(cell.nodes[k]);
+      if (has_node<Dim>(cell.edges, k)) model(cell.nodes[k]);
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // all are there: none moves any more
-      if (k <= Dim || cell.edges >> (k - Dim - 1) & 1) models[k] = &model(cell.nodes[k]);
+      if (has_node<Dim>(cell.edges, k)) models[k] = &model(cell.nodes[k]);
     add(cell, body, edit, models);
   }
   /// A cell after the edit, of which nothing moves: its energy alone.
@@ -66,10 +67,7 @@ class NodalModels {
            const std::array<Model*, kQuadraticNodes<Dim>>& models) {
     const StepContext<Dim>& context = state_.context;
     PlacedCell placed{cell.edges, {}, cell.values(state_.fields.x, edit), context.materials.at(body), models};
-    for (int k = 0; k <= Dim; ++k) {
-      const VertexId v = cell.nodes[k];
-      placed.rest[k] = edit.value && v == edit.value->vertex ? edit.value->rest : state_.mesh.rest(v);
-    }
+    for (int k = 0; k <= Dim; ++k) placed.rest[k] = rest_after(state_.mesh, edit, cell.nodes[k]);
     add_elasticity(placed);
     if (!context.has_inertia && !context.loads.acceleration) return;
     QuadraticCell<Dim> way = placed.x;

@@ -79,10 +79,7 @@ constexpr double kLeastForgotten = 0.3;
 
 template <int Dim>
 double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
-  const auto after = [&](const VectorX& field, VertexId v) {
-    return v == edit.value->vertex ? RemeshFields<Dim>::interpolate(field, *edit.value)
-                                   : Vec<Dim>(field.segment<Dim>(Dim * v));
-  };
+  const auto after = [&](const VectorX& field, VertexId v) { return RemeshFields<Dim>::after(field, edit, v); };
   double forgotten = 0;
   for (const VertexId v : {edit.value->vertex, edit.removed_vertex}) {
     if (v == kNone || v == kNewVertex) continue;
@@ -98,7 +95,7 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
     Vec<Dim> way = Vec<Dim>::Zero(), predictor = way;
     for (const auto& [cell, body] : edit.inserted_cells) {
       std::array<Vec<Dim>, Dim + 1> rest;
-      for (int k = 0; k <= Dim; ++k) rest[k] = cell[k] == edit.value->vertex ? edit.value->rest : state.mesh.rest(cell[k]);
+      for (int k = 0; k <= Dim; ++k) rest[k] = rest_after(state.mesh, edit, cell[k]);
       const Vec<Dim> weights = edge_matrix<Dim>(rest).inverse() * (X - rest[0]);
       const double depth = std::min(weights.minCoeff(), 1 - weights.sum());
       if (depth <= deepest) continue;
@@ -129,9 +126,9 @@ double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   if (!edit.value) return predict_gain_of_swap(state, edit);
   const VertexId set = edit.value->vertex;
   const auto at = [&](const VectorX& field, VertexId v, bool after) {
-    return after && v == set ? RemeshFields<Dim>::interpolate(field, *edit.value) : Vec<Dim>(field.segment<Dim>(Dim * v));
+    return after ? RemeshFields<Dim>::after(field, edit, v) : Vec<Dim>(field.segment<Dim>(Dim * v));
   };
-  const auto rest = [&](VertexId v) { return v == set ? edit.value->rest : state.mesh.rest(v); };
+  const auto rest = [&](VertexId v) { return rest_after(state.mesh, edit, v); };
   QuadraticModel<Dim> before(context), after(context);
   for (const CellId c : edit.removed_cells)
     before.add_cell(corners_of(state, state.mesh.cell(c)), state.mesh.body(c), kNone);
@@ -194,7 +191,7 @@ template <int Dim>
 bool are_terms_constant(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!is_predictable(context) || context.mass == MassKind::lumped) return false;
+  if (!is_predictable(context)) return false;
   if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return false;
   const auto around = mesh.cells_of_edge(edge);
   return std::none_of(around.begin(), around.end(), [&](CellId c) {
@@ -218,7 +215,7 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   if (!is_predictable(context)) return kCannotTell;
   const auto around = mesh.cells_of_edge(edge);
   const auto is_hard = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
-  if (context.mass == MassKind::lumped || std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
+  if (std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
   QuadraticModel<Dim> model(context);
   for (const CellId c : around) {
     if (mesh.is_curved(c)) {

@@ -51,19 +51,17 @@ template <int Dim>
 double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge);
 
 /// The same at cells with curved edges, by the vertex and the nodes that the split adds, together: ½ r^T A^-1 r, and what
-/// finer quadrature changes. NaN where moduli or density vary in space, mass is lumped, a facet is loaded or A is
-/// indefinite.
+/// finer quadrature changes. NaN where moduli or density vary in space, a facet is loaded or A is indefinite.
 template <int Dim>
 double predict_split_at_curves(const RemeshState<Dim>& state, const EdgeKey& edge);
 
-/// The decrease of energy by making an edge curved, by the new node alone: ½ r^T A^-1 r. NaN where moduli vary in space or
-/// mass is lumped.
+/// The decrease of energy by making an edge curved, by the new node alone: ½ r^T A^-1 r. NaN where moduli vary in space.
 template <int Dim>
 double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge);
 
 /// The decrease of energy, negative in most cases, if a curved edge becomes straight and nothing else moves. The new mesh
-/// pays for the motion that it forgets. NaN where moduli or density vary in space, mass is lumped, history is interpolated
-/// or a facet at the edge is loaded. Contact is left out. [J, times the scaling]
+/// pays for the motion that it forgets. NaN where moduli or density vary in space, history is interpolated or a facet at
+/// the edge is loaded. Contact is left out. [J, times the scaling]
 template <int Dim>
 double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge);
 

@@ -21,7 +21,7 @@ std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cel
     if (!mesh.is_cell_alive(c)) continue;
     const auto& cell = mesh.cell(c);
     for (int i = 0; i <= Dim; ++i)
-      for (int j = i + 1; j <= Dim; ++j) edges.push_back({std::min(cell[i], cell[j]), std::max(cell[i], cell[j])});
+      for (int j = i + 1; j <= Dim; ++j) edges.push_back(edge_key(cell[i], cell[j]));
   }
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
@@ -48,11 +48,8 @@ bool RemeshQueries<Dim>::makes_short_chords(const EdgeKey& e) const {
   if (!mesh_.has_nodes()) return false;
   const double dhat = context_.contact.activation_distance;
   const Edit<Dim> edit = make_split(mesh_, e);
-  const auto rest = [&](VertexId v) { return v == kNewVertex ? edit.value->rest : mesh_.rest(v); };
-  const auto x = [&](VertexId v) {
-    return v == kNewVertex ? fields_.interpolate(fields_.x, *edit.value)
-                           : Vec<Dim>(fields_.x.template segment<Dim>(Dim * v));
-  };
+  const auto rest = [&](VertexId v) { return rest_after(mesh_, edit, v); };
+  const auto x = [&](VertexId v) { return fields_.after(fields_.x, edit, v); };
   const auto is_on_surface = [&](const EdgeKey& edge) {
     return std::any_of(edit.inserted_facets.begin(), edit.inserted_facets.end(), [&](const auto& facet) {
       const auto has = [&](VertexId v) { return std::find(facet.vertices.begin(), facet.vertices.end(), v); };
@@ -262,8 +259,7 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
   TrialOptions options{.required = context_.scaling * tolerance, .local = local};
   if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
   // The vertex or nodes that a move or a swap sets do not tell what the vertices around gain.
-  if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap &&
-      (edit.value || !edit.inserted_nodes.empty() || !edit.removed_nodes.empty()))
+  if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap)
     options.patch_over_vertex = is_refined && !trial.in_contact
                                     ? patch_over_refinement(edit.removed_cells)
                                     : patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));

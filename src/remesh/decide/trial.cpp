@@ -84,14 +84,12 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
     verdict.touches_contact = found.touches_contact;
     verdict.surface_read.include(found.surface_read);
   };
-  const auto accept = [&](LocalProblem<Dim>& after) {
+  // Of an edit that gains enough: it may still make a cell that is distorted.
+  const auto finish = [&](LocalProblem<Dim>& after) {
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
-    if (edit.kind == Edit<Dim>::Kind::curve && after.distorts()) {
-      verdict.refusal = Refusal::shape;
-      return;
-    }
-    verdict.refusal = Refusal::none;
+    if (edit.kind == Edit<Dim>::Kind::curve && after.distorts()) return Refusal::shape;
     after.get_positions(verdict.positions);
+    return Refusal::none;
   };
   bool is_enough = false;
   // The bound is not asked where it is known to decide nothing.
@@ -118,13 +116,14 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
     LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
     verdict.touches_contact = after.touches_contact();
     verdict.surface_read.include(after.surface_read());
-    return accept(after);
+    verdict.refusal = finish(after);
+    return;
   }
-  const auto found = compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
-                                  options.local.max_contact_iterations, scratch, accept);
-  const bool was_refused_by_energy = verdict.refusal == Refusal::invalid || verdict.refusal == Refusal::bound;
-  const Refusal by_energy = found.has_unknowns ? Refusal::energy : Refusal::no_unknowns;
-  note(found, was_refused_by_energy ? by_energy : verdict.refusal);
+  std::optional<Refusal> finished;
+  const auto found =
+      compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
+                   options.local.max_contact_iterations, scratch, [&](auto& after) { finished = finish(after); });
+  note(found, finished.value_or(found.has_unknowns ? Refusal::energy : Refusal::no_unknowns));
   verdict.was_relaxed = true;
 }
 

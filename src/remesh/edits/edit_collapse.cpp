@@ -128,7 +128,7 @@ void merge_nodes(const Mesh<Dim>& mesh, const Merge<Dim>& merge, Edit<Dim>& edit
   };
   const auto remove = [&](VertexId end, VertexId v) {  // returns whether the edge's node has a successor
     if (mesh.node_of(end, v) == kNone) return false;
-    const EdgeKey edge{std::min(end, v), std::max(end, v)};
+    const EdgeKey edge = edge_key(end, v);
     edit.removed_nodes.push_back(edge);
     return v != kept && (!on_boundary(v) || !mesh.facets_of_edge(edge).empty());
   };

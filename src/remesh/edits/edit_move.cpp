@@ -113,7 +113,7 @@ void move_nodes(const Mesh<Dim>& mesh, VertexId vertex, Edit<Dim>& edit) {
     for (const VertexId v : mesh.cell(c))
       if (mesh.node_of(vertex, v) != kNone && std::find(ends.begin(), ends.end(), v) == ends.end()) ends.push_back(v);
   for (const VertexId v : ends) {
-    edit.removed_nodes.push_back({std::min(vertex, v), std::max(vertex, v)});
+    edit.removed_nodes.push_back(edge_key(vertex, v));
     insert_node(mesh, vertex, v, edit);
   }
 }

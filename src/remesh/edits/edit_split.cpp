@@ -7,13 +7,11 @@ namespace itr {
 
 namespace {
 
-EdgeKey key_of(VertexId a, VertexId b) { return {std::min(a, b), std::max(a, b)}; }
-
 /// The node of the edge from the midpoint of the edge ab to a vertex `c` of a cell there, if the old functions are quadratic
 /// along it; of the half of the edge at `c` where c is a or b. What it has is the functions' value at the edge's middle.
 template <int Dim>
 void add_node_from_middle(const Mesh<Dim>& mesh, VertexId a, VertexId b, VertexId c, Edit<Dim>& edit) {
-  typename Edit<Dim>::NewNode node{key_of(c, kNewVertex)};
+  typename Edit<Dim>::NewNode node{edge_key(c, kNewVertex)};
   const auto add = [&](const auto& ids, const auto& shapes) {
     for (int k = 0; k < shapes.size(); ++k)
       if (shapes[k] != 0) node.add_parent(ids[k], shapes[k]);
@@ -129,7 +127,7 @@ Edit<Dim> make_chords(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   Edit<Dim> edit = make_split(mesh, edge);
   edit.kind = Edit<Dim>::Kind::chords;
   std::erase_if(edit.inserted_nodes, [&](const auto& node) {
-    return node.edge == key_of(edge[0], kNewVertex) || node.edge == key_of(edge[1], kNewVertex);
+    return node.edge == edge_key(edge[0], kNewVertex) || node.edge == edge_key(edge[1], kNewVertex);
   });
   return edit;
 }

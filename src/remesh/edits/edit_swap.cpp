@@ -127,8 +127,7 @@ Edit<3> draft_removal(const Mesh<3>& mesh, const EdgeKey& edge, const std::vecto
   for (const auto& [vertices, body] : polygons)
     for (std::size_t i = 0; i < vertices.size(); ++i)
       for (std::size_t j = i + 1; j < vertices.size(); ++j)
-        if (!mesh.are_joined(vertices[i], vertices[j]) &&
-            draft.inserted_node({std::min(vertices[i], vertices[j]), std::max(vertices[i], vertices[j])}) == kNone)
+        if (!mesh.are_joined(vertices[i], vertices[j]) && draft.inserted_node(edge_key(vertices[i], vertices[j])) == kNone)
           insert_node(mesh, vertices[i], vertices[j], draft);
   return draft;
 }
@@ -202,7 +201,7 @@ Proposal<3> propose_facet_removal(const Mesh<3>& mesh, const MeshTypes<3>::Facet
   };
   const VertexId d = opposite(cells[0]), e = opposite(cells[1]);
   if (mesh.are_joined(d, e)) return refused<3>(Refusal::exists);
-  Edit<3> edit{.kind = Edit<3>::Kind::swap, .edge = {std::min(d, e), std::max(d, e)}, .removed_cells = cells};
+  Edit<3> edit{.kind = Edit<3>::Kind::swap, .edge = edge_key(d, e), .removed_cells = cells};
   const double least = rule.least(worst_quality<3>(mesh, cells));
   for (const VertexId v : facet) {  // one vertex of the facet after the other gives way to the far end
     const auto cell = replaced(mesh.cell(cells[0]), v, e);

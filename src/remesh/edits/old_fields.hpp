@@ -7,6 +7,7 @@
 #include <span>
 
 #include "remesh/curved_cell.hpp"
+#include "remesh/edits.hpp"
 
 namespace itr {
 
@@ -53,10 +54,9 @@ bool find_parents(const Mesh<Dim>& mesh, std::span<const CellId> cells, const Ve
 /// old functions have at its place, which lies in the cells that the edit removes.
 template <int Dim>
 void insert_node(const Mesh<Dim>& mesh, VertexId a, VertexId b, Edit<Dim>& edit) {
-  const auto rest = [&](VertexId v) { return edit.value && v == edit.value->vertex ? edit.value->rest : mesh.rest(v); };
-  typename Edit<Dim>::NewNode node{{std::min(a, b), std::max(a, b)}};
+  typename Edit<Dim>::NewNode node{edge_key(a, b)};
   constexpr double kAnywhere = -std::numeric_limits<double>::infinity();  // flat surfaces are so up to a tolerance
-  find_parents<Dim>(mesh, edit.removed_cells, (rest(a) + rest(b)) / 2, kAnywhere, node);
+  find_parents<Dim>(mesh, edit.removed_cells, (rest_after(mesh, edit, a) + rest_after(mesh, edit, b)) / 2, kAnywhere, node);
   edit.inserted_nodes.push_back(node);
 }
 

@@ -26,7 +26,7 @@ class Coarsener {
         options_(ask_.options().collapse),
         straightens_(straightens),
         tolerance_(options_.acceptance_tolerance.value()),
-        straighten_tolerance_(ask_.options().straighten.acceptance_tolerance.value_or(tolerance_)) {}
+        straighten_tolerance_(ask_.options().straighten_tolerance()) {}
 
   /// The collapses of `edges`, and the straightenings of those with nodes.
   std::vector<Place> candidates(const std::vector<EdgeKey>& edges) const {
@@ -53,7 +53,7 @@ class Coarsener {
       return PlaceQueue::Entry{.place = place, .priority = -std::numeric_limits<double>::max()};  // to be counted
     const Edit<Dim>& edit = *proposal.edit;
     return PlaceQueue::Entry{.place = place,
-                             .priority = ask_.predict_collapse(edit, tolerance_, scratch) / removed_nodes(edit)};
+                             .priority = ask_.predict_collapse(edit, tolerance_, scratch) / -edit.added_nodes()};
   }
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
@@ -67,7 +67,7 @@ class Coarsener {
     trial.is_asked = true;
     if (!trial.take(propose_collapse(ask_.mesh(), ask_.strata(), edge))) return;
     const bool is_known = straightens_ && session_.is_unchanged(trial.candidate);
-    const double gain = is_known ? trial.candidate.priority * removed_nodes(*trial.edit)
+    const double gain = is_known ? trial.candidate.priority * -trial.edit->added_nodes()
                                  : ask_.predict_collapse(*trial.edit, tolerance_, scratch, &trial.surface_read);
     if (ask_.any_is_curved(trial.edit->removed_cells)) trial.predicted = gain;
     if (!trial.in_contact && ask_.is_hopeless(trial.edit->removed_cells, gain, tolerance_))
@@ -90,11 +90,6 @@ class Coarsener {
   }
 
  private:
-  /// By how many nodes, the vertex among them, a collapse makes the space smaller.
-  static double removed_nodes(const Edit<Dim>& edit) {
-    return 1 + static_cast<double>(edit.removed_nodes.size()) - static_cast<double>(edit.inserted_nodes.size());
-  }
-
   std::optional<PlaceQueue::Entry> rank_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch) const {
     if (ask_.refuse_straighten(edge) != Refusal::none) return std::nullopt;
     const double gain = ask_.predict_straighten(edge, scratch);

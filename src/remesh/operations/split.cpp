@@ -18,7 +18,7 @@ class Refiner {
         ask_(session.ask()),
         options_(ask_.options().split),
         tolerance_(options_.acceptance_tolerance.value()),
-        curve_tolerance_(ask_.options().curve.acceptance_tolerance.value_or(tolerance_)) {}
+        curve_tolerance_(ask_.options().curve_tolerance()) {}
 
   /// These edges and, where curves are enabled, their nodes.
   std::vector<Place> candidates(const std::vector<EdgeKey>& edges) const {

@@ -47,10 +47,8 @@ double least_gain(const RemeshQueries<Dim>& ask) {
 /// Least gain of a swap [J]: `least`, and for each node that it adds that of a curve.
 template <int Dim>
 double with_nodes(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
-  const auto added = static_cast<int>(edit.inserted_nodes.size()) - static_cast<int>(edit.removed_nodes.size());
-  if (added <= 0) return least;
-  const RemeshOptions& options = ask.options();
-  return least + added * options.curve.acceptance_tolerance.value_or(options.split.acceptance_tolerance.value());
+  const int added = edit.added_nodes();
+  return added <= 0 ? least : least + added * ask.options().curve_tolerance();
 }
 
 /// Whether the prediction from bulk terms reaches `least` [J].

@@ -4,30 +4,10 @@
 #include <algorithm>
 
 #include "core/check.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
-#include "mesh/validate.hpp"
-#include "remesh/curved_cell.hpp"
+#include "fem/inverted.hpp"
 #include "remesh/edits.hpp"
 
 namespace itr {
-
-namespace {
-
-/// The first cell that is not proven to be positively oriented everywhere.
-template <int Dim>
-[[maybe_unused]] CellId find_inverted_cell(const Mesh<Dim>& mesh, const VectorX& x) {
-  const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
-    const CurvedCell<Dim> cell = cell_before(mesh, c);
-    const bool is_positive =
-        cell.edges ? is_positive_everywhere<Dim>(cell.values(x, none)) : is_positively_oriented<Dim>(mesh.cell(c), x);
-    if (!is_positive) return c;
-  }
-  return kNone;
-}
-
-}  // namespace
 
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
@@ -56,8 +36,11 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   log_.add_follower([&](const Change<Dim>& change) { memory_.follow(mesh, change); });
   log_.add_follower([&](const Change<Dim>&) {
     ITR_AUDIT(mesh.find_defect().empty(), mesh.find_defect());
-    ITR_AUDIT(find_inverted_cell(mesh, fields.x) == kNone, find_inverted_cell(mesh, fields.x));
-    for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(find_inverted_cell(mesh, past) == kNone);
+    [[maybe_unused]] const auto inverted = [&](const VectorX& x) {
+      return find_inverted(mesh, x, [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
+    };
+    ITR_AUDIT(inverted(fields.x) == kNone, inverted(fields.x));
+    for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(inverted(past) == kNone);
   });
 }
 
