@@ -27,7 +27,6 @@ struct CellPoint {
 template <int Dim, typename Function>
 void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels,
                             const Setup<Dim>& setup, const Function& f) {
-  const auto& rule = quadrature<Dim>(setup.quadrature_degree);
   std::vector<CellPoint<Dim>> points;
   auto straight = cells.elements.begin();
   auto curved = cells.curved_elements.begin();
@@ -41,8 +40,7 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
       continue;
     }
     const std::size_t e = static_cast<std::size_t>(curved - cells.curved_elements.begin());
-    const bool is_refined = !levels.empty() && levels[e] > 0;
-    for (const auto& point : is_refined ? closed_quadrature<Dim>(levels[e]) : rule)
+    for (const auto& point : cell_quadrature<Dim>(levels.empty() ? 0 : levels[e], setup.quadrature_degree))
       points.push_back({at_nodes<Dim>(curved->nodes, x) * shape_gradients<Dim>(*curved, point.weights).transpose(),
                         rest_position<Dim>(cells, *curved, point.weights), point.share});
     f(setup.materials.at(curved->body), std::span<const CellPoint<Dim>>(points));

@@ -12,10 +12,12 @@
 #include "itr/energy/step_limit.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadrature.hpp"
+#include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr {
 
-/// scale * sum over curved elements and points of share * rest volume * W(F). Feasible: det F > 0 everywhere in each cell.
+/// scale * sum over curved elements and points of share * rest volume * W(F), and in elements whose level has a barrier
+/// depth, scale * rest volume * stiffness at rest * JacobianBarrier. Feasible: det F > 0 everywhere in each cell.
 template <int Dim>
 class QuadraticElasticity {
  public:
@@ -35,17 +37,18 @@ class QuadraticElasticity {
   using Element = typename CellSet<Dim>::CurvedElement;
   static constexpr int kNodes = kQuadraticNodes<Dim>;
 
-  const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
-    return levels_.empty() || levels_[e] == 0 ? rule_ : closed_quadrature<Dim>(levels_[e]);
-  }
+  int level(std::size_t e) const { return levels_.empty() ? 0 : levels_[e]; }
+  const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const { return cell_quadrature<Dim>(level(e), degree_); }
   const ElasticModuli& moduli(std::size_t e, std::size_t point) const {
     return varying_.empty() ? *by_element_[e] : varying_[first_varying_[e] + point];
   }
   void sample_moduli();
-  bool is_blind(std::size_t e, ConstVectorView x) const;
+  bool is_blind(std::size_t e, const QuadraticCell<Dim>& positions, double least) const;
+  int next_level(std::size_t e, ConstVectorView x) const;
+  double barrier_weight(std::size_t e) const;
 
   const CellSet<Dim>& cells_;
-  const std::vector<QuadraturePoint<Dim>>& rule_;  ///< of level 0
+  int degree_;  ///< of level 0
   QuadratureLevels levels_;
   std::map<int, Material> materials_;  ///< empty unless moduli vary in space
   std::map<int, ElasticModuli> by_body_;

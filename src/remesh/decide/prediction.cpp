@@ -186,12 +186,21 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
 
 namespace {
 
+/// Whether a cell around an edge has a Jacobian barrier, which no prediction contains.
+template <int Dim>
+bool has_barrier(const RemeshState<Dim>& state, const EdgeKey& edge) {
+  const auto& levels = state.fields.levels;
+  const auto around = state.mesh.cells_of_edge(edge);
+  return !levels.empty() &&
+         std::any_of(around.begin(), around.end(), [&](CellId c) { return barrier_depth(levels[c]) > 0; });
+}
+
 /// Whether the nodes of curved edges around an edge feel only terms of constant moduli and density, and no tractions.
 template <int Dim>
 bool are_terms_constant(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!is_predictable(context)) return false;
+  if (!is_predictable(context) || has_barrier(state, edge)) return false;
   if (!context.loads.tractions.empty() && !mesh.facets_of_edge(edge).empty()) return false;
   const auto around = mesh.cells_of_edge(edge);
   return std::none_of(around.begin(), around.end(), [&](CellId c) {
@@ -212,7 +221,7 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   constexpr double kCannotTell = std::numeric_limits<double>::quiet_NaN();
   const StepContext<Dim>& context = state.context;
   const Mesh<Dim>& mesh = state.mesh;
-  if (!is_predictable(context)) return kCannotTell;
+  if (!is_predictable(context) || has_barrier(state, edge)) return kCannotTell;
   const auto around = mesh.cells_of_edge(edge);
   const auto is_hard = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
   if (std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
@@ -266,7 +275,7 @@ double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge) {
     straight.col(n) = middle;
     const int level = state.fields.levels.empty() ? 0 : state.fields.levels[c];
     double density = 0;
-    for (const auto& point : level == 0 ? quadrature<Dim>(context.quadrature_degree) : closed_quadrature<Dim>(level)) {
+    for (const auto& point : cell_quadrature<Dim>(level, context.quadrature_degree)) {
       const auto shapes = quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear);
       density += point.share * (elastic_density<Dim>(x * shapes.transpose(), moduli) -
                                 elastic_density<Dim>(straight * shapes.transpose(), moduli));

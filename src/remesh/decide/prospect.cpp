@@ -49,7 +49,7 @@ double energy_at_curves(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   const auto x = at_nodes<Dim>(cell.nodes, fields.x);
   const int level = fields.levels.empty() ? 0 : fields.levels[c];
   double density = 0;
-  for (const auto& point : level == 0 ? quadrature<Dim>(context.quadrature_degree) : closed_quadrature<Dim>(level))
+  for (const auto& point : cell_quadrature<Dim>(level, context.quadrature_degree))
     density += point.share * elastic_density<Dim>(
                                  x * quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear).transpose(), moduli);
   double energy = context.scaling * mesh.volume(c) * density;

@@ -93,9 +93,7 @@ class SplitModel {
     QuadraticCell<Dim> way = QuadraticCell<Dim>::Zero();
     if (context.has_inertia) way = x - cell.nodes.values(state_.fields.predictor, none);
     const int level = state_.fields.levels.empty() ? 0 : state_.fields.levels[cell.id];
-    const auto& rule = !cell.nodes.edges ? quadrature<Dim>(1)
-                       : level == 0      ? quadrature<Dim>(context.quadrature_degree)
-                                         : closed_quadrature<Dim>(level);
+    const auto& rule = !cell.nodes.edges ? quadrature<Dim>(1) : cell_quadrature<Dim>(level, context.quadrature_degree);
     if (cell.nodes.edges)
       for (const auto& point : rule)
         gain_ += sV * point.share * elastic_density<Dim>(gradient_at(x, cell.nodes.edges, point.weights, linear), moduli);
