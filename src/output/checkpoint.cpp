@@ -345,9 +345,9 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   if (file.contains("/checkpoint/quadrature_levels")) {
     const auto levels = read_ints(saved.file, file, "/checkpoint/quadrature_levels");
     for (const int level : levels)
-      if (level < 0 || level > kMostCellLevel)
+      if (level < 0 || level > kMostClosedLevel)
         throw InputError({saved.file.string(), "/checkpoint/quadrature_levels", std::to_string(level),
-                          "0 to " + std::to_string(kMostCellLevel)});
+                          "0 to " + std::to_string(kMostClosedLevel)});
     state.quadrature.assign(levels.begin(), levels.end());
   }
   const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;

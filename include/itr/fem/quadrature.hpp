@@ -26,17 +26,10 @@ template <int Dim>
 const std::vector<QuadraturePoint<Dim>>& closed_quadrature(int level);
 inline constexpr int kMostClosedLevel = 3;
 
-/// How finely the energy sees a curved cell: the level of its closed rule (0: the rule of the setup's degree) plus
-/// kBarrierLevel times the depth of its Jacobian barrier (0: none; see JacobianBarrier).
-inline constexpr int kBarrierLevel = kMostClosedLevel + 1;
-inline constexpr int kMostBarrierDepth = 3;
-inline constexpr int kMostCellLevel = kBarrierLevel * (kMostBarrierDepth + 1) - 1;
-constexpr int closed_level(int level) { return level % kBarrierLevel; }
-constexpr int barrier_depth(int level) { return level / kBarrierLevel; }
-/// The rule of a curved cell of `level`, where the setup's `degree` is that of level 0.
+/// The rule of a curved cell: that of closed_quadrature, or, at level 0, that of `degree`.
 template <int Dim>
 const std::vector<QuadraturePoint<Dim>>& cell_quadrature(int level, int degree) {
-  return closed_level(level) == 0 ? quadrature<Dim>(degree) : closed_quadrature<Dim>(closed_level(level));
+  return level == 0 ? quadrature<Dim>(degree) : closed_quadrature<Dim>(level);
 }
 
 inline constexpr int kMassDegree = 4;  ///< products of two quadratic functions

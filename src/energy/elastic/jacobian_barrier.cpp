@@ -3,15 +3,22 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "geometry/quadratic_bernstein.hpp"
-#include "itr/fem/quadrature.hpp"
 
 namespace itr {
 
 namespace {
+
+template <int Dim>
+constexpr int kRefinements = Dim == 2 ? 4 : 3;  ///< d
+template <int Dim>
+constexpr double kShare = 1.0 / (1 << kRefinements<Dim>);
+template <int Dim>
+constexpr std::size_t kCoefficients = Dim == 2 ? 6 : 20;
 
 /// phi and its derivatives by s.
 struct Phi {
@@ -53,34 +60,7 @@ std::array<Vec<Dim>, Dim> columns_of(const Term& term, const std::array<Mat<Dim>
 }  // namespace
 
 template <int Dim>
-const std::vector<typename JacobianBarrier<Dim>::Part>& JacobianBarrier<Dim>::parts(int depth) {
-  static const auto all = [] {
-    std::array<std::vector<Part>, kMostBarrierDepth> by_depth;
-    Part whole{};
-    for (int k = 0; k <= Dim; ++k) whole[k][k] = 1;
-    by_depth[0] = {whole};
-    for (int d = 1; d < kMostBarrierDepth; ++d)
-      for (const Part& part : by_depth[d - 1])
-        for (const auto& child : child_corners<Dim>()) {
-          Part& finer = by_depth[d].emplace_back();
-          for (int v = 0; v <= Dim; ++v)
-            for (int k = 0; k <= Dim; ++k) finer[v][k] = (part[child[v][0]][k] + part[child[v][1]][k]) / 2;
-        }
-    return by_depth;
-  }();
-  return all[depth - 1];
-}
-
-template <int Dim>
-JacobianBarrier<Dim>::PartState::PartState(const Element& element, const Nodal& positions, const Part& corners) {
-  for (int c = 0; c <= Dim; ++c) {
-    shapes[c] = shape_gradients<Dim>(element, corners[c]);
-    F[c] = positions * shapes[c].transpose();
-  }
-}
-
-template <int Dim>
-double JacobianBarrier<Dim>::PartState::coefficient(std::size_t k) const {
+double JacobianBarrier<Dim>::Part::coefficient(std::size_t k) const {
   const auto& terms = coefficients<Dim>()[k].terms;
   double sum = 0;
   for (const auto& term : terms) {
@@ -91,7 +71,7 @@ double JacobianBarrier<Dim>::PartState::coefficient(std::size_t k) const {
 }
 
 template <int Dim>
-void JacobianBarrier<Dim>::PartState::add_gradient(std::size_t k, double factor, Nodal& gradient) const {
+void JacobianBarrier<Dim>::Part::add_gradient(std::size_t k, double factor, Nodal& gradient) const {
   const auto& terms = coefficients<Dim>()[k].terms;
   factor /= static_cast<double>(terms.size());
   for (const auto& term : terms) {
@@ -101,7 +81,7 @@ void JacobianBarrier<Dim>::PartState::add_gradient(std::size_t k, double factor,
 }
 
 template <int Dim>
-void JacobianBarrier<Dim>::PartState::add_hessian(std::size_t k, double factor, Block& block) const {
+void JacobianBarrier<Dim>::Part::add_hessian(std::size_t k, double factor, Block& block) const {
   const auto& terms = coefficients<Dim>()[k].terms;
   factor /= static_cast<double>(terms.size());
   for (const auto& term : terms) {
@@ -121,49 +101,78 @@ void JacobianBarrier<Dim>::PartState::add_hessian(std::size_t k, double factor, 
 }
 
 template <int Dim>
-JacobianBarrier<Dim>::JacobianBarrier(const Element& element, const Nodal& positions, int depth)
-    : element_(element), positions_(positions), depth_(depth) {
+JacobianBarrier<Dim>::JacobianBarrier(CurvedEdges curved, const Eigen::Matrix<double, Dim, Dim + 1>& linear,
+                                      const Nodal& positions) {
+  for (int c = 0; c <= Dim; ++c) {
+    std::array<double, Dim + 1> corner{};
+    corner[c] = 1;
+    whole_.shapes[c] = quadratic_gradients<Dim, Dim>(curved, corner, linear);
+    whole_.F[c] = positions * whole_.shapes[c].transpose();
+  }
   const std::size_t count = coefficients<Dim>().size();
-  const PartState whole(element, positions, parts(1)[0]);
-  for (std::size_t k = 0; k < count; ++k) mean_ += whole.coefficient(k) / static_cast<double>(count);
-  is_positive_ = mean_ > 0;
-  for (std::size_t p = 0; is_positive_ && p < parts(depth).size(); ++p) {
-    const PartState part = state_of(p);
-    for (std::size_t k = 0; is_positive_ && k < count; ++k) {
-      const double ratio = part.coefficient(k) / mean_;
-      is_positive_ = ratio > 0;
-      least_ratio_ = std::min(least_ratio_, ratio);
-      if (is_positive_ && ratio < kActive) active_.push_back({p, k, ratio});
+  for (std::size_t k = 0; k < count; ++k) mean_ += whole_.coefficient(k) / static_cast<double>(count);
+  if (mean_ > 0)
+    search(whole_, kRefinements<Dim>);
+  else
+    least_ratio_ = 0;
+}
+
+template <int Dim>
+void JacobianBarrier<Dim>::search(const Part& part, int refinements_left) {
+  const auto& all = coefficients<Dim>();
+  std::array<double, kCoefficients<Dim>> ratios;
+  double least = 1;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    ratios[k] = part.coefficient(k) / mean_;
+    least = std::min(least, ratios[k]);
+    if (!(ratios[k] > 0) && (all[k].is_value || refinements_left == 0)) {
+      least_ratio_ = 0;
+      return;
     }
+  }
+  if (least >= kActive || refinements_left == 0) {
+    least_ratio_ = std::min(least_ratio_, least);
+    if (least >= kActive) return;
+    for (std::size_t k = 0; k < all.size(); ++k)
+      if (ratios[k] < kActive) active_.push_back({parts_.size(), k, ratios[k]});
+    parts_.push_back(part);
+    return;
+  }
+  for (const auto& child : child_corners<Dim>()) {
+    Part finer;
+    for (int v = 0; v <= Dim; ++v) {
+      const auto [i, j] = child[v];
+      finer.shapes[v] = (part.shapes[i] + part.shapes[j]) / 2;
+      finer.F[v] = (part.F[i] + part.F[j]) / 2;
+    }
+    search(finer, refinements_left - 1);
+    if (least_ratio_ == 0) return;
   }
 }
 
 template <int Dim>
 double JacobianBarrier<Dim>::value() const {
-  if (!is_positive_) return std::numeric_limits<double>::infinity();
+  if (least_ratio_ == 0) return std::numeric_limits<double>::infinity();
   double sum = 0;
   for (const Active& active : active_) sum += phi(active.ratio, kActive).value;
-  return sum / static_cast<double>(parts(depth_).size());
+  return kShare<Dim> * sum;
 }
 
 template <int Dim>
 typename JacobianBarrier<Dim>::Nodal JacobianBarrier<Dim>::mean_gradient() const {
   Nodal gradient = Nodal::Zero();
-  const std::size_t count = coefficients<Dim>().size();
-  const PartState whole(element_, positions_, parts(1)[0]);
-  for (std::size_t k = 0; k < count; ++k) whole.add_gradient(k, 1.0 / static_cast<double>(count), gradient);
+  for (std::size_t k = 0; k < coefficients<Dim>().size(); ++k)
+    whole_.add_gradient(k, 1.0 / static_cast<double>(coefficients<Dim>().size()), gradient);
   return gradient;
 }
 
 template <int Dim>
 typename JacobianBarrier<Dim>::Nodal JacobianBarrier<Dim>::gradient() const {
   Nodal gradient = Nodal::Zero();
-  if (active_.empty()) return gradient;
-  const double share = 1 / (mean_ * static_cast<double>(parts(depth_).size()));
   double of_mean = 0;
   for (const Active& active : active_) {
-    const double slope = share * phi(active.ratio, kActive).first;
-    state_of(active.part).add_gradient(active.coefficient, slope, gradient);
+    const double slope = kShare<Dim> / mean_ * phi(active.ratio, kActive).first;
+    parts_[active.part].add_gradient(active.coefficient, slope, gradient);
     of_mean -= slope * active.ratio;
   }
   return gradient + of_mean * mean_gradient();
@@ -174,27 +183,25 @@ template <int Dim>
 typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
   using Column = Eigen::Matrix<double, Dim * kQuadraticNodes<Dim>, 1>;
   Block block = Block::Zero();
-  if (active_.empty()) return block;
-  const double share = 1 / static_cast<double>(parts(depth_).size());
   const Nodal of_mean = mean_gradient();
   const Eigen::Map<const Column> dm(of_mean.data());
+  Column mixed = Column::Zero();
   double mean_factor = 0;
   for (const Active& active : active_) {
     const Phi value = phi(active.ratio, kActive);
-    const PartState part = state_of(active.part);
     Nodal of_ratio = -active.ratio / mean_ * of_mean;
-    part.add_gradient(active.coefficient, 1 / mean_, of_ratio);
+    parts_[active.part].add_gradient(active.coefficient, 1 / mean_, of_ratio);
     const Eigen::Map<const Column> ds(of_ratio.data());
-    block.noalias() += share * value.second * ds * ds.transpose();
-    const double slope = share * value.first / mean_;
-    block.noalias() -= slope * (ds * dm.transpose());
-    block.noalias() -= slope * (dm * ds.transpose());
-    part.add_hessian(active.coefficient, slope, block);
+    block.noalias() += (kShare<Dim> * value.second * ds) * ds.transpose();
+    const double slope = kShare<Dim> / mean_ * value.first;
+    parts_[active.part].add_hessian(active.coefficient, slope, block);
+    mixed -= slope * ds;
     mean_factor -= slope * active.ratio;
   }
-  const std::size_t count = coefficients<Dim>().size();
-  const PartState whole(element_, positions_, parts(1)[0]);
-  for (std::size_t k = 0; k < count; ++k) whole.add_hessian(k, mean_factor / static_cast<double>(count), block);
+  block.noalias() += mixed * dm.transpose();
+  block.noalias() += dm * mixed.transpose();
+  for (std::size_t k = 0; k < coefficients<Dim>().size(); ++k)
+    whole_.add_hessian(k, mean_factor / static_cast<double>(coefficients<Dim>().size()), block);
   return block;
 }
 

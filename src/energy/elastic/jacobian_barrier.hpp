@@ -2,10 +2,12 @@
 // A barrier that keeps det F above zero all over a curved cell. No quadrature rule does: between its points det F may
 // vanish, and validity (quadratic_validity.hpp) then stops Newton's step at a place that the energy does not see.
 //
-// det F is a polynomial in the cell. It lies between the least and the greatest of its Bernstein coefficients b_k, on the
-// cell or on each of its equal parts. With their mean m over the cell, the barrier is the mean over parts of
-//   sum_k phi(b_k / m),   phi(s) = -(s/s0 - 1)^2 ln(s/s0) where s < s0 = 0.05, else 0,
-// zero with two derivatives where no coefficient is far below the mean, and infinite where one vanishes.
+// On a part of the cell, det F lies between the least and the greatest of its Bernstein coefficients b_k. Over the 2^(Dim d)
+// equal parts of d uniform refinements, with the mean m of det F over the cell, the barrier is
+//   2^-d sum over parts and k of phi(b_k / m),   phi(s) = -(s/s0 - 1)^2 ln(s/s0) where s < s0 = 0.05, else 0.
+// It is infinite where a coefficient is not positive, and zero with two derivatives where none is far below the mean. The
+// weight 2^-d is that of parts along a line. Coefficients of a part bound those of its refinement, so that parts in which
+// none is below s0 m are not refined.
 #pragma once
 
 #include <vector>
@@ -18,53 +20,48 @@ namespace itr {
 template <int Dim>
 class JacobianBarrier {
  public:
-  using Element = typename CellSet<Dim>::CurvedElement;
   using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;  ///< columns
   using Block = Mat<Dim * kQuadraticNodes<Dim>>;
   static constexpr double kActive = 0.05;  ///< s0
 
-  /// `positions` are those of at_nodes. Depth 1: the whole cell; each more refines it uniformly once. At most
-  /// kMostBarrierDepth.
-  JacobianBarrier(const Element& element, const Nodal& positions, int depth);
-  /// Of det F in the cell.
+  /// `linear`: gradients of barycentric coordinates as columns. `positions` are those of at_nodes.
+  JacobianBarrier(CurvedEdges curved, const Eigen::Matrix<double, Dim, Dim + 1>& linear, const Nodal& positions);
+  JacobianBarrier(const typename CellSet<Dim>::CurvedElement& element, const Nodal& positions)
+      : JacobianBarrier(element.curved, barycentric_gradients<Dim>(element.inverse_edges), positions) {}
+
+  /// Whether it is not zero.
+  bool is_active() const { return least_ratio_ < kActive; }
+  /// The least b_k / m of parts that are not refined; one that is not positive ends the search.
+  double least_ratio() const { return least_ratio_; }
+  /// The mean of det F.
   double mean() const { return mean_; }
-  /// Of those looked at: none is, after one that is not positive.
-  double least_coefficient() const { return least_ratio_ * mean_; }
-  /// Infinite unless all coefficients are positive, which proves that det F is.
   double value() const;
   /// By the positions of nodes.
   Nodal gradient() const;
   Block hessian() const;
 
  private:
-  using Corner = std::array<double, Dim + 1>;  ///< barycentric
-  using Part = std::array<Corner, Dim + 1>;
-  /// A part with shape gradients and F at its corners.
-  struct PartState {
-    PartState(const Element& element, const Nodal& positions, const Part& corners);
+  /// Shape gradients and F at the corners of a part.
+  struct Part {
+    std::array<Nodal, Dim + 1> shapes;
+    std::array<Mat<Dim>, Dim + 1> F;
+
     double coefficient(std::size_t k) const;
     void add_gradient(std::size_t k, double factor, Nodal& gradient) const;
     void add_hessian(std::size_t k, double factor, Block& block) const;
-
-    std::array<Nodal, Dim + 1> shapes;
-    std::array<Mat<Dim>, Dim + 1> F;
   };
-  /// A coefficient below s0 times the mean.
+  /// A coefficient below s0 m.
   struct Active {
     std::size_t part, coefficient;
     double ratio;
   };
 
-  static const std::vector<Part>& parts(int depth);
-  PartState state_of(std::size_t part) const { return {element_, positions_, parts(depth_)[part]}; }
+  void search(const Part& part, int refinements_left);
   Nodal mean_gradient() const;
 
-  const Element& element_;
-  const Nodal positions_;
-  int depth_;
-  double mean_ = 0;
-  double least_ratio_ = 1;
-  bool is_positive_ = true;
+  Part whole_;
+  double mean_ = 0, least_ratio_ = 1;
+  std::vector<Part> parts_;  ///< those with active coefficients
   std::vector<Active> active_;
 };
 

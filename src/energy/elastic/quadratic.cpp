@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "core/parallel_reduce.hpp"
 #include "energy/project_block.hpp"
@@ -17,8 +18,9 @@ namespace {
 
 constexpr std::size_t kBlock = 64;
 constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
-constexpr double kBlindShare = 0.2;       ///< of det F at quadrature points: where it is less, they do not see it
-constexpr double kBoundTolerance = 0.1;   ///< relative, of the bound of det F
+constexpr double kLeastStep = 1e-12;
+constexpr double kBlindShare = 0.2;      ///< of det F at quadrature points: where it is less, they do not see it
+constexpr double kBlindTolerance = 0.1;  ///< relative, of the bound that tells
 /// Where the Jacobian varies less, det F is anywhere at least ((1 - 0.2) / (1 + 0.2))^3 of what points see, 0.29.
 constexpr double kSeen = 0.2;
 
@@ -125,9 +127,22 @@ class NeoHookeanSum {
   double pairs_[Dim * (Dim + 1) / 2][kNodes][kPadded];  ///< of i <= j; columns of b
 };
 
+/// How far a step may go: not past an inversion, and not to where a tenth of the least Bernstein coefficient of det F is
+/// left.
 template <int Dim>
-double first_unproven(const typename CellSet<Dim>::CurvedElement& element, ConstVectorView x, ConstVectorView dx) {
-  return max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, dx));
+double free_step(const typename CellSet<Dim>::CurvedElement& element, ConstVectorView x, ConstVectorView dx) {
+  const QuadraticCell<Dim> all = at_all_nodes<Dim>(element, x), all_dx = at_all_nodes<Dim>(element, dx);
+  double t = max_positive_step<Dim>(all, all_dx);
+  if (t < 1) t *= kInversionMargin;
+  if (varies_little<Dim>(all + t * all_dx, kSeen)) return t;
+  const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x), way = at_nodes<Dim>(element.nodes, dx);
+  const auto least = [&](double at) {
+    return std::min(JacobianBarrier<Dim>(element, positions + at * way).least_ratio(), JacobianBarrier<Dim>::kActive);
+  };
+  const double bound = (1 - kInversionMargin) * least(0);
+  if (bound <= 0) return t;
+  while (t > kLeastStep && least(t) < bound) t /= 2;
+  return t;
 }
 
 }  // namespace
@@ -168,58 +183,36 @@ void QuadraticElasticity<Dim>::set_levels(const QuadratureLevels& levels) {
   sample_moduli();
 }
 
-/// Whether `least`, the least det F in the cell, is much smaller than det F at all of its quadrature points.
+/// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.
 template <int Dim>
-bool QuadraticElasticity<Dim>::is_blind(std::size_t e, const QuadraticCell<Dim>& positions, double least) const {
-  double seen = std::numeric_limits<double>::infinity();
-  for (const auto& point : rule(e))
-    seen = std::min(seen,
-                    (positions * shape_gradients<Dim>(cells_.curved_elements[e], point.weights).transpose()).determinant());
-  return least < kBlindShare * seen;
-}
-
-/// 0 where `least`, the least det F in the cell, is too large for the barrier to act; else the least depth at which
-/// Bernstein coefficients tell it within a factor of 2.
-template <int Dim>
-int depth_of_barrier(const typename CellSet<Dim>::CurvedElement& element, const Nodal<Dim>& positions, double least) {
-  for (int depth = 1; depth <= kMostBarrierDepth; ++depth) {
-    const JacobianBarrier<Dim> barrier(element, positions, depth);
-    if (least >= JacobianBarrier<Dim>::kActive * barrier.mean()) return 0;
-    if (barrier.least_coefficient() >= least / 2 || (depth == kMostBarrierDepth && std::isfinite(barrier.value())))
-      return depth;
-  }
-  return 0;
-}
-
-/// An edit may leave a cell the barrier of its parent where it is infinite: then the cell gets another one.
-template <int Dim>
-int QuadraticElasticity<Dim>::next_level(std::size_t e, ConstVectorView x) const {
+bool QuadraticElasticity<Dim>::is_blind(std::size_t e, ConstVectorView x) const {
   const Element& element = cells_.curved_elements[e];
   const QuadraticCell<Dim> all = at_all_nodes<Dim>(element, x);
+  if (varies_little<Dim>(all, kSeen)) return false;
   const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
-  const int now = level(e), depth = barrier_depth(now);
-  if (depth > 0 && std::isfinite(JacobianBarrier<Dim>(element, positions, depth).value())) return now;
-  int closed = closed_level(now);
-  if (varies_little<Dim>(all, kSeen)) return closed;
-  const double least = min_jacobian_bound<Dim>(all, kBoundTolerance) * element.inverse_edges.determinant();
-  if (closed < kMostClosedLevel && is_blind(e, positions, least)) ++closed;
-  return closed + kBarrierLevel * depth_of_barrier<Dim>(element, positions, least);
+  double seen = std::numeric_limits<double>::infinity();
+  for (const auto& point : rule(e))
+    seen = std::min(seen, (positions * shape_gradients<Dim>(element, point.weights).transpose()).determinant());
+  const double enough = kBlindShare * seen / element.inverse_edges.determinant();
+  return min_jacobian_bound<Dim>(all, kBlindTolerance, enough) < enough;
 }
 
 template <int Dim>
 bool QuadraticElasticity<Dim>::refine_quadrature(ConstVectorView x) {
   const std::size_t n = by_element_.size();
-  QuadratureLevels next(n);
+  std::vector<char> is_to_refine(n, 0);
   parallel_blocks(n, kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e) next[e] = static_cast<std::uint8_t>(next_level(e, x));
+    for (std::size_t e = begin; e < end; ++e)
+      is_to_refine[e] = (levels_.empty() || levels_[e] < kMostClosedLevel) && is_blind(e, x);
   });
-  if (levels_.empty() ? std::all_of(next.begin(), next.end(), [](int level) { return level == 0; }) : next == levels_)
-    return false;
-  set_levels(next);
+  if (std::find(is_to_refine.begin(), is_to_refine.end(), 1) == is_to_refine.end()) return false;
+  levels_.resize(n, 0);
+  for (std::size_t e = 0; e < n; ++e) levels_[e] = static_cast<std::uint8_t>(levels_[e] + is_to_refine[e]);
+  sample_moduli();
   return true;
 }
 
-/// The barrier's factor [J]: rest volume times the law's greatest stiffness at rest.
+/// The barrier's factor without `scale_` [J]: rest volume times the law's greatest stiffness at rest.
 template <int Dim>
 double QuadraticElasticity<Dim>::barrier_weight(std::size_t e) const {
   const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), moduli(e, 0)).values;
@@ -238,8 +231,8 @@ double QuadraticElasticity<Dim>::value(ConstVectorView x) const {
                const Mat<Dim> F = positions * shape_gradients<Dim>(element, rule[q].weights).transpose();
                sum += rule[q].share * element.volume * elastic_density<Dim>(F, moduli(e, q));
              }
-             if (const int depth = barrier_depth(level(e)))
-               sum += barrier_weight(e) * JacobianBarrier<Dim>(element, positions, depth).value();
+             if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active())
+               sum += barrier_weight(e) * barrier.value();
            }
            return sum;
          });
@@ -257,8 +250,8 @@ void QuadraticElasticity<Dim>::add_gradient(ConstVectorView x, VectorView gradie
       const Mat<Dim> P = elastic_stress<Dim>(positions * gradients.transpose(), moduli(e, q));
       forces.noalias() += (scale_ * rule[q].share * element.volume) * (P * gradients);
     }
-    if (const int depth = barrier_depth(level(e)))
-      forces += scale_ * barrier_weight(e) * JacobianBarrier<Dim>(element, positions, depth).gradient();
+    if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active())
+      forces += scale_ * barrier_weight(e) * barrier.gradient();
     return forces;
   };
   parallel_then_ordered<Nodal<Dim>>(cells_.curved_elements.size(), kBlock, forces_of,
@@ -296,10 +289,10 @@ void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd,
     }
     modes.finish();
     if (is_neo_hookean) exact.add_to(block);
-    if (const int depth = barrier_depth(level(e))) {
-      Mat<Dim* kNodes> barrier = JacobianBarrier<Dim>(element, positions, depth).hessian();
-      project_block(barrier, psd);
-      block += scale_ * barrier_weight(e) * barrier;
+    if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active()) {
+      Mat<Dim* kNodes> of_barrier = scale_ * barrier_weight(e) * barrier.hessian();
+      project_block(of_barrier, psd);
+      block += of_barrier;
     }
   });
 }
@@ -308,10 +301,8 @@ template <int Dim>
 double QuadraticElasticity<Dim>::max_step(ConstVectorView x, ConstVectorView dx) const {
   return parallel_min(cells_.curved_elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     double step = 1;
-    for (std::size_t e = begin; e < end; ++e) {
-      const double t = first_unproven<Dim>(cells_.curved_elements[e], x, dx);
-      if (t < 1) step = std::min(step, kInversionMargin * t);
-    }
+    for (const Element& element : std::span(cells_.curved_elements).subspan(begin, end - begin))
+      step = std::min(step, free_step<Dim>(element, x, dx));
     return step;
   });
 }
@@ -319,7 +310,7 @@ double QuadraticElasticity<Dim>::max_step(ConstVectorView x, ConstVectorView dx)
 template <int Dim>
 void QuadraticElasticity<Dim>::limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const {
   for (const Element& element : cells_.curved_elements) {
-    const double t = kInversionMargin * first_unproven<Dim>(element, x, dx);
+    const double t = free_step<Dim>(element, x, dx);
     if (t < least.step) least = {t, "cell", {element.nodes.begin(), element.nodes.begin() + Dim + 1}};
   }
 }

@@ -12,12 +12,11 @@
 #include "itr/energy/step_limit.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadrature.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr {
 
-/// scale * sum over curved elements and points of share * rest volume * W(F), and in elements whose level has a barrier
-/// depth, scale * rest volume * stiffness at rest * JacobianBarrier. Feasible: det F > 0 everywhere in each cell.
+/// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus stiffness at rest *
+/// JacobianBarrier). Feasible: det F > 0 everywhere in each cell.
 template <int Dim>
 class QuadraticElasticity {
  public:
@@ -37,14 +36,14 @@ class QuadraticElasticity {
   using Element = typename CellSet<Dim>::CurvedElement;
   static constexpr int kNodes = kQuadraticNodes<Dim>;
 
-  int level(std::size_t e) const { return levels_.empty() ? 0 : levels_[e]; }
-  const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const { return cell_quadrature<Dim>(level(e), degree_); }
+  const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
+    return cell_quadrature<Dim>(levels_.empty() ? 0 : levels_[e], degree_);
+  }
   const ElasticModuli& moduli(std::size_t e, std::size_t point) const {
     return varying_.empty() ? *by_element_[e] : varying_[first_varying_[e] + point];
   }
   void sample_moduli();
-  bool is_blind(std::size_t e, const QuadraticCell<Dim>& positions, double least) const;
-  int next_level(std::size_t e, ConstVectorView x) const;
+  bool is_blind(std::size_t e, ConstVectorView x) const;
   double barrier_weight(std::size_t e) const;
 
   const CellSet<Dim>& cells_;

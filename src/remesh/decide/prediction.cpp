@@ -9,6 +9,7 @@
 #include <span>
 
 #include <boost/container/small_vector.hpp>
+#include "energy/elastic/jacobian_barrier.hpp"
 #include "nodal_models.hpp"
 #include "quadratic_model.hpp"
 #include "remesh/edits.hpp"
@@ -186,13 +187,17 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
 
 namespace {
 
-/// Whether a cell around an edge has a Jacobian barrier, which no prediction contains.
+/// Whether a JacobianBarrier acts in a cell around an edge: no prediction contains it.
 template <int Dim>
 bool has_barrier(const RemeshState<Dim>& state, const EdgeKey& edge) {
-  const auto& levels = state.fields.levels;
-  const auto around = state.mesh.cells_of_edge(edge);
-  return !levels.empty() &&
-         std::any_of(around.begin(), around.end(), [&](CellId c) { return barrier_depth(levels[c]) > 0; });
+  const Mesh<Dim>& mesh = state.mesh;
+  const auto around = mesh.cells_of_edge(edge);
+  return std::any_of(around.begin(), around.end(), [&](CellId c) {
+    if (!mesh.is_curved(c)) return false;
+    const CurvedCell<Dim> cell = cell_before(mesh, c);
+    const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
+    return JacobianBarrier<Dim>(cell.edges, linear, at_nodes<Dim>(cell.nodes, state.fields.x)).is_active();
+  });
 }
 
 /// Whether the nodes of curved edges around an edge feel only terms of constant moduli and density, and no tractions.

@@ -21,7 +21,7 @@ class QuadraticElasticity;
 using QuadratureLevels = std::vector<std::uint8_t>;
 
 /// scale * integral of W(F) over the rest shape: exact on straight elements, by quadrature on curved ones. Feasible: det F >
-/// 0 everywhere in every element.
+/// 0 everywhere in every element. Where det F varies much in a curved element, a barrier adds to it (JacobianBarrier).
 template <int Dim>
 class ElasticEnergy final : public Energy {
  public:
@@ -39,9 +39,8 @@ class ElasticEnergy final : public Energy {
   /// 0.9 of the first time at which an element's volume vanishes on the way.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override;
   /// Validity asks for det F > 0 everywhere, the energy sees it at quadrature points only. Where det F is much smaller
-  /// elsewhere in a curved element, it gets a finer rule with points at its corners, and where the finest one does not
-  /// suffice, a barrier (JacobianBarrier), so that Newton is not stopped again and again by what the energy does not see.
-  /// Says whether any did: the energy is another one then.
+  /// elsewhere in a curved element, it gets a finer rule with points at its corners, so that Newton is not stopped again and
+  /// again by what the energy does not see. Says whether any did: the energy is another one then.
   bool refine_quadrature(ConstVectorView x);
   QuadratureLevels quadrature_levels() const;
   void set_quadrature_levels(const QuadratureLevels& levels);
