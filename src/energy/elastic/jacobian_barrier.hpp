@@ -41,24 +41,30 @@ class JacobianBarrier {
   Block hessian() const;
 
  private:
-  /// Shape gradients and F at the corners of a part.
   struct Part {
-    std::array<Nodal, Dim + 1> shapes;
-    std::array<Mat<Dim>, Dim + 1> F;
+    std::array<std::array<double, Dim + 1>, Dim + 1> corners;  ///< barycentric
+    std::array<Mat<Dim>, Dim + 1> F;                           ///< there
 
     double coefficient(std::size_t k) const;
-    void add_gradient(std::size_t k, double factor, Nodal& gradient) const;
-    void add_hessian(std::size_t k, double factor, Block& block) const;
   };
   /// A coefficient below s0 m.
   struct Active {
     std::size_t part, coefficient;
     double ratio;
   };
+  /// Shape gradients at a part's corners.
+  using Shapes = std::array<Nodal, Dim + 1>;
+  /// By pairs of nodes a, b, the independent entries of d2b / dx_a dx_b, which is skew.
+  using SkewBlocks = std::array<Mat<kQuadraticNodes<Dim>>, Dim == 2 ? 1 : 3>;
 
   void search(const Part& part, int refinements_left);
+  Shapes shapes_of(const Part& part) const;
+  void add_gradient(const Part& part, const Shapes& shapes, std::size_t k, double factor, Nodal& gradient) const;
+  void add_hessian(const Part& part, const Shapes& shapes, std::size_t k, double factor, SkewBlocks& blocks) const;
   Nodal mean_gradient() const;
 
+  CurvedEdges curved_;
+  Eigen::Matrix<double, Dim, Dim + 1> linear_;
   Part whole_;
   double mean_ = 0, least_ratio_ = 1;
   std::vector<Part> parts_;  ///< those with active coefficients
