@@ -55,8 +55,8 @@ std::array<Vec<Dim>, Dim> columns_of(const Term& term, const std::array<Mat<Dim>
   return columns;
 }
 
-/// Whether F = M (I + E) with |E| < 0.2 at all corners, M its mean. Then coefficients are at least ((1 - 0.2) / (1 +
-/// 0.2))^3, 0.29, of m.
+/// Whether F = M (I + E) with |E| < 1/2 at all corners, M its mean. A coefficient is a mean of determinants with columns
+/// from corners, each at least (1 - 1/2)^3 det M, and m is at most 1.9 det M: so that no coefficient is below s0 m.
 template <int Dim>
 bool varies_little(const std::array<Mat<Dim>, Dim + 1>& F) {
   Mat<Dim> mean = Mat<Dim>::Zero();
@@ -64,7 +64,7 @@ bool varies_little(const std::array<Mat<Dim>, Dim + 1>& F) {
   if (!(mean.determinant() > 0)) return false;
   const Mat<Dim> inverse = mean.inverse();
   return std::all_of(F.begin(), F.end(), [&](const Mat<Dim>& at_corner) {
-    return (inverse * at_corner - Mat<Dim>::Identity()).squaredNorm() < 0.04;
+    return (inverse * at_corner - Mat<Dim>::Identity()).squaredNorm() < 0.25;
   });
 }
 
@@ -120,12 +120,20 @@ template <int Dim>
 JacobianBarrier<Dim>::JacobianBarrier(CurvedEdges curved, const Eigen::Matrix<double, Dim, Dim + 1>& linear,
                                       const Nodal& positions)
     : curved_(curved), linear_(linear) {
+  // With the offset o of an edge's node from the middle of its ends, F has 4 o grad^T of the barycentric coordinate of the
+  // other end at each end.
+  whole_.F.fill(positions.template leftCols<Dim + 1>() * linear.transpose());
+  for_each_edge<Dim>([&](int edge, int i, int j) {
+    if (!(curved >> edge & 1)) return;
+    const Vec<Dim> offset = 4 * positions.col(Dim + 1 + edge) - 2 * (positions.col(i) + positions.col(j));
+    whole_.F[i].noalias() += offset * linear.col(j).transpose();
+    whole_.F[j].noalias() += offset * linear.col(i).transpose();
+  });
+  if (varies_little<Dim>(whole_.F)) return;
   for (int c = 0; c <= Dim; ++c) {
     whole_.corners[c] = {};
     whole_.corners[c][c] = 1;
-    whole_.F[c] = positions * quadratic_gradients<Dim, Dim>(curved, whole_.corners[c], linear).transpose();
   }
-  if (varies_little<Dim>(whole_.F)) return;
   const std::size_t count = coefficients<Dim>().size();
   for (std::size_t k = 0; k < count; ++k) mean_ += whole_.coefficient(k) / static_cast<double>(count);
   if (mean_ > 0)

@@ -127,21 +127,18 @@ class NeoHookeanSum {
   double pairs_[Dim * (Dim + 1) / 2][kNodes][kPadded];  ///< of i <= j; columns of b
 };
 
-/// How far a step may go: not past an inversion, and not to where a tenth of the least Bernstein coefficient of det F is
-/// left.
+/// How far a step may go: not past an inversion, and not to where less than a tenth of the least Bernstein coefficient of
+/// det F is left.
 template <int Dim>
 double free_step(const typename CellSet<Dim>::CurvedElement& element, ConstVectorView x, ConstVectorView dx) {
-  const QuadraticCell<Dim> all = at_all_nodes<Dim>(element, x), all_dx = at_all_nodes<Dim>(element, dx);
-  double t = max_positive_step<Dim>(all, all_dx);
+  double t = max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, dx));
   if (t < 1) t *= kInversionMargin;
-  if (varies_little<Dim>(all + t * all_dx, kSeen)) return t;
   const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x), way = at_nodes<Dim>(element.nodes, dx);
-  const auto least = [&](double at) {
-    return std::min(JacobianBarrier<Dim>(element, positions + at * way).least_ratio(), JacobianBarrier<Dim>::kActive);
-  };
-  const double bound = (1 - kInversionMargin) * least(0);
-  if (bound <= 0) return t;
-  while (t > kLeastStep && least(t) < bound) t /= 2;
+  const auto least = [&](double at) { return JacobianBarrier<Dim>(element, positions + at * way).least_ratio(); };
+  double at_end = least(t);
+  if (at_end >= JacobianBarrier<Dim>::kActive) return t;
+  const double bound = (1 - kInversionMargin) * std::min(least(0), JacobianBarrier<Dim>::kActive);
+  for (; bound > 0 && at_end < bound && t > kLeastStep; at_end = least(t)) t /= 2;
   return t;
 }
 
