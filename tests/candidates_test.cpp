@@ -157,6 +157,9 @@ TEST(Candidates, OfAFreeFlightAreWalkedThrough) {
   const double far = contact.max_step(scene.x, 1e6 * dx, workspace);
   EXPECT_GT(far, 0);
   EXPECT_LT(far, 1) << "walks have an end";
+  const StepLimit limit = contact.step_limit(scene.x, 1e6 * dx, workspace);
+  EXPECT_EQ(limit.step, 1) << "no pair limits it";
+  EXPECT_TRUE(limit.vertices.empty());
 }
 
 /// Where bodies at rest have many pairs, a limit on those of motions must not cut steps to the reach.

@@ -18,6 +18,7 @@ struct CcdOptions {
 /// one; else the largest t such that on [0, t] they keep at least `min_separation_ratio` of it. Both conservative estimates;
 /// 0 only if they touch at the start. No motion brings primitives nearer than 1e-14 of their largest coordinate, where
 /// round-off could decide on which side they are: from such a distance, 0 unless they move apart.
+/// Pairs of input within round-off stay: 0.
 template <int Dim>
 double point_edge_ccd(const Vec<Dim>& p0, const Vec<Dim>& a0, const Vec<Dim>& b0, const Vec<Dim>& p1, const Vec<Dim>& a1,
                       const Vec<Dim>& b1, const CcdOptions& options = {});

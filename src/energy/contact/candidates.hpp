@@ -65,7 +65,7 @@ class ContactCandidates {
   void update(const CollisionSurface& surface, ConstVectorView x, double reach) {
     hold(surface, x, nullptr, reach, kNoLimit);
   }
-  /// Makes the pairs hold for the motion of x by dx. Where these would be more than most_pairs(), `part` gets the longest of
+  /// Makes the pairs hold for the motion of x by dx. Where these would be more than most_now(), `part` gets the longest of
   /// dx / 2, dx / 4, ... that takes no more, or that is shorter than `reach`. Returns the share of dx that the pairs hold
   /// for, at most `longest`.
   double update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part,

@@ -499,6 +499,7 @@ StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, 
       }
     return least.step;
   });
+  if (least.kind.empty()) least.step = 1;  // the parts that were walked are free
   return least;
 }
 
