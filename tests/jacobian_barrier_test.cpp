@@ -35,6 +35,13 @@ CellSet<Dim> one_cell() {
 }
 
 template <int Dim>
+double mean_jacobian(const QuadraticCell<Dim>& x) {
+  double mean = 0;
+  for (const auto& point : quadrature<Dim>(Dim)) mean += point.share * jacobian_at<Dim>(x, point.weights);
+  return mean;
+}
+
+template <int Dim>
 VectorX flat(const QuadraticCell<Dim>& x) {
   return Eigen::Map<const VectorX>(x.data(), x.size());
 }
@@ -75,7 +82,7 @@ TYPED_TEST(JacobianBarriers, ActWhereDetFIsFarBelowItsMeanAndAreFiniteOnlyWhereI
     if (!std::isfinite(barrier.value())) continue;
     ++finite;
     ASSERT_TRUE(is_positive_everywhere_exact<Dim>(x));
-    const double ratio = min_jacobian_bound<Dim>(x, 1e-3) / barrier.mean();
+    const double ratio = min_jacobian_bound<Dim>(x, 1e-3) / mean_jacobian<Dim>(x);
     if (ratio < 0.9 * JacobianBarrier<Dim>::kActive) {
       ++acting;
       EXPECT_GT(barrier.value(), 0);

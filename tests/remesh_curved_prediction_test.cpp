@@ -7,6 +7,7 @@
 
 #include "curved_scene.hpp"
 #include "curved_trial.hpp"
+#include "energy/elastic/jacobian_barrier.hpp"
 #include "remesh/baselines/baseline.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/prospect.hpp"
@@ -229,6 +230,42 @@ TYPED_TEST(CurvedPrediction, AvailableEnergyIsOfTheFunctions) {
         scene.apply(make_curve(scene.mesh, edge));
     EXPECT_NEAR(available_energy(scene.mesh, scene.fields, context), straight, 1e-12 * straight) << "seed " << seed;
   }
+}
+
+/// The energies of cells have the barrier of distorted ones, and predictions without it cannot tell there.
+TYPED_TEST(CurvedPrediction, BarriersArePartOfEnergies) {
+  constexpr int Dim = TypeParam::value;
+  int compared = 0;
+  for (unsigned seed = 1; seed < 1200; seed += 2) {
+    CurvedScene<Dim> scene(seed, 0.5, (0.2 + 0.01 * (seed % 80)) * (Dim == 2 ? 0.12 : 0.06));
+    StepContext<Dim> context = context_of<Dim>(seed);
+    context.loads = {};
+    context.coupling = 0;
+    const Compact<Dim> compact(scene.mesh);
+    const CellSet<Dim> cells = whole_mesh(compact.mesh, {}, compact.space);
+    Workspace workspace;
+    const VectorX x = compact.field(scene.fields.x);
+    const double whole =
+        ElasticEnergy<Dim>(cells, context.materials, context.scaling, context.quadrature_degree).value(x, workspace);
+    const auto is_active = [&](const auto& e) { return JacobianBarrier<Dim>(e, at_nodes<Dim>(e.nodes, x)).is_active(); };
+    const auto active = std::find_if(cells.curved_elements.begin(), cells.curved_elements.end(), is_active);
+    if (active == cells.curved_elements.end() || !std::isfinite(whole)) continue;
+    const View<Dim> view(scene, context);
+    const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
+    double sum = 0;
+    for (CellId c = 0; c < scene.mesh.cell_slots(); ++c)
+      sum += cell_energy<Dim>(view.state, scene.mesh.cell(c), scene.mesh.body(c), none);
+    EXPECT_NEAR(sum, whole, 1e-10 * whole) << "seed " << seed;
+    EXPECT_NEAR(available_energy(scene.mesh, scene.fields, context), whole, 1e-10 * whole) << "seed " << seed;
+    for (const EdgeKey& edge : edges_of<Dim>(scene.mesh, std::array{active->cell})) {
+      EXPECT_TRUE(std::isnan(predict_split_at_curves<Dim>(view.state, edge)));
+      EXPECT_TRUE(std::isnan(scene.mesh.node_of(edge[0], edge[1]) == kNone ? predict_curve<Dim>(view.state, edge)
+                                                                           : predict_straighten<Dim>(view.state, edge)));
+      EXPECT_TRUE(std::isinf(predict_gain<Dim>(view.state, make_split(scene.mesh, edge))));
+    }
+    ++compared;
+  }
+  EXPECT_GT(compared, 3);
 }
 
 /// With a quadratic energy the prediction of a split at curved edges is what its nodes gain together.

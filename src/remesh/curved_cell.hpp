@@ -109,7 +109,7 @@ double mean_jacobian(const QuadraticCell<Dim>& x) {
   unit.col(0).setConstant(-1);
   unit.template rightCols<Dim>().setIdentity();
   double mean = 0;
-  for (const auto& point : quadrature<Dim>(2))
+  for (const auto& point : quadrature<Dim>(Dim))
     mean +=
         point.share * (x * quadratic_gradients<Dim, Dim>(kAllCurved<Dim>, point.weights, unit).transpose()).determinant();
   return mean;

@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 
@@ -21,8 +22,7 @@ namespace {
 double least_gain_of_refining(const RemeshOptions& options) {
   const double split = options.split.acceptance_tolerance.value();
   if (!options.curve.enabled) return split;
-  const double curve = options.curve.acceptance_tolerance.value_or(split);
-  return options.split.enabled ? std::min(split, curve) : curve;
+  return options.split.enabled ? std::min(split, options.curve_tolerance()) : options.curve_tolerance();
 }
 
 /// Tolerances of all operations, by RemeshMemory::Kind [J].
@@ -107,8 +107,14 @@ RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume
                               const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
                               Strata<Dim>& strata) {
   RemeshSession<Dim> session(mesh, fields, context, options, nullptr, memory, strata);
+  // Nor is the energy of a new cell infinite, which the gate does not ask.
+  const auto is_finite = [&](const Edit<Dim>& edit) {
+    return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
+      return std::isfinite(session.ask().energy_of(cell.vertices, cell.body, edit));
+    });
+  };
   const auto commit = [&](const Edit<Dim>& edit) {
-    return (least_volume == 0 || keeps_volumes(mesh, fields, edit, least_volume)) &&
+    return is_finite(edit) && (least_volume == 0 || keeps_volumes(mesh, fields, edit, least_volume)) &&
            session.commits().commit_unjudged(edit, session.scratch().gate, session.report().straightens);
   };
   const CellId first_new = mesh.cell_slots();

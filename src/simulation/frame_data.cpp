@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "cell_stress.hpp"
+#include "energy/elastic/jacobian_barrier.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/simulation/resultant.hpp"
 #include "simulation/contact_surface.hpp"
@@ -22,8 +23,8 @@ struct CellPoint {
   double share;
 };
 
-/// f(material, points) for each cell in the mesh's order: one point where F is constant, those of the elastic energy's
-/// quadrature in cells with curved edges, of which `levels` are those of the state.
+/// f(material, points, curved) for each cell in the mesh's order: one point where F is constant and `curved` is null, those
+/// of the elastic energy's quadrature in cells with curved edges, of which `levels` are those of the state.
 template <int Dim, typename Function>
 void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels,
                             const Setup<Dim>& setup, const Function& f) {
@@ -35,7 +36,7 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
     points.clear();
     if (curved == cells.curved_elements.end() || static_cast<std::size_t>(curved->cell) != c) {
       points.push_back({deformation_gradient<Dim>(*straight, x), rest_barycenter(cells, *straight), 1});
-      f(setup.materials.at(straight->body), std::span<const CellPoint<Dim>>(points));
+      f(setup.materials.at(straight->body), std::span<const CellPoint<Dim>>(points), nullptr);
       ++straight;
       continue;
     }
@@ -43,7 +44,7 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
     for (const auto& point : cell_quadrature<Dim>(levels.empty() ? 0 : levels[e], setup.quadrature_degree))
       points.push_back({at_nodes<Dim>(curved->nodes, x) * shape_gradients<Dim>(*curved, point.weights).transpose(),
                         rest_position<Dim>(cells, *curved, point.weights), point.share});
-    f(setup.materials.at(curved->body), std::span<const CellPoint<Dim>>(points));
+    f(setup.materials.at(curved->body), std::span<const CellPoint<Dim>>(points), &*curved);
     ++curved;
   }
 }
@@ -57,11 +58,16 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>
   data.x = state.history.x[0].head(Dim * bodies);
   data.v = state.history.v[0].head(Dim * bodies);
   const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
-  for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup(), [&](const Material& material, auto points) {
+  using Curved = const typename CellSet<Dim>::CurvedElement*;
+  const auto add_density = [&](const Material& material, auto points, Curved curved) {
     double mean = 0;
     for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
+    if (curved)
+      mean += barrier_density<Dim>(JacobianBarrier<Dim>(*curved, at_nodes<Dim>(curved->nodes, data.x)),
+                                   elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, *curved)));
     data.elastic_density.push_back(mean);
-  });
+  };
+  for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup(), add_density);
   data.asked.forces = forces;
   add_asked(cells, state, data);
   const VectorX& all = state.history.x[0];
@@ -111,7 +117,7 @@ double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Ve
 template <int Dim>
 CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels, const Setup<Dim>& setup) {
   CellStress stress;
-  for_each_cell_in_order<Dim>(cells, x, levels, setup, [&](const Material& material, auto points) {
+  for_each_cell_in_order<Dim>(cells, x, levels, setup, [&](const Material& material, auto points, auto) {
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
     for (const auto& [F, X, share] : points) {

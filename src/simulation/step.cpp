@@ -139,7 +139,9 @@ class StepAttempt {
     NewtonSummary summary = solve(expected());
     const std::string jump = jumped();
     if (!summary.converged()) {
-      const bool is_stuck = summary.termination == Termination::no_descent || summary.termination == Termination::iterations;
+      // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
+      const bool is_stuck = summary.termination == Termination::no_descent ||
+                            summary.termination == Termination::iterations || summary.termination == Termination::infeasible;
       if (is_stuck && setup_.remesh.enabled) nearly_inverted_ = find_nearly_inverted(next_, x_);
       return failed(summary, jump);
     }

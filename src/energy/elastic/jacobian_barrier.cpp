@@ -41,7 +41,7 @@ Vec<2> cofactor(const std::array<Vec<2>, 2>& c, int column) {
 Vec<3> cofactor(const std::array<Vec<3>, 3>& c, int column) { return c[(column + 1) % 3].cross(c[(column + 2) % 3]); }
 
 /// The determinant's derivative by `column` and the next one, S_rs = sum_c e_crs v_c with the permutation symbol e, as v.
-std::array<double, 1> second_cofactor(const std::array<Vec<2>, 2>&, int column) { return {column == 0 ? 1.0 : -1.0}; }
+std::array<double, 1> second_cofactor(const std::array<Vec<2>, 2>&, int) { return {1}; }
 std::array<double, 3> second_cofactor(const std::array<Vec<3>, 3>& c, int column) {
   const Vec<3>& last = c[(column + 2) % 3];
   return {last[0], last[1], last[2]};
@@ -56,7 +56,7 @@ std::array<Vec<Dim>, Dim> columns_of(const Term& term, const std::array<Mat<Dim>
 }
 
 /// Whether F = M (I + E) with |E| < 1/2 at all corners, M its mean. A coefficient is a mean of determinants with columns
-/// from corners, each at least (1 - 1/2)^3 det M, and m is at most 1.9 det M: so that no coefficient is below s0 m.
+/// from corners, each at least 0.11 det M, and m is at most 1.9 det M: so that no coefficient is below s0 m.
 template <int Dim>
 bool varies_little(const std::array<Mat<Dim>, Dim + 1>& F) {
   Mat<Dim> mean = Mat<Dim>::Zero();
@@ -250,7 +250,15 @@ typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
   return block;
 }
 
+template <int Dim>
+double barrier_stiffness(const ElasticModuli& moduli) {
+  const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), moduli).values;
+  return *std::max_element(values.begin(), values.end());
+}
+
 template class JacobianBarrier<2>;
 template class JacobianBarrier<3>;
+template double barrier_stiffness<2>(const ElasticModuli&);
+template double barrier_stiffness<3>(const ElasticModuli&);
 
 }  // namespace itr

@@ -12,6 +12,7 @@
 
 #include <vector>
 
+#include "itr/energy/elastic/laws.hpp"
 #include "itr/fem/cell_set.hpp"
 
 namespace itr {
@@ -33,8 +34,6 @@ class JacobianBarrier {
   bool is_active() const { return least_ratio_ < kActive; }
   /// The least b_k / m of parts that are not refined; one that is not positive ends the search.
   double least_ratio() const { return least_ratio_; }
-  /// The mean of det F.
-  double mean() const { return mean_; }
   double value() const;
   /// By the positions of nodes.
   Nodal gradient() const;
@@ -66,9 +65,20 @@ class JacobianBarrier {
   CurvedEdges curved_;
   Eigen::Matrix<double, Dim, Dim + 1> linear_;
   Part whole_;
-  double mean_ = 0, least_ratio_ = 1;
+  double mean_ = 0;  ///< of det F, where it may be small
+  double least_ratio_ = 1;
   std::vector<Part> parts_;  ///< those with active coefficients
   std::vector<Active> active_;
 };
+
+/// Its factor in the elastic energy for each unit of rest volume [Pa]: the law's greatest stiffness at rest.
+template <int Dim>
+double barrier_stiffness(const ElasticModuli& moduli);
+
+/// Its energy in a cell over the cell's rest volume [Pa]. `moduli` are those at the cell's barycentre.
+template <int Dim>
+double barrier_density(const JacobianBarrier<Dim>& barrier, const ElasticModuli& moduli) {
+  return barrier.is_active() ? barrier_stiffness<Dim>(moduli) * barrier.value() : 0;
+}
 
 }  // namespace itr

@@ -127,8 +127,8 @@ class NeoHookeanSum {
   double pairs_[Dim * (Dim + 1) / 2][kNodes][kPadded];  ///< of i <= j; columns of b
 };
 
-/// How far a step may go: not past an inversion, and not to where less than a tenth of the least Bernstein coefficient of
-/// det F is left.
+/// How far a step may go: not past an inversion, and not to where the least Bernstein coefficient of det F over its mean is
+/// less than a tenth of that before (at most of s0).
 template <int Dim>
 double free_step(const typename CellSet<Dim>::CurvedElement& element, ConstVectorView x, ConstVectorView dx) {
   double t = max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, dx));
@@ -164,10 +164,12 @@ template <int Dim>
 void QuadraticElasticity<Dim>::sample_moduli() {
   varying_.clear();
   first_varying_.clear();
+  at_barycenters_.clear();
   if (materials_.empty()) return;
   for (std::size_t e = 0; e < by_element_.size(); ++e) {
     const Element& element = cells_.curved_elements[e];
     first_varying_.push_back(varying_.size());
+    at_barycenters_.push_back(elastic_moduli<Dim>(materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
     for (const auto& point : rule(e))
       varying_.push_back(
           elastic_moduli<Dim>(materials_.at(element.body), rest_position<Dim>(cells_, element, point.weights)));
@@ -209,13 +211,6 @@ bool QuadraticElasticity<Dim>::refine_quadrature(ConstVectorView x) {
   return true;
 }
 
-/// The barrier's factor without `scale_` [J]: rest volume times the law's greatest stiffness at rest.
-template <int Dim>
-double QuadraticElasticity<Dim>::barrier_weight(std::size_t e) const {
-  const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), moduli(e, 0)).values;
-  return cells_.curved_elements[e].volume * *std::max_element(values.begin(), values.end());
-}
-
 template <int Dim>
 double QuadraticElasticity<Dim>::value(ConstVectorView x) const {
   return scale_ * parallel_sum(cells_.curved_elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -228,8 +223,7 @@ double QuadraticElasticity<Dim>::value(ConstVectorView x) const {
                const Mat<Dim> F = positions * shape_gradients<Dim>(element, rule[q].weights).transpose();
                sum += rule[q].share * element.volume * elastic_density<Dim>(F, moduli(e, q));
              }
-             if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active())
-               sum += barrier_weight(e) * barrier.value();
+             sum += element.volume * barrier_density<Dim>(JacobianBarrier<Dim>(element, positions), moduli_at_barycenter(e));
            }
            return sum;
          });
@@ -248,7 +242,7 @@ void QuadraticElasticity<Dim>::add_gradient(ConstVectorView x, VectorView gradie
       forces.noalias() += (scale_ * rule[q].share * element.volume) * (P * gradients);
     }
     if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active())
-      forces += scale_ * barrier_weight(e) * barrier.gradient();
+      forces += scale_ * element.volume * barrier_stiffness<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
     return forces;
   };
   parallel_then_ordered<Nodal<Dim>>(cells_.curved_elements.size(), kBlock, forces_of,
@@ -287,7 +281,8 @@ void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd,
     modes.finish();
     if (is_neo_hookean) exact.add_to(block);
     if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active()) {
-      Mat<Dim* kNodes> of_barrier = scale_ * barrier_weight(e) * barrier.hessian();
+      const double weight = scale_ * element.volume * barrier_stiffness<Dim>(moduli_at_barycenter(e));
+      Mat<Dim* kNodes> of_barrier = weight * barrier.hessian();
       project_block(of_barrier, psd);
       block += of_barrier;
     }

@@ -15,8 +15,8 @@
 
 namespace itr {
 
-/// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus stiffness at rest *
-/// JacobianBarrier). Feasible: det F > 0 everywhere in each cell.
+/// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus barrier_density). Feasible: det
+/// F > 0 everywhere in each cell. There, too, the energy is infinite where the barrier's parts do not prove it.
 template <int Dim>
 class QuadraticElasticity {
  public:
@@ -44,7 +44,9 @@ class QuadraticElasticity {
   }
   void sample_moduli();
   bool is_blind(std::size_t e, ConstVectorView x) const;
-  double barrier_weight(std::size_t e) const;
+  const ElasticModuli& moduli_at_barycenter(std::size_t e) const {
+    return varying_.empty() ? *by_element_[e] : at_barycenters_[e];
+  }
 
   const CellSet<Dim>& cells_;
   int degree_;  ///< of level 0
@@ -52,7 +54,8 @@ class QuadraticElasticity {
   std::map<int, Material> materials_;  ///< empty unless moduli vary in space
   std::map<int, ElasticModuli> by_body_;
   std::vector<const ElasticModuli*> by_element_;
-  std::vector<ElasticModuli> varying_;      ///< by element and point; empty unless moduli vary in space
+  std::vector<ElasticModuli> varying_;  ///< by element and point; empty unless moduli vary in space
+  std::vector<ElasticModuli> at_barycenters_;
   std::vector<std::size_t> first_varying_;  ///< by element
   double scale_;
 };

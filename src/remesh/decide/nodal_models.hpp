@@ -7,6 +7,7 @@
 #include <array>
 #include <vector>
 
+#include "energy/elastic/jacobian_barrier.hpp"
 #include "energy/elastic/point.hpp"
 #include "geometry/measures.hpp"
 #include "itr/fem/mass.hpp"
@@ -43,6 +44,8 @@ class NodalModels {
   /// A cell after the edit, of which nothing moves: its energy alone.
   void add_still_cell(const CurvedCell<Dim>& cell, int body) { add(cell, body, edit_, {}); }
   double energy() const { return energy_; }
+  /// Whether a JacobianBarrier acts: the energy has it, gradients and Hessians do not.
+  bool has_barrier() const { return has_barrier_; }
   const auto& models() const { return models_; }
   const Model* find(VertexId id) const {
     const auto it = std::find_if(models_.begin(), models_.end(), [&](const Model& model) { return model.id == id; });
@@ -99,6 +102,13 @@ class NodalModels {
         cell.models[k]->hessian += weight * response.hessian(shapes.col(k));
       }
     }
+    const JacobianBarrier<Dim> barrier(cell.edges, linear, cell.x);
+    if (!barrier.is_active()) return;
+    has_barrier_ = true;
+    std::array<double, Dim + 1> barycenter;
+    barycenter.fill(1.0 / (Dim + 1));
+    energy_ += state_.context.scaling * volume *
+               barrier_density<Dim>(barrier, elastic_moduli<Dim>(cell.material, cell.place(barycenter)));
   }
 
   /// `way`: from the predictor, where there is inertia.
@@ -131,6 +141,7 @@ class NodalModels {
   const RemeshState<Dim>& state_;
   const Edit<Dim>& edit_;
   double energy_ = 0;
+  bool has_barrier_ = false;
   std::vector<Model> models_;
 };
 

@@ -34,7 +34,7 @@ double predict_gain_at_curves(const RemeshState<Dim>& state, const Edit<Dim>& ed
   NodalModels<Dim> before(state, edit), after(state, edit);
   for (const CellId c : edit.removed_cells) before.add_cell(state.mesh.cell(c), state.mesh.body(c), false);
   for (const auto& cell : edit.inserted_cells) after.add_cell(cell.vertices, cell.body, true);
-  if (!std::isfinite(after.energy())) return kUnknown;  // inverted there
+  if (!std::isfinite(after.energy()) || before.has_barrier()) return kUnknown;  // inverted there, or nearly so now
   double gain = before.energy() - after.energy();
   for (const auto& model : after.models()) {
     const bool is_set = (edit.value && model.id == edit.value->vertex) || model.id >= state.mesh.vertex_slots();
@@ -187,7 +187,7 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
 
 namespace {
 
-/// Whether a JacobianBarrier acts in a cell around an edge: no prediction contains it.
+/// Whether a JacobianBarrier acts in a cell around an edge: predictions of splits, curves and straightenings leave it out.
 template <int Dim>
 bool has_barrier(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const Mesh<Dim>& mesh = state.mesh;
@@ -278,6 +278,7 @@ double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge) {
     const auto x = at_nodes<Dim>(cell.nodes, state.fields.x);
     auto straight = x;
     straight.col(n) = middle;
+    if (JacobianBarrier<Dim>(cell.edges, linear, straight).is_active()) return kCannotTell;
     const int level = state.fields.levels.empty() ? 0 : state.fields.levels[c];
     double density = 0;
     for (const auto& point : cell_quadrature<Dim>(level, context.quadrature_degree)) {

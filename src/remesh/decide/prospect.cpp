@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "energy/elastic/jacobian_barrier.hpp"
 #include "energy/elastic/point.hpp"
 #include "itr/fem/mass.hpp"
 #include "mesh/connected_parts.hpp"
@@ -48,7 +49,7 @@ double energy_at_curves(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   const auto moduli = elastic_moduli<Dim>(material, mesh.rest(cell.nodes[0]));
   const auto x = at_nodes<Dim>(cell.nodes, fields.x);
   const int level = fields.levels.empty() ? 0 : fields.levels[c];
-  double density = 0;
+  double density = barrier_density<Dim>(JacobianBarrier<Dim>(cell.edges, linear, x), moduli);
   for (const auto& point : cell_quadrature<Dim>(level, context.quadrature_degree))
     density += point.share * elastic_density<Dim>(
                                  x * quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear).transpose(), moduli);

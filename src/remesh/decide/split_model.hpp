@@ -16,7 +16,7 @@
 namespace itr {
 
 /// See edit_split.cpp for the nodes that a split adds. The functions stay, so that the energy changes by quadrature alone.
-/// Loads on facets are left out.
+/// Loads on facets and JacobianBarrier are left out.
 template <int Dim>
 class SplitModel {
  public:

@@ -21,7 +21,7 @@ class QuadraticElasticity;
 using QuadratureLevels = std::vector<std::uint8_t>;
 
 /// scale * integral of W(F) over the rest shape: exact on straight elements, by quadrature on curved ones. Feasible: det F >
-/// 0 everywhere in every element. Where det F varies much in a curved element, a barrier adds to it (JacobianBarrier).
+/// 0 everywhere in every element. JacobianBarrier adds to it in distorted curved ones, infinite where it cannot prove that.
 template <int Dim>
 class ElasticEnergy final : public Energy {
  public:
