@@ -96,7 +96,8 @@ def run(name, options):
     done = study()
     references = REFERENCES.get(name, ())
     if name in AFTER_REFERENCE:
-        references = (next(r.name for r in (folder / "runs").glob("reference*")), "second-reference")
+        found = [run for run in (folder / "runs").glob("reference*") if run.is_dir()]
+        references = (max(found, key=lambda run: run.stat().st_mtime).name, "second-reference")  # earlier ones split nothing
         series = arguments.index("--series") + 1
         arguments = [*arguments[:series], f"{arguments[series]},{AFTER_REFERENCE[name]}", *arguments[series + 1:]]
     if done.returncode == 0 and references:
