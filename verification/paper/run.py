@@ -178,9 +178,14 @@ def check(itr, shared, results):
     return [(row, misses(row, rows)) for row in rows.values()]
 
 
+def counted(step, key, operations=OPERATIONS):
+    """A count of a step; builds of earlier commits have no curved edges."""
+    return sum(step[operation][key] for operation in operations if operation in step)
+
+
 def median_trial(steps):
     """Of the steps' medians, each counted as often as the step tried something [s]; 0 where nothing was tried."""
-    tried = sorted((s["trial_seconds"], sum(s[k]["tried"] for k in OPERATIONS)) for s in steps)
+    tried = sorted((s["trial_seconds"], counted(s, "tried")) for s in steps)
     half, so_far = sum(count for _, count in tried) / 2, 0
     for seconds, count in tried:
         so_far += count
@@ -216,14 +221,13 @@ def run(case, options):
         # What the projection forgot is lower energy, too, but nothing gained.
         "gain": sum(s["energy_before_remesh"] - s["energy"]["total"] - s["history_loss"] for s in steps),
         "history_loss": sum(s["history_loss"] for s in steps),
-        "trials": sum(s[k]["relaxed"] for s in steps for k in OPERATIONS),
-        "accepted": sum(s[k]["accepted"] for s in steps for k in OPERATIONS),
+        "trials": sum(counted(s, "relaxed") for s in steps), "accepted": sum(counted(s, "accepted") for s in steps),
         "microseconds_per_trial": 1e6 * median_trial(steps),
         "peak_rss_mb": last["peak_rss_mb"],
         "linear_share": sum(s["seconds"]["linear_solve"] for s in steps) / total,
         "unknowns_mean": sum(s["unknowns"] for s in steps) / len(steps), "unknowns_max": max(s["unknowns"] for s in steps),
-        "curved": sum(s["curves"]["accepted"] for s in steps), "straightened": sum(s["straightens"]["accepted"] for s in steps),
-        "tried": sum(s[k]["tried"] for s in steps for k in OPERATIONS),
+        "curved": sum(counted(s, "accepted", ["curves"]) for s in steps),
+        "straightened": sum(counted(s, "accepted", ["straightens"]) for s in steps), "tried": sum(counted(s, "tried") for s in steps),
         "reference_seconds": reference[0] if reference else None, "reference_gain": reference[1] if reference else None,
         "reference_mb": reference[2] if reference else None, "commit": stored.made("verification/paper/results.csv"),
     }
