@@ -25,7 +25,8 @@ from harness import stored  # noqa: E402
 STUDIES = {
     "cantilever": ("cantilever/cantilever.json", ["--series", "all", "--starts", "0,1", "--tolerances", "400,100,25,6.25,1.56"], "the whole scene: 10 load steps"),
     "square-dbc": ("unit-tests/1-square-dbc.json",
-                   ["--levels", "3", "--reference-tolerance", "2.2e-6", "--series", "uniform,uniform-p2,itr,swaps,smoothing"],
+                   ["--levels", "3", "--reference-tolerance", "2.2e-6", "--series", "uniform,uniform-p2,itr,swaps,smoothing",
+                    "--time-limit", "150"],
                    "the whole scene: 21 steps"),
     # With one round of friction, as the scene has it, a fixed mesh slides 11 % too far: a remeshed step solves twice. `itr study`
     # lags friction in all runs until it does not change.
