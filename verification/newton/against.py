@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Compares two builds on the scenes of ../paper/run.py: processor seconds, Newton iterations, and the last step's energy.
+"""Compares two builds on the scenes of ../paper/run.py: processor seconds of the steps without output, Newton iterations, and
+the last step's energy.
 
 python3 verification/newton/against.py BEFORE NOW [--shared ../shared] [--results DIR] [--repeats 3] [--case PART-OF-NAME]...
 
@@ -9,6 +10,7 @@ frame is certified; of repeated runs the fastest counts. A scene's ratio is the 
 of less than 20 ms are not timed. The exit status is 1 if a run of NOW stops or is not certified.
 """
 import argparse
+import json
 import pathlib
 import statistics
 import sys
@@ -28,20 +30,18 @@ def compare(case, options):
         for name in ("before", "now"):
             ways = argparse.Namespace(itr=getattr(options, name).resolve(), shared=options.shared, results=options.results / name)
             row = paper.run((*case[:3], None), ways)
-            if name not in best or row["processor_seconds_per_step"] < best[name]["processor_seconds_per_step"]:
+            lines = open(paper.folder_of(case[0], ways) / "steps.jsonl")
+            row["seconds"] = sum(json.loads(line)["processor_seconds"] for line in lines)
+            if name not in best or row["seconds"] < best[name]["seconds"]:
                 best[name] = row
     return best["before"], best["now"]
 
 
-def seconds(row):
-    return row["processor_seconds_per_step"] * row["steps"]
-
-
 def line(before, now):
-    is_timed = seconds(before) >= LEAST_SECONDS
-    ratio = f"{seconds(now) / seconds(before):.2f}" if is_timed else ""
+    is_timed = before["seconds"] >= LEAST_SECONDS
+    ratio = f"{now['seconds'] / before['seconds']:.2f}" if is_timed else ""
     end = ", ".join(text for text, holds in (("stopped", not now["finished"]), ("not certified", not now["certified"])) if holds)
-    return (f"| {now['case']} | {end or 'finished, certified'} | {seconds(before):.2f} → {seconds(now):.2f} | {ratio} "
+    return (f"| {now['case']} | {end or 'finished, certified'} | {before['seconds']:.2f} → {now['seconds']:.2f} | {ratio} "
             f"| {before['newton']} → {now['newton']} | {before['energy_total']:.6g} → {now['energy_total']:.6g} |")
 
 
@@ -59,7 +59,7 @@ def main():
     print("| scene | end | processor s | ratio | iterations | energy, last step [J] |\n|---|---|---|---|---|---|")
     for before, now in pairs:
         print(line(before, now))
-    ratios = [seconds(now) / seconds(before) for before, now in pairs if seconds(before) >= LEAST_SECONDS]
+    ratios = [now["seconds"] / before["seconds"] for before, now in pairs if before["seconds"] >= LEAST_SECONDS]
     if ratios:
         print(f"\nMedian ratio of {len(ratios)} scenes: {statistics.median(ratios):.2f}")
     return 0 if all(now["finished"] and now["certified"] for _, now in pairs) else 1

@@ -194,9 +194,13 @@ def median_trial(steps):
     return 0
 
 
+def folder_of(name, options):
+    return options.results / name.replace(" ", "_").replace("=", "").replace("|", "").replace(",", "").replace(".", "").replace("'", "")
+
+
 def run(case, options):
     name, scene, sets, reference = case
-    folder = options.results / name.replace(" ", "_").replace("=", "").replace("|", "").replace(",", "").replace(".", "").replace("'", "")
+    folder = folder_of(name, options)
     command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--overwrite",
                "--threads", "1"]
     for assignment in sets:
