@@ -251,14 +251,14 @@ typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
 }
 
 template <int Dim>
-double barrier_stiffness(const ElasticModuli& moduli) {
+double stiffness_at_rest(const ElasticModuli& moduli) {
   const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), moduli).values;
   return *std::max_element(values.begin(), values.end());
 }
 
 template class JacobianBarrier<2>;
 template class JacobianBarrier<3>;
-template double barrier_stiffness<2>(const ElasticModuli&);
-template double barrier_stiffness<3>(const ElasticModuli&);
+template double stiffness_at_rest<2>(const ElasticModuli&);
+template double stiffness_at_rest<3>(const ElasticModuli&);
 
 }  // namespace itr

@@ -73,12 +73,12 @@ class JacobianBarrier {
 
 /// Its factor in the elastic energy for each unit of rest volume [Pa]: the law's greatest stiffness at rest.
 template <int Dim>
-double barrier_stiffness(const ElasticModuli& moduli);
+double stiffness_at_rest(const ElasticModuli& moduli);
 
 /// Its energy in a cell over the cell's rest volume [Pa]. `moduli` are those at the cell's barycentre.
 template <int Dim>
 double barrier_density(const JacobianBarrier<Dim>& barrier, const ElasticModuli& moduli) {
-  return barrier.is_active() ? barrier_stiffness<Dim>(moduli) * barrier.value() : 0;
+  return barrier.is_active() ? stiffness_at_rest<Dim>(moduli) * barrier.value() : 0;
 }
 
 }  // namespace itr

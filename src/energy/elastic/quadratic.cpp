@@ -242,7 +242,7 @@ void QuadraticElasticity<Dim>::add_gradient(ConstVectorView x, VectorView gradie
       forces.noalias() += (scale_ * rule[q].share * element.volume) * (P * gradients);
     }
     if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active())
-      forces += scale_ * element.volume * barrier_stiffness<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
+      forces += scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
     return forces;
   };
   parallel_then_ordered<Nodal<Dim>>(cells_.curved_elements.size(), kBlock, forces_of,
@@ -281,7 +281,7 @@ void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd,
     modes.finish();
     if (is_neo_hookean) exact.add_to(block);
     if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active()) {
-      const double weight = scale_ * element.volume * barrier_stiffness<Dim>(moduli_at_barycenter(e));
+      const double weight = scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e));
       Mat<Dim* kNodes> of_barrier = weight * barrier.hessian();
       project_block(of_barrier, psd);
       block += of_barrier;
