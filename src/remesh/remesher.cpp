@@ -107,7 +107,7 @@ RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume
                               const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
                               Strata<Dim>& strata) {
   RemeshSession<Dim> session(mesh, fields, context, options, nullptr, memory, strata);
-  // Nor is the energy of a new cell infinite, which the gate does not ask.
+  // The gate does not ask whether the energy of a new cell is finite.
   const auto is_finite = [&](const Edit<Dim>& edit) {
     return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
       return std::isfinite(session.ask().energy_of(cell.vertices, cell.body, edit));

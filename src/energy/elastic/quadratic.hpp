@@ -16,7 +16,7 @@
 namespace itr {
 
 /// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus barrier_density). Feasible: det
-/// F > 0 everywhere in each cell. There, too, the energy is infinite where the barrier's parts do not prove it.
+/// F > 0 everywhere in each cell. The energy is infinite in feasible cells, too, where the barrier cannot prove that.
 template <int Dim>
 class QuadraticElasticity {
  public:
