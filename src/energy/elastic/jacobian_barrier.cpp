@@ -195,6 +195,7 @@ typename JacobianBarrier<Dim>::Nodal JacobianBarrier<Dim>::mean_gradient() const
 template <int Dim>
 typename JacobianBarrier<Dim>::Nodal JacobianBarrier<Dim>::gradient() const {
   Nodal gradient = Nodal::Zero();
+  if (active_.empty()) return gradient;
   double of_mean = 0;
   for (std::size_t p = 0, next = 0; p < parts_.size(); ++p) {
     const Shapes shapes = shapes_of(parts_[p]);
@@ -212,6 +213,7 @@ template <int Dim>
 typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
   using Column = Eigen::Matrix<double, Dim * kQuadraticNodes<Dim>, 1>;
   Block block = Block::Zero();
+  if (active_.empty()) return block;
   SkewBlocks second;
   for (auto& entries : second) entries.setZero();
   const Nodal of_mean = mean_gradient();
