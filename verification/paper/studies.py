@@ -67,7 +67,7 @@ STUDIES = {
                     ["--set", "/time/tend=0.5", "--levels", "3", "--frames", "5", "--series", "uniform,uniform-p2,itr,smoothing,hp"],
                     "to t = 0.5; kept aside"),
     "ball-obstacle": ("unused/ball-obstacle/2D.json", ["--levels", "3", "--frames", "8", "--series", "uniform,itr,smoothing", "--time-limit", "600"],
-                      "the whole scene: 100 steps; kept aside; an old study: by now runs with linear elements come to their end (REMESHING.md)"),
+                      "the whole scene: 100 steps; kept aside; an old study: by now runs with straight and with curved edges come to their ends (NOTEBOOK.md)"),
     "rollers": ("rollers/monkey-soft-hard.json",
                 ["--set", "/time/tend=0.1", "--tolerances", "0.01,0.001", "--reference-tolerance", "2.5e-4", "--levels", "1", "--frames", "2",
                  "--series", "uniform,itr", "--time-limit", "3000"], "to t = 0.1: the rollers turn, first contact"),
