@@ -96,7 +96,7 @@ def run(name, options):
 
     done = study()
     references = REFERENCES.get(name, ())
-    if name in AFTER_REFERENCE:
+    if done.returncode == 0 and name in AFTER_REFERENCE:
         found = [run for run in (folder / "runs").glob("reference*") if run.is_dir()]
         references = (max(found, key=lambda run: run.stat().st_mtime).name, "second-reference")  # earlier ones split nothing
         series = arguments.index("--series") + 1
