@@ -7,6 +7,7 @@
 #include <random>
 
 #include "derivatives.hpp"
+#include "energy/elastic/strain.hpp"
 #include "itr/energy/damping.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/inertia.hpp"
@@ -224,6 +225,50 @@ TYPED_TEST(VolumeTerms, AllLawsAreLinearElasticityAtSmallStrains) {
     if (material.law == MaterialLaw::linear) continue;
     EXPECT_NEAR(elastic_density<Dim>(rotation, moduli), 0, 1e-12);
     EXPECT_LE(elastic_stress<Dim>(rotation, moduli).norm(), 1e-12);
+  }
+}
+
+/// Small strains leave no more than their own size between all laws and linear elasticity, before and after a rotation.
+TYPED_TEST(VolumeTerms, DensitiesAndStressesKeepTheirDigitsAtSmallStrains) {
+  constexpr int Dim = TypeParam::value;
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  std::mt19937 random(11);
+  const Mat<Dim> identity = Mat<Dim>::Identity();
+  Mat<Dim> rotation = identity;
+  rotation.template topLeftCorner<2, 2>() << std::cos(0.7), -std::sin(0.7), std::sin(0.7), std::cos(0.7);
+  const auto laws = all_laws<Dim>();
+  const ElasticModuli linear = elastic_moduli<Dim>(laws[1], Vec<Dim>::Zero());
+  for (const Material& material : laws) {
+    if (material.law == MaterialLaw::own) continue;  // its program's precision
+    SCOPED_TRACE(static_cast<int>(material.law));
+    const ElasticModuli moduli = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
+    for (const double strain : {1e-14, 1e-11, 1e-8, 1e-5}) {
+      SCOPED_TRACE(strain);
+      const Mat<Dim> any = random_upright<Dim>(random, 0.4) - identity;
+      const DisplacementGradient<Dim> at{strain * (any + any.transpose())};
+      const double W = elastic_density<Dim>(at, linear);
+      const Mat<Dim> P = elastic_stress<Dim>(at, linear);
+      const double tolerance = 20 * strain + 50 * kEpsilon;
+      EXPECT_NEAR(elastic_density<Dim>(at, moduli), W, tolerance * W);
+      EXPECT_LE((elastic_stress<Dim>(at, moduli) - P).norm(), tolerance * P.norm());
+      if (material.law == MaterialLaw::linear) continue;
+      const DisplacementGradient<Dim> turned{rotation * at.G + (rotation - identity)};
+      EXPECT_NEAR(elastic_density<Dim>(turned, moduli), W, tolerance * W + 100 * kEpsilon / strain * W);
+      EXPECT_LE((elastic_stress<Dim>(turned, moduli) - rotation * P).norm(),
+                (tolerance + 100 * kEpsilon / strain) * P.norm());
+    }
+  }
+}
+
+TEST(Strain, RemaindersKeepTheirDigits) {
+  for (const double x : {1e-12, -1e-9, 1e-4, -0.01, 0.0624, 0.0626, -0.0624, 0.24, -0.26, 0.9, -0.9, 30.0}) {
+    const long double exact = x;
+    const long double log =
+        std::abs(x) < 1e-3 ? exact * exact * (0.5L - exact / 3 + exact * exact / 4) : exact - std::log1p(exact);
+    const long double exp =
+        std::abs(x) < 1e-3 ? exact * exact * (0.5L + exact / 6 + exact * exact / 24) : std::expm1(exact) - exact;
+    EXPECT_NEAR(minus_log1p(x) / static_cast<double>(log), 1, 1e-12) << x;
+    EXPECT_NEAR(minus_expm1(x) / static_cast<double>(exp), 1, 1e-12) << x;
   }
 }
 

@@ -245,6 +245,58 @@ TEST(Newton, EndsAtRoundOffAndSaysSo) {
   EXPECT_LT(summary.iterations, 12);
 }
 
+/// A slope without an end whose values are too coarse to show it.
+class CoarseSlope final : public Energy {
+ public:
+  std::string_view name() const override { return "coarse slope"; }
+  double value(ConstVectorView, Workspace&) const override { return 1e6; }
+  void add_gradient(ConstVectorView, VectorView gradient, Workspace&) const override { gradient.array() += 1e-12; }
+  void add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const override {
+    for (int v = 0; v < x.size() / 2; ++v) sink.add<2>(std::array{v}, Mat<2>(Mat<2>::Identity()).data());
+  }
+};
+
+TEST(Newton, DoesNotCallForcesFarAboveTheirRoundOffConverged) {
+  VectorX x = VectorX::Constant(4, 1.0);
+  const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+  DenseSystem system;
+  NewtonOptions options;
+  options.force_tolerance = 0;
+  Workspace workspace;
+  const NewtonSummary summary = minimize(CoarseSlope(), x, dofs, VectorX(), system, options, workspace);
+  EXPECT_EQ(summary.termination, Termination::no_descent) << to_string(summary.termination);
+  EXPECT_LT(summary.iterations, 30);
+}
+
+/// A bowl that a load pushes from rest; both scaled, as by a short step.
+class LoadedBowl final : public Energy {
+ public:
+  explicit LoadedBowl(double scale) : scale_(scale) {}
+  std::string_view name() const override { return "loaded bowl"; }
+  double value(ConstVectorView x, Workspace&) const override { return scale_ * (x.squaredNorm() / 2 - x.sum()); }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
+    gradient.array() += scale_ * (x.array() - 1);
+  }
+  void add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const override {
+    for (int v = 0; v < x.size() / 2; ++v) sink.add<2>(std::array{v}, Mat<2>(scale_ * Mat<2>::Identity()).data());
+  }
+
+ private:
+  double scale_;
+};
+
+TEST(Newton, PassesOverNoLoadByDefaultHoweverSmallTheScale) {
+  for (const double scale : {1e-30, 1e-14, 1.0, 1e14}) {
+    VectorX x = VectorX::Zero(4);
+    const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+    DenseSystem system;
+    Workspace workspace;
+    const NewtonSummary summary = minimize(LoadedBowl(scale), x, dofs, VectorX(), system, NewtonOptions(), workspace);
+    EXPECT_TRUE(summary.converged()) << scale;
+    EXPECT_LE((x.array() - 1).abs().maxCoeff(), 1e-12) << scale;
+  }
+}
+
 /// A quadratic whose minimum lies between coordinates that doubles have.
 class FarBowl final : public Energy {
  public:

@@ -23,6 +23,16 @@ void DampingEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 }
 
 template <int Dim>
+double DampingEnergy<Dim>::value_at(const Increment& at, Workspace&) const {
+  return coefficient_ * velocity_.rate * damped_.value(at.d, velocity_.reference - at.base);
+}
+
+template <int Dim>
+void DampingEnergy<Dim>::add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const {
+  damped_.add_gradient(at.d, velocity_.reference - at.base, coefficient_ * velocity_.rate, gradient);
+}
+
+template <int Dim>
 void DampingEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
   MatrixX scaled;
   damped_.for_each([&](std::span<const int> vertices, const auto& K) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "itr/core/kept_vector.hpp"
+#include "round_off.hpp"
 
 namespace itr {
 
@@ -16,7 +17,39 @@ struct SecondWays {  // which say that two terms can tell
 struct PartOfWay {
   KeptVector dx;
 };
+struct TermScratch {
+  KeptVector gradient;
+};
+struct RoundOffScratch {
+  KeptVector x, gradient;
+};
 }  // namespace
+
+void Energy::add_gradient_and_sizes(ConstVectorView x, VectorView gradient, VectorView sizes, Workspace& workspace) const {
+  VectorView own = workspace.get<TermScratch>().gradient.resize(x.size());
+  own.setZero();
+  add_gradient(x, own, workspace);
+  gradient += own;
+  sizes += own.cwiseAbs();
+}
+
+double Energy::value_round_off(ConstVectorView x, Workspace& workspace) const {
+  VectorView gradient = workspace.get<TermScratch>().gradient.resize(x.size());
+  gradient.setZero();
+  add_gradient(x, gradient, workspace);
+  return kEpsilon * (std::abs(value(x, workspace)) + gradient.cwiseAbs().dot(x.cwiseAbs()));
+}
+
+void Energy::add_gradient_round_off(ConstVectorView x, VectorView round_off, Workspace& workspace) const {
+  auto& scratch = workspace.get<RoundOffScratch>();
+  VectorView other = scratch.x.resize(x.size()), change = scratch.gradient.resize(x.size());
+  change.setZero();
+  add_gradient(x, change, workspace);
+  change = -change;
+  change_last_bits(x, other);
+  add_gradient(other, change, workspace);
+  round_off += change.cwiseAbs();
+}
 
 double Energy::max_step(ConstVectorView, ConstVectorView, Workspace&) const { return 1; }
 
@@ -39,6 +72,17 @@ void EnergySum::add_gradient(ConstVectorView x, VectorView gradient, Workspace& 
 
 void EnergySum::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
   for (const auto& term : terms_) term->add_hessian(x, psd, sink, workspace);
+}
+
+void EnergySum::add_gradient_and_sizes(ConstVectorView x, VectorView gradient, VectorView sizes,
+                                       Workspace& workspace) const {
+  for (const auto& term : terms_) term->add_gradient_and_sizes(x, gradient, sizes, workspace);
+}
+
+double EnergySum::value_round_off(ConstVectorView x, Workspace& workspace) const {
+  double sum = 0;
+  for (const auto& term : terms_) sum += term->value_round_off(x, workspace);
+  return sum;
 }
 
 double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {

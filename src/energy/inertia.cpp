@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t kBlock = 256;
 
 struct FromPredictor {
-  KeptVector way;
+  KeptVector distance;
 };
 }  // namespace
 
@@ -30,6 +30,7 @@ void InertiaEnergy<Dim>::renew(const std::map<int, Material>& materials, MassKin
     mass_.push_back(mass_density<Dim>(materials.at(element.body), rest_barycenter(cells_, element)) * element.volume);
   renew_curved(materials);
   predictor_ = predictor;
+  predicted_increment_.resize(0);
   residual_.resize(0);
   loss_ = 0;
 }
@@ -67,15 +68,14 @@ void InertiaEnergy<Dim>::set_unrepresented_history(ConstVectorView residual, dou
 }
 
 template <int Dim>
-double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
-  const ConstVectorView predictor = predictor_.view();
+double InertiaEnergy<Dim>::value_of(ConstVectorView distance) const {
   double sum = parallel_sum(mass_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     double part = 0;
     for (std::size_t e = begin; e < end; ++e) {
       Vec<Dim> total = Vec<Dim>::Zero();
       double squares = 0;
       for (const int v : cells_.elements[e].vertices) {
-        const Vec<Dim> d = x.segment<Dim>(Dim * v) - predictor.segment<Dim>(Dim * v);
+        const Vec<Dim> d = distance.segment<Dim>(Dim * v);
         total += d;
         squares += d.squaredNorm();
       }
@@ -84,12 +84,39 @@ double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
     return part;
   });
   for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
-    const auto& nodes = cells_.curved_elements[e].nodes;
-    const auto d = (at_nodes<Dim>(nodes, x) - at_nodes<Dim>(nodes, predictor)).eval();
+    const auto d = at_nodes<Dim>(cells_.curved_elements[e].nodes, distance);
     sum += 0.5 * curved_mass_[e].mass * (d * matrices_[curved_mass_[e].matrix]).cwiseProduct(d).sum();
   }
-  if (residual_.size() > 0) sum += residual_.view().dot(x - predictor) + loss_;
+  if (residual_.size() > 0) sum += residual_.view().dot(distance) + loss_;
   return sum;
+}
+
+template <int Dim>
+double InertiaEnergy<Dim>::value(ConstVectorView x, Workspace& workspace) const {
+  VectorView distance = workspace.get<FromPredictor>().distance.resize(x.size());
+  distance = x - predictor_.view();
+  return value_of(distance);
+}
+
+template <int Dim>
+ConstVectorView InertiaEnergy<Dim>::distance_at(const Increment& at, Workspace& workspace) const {
+  VectorView distance = workspace.get<FromPredictor>().distance.resize(at.d.size());
+  if (predicted_increment_.size() > 0)
+    distance = at.d - predicted_increment_.view();
+  else
+    distance = at.d - (predictor_.view() - at.base);
+  return distance;
+}
+
+template <int Dim>
+double InertiaEnergy<Dim>::value_at(const Increment& at, Workspace& workspace) const {
+  return value_of(distance_at(at, workspace));
+}
+
+template <int Dim>
+void InertiaEnergy<Dim>::add_gradient_at(const Increment& at, VectorView gradient, Workspace& workspace) const {
+  add_mass_product(distance_at(at, workspace), gradient);
+  if (residual_.size() > 0) gradient += residual_.view();
 }
 
 template <int Dim>
@@ -108,9 +135,9 @@ void InertiaEnergy<Dim>::add_mass_product(ConstVectorView x, VectorView y) const
 
 template <int Dim>
 void InertiaEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
-  VectorView way = workspace.get<FromPredictor>().way.resize(x.size());
-  way = x - predictor_.view();
-  add_mass_product(way, gradient);
+  VectorView distance = workspace.get<FromPredictor>().distance.resize(x.size());
+  distance = x - predictor_.view();
+  add_mass_product(distance, gradient);
   if (residual_.size() > 0) gradient += residual_.view();
 }
 

@@ -10,6 +10,7 @@
 #include "geometry/bvh.hpp"
 #include "itr/core/error.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/increment.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadratic.hpp"
 
@@ -19,7 +20,7 @@ namespace {
 
 /// -scale f . (x - X).
 template <int Dim>
-class PointForces final : public Energy {
+class PointForces final : public Energy, public IncrementalTerm {
  public:
   PointForces(VectorX forces, double rest_work, double scale)
       : forces_(std::move(forces)), rest_work_(rest_work), scale_(scale) {}
@@ -27,6 +28,10 @@ class PointForces final : public Energy {
   double value(ConstVectorView x, Workspace&) const override { return -scale_ * (forces_.dot(x) - rest_work_); }
   void add_gradient(ConstVectorView, VectorView gradient, Workspace&) const override { gradient -= scale_ * forces_; }
   void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+  double value_at(const Increment& at, Workspace&) const override { return -scale_ * forces_.dot(at.d); }
+  void add_gradient_at(const Increment& at, VectorView gradient, Workspace& workspace) const override {
+    add_gradient(at.base, gradient, workspace);
+  }
 
  private:
   VectorX forces_;

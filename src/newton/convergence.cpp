@@ -8,11 +8,14 @@ namespace itr {
 
 namespace {
 
-constexpr double kNothing = 1e-10;   ///< see NewtonExtras::way_to_start
-constexpr int kMostUnresolved = 20;  ///< steps in a row below round-off
-constexpr int kMostStill = 4;        ///< of these, steps in a row after which the gradient had not shrunk: it is round-off
-constexpr double kShrunk = 0.9;      ///< share of the gradient that had shrunk last
-constexpr double kNear = 10;         ///< times a tolerance
+constexpr double kNothing = 1e-10;     ///< see NewtonExtras::way_to_start
+constexpr double kVanishing = 1e-140;  ///< squares of smaller numbers are no numbers any more
+constexpr double kFloor = 8;           ///< times the round-off of the gradient: no step can be told to improve it
+constexpr double kFarAbove = 1e4;      ///< the same: a larger residual is an error, not round-off
+constexpr int kMostUnresolved = 20;    ///< steps in a row below the resolution of the energy
+constexpr int kMostStill = 4;          ///< of these, steps in a row after which the gradient had not shrunk
+constexpr double kShrunk = 0.9;        ///< fraction of the gradient that had shrunk last
+constexpr double kNear = 10;           ///< times a tolerance
 
 }  // namespace
 
@@ -21,6 +24,7 @@ bool Convergence::has_small_gradient() {
   const NewtonOptions& options = task_.options;
   const double now = at_.gradient_norm();
   if (first_gradient_ < 0) first_gradient_ = now;
+  if (now <= std::max(force_asked(), kVanishing)) return true;
   if (!is_first()) return now < options.gradient_tolerance || now < options.relative_gradient_tolerance * first_gradient_;
   if (begins_elsewhere() && now > kNothing * task_.norms.of_gradient(task_.extras.gradient_of_way)) return false;
   return now < options.first_gradient_tolerance;
@@ -45,24 +49,27 @@ std::optional<Termination> Convergence::test(const Step& step) {
   }
   if (has_small_step(step)) return Termination::step;
   if (at_.decrement_of(step) < task_.options.decrement_tolerance) return Termination::decrement;
-  if (is_lost_in_round_off(step)) return Termination::round_off;
+  if (has_ceased_to_improve(step)) return Termination::round_off;
   return {};
 }
 
-/// Whether many steps in a row promised a decrease below the resolution of energy or positions. They still may lower the
-/// gradient, but not below its own round-off.
-bool Convergence::is_lost_in_round_off(const Step& step) {
+/// The one rule for round-off: a step that promises less than the energy resolves may still lower the gradient, but not
+/// below the gradient's own round-off.
+bool Convergence::has_ceased_to_improve(const Step& step) {
   unresolved_ = at_.is_unresolved(step) ? unresolved_ + 1 : 0;
+  if (unresolved_ == 0) {
+    still_ = 0;
+    return false;
+  }
   const double now = at_.gradient_norm();
   still_ = unresolved_ > 1 && now > kShrunk * last_shrunk_ ? still_ + 1 : 0;
   if (still_ == 0) last_shrunk_ = now;
-  return still_ >= kMostStill || unresolved_ >= kMostUnresolved;
+  return now <= kFloor * at_.gradient_round_off() || still_ >= kMostStill || unresolved_ >= kMostUnresolved;
 }
 
-bool Convergence::is_at_round_off(const Step& step) const {
-  if (step.is_of_shift) return false;
-  return at_.is_unresolved(step) || at_.decrement_of(step) < kUnresolved * std::abs(at_.first_value());
-}
+bool Convergence::is_at_round_off() const { return at_.gradient_norm() <= kFarAbove * at_.gradient_round_off(); }
+
+double Convergence::residual_by_round_off() const { return at_.gradient_norm() / at_.gradient_round_off(); }
 
 bool Convergence::has_stalled(double value_before) {
   const bool hardly_changed = std::abs(at_.value() - value_before) < task_.options.energy_tolerance;
@@ -77,7 +84,15 @@ bool Convergence::is_near(const Step& step) const {
 }
 
 double Convergence::gradient_asked() const {
-  return std::max(task_.options.gradient_tolerance, task_.options.relative_gradient_tolerance * first_gradient_);
+  const NewtonOptions& options = task_.options;
+  return std::max({options.gradient_tolerance, options.relative_gradient_tolerance * first_gradient_, force_asked()});
+}
+
+/// What acts is the measure, unless the options give another one for gradients.
+double Convergence::force_asked() const {
+  const NewtonOptions& options = task_.options;
+  const bool has_other = options.gradient_tolerance > 0 || options.relative_gradient_tolerance > 0;
+  return has_other ? 0 : options.force_tolerance * at_.force_size();
 }
 
 void Convergence::note_decrement(const Step& step) {

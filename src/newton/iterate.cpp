@@ -1,25 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "iterate.hpp"
 
-#include <cmath>
-#include <limits>
-
 #include "core/timer.hpp"
 
 namespace itr {
 
-namespace {
-
-constexpr double kSpacing = 8 * std::numeric_limits<double>::epsilon();  ///< of the largest coordinate
-
-}  // namespace
-
 Iterate::Iterate(const Task& task, VectorView x)
-    : task_(task),
-      x_(x),
-      gradient_(task.workspace.get<Kept>().gradient.resize(x.size())),
-      value_(value_at(x)),
-      first_value_(value_) {}
+    : task_(task), x_(x), gradient_(task.workspace.get<Kept>().gradient.resize(x.size())), value_(value_at(x)) {}
 
 double Iterate::value_at(ConstVectorView x) const {
   const ScopedTimer timer(task_.summary.line_search_seconds);
@@ -38,21 +25,40 @@ double Iterate::free_share(ConstVectorView way) const {
 }
 
 void Iterate::update_gradient() {
-  gradient_at(x_, gradient_);
+  const ScopedTimer timer(task_.summary.assembly_seconds);
+  VectorView sizes = task_.workspace.get<Kept>().sizes.resize(x_.size());
+  sizes.setZero();
+  gradient_.setZero();
+  task_.energy.add_gradient_and_sizes(x_, gradient_, sizes, task_.workspace);
   has_gradient_ = true;
   gradient_norm_ = task_.norms.of_gradient(gradient_);
+  force_size_ = task_.norms.of_forces(sizes);
+}
+
+double Iterate::value_round_off() const {
+  if (value_round_off_at_ != revision_) {
+    const ScopedTimer timer(task_.summary.line_search_seconds);
+    value_round_off_ = task_.energy.value_round_off(x_, task_.workspace);
+    value_round_off_at_ = revision_;
+  }
+  return value_round_off_;
+}
+
+double Iterate::gradient_round_off() const {
+  if (gradient_round_off_at_ != revision_) {
+    const ScopedTimer timer(task_.summary.assembly_seconds);
+    VectorX round_off = VectorX::Zero(x_.size());
+    task_.energy.add_gradient_round_off(x_, round_off, task_.workspace);
+    gradient_round_off_ = task_.norms.of_gradient(round_off);
+    gradient_round_off_at_ = revision_;
+  }
+  return gradient_round_off_;
 }
 
 void Iterate::move_to(ConstVectorView x, double value) {
   x_ = x;
   value_ = value;
   ++revision_;
-}
-
-bool Iterate::is_unresolved(const Step& step) const {
-  if (decrement_of(step) < kUnresolved * std::abs(value_)) return true;
-  // Far from the origin the last bits are long distances.
-  return step.way.lpNorm<Eigen::Infinity>() <= kSpacing * x_.lpNorm<Eigen::Infinity>();
 }
 
 }  // namespace itr

@@ -12,18 +12,23 @@ class Iterate {
 
   const VectorView& x() const { return x_; }
   double value() const { return value_; }
-  double first_value() const { return first_value_; }  ///< where the solve began
   /// Of the last update_gradient.
   const VectorView& gradient() const { return gradient_; }
   bool has_gradient() const { return has_gradient_; }
   double gradient_norm() const { return gradient_norm_; }
+  /// The norm of the forces that act, of which the gradient is the sum: those of each term, on held dofs, too.
+  double force_size() const { return force_size_; }
   /// Grows with each move: what was found out at the same revision is still true.
   int revision() const { return revision_; }
 
   /// The decrease of energy that the quadratic model promises for a full Newton step.
   double decrement_of(const Step& step) const { return -0.5 * task_.norms.dot(step.way, gradient_); }
-  /// Whether a step promises less than a sum of many terms resolves, or changes only the last bits of positions.
-  bool is_unresolved(const Step& step) const;
+  /// By how much round-off may change the value.
+  double value_round_off() const;
+  /// The norm of what round-off may change of the gradient.
+  double gradient_round_off() const;
+  /// Whether a step promises less than the energy resolves.
+  bool is_unresolved(const Step& step) const { return decrement_of(step) < value_round_off(); }
 
   double value_at(ConstVectorView x) const;
   void gradient_at(ConstVectorView x, VectorView gradient) const;
@@ -36,17 +41,16 @@ class Iterate {
 
  private:
   struct Kept {
-    KeptVector gradient;
+    KeptVector gradient, sizes;
   };
   const Task& task_;
   VectorView x_, gradient_;
-  double value_, first_value_;
-  double gradient_norm_ = 0;
+  double value_;
+  double gradient_norm_ = 0, force_size_ = 0;
+  mutable double value_round_off_ = 0, gradient_round_off_ = 0;
+  mutable int value_round_off_at_ = kNone, gradient_round_off_at_ = kNone;  ///< revisions of x
   bool has_gradient_ = false;
   int revision_ = 0;
 };
-
-/// Relative change of energy that a sum of many terms does not resolve.
-inline constexpr double kUnresolved = 1e-14;
 
 }  // namespace itr

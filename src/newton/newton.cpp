@@ -2,6 +2,7 @@
 #include "itr/newton/newton.hpp"
 
 #include <cmath>
+#include <sstream>
 #include <string_view>
 
 #include "round_off.hpp"
@@ -40,7 +41,7 @@ class Minimizer {
       }
       const double value_before = at_.value();
       if (!search()) {
-        const bool at_round_off = convergence_.is_at_round_off(direction_.step());
+        const bool at_round_off = convergence_.is_at_round_off();
         if (held_.takes_turns(at_round_off)) {
           if (held_.is_blocked_for_good()) return stop(Termination::no_descent, held_.describe_way_left());
           continue;
@@ -87,6 +88,8 @@ class Minimizer {
 
   /// Ends a solve that has converged, if not at a saddle.
   NewtonSummary finish(Termination termination) {
+    if (termination == Termination::round_off && !convergence_.is_at_round_off())
+      return stop(Termination::no_descent, describe_residual());
     if (saddle_.is_here()) return stop(Termination::round_off, kFlatSaddle);
     return stop(termination, termination == Termination::round_off ? kAtRoundOff : "");
   }
@@ -116,6 +119,13 @@ class Minimizer {
       worst = static_cast<int>(i);
     }
     return worst;
+  }
+
+  std::string describe_residual() const {
+    std::ostringstream text;
+    text << "no step lowers the forces that are left, which are " << convergence_.residual_by_round_off()
+         << " times their round-off";
+    return text.str();
   }
 
   std::string describe_end_of_iterations() const {

@@ -22,6 +22,18 @@ class Norms {
       return kind_ == NewtonNorm::l2 ? g / std::sqrt(weights_[i]) : g / weights_[i];
     });
   }
+  /// The same over all dofs, held ones included.
+  double of_forces(ConstVectorView forces) const {
+    double sum = 0, largest = 0;
+    for (Eigen::Index i = 0; i < forces.size(); ++i) {
+      double entry = forces[i];
+      if (kind_ == NewtonNorm::l2) entry /= std::sqrt(weights_[i]);
+      if (kind_ == NewtonNorm::linf) entry /= weights_[i];
+      sum += entry * entry;
+      largest = std::max(largest, entry);
+    }
+    return kind_ == NewtonNorm::linf ? largest : std::sqrt(sum);
+  }
   double of_step(ConstVectorView step) const {
     return norm(step, [&](double p, Eigen::Index i) { return kind_ == NewtonNorm::l2 ? p * std::sqrt(weights_[i]) : p; });
   }

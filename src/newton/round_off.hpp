@@ -3,8 +3,7 @@
 
 namespace itr {
 
-/// NewtonSummary::message of a solve whose last steps promised less than energy or positions resolve.
-inline constexpr const char* kAtRoundOff =
-    "converged to the round-off of energy and positions, above the tolerances asked for";
+/// NewtonSummary::message of a solve after which no step lowers the forces that are left, which are their round-off.
+inline constexpr const char* kAtRoundOff = "converged to the round-off of forces, above the tolerances asked for";
 
 }  // namespace itr

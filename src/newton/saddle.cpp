@@ -11,7 +11,7 @@ namespace itr {
 
 namespace {
 
-constexpr double kRoundOff = 1e-9;  ///< relative change of energy that the first step exceeds
+constexpr double kResolved = 1e4;  ///< times its round-off: the change of energy that the first step exceeds
 constexpr int kMostDoublings = 12;
 
 }  // namespace
@@ -53,7 +53,7 @@ bool Saddle::find_way(VectorView way) {
   way.setZero();
   for (Eigen::Index i = 0; i < way.size(); ++i)
     if (task_.dofs.unknown[i] != kNone) way[i] = eigenvector[task_.dofs.unknown[i]];
-  const double resolved = kRoundOff * std::abs(at_.value());
+  const double resolved = kResolved * at_.value_round_off();
   way *= std::max(task_.options.step_tolerance, std::sqrt(2 * resolved / -curvature));
   if (way.dot(at_.gradient()) > resolved) way = -way;
   return true;

@@ -11,7 +11,7 @@ namespace itr {
 namespace {
 
 constexpr double kArmijo = 1e-4;
-constexpr double kRoundOff = 1e-9;  ///< relative change of energy below which slopes tell more
+constexpr double kResolved = 8;  ///< times its round-off: changes of energy below which slopes tell more
 constexpr double kLeastShare = 1e-14;
 constexpr double kStraightFall = 0.8;  ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostDoublings = 12;
@@ -93,9 +93,9 @@ bool Search::is_acceptable(double value, double share, const Way& way, const Ste
   // So, where the energy changes by round-off alone, a slope that shrinks to half suffices, too: if the end is no higher, or
   // the promised decrease was below round-off.
   const double change_of_energy = std::abs(value - at_.value());
-  if (change_of_energy > 0.1 * std::abs(at_.value())) return false;
+  if (change_of_energy > 0.1 * std::abs(at_.value()) && change_of_energy > kResolved * at_.value_round_off()) return false;
   const double after = slope_at_candidate(step);
-  const double resolved = kRoundOff * std::abs(at_.value());
+  const double resolved = kResolved * at_.value_round_off();
   return after <= kArmijo * slope ||
          (change_of_energy <= resolved && (value <= at_.value() || -share * slope <= resolved) && after <= -0.5 * slope);
 }

@@ -197,10 +197,8 @@ void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& 
   const Node advanced = nonlinear["advanced"];
   const Units& units = nonlinear.document().units;
   options.step_tolerance = length * nonlinear["x_delta"].non_negative(0);
-  options.gradient_tolerance = length * nonlinear["grad_norm"].non_negative(1e-8);
-  const Node first = first_gradient_node(nonlinear);
-  const double unit = units.factor("N s");
-  options.first_gradient_tolerance = length * (first.exists() ? unit * first.non_negative(0) : 1e-10);
+  options.gradient_tolerance = length * nonlinear["grad_norm"].non_negative(0);
+  options.first_gradient_tolerance = length * units.factor("N s") * first_gradient_node(nonlinear).non_negative(0);
   const Node energy = advanced.has("f_delta") ? advanced["f_delta"] : nonlinear["f_delta"];
   options.energy_tolerance = length * energy.non_negative(0);
   options.energy_steps = advanced["f_delta_step_tol"].integer_at_least(1, 100);
@@ -219,9 +217,7 @@ void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptio
   // What the scales are multiplied with has the dimension that is missing: a gradient's has that of h^2.
   double gradient_unit = units.factor("N s^2"), step_unit = units.factor("m");
   if (options.norm != NewtonNorm::euclidean) gradient_unit = units.factor("s^2"), step_unit = 1;
-  const auto gradient = [&](const Node& node, double fallback) {
-    return gradient_scale * (node.exists() ? gradient_unit * node.non_negative(0) : fallback);
-  };
+  const auto gradient = [&](const Node& node) { return gradient_scale * gradient_unit * node.non_negative(0); };
   if (options.norm == NewtonNorm::l2) {
     const double root_of_volume = std::pow(length, 0.5 * scale.dimension);
     gradient_scale = force * root_of_volume;
@@ -231,9 +227,9 @@ void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptio
     step_scale = length;
   }
   options.step_tolerance = step_scale * step_unit * nonlinear["x_delta_tol"].non_negative(0);
-  options.gradient_tolerance = gradient(nonlinear["grad_norm_tol"], 1e-10);
-  options.first_gradient_tolerance = gradient(first_gradient_node(nonlinear), 1e-12);
-  options.relative_gradient_tolerance = nonlinear["rel_grad_norm_tol"].non_negative(1e-10);
+  options.gradient_tolerance = gradient(nonlinear["grad_norm_tol"]);
+  options.first_gradient_tolerance = gradient(first_gradient_node(nonlinear));
+  options.relative_gradient_tolerance = nonlinear["rel_grad_norm_tol"].non_negative(0);
   options.relative_step_tolerance = nonlinear["rel_x_delta_tol"].non_negative(0);
   options.decrement_tolerance = nonlinear["newton_decrement_tol"].non_negative(0);
   options.energy_tolerance = nonlinear["advanced"]["f_delta_tol"].non_negative(0);
@@ -253,6 +249,7 @@ IndefiniteHessian indefinite_by_solver(const Node& root) {
 NewtonOptions read_newton(const Node& root, double characteristic_length, const SceneScale& scale) {
   const Node nonlinear = root["solver"]["nonlinear"];
   NewtonOptions options;
+  options.force_tolerance = nonlinear["force_tol"].non_negative(options.force_tolerance);
   options.max_iterations = nonlinear["max_iterations"].integer_at_least(1, options.max_iterations);
   const Node paper_key = find_any(nonlinear, kPaperKeys, "f_delta");
   const Node main_key = find_any(nonlinear, kMainKeys, "f_delta_tol");

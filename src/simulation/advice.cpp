@@ -12,6 +12,7 @@
 
 #include "barrier_stiffness.hpp"
 #include "geometry/measures.hpp"
+#include "simulation/resolution.hpp"
 #include "simulation/step_problem.hpp"
 #include "sizes.hpp"
 
@@ -397,6 +398,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_locking(setup, found);
   find_loose_tolerance(simulation, found);
   find_near_surfaces(simulation, found);
+  find_unresolved(simulation, found);
   return found;
 }
 

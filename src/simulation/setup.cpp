@@ -55,6 +55,7 @@ void check_contact(const ContactOptions& contact) {
 
 void check_newton(const NewtonOptions& newton) {
   require_at_least("/solver/nonlinear/max_iterations", newton.max_iterations, 1);
+  require_not_negative("/solver/nonlinear/force_tol", newton.force_tolerance);
   require_not_negative("newton.step_tolerance", newton.step_tolerance);
   require_not_negative("newton.gradient_tolerance", newton.gradient_tolerance);
   require_not_negative("newton.first_gradient_tolerance", newton.first_gradient_tolerance);

@@ -58,13 +58,7 @@ std::string reason_of(const NewtonSummary& summary) {
   return std::string(to_string(summary.termination)) + ": " + summary.message;
 }
 
-/// Whether a solve has all digits that its energy has, and nothing else is to be said of it.
-bool is_exact(const NewtonSummary& summary) {
-  constexpr double kLastDigits = 1e-13;
-  return summary.message == kAtRoundOff && summary.decrement < kLastDigits * std::abs(summary.energy);
-}
-
-/// That of the present positions and of those that the history holds.
+/// Finds what is violated by the present positions, or by those that the history holds.
 template <int Dim>
 std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
   std::string violation = find_violation(setup, state.mesh, x, state.space);
@@ -189,7 +183,7 @@ class StepAttempt {
     report_.residual_worth = std::max(report_.residual_worth, summary.decrement / problem_->scaling());
     report_.indefinite += summary.indefinite;
     if (summary.converged() && !summary.message.empty()) {
-      if (is_exact(summary))
+      if (summary.message == kAtRoundOff)
         tools_.logger.debug(fmt::format("step {}: {}", next_.step, summary.message));
       else
         warn(summary.message);
@@ -279,7 +273,8 @@ class StepAttempt {
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
     if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
-    TimeIntegrator(setup_.time).push(std::move(x_), next_.history);
+    const VectorX increment = problem_->increment_of(x_);
+    TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
     after = std::move(next_);  // before_ may be the same, and is not needed any more
     clock_.tell(report_);
     report_.peak_rss_mb = peak_rss_mb();

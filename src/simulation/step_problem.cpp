@@ -161,8 +161,11 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       potential_(terms_, cells_,
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
                   .velocity_reference = TimeIntegrator(setup.time).velocity_reference(history)}),
+      base_(history.x[0]),
       stiffness_(stiffness),
       cache_(cache) {
+  if (terms_.has_inertia)
+    potential_.inertia()->set_predicted_increment(TimeIntegrator(setup.time).predicted_increment(history));
   if (setup.follower.forces)
     terms_.follower = [this, &mesh, t](const VectorX& x) {
       return lag_follower(setup_.follower, mesh, x, t, terms_.scaling);
@@ -256,21 +259,42 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
   }
   if (!cells_.curved_elements.empty()) {
     potential_.elastic()->refine_quadrature(x);
-    extras.after_step = [&](const VectorX& iterate) { return potential_.elastic()->refine_quadrature(iterate); };
+    extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
   }
-  if (!adaptive_)
-    return explained(minimize(sum, x, dofs_, held_.target, system(), setup_.newton, workspace_, extras), sum, x);
+  if (!adaptive_) return minimize_from(x, sum, extras);
   initialize_stiffness(x);
   x = start_of_solve(x);
   bool is_first = true;
-  extras.after_step = [&](const VectorX& iterate) {
+  extras.after_step = [&](const VectorX& d) {
+    const VectorX iterate = base_ + d;
     const bool refined = potential_.elastic()->refine_quadrature(iterate);
     if (std::exchange(is_first, false) || setup_.time.is_static) return refined;
     const bool changed = adaptive_->update(surface_.positions(iterate), stiffness_, workspace_);
     if (changed) potential_.contact()->set_stiffness(stiffness_.value);
     return changed || refined;
   };
-  return explained(minimize(sum, x, dofs_, held_.target, system(), setup_.newton, workspace_, extras), sum, x);
+  return minimize_from(x, sum, extras);
+}
+
+/// Minimises over the increment from the positions at the start of the step.
+template <int Dim>
+NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, const NewtonExtras& extras) {
+  VectorX d = increment_of(x);
+  const VectorX target = held_.target - base_;
+  NewtonSummary summary =
+      minimize(EnergyOfIncrement(sum, base_), d, dofs_, target, system(), setup_.newton, workspace_, extras);
+  x = base_ + d;
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
+  if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
+  solution_ = {x, std::move(d)};
+  return explained(std::move(summary), sum, x);
+}
+
+/// x minus the positions at the start of the step; of the last solution without the round-off of x.
+template <int Dim>
+VectorX StepProblem<Dim>::increment_of(const VectorX& x) const {
+  return solution_.x.size() == x.size() && solution_.x == x ? solution_.increment : VectorX(x - base_);
 }
 
 /// How often the step may be solved, each time with what is lagged at the solution before.
@@ -397,7 +421,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     {
       const ScopedTimer timer(summary.assembly_seconds);
       next_lagged = potential_.lag(x, workspace_);
-      potential_.sum(next_lagged).add_gradient(x, gradient, workspace_);
+      EnergyOfIncrement(potential_.sum(next_lagged), base_).add_gradient(increment_of(x), gradient, workspace_);
     }
     double norm = 0;
     for (Eigen::Index i = 0; i < x.size(); ++i)
@@ -456,12 +480,13 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
 template <int Dim>
 NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
+  const VectorX increment = increment_of(x);
   NodalForces forces;
   const FieldOptions& asked = setup_.fields;
   const bool all = !asked.curves.empty();
   const auto get = [&](const EnergySum& sum, VectorX& of_bodies, VectorX* of_obstacles) {
     VectorX gradient = VectorX::Zero(x.size());
-    sum.add_gradient(x, gradient, workspace_);
+    EnergyOfIncrement(sum, base_).add_gradient(increment, gradient, workspace_);
     of_bodies = -gradient.head(bodies) / terms_.scaling;
     if (of_obstacles) *of_obstacles = -gradient.tail(x.size() - bodies) / terms_.scaling;
   };

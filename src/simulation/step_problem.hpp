@@ -48,6 +48,9 @@ class StepProblem {
   /// way there is free and the energy lower.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected = {});
 
+  /// x minus the positions at the start of the step [m]; of the last solve's x without the round-off of x.
+  VectorX increment_of(const VectorX& x) const;
+
   /// Why the last solve took as many iterations as its summary says.
   std::string describe_effort(const NewtonSummary& summary);
 
@@ -76,6 +79,7 @@ class StepProblem {
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
   NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {});
+  NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, const NewtonExtras& extras);
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
   void reset_system();
@@ -100,6 +104,11 @@ class StepProblem {
   HeldDofs<Dim> held_;
   DofMap dofs_;
   IncrementalPotential<Dim> potential_;
+  struct Solution {
+    VectorX x, increment;
+  };
+  VectorX base_;                                      ///< positions at the start of the step
+  Solution solution_;                                 ///< of the last solve
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed

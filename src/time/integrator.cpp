@@ -34,6 +34,13 @@ VectorX combine(const BdfRow& row, int order, const std::vector<VectorX>& past) 
   return sum;
 }
 
+/// The sum of the weights is 1: what positions add to that of the newest one.
+VectorX combine_increments(const BdfRow& row, int order, const std::vector<VectorX>& past) {
+  VectorX sum = VectorX::Zero(past[0].size());
+  for (int i = 1; i < order; ++i) sum += row.past[i] * (past[i] - past[0]);
+  return sum;
+}
+
 }  // namespace
 
 bool TimeIntegrator::is_newmark(const History& history) const {
@@ -50,12 +57,14 @@ int TimeIntegrator::order(const History& history) const {
   return std::min<int>(depth(), static_cast<int>(history.x.size()));
 }
 
-VectorX TimeIntegrator::predictor(const History& history) const {
+VectorX TimeIntegrator::predicted_increment(const History& history) const {
   const double h = options_.dt;
-  if (is_newmark(history)) return history.x[0] + h * history.v[0] + h * h * (0.5 - options_.newmark_beta) * history.a[0];
+  if (is_newmark(history)) return h * history.v[0] + h * h * (0.5 - options_.newmark_beta) * history.a[0];
   const int k = order(history);
-  return combine(bdf(k), k, history.x) + bdf(k).b * h * combine(bdf(k), k, history.v);
+  return combine_increments(bdf(k), k, history.x) + bdf(k).b * h * combine(bdf(k), k, history.v);
 }
+
+VectorX TimeIntegrator::predictor(const History& history) const { return history.x[0] + predicted_increment(history); }
 
 double TimeIntegrator::scaling(const History& history) const {
   if (options_.is_static) return 1;
@@ -71,18 +80,26 @@ double TimeIntegrator::velocity_rate(const History& history) const {
   return 1 / (bdf(order(history)).b * options_.dt);
 }
 
-VectorX TimeIntegrator::velocity_reference(const History& history) const {
+/// The positions of no velocity minus the newest ones.
+VectorX TimeIntegrator::reference_increment(const History& history) const {
   if (is_newmark(history)) {
     const double beta = options_.newmark_beta, gamma = options_.newmark_gamma, h = options_.dt;
-    return history.x[0] -
-           ((1 - gamma / beta) * history.v[0] + (1 - gamma / (2 * beta)) * h * history.a[0]) * (beta * h / gamma);
+    return ((1 - gamma / beta) * history.v[0] + (1 - gamma / (2 * beta)) * h * history.a[0]) * (-beta * h / gamma);
   }
   const int k = order(history);
-  return combine(bdf(k), k, history.x);
+  return combine_increments(bdf(k), k, history.x);
+}
+
+VectorX TimeIntegrator::velocity_reference(const History& history) const {
+  return history.x[0] + reference_increment(history);
 }
 
 VectorX TimeIntegrator::velocity(const VectorX& x, const History& history) const {
-  return velocity_rate(history) * (x - velocity_reference(history));
+  return velocity_after(x - history.x[0], history);
+}
+
+VectorX TimeIntegrator::velocity_after(const VectorX& increment, const History& history) const {
+  return velocity_rate(history) * (increment - reference_increment(history));
 }
 
 VectorX TimeIntegrator::acceleration(const VectorX& v, const History& history) const {
@@ -93,8 +110,8 @@ VectorX TimeIntegrator::acceleration(const VectorX& v, const History& history) c
   return (v - combine(bdf(k), k, history.v)) / (bdf(k).b * h);
 }
 
-void TimeIntegrator::push(VectorX x, History& history) const {
-  VectorX v = velocity(x, history);
+void TimeIntegrator::push(VectorX x, const VectorX& increment, History& history) const {
+  VectorX v = velocity_after(increment, history);
   VectorX a = uses_acceleration() ? acceleration(v, history) : VectorX();
   const auto push_front = [&](std::vector<VectorX>& past, VectorX newest) {
     past.insert(past.begin(), std::move(newest));

@@ -3,6 +3,7 @@
 
 #include "itr/energy/damping_options.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/increment.hpp"
 #include "itr/energy/quadratic_blocks.hpp"
 #include "itr/energy/velocity_rule.hpp"
 
@@ -11,7 +12,7 @@ namespace itr {
 /// coefficient / (2 rate) * v^T K v with K the Hessian of another term at the positions where this was made, projected to be
 /// positive semi-definite: it only ever takes energy out. A new lag is a new object.
 template <int Dim>
-class DampingEnergy final : public Energy {
+class DampingEnergy final : public Energy, public IncrementalTerm {
  public:
   /// K is taken with the scale (alpha h^2) that `damped` has.
   DampingEnergy(const Energy& damped, ConstVectorView lagged_x, double coefficient, VelocityRule velocity,
@@ -20,6 +21,8 @@ class DampingEnergy final : public Energy {
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
+  double value_at(const Increment& at, Workspace&) const override;
+  void add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const override;
 
  private:
   QuadraticBlocks<Dim> damped_;

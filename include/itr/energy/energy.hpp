@@ -44,6 +44,14 @@ class Energy {
   virtual double value(ConstVectorView x, Workspace& workspace) const = 0;
   virtual void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const = 0;
   virtual void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const = 0;
+  /// Adds the gradient, and to `sizes` the absolute forces of which it is the sum: those of each term.
+  virtual void add_gradient_and_sizes(ConstVectorView x, VectorView gradient, VectorView sizes, Workspace& workspace) const;
+  /// By how much round-off may change the value: epsilon times the size of what is summed. By default that of the value and
+  /// of the work of its forces along x.
+  virtual double value_round_off(ConstVectorView x, Workspace& workspace) const;
+  /// Adds by how much round-off may change each entry of the gradient: the change where each number that it is computed from
+  /// changes in its last bits.
+  virtual void add_gradient_round_off(ConstVectorView x, VectorView round_off, Workspace& workspace) const;
   /// Largest a in [0, 1] such that x + s dx is feasible for all s in [0, a] (conservative).
   virtual double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
   /// The motion dx with each vertex' way as long as it is feasible whatever stops others, for where max_step cuts dx short
@@ -65,6 +73,8 @@ class EnergySum final : public Energy {
   double value(ConstVectorView x, Workspace& workspace) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
+  void add_gradient_and_sizes(ConstVectorView x, VectorView gradient, VectorView sizes, Workspace& workspace) const override;
+  double value_round_off(ConstVectorView x, Workspace& workspace) const override;
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Those of the one term that can tell; false where another cuts dx short.
   bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;

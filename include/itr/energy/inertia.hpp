@@ -5,6 +5,7 @@
 
 #include "itr/core/kept_vector.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/increment.hpp"
 #include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "itr/fem/mass.hpp"
@@ -13,7 +14,7 @@ namespace itr {
 
 /// 1/2 (x - xhat)^T M (x - xhat): the body's distance to where it would fly without forces, as a function on the body.
 template <int Dim>
-class InertiaEnergy final : public Energy {
+class InertiaEnergy final : public Energy, public IncrementalTerm {
  public:
   /// `predictor` is xhat at the vertices of `cells`, which must outlive this.
   InertiaEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, MassKind kind,
@@ -25,11 +26,16 @@ class InertiaEnergy final : public Energy {
   /// mesh cannot represent (REMESHING.md, "The rules", rule b): see projection/forgotten_history.hpp.
   void set_unrepresented_history(ConstVectorView residual, double loss);
 
+  /// Gives xhat - base for increments from `base`, where xhat itself would round it away.
+  void set_predicted_increment(ConstVectorView increment) { predicted_increment_ = increment; }
+
   ConstVectorView predictor() const { return predictor_.view(); }
   std::string_view name() const override { return "inertia"; }
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
+  double value_at(const Increment& at, Workspace&) const override;
+  void add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const override;
   /// y += M x.
   void add_mass_product(ConstVectorView x, VectorView y) const;
 
@@ -40,13 +46,16 @@ class InertiaEnergy final : public Energy {
     std::size_t matrix;
   };
   void renew_curved(const std::map<int, Material>& materials);
+  /// At x = xhat + `distance`.
+  double value_of(ConstVectorView distance) const;
+  ConstVectorView distance_at(const Increment& at, Workspace& workspace) const;
 
   std::vector<double> mass_;                         ///< rho |e| by element
   std::vector<Mat<kQuadraticNodes<Dim>>> matrices_;  ///< by unit mass: one a set of curved edges, or one an element
   std::vector<CurvedMass> curved_mass_;
   MassKind kind_ = MassKind::consistent;
-  KeptVector predictor_;
-  KeptVector residual_;  ///< empty: none
+  KeptVector predictor_, predicted_increment_;  ///< the second is empty where none is given
+  KeptVector residual_;                         ///< empty: none
   double loss_ = 0;
 };
 

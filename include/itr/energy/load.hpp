@@ -6,6 +6,7 @@
 
 #include "itr/core/kept_vector.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/increment.hpp"
 #include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
 
@@ -32,7 +33,7 @@ struct Loads {
 /// -scale * f . (x - X) with the consistent nodal forces f of body force and tractions, the dead loads: minus the work done
 /// from rest.
 template <int Dim>
-class LoadEnergy final : public Energy {
+class LoadEnergy final : public Energy, public IncrementalTerm {
  public:
   /// `cells` must outlive this.
   LoadEnergy(const CellSet<Dim>& cells, const std::map<int, Material>& materials, const Loads<Dim>& loads, double scale);
@@ -42,6 +43,10 @@ class LoadEnergy final : public Energy {
   double value(ConstVectorView x, Workspace&) const override { return -(scale_ * (forces_.view().dot(x) - rest_work_)); }
   void add_gradient(ConstVectorView, VectorView gradient, Workspace&) const override { gradient -= scale_ * forces_.view(); }
   void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+  double value_at(const Increment& at, Workspace&) const override { return -scale_ * forces_.view().dot(at.d); }
+  void add_gradient_at(const Increment& at, VectorView gradient, Workspace& workspace) const override {
+    add_gradient(at.base, gradient, workspace);
+  }
   ConstVectorView forces() const { return forces_.view(); }  ///< [N]
 
  private:

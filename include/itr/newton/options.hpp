@@ -32,19 +32,20 @@ struct NewtonProgress {
   double step_norm = 0;
 };
 
-/// Convergence tests and search of a solve. Tolerances are those of the scene, already multiplied by the factors of
-/// CONVENTIONS.md, "Tolerances". 0 turns a test off.
+/// Convergence tests and search of a solve. Absolute tolerances are those of the scene, already multiplied by the factors of
+/// CONVENTIONS.md, "Tolerances". 0 turns a test off. Where none is given, forces are compared with the forces that act.
 struct NewtonOptions {
   int max_iterations = 3000;
   NewtonNorm norm = NewtonNorm::euclidean;
-  double step_tolerance = 0;                ///< stop when the full step has a norm below it
-  double gradient_tolerance = 1e-8;         ///< stop when the gradient has a norm below it
-  double first_gradient_tolerance = 1e-10;  ///< the same before the first iteration
-  double relative_step_tolerance = 0;       ///< of the norm of the solve's first full step
-  double relative_gradient_tolerance = 0;   ///< of the norm of the solve's first gradient
-  double decrement_tolerance = 0;           ///< stop when the Newton decrement -p.g / 2 is below it [J s^2]
-  double split_share = 0;       ///< with remeshing: stop when the decrement is below this part of the split tolerance
-  double energy_tolerance = 0;  ///< stop after `energy_steps` steps in a row that change less [J s^2]
+  double step_tolerance = 0;               ///< stop when the full step has a norm below it
+  double force_tolerance = 1e-9;           ///< stop when the gradient is below this part of the forces that act; not
+                                           ///< where a gradient tolerance is given
+  double gradient_tolerance = 0;           ///< stop when the gradient has a norm below it
+  double first_gradient_tolerance = 0;     ///< the same before the first iteration
+  double relative_step_tolerance = 0;      ///< of the norm of the solve's first full step
+  double relative_gradient_tolerance = 0;  ///< of the norm of the solve's first gradient
+  double decrement_tolerance = 0;          ///< stop when the Newton decrement -p.g / 2 is below it [J s^2]
+  double energy_tolerance = 0;             ///< stop after `energy_steps` steps in a row that change less [J s^2]
   int energy_steps = 100;
   LineSearch line_search = LineSearch::robust_armijo;
   IndefiniteHessian indefinite = IndefiniteHessian::project;

@@ -33,6 +33,8 @@ class TimeIntegrator {
 
   /// x-hat: where the body flies without forces [m].
   VectorX predictor(const History& history) const;
+  /// x-hat minus the newest positions, without the round-off of positions [m].
+  VectorX predicted_increment(const History& history) const;
   /// alpha h^2 [s^2]; 1 for statics.
   double scaling(const History& history) const;
   /// dv/dx [1/s].
@@ -40,13 +42,18 @@ class TimeIntegrator {
   /// The positions at which the velocity would vanish: v = velocity_rate * (x - reference).
   VectorX velocity_reference(const History& history) const;
 
+  /// Of the positions x.
   VectorX velocity(const VectorX& x, const History& history) const;
+  /// Of the newest positions plus `increment`, without the round-off of positions.
+  VectorX velocity_after(const VectorX& increment, const History& history) const;
   VectorX acceleration(const VectorX& v, const History& history) const;
-  /// Makes x the newest state.
-  void push(VectorX x, History& history) const;
+  /// Makes x the newest state; `increment` is x minus the newest positions, before it was rounded.
+  void push(VectorX x, const VectorX& increment, History& history) const;
+  void push(const VectorX& x, History& history) const { push(x, x - history.x[0], history); }
 
  private:
   bool is_newmark(const History& history) const;
+  VectorX reference_increment(const History& history) const;
 
   TimeOptions options_;
 };

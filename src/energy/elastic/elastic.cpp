@@ -7,6 +7,8 @@
 
 #include "core/check.hpp"
 #include "core/parallel_reduce.hpp"
+#include "energy/round_off.hpp"
+#include "fem/displacement.hpp"
 #include "geometry/measures.hpp"
 #include "point.hpp"
 #include "quadratic.hpp"
@@ -18,12 +20,23 @@ namespace {
 constexpr std::size_t kBlock = 256;
 constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
 
+struct PositionScratch {
+  KeptVector x;
+};
+
 template <int Dim>
 Mat<Dim> edges_of(const typename CellSet<Dim>::Element& element, ConstVectorView x) {
   Mat<Dim> edges;
   for (int k = 0; k < Dim; ++k)
     edges.col(k) = x.segment<Dim>(Dim * element.vertices[k + 1]) - x.segment<Dim>(Dim * element.vertices[0]);
   return edges;
+}
+
+template <int Dim>
+DisplacementGradient<Dim> displacement_gradient(const typename CellSet<Dim>::Element& element, const Displacement<Dim>& u) {
+  Mat<Dim> edges;
+  for (int k = 0; k < Dim; ++k) edges.col(k) = u.difference(element.vertices[0], element.vertices[k + 1]);
+  return {edges * element.inverse_edges};
 }
 
 /// Smallest root in (0, 1] of a + b t + c t^2 (+ d t^3) with a > 0; 2 if there is none.
@@ -74,9 +87,9 @@ using ElementBlock = Mat<Dim*(Dim + 1)>;
 
 /// weight * d2W/dx2 in terms of h_i = F^-T grad phi_i: no decomposition is needed.
 template <int Dim>
-void exact_block(const Mat<Dim>& F, const ShapeGradients<Dim>& gradients, const LameParameters& lame, double weight,
-                 ElementBlock<Dim>& block) {
-  const NeoHookeanPoint<Dim> point(F, lame);
+void exact_block(const DisplacementGradient<Dim>& at, const ShapeGradients<Dim>& gradients, const LameParameters& lame,
+                 double weight, ElementBlock<Dim>& block) {
+  const NeoHookeanPoint<Dim> point(at, lame);
   const auto stiffness = point.stiffness(weight);
   const ShapeGradients<Dim> h = point.inverse().transpose() * gradients;
   for (int j = 0; j <= Dim; ++j)
@@ -156,21 +169,41 @@ const ElasticModuli& ElasticEnergy<Dim>::moduli(std::size_t e) const {
 }
 
 template <int Dim>
-double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
-  const double straight = scale_ * parallel_sum(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-                            double sum = 0;
-                            for (std::size_t e = begin; e < end; ++e)
-                              sum += elastic_energy<Dim>(cells_.elements[e], x, moduli(e));
-                            return sum;
-                          });
-  return curved_ ? straight + curved_->value(x) : straight;
+template <typename F>
+double ElasticEnergy<Dim>::sum_over_elements(const F& f) const {
+  return scale_ * parallel_sum(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+           double sum = 0;
+           for (std::size_t e = begin; e < end; ++e) sum += f(e);
+           return sum;
+         });
 }
 
 template <int Dim>
-void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
+double ElasticEnergy<Dim>::value_of(const Displacement<Dim>& u, ConstVectorView x) const {
+  const double straight = sum_over_elements([&](std::size_t e) {
+    const auto& element = cells_.elements[e];
+    return element.volume * elastic_density<Dim>(displacement_gradient<Dim>(element, u), moduli(e));
+  });
+  return curved_ ? straight + curved_->value(u, x) : straight;
+}
+
+/// Stress and displacement gradient both round: W by epsilon of itself, and by epsilon |P| |G|.
+template <int Dim>
+double ElasticEnergy<Dim>::round_off_of(const Displacement<Dim>& u, ConstVectorView x) const {
+  const double straight = sum_over_elements([&](std::size_t e) {
+    const auto& element = cells_.elements[e];
+    const auto at = displacement_gradient<Dim>(element, u);
+    return element.volume *
+           (std::abs(elastic_density<Dim>(at, moduli(e))) + elastic_stress<Dim>(at, moduli(e)).norm() * at.G.norm());
+  });
+  return kEpsilon * (curved_ ? straight + curved_->size_of_summands(u, x) : straight);
+}
+
+template <int Dim>
+void ElasticEnergy<Dim>::add_gradient_of(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const {
   const auto forces_of = [&](std::size_t e) -> Mat<Dim> {  // on all vertices but the first
     const auto& element = cells_.elements[e];
-    const Mat<Dim> P = elastic_stress<Dim>(deformation_gradient<Dim>(element, x), moduli(e));
+    const Mat<Dim> P = elastic_stress<Dim>(displacement_gradient<Dim>(element, u), moduli(e));
     return scale_ * element.volume * P * element.inverse_edges.transpose();
   };
   parallel_then_ordered<Mat<Dim>>(cells_.elements.size(), kBlock, forces_of, [&](std::size_t e, const Mat<Dim>& forces) {
@@ -180,23 +213,64 @@ void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
       gradient.segment<Dim>(Dim * vertices[0]) -= forces.col(k);
     }
   });
-  if (curved_) curved_->add_gradient(x, gradient);
+  if (curved_) curved_->add_gradient(u, x, gradient);
+}
+
+template <int Dim>
+double ElasticEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
+  return value_of({cells_.rest, x}, x);
+}
+
+template <int Dim>
+void ElasticEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
+  add_gradient_of({cells_.rest, x}, x, gradient);
+}
+
+/// Positions round, too: that changes the value by the work of the forces.
+template <int Dim>
+double ElasticEnergy<Dim>::value_round_off(ConstVectorView x, Workspace& workspace) const {
+  return Energy::value_round_off(x, workspace) + round_off_of({cells_.rest, x}, x);
+}
+
+template <int Dim>
+ConstVectorView ElasticEnergy<Dim>::curved_positions(const Increment& at, Workspace& workspace) const {
+  if (!curved_) return at.base;
+  VectorView x = workspace.get<PositionScratch>().x.resize(at.d.size());
+  x = at.base + at.d;
+  return x;
+}
+
+template <int Dim>
+double ElasticEnergy<Dim>::value_at(const Increment& at, Workspace& workspace) const {
+  return value_of({cells_.rest, at.base, at.d}, curved_positions(at, workspace));
+}
+
+template <int Dim>
+void ElasticEnergy<Dim>::add_gradient_at(const Increment& at, VectorView gradient, Workspace& workspace) const {
+  add_gradient_of({cells_.rest, at.base, at.d}, curved_positions(at, workspace), gradient);
+}
+
+template <int Dim>
+double ElasticEnergy<Dim>::value_round_off_at(const Increment& at, Workspace& workspace) const {
+  return IncrementalTerm::value_round_off_at(at, workspace) +
+         round_off_of({cells_.rest, at.base, at.d}, curved_positions(at, workspace));
 }
 
 template <int Dim>
 void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
+  const Displacement<Dim> u(cells_.rest, x);
   sink.add_elements<Dim>(cells_, [&](std::size_t e, ElementBlock<Dim>& block) {
     const auto& element = cells_.elements[e];
-    const Mat<Dim> F = deformation_gradient<Dim>(element, x);
+    const auto at = displacement_gradient<Dim>(element, u);
     const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);
     const double weight = scale_ * element.volume;
     const ElasticModuli& here = moduli(e);
     if (here.law == MaterialLaw::neo_hookean) {
-      exact_block<Dim>(F, gradients, here.lame, weight, block);
+      exact_block<Dim>(at, gradients, here.lame, weight, block);
       if (psd != PsdProjection::none)
-        project_modes<Dim>(neo_hookean_negative_modes<Dim>(F, here.lame), gradients, weight, psd, block);
+        project_modes<Dim>(neo_hookean_negative_modes<Dim>(at.F(), here.lame), gradients, weight, psd, block);
     } else {
-      block_of_modes<Dim>(elastic_eigensystem<Dim>(F, here), gradients, weight, psd, block);
+      block_of_modes<Dim>(elastic_eigensystem<Dim>(at.F(), here), gradients, weight, psd, block);
     }
   });
   if (curved_) curved_->add_hessian(x, psd, sink);

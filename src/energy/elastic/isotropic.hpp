@@ -14,24 +14,25 @@ struct InvariantDerivatives {
   Mat<4> second = Mat<4>::Zero();
 };
 
+/// Densities and stresses take G = F - I.
 template <int Dim>
-double saint_venant_density(const Mat<Dim>& F, const LameParameters& lame);
+double saint_venant_density(const Mat<Dim>& G, const LameParameters& lame);
 template <int Dim>
-Mat<Dim> saint_venant_stress(const Mat<Dim>& F, const LameParameters& lame);
+Mat<Dim> saint_venant_stress(const Mat<Dim>& G, const LameParameters& lame);
 template <int Dim>
 InvariantDerivatives saint_venant_derivatives(const Vec<Dim>& s, const LameParameters& lame);
 
 template <int Dim>
-double fixed_corotated_density(const Mat<Dim>& F, const LameParameters& lame);
+double fixed_corotated_density(const Mat<Dim>& G, const LameParameters& lame);
 template <int Dim>
-Mat<Dim> fixed_corotated_stress(const Mat<Dim>& F, const LameParameters& lame);
+Mat<Dim> fixed_corotated_stress(const Mat<Dim>& G, const LameParameters& lame);
 template <int Dim>
 InvariantDerivatives fixed_corotated_derivatives(const Vec<Dim>& s, const LameParameters& lame);
 
 template <int Dim>
-double mooney_rivlin_density(const Mat<Dim>& F, const MooneyRivlinModuli& moduli);
+double mooney_rivlin_density(const Mat<Dim>& G, const MooneyRivlinModuli& moduli);
 template <int Dim>
-Mat<Dim> mooney_rivlin_stress(const Mat<Dim>& F, const MooneyRivlinModuli& moduli);
+Mat<Dim> mooney_rivlin_stress(const Mat<Dim>& G, const MooneyRivlinModuli& moduli);
 template <int Dim>
 InvariantDerivatives mooney_rivlin_derivatives(const Vec<Dim>& s, const MooneyRivlinModuli& moduli);
 

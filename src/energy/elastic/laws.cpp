@@ -8,6 +8,7 @@
 
 #include "core/check.hpp"
 #include "isotropic.hpp"
+#include "point.hpp"
 
 namespace itr {
 
@@ -21,8 +22,8 @@ Vec<3> in_space(const Vec<Dim>& X) {
 }
 
 template <int Dim>
-Mat<Dim> small_strain(const Mat<Dim>& F) {
-  return 0.5 * (F + F.transpose()) - Mat<Dim>::Identity();
+Mat<Dim> small_strain(const Mat<Dim>& G) {
+  return 0.5 * (G + G.transpose());
 }
 
 /// The Hessian of the linear law does not depend on F: traces, symmetric shears, and nothing for rotations.
@@ -83,47 +84,51 @@ double mass_density(const Material& material, const Vec<Dim>& X) {
 }
 
 template <int Dim>
-double elastic_density(const Mat<Dim>& F, const ElasticModuli& moduli) {
-  if (moduli.law == MaterialLaw::neo_hookean) return neo_hookean_density<Dim>(F, moduli.lame);
-  if (!(F.determinant() > 0)) return std::numeric_limits<double>::infinity();
+double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+  if (moduli.law == MaterialLaw::neo_hookean) return NeoHookeanPoint<Dim>(at, moduli.lame).density();
+  const Mat<Dim>& G = at.G;
+  if (!(G.trace() + sum_of_minors(G) > -1)) return std::numeric_limits<double>::infinity();
   const LameParameters& lame = moduli.lame;
   switch (moduli.law) {
     case MaterialLaw::linear: {
-      const Mat<Dim> e = small_strain<Dim>(F);
+      const Mat<Dim> e = small_strain<Dim>(G);
       return lame.mu * e.squaredNorm() + lame.lambda / 2 * e.trace() * e.trace();
     }
     case MaterialLaw::saint_venant_kirchhoff:
-      return saint_venant_density<Dim>(F, lame);
+      return saint_venant_density<Dim>(G, lame);
     case MaterialLaw::fixed_corotated:
-      return fixed_corotated_density<Dim>(F, lame);
+      return fixed_corotated_density<Dim>(G, lame);
     case MaterialLaw::own:
-      return moduli.own->density(F);
+      return moduli.own->density(at.F());
     default:
-      return mooney_rivlin_density<Dim>(F, moduli.mooney_rivlin);
+      return mooney_rivlin_density<Dim>(G, moduli.mooney_rivlin);
   }
 }
 
 template <int Dim>
-Mat<Dim> elastic_stress(const Mat<Dim>& F, const ElasticModuli& moduli) {
+Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+  const Mat<Dim>& G = at.G;
   const LameParameters& lame = moduli.lame;
   switch (moduli.law) {
-    case MaterialLaw::neo_hookean:
-      return neo_hookean_stress<Dim>(F, lame);
+    case MaterialLaw::neo_hookean: {
+      const NeoHookeanPoint<Dim> point(at, lame);
+      return point.stress(point.inverse());
+    }
     case MaterialLaw::linear: {
-      const Mat<Dim> e = small_strain<Dim>(F);
+      const Mat<Dim> e = small_strain<Dim>(G);
       return 2 * lame.mu * e + lame.lambda * e.trace() * Mat<Dim>::Identity();
     }
     case MaterialLaw::saint_venant_kirchhoff:
-      return saint_venant_stress<Dim>(F, lame);
+      return saint_venant_stress<Dim>(G, lame);
     case MaterialLaw::fixed_corotated:
-      return fixed_corotated_stress<Dim>(F, lame);
+      return fixed_corotated_stress<Dim>(G, lame);
     case MaterialLaw::own: {
       MatrixX P(Dim, Dim);
-      moduli.own->stress(F, P);
+      moduli.own->stress(at.F(), P);
       return P;
     }
     default:
-      return mooney_rivlin_stress<Dim>(F, moduli.mooney_rivlin);
+      return mooney_rivlin_stress<Dim>(G, moduli.mooney_rivlin);
   }
 }
 
@@ -143,11 +148,11 @@ EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& mod
   }
 }
 
-#define ITR_INSTANTIATE(Dim)                                                    \
-  template ElasticModuli elastic_moduli<Dim>(const Material&, const Vec<Dim>&); \
-  template double mass_density<Dim>(const Material&, const Vec<Dim>&);          \
-  template double elastic_density<Dim>(const Mat<Dim>&, const ElasticModuli&);  \
-  template Mat<Dim> elastic_stress<Dim>(const Mat<Dim>&, const ElasticModuli&); \
+#define ITR_INSTANTIATE(Dim)                                                                     \
+  template ElasticModuli elastic_moduli<Dim>(const Material&, const Vec<Dim>&);                  \
+  template double mass_density<Dim>(const Material&, const Vec<Dim>&);                           \
+  template double elastic_density<Dim>(const DisplacementGradient<Dim>&, const ElasticModuli&);  \
+  template Mat<Dim> elastic_stress<Dim>(const DisplacementGradient<Dim>&, const ElasticModuli&); \
   template EigenSystem<Dim> elastic_eigensystem<Dim>(const Mat<Dim>&, const ElasticModuli&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

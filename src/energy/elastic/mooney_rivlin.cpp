@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "isotropic.hpp"
+#include "strain.hpp"
 
 namespace itr {
 
@@ -55,22 +56,49 @@ InvariantDerivatives derivatives(double a, double q, double J, const MooneyRivli
 
 }  // namespace
 
+namespace {
+
+/// I1 - d and I2 - d in which nothing cancels, with t = tr(C - I), m = (t^2 - |C - I|^2) / 2 and l = ln J:
+/// I1 - d = (t - 2 l) + d r(-p l) + e t and I2 - 3 = 2 (t - 2 l) + 3 r(-2 p l) + m + e2 (2 t + m), where
+/// r(y) = exp(y) - 1 - y, e = exp(-p l) - 1 and e2 = exp(-2 p l) - 1.
 template <int Dim>
-double mooney_rivlin_density(const Mat<Dim>& F, const MooneyRivlinModuli& m) {
-  const Mat<Dim> C = F.transpose() * F;
-  const double J = F.determinant(), log_J = std::log(J);
-  const Isochoric<Dim> iso(C.trace(), C.squaredNorm(), J);
-  return (m.c1 + m.c3 * (iso.I2 - Dim)) * (iso.I1 - Dim) + m.c2 * (iso.I2 - Dim - kRestI2<Dim>)+m.log_k / 2 * log_J * log_J +
-         m.volume_d * (J - 1) * (J - 1);
-}
+struct IsochoricChange {
+  double t, m, scale, I1, I2;  ///< scale: J^-p; I2 is 0 in 2D
+
+  explicit IsochoricChange(const Strain<Dim>& strain)
+      : t(strain.A.trace()), m(Dim == 2 ? 0 : (t * t - strain.A.squaredNorm()) / 2) {
+    const double y = -2.0 / Dim * strain.log_J, e = std::expm1(y), e2 = std::expm1(2 * y);
+    const double second = strain.trace_minus_log();
+    scale = 1 + e;
+    I1 = second + Dim * minus_expm1(y) + e * t;
+    I2 = Dim == 2 ? 0 : 2 * second + 3 * minus_expm1(2 * y) + m + e2 * (2 * t + m);
+  }
+};
+
+}  // namespace
 
 template <int Dim>
-Mat<Dim> mooney_rivlin_stress(const Mat<Dim>& F, const MooneyRivlinModuli& m) {
-  using I = InvariantDerivatives;
-  const Mat<Dim> C = F.transpose() * F;
-  const double J = F.determinant();
-  const Vec<4> W = derivatives<Dim>(C.trace(), C.squaredNorm(), J, m).first;
-  return 2 * W[I::a] * F + 4 * W[I::q] * F * C + W[I::J] * J * F.inverse().transpose();
+double mooney_rivlin_density(const Mat<Dim>& G, const MooneyRivlinModuli& moduli) {
+  const Strain<Dim> strain(G);
+  const IsochoricChange<Dim> change(strain);
+  return (moduli.c1 + moduli.c3 * (change.I2 + kRestI2<Dim>)) * change.I1 + moduli.c2 * change.I2 +
+         moduli.log_k / 2 * strain.log_J * strain.log_J + moduli.volume_d * strain.J_minus_1 * strain.J_minus_1;
+}
+
+/// F^-T times a symmetric matrix that vanishes at rest: 2 W_1 J^-p (A - t/d) + 2 W_2 J^-2p ((1 + t) A - A^2 - (t + 2 m)/3) +
+/// k ln J + 2 D (J - 1) J with A = C - I.
+template <int Dim>
+Mat<Dim> mooney_rivlin_stress(const Mat<Dim>& G, const MooneyRivlinModuli& moduli) {
+  const Strain<Dim> strain(G);
+  const IsochoricChange<Dim> change(strain);
+  const double by_I1 = moduli.c1 + moduli.c3 * (change.I2 + kRestI2<Dim>), by_I2 = moduli.c2 + moduli.c3 * change.I1;
+  const Mat<Dim>& A = strain.A;
+  const Mat<Dim> I = Mat<Dim>::Identity();
+  Mat<Dim> inner = 2 * by_I1 * change.scale * (A - change.t / Dim * I);
+  if (Dim == 3)
+    inner += 2 * by_I2 * change.scale * change.scale * ((1 + change.t) * A - A * A - (change.t + 2 * change.m) / 3 * I);
+  inner += (moduli.log_k * strain.log_J + 2 * moduli.volume_d * strain.J_minus_1 * strain.J()) * I;
+  return strain.inverse_transpose() * inner;
 }
 
 template <int Dim>

@@ -14,12 +14,12 @@ namespace itr {
 
 template <int Dim>
 double neo_hookean_density(const Mat<Dim>& F, const LameParameters& lame) {
-  return NeoHookeanPoint<Dim>(F, lame).density();
+  return NeoHookeanPoint<Dim>(DisplacementGradient<Dim>::of(F), lame).density();
 }
 
 template <int Dim>
 Mat<Dim> neo_hookean_stress(const Mat<Dim>& F, const LameParameters& lame) {
-  const NeoHookeanPoint<Dim> point(F, lame);
+  const NeoHookeanPoint<Dim> point(DisplacementGradient<Dim>::of(F), lame);
   return point.stress(point.inverse());
 }
 

@@ -9,23 +9,26 @@
 
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/fem/cell_set.hpp"
+#include "strain.hpp"
 
 namespace itr {
 
-/// Neo-Hookean elasticity (itr/energy/elastic/neo_hookean.hpp). F must outlive this.
+/// Neo-Hookean elasticity (itr/energy/elastic/neo_hookean.hpp) at a displacement gradient.
 template <int Dim>
 class NeoHookeanPoint {
  public:
-  NeoHookeanPoint(const Mat<Dim>& F, const LameParameters& lame)
-      : F_(F), lame_(lame), J_(F.determinant()), log_J_(std::log(J_)) {}
+  NeoHookeanPoint(const DisplacementGradient<Dim>& at, const LameParameters& lame) : strain_(at.G), lame_(lame) {}
 
   double density() const {
-    return J_ > 0 ? lame_.mu / 2 * (F_.squaredNorm() - Dim - 2 * log_J_) + lame_.lambda / 2 * log_J_ * log_J_
-                  : std::numeric_limits<double>::infinity();
+    return strain_.J() > 0 ? lame_.mu / 2 * strain_.trace_minus_log() + lame_.lambda / 2 * strain_.log_J * strain_.log_J
+                           : std::numeric_limits<double>::infinity();
   }
-  Mat<Dim> inverse() const { return F_.inverse(); }
+  Mat<Dim> inverse() const { return strain_.F.inverse(); }
+  /// F^-T (mu (C - I) + lambda ln J), in which nothing cancels.
   Mat<Dim> stress(const Mat<Dim>& inverse) const {
-    return lame_.mu * F_ + (lame_.lambda * log_J_ - lame_.mu) * inverse.transpose();
+    Mat<Dim> inner = lame_.mu * strain_.A;
+    inner.diagonal().array() += lame_.lambda * strain_.log_J;
+    return inverse.transpose() * inner;
   }
 
   /// Second derivatives times a weight, by vertices whose shape functions have the gradients g_i and g_j.
@@ -44,30 +47,31 @@ class NeoHookeanPoint {
     }
   };
   Stiffness stiffness(double weight) const {
-    return {weight * (lame_.mu - lame_.lambda * log_J_), weight * lame_.lambda, weight * lame_.mu};
+    return {weight * (lame_.mu - lame_.lambda * strain_.log_J), weight * lame_.lambda, weight * lame_.mu};
   }
 
  private:
-  const Mat<Dim>& F_;
+  Strain<Dim> strain_;
   LameParameters lame_;
-  double J_, log_J_;
 };
 
-/// Any law at F, and its derivatives by the position of one vertex. F and the moduli must outlive this.
+/// Any law at F, and its derivatives by the position of one vertex.
 template <int Dim>
 class ElasticPoint {
  public:
-  ElasticPoint(const Mat<Dim>& F, const ElasticModuli& moduli) : is_neo_hookean_(moduli.law == MaterialLaw::neo_hookean) {
+  ElasticPoint(const Mat<Dim>& F, const ElasticModuli& moduli) : ElasticPoint(DisplacementGradient<Dim>::of(F), moduli) {}
+  ElasticPoint(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli)
+      : is_neo_hookean_(moduli.law == MaterialLaw::neo_hookean) {
     if (is_neo_hookean_) {  // with one inverse and one logarithm
-      const NeoHookeanPoint<Dim> point(F, moduli.lame);
+      const NeoHookeanPoint<Dim> point(at, moduli.lame);
       inverse_ = point.inverse();
       density_ = point.density();
       stress_ = point.stress(inverse_);
       stiffness_ = point.stiffness(1);
     } else {
-      density_ = elastic_density<Dim>(F, moduli);
-      stress_ = elastic_stress<Dim>(F, moduli);
-      system_ = elastic_eigensystem<Dim>(F, moduli);
+      density_ = elastic_density<Dim>(at, moduli);
+      stress_ = elastic_stress<Dim>(at, moduli);
+      system_ = elastic_eigensystem<Dim>(at.F(), moduli);
     }
   }
   double density() const { return density_; }

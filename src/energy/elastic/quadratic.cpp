@@ -27,6 +27,15 @@ constexpr double kSeen = 0.2;
 template <int Dim>
 using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
 
+/// Displacements of the nodes from that of the first one, which derivatives do not depend on.
+template <int Dim>
+Nodal<Dim> relative_to_first(const typename CellSet<Dim>::CurvedElement& element, const Displacement<Dim>& u) {
+  Nodal<Dim> values = Nodal<Dim>::Zero();
+  for (int k = 1; k < kQuadraticNodes<Dim>; ++k)
+    if (has_node<Dim>(element.curved, k)) values.col(k) = u.difference(element.nodes[0], element.nodes[k]);
+  return values;
+}
+
 /// Adds value * mode * mode^T over modes of the cell's forces to a block, many at a time: a product of matrices.
 template <int Dim>
 class ModalSum {
@@ -211,37 +220,55 @@ bool QuadraticElasticity<Dim>::refine_quadrature(ConstVectorView x) {
   return true;
 }
 
+/// Sums share * volume * at_point(G, moduli) over all points, and the barriers.
 template <int Dim>
-double QuadraticElasticity<Dim>::value(ConstVectorView x) const {
+template <typename F>
+double QuadraticElasticity<Dim>::sum_over_cells(const Displacement<Dim>& u, ConstVectorView x, const F& at_point) const {
   return scale_ * parallel_sum(cells_.curved_elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
            double sum = 0;
            for (std::size_t e = begin; e < end; ++e) {
              const Element& element = cells_.curved_elements[e];
-             const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+             const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
              const auto& rule = this->rule(e);
              for (std::size_t q = 0; q < rule.size(); ++q) {
-               const Mat<Dim> F = positions * shape_gradients<Dim>(element, rule[q].weights).transpose();
-               sum += rule[q].share * element.volume * elastic_density<Dim>(F, moduli(e, q));
+               const Mat<Dim> G = displacements * shape_gradients<Dim>(element, rule[q].weights).transpose();
+               sum += rule[q].share * element.volume * at_point(DisplacementGradient<Dim>{G}, moduli(e, q));
              }
-             sum += element.volume * barrier_density<Dim>(JacobianBarrier<Dim>(element, positions), moduli_at_barycenter(e));
+             const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes, x));
+             sum += element.volume * barrier_density<Dim>(barrier, moduli_at_barycenter(e));
            }
            return sum;
          });
 }
 
 template <int Dim>
-void QuadraticElasticity<Dim>::add_gradient(ConstVectorView x, VectorView gradient) const {
+double QuadraticElasticity<Dim>::value(const Displacement<Dim>& u, ConstVectorView x) const {
+  return sum_over_cells(u, x, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+    return elastic_density<Dim>(at, moduli);
+  });
+}
+
+template <int Dim>
+double QuadraticElasticity<Dim>::size_of_summands(const Displacement<Dim>& u, ConstVectorView x) const {
+  return sum_over_cells(u, x, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+    return std::abs(elastic_density<Dim>(at, moduli)) + elastic_stress<Dim>(at, moduli).norm() * at.G.norm();
+  });
+}
+
+template <int Dim>
+void QuadraticElasticity<Dim>::add_gradient(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const {
   const auto forces_of = [&](std::size_t e) -> Nodal<Dim> {
     const Element& element = cells_.curved_elements[e];
-    const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+    const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
     Nodal<Dim> forces = Nodal<Dim>::Zero();
     const auto& rule = this->rule(e);
     for (std::size_t q = 0; q < rule.size(); ++q) {
       const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
-      const Mat<Dim> P = elastic_stress<Dim>(positions * gradients.transpose(), moduli(e, q));
+      const DisplacementGradient<Dim> at{displacements * gradients.transpose()};
+      const Mat<Dim> P = elastic_stress<Dim>(at, moduli(e, q));
       forces.noalias() += (scale_ * rule[q].share * element.volume) * (P * gradients);
     }
-    if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active())
+    if (const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes, x)); barrier.is_active())
       forces += scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
     return forces;
   };

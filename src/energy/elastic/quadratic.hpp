@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "fem/displacement.hpp"
 #include "itr/core/types.hpp"
 #include "itr/energy/elastic/elastic.hpp"
 #include "itr/energy/elastic/laws.hpp"
@@ -22,8 +23,11 @@ class QuadraticElasticity {
  public:
   QuadraticElasticity(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale, int degree);
 
-  double value(ConstVectorView x) const;
-  void add_gradient(ConstVectorView x, VectorView gradient) const;
+  /// `x` are the positions that `u` leads to.
+  double value(const Displacement<Dim>& u, ConstVectorView x) const;
+  void add_gradient(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const;
+  /// The sum of |W| + |P| |G| over points: what value() rounds.
+  double size_of_summands(const Displacement<Dim>& u, ConstVectorView x) const;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const;
   double max_step(ConstVectorView x, ConstVectorView dx) const;
   /// See ElasticEnergy.
@@ -42,6 +46,8 @@ class QuadraticElasticity {
   const ElasticModuli& moduli(std::size_t e, std::size_t point) const {
     return varying_.empty() ? *by_element_[e] : varying_[first_varying_[e] + point];
   }
+  template <typename F>
+  double sum_over_cells(const Displacement<Dim>& u, ConstVectorView x, const F& at_point) const;
   void sample_moduli();
   bool is_blind(std::size_t e, ConstVectorView x) const;
   const ElasticModuli& moduli_at_barycenter(std::size_t e) const {

@@ -1,29 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "isotropic.hpp"
+#include "strain.hpp"
 
 namespace itr {
 
-namespace {
-
-/// Green's strain from the displacement gradient: without the cancellation of (F^T F - I) / 2 at small strains.
 template <int Dim>
-Mat<Dim> green_strain(const Mat<Dim>& F) {
-  const Mat<Dim> H = F - Mat<Dim>::Identity();
-  return 0.5 * (H + H.transpose() + H.transpose() * H);
-}
-
-}  // namespace
-
-template <int Dim>
-double saint_venant_density(const Mat<Dim>& F, const LameParameters& lame) {
-  const Mat<Dim> E = green_strain<Dim>(F);
+double saint_venant_density(const Mat<Dim>& G, const LameParameters& lame) {
+  const Mat<Dim> E = 0.5 * twice_green_strain<Dim>(G);
   return lame.mu * E.squaredNorm() + lame.lambda / 2 * E.trace() * E.trace();
 }
 
 template <int Dim>
-Mat<Dim> saint_venant_stress(const Mat<Dim>& F, const LameParameters& lame) {
-  const Mat<Dim> E = green_strain<Dim>(F);
-  return F * (2 * lame.mu * E + lame.lambda * E.trace() * Mat<Dim>::Identity());
+Mat<Dim> saint_venant_stress(const Mat<Dim>& G, const LameParameters& lame) {
+  const Mat<Dim> E = 0.5 * twice_green_strain<Dim>(G), I = Mat<Dim>::Identity();
+  return (I + G) * (2 * lame.mu * E + lame.lambda * E.trace() * I);
 }
 
 /// W = mu/4 (q - 2 a + d) + lambda/8 (a - d)^2.

@@ -8,6 +8,7 @@
 
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/energy/energy.hpp"
+#include "itr/energy/increment.hpp"
 #include "itr/energy/step_limit.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadrature.hpp"
@@ -16,6 +17,8 @@ namespace itr {
 
 template <int Dim>
 class QuadraticElasticity;
+template <int Dim>
+class Displacement;
 
 /// By curved element, see cell_quadrature; empty: all 0.
 using QuadratureLevels = std::vector<std::uint8_t>;
@@ -23,7 +26,7 @@ using QuadratureLevels = std::vector<std::uint8_t>;
 /// scale * integral of W(F) over the rest shape: exact on straight elements, by quadrature on curved ones. Feasible: det F >
 /// 0 everywhere in every element. JacobianBarrier adds to it in distorted curved ones, infinite where it cannot prove that.
 template <int Dim>
-class ElasticEnergy final : public Energy {
+class ElasticEnergy final : public Energy, public IncrementalTerm {
  public:
   /// `scale` is alpha h^2 [s^2]; `degree` that of the quadrature on curved elements. Elements are referred to, not copied:
   /// `cells` must outlive this.
@@ -36,6 +39,10 @@ class ElasticEnergy final : public Energy {
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
+  double value_round_off(ConstVectorView x, Workspace&) const override;
+  double value_at(const Increment& at, Workspace&) const override;
+  void add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const override;
+  double value_round_off_at(const Increment& at, Workspace&) const override;
   /// 0.9 of the first time at which an element's volume vanishes on the way.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override;
   /// Validity asks for det F > 0 everywhere, the energy sees it at quadrature points only. Where det F is much smaller
@@ -49,6 +56,13 @@ class ElasticEnergy final : public Energy {
 
  private:
   const ElasticModuli& moduli(std::size_t e) const;
+  template <typename F>
+  double sum_over_elements(const F& f) const;
+  /// `x` are the positions; only curved elements, of which the validity depends on them, read it.
+  double value_of(const Displacement<Dim>& u, ConstVectorView x) const;
+  double round_off_of(const Displacement<Dim>& u, ConstVectorView x) const;
+  void add_gradient_of(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const;
+  ConstVectorView curved_positions(const Increment& at, Workspace& workspace) const;
 
   const CellSet<Dim>& cells_;
   std::vector<std::pair<int, ElasticModuli>> by_body_;  ///< few, searched linearly

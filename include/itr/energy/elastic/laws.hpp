@@ -29,12 +29,28 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X);
 template <int Dim>
 double mass_density(const Material& material, const Vec<Dim>& X);
 
-/// W(F) [J/m^Dim]; +infinity where det F <= 0.
+/// G = F - I = du/dX. Densities and stresses are computed from it, because F itself rounds small strains away.
 template <int Dim>
-double elastic_density(const Mat<Dim>& F, const ElasticModuli& moduli);
+struct DisplacementGradient {
+  Mat<Dim> G;
+  static DisplacementGradient of(const Mat<Dim>& F) { return {F - Mat<Dim>::Identity()}; }
+  Mat<Dim> F() const { return G + Mat<Dim>::Identity(); }
+};
+
+/// W [J/m^Dim]; +infinity where det F <= 0.
+template <int Dim>
+double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli);
+template <int Dim>
+double elastic_density(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  return elastic_density<Dim>(DisplacementGradient<Dim>::of(F), moduli);
+}
 /// First Piola-Kirchhoff stress dW/dF [Pa].
 template <int Dim>
-Mat<Dim> elastic_stress(const Mat<Dim>& F, const ElasticModuli& moduli);
+Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli);
+template <int Dim>
+Mat<Dim> elastic_stress(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  return elastic_stress<Dim>(DisplacementGradient<Dim>::of(F), moduli);
+}
 /// The exact Hessian d2W/dF2 by eigenvalues and modes; leaving out negative values projects it.
 template <int Dim>
 EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& moduli);

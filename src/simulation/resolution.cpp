@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#include "simulation/resolution.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sizes.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kSpacing = std::numeric_limits<double>::epsilon();
+constexpr double kDigits = 1e3;  ///< spacings of positions that a motion or strain has to be worth
+
+/// The largest of what acts on the bodies of a setup.
+struct Actions {
+  double speed = 0;         ///< at the start [m/s]
+  double motion = 0;        ///< prescribed, in a step [m]
+  double displacement = 0;  ///< prescribed [m]
+  double acceleration = 0;  ///< [m/s^2]
+  double traction = 0;      ///< [Pa]
+  bool is_any() const { return std::max({speed, motion, displacement, acceleration, traction}) > 0; }
+};
+
+template <int Dim>
+void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  const auto raise = [](double& largest, double value) {
+    if (std::isfinite(value)) largest = std::max(largest, value);
+  };
+  const double dt = setup.time.dt;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.rest(v), t).norm());
+  const auto add_held = [&](const Vec<Dim>& X, const DirichletCondition<Dim>& condition) {
+    const Vec<Dim> there = condition.displacement(X, t);
+    raise(actions.displacement, there.norm());
+    if (!setup.time.is_static) raise(actions.motion, (there - condition.displacement(X, t - dt)).norm());
+  };
+  for (const auto& condition : setup.dirichlet)
+    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+      if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.rest(v), condition);
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+    if (!mesh.is_facet_alive(f)) continue;
+    const Vec<Dim> X = mesh.rest(mesh.facet(f)[0]);
+    for (const auto& condition : setup.dirichlet)
+      if (condition.tag == mesh.facet_tag(f)) add_held(X, condition);
+    for (const auto& condition : setup.neumann)
+      if (condition.tag == mesh.facet_tag(f)) raise(actions.traction, condition.traction(X, t).norm());
+    for (const auto& condition : setup.pressure)
+      if (condition.tag == mesh.facet_tag(f)) raise(actions.traction, std::abs(condition.pressure(X, t)));
+  }
+  for (std::size_t o = 0; o < setup.obstacles.motion.size(); ++o)
+    if (const int motion = setup.obstacles.motion[o]; motion != kNone) {
+      const auto& moves = setup.obstacles.motions[motion];
+      const Vec<Dim>& X = setup.obstacles.rest[o];
+      raise(actions.motion, (moves(X, t) - moves(X, t - dt)).norm());
+    }
+}
+
+}  // namespace
+
+template <int Dim>
+void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
+  const Setup<Dim>& setup = simulation.setup();
+  const TimeOptions& time = setup.time;
+  const History& history = simulation.state().history;
+  Actions actions;
+  if (!history.v.empty() && history.v[0].size() > 0) actions.speed = history.v[0].template lpNorm<Eigen::Infinity>();
+  add_loads(setup, time.time_after(time.first_step + 1), actions);
+  if (time.steps > 1) add_loads(setup, time.time_after(time.first_step + time.steps), actions);
+  if (!actions.is_any()) return;
+  double farthest = history.x[0].template lpNorm<Eigen::Infinity>();
+  for (const Vec<Dim>& X : setup.obstacles.rest) farthest = std::max(farthest, X.template lpNorm<Eigen::Infinity>());
+  const double spacing = kSpacing * farthest;
+  double motion = actions.motion, strain = 0;
+  for (const auto& [body, size] : body_sizes(setup.mesh)) {
+    const Material& material = setup.materials.at(body);
+    const double length = size.diagonal, stress = actions.traction + material.density * actions.acceleration * length;
+    const double of_load = stress / material.youngs_modulus;
+    strain = std::max({strain, of_load, actions.displacement / length,
+                       actions.speed / std::sqrt(material.youngs_modulus / material.density)});
+    if (time.quasistatic || time.is_static)
+      motion = std::max(motion, of_load * length);
+    else
+      motion = std::max(motion, time.dt * (actions.speed + time.dt * (actions.acceleration +
+                                                                      actions.traction / (material.density * length))));
+  }
+  const Units& units = setup.units;
+  if (motion < kDigits * spacing)
+    found.push_back(fmt::format(
+        "bodies move by about {} in the first step, and positions up to {} from the origin are {} apart: results of single "
+        "steps are round-off; a larger dt, or a scene near the origin, helps",
+        units.text(motion, "m", 2), units.text(farthest, "m", 2), units.text(spacing, "m", 2)));
+  else if (strain < kDigits * kSpacing)
+    found.push_back(
+        fmt::format("strains are about {:.1g}, and positions resolve {:.1g}: stresses in stored frames are round-off",
+                    strain, kSpacing));
+}
+
+template void find_unresolved(const Simulation<2>&, std::vector<std::string>&);
+template void find_unresolved(const Simulation<3>&, std::vector<std::string>&);
+
+}  // namespace itr

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+// Scenes without contact whose loads, motions or strains are small: whatever dt, modulus and size are, no load is passed
+// over and no solve ends for round-off.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "itr/linear/registry.hpp"
+#include "random_tets.hpp"
+#include "simulation/resolution.hpp"
+#include "simulation_scenes.hpp"
+
+namespace itr {
+namespace {
+
+constexpr double kGravity = 9.81;
+
+/// A square of 0.2 m with the default tolerances.
+Setup<2> plain_square(int n, double modulus) {
+  Setup<2> setup;
+  setup.mesh = make_square(n, 0.2);
+  setup.materials[1] = {.youngs_modulus = modulus, .poisson_ratio = 0.3, .density = 1000};
+  return setup;
+}
+
+template <int Dim>
+void hold(Setup<Dim>& setup, int tag) {
+  DirichletCondition<Dim> condition;
+  condition.tag = tag;
+  condition.components.fill(true);
+  condition.displacement = [](const Vec<Dim>&, double) { return Vec<Dim>(Vec<Dim>::Zero()); };
+  setup.dirichlet.push_back(condition);
+}
+
+/// Twenty by one squares of 1 mm, each cut in two, held on the left.
+Setup<2> cantilever(double modulus) {
+  constexpr int kLength = 20;
+  constexpr double kSize = 1e-3;
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  for (int j = 0; j <= 1; ++j)
+    for (int i = 0; i <= kLength; ++i) rest.emplace_back(kSize * i, kSize * j);
+  for (int i = 0; i < kLength; ++i) {
+    const int a = i, b = i + 1, c = kLength + 2 + i, d = kLength + 1 + i;
+    cells.push_back({a, b, c});
+    cells.push_back({a, c, d});
+  }
+  Setup<2> setup;
+  setup.mesh = Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1));
+  for (int f = 0; f < setup.mesh.facet_slots(); ++f) {
+    const auto [a, b] = setup.mesh.facet(f);
+    const double x = (setup.mesh.rest(a)[0] + setup.mesh.rest(b)[0]) / 2;
+    setup.mesh.set_facet_tag(f, x < 1e-9 ? 1 : x > kSize * kLength - 1e-9 ? 3 : 4);
+  }
+  setup.materials[1] = {.youngs_modulus = modulus, .poisson_ratio = 0.35, .density = 1200};
+  hold(setup, 1);
+  return setup;
+}
+
+template <int Dim>
+Vec<Dim> sum_of(const VectorX& field) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (Eigen::Index v = 0; v < field.size() / Dim; ++v) sum += field.segment<Dim>(Dim * v);
+  return sum;
+}
+
+TEST(AtRest, BodiesFallHoweverShortTheSteps) {
+  for (const double dt : {1e-3, 1e-6, 1e-7})
+    for (const Integrator integrator : {Integrator::implicit_euler, Integrator::bdf, Integrator::newmark}) {
+      SCOPED_TRACE(dt);
+      auto setup = plain_square(2, 1e6);
+      setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -kGravity); };
+      setup.time = {.integrator = integrator, .dt = dt, .steps = 100};
+      setup.consistent_initial_acceleration = integrator == Integrator::newmark;
+      linear::Registry registry;
+      Simulation<2> simulation(setup, registry);
+      for (int i = 0; i < 100; ++i) {
+        const auto result = simulation.advance();
+        ASSERT_TRUE(result.ok) << result.reason;
+      }
+      const VectorX& v = simulation.state().history.v[0];
+      for (Eigen::Index i = 0; i < v.size(); ++i) EXPECT_NEAR(v[i], i % 2 ? -kGravity * 100 * dt : 0, kGravity * dt);
+    }
+}
+
+TEST(AtRest, MomentumIsTheImpulseOfASmallLoad) {
+  auto setup = plain_square(3, 2e11);
+  setup.materials[1].density = 7800;
+  setup.neumann.push_back({3, [](const Vec<2>&, double) { return Vec<2>(-5e4, 0); }});
+  setup.time = {.integrator = Integrator::bdf, .dt = 1e-7, .steps = 50};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  for (int i = 0; i < 50; ++i) ASSERT_TRUE(simulation.advance().ok);
+  const double impulse = -5e4 * 0.2 * 50 * 1e-7;
+  double momentum = 0;
+  const auto& [mesh, v] = std::pair(simulation.state().mesh, simulation.state().history.v[0]);
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    for (const int corner : mesh.cell(c)) momentum += 7800 * mesh.volume(c) / 3 * v[2 * corner];
+  EXPECT_NEAR(momentum, impulse, 1e-3 * std::abs(impulse));
+}
+
+TEST(AtRest, QuasistaticForcesDoNotDependOnTheLengthOfSteps) {
+  VectorX expected;
+  for (const double dt : {1.0, 1e-9, 1e-6, 1e3}) {
+    SCOPED_TRACE(dt);
+    auto setup = plain_square(3, 1e6);
+    hold(setup, 1);
+    setup.neumann.push_back({3, [](const Vec<2>&, double) { return Vec<2>(0, 1000); }});
+    setup.time = {.quasistatic = true, .dt = dt, .steps = 2};
+    setup.fields.reaction_forces = true;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    ASSERT_TRUE(simulation.advance().ok);
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    EXPECT_NEAR(sum_of<2>(result.forces.reaction)[1], -200, 200e-9);
+    if (expected.size() == 0) expected = result.forces.reaction;
+    EXPECT_LE((result.forces.reaction - expected).lpNorm<Eigen::Infinity>(), 1e-9 * expected.lpNorm<Eigen::Infinity>());
+  }
+}
+
+TEST(AtRest, APluckedCantileverRingsDown) {
+  for (const double modulus : {2e9, 2e11}) {
+    SCOPED_TRACE(modulus);
+    auto setup = cantilever(modulus);
+    setup.initial_velocity.push_back({1, [](const Vec<2>& X, double) { return Vec<2>(0, 0.5 * X[0] / 0.02); }});
+    setup.time = {.dt = 0.005, .steps = 600};
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    double before = std::numeric_limits<double>::infinity();
+    int iterations = 0;
+    for (int i = 0; i < 600; ++i) {
+      const auto result = simulation.advance();
+      ASSERT_TRUE(result.ok) << "step " << i + 1 << ": " << result.reason;
+      const double energy = result.report.energy.elastic;
+      if (before > 1e-100) ASSERT_LE(energy, before) << "step " << i + 1;
+      before = energy;
+      iterations += result.report.newton_iterations;
+    }
+    EXPECT_LE(iterations, 800);
+    EXPECT_LT(before, 1e-100);
+  }
+}
+
+TEST(AtRest, ATurnedEdgeTurnsTheBody) {
+  auto setup = plain_square(1, 1e6);
+  const double angle = 8 * M_PI / 180;
+  setup.dirichlet.push_back({1, {true, true}, [=](const Vec<2>& X, double) {
+                               const Vec<2> there(std::cos(angle) * X[0] - std::sin(angle) * X[1],
+                                                  std::sin(angle) * X[0] + std::cos(angle) * X[1]);
+                               return Vec<2>(there - X);
+                             }});
+  setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const auto result = simulation.advance();
+  ASSERT_TRUE(result.ok) << result.reason;
+  EXPECT_LE(result.report.newton_iterations, 30);
+  EXPECT_LE(result.report.energy.elastic, 1e-20 * 1e6 * 0.04);
+}
+
+TEST(AtRest, StiffBodiesCarrySmallLoads) {
+  for (const double traction : {1e3, 1.0, 1e-3}) {
+    SCOPED_TRACE(traction);
+    auto setup = cantilever(2e11);
+    setup.neumann.push_back({3, [=](const Vec<2>&, double t) { return Vec<2>(0, traction * t); }});
+    setup.time = {.quasistatic = true, .dt = 0.25, .steps = 4};
+    setup.fields.reaction_forces = true;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    for (int i = 1; i <= 4; ++i) {
+      const auto result = simulation.advance();
+      ASSERT_TRUE(result.ok) << result.reason;
+      const double load = traction * 0.25 * i * 1e-3;
+      EXPECT_NEAR(sum_of<2>(result.forces.reaction)[1], -load, 1e-6 * load);
+      EXPECT_LE(result.report.newton_iterations, 10);
+    }
+  }
+}
+
+TEST(AtRest, ASteelCubeStandsUnderItsWeight) {
+  for (const double size : {1e-2, 1e-3, 1e-4}) {
+    SCOPED_TRACE(size);
+    itr::Setup<3> setup;
+    setup.mesh = make_cubes(
+        3, [=](int i, int j, int k) { return Vec<3>(Vec<3>(i, j, k) * (size / 3)); }, [](int, int, int) { return 1; });
+    for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f) {
+      double top = 0;
+      for (const int v : setup.mesh.facet(f)) top = std::max(top, setup.mesh.rest(v)[1]);
+      setup.mesh.set_facet_tag(f, top < 1e-9 * size ? 1 : 2);
+    }
+    setup.materials[1] = {.youngs_modulus = 2e11, .poisson_ratio = 0.3, .density = 7800};
+    hold(setup, 1);
+    setup.body_acceleration = [](const Vec<3>&, double) { return Vec<3>(0, -kGravity, 0); };
+    setup.time = {.is_static = true};
+    setup.fields.reaction_forces = true;
+    linear::Registry registry;
+    Simulation<3> simulation(setup, registry);
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    const double weight = 7800 * kGravity * size * size * size;
+    EXPECT_NEAR(sum_of<3>(result.forces.reaction)[1], weight, 1e-6 * weight);
+  }
+}
+
+TEST(Resolution, IsToldWhereStepsOrStrainsAreBelowIt) {
+  const auto count = [](double dt, double traction, double modulus) {
+    auto setup = plain_square(1, modulus);
+    setup.neumann.push_back({3, [=](const Vec<2>&, double) { return Vec<2>(traction, 0); }});
+    setup.time.dt = dt;
+    linear::Registry registry;
+    std::vector<std::string> found;
+    find_unresolved(Simulation<2>(setup, registry), found);
+    return found.size();
+  };
+  EXPECT_EQ(count(1e-3, 1, 1e6), 0u);
+  EXPECT_EQ(count(1e-7, 1, 1e6), 1u) << "a step moves the square by 5e-17 m";
+  EXPECT_EQ(count(1e-3, 1, 1e13), 1u) << "a strain of 1e-13";
+  EXPECT_EQ(count(1e-7, 0, 1e6), 0u) << "nothing acts";
+}
+
+}  // namespace
+}  // namespace itr
