@@ -248,7 +248,8 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
   const EnergySum sum = potential_.sum(lagged_);
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
-                      .on_iteration = setup_.on_iteration};
+                      .on_iteration = setup_.on_iteration,
+                      .must_be_minimum = !terms_.has_inertia};
   if (way_to_start.size() > 0) {
     extras.gradient_of_way = VectorX::Zero(x.size());
     potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
