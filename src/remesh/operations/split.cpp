@@ -142,6 +142,14 @@ class Refiner {
       range.least = 0;
       if (gain > 0) range.most = signal * std::max(kSameSignal, ask_.context().scaling * tolerance / (kMargin * gain));
     }
+    const double noise = trial.verdict.required - ask_.context().scaling * tolerance;
+    if (trial.in_contact && noise > trial.verdict.required / 2) {
+      // What the barrier feigns grows with its energy, as the signal does.
+      constexpr double kMostLonger = 10;
+      const double short_of = gain > 0 ? trial.verdict.required / (2 * gain) : kMostLonger;
+      range.least = 0;
+      range.most = signal * std::clamp(short_of, kSameSignal, kMostLonger);
+    }
     session_.memory().remember(curves ? RemeshMemory::curve : RemeshMemory::split, trial.edge(), range);
   }
 
