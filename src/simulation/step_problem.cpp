@@ -15,6 +15,7 @@
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
+#include "newton/curvature.hpp"
 
 namespace itr {
 
@@ -440,6 +441,30 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
   const bool is_open = end == RoundsEnd::most || end == RoundsEnd::cycle || end == RoundsEnd::stalled;
   if (summary.converged() && is_open) judge_lagging(x, std::move(now), to_string(end), round, summary);
   return summary;
+}
+
+template <int Dim>
+VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
+  lagged_ = potential_.lag(x, workspace_);
+  const EnergySum sum = potential_.sum(lagged_);
+  PrescribedMotion none;
+  const auto assemble = [&](PsdProjection psd) { system().assemble(sum, x, psd, dofs_, none, workspace_); };
+  const int unknowns = dofs_.num_unknowns;
+  VectorX by_unknown;
+  double curvature = 0;
+  if (unknowns == 0) return {};
+  if (system().sees_all_directions()) {
+    assemble(PsdProjection::none);
+    const bool is_indefinite = system().factorize(0).definiteness == linear::Definiteness::indefinite;
+    if (is_indefinite) curvature = find_negative_curvature(system(), unknowns, by_unknown);
+  } else {
+    curvature = find_negative_curvature_by_products(system(), assemble, unknowns, by_unknown).value_or(0);
+  }
+  if (!(curvature < 0)) return {};
+  VectorX direction = VectorX::Zero(x.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    if (dofs_.unknown[i] != kNone) direction[i] = by_unknown[dofs_.unknown[i]];
+  return direction;
 }
 
 template <int Dim>
