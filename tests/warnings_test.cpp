@@ -184,6 +184,7 @@ TEST_F(WarningsTest, LockingElements) {
   const std::string remeshed = "explain " ITR_SOURCE_DIR "/examples/tasks/twist.json ";
   EXPECT_TRUE(itr(remeshed + "--set /materials/0/nu=0.49").has("remeshing takes most of that away"));
   EXPECT_FALSE(itr(remeshed).has("lock")) << itr(remeshed).text;
+  EXPECT_TRUE(itr(remeshed).has("where it bends they are too stiff")) << itr(remeshed).text;
 }
 
 /// Without a floor, inertia or anything that holds it.

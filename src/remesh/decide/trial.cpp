@@ -120,7 +120,8 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
       const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();
       const double factor = surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex;
       required = bound.required;
-      if (at_most(bound.gain, factor) < required) return;
+      const double noise = required - options.required;
+      if (at_most(bound.gain, factor) < required + noise) return;  // patches multiply noise less than what they resolve
     }
   }
   select_patch<Dim>(state.mesh, edit, options.local, options.least_volume, scratch.patch, verdict.patch);
