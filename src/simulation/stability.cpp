@@ -7,15 +7,16 @@
 #include <set>
 
 #include "energy/elastic/point.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/predicates.hpp"
 #include "sizes.hpp"
 
 namespace itr {
 
 namespace {
 
-/// Thickness by diagonal, below which bodies buckle at strains below some 0.2.
-template <int Dim>
-constexpr double kSlender = Dim == 2 ? 0.25 : 0.12;
+constexpr double kSlender = 0.25;     ///< thickness by diagonal, below which bodies buckle at strains below some 0.2
+constexpr double kStart = 1e-3;       ///< of a way through a body, where it begins
 constexpr double kCompressed = 1e-9;  ///< stress by modulus
 constexpr double kNegligible = 0.02;  ///< of the largest part of the way that straight edges cannot follow
 
@@ -31,11 +32,70 @@ bool is_compressed(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, CellId c,
   return principal.eigenvalues()[0] < -kCompressed * material.youngs_modulus;
 }
 
+/// The inner side of a boundary facet.
+template <int Dim>
+struct Inside {
+  int body = 0;
+  Vec<Dim> center, inward;  ///< at rest; a unit vector
+};
+
+template <int Dim>
+Inside<Dim> inside_of(const Mesh<Dim>& mesh, FacetId f) {
+  const auto& facet = mesh.facet(f);
+  const auto has = [](const auto& ids, int v) { return std::find(ids.begin(), ids.end(), v) != ids.end(); };
+  Inside<Dim> inside{0, Vec<Dim>::Zero(), Vec<Dim>::Zero()};
+  for (const int v : facet) inside.center += mesh.rest(v) / Dim;
+  for (const CellId c : mesh.cells_of(facet[0])) {
+    const auto& cell = mesh.cell(c);
+    if (!std::all_of(facet.begin(), facet.end(), [&](int v) { return has(cell, v); })) continue;
+    const int apex = *std::find_if(cell.begin(), cell.end(), [&](int v) { return !has(facet, v); });
+    // The gradient of the apex' barycentric coordinate is normal to the facet.
+    inside.body = mesh.body(c);
+    const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
+    const auto gradients = barycentric_gradients<Dim>(inverse);
+    inside.inward = gradients.col(std::find(cell.begin(), cell.end(), apex) - cell.begin()).normalized();
+  }
+  return inside;
+}
+
+bool meets(const Mesh<2>& mesh, FacetId f, const Vec<2>& p, const Vec<2>& q) {
+  const auto& facet = mesh.facet(f);
+  return segments_intersect(p, q, mesh.rest(facet[0]), mesh.rest(facet[1]));
+}
+bool meets(const Mesh<3>& mesh, FacetId f, const Vec<3>& p, const Vec<3>& q) {
+  const auto& facet = mesh.facet(f);
+  return segment_intersects_triangle(p, q, mesh.rest(facet[0]), mesh.rest(facet[1]), mesh.rest(facet[2]));
+}
+
+/// Bodies with a part that is thin against the body, by straight ways from facets through the body.
+template <int Dim>
+std::set<int> slender_bodies(const Mesh<Dim>& mesh) {
+  const std::map<int, BodySize> sizes = body_sizes(mesh);
+  std::vector<Box<Dim>> boxes(mesh.facet_slots());
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    for (const int v : mesh.facet(f)) boxes[f].include(mesh.rest(v));
+  const Bvh<Dim> tree(boxes);
+  std::set<int> slender;
+  std::vector<int> hits;
+  for (FacetId f = 0; f < mesh.facet_slots() && slender.size() < sizes.size(); ++f) {
+    const Inside<Dim> inside = inside_of(mesh, f);
+    if (slender.contains(inside.body)) continue;
+    const double length = kSlender * sizes.at(inside.body).diagonal;
+    const Vec<Dim> p = inside.center + kStart * length * inside.inward, q = inside.center + length * inside.inward;
+    Box<Dim> way;
+    way.include(p);
+    way.include(q);
+    hits.clear();
+    tree.query(way, hits);
+    if (std::any_of(hits.begin(), hits.end(), [&](FacetId other) { return other != f && meets(mesh, other, p, q); }))
+      slender.insert(inside.body);
+  }
+  return slender;
+}
+
 template <int Dim>
 bool may_buckle(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
-  std::set<int> slender;
-  for (const auto& [body, size] : body_sizes(state.mesh))
-    if (size.thickness < kSlender<Dim> * size.diagonal) slender.insert(body);
+  const std::set<int> slender = slender_bodies(state.mesh);
   for (CellId c = 0; !slender.empty() && c < state.mesh.cell_slots(); ++c)
     if (slender.contains(state.mesh.body(c)) && is_compressed(setup, state.mesh, c, x)) return true;
   return false;
