@@ -141,6 +141,24 @@ TEST(Newton, CallsNoSaddleConverged) {
     }
 }
 
+/// A start whose gradient is exactly zero, with solvers that tell of negative eigenvalues and solvers that cannot.
+TEST(Newton, LeavesASaddleThatItStartsAtWhereAMinimumIsAskedFor) {
+  const double c = 1e-2;
+  linear::Registry registry;
+  for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "eigen:cg"}) {
+    const auto solver = registry.create(name);
+    SparseSystem system(*solver);
+    const DofMap dofs = DofMap::from_held(std::vector<char>(4, 0));
+    system.reset(dofs, 2, {});
+    VectorX x = VectorX::Zero(4);
+    Workspace workspace;
+    const NewtonSummary summary =
+        minimize(DoubleWell(c), x, dofs, VectorX(), system, until_steps_below(1e-10), workspace, {.must_be_minimum = true});
+    EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
+    EXPECT_LE((x.array().abs() - std::sqrt(c)).abs().maxCoeff(), 1e-6) << name;
+  }
+}
+
 /// Where not all digits are asked for, like iterations that end before they meet the first dof, and what curvature it has.
 class ShortSighted final : public NewtonSystem {
  public:

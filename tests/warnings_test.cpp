@@ -119,8 +119,13 @@ TEST_F(WarningsTest, SmallerTolerancesGiveNoLargerErrors) {
     const Said said = run("tasks/press.json", press + set);
     ASSERT_EQ(said.status, 0) << said.text;
     const double error = std::abs(force() / reference - 1);
-    EXPECT_LE(error, larger + 2e-3) << tolerance;
-    if (error > 0.02) {
+    const bool is_told = error > 0.02;
+    if (is_told && larger > 0.02) {
+      EXPECT_LE(error, 0.1) << tolerance;  // of two such runs either may be nearer by accident
+    } else {
+      EXPECT_LE(error, larger + 2e-3) << tolerance;
+    }
+    if (is_told) {
       EXPECT_TRUE(said.has("Newton ended where one more iteration would gain")) << tolerance << said.text;
     }
     larger = error;
@@ -184,6 +189,7 @@ TEST_F(WarningsTest, LockingElements) {
   const std::string remeshed = "explain " ITR_SOURCE_DIR "/examples/tasks/twist.json ";
   EXPECT_TRUE(itr(remeshed + "--set /materials/0/nu=0.49").has("remeshing takes most of that away"));
   EXPECT_FALSE(itr(remeshed).has("lock")) << itr(remeshed).text;
+  EXPECT_TRUE(itr(remeshed).has("where it bends they are too stiff")) << itr(remeshed).text;
 }
 
 /// Without a floor, inertia or anything that holds it.

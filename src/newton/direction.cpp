@@ -104,12 +104,14 @@ void Direction::note_definiteness() {
 
 bool Direction::is_hessian_indefinite() {
   if (task_.options.indefinite == IndefiniteHessian::accept || !task_.has_unknowns()) return false;
-  if (!was_indefinite_ && !is_loose_) return false;
+  const bool is_open = is_loose_ || (task_.extras.must_be_minimum && known_at_ == kNone);
+  if (!was_indefinite_ && !is_open) return false;
   if (was_indefinite_ && known_at_ == at_.revision()) return true;
   assemble(PsdProjection::none);
   const ScopedTimer timer(task_.summary.linear_seconds);
   VectorX none;
-  solved_ = was_indefinite_ ? task_.system.factorize(0) : task_.system.solve(0, right_hand_side(), {kTightResidual}, none);
+  solved_ = was_indefinite_ || !is_loose_ ? task_.system.factorize(0)
+                                          : task_.system.solve(0, right_hand_side(), {kTightResidual}, none);
   is_loose_ = false;
   note_definiteness();
   return was_indefinite_;

@@ -14,7 +14,7 @@ class Saddle {
  public:
   Saddle(const Task& task, Iterate& at, Direction& direction, Search& search);
 
-  bool is_here() { return direction_.is_hessian_indefinite(); }
+  bool is_here();
   /// Called before a solve ends: leaves x if it is a saddle. Returns whether x has moved to a lower energy.
   bool leave() { return is_here() && descend(); }
 
@@ -24,12 +24,17 @@ class Saddle {
   };
   bool descend();
   bool find_way(VectorView way);
+  bool asks_products() const;
+  double curvature_by_products();
 
   const Task& task_;
   Iterate& at_;
   Direction& direction_;
   Search& search_;
   VectorView candidate_;
+  VectorX eigenvector_;  ///< by products, of the curvature below
+  double curvature_ = 0;
+  int known_at_ = kNone;  ///< revision of x where that was
 };
 
 }  // namespace itr

@@ -50,6 +50,13 @@ linear::SolveReport DenseSystem::solve_again(ConstVectorView rhs, VectorView sol
   return {solution.allFinite() ? linear::Outcome::ok : linear::Outcome::non_finite, 0};
 }
 
+NewtonSystem::Product DenseSystem::product() const {
+  const VectorX all = hessian_.view();
+  return [all, n = order_](ConstVectorView v, VectorView Hv) {
+    Hv = Eigen::Map<const MatrixX>(all.data(), n, n).selfadjointView<Eigen::Lower>() * v;
+  };
+}
+
 double DenseSystem::diagonal_scale() const {
   double scale = 0;
   for (Eigen::Index i = 0; i < order_; ++i) scale = std::max(scale, std::abs(hessian_.view()[(order_ + 1) * i]));
@@ -144,6 +151,22 @@ bool SparseSystem::solve_columns(const MatrixX& B, MatrixX& X) {
   const auto report = solver_.solve({B.data(), static_cast<std::size_t>(B.size())},
                                     {X.data(), static_cast<std::size_t>(X.size())}, static_cast<int>(B.cols()), asked);
   return report.outcome == linear::Outcome::ok && X.allFinite();
+}
+
+NewtonSystem::Product SparseSystem::product() const {
+  const linear::SparsityPattern& pattern = assembler_.pattern();
+  const auto values = assembler_.values();
+  return [pattern, values = std::vector<double>(values.begin(), values.end())](ConstVectorView v, VectorView Hv) {
+    Hv.setZero();
+    for (int j = 0; j < pattern.order; ++j) {
+      const int diagonal = pattern.column_starts[j];
+      Hv[j] += values[diagonal] * v[j];
+      for (int k = diagonal + 1; k < pattern.column_starts[j + 1]; ++k) {
+        Hv[pattern.row_indices[k]] += values[k] * v[j];
+        Hv[j] += values[k] * v[pattern.row_indices[k]];
+      }
+    }
+  };
 }
 
 std::string SparseSystem::message() const { return std::string(solver_.name()) + ": " + solver_.message(); }

@@ -103,6 +103,24 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
 }
 
 template <int Dim>
+RemeshReport curve_edges(std::span<const EdgeKey> edges, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
+                         const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
+                         Strata<Dim>& strata) {
+  RemeshSession<Dim> session(mesh, fields, context, options, nullptr, memory, strata);
+  OperationCount& count = session.report().curves;
+  for (const EdgeKey& edge : edges) {
+    const Refusal refusal = session.ask().refuse_curve(edge, session.scratch());
+    if (refusal == Refusal::none)
+      session.commits().commit_unjudged(make_curve(mesh, edge), session.scratch().gate, count);
+    else
+      count.note(refusal);
+  }
+  fields.trim(mesh.vertex_slots());
+  memory.refusals = session.memory().remembered(session.ask());
+  return session.report();
+}
+
+template <int Dim>
 RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
                               const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
                               Strata<Dim>& strata) {
@@ -136,6 +154,10 @@ RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume
   return session.report();
 }
 
+template RemeshReport curve_edges(std::span<const EdgeKey>, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,
+                                  const RemeshOptions&, RemeshMemory&, Strata<2>&);
+template RemeshReport curve_edges(std::span<const EdgeKey>, Mesh<3>&, RemeshFields<3>&, const StepContext<3>&,
+                                  const RemeshOptions&, RemeshMemory&, Strata<3>&);
 template RemeshReport straighten_cells(std::span<const CellId>, double, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,
                                        const RemeshOptions&, RemeshMemory&, Strata<2>&);
 template RemeshReport straighten_cells(std::span<const CellId>, double, Mesh<3>&, RemeshFields<3>&, const StepContext<3>&,

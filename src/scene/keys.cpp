@@ -322,7 +322,9 @@ constexpr Key kKeys[] = {
     {"/space/remesh/split/min_edge_length", read, "non_negative", "(1e-6 of the bodies' diagonal)", "m",
      "shorter edges are not split"},
     {"/space/remesh/curve/enabled", read, "boolean", "false", "",
-     "edges become curved (quadratic elements, edge by edge) where that gains more for each new node than a split", basic},
+     "edges become curved (quadratic elements, edge by edge) where that gains more for each new node than a split; without "
+     "this key only where straight ones keep up a slender body that would buckle, in statics; false: never",
+     basic},
     {"/space/remesh/curve/acceptance_tolerance", read, "positive", "(that of splits)", "J",
      "least decrease of energy by making an edge curved"},
     {"/space/remesh/straighten/enabled", read, "boolean", "(that of curve)", "",

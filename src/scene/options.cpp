@@ -318,6 +318,7 @@ RemeshOptions read_remesh(const Node& root) {
   if (split.has("min_edge_length")) options.split.min_edge_length = split["min_edge_length"].non_negative(0);
 
   read_acceptance(node["curve"], options.curve.enabled, options.curve.acceptance_tolerance);
+  if (node["curve"].has("enabled")) options.curve.for_stability = options.curve.enabled;
   options.straighten.enabled = options.curve.enabled;
   read_acceptance(node["straighten"], options.straighten.enabled, options.straighten.acceptance_tolerance);
 

@@ -225,7 +225,14 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
         "quadratic elements (/space/discr_order: 2), remeshing (/space/remesh/enabled) or a finer mesh (n_refs) help: "
         "compare";
     const bool keeps_volume = Dim == 3 || material.plane_strain;
+    const bool is_thin = size.thickness < kSlender * size.diagonal && layers < kFewLayers;
     if (setup.remesh.enabled) {
+      if (is_thin)
+        found.push_back(
+            fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends they are "
+                        "too stiff until "
+                        "remeshing has refined them; compare with quadratic elements (/space/discr_order: 2)",
+                        body, layers));
       if (keeps_volume && material.poisson_ratio >= kIncompressible)
         found.push_back(fmt::format(
             "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes most of that away, but forces "
@@ -237,7 +244,7 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
           fmt::format("body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
                       "lock, forces are too large, often several times; {}",
                       body, material.poisson_ratio, layers, help));
-    else if (size.thickness < kSlender * size.diagonal && layers < kFewLayers)
+    else if (is_thin)
       found.push_back(
           fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends they "
                       "are too stiff; {}",

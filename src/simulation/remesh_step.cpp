@@ -260,6 +260,14 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
 }
 
 template <int Dim>
+std::optional<MeshRenumbering> curve_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+                                                 std::span<const EdgeKey> edges, const State<Dim>& before, State<Dim>& state,
+                                                 VectorX& x, StepReport& report) {
+  return change_and_project(tools, problem, before, state, x, report,
+                            [&](auto&&... all) { return curve_edges<Dim>(edges, std::forward<decltype(all)>(all)...); });
+}
+
+template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
                                                       double least_volume, const State<Dim>& before, State<Dim>& state,
                                                       VectorX& x, StepReport& report) {
@@ -274,10 +282,13 @@ std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tool
   return renumbering;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                        \
-  template std::optional<MeshRenumbering> remesh_and_project<Dim>(                                                  \
-      const StepTools<Dim>&, const StepProblem<Dim>&, const State<Dim>&, State<Dim>&, VectorX&, StepReport&, bool); \
-  template std::optional<MeshRenumbering> straighten_and_project<Dim>(                                              \
+#define ITR_INSTANTIATE(Dim)                                                                                               \
+  template std::optional<MeshRenumbering> remesh_and_project<Dim>(                                                         \
+      const StepTools<Dim>&, const StepProblem<Dim>&, const State<Dim>&, State<Dim>&, VectorX&, StepReport&, bool);        \
+  template std::optional<MeshRenumbering> curve_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&,           \
+                                                                 std::span<const EdgeKey>, const State<Dim>&, State<Dim>&, \
+                                                                 VectorX&, StepReport&);                                   \
+  template std::optional<MeshRenumbering> straighten_and_project<Dim>(                                                     \
       const StepTools<Dim>&, std::span<const CellId>, double, const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -18,6 +18,12 @@ std::optional<MeshRenumbering> remesh_and_project(const StepTools<Dim>& tools, c
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
                                                   StepReport& report, bool may_curve);
 
+/// Curves these edges around the solution x of `problem`, as far as they may be; else as remesh_and_project.
+template <int Dim>
+std::optional<MeshRenumbering> curve_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+                                                 std::span<const EdgeKey> edges, const State<Dim>& before, State<Dim>& state,
+                                                 VectorX& x, StepReport& report);
+
 /// Makes the curved edges of cells straight in the state between two steps, whatever it costs, and carries it over. `x` gets
 /// its positions interpolated on the new mesh: those that are projected may be nearly inverted, and no solve can start
 /// there. `least_volume`: see straighten_cells.

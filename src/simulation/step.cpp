@@ -20,6 +20,7 @@
 #include "simulation/energy_guard.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
+#include "simulation/stability.hpp"
 #include "watch.hpp"
 
 namespace itr {
@@ -143,6 +144,7 @@ class StepAttempt {
     if (!jump.empty()) return failed(jump);
     if (setup_.remesh.enabled) {
       if (const auto cancelled = remesh()) return failed(*cancelled);
+      if (const auto cancelled = let_buckle()) return failed(*cancelled);
       if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();  // as it ends
     }
     if (setup_.newton.is_cancelled()) {
@@ -238,6 +240,49 @@ class StepAttempt {
       break;
     }
     problem_ = std::move(problem_before);
+    return std::nullopt;
+  }
+
+  /// Whether edges become curved where straight ones keep up what would buckle.
+  bool may_curve_for_stability() const {
+    return !has_inertia() && setup_.remesh.curve.for_stability && !setup_.remesh.sizing_field.enabled && !setup_.lump_mass &&
+           setup_.terms.empty() && !setup_.follower.forces && setup_.newton.indefinite == IndefiniteHessian::project;
+  }
+
+  /// Curves edges and solves again as long as the solution is stable only because edges are straight. The last solve, if it
+  /// was cancelled.
+  std::optional<NewtonSummary> let_buckle() {
+    constexpr int kMostRounds = 5;
+    if (!may_curve_for_stability()) return std::nullopt;
+    for (int round = 0; round < kMostRounds; ++round) {
+      const std::vector<EdgeKey> edges = find_edges_that_lock(tools_, next_, x_);
+      if (edges.empty()) return std::nullopt;
+      next_.stiffness = problem_->stiffness();
+      next_.quadrature = problem_->quadrature_levels();
+      const State<Dim> unchanged = next_;
+      const VectorX solution = x_;
+      StepReport effort;
+      effort.energy = problem_->report(x_);
+      auto problem_before = std::move(problem_);
+      auto renumbering =
+          curve_and_project(tools_, *problem_before, std::span<const EdgeKey>(edges), unchanged, next_, x_, effort);
+      std::string failure = "contact lets no edge become curved";
+      if (renumbering) {
+        make_problem();
+        const NewtonSummary summary = solve();
+        if (summary.termination == Termination::cancelled) return summary;
+        failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
+      }
+      if (!failure.empty()) {
+        next_ = unchanged;
+        x_ = solution;
+        problem_ = std::move(problem_before);
+        warn("linear elements keep up what would buckle with quadratic ones, and stay: " + failure);
+        return std::nullopt;
+      }
+      renumbering_ = renumbering_.empty() ? std::move(*renumbering) : compose(renumbering_, *renumbering);
+      report_.add_effort(effort);
+    }
     return std::nullopt;
   }
 

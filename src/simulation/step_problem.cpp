@@ -15,6 +15,7 @@
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
+#include "newton/curvature.hpp"
 
 namespace itr {
 
@@ -251,7 +252,8 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
   const EnergySum sum = potential_.sum(lagged_);
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
-                      .on_iteration = setup_.on_iteration};
+                      .on_iteration = setup_.on_iteration,
+                      .must_be_minimum = !terms_.has_inertia};
   if (way_to_start.size() > 0) {
     extras.gradient_of_way = VectorX::Zero(x.size());
     potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
@@ -463,6 +465,30 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
   const bool is_open = end == RoundsEnd::most || end == RoundsEnd::cycle || end == RoundsEnd::stalled;
   if (summary.converged() && is_open) judge_lagging(x, std::move(now), to_string(end), round, summary);
   return summary;
+}
+
+template <int Dim>
+VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
+  lagged_ = potential_.lag(x, workspace_);
+  const EnergySum sum = potential_.sum(lagged_);
+  PrescribedMotion none;
+  const auto assemble = [&](PsdProjection psd) { system().assemble(sum, x, psd, dofs_, none, workspace_); };
+  const int unknowns = dofs_.num_unknowns;
+  VectorX by_unknown;
+  double curvature = 0;
+  if (unknowns == 0) return {};
+  if (system().sees_all_directions()) {
+    assemble(PsdProjection::none);
+    const bool is_indefinite = system().factorize(0).definiteness == linear::Definiteness::indefinite;
+    if (is_indefinite) curvature = find_negative_curvature(system(), unknowns, by_unknown);
+  } else {
+    curvature = find_negative_curvature_by_products(system(), assemble, unknowns, by_unknown).value_or(0);
+  }
+  if (!(curvature < 0)) return {};
+  VectorX direction = VectorX::Zero(x.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    if (dofs_.unknown[i] != kNone) direction[i] = by_unknown[dofs_.unknown[i]];
+  return direction;
 }
 
 template <int Dim>

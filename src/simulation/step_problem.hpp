@@ -56,6 +56,8 @@ class StepProblem {
 
   /// With friction lagged at x, so that numbers compare between meshes and with other codes; else as in the last solve.
   EnergyReport report(const VectorX& x);
+  /// A direction in which the energy has negative curvature at x; empty where there is none.
+  VectorX find_instability(const VectorX& x);
   double min_distance(const VectorX& x);
   /// At a solution x, those that the setup asks for, as they were in the solve.
   NodalForces forces(const VectorX& x);

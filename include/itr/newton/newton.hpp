@@ -52,6 +52,11 @@ class NewtonSystem {
   virtual bool solve_columns(const MatrixX& B, MatrixX& X);
   /// Whether solve and factorize tell of every matrix that is not positive definite.
   virtual bool tells_definiteness() const { return true; }
+  /// Whether that is so whatever the right-hand side.
+  virtual bool sees_all_directions() const { return tells_definiteness(); }
+  /// A copy of the Hessian as it is assembled, which maps v to H v; null for a system that has no such copies.
+  using Product = std::function<void(ConstVectorView v, VectorView Hv)>;
+  virtual Product product() const { return {}; }
   /// Who failed and why, after an outcome that was not ok.
   virtual std::string message() const = 0;
   /// Largest absolute diagonal entry of the Hessian: the scale of shifts.
@@ -66,6 +71,7 @@ class DenseSystem final : public NewtonSystem {
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::SystemReport factorize(const Shift& shift) override;
   linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override;
+  Product product() const override;
   std::string message() const override { return "dense Cholesky"; }
   double diagonal_scale() const override;
   double curvature_of(const Shift& shift, ConstVectorView step) const override;
@@ -93,6 +99,8 @@ class SparseSystem final : public NewtonSystem {
   linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override;
   bool solve_columns(const MatrixX& B, MatrixX& X) override;
   bool tells_definiteness() const override { return solver_.capabilities().tells_definiteness; }
+  bool sees_all_directions() const override { return tells_definiteness() && !solver_.capabilities().iterative; }
+  Product product() const override;
   std::string message() const override;
   double diagonal_scale() const override;
   double curvature_of(const Shift& shift, ConstVectorView step) const override;
@@ -156,6 +164,9 @@ struct NewtonExtras {
   std::function<bool(const VectorX& x)> after_step{};
   /// Called after each iteration; false ends the solve, not converged.
   std::function<bool(const NewtonProgress& progress)> on_iteration{};
+  /// Looks for negative curvature with every solver before it ends, at a start that has converged too: nothing but the end
+  /// matters, as in statics.
+  bool must_be_minimum = false;
   /// Says nothing of why it ended: neither message nor failed step. For solves that end after so many iterations anyway.
   bool is_brief = false;
   /// Where the solve begins elsewhere than the state is: the way from there, and what inertia does along it to the gradient.

@@ -32,6 +32,8 @@ struct SplitOptions {
 struct CurveOptions {
   bool enabled = false;
   std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]; none: that of splits
+  /// Curves edges in statics where straight ones keep up what would buckle, whether or not `enabled`.
+  bool for_stability = true;
 };
 
 struct StraightenOptions {

@@ -21,6 +21,12 @@ template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata);
 
+/// Curves these edges, whatever that gains, where contact and the shape of cells allow it; else as `remesh`.
+template <int Dim>
+RemeshReport curve_edges(std::span<const EdgeKey> edges, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,
+                         const StepContext<Dim>& context, const RemeshOptions& options, RemeshMemory& memory,
+                         Strata<Dim>& strata);
+
 /// Replaces curved edges of these cells by their chords or makes them straight, whatever it costs, where that inverts and
 /// meets nothing; else as `remesh`. New cells keep `least_volume` everywhere, a share of the least mean volume ratio of
 /// those that they replace, now and in the past.

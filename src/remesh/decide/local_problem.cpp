@@ -446,6 +446,11 @@ NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
 }
 
 template <int Dim>
+double LocalProblem<Dim>::contact_energy() {
+  return touches_contact_ ? std::max(0.0, storage_->potential->contact()->value(x_.view(), workspace_)) : 0;
+}
+
+template <int Dim>
 bool LocalProblem<Dim>::distorts() const {
   return std::any_of(cells_.curved_elements.begin(), cells_.curved_elements.end(), [&](const auto& element) {
     return element.cell == kNone && relative_jacobian<Dim>(at_all_nodes<Dim>(element, x_.view())) < kLeastRelativeJacobian;

@@ -90,6 +90,8 @@ class LocalProblem {
   /// Whether a cell with curved edges that the edit makes is distorted.
   bool distorts() const;
   double value() { return energy_.value(x_.view(), workspace_); }
+  /// Of the barrier, where the patch can change it; not below 0.
+  double contact_energy();
   /// Relaxes from the present positions by at most so many Newton iterations.
   NewtonSummary relax(int max_iterations);
   bool has_unknowns() const { return dofs_.num_unknowns > 0; }

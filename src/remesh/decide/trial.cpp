@@ -17,19 +17,25 @@ constexpr int kIterationsAfterAcceptance = 100;
 constexpr double kSurelyTooLittle = 0.9;                          ///< share of the required gain, as a prediction
 constexpr int kBoundIterations = 1, kBoundContactIterations = 2;  ///< of Newton, for a vertex alone
 
+/// Of the barrier's energy around an edit: what its weights, which depend on the mesh, can feign as a gain.
+constexpr double kBarrierNoise = 2;
+
 /// Both sides of a comparison on one support.
 template <int Dim>
 struct Comparison {
   double gain = -std::numeric_limits<double>::infinity();
+  double required = 0;  ///< of the gain, noise included
   bool touches_contact = false;
   bool has_unknowns = false;
   Box<Dim> surface_read{};
 };
 
-/// `accept`, called with the side after the edit where it gains `required`, may go on with it.
+/// `accept`, called with the side after the edit where it gains `required` and `noise_share` of the barrier's energy, may go
+/// on with it.
 template <int Dim, typename Accept>
 Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, double required,
-                        int iterations, int contact_iterations, LocalScratch<Dim>& scratch, const Accept& accept) {
+                        double noise_share, int iterations, int contact_iterations, LocalScratch<Dim>& scratch,
+                        const Accept& accept) {
   LocalProblem<Dim> before(state, patch, edit, false, scratch);
   LocalProblem<Dim> after(state, patch, edit, true, scratch);
   Comparison<Dim> result;
@@ -39,6 +45,8 @@ Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> p
   result.surface_read.include(after.surface_read());
   const int effort = result.touches_contact ? contact_iterations : iterations;
   const double energy_before = before.value();
+  if (noise_share > 0) required += noise_share * before.contact_energy();
+  result.required = required;
   const double energy_after = after.has_unknowns() ? after.relax(effort).energy : after.value();
   result.gain = energy_before - energy_after;
   // The side without the edit gets the same effort, so that residual left over elsewhere is not credited to the edit.
@@ -67,7 +75,7 @@ double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, Loca
   find_star(state.mesh, edit, scratch.star);
   constexpr double kNever = std::numeric_limits<double>::infinity();
   const auto found =
-      compare<Dim>(state, scratch.star, edit, kNever, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {});
+      compare<Dim>(state, scratch.star, edit, kNever, 0, kBoundIterations, kBoundContactIterations, scratch, [](auto&) {});
   if (surface_read) surface_read->include(found.surface_read);
   return found.gain;
 }
@@ -81,6 +89,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   const auto note = [&](const Comparison<Dim>& found, Refusal refusal) {
     verdict.refusal = refusal;
     verdict.gain = found.gain;
+    verdict.required = found.required;
     verdict.touches_contact = found.touches_contact;
     verdict.surface_read.include(found.surface_read);
   };
@@ -92,23 +101,27 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
     return Refusal::none;
   };
   bool is_enough = false;
+  double required = options.required;
   // The bound is not asked where it is known to decide nothing.
   const bool is_bound_open = options.predicted && *options.predicted < kSurelyTooLittle * options.required &&
                              at_most(*options.predicted, options.patch_over_vertex) >= options.required;
   if (options.patch_over_vertex > 0 && !is_bound_open) {
     find_star(state.mesh, edit, scratch.star);
     // History that the new mesh cannot represent takes the longest to find, so the first of two checks leaves it out.
+    const double noise_share = edit.is_nested() ? kBarrierNoise : 0;
     const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
     for (int check = is_nested || options.predicted ? 1 : 0; check < 2; ++check) {
       const HistoryRule history = check == 0 ? HistoryRule::interpolated : state.history;
       const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
       is_enough = false;
-      const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, kBoundIterations,
+      const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, noise_share, kBoundIterations,
                                       kBoundContactIterations, scratch, [&](auto&) { is_enough = true; });
       note(bound, Refusal::bound);
       const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();
       const double factor = surface_touches ? kPatchOverVertexInContact<Dim> : options.patch_over_vertex;
-      if (at_most(bound.gain, factor) < options.required) return;
+      required = bound.required;
+      const double noise = required - options.required;
+      if (at_most(bound.gain, factor) < required + noise) return;  // patches multiply noise less than what they resolve
     }
   }
   select_patch<Dim>(state.mesh, edit, options.local, options.least_volume, scratch.patch, verdict.patch);
@@ -121,7 +134,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   }
   std::optional<Refusal> finished;
   const auto found =
-      compare<Dim>(state, verdict.patch, edit, options.required, options.local.max_iterations,
+      compare<Dim>(state, verdict.patch, edit, required, 0, options.local.max_iterations,
                    options.local.max_contact_iterations, scratch, [&](auto& after) { finished = finish(after); });
   note(found, finished.value_or(found.has_unknowns ? Refusal::energy : Refusal::no_unknowns));
   verdict.was_relaxed = true;

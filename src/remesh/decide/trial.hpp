@@ -19,6 +19,7 @@ struct Verdict {
   Refusal refusal = Refusal::not_asked;
   bool was_relaxed = false;  ///< whether it took the relaxation of a patch to decide
   double gain = 0;           ///< decrease of the energy that was found [J, times the scaling]; negative: increase
+  double required = 0;       ///< what it had to be
   bool touches_contact = false;
   Box<Dim> surface_read{};      ///< holds what was read of the surface as it is now, beside the patch's own vertices
   std::vector<CellId> patch{};  ///< that was read, where the star of the edit did not do

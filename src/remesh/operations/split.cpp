@@ -70,7 +70,7 @@ class Refiner {
       return;
     }
     if (!session_.commits().commit(trial, count)) {
-      if (!curves) note_refused(trial.verdict.gain);
+      if (!curves) note_refused(trial.verdict.gain - noise_in(trial.verdict, tolerance_));
       return remember(trial, curves);
     }
     auto changed = std::span<const CellId>(trial.verdict.patch).last(trial.edit->inserted_cells.size());
@@ -131,16 +131,28 @@ class Refiner {
     if (gain > best) best = gain;
   }
 
+  /// Of what was required, the part that the barrier may feign.
+  double noise_in(const Verdict<Dim>& verdict, double tolerance) const {
+    return std::max(0.0, verdict.required - ask_.context().scaling * tolerance);
+  }
+
   /// Bulk terms alone tell when a refused split can have become worthwhile; in contact any change may have done it.
   void remember(const Trial<Dim>& trial, bool curves) {
     if (trial.verdict.refusal == Refusal::invalid) return;  // the history decided
     const double tolerance = curves ? curve_tolerance_ : tolerance_;
     const double signal = trial.signal, gain = trial.verdict.gain;
+    constexpr double kMargin = 1.3;
     RemeshMemory::SignalRange range{signal / kSameSignal, signal * kSameSignal, trial.in_contact};
     if (!trial.in_contact && trial.verdict.refusal != Refusal::shape) {  // another function may be less distorted
-      constexpr double kMargin = 1.3;
       range.least = 0;
       if (gain > 0) range.most = signal * std::max(kSameSignal, ask_.context().scaling * tolerance / (kMargin * gain));
+    }
+    if (trial.in_contact && noise_in(trial.verdict, tolerance) > trial.verdict.required / 2) {
+      // What the barrier feigns grows with its energy, as the signal does.
+      constexpr double kMostLonger = 10;
+      const double short_of = gain > 0 ? trial.verdict.required / (kMargin * gain) : kMostLonger;
+      range.least = 0;
+      range.most = signal * std::clamp(short_of, kSameSignal, kMostLonger);
     }
     session_.memory().remember(curves ? RemeshMemory::curve : RemeshMemory::split, trial.edge(), range);
   }

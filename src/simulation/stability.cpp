@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include "simulation/stability.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <set>
+
+#include "energy/elastic/point.hpp"
+#include "geometry/bvh.hpp"
+#include "geometry/predicates.hpp"
+#include "sizes.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kSlender = 0.25;     ///< thickness by diagonal, below which bodies buckle at strains below some 0.2
+constexpr double kStart = 1e-3;       ///< of a way through a body, where it begins
+constexpr double kCompressed = 1e-9;  ///< stress by modulus
+constexpr double kNegligible = 0.02;  ///< of the largest part of the way that straight edges cannot follow
+
+/// Whether the body of a cell may buckle, as far as its stress tells.
+template <int Dim>
+bool is_compressed(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, CellId c, const VectorX& x) {
+  const Material& material = setup.materials.at(mesh.body(c));
+  const auto element = element_of(mesh, c);
+  const Mat<Dim> F = deformation_gradient<Dim>(element, x);
+  const Mat<Dim> stress = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, mesh.rest(mesh.cell(c)[0]))) * F.transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat<Dim>> principal(Mat<Dim>((stress + stress.transpose()) / 2),
+                                                          Eigen::EigenvaluesOnly);
+  return principal.eigenvalues()[0] < -kCompressed * material.youngs_modulus;
+}
+
+/// The inner side of a boundary facet.
+template <int Dim>
+struct Inside {
+  int body = 0;
+  Vec<Dim> center, inward;  ///< at rest; a unit vector
+};
+
+template <int Dim>
+Inside<Dim> inside_of(const Mesh<Dim>& mesh, FacetId f) {
+  const auto& facet = mesh.facet(f);
+  const auto has = [](const auto& ids, int v) { return std::find(ids.begin(), ids.end(), v) != ids.end(); };
+  Inside<Dim> inside{0, Vec<Dim>::Zero(), Vec<Dim>::Zero()};
+  for (const int v : facet) inside.center += mesh.rest(v) / Dim;
+  for (const CellId c : mesh.cells_of(facet[0])) {
+    const auto& cell = mesh.cell(c);
+    if (!std::all_of(facet.begin(), facet.end(), [&](int v) { return has(cell, v); })) continue;
+    const int apex = *std::find_if(cell.begin(), cell.end(), [&](int v) { return !has(facet, v); });
+    // The gradient of the apex' barycentric coordinate is normal to the facet.
+    inside.body = mesh.body(c);
+    const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
+    const auto gradients = barycentric_gradients<Dim>(inverse);
+    inside.inward = gradients.col(std::find(cell.begin(), cell.end(), apex) - cell.begin()).normalized();
+  }
+  return inside;
+}
+
+bool meets(const Mesh<2>& mesh, FacetId f, const Vec<2>& p, const Vec<2>& q) {
+  const auto& facet = mesh.facet(f);
+  return segments_intersect(p, q, mesh.rest(facet[0]), mesh.rest(facet[1]));
+}
+bool meets(const Mesh<3>& mesh, FacetId f, const Vec<3>& p, const Vec<3>& q) {
+  const auto& facet = mesh.facet(f);
+  return segment_intersects_triangle(p, q, mesh.rest(facet[0]), mesh.rest(facet[1]), mesh.rest(facet[2]));
+}
+
+/// Bodies with a part that is thin against the body, by straight ways from facets through the body.
+template <int Dim>
+std::set<int> slender_bodies(const Mesh<Dim>& mesh) {
+  const std::map<int, BodySize> sizes = body_sizes(mesh);
+  std::vector<Box<Dim>> boxes(mesh.facet_slots());
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    for (const int v : mesh.facet(f)) boxes[f].include(mesh.rest(v));
+  const Bvh<Dim> tree(boxes);
+  std::set<int> slender;
+  std::vector<int> hits;
+  for (FacetId f = 0; f < mesh.facet_slots() && slender.size() < sizes.size(); ++f) {
+    const Inside<Dim> inside = inside_of(mesh, f);
+    if (slender.contains(inside.body)) continue;
+    const double length = kSlender * sizes.at(inside.body).diagonal;
+    const Vec<Dim> p = inside.center + kStart * length * inside.inward, q = inside.center + length * inside.inward;
+    Box<Dim> way;
+    way.include(p);
+    way.include(q);
+    hits.clear();
+    tree.query(way, hits);
+    if (std::any_of(hits.begin(), hits.end(), [&](FacetId other) { return other != f && meets(mesh, other, p, q); }))
+      slender.insert(inside.body);
+  }
+  return slender;
+}
+
+template <int Dim>
+bool may_buckle(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
+  const std::set<int> slender = slender_bodies(state.mesh);
+  for (CellId c = 0; !slender.empty() && c < state.mesh.cell_slots(); ++c)
+    if (slender.contains(state.mesh.body(c)) && is_compressed(setup, state.mesh, c, x)) return true;
+  return false;
+}
+
+/// A field over the nodes of a space and obstacles in the space with all edges curved.
+template <int Dim>
+VectorX in_space(const Mesh<Dim>& mesh, const Space& space, const Space& curved, const VectorX& field) {
+  if (field.size() == 0) return field;
+  const int vertices = Dim * mesh.vertex_slots(), nodes = Dim * num_nodes(mesh, space);
+  const auto at = [&](int node) { return field.segment<Dim>(Dim * node); };
+  VectorX result(field.size() + Dim * (curved.num_curved() - space.num_curved()));
+  result.head(vertices) = field.head(vertices);
+  for (int i = 0; i < curved.num_curved(); ++i) {
+    const auto [a, b] = curved.curved_edges()[i];
+    const int node = space.node_of(a, b, mesh.vertex_slots());
+    result.segment<Dim>(vertices + Dim * i) = node == kNone ? Vec<Dim>((at(a) + at(b)) / 2) : Vec<Dim>(at(node));
+  }
+  result.tail(field.size() - nodes) = field.tail(field.size() - nodes);
+  return result;
+}
+
+}  // namespace
+
+template <int Dim>
+std::vector<EdgeKey> find_edges_that_lock(const StepTools<Dim>& tools, const State<Dim>& state, const VectorX& x) {
+  if (!may_buckle(tools.setup, state, x)) return {};
+  const Mesh<Dim>& mesh = state.mesh;
+  const Space curved(mesh.edges());
+  if (curved == state.space) return {};
+  History history = state.history;
+  for (auto* fields : {&history.x, &history.v, &history.a})
+    for (VectorX& field : *fields) field = in_space(mesh, state.space, curved, field);
+  const linear::FactorRecord record = tools.solver.record();
+  ProblemCache<Dim> cache(tools.solver);
+  VectorX way;
+  {
+    StepProblem<Dim> problem(tools.setup, mesh, curved, history, state.t, cache, state.stiffness);
+    way = problem.find_instability(in_space(mesh, state.space, curved, x));
+  }
+  tools.solver.restore(record);
+  ++tools.cache.served;  // the solver has analysed another system since
+  if (way.size() == 0) return {};
+  std::vector<double> parts;
+  for (int i = 0; i < curved.num_curved(); ++i) {
+    const auto [a, b] = curved.curved_edges()[i];
+    const auto at = [&](int node) { return way.segment<Dim>(Dim * node); };
+    const bool is_straight = state.space.find(a, b) == kNone;
+    parts.push_back(is_straight ? (at(mesh.vertex_slots() + i) - (at(a) + at(b)) / 2).norm() : 0);
+  }
+  const double largest = *std::max_element(parts.begin(), parts.end());
+  std::vector<EdgeKey> found;
+  for (int i = 0; i < curved.num_curved(); ++i)
+    if (parts[i] > kNegligible * largest) found.push_back(curved.curved_edges()[i]);
+  return found;
+}
+
+template std::vector<EdgeKey> find_edges_that_lock(const StepTools<2>&, const State<2>&, const VectorX&);
+template std::vector<EdgeKey> find_edges_that_lock(const StepTools<3>&, const State<3>&, const VectorX&);
+
+}  // namespace itr
