@@ -122,13 +122,13 @@ def sayings(words):
     return [line for line in words.splitlines() if re.search(r"\bwarning", line) and not any(a in line for a in ADVICE)]
 
 
-def judge(scene, folder, status, words):
-    """Verdict, quantity, error and words."""
+def judge(scene, outcome, status, words):
+    """Verdict, quantity, error and words. A failed run needs no outcome."""
     if status != 0:
         reason = next((line for line in reversed(words.splitlines()) if line.startswith("itr:")), words.strip()[-300:])
         has_reason = status in (2, 3) and scene.may_refuse
         return "said" if has_reason else "stopped", "", float("inf"), reason
-    found = [(name, float(error), bar) for name, error, bar in scene.check(Outcome(folder / "out"))]
+    found = [(name, float(error), bar) for name, error, bar in scene.check(outcome)]
     off = [(error / bar if bar else float("inf"), name, error) for name, error, bar in found if not error <= bar]
     said = sayings(words)
     if off:
@@ -147,21 +147,13 @@ def one(arguments):
     start = time.perf_counter()
     status, words = run(itr, folder)
     row = Row(number, scene.kind, seconds=time.perf_counter() - start, facts=scene.facts)
-    row.verdict, row.quantity, row.error, row.words = judge(scene, folder, status, words)
+    outcome = Outcome(folder / "out") if status == 0 else None
+    row.verdict, row.quantity, row.error, row.words = judge(scene, outcome, status, words)
     if row.verdict == "right" and not keep:
         shutil.rmtree(folder)
     else:
         (folder / "words.txt").write_text(f"{row.verdict}: {row.quantity} {row.error:.3g}\n{words}")
     return row
-
-
-def all_rows(options, numbers):
-    jobs = [(options.seed, n, options.kind, options.itr, options.runs, options.keep) for n in numbers]
-    with concurrent.futures.ProcessPoolExecutor(options.jobs) as pool:
-        for row in pool.map(one, jobs):
-            if row.verdict != "right" or options.verbose:
-                print(line(row), flush=True)
-            yield row
 
 
 def line(row):
@@ -200,6 +192,14 @@ def passed(rows):
     return not counts["stopped"] and not counts["wrong without a word"] and counts["right"] >= 0.95 * len(rows)
 
 
+def drawn(seed, count, itr, runs, jobs=2, kind=None, only=None, keep=False, report=lambda row: None):
+    """Rows of scenes that are drawn, run and judged, several at a time."""
+    with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
+        for row in pool.map(one, [(seed, n, kind, itr, runs, keep) for n in only or range(count)]):
+            report(row)
+            yield row
+
+
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=2000)
@@ -222,10 +222,10 @@ def main():
         options.seed = secrets.randbelow(10**6)
     repeat = f"simple.py --seed {options.seed}" + (f" --kind {options.kind}" if options.kind else "") + " --only NUMBER"
     print(f"seed {options.seed}; a scene alone: {repeat}", flush=True)
-    options.keep |= bool(options.only)
-    options.verbose |= bool(options.only)
     start = time.perf_counter()
-    rows = list(all_rows(options, options.only or range(options.count)))
+    verbose = options.verbose or options.only
+    rows = list(drawn(options.seed, options.count, options.itr, options.runs, options.jobs, options.kind, options.only,
+                      options.keep or options.only, lambda row: print(line(row), flush=True) if verbose or row.verdict != "right" else None))
     write_results((options.results or options.runs).resolve(), rows, options.seed)
     print(table(rows) + f"{time.perf_counter() - start:.0f} s; scenes that are not right are in {options.runs}")
     return 0 if passed(rows) else 1

@@ -582,7 +582,7 @@ def turned(rng):
         yield relative("displacement", pairs)
         modulus = small_strain_moduli(draw.material, draw.dim)[0]
         area = draw.size**(draw.dim - 1)
-        yield "reaction over modulus", max(float(np.abs(f.reaction).max()) for f in outcome.frames) / (modulus * area), 1e-6
+        yield "reaction over modulus", max(float(np.abs(f.reaction).max()) for f in outcome.frames) / (modulus * area), 1e-5
 
     return Scene("turned", content, draw.meshes(), check, plan.facts(strain=0.0, angle=step))
 
@@ -673,7 +673,7 @@ def press(rng):
         yield "lid below the top", max(0.0, travel - gap - sunk / top.sum()) / draw.size, 2e-3
         yield relative("force on the lid", [(outcome.forces["lid"][-1], force)], force, BAR + 3 * strain)
         held = sum(outcome.forces[name][-1] for name in outcome.forces if name == "side2")
-        yield relative("forces add up", [(held, outcome.forces["lid"][-1])], force, 1e-3)
+        yield relative("forces add up", [(held, outcome.forces["lid"][-1])], force)
 
     return Scene("press", content, draw.meshes(), check, plan.facts(strain=strain, gap=gap / draw.size))
 
@@ -720,7 +720,7 @@ def drop(rng):
         yield "passes the ground", max(0.0, draw.low[1] - gap - lowest) / draw.size, 1e-9
         side = [k for k in range(draw.dim) if k != 1]
         momentum = solid.mass() * largest
-        yield "sideways momentum", max(float(np.abs(f.momentum[side]).max()) for f in outcome.frames) / momentum, 1e-3
+        yield "sideways momentum", max(float(np.abs(f.momentum[side]).max()) for f in outcome.frames) / momentum, BAR
         energies = [s["energy"]["elastic"] + s["energy"]["contact"] + f.kinetic
                     + (GRAVITY * float(solid.scalar_mass.sum(axis=1) @ f.u[:, 1]) if by_weight else 0.0)
                     for s, f in zip(outcome.steps, outcome.frames)]
@@ -768,7 +768,7 @@ def spin(rng):
         pairs = [(f.u, (f.rest - center) @ (turns[f.step] - np.eye(draw.dim)).T) for f in outcome.frames if f.step > 0]
         yield relative("displacement", pairs)
         momentum = solid.mass() * speed * draw.size
-        yield "momentum", max(float(np.abs(f.momentum).max()) for f in outcome.frames) / momentum, 1e-3
+        yield "momentum", max(float(np.abs(f.momentum).max()) for f in outcome.frames) / momentum, BAR
 
     return Scene("spin", plan.content(), draw.meshes(), check, plan.facts(strain=strain, angle=math.degrees(angle)))
 
@@ -812,10 +812,10 @@ def heavy(rng):
     def check(outcome):
         relative_mesh(outcome, solid, draw.size)
         frame = outcome.frames[-1]
-        yield relative("reaction", [(frame.reaction.sum(axis=0), -load.sum(axis=0))], float(np.abs(load).sum()), 1e-4)
+        yield relative("reaction", [(frame.reaction.sum(axis=0), -load.sum(axis=0))], float(np.abs(load).sum()))
         arm = frame.u + solid.nodes
         size = float(np.abs(load).sum()) * draw.size
-        yield "moment", float(np.abs(torque(arm - arm[0], frame.reaction + load)).max()) / size, 1e-4
+        yield "moment", float(np.abs(torque(arm - arm[0], frame.reaction + load)).max()) / size, BAR
 
     return Scene("heavy", plan.content(), draw.meshes(), check, plan.facts(strain=strain))
 
