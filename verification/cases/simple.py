@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Simple scenes, drawn at random, against the right value of each: the quick suite draws the same ones each time, the long one others."""
+"""Simple scenes, drawn at random, against the right value of each. The quick suite draws the same ones each time."""
 import collections
 import pathlib
 import secrets

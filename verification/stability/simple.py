@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import time
+import types
 
 SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's, with numpy, scipy and h5py
 if importlib.util.find_spec("h5py") is None and os.path.exists(SYSTEM_PYTHON) and "ITR_REEXECUTED" not in os.environ:
@@ -29,6 +30,7 @@ import numpy as np  # noqa: E402
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+PACKAGE = ROOT / "build/release/python"
 sys.path.insert(0, str(HERE))
 import simple_scenes  # noqa: E402
 
@@ -78,6 +80,14 @@ class Outcome:
                     self.forces[row["name"]].append(sum(float(row[f"{of}_y"]) for of in ("contact", "friction", "reaction")))
 
 
+class ByVertex:
+    """What by_vertex.py has left: the last state."""
+
+    def __init__(self, path):
+        with np.load(path) as data:
+            self.frames = [types.SimpleNamespace(step=int(data["step"]), rest=data["rest"], u=data["u"])]
+
+
 def write_msh(path, points, cells, tags, version):
     """A mesh as Gmsh writes it, as text."""
     dim, count = points.shape[1], len(cells)
@@ -107,11 +117,16 @@ def write_scene(scene, folder, seed, number):
     (folder / "scene.json").write_text(json.dumps(scene.content, indent=1) + "\n")
 
 
-def run(itr, folder):
+def run(itr, folder, program=""):
     """Exit status and words; None where it took too long."""
-    command = [str(itr), "run", str(folder / "scene.json"), "-o", str(folder / "out"), "--overwrite", "--threads", "1"]
+    scene, out = folder / "scene.json", folder / "out"
+    command = [str(itr), "run", str(scene), "-o", str(out), "--overwrite", "--threads", "1"]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    if program:
+        command = [sys.executable, str(HERE / program), str(scene), str(folder / "out.npz")]
+        environment["PYTHONPATH"] = str(PACKAGE)
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT, env=environment)
     except subprocess.TimeoutExpired:
         return None, f"no end within {TIME_LIMIT} s"
     return done.returncode, done.stdout + done.stderr
@@ -145,9 +160,11 @@ def one(arguments):
     folder = runs / f"{number:05d}-{scene.kind}"
     write_scene(scene, folder, seed, number)
     start = time.perf_counter()
-    status, words = run(itr, folder)
+    status, words = run(itr, folder, scene.program)
     row = Row(number, scene.kind, seconds=time.perf_counter() - start, facts=scene.facts)
-    outcome = Outcome(folder / "out") if status == 0 else None
+    outcome = None
+    if status == 0:
+        outcome = ByVertex(folder / "out.npz") if scene.program else Outcome(folder / "out")
     row.verdict, row.quantity, row.error, row.words = judge(scene, outcome, status, words)
     if row.verdict == "right" and not keep:
         shutil.rmtree(folder)
@@ -158,8 +175,9 @@ def one(arguments):
 
 def line(row):
     facts = row.facts
-    size = " ".join(f"{k}={facts[k]:.3g}" for k in ("size", "E", "dt", "strain", "gap", "angle", "share") if k in facts)
+    size = " ".join(f"{k}={facts[k]:.3g}" for k in ("size", "E", "dt", "strain", "motion", "gap", "angle", "share") if k in facts)
     kind = f"{row.kind} {facts['dim']}D P{facts['order']} {facts['law']} {facts.get('mode', '')} {facts.get('integrator', '')}"
+    kind += " remeshed" if facts.get("remeshed") else ""
     return f"{row.number:5d} {row.verdict:20} {kind} {size}: {row.quantity} {row.error:.2g} {row.words[:160]}"
 
 
@@ -223,9 +241,13 @@ def main():
     repeat = f"simple.py --seed {options.seed}" + (f" --kind {options.kind}" if options.kind else "") + " --only NUMBER"
     print(f"seed {options.seed}; a scene alone: {repeat}", flush=True)
     start = time.perf_counter()
-    verbose = options.verbose or options.only
+
+    def report(row):
+        if options.verbose or options.only or row.verdict != "right":
+            print(line(row), flush=True)
+
     rows = list(drawn(options.seed, options.count, options.itr, options.runs, options.jobs, options.kind, options.only,
-                      options.keep or options.only, lambda row: print(line(row), flush=True) if verbose or row.verdict != "right" else None))
+                      options.keep or options.only, report))
     write_results((options.results or options.runs).resolve(), rows, options.seed)
     print(table(rows) + f"{time.perf_counter() - start:.0f} s; scenes that are not right are in {options.runs}")
     return 0 if passed(rows) else 1
