@@ -39,7 +39,7 @@ VERDICTS = ("right", "said", "wrong without a word", "stopped")
 # Advice before the first step speaks of scenes, not of a result that is off.
 ADVICE = ("bodies span", "is unusual", "thin, with about", "nu = ", "bodies fall along", "at the start is below", "d-hat = ",
           "every vertex is held", "a load acts on the surface", "slivers", "have neither inertia nor a held vertex",
-          "stiffness ratio", "edges differ in length", "warning: see above", "warnings: see above", "Newton iterations")
+          "stiffness ratio", "edges differ in length", "see above", "Newton iterations", "takes its place")
 
 
 @dataclasses.dataclass
