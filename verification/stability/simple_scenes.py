@@ -417,7 +417,7 @@ def wild(rng):
     plan.integrator, plan.steps = pick(rng, ["ImplicitEuler", "ImplicitEuler", "BDF2"]), int(rng.integers(3, 25))
     B = rng.uniform(-1, 1, (draw.dim, draw.dim))
     speed = draw.wave_speed() * log_uniform(rng, 1e-2, 0.2) * math.sqrt(draw.softness())
-    plan.dt = float(f"{draw.size / draw.wave_speed() * log_uniform(rng, 1e-2, 1e2):.3g}")
+    plan.dt = float(f"{min(draw.size / draw.wave_speed() * log_uniform(rng, 1e-2, 1e2), 0.3 * draw.size / speed):.3g}")
     if not 1e-8 <= plan.dt <= 10:
         raise Redraw
     drift = speed * rng.uniform(-1, 1, draw.dim)
@@ -432,8 +432,8 @@ def wild(rng):
         scale = solid.mass() * speed
         yield relative("momentum", [(f.momentum, start) for f in outcome.frames], scale, 1e-3)
         energies = [f.kinetic + s["energy"]["elastic"] for f, s in zip(outcome.frames, outcome.steps)]
-        if plan.integrator == "ImplicitEuler":
-            yield "energy grows", max(b - a for a, b in zip(energies, energies[1:])) / energies[0], 1e-3
+        if plan.integrator == "ImplicitEuler":  # a single step may gain some, where the energy is not convex
+            yield "energy is gained", max(energies) / energies[0] - 1, 1e-3
 
     return Scene("wild", content, draw.meshes(), check, plan.facts(strain=speed / draw.wave_speed()))
 
