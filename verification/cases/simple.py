@@ -22,6 +22,7 @@ def results(context):
     seed, count = (QUICK_SEED, QUICK_COUNT) if context.quick else (secrets.randbelow(10**6), COUNT)
     rows = list(simple.drawn(seed, count, context.build / "bin/itr", context.folder))
     simple.write_results(context.folder, rows, seed)
+    context.table("kinds", simple.COLUMNS, simple.by_kind(rows))
     by_verdict = collections.defaultdict(list)
     for row in rows:
         by_verdict[row.verdict].append(row)

@@ -31,8 +31,9 @@ import numpy as np  # noqa: E402
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 PACKAGE = ROOT / "build/release/python"
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parent)]
 import simple_scenes  # noqa: E402
+from harness import stored  # noqa: E402
 
 TIME_LIMIT = 30  # seconds of a run, after which it counts as stopped
 VERDICTS = ("right", "said", "wrong without a word", "stopped")
@@ -181,26 +182,33 @@ def line(row):
     return f"{row.number:5d} {row.verdict:20} {kind} {size}: {row.quantity} {row.error:.2g} {row.words[:160]}"
 
 
-def table(rows):
-    """Verdicts by kind."""
-    lines = ["| kind | scenes | " + " | ".join(VERDICTS) + " |", "|---" * (len(VERDICTS) + 2) + "|"]
+COLUMNS = ("kind", "scenes", *VERDICTS, "right but warned")
+
+
+def by_kind(rows):
+    """Rows of a table: counts of verdicts by kind, in the order of COLUMNS."""
     for kind in [*sorted({row.kind for row in rows}), "all"]:
         of = [row for row in rows if kind in (row.kind, "all")]
         counts = collections.Counter(row.verdict for row in of)
-        lines.append(f"| {kind} | {len(of)} | " + " | ".join(str(counts[v]) for v in VERDICTS) + " |")
-    return "\n".join(lines) + "\n"
+        yield kind, len(of), *(counts[v] for v in VERDICTS), sum(row.verdict == "right" and bool(row.words) for row in of)
+
+
+def table(rows):
+    lines = [COLUMNS, ["---"] * len(COLUMNS), *by_kind(rows)]
+    return "".join("| " + " | ".join(map(str, line)) + " |\n" for line in lines)
 
 
 def write_results(folder, rows, seed):
     folder.mkdir(parents=True, exist_ok=True)
+    commit = stored.made("verification/stability/simple.csv")
     facts = list(dict.fromkeys(key for row in rows for key in row.facts))
     with open(folder / "simple.csv", "w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["seed", "number", "kind", "verdict", "quantity", "error", "seconds", *facts, "words"])
+        writer.writerow(["seed", "number", "kind", "verdict", "quantity", "error", "seconds", *facts, "words", "commit"])
         for row in rows:
             values = [row.facts.get(key, "") for key in facts]
             writer.writerow([seed, row.number, row.kind, row.verdict, row.quantity, f"{row.error:.3g}", f"{row.seconds:.3f}",
-                             *[f"{v:.3g}" if isinstance(v, float) else v for v in values], row.words[:300]])
+                             *[f"{v:.3g}" if isinstance(v, float) else v for v in values], row.words[:300], commit])
     (folder / "simple.md").write_text(table(rows))
 
 

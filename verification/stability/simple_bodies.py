@@ -327,9 +327,12 @@ class Plan:
                 momenta = [(f.momentum, (solid.scalar_mass @ s[2]).sum(axis=0)) for f, s in pairs]
                 yield relative("momentum", momenta, solid.mass() * most[1])
             if self.held and most[2] > 0:
-                scale = max(float(np.abs(s[3]).sum()) for s in states)
+                # The linear system leaves out stresses of second order, as of turns.
+                largest = max(solid.largest_gradient(s[1]) for s in states)
+                left_out = max(solid.mu.max(), solid.lam.max()) * largest**2 * solid.facet_area.max() * 2 / BAR
+                scale = max(float(np.abs(s[3]).sum()) for s in states) + left_out
                 yield relative("reaction", [(f.reaction.sum(axis=0), s[3].sum(axis=0)) for f, s in pairs], scale)
-                yield relative("reaction of a vertex", [(f.reaction, s[3]) for f, s in pairs], most[2])
+                yield relative("reaction of a vertex", [(f.reaction, s[3]) for f, s in pairs], most[2] + left_out)
 
         return check
 
