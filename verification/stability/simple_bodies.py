@@ -75,6 +75,7 @@ class Draw:
         self.points = points + self.low
         self.tags = np.ones(len(self.cells), dtype=int)
         self.more = {}  # further top-level keys
+        self.is_unit_mesh = chance(rng, 0.2)  # sized and placed by the scene
         if chance(rng, 0.1):
             self.more["units"] = self.draw_units()
 
@@ -132,6 +133,8 @@ class Draw:
     def geometry(self, name="body.msh"):
         """The body's entry: sides by threshold or by boxes, sizes in the mesh or by a transformation."""
         entry = {"mesh": name, "volume_selection": 1}
+        if self.is_unit_mesh:
+            entry["transformation"] = {"scale": self.size, "translation": self.low.tolist()}
         if chance(self.rng, 0.5):
             entry["surface_selection"] = {"threshold": 1e-4 * self.size}
         else:
@@ -166,7 +169,8 @@ class Draw:
                 "rho": self.rho, "cells": len(self.cells), **more}
 
     def meshes(self):
-        return {"body.msh": (self.points, self.cells, self.tags)}
+        points = (self.points - self.low) / self.size if self.is_unit_mesh else self.points
+        return {"body.msh": (points, self.cells, self.tags)}
 
 
 SIDE_AXIS = {1: (0, False), 2: (1, False), 3: (0, True), 4: (1, True), 5: (2, False), 6: (2, True)}
@@ -290,7 +294,8 @@ class Plan:
         if self.velocity is not None:
             content["initial_conditions"] = {"velocity": [{"id": 1, "value": self.velocity.json()}]}
         if self.mode != "static":
-            content["time"] = {"dt": self.dt, "time_steps": self.steps} | ({"t0": self.t0} if self.t0 else {})
+            ends = {"tend": self.t0 + self.dt * self.steps} if chance(draw.rng, 0.5) else {"time_steps": self.steps}
+            content["time"] = {"dt": self.dt, **ends} | ({"t0": self.t0} if self.t0 else {})
             content["time"] |= {"quasistatic": True} if self.mode == "quasistatic" else {"integrator": self.integrator}
         return content
 

@@ -454,6 +454,7 @@ def stack(rng):
     draw.more["contact"] = gap_contact(rng)
     up = [0.0] * draw.dim
     up[1] = float(draw.extent[1] + gaps[1])
+    draw.is_unit_mesh = False
     second = {"mesh": "body.msh", "volume_selection": 2, "transformation": {"translation": up}}
     ground = {"type": "ground", "height": float(draw.low[1] - gaps[0]), "surface_selection": 9, "name": "ground"}
     content = plan.content([draw.geometry(), second, ground])
