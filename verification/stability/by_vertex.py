@@ -18,13 +18,15 @@ def main():
         model.add_boundary(name, facets=np.array(facets))
     model.set_options(scene["options"])
     simulation = itr.Simulation(model)
+    simulation.watch_forces()
     for name, values in scene["fixed"].items():
         simulation.fix(name, np.array(values))
     for name, values in scene["tractions"].items():
         simulation.set_traction(name, np.array(values))
     while not simulation.finished:
         simulation.step()
-    np.savez(sys.argv[2], rest=simulation.rest_positions, u=simulation.positions - simulation.rest_positions, step=simulation.steps)
+    np.savez(sys.argv[2], rest=simulation.rest_positions, u=simulation.positions - simulation.rest_positions, step=simulation.steps,
+             applied=simulation.forces("applied"), reaction=simulation.forces("reaction"))
 
 
 if __name__ == "__main__":

@@ -30,7 +30,6 @@ import numpy as np  # noqa: E402
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-PACKAGE = ROOT / "build/release/python"
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 import simple_scenes  # noqa: E402
 from harness import stored  # noqa: E402
@@ -86,7 +85,7 @@ class ByVertex:
 
     def __init__(self, path):
         with np.load(path) as data:
-            self.frames = [types.SimpleNamespace(step=int(data["step"]), rest=data["rest"], u=data["u"])]
+            self.frames = [types.SimpleNamespace(**data)]
 
 
 def write_msh(path, points, cells, tags, version):
@@ -118,6 +117,12 @@ def write_scene(scene, folder, seed, number):
     (folder / "scene.json").write_text(json.dumps(scene.content, indent=1) + "\n")
 
 
+def package_beside(itr):
+    """The Python package of the same build, or that of this source folder for a copied program."""
+    beside = itr.parent.parent / "python"
+    return beside if (beside / "itr").exists() else ROOT / "build/release/python"
+
+
 def run(itr, folder, program=""):
     """Exit status and words; None where it took too long."""
     scene, out = folder / "scene.json", folder / "out"
@@ -125,7 +130,7 @@ def run(itr, folder, program=""):
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     if program:
         command = [sys.executable, str(HERE / program), str(scene), str(folder / "out.npz")]
-        environment["PYTHONPATH"] = str(PACKAGE)
+        environment["PYTHONPATH"] = str(package_beside(itr))
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT, env=environment)
     except subprocess.TimeoutExpired:
