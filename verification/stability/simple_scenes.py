@@ -90,7 +90,7 @@ def load(rng):
 
 
 def rollers(rng):
-    """A body on rollers along each axis carries a load, or is pulled. It may be free to roll along an axis, where nothing pushes."""
+    """A body on rollers along each axis carries a load, or is pulled. It may be free to roll along an axis that nothing pushes."""
     draw = Draw(rng)
     plan = Plan(draw, pick_mode(rng))
     sides = {axis: pick(rng, [s for s, (a, _) in SIDE_AXIS.items() if a == axis]) for axis in range(draw.dim)}
@@ -568,8 +568,8 @@ def crack(rng):
 
 
 def crack_faces(rng):
-    """A crack whose faces are loaded or moved one by one, which only their vertices tell apart: through the Python package. Where the
-    mesh changes, the loads and what they open are held against those of the first mesh."""
+    """A crack whose faces, which only their vertices tell apart, are loaded or moved one by one through the Python package. Where
+    the mesh changes, the loads and the opening are held against those of the first mesh."""
     draw, solid, middle, faces = cracked(rng)
     plan = Plan(draw, "quasistatic", dt=float(f"{log_uniform(rng, 1e-8, 10):.3g}"))
     is_upper = {f: solid.points[draw.cells[solid.facets[f][0]]].mean(axis=0)[1] > middle for f in faces}
@@ -618,7 +618,8 @@ def crack_faces(rng):
         opened, first = (float(np.ptp(field[at, 1])) for field, at in zip((frame.u, u), mouth))
         yield "crack opens less", max(0.0, 0.9 - opened / first), 0.0
         if not moves:
-            yield relative("applied forces", [(frame.applied.sum(axis=0), factor * force.sum(axis=0))], factor * np.abs(force).sum())
+            load = factor * force
+            yield relative("applied forces", [(frame.applied.sum(axis=0), load.sum(axis=0))], np.abs(load).sum())
         yield relative("forces add up", [(frame.reaction.sum(axis=0), -frame.applied.sum(axis=0))], np.abs(frame.reaction).sum())
 
     return Scene("crack_faces", content, {}, check, plan.facts(strain=solid.largest_gradient(u), remeshed=is_remeshed),
