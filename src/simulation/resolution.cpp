@@ -89,13 +89,14 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
       motion = std::max(motion, time.dt * (actions.speed + time.dt * (actions.acceleration +
                                                                       actions.traction / (material.density * length))));
   }
+  if (time.is_static) motion = std::max(motion, actions.displacement);
   const Units& units = setup.units;
   if (motion < kDigits * spacing)
     found.push_back(fmt::format(
         "bodies move by about {} in the first step, and positions up to {} from the origin are {} apart: results of single "
         "steps are round-off; a larger dt, or a scene near the origin, helps",
         units.text(motion, "m", 2), units.text(farthest, "m", 2), units.text(spacing, "m", 2)));
-  else if (strain < kDigits * kSpacing)
+  else if (strain > 0 && strain < kDigits * kSpacing)  // none is known where only obstacles move
     found.push_back(
         fmt::format("strains are about {:.1g}, and positions resolve {:.1g}: stresses in stored frames are round-off",
                     strain, kSpacing));

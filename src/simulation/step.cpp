@@ -21,7 +21,6 @@
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/stability.hpp"
-#include "watch.hpp"
 
 namespace itr {
 
@@ -132,16 +131,14 @@ class StepAttempt {
     }
     make_problem();
     NewtonSummary summary = solve(expected());
-    const std::string jump = jumped();
     if (!summary.converged()) {
       // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
       const bool is_stuck = summary.termination == Termination::no_descent ||
                             summary.termination == Termination::iterations || summary.termination == Termination::infeasible;
       if (is_stuck && setup_.remesh.enabled) nearly_inverted_ = find_nearly_inverted(next_, x_);
-      return failed(summary, jump);
+      return failed(summary);
     }
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
-    if (!jump.empty()) return failed(jump);
     if (setup_.remesh.enabled) {
       if (const auto cancelled = remesh()) return failed(*cancelled);
       if (const auto cancelled = let_buckle()) return failed(*cancelled);
@@ -328,14 +325,8 @@ class StepAttempt {
     return result;
   }
 
-  /// What flew away without inertia; empty: nothing.
-  std::string jumped() const {
-    if (has_inertia() || setup_.time.allow_jumps) return {};
-    return find_jump(setup_, next_.mesh, next_.space, before_.history.x[0], x_);
-  }
-
-  StepResult failed(const NewtonSummary& summary, const std::string& jump = {}) {
-    StepResult result = failed(jump.empty() ? reason_of(summary) : jump + "; " + reason_of(summary));
+  StepResult failed(const NewtonSummary& summary) {
+    StepResult result = failed(reason_of(summary));
     result.cancelled = summary.termination == Termination::cancelled;
     return result;
   }

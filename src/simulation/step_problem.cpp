@@ -179,6 +179,9 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
                                                            surface_.map.get());
   }
   potential_.elastic()->set_quadrature_levels(levels);
+  if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
+    if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials); !loose.empty())
+      least_motion_ = std::make_shared<LeastMotion<Dim>>(std::move(loose), terms_.scaling);
   reset_system();
 }
 
@@ -280,17 +283,71 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
 
 /// Minimises over the increment from the positions at the start of the step.
 template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, const NewtonExtras& extras) {
+NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras) {
   VectorX d = increment_of(x);
   const VectorX target = held_.target - base_;
+  EnergySum all = sum;
+  bool has_flown = false;
+  if (least_motion_) {
+    all.add(least_motion_);
+    follow_least_motion(sum, d);
+    extras.after_step = [&, before = extras.after_step](const VectorX& iterate) {
+      const bool changed = before && before(iterate);
+      follow_least_motion(sum, iterate);
+      return changed;
+    };
+    extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
+      has_flown = has_flown_away(d);
+      return !has_flown && (!before || before(progress));
+    };
+  }
   NewtonSummary summary =
-      minimize(EnergyOfIncrement(sum, base_), d, dofs_, target, system(), setup_.newton, workspace_, extras);
+      minimize(EnergyOfIncrement(all, base_), d, dofs_, target, system(), setup_.newton, workspace_, extras);
   x = base_ + d;
   for (Eigen::Index i = 0; i < x.size(); ++i)
     if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
   if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
   solution_ = {x, std::move(d)};
+  if (has_flown) {
+    summary.termination = Termination::no_descent;
+    summary.message = describe_flight();
+    return summary;
+  }
   return explained(std::move(summary), sum, x);
+}
+
+template <int Dim>
+void StepProblem<Dim>::follow_least_motion(const EnergySum& sum, const VectorX& d) {
+  VectorX gradient = VectorX::Zero(d.size()), sizes = gradient;
+  EnergyOfIncrement(sum, base_).add_gradient_and_sizes(d, gradient, sizes, workspace_);
+  least_motion_->follow(gradient, sizes, dofs_);
+}
+
+/// Whether a body that nothing holds has gone farther than anything of the scene could meet it.
+template <int Dim>
+bool StepProblem<Dim>::has_flown_away(const VectorX& d) const {
+  constexpr double kFar = 10;  ///< times the extent of bodies, obstacles and targets
+  if (setup_.time.allow_jumps) return false;
+  Eigen::AlignedBox<double, Dim> box;
+  for (Eigen::Index i = 0; i < base_.size(); i += Dim) box.extend(Vec<Dim>(base_.template segment<Dim>(i)));
+  for (Eigen::Index i = 0; i < base_.size(); i += Dim)
+    if (dofs_.unknown[i] == kNone) box.extend(Vec<Dim>(held_.target.template segment<Dim>(i)));
+  const double limit = kFar * box.diagonal().norm();
+  for (const auto& part : least_motion_->parts())
+    if (d.template segment<Dim>(Dim * part.nodes.front()).norm() > limit) return true;
+  return false;
+}
+
+template <int Dim>
+std::string StepProblem<Dim>::describe_flight() const {
+  std::string place;
+  const Eigen::Index first = Dim * least_motion_->parts().front().nodes.front();
+  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.3g}", c ? ", " : "", setup_.units.from_si(base_[first + c], "m"));
+  return fmt::format(
+      "loads push a body that its conditions do not hold, such as the one at ({}), and nothing comes in its way: there is "
+      "no "
+      "equilibrium; hold it (a point, or rollers on a side), or take dynamics (/time/quasistatic = false)",
+      place);
 }
 
 /// x minus the positions at the start of the step; of the last solution without the round-off of x.
@@ -470,7 +527,8 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
 template <int Dim>
 VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
   lagged_ = potential_.lag(x, workspace_);
-  const EnergySum sum = potential_.sum(lagged_);
+  EnergySum sum = potential_.sum(lagged_);
+  if (least_motion_) sum.add(least_motion_);
   PrescribedMotion none;
   const auto assemble = [&](PsdProjection psd) { system().assemble(sum, x, psd, dofs_, none, workspace_); };
   const int unknowns = dofs_.num_unknowns;

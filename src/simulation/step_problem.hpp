@@ -2,6 +2,7 @@
 // The incremental potential of one time step on one mesh, and its solution: terms that the scene needs and no others.
 #pragma once
 
+#include "energy/least_motion.hpp"
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/incremental_potential.hpp"
 #include "itr/newton/newton.hpp"
@@ -81,7 +82,10 @@ class StepProblem {
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
   NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {});
-  NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, const NewtonExtras& extras);
+  NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras);
+  void follow_least_motion(const EnergySum& sum, const VectorX& d);
+  bool has_flown_away(const VectorX& d) const;
+  std::string describe_flight() const;
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
   void reset_system();
@@ -109,6 +113,7 @@ class StepProblem {
   struct Solution {
     VectorX x, increment;
   };
+  std::shared_ptr<LeastMotion<Dim>> least_motion_;  ///< null: inertia or conditions hold all bodies
   VectorX base_;                                      ///< positions at the start of the step
   Solution solution_;                                 ///< of the last solve
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number

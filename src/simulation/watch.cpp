@@ -8,7 +8,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "geometry/bvh.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -98,36 +97,7 @@ void Watch<Dim>::find_loose_forces(const Setup<Dim>& setup, const State<Dim>& st
       report.step, setup.units.text(report.residual_worth, "J", 2), setup.units.text(energy, "J", 2), 100 * error));
 }
 
-template <int Dim>
-std::string find_jump(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const VectorX& before,
-                      const VectorX& x) {
-  Box<Dim> box;
-  for (Eigen::Index i = 0; i + Dim <= before.size(); i += Dim) box.include(Vec<Dim>(before.template segment<Dim>(i)));
-  const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
-  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0, space).held;
-  double limit = (box.max - box.min).norm(), most = 0;
-  Eigen::Index where = 0;
-  for (Eigen::Index i = 0; i + Dim <= x.size(); i += Dim) {
-    const double way = (x.template segment<Dim>(i) - before.template segment<Dim>(i)).norm();
-    const bool is_held = i >= bodies || (i < static_cast<Eigen::Index>(held.size()) && held[i]);
-    if (is_held) limit = std::max(limit, way);
-    if (way > most) most = way, where = i;
-  }
-  if (!(most > limit)) return {};
-  std::string place;
-  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.3g}", c ? ", " : "", setup.units.from_si(before[where + c], "m"));
-  return fmt::format(
-      "the body at ({}) jumps by {}, further than the scene is wide ({}): neither inertia nor a "
-      "held vertex nor contact holds it; hold it, add friction or leave /time/quasistatic out "
-      "(/time/allow_jumps = true lets it go)",
-      place, setup.units.text(most, "m", 3), setup.units.text(limit, "m", 3));
-}
-
-#define ITR_INSTANTIATE(Dim) \
-  template class Watch<Dim>; \
-  template std::string find_jump<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const VectorX&, const VectorX&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+template class Watch<2>;
+template class Watch<3>;
 
 }  // namespace itr

@@ -20,10 +20,4 @@ class Watch {
   int loose_steps_ = 0;  ///< in a row
 };
 
-/// What moves in a step from `before` to `x` by more than the scene and all that is prescribed: where, and how far. Empty:
-/// nothing does.
-template <int Dim>
-std::string find_jump(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const VectorX& before,
-                      const VectorX& x);
-
 }  // namespace itr

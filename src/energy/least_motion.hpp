@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "itr/energy/energy.hpp"
+#include "itr/energy/material.hpp"
+#include "itr/fem/cell_set.hpp"
+
+namespace itr {
+
+/// sigma / 2 |d - d_k|^2 in the mass norm about the iterate d_k itself, for bodies that conditions do not hold: no energy
+/// and no force, only stiffness. A Newton step is then the one of least motion among those that lower the energy alike,
+/// where the Hessian alone is singular.
+template <int Dim>
+class LeastMotion final : public Energy {
+ public:
+  /// A connected part of bodies with a free rigid motion.
+  struct Part {
+    std::vector<int> nodes;
+    std::vector<double> weights;  ///< parts of the volume; their sum is 1
+    double size = 0;              ///< diagonal of its box [m]
+    double modulus = 0;           ///< largest, times size^(Dim - 2) [N/m]
+    double stiffness = 0;         ///< sigma, times the scaling
+  };
+
+  explicit LeastMotion(std::vector<Part> parts, double scaling) : parts_(std::move(parts)), scaling_(scaling) {}
+  /// Sets sigma from the gradient and the absolute forces at the iterate. It fades with the forces that are left.
+  void follow(ConstVectorView gradient, ConstVectorView sizes, const DofMap& dofs);
+  const std::vector<Part>& parts() const { return parts_; }
+
+  std::string_view name() const override { return "least motion"; }
+  double value(ConstVectorView, Workspace&) const override { return 0; }
+  void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
+
+ private:
+  std::vector<Part> parts_;
+  double scaling_;
+};
+
+/// The connected parts of which `held` dofs leave a rigid motion free, at positions x. A rank of conditions, not a count:
+/// rollers and single points hold what they hold.
+template <int Dim>
+std::vector<typename LeastMotion<Dim>::Part> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x,
+                                                              const std::vector<char>& held,
+                                                              const std::map<int, Material>& materials);
+
+}  // namespace itr

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT
+// Bodies without inertia that only contact will hold, or nothing will, and held ones that turn far.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "energy/least_motion.hpp"
+#include "itr/linear/registry.hpp"
+#include "random_tets.hpp"
+#include "simulation/step_problem.hpp"
+#include "simulation_scenes.hpp"
+
+namespace itr {
+namespace {
+
+constexpr double kGravity = 9.81;
+
+/// A square of 0.2 m and 40 kg, 20 mm above a table, without inertia.
+Setup<2> square_above_a_table(double modulus, const std::string& solver = "eigen") {
+  Setup<2> setup;
+  setup.mesh = make_square(3, 0.2);
+  setup.materials[1] = {.youngs_modulus = modulus, .poisson_ratio = 0.3, .density = 1000};
+  setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -kGravity); };
+  setup.obstacles.rest = {{-1, -0.02}, {1, -0.02}};
+  setup.obstacles.edges = {{0, 1}};
+  setup.obstacles.motion = {kNone, kNone};
+  setup.contact = {.enabled = true, .activation_distance = 1e-4, .convergent = true};
+  setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
+  setup.linear.solvers = {solver};
+  return setup;
+}
+
+/// Of the mass.
+template <int Dim>
+Vec<Dim> mean_displacement(const Simulation<Dim>& simulation) {
+  const auto& state = simulation.state();
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
+    for (const int v : state.mesh.cell(c))
+      sum += state.mesh.volume(c) / (Dim + 1) * (state.history.x[0].template segment<Dim>(Dim * v) - state.mesh.rest(v));
+  return sum / state.mesh.total_volume();
+}
+
+TEST(LooseBodies, ComeDownStraightWhateverModulusAndSolver) {
+  for (const std::string& solver : {"eigen:ldlt", "eigen:lu"})
+    for (const double modulus : {1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11}) {
+      SCOPED_TRACE(solver + " " + std::to_string(modulus));
+      linear::Registry registry;
+      Simulation<2> simulation(square_above_a_table(modulus, solver), registry);
+      const auto result = simulation.advance();
+      ASSERT_TRUE(result.ok) << result.reason;
+      const Vec<2> moved = mean_displacement(simulation);
+      EXPECT_NEAR(moved[0], 0, 1e-6 * 0.2);
+      EXPECT_NEAR(moved[1], -0.02, 1e-3 + kGravity * 1000 * 0.04 / modulus);
+      EXPECT_LE(result.report.newton_iterations, 60);
+    }
+}
+
+TEST(LooseBodies, StayWhereNoForceActs) {
+  auto setup = square_above_a_table(1e6);
+  setup.body_acceleration = {};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const auto result = simulation.advance();
+  ASSERT_TRUE(result.ok) << result.reason;
+  EXPECT_LE(mean_displacement(simulation).norm(), 1e-15);
+}
+
+/// Forces in balance leave all rigid motions neutral.
+TEST(LooseBodies, InBalanceDoNotDrift) {
+  for (const double modulus : {1e4, 1e7, 1e11}) {
+    SCOPED_TRACE(modulus);
+    auto setup = square_above_a_table(modulus);
+    setup.body_acceleration = {};
+    setup.contact.enabled = false;
+    setup.obstacles = {};
+    for (const int side : {1, 3})
+      setup.neumann.push_back({side, [=](const Vec<2>&, double) { return Vec<2>((side - 2) * 1e-4 * modulus, 0); }});
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    EXPECT_LE(mean_displacement(simulation).norm(), 1e-9);
+    EXPECT_GT(result.report.energy.elastic, 0);
+  }
+}
+
+TEST(LooseBodies, ThatNothingWillHoldStopTheRunSoon) {
+  auto setup = square_above_a_table(1e6);
+  setup.contact.enabled = false;
+  setup.obstacles = {};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const auto result = simulation.advance();
+  EXPECT_FALSE(result.ok);
+  EXPECT_LE(result.report.newton_iterations, 50);
+  EXPECT_NE(result.reason.find("no equilibrium"), std::string::npos) << result.reason;
+}
+
+TEST(LooseBodies, AreFoundByTheRankOfTheirConditions) {
+  const Mesh<2> mesh = make_square(2, 0.2);
+  const CellSet<2> cells = whole_mesh(mesh, {});
+  VectorX x(2 * cells.num_vertices);
+  for (int v = 0; v < cells.num_vertices; ++v) x.segment<2>(2 * v) = cells.rest[v];
+  const std::map<int, Material> materials = {{1, {}}};
+  const auto is_loose = [&](std::initializer_list<int> dofs) {
+    std::vector<char> held(x.size(), 0);
+    for (const int dof : dofs) held[dof] = 1;
+    return !find_loose_parts<2>(cells, x, held, materials).empty();
+  };
+  EXPECT_TRUE(is_loose({}));
+  EXPECT_TRUE(is_loose({0, 1})) << "one point: it turns";
+  EXPECT_TRUE(is_loose({1, 3, 5})) << "rollers along one side";
+  EXPECT_FALSE(is_loose({1, 3, 0})) << "rollers and a point";
+  EXPECT_TRUE(is_loose({0, 2, 4})) << "all of one component on a line along it";
+  EXPECT_FALSE(is_loose({0, 1, 2, 3}));
+}
+
+TEST(LooseBodies, AreConnectedPartsIn3D) {
+  const Mesh<3> mesh = make_cubes(
+      3, [](int i, int j, int k) { return Vec<3>(i, j, k); }, [](int i, int, int) { return i == 1 ? kNone : 1; });
+  const CellSet<3> cells = whole_mesh(mesh, {});
+  VectorX x(3 * cells.num_vertices);
+  std::vector<char> held(x.size(), 0);
+  for (int v = 0; v < cells.num_vertices; ++v) {
+    x.segment<3>(3 * v) = cells.rest[v];
+    if (cells.rest[v][0] == 0) held[3 * v] = held[3 * v + 1] = held[3 * v + 2] = 1;
+  }
+  const auto loose = find_loose_parts<3>(cells, x, held, {{1, {}}});
+  ASSERT_EQ(loose.size(), 1u);
+  double weights = 0;
+  for (std::size_t k = 0; k < loose[0].nodes.size(); ++k) {
+    EXPECT_GE(cells.rest[loose[0].nodes[k]][0], 2);
+    weights += loose[0].weights[k];
+  }
+  EXPECT_NEAR(weights, 1, 1e-14);
+}
+
+TEST(HeldBodies, TurnByNinetyDegreesInAStep) {
+  itr::Setup<2> setup;
+  setup.mesh = make_square(2, 0.2);
+  setup.materials[1] = {.youngs_modulus = 1e6, .poisson_ratio = 0.3, .density = 1000};
+  setup.dirichlet.push_back({1, {true, true}, [](const Vec<2>& X, double t) {
+                               const double c = std::cos(t * M_PI / 2), s = std::sin(t * M_PI / 2);
+                               return Vec<2>(c * X[0] - s * X[1] - X[0], s * X[0] + c * X[1] - X[1]);
+                             }});
+  setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const auto result = simulation.advance();
+  ASSERT_TRUE(result.ok) << result.reason;
+  EXPECT_LE(result.report.energy.elastic, 1e-12 * 1e6 * 0.04);
+}
+
+}  // namespace
+}  // namespace itr
