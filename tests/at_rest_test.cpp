@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "random_tets.hpp"
 #include "simulation/resolution.hpp"
@@ -201,6 +202,21 @@ TEST(AtRest, ASteelCubeStandsUnderItsWeight) {
     const double weight = 7800 * kGravity * size * size * size;
     EXPECT_NEAR(sum_of<3>(result.forces.reaction)[1], weight, 1e-6 * weight);
   }
+}
+
+/// A program's functions have no key: the error says what they prescribe. The state stays.
+TEST(Values, OfProgramsThatAreNoneEndTheStepBeforeItIsTaken) {
+  auto setup = plain_square(2, 1e6);
+  hold(setup, 1);
+  setup.dirichlet[0].displacement = [](const Vec<2>&, double t) { return Vec<2>(t > 0.015 ? std::nan("") : 0.1 * t, 0); };
+  setup.time = {.quasistatic = true, .dt = 0.01, .steps = 3};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  ASSERT_TRUE(simulation.advance().ok);
+  const VectorX x = simulation.state().history.x[0];
+  EXPECT_THROW(simulation.advance(), InputError);
+  EXPECT_EQ(simulation.state().step, 1);
+  EXPECT_EQ(simulation.state().history.x[0], x);
 }
 
 TEST(Resolution, IsToldWhereStepsOrStrainsAreBelowIt) {

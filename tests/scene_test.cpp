@@ -238,7 +238,7 @@ TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
 
   EXPECT_DOUBLE_EQ(dynamic.newton.step_tolerance, 1e-4);
   EXPECT_DOUBLE_EQ(dynamic.newton.gradient_tolerance, 1e-8);
-  EXPECT_DOUBLE_EQ(dynamic.newton.first_gradient_tolerance, 1e-11);
+  EXPECT_EQ(dynamic.newton.first_gradient_tolerance, 0) << "only where a scene asks for it";
   EXPECT_DOUBLE_EQ(statics.newton.step_tolerance, 1e-3);
   EXPECT_EQ(read2(square({{"solver", {{"nonlinear", euclidean}}}})).newton.gradient_tolerance, 1e-6);
   EXPECT_DOUBLE_EQ(dynamic.newton.energy_tolerance, 1e-4);
@@ -254,17 +254,55 @@ TEST_F(SceneTest, TolerancesOfMainCarryTheScalesOfTheScene) {
   const NewtonOptions l2 = newton({{"x_delta_tol", 1e-4}, {"grad_norm_tol", 1e-8}, {"newton_decrement_tol", 1e-9}});
   EXPECT_EQ(l2.norm, NewtonNorm::l2);
   EXPECT_DOUBLE_EQ(l2.gradient_tolerance, 1e-8 * 1e4 * L);
-  EXPECT_DOUBLE_EQ(l2.first_gradient_tolerance, 1e-12 * 1e4 * L);
+  EXPECT_EQ(l2.first_gradient_tolerance, 0) << "only where a scene asks for it";
   EXPECT_DOUBLE_EQ(l2.step_tolerance, 1e-4 * L * L);
-  EXPECT_DOUBLE_EQ(l2.relative_gradient_tolerance, 1e-10);
+  EXPECT_EQ(l2.relative_gradient_tolerance, 0);
   EXPECT_DOUBLE_EQ(l2.decrement_tolerance, 1e-9);
   const NewtonOptions linf = newton({{"norm_type", "Linf"}, {"x_delta_tol", 1e-4}, {"rel_x_delta_tol", 1e-3}},
                                     {{"characteristic_length", 3}, {"characteristic_force_density", 10}});
   EXPECT_EQ(linf.norm, NewtonNorm::linf);
-  EXPECT_DOUBLE_EQ(linf.gradient_tolerance, 1e-10 * 10);
+  EXPECT_EQ(linf.gradient_tolerance, 0);
+  EXPECT_DOUBLE_EQ(newton({{"norm_type", "Linf"}, {"first_grad_norm_tol", 1e-9}}, {{"characteristic_force_density", 10}})
+                       .first_gradient_tolerance,
+                   1e-9 * 10);
   EXPECT_DOUBLE_EQ(linf.step_tolerance, 1e-4 * 3);
   EXPECT_DOUBLE_EQ(linf.relative_step_tolerance, 1e-3);
   EXPECT_EQ(newton(json::object()).norm, NewtonNorm::l2);  // no key of either vocabulary
+}
+
+TEST_F(SceneTest, ForcesAreComparedWithThoseThatActUnlessAScenesSaysOtherwise) {
+  EXPECT_EQ(read2(square()).newton.force_tolerance, 1e-9);
+  EXPECT_EQ(read2(square({{"solver", {{"nonlinear", {{"force_tol", 1e-6}}}}}})).newton.force_tolerance, 1e-6);
+}
+
+/// At times and places that were not looked at when the scene was read.
+TEST_F(SceneTest, ValuesThatAreNoneNameKeyPlaceAndTimeWhereTheyAreAsked) {
+  const auto parts_of = [](const auto& ask) {
+    try {
+      ask();
+    } catch (const InputError& error) {
+      return error.parts();
+    }
+    ADD_FAILURE() << "no error";
+    return InputError::Parts();
+  };
+  const json sides = {{"rhs", {"1/(t-0.123)", 0}},
+                      {"dirichlet_boundary", {{{"id", 1}, {"value", {"0.1*sqrt((t-0.3)*(t-0.4)+0.002)", 0}}}}}};
+  const itr::Setup<2> setup = read2(square(
+      {{"boundary_conditions", sides},
+       {"geometry", {{{"mesh", "square.obj"}, {"volume_selection", 1}, {"surface_selection", {{"threshold", 1e-3}}}}}}}));
+  const auto side = parts_of([&] { setup.dirichlet[0].displacement({0, 0.5}, 0.35); });
+  EXPECT_EQ(side.place, "/boundary_conditions/dirichlet_boundary/0/value");
+  EXPECT_NE(side.found.find("0.5"), std::string::npos) << side.found;
+  EXPECT_NE(side.found.find("t = 0.35"), std::string::npos) << side.found;
+  EXPECT_EQ(parts_of([&] { setup.body_acceleration({0, 0}, 0.123); }).place, "/boundary_conditions/rhs");
+
+  json soft = square();
+  soft["materials"][0]["E"] = "1e6*(x-0.2)";
+  const itr::Setup<2> varying = read2(soft);
+  const auto modulus = parts_of([&] { varying.materials.at(1).youngs_modulus_at({0.1, 0.5, 0}); });
+  EXPECT_EQ(modulus.place, "/materials/0/E");
+  EXPECT_NE(modulus.found.find("-100000"), std::string::npos) << modulus.found;
 }
 
 TEST_F(SceneTest, TolerancesOfTwoVocabulariesAreRefused) {

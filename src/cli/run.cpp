@@ -346,7 +346,14 @@ class Run {
       before_ = simulation_.save();
       const StepResult result = [&] {
         const Unlocked while_stepping(at_output);
-        return simulation_.advance();
+        try {
+          return simulation_.advance();
+        } catch (const InputError& error) {  // a value of the scene that is none at this time or place
+          StepResult failed;
+          failed.ok = false;
+          failed.reason = error.what();
+          return failed;
+        }
       }();
       if (!result.ok && stop_now)
         return fmt::format("interrupted in step {}, which is dropped", simulation_.state().step + 1);

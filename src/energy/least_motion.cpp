@@ -12,8 +12,8 @@ namespace itr {
 
 namespace {
 
-constexpr double kShare = 0.1;         ///< of the forces by the size: a step moves a body by ten of its sizes at most
-constexpr double kLeastLeft = 1e-3;    ///< of the forces that act, below which sigma fades no more
+constexpr double kShare = 10;          ///< of the forces by the size: a step moves a body by a tenth of its size at most
+constexpr double kLeastLeft = 1e-5;    ///< of the forces that act, below which sigma fades no more
 constexpr double kLeastShare = 1e-12;  ///< of the elastic stiffness: what a factorisation resolves
 constexpr double kHeld = 1e-8;         ///< of the best held rigid motion: what is held less is free
 
@@ -127,6 +127,44 @@ void LeastMotion<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& 
       const Mat<Dim> block = part.stiffness * part.weights[k] * Mat<Dim>::Identity();
       sink.add<Dim>(std::array{part.nodes[k]}, block.data());
     }
+}
+
+template <int Dim>
+bool LeastMotion<Dim>::get_single_ways(ConstVectorView, ConstVectorView dx, VectorView ways, Workspace&) const {
+  ways = dx;
+  return true;
+}
+
+template <int Dim>
+MatrixX LeastMotion<Dim>::rigid_motions(ConstVectorView x, const DofMap& dofs) const {
+  constexpr double kLeast = 1e-12;  ///< of the largest: a motion of which held dofs leave less is none
+  using Motions = Eigen::Matrix<double, Dim, kRigidModes<Dim>>;
+  MatrixX motions = MatrixX::Zero(x.size(), kRigidModes<Dim> * static_cast<Eigen::Index>(parts_.size()));
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const Part& part = parts_[p];
+    Vec<Dim> centre = Vec<Dim>::Zero();
+    for (std::size_t k = 0; k < part.nodes.size(); ++k) centre += part.weights[k] * x.segment<Dim>(Dim * part.nodes[k]);
+    const auto at = [&](int node) {
+      Motions rows = rigid_modes(Vec<Dim>(x.segment<Dim>(Dim * node) - centre), part.size / 2);
+      for (int c = 0; c < Dim; ++c)
+        if (dofs.unknown[Dim * node + c] == kNone) rows.row(c).setZero();
+      return rows;
+    };
+    Mat<kRigidModes<Dim>> gram = Mat<kRigidModes<Dim>>::Zero();
+    for (std::size_t k = 0; k < part.nodes.size(); ++k) {
+      const Motions rows = at(part.nodes[k]);
+      gram += part.stiffness * part.weights[k] * rows.transpose() * rows;
+    }
+    const Eigen::SelfAdjointEigenSolver<Mat<kRigidModes<Dim>>> solver(gram);
+    Mat<kRigidModes<Dim>> normal = Mat<kRigidModes<Dim>>::Zero();
+    for (int k = 0; k < kRigidModes<Dim>; ++k)
+      if (const double value = solver.eigenvalues()[k]; value > kLeast * solver.eigenvalues()[kRigidModes<Dim> - 1])
+        normal.col(k) = solver.eigenvectors().col(k) / std::sqrt(value);
+    for (const int node : part.nodes)
+      motions.template block<Dim, kRigidModes<Dim>>(Dim * node, kRigidModes<Dim> * static_cast<Eigen::Index>(p)) =
+          at(node) * normal;
+  }
+  return motions;
 }
 
 #define ITR_INSTANTIATE(Dim)                                          \

@@ -29,11 +29,16 @@ class LeastMotion final : public Energy {
   /// Sets sigma from the gradient and the absolute forces at the iterate. It fades with the forces that are left.
   void follow(ConstVectorView gradient, ConstVectorView sizes, const DofMap& dofs);
   const std::vector<Part>& parts() const { return parts_; }
+  /// The rigid motions of the parts at positions x, without their held dofs, as columns over all dofs; orthonormal in this
+  /// term's Hessian.
+  MatrixX rigid_motions(ConstVectorView x, const DofMap& dofs) const;
 
   std::string_view name() const override { return "least motion"; }
   double value(ConstVectorView, Workspace&) const override { return 0; }
   void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
+  /// Asks for nothing: vertices that go alone would turn and shift the body.
+  bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
 
  private:
   std::vector<Part> parts_;

@@ -47,7 +47,8 @@ double Iterate::value_round_off() const {
 double Iterate::gradient_round_off() const {
   if (gradient_round_off_at_ != revision_) {
     const ScopedTimer timer(task_.summary.assembly_seconds);
-    VectorX round_off = VectorX::Zero(x_.size());
+    VectorView round_off = task_.workspace.get<Kept>().round_off.resize(x_.size());
+    round_off.setZero();
     task_.energy.add_gradient_round_off(x_, round_off, task_.workspace);
     gradient_round_off_ = task_.norms.of_gradient(round_off);
     gradient_round_off_at_ = revision_;

@@ -41,7 +41,7 @@ class Iterate {
 
  private:
   struct Kept {
-    KeptVector gradient, sizes;
+    KeptVector gradient, sizes, round_off;
   };
   const Task& task_;
   VectorView x_, gradient_;

@@ -22,11 +22,25 @@ Expression parse_expression(const Node& node) {
   }
 }
 
-/// Place and time in the units of a scene, which its expressions are of.
+/// Place and time in the units of a scene, which its expressions are of; and where in the scene a value stands, for errors
+/// long after it was read.
 struct SceneUnits {
   double length = 1, time = 1;  ///< in SI units
+  InputError::Parts value;      ///< file, pointer, the value's text, and what is expected
   explicit SceneUnits(const Node& node)
-      : length(node.document().units.factor("m")), time(node.document().units.factor("s")) {}
+      : length(node.document().units.factor("m")),
+        time(node.document().units.factor("s")),
+        value{node.document().file.string(), node.pointer(), abbreviate(node.json()), "a value there"} {}
+
+  /// Throws InputError: the value is not finite at X and t.
+  template <int Dim>
+  [[noreturn]] void fail(const Vec<Dim>& X, double t) const {
+    std::ostringstream found;
+    found << value.found << ", which has no finite value at X = (" << X.transpose() / length << "), t = " << t / time;
+    InputError::Parts parts = value;
+    parts.found = found.str();
+    throw InputError(parts);
+  }
   template <int Dim>
   Expression::Variables operator()(const Vec<Dim>& X, double t) const {
     return {X[0] / length, X[1] / length, Dim == 3 ? X[Dim - 1] / length : 0, t / time};
@@ -86,6 +100,7 @@ ValueFunction<Dim> combine(const std::array<Component, Dim>& components, const S
             const Expression::Variables variables = units.operator()<Dim>(X, t);
             Vec<Dim> result;
             for (int c = 0; c < Dim; ++c) result[c] = sign * components[c](variables);
+            if (!result.allFinite()) units.fail<Dim>(X, t);
             return result;
           },
           false};
@@ -131,23 +146,20 @@ ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpol
   if (!scales.empty()) component.scale = Interpolation(scales[0]);
   if (component.is_constant())
     return {[constant = component.constant](const Vec<Dim>&, double) { return constant; }, component.constant == 0};
-  return {
-      [component, units = SceneUnits(value)](const Vec<Dim>& X, double t) { return component(units.operator()<Dim>(X, t)); },
-      false};
+  return {[component, units = SceneUnits(value)](const Vec<Dim>& X, double t) {
+            const double result = component(units.operator()<Dim>(X, t));
+            if (!std::isfinite(result)) units.fail<Dim>(X, t);
+            return result;
+          },
+          false};
 }
 
 template <int Dim>
 void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points,
                    const std::vector<double>& times, const Node& value) {
   for (const double t : times)
-    for (const Vec<Dim>& X : points) {
-      if (function(X, t).allFinite()) continue;
-      const Units& units = value.document().units;
-      std::ostringstream place;
-      place << abbreviate(value.json()) << ", which has no finite value at X = (" << X.transpose() / units.factor("m")
-            << "), t = " << units.from_si(t, "s");
-      value.fail(place.str(), "a value there");
-    }
+    for (const Vec<Dim>& X : points)
+      if (!function(X, t).allFinite()) SceneUnits(value).fail<Dim>(X, t);
 }
 
 template ValueFunction<2> read_function(const Node&, double);

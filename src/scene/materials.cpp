@@ -29,22 +29,23 @@ const std::vector<LawName> kLaws = {
     {"MooneyRivlin3Param", MaterialLaw::mooney_rivlin, {"c1", "c2", "c3", "d1"}},
 };
 
-/// A scalar of a material and what it must be.
+/// A scalar of a material and what it must be. It outlives the scene that it was read from.
 struct Requirement {
-  Node node;
   ScalarValue value;
   bool (*is_met)(double);
-  const char* expected;
+  InputError::Parts parts;  ///< file, pointer, the value's text, and what is expected
+  double unit, length;      ///< of the value, of places, in SI units
 
   void check(const Vec<3>& X) const {
     const double here = value(X);
     if (std::isfinite(here) && is_met(here)) return;
-    if (!value.function) node.fail(expected);
-    std::ostringstream found;
-    const Units& units = node.document().units;
-    found << abbreviate(node.json()) << ", which is " << here / units.factor(node.unit()) << " at X = ("
-          << X.transpose() / units.factor("m") << ")";
-    node.fail(found.str(), expected);
+    InputError::Parts wrong = parts;
+    if (value.function) {
+      std::ostringstream found;
+      found << parts.found << ", which is " << here / unit << " at X = (" << X.transpose() / length << ")";
+      wrong.found = found.str();
+    }
+    throw InputError(wrong);
   }
 };
 
@@ -85,6 +86,18 @@ class MaterialReader {
       return most;
     };
     Material material = material_;
+    // Remeshing and quadrature ask at other points than these.
+    const auto guard = [&](SpaceFunction& f) {
+      if (!f) return;
+      f = [f, requirements = requirements_](const Vec<3>& X) {
+        for (const Requirement& requirement : requirements)
+          if (requirement.value.function) requirement.check(X);
+        return f(X);
+      };
+    };
+    guard(material.youngs_modulus_at);
+    guard(material.poisson_ratio_at);
+    guard(material.density_at);
     material.youngs_modulus = largest(material.youngs_modulus_at, material.youngs_modulus);
     material.poisson_ratio = largest(material.poisson_ratio_at, material.poisson_ratio);
     material.density = largest(material.density_at, material.density);
@@ -101,7 +114,13 @@ class MaterialReader {
 
   /// The value must meet `is_met`: at once if it is constant, else wherever it is used.
   void require(const char* key, ScalarValue value, bool (*is_met)(double), const char* expected) {
-    requirements_.push_back({node_[key], std::move(value), is_met, expected});
+    const Node node = node_[key];
+    const Units& units = node.document().units;
+    requirements_.push_back({std::move(value),
+                             is_met,
+                             {node.document().file.string(), node.pointer(), abbreviate(node.json()), expected},
+                             units.factor(node.unit()),
+                             units.factor("m")});
     if (!requirements_.back().value.function) requirements_.back().check(Vec<3>::Zero());
   }
 

@@ -66,7 +66,10 @@ struct MeshFigures {
       if (quality < worst_quality) worst_quality = quality, worst_cell = c;
     }
     size = (high - low).maxCoeff();
-    center = (low + high) / 2;
+    const Vec<Dim> middle = (low + high) / 2;  // may lie outside of the bodies, where loads need not be defined
+    center = mesh.rest(0);
+    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+      if (mesh.is_vertex_alive(v) && (mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
   }
 };
 

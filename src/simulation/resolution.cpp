@@ -32,13 +32,13 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   const auto raise = [](double& largest, double value) {
     if (std::isfinite(value)) largest = std::max(largest, value);
   };
-  const double dt = setup.time.dt;
+  const double before = std::max(setup.time.t0, t - setup.time.dt);
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
     if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.rest(v), t).norm());
   const auto add_held = [&](const Vec<Dim>& X, const DirichletCondition<Dim>& condition) {
     const Vec<Dim> there = condition.displacement(X, t);
     raise(actions.displacement, there.norm());
-    if (!setup.time.is_static) raise(actions.motion, (there - condition.displacement(X, t - dt)).norm());
+    if (!setup.time.is_static) raise(actions.motion, (there - condition.displacement(X, before)).norm());
   };
   for (const auto& condition : setup.dirichlet)
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
@@ -57,7 +57,7 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
     if (const int motion = setup.obstacles.motion[o]; motion != kNone) {
       const auto& moves = setup.obstacles.motions[motion];
       const Vec<Dim>& X = setup.obstacles.rest[o];
-      raise(actions.motion, (moves(X, t) - moves(X, t - dt)).norm());
+      raise(actions.motion, (moves(X, t) - moves(X, before)).norm());
     }
 }
 

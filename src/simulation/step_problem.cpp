@@ -14,7 +14,9 @@
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
+#include "itr/core/error.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
+#include "newton/corrected_system.hpp"
 #include "newton/curvature.hpp"
 
 namespace itr {
@@ -72,14 +74,39 @@ std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<Vector
 
 }  // namespace
 
+namespace {
+
+/// Throws InputError for a value of a program's function that is not finite; those of scenes name their keys themselves.
+template <int Dim, typename Value>
+Value finite(const Value& value, const char* what, const Vec<Dim>& X, double t) {
+  bool is_finite = false;
+  if constexpr (std::is_same_v<Value, double>)
+    is_finite = std::isfinite(value);
+  else
+    is_finite = value.allFinite();
+  if (is_finite) return value;
+  std::string place;
+  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:g}", c ? ", " : "", X[c]);
+  throw InputError({"", what, fmt::format("no finite value at X = ({}) m, t = {:g} s", place, t), "a value there"});
+}
+
+}  // namespace
+
 template <int Dim>
 Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
   Loads<Dim> loads;
-  if (setup.body_acceleration) loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) { return f(X, t); };
+  if (setup.body_acceleration)
+    loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) {
+      return finite<Dim, Vec<Dim>>(f(X, t), "body force", X, t);
+    };
   for (const auto& condition : setup.neumann)
-    loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const Vec<Dim>& X) { return f(X, t); });
+    loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const Vec<Dim>& X) {
+      return finite<Dim, Vec<Dim>>(f(X, t), "traction", X, t);
+    });
   for (const auto& condition : setup.pressure)
-    loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const Vec<Dim>& X) { return f(X, t); });
+    loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const Vec<Dim>& X) {
+      return finite<Dim, double>(f(X, t), "pressure", X, t);
+    });
   return loads;
 }
 
@@ -94,7 +121,8 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
   std::sort(by_tag.begin(), by_tag.end(), [](const auto* a, const auto* b) { return a->tag < b->tag; });
   const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
   const auto hold = [&](int v, const DirichletCondition<Dim>& condition) {
-    const Vec<Dim> target = rest[v] + condition.displacement(rest[v], t);
+    const Vec<Dim> target =
+        rest[v] + finite<Dim, Vec<Dim>>(condition.displacement(rest[v], t), "prescribed displacement", rest[v], t);
     for (int c = 0; c < Dim; ++c) {
       if (!condition.components[c]) continue;
       result.held[Dim * v + c] = 1;
@@ -116,7 +144,9 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
     const Vec<Dim>& X = setup.obstacles.rest[o];
     const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
     result.target.template segment<Dim>(Dim * (bodies + o)) =
-        motion == kNone ? X : Vec<Dim>(X + setup.obstacles.motions[motion](X, t));
+        motion == kNone
+            ? X
+            : Vec<Dim>(X + finite<Dim, Vec<Dim>>(setup.obstacles.motions[motion](X, t), "motion of an obstacle", X, t));
     for (int c = 0; c < Dim; ++c) result.held[Dim * (bodies + o) + c] = 1;
   }
   return result;
@@ -301,8 +331,14 @@ NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
       return !has_flown && (!before || before(progress));
     };
   }
+  constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
+  const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
+  CorrectedSystem corrected(system(), [&](ConstVectorView iterate, const DofMap& dofs) {
+    return least_motion_->rigid_motions(base_ + iterate, dofs);
+  });
+  NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : system();
   NewtonSummary summary =
-      minimize(EnergyOfIncrement(all, base_), d, dofs_, target, system(), setup_.newton, workspace_, extras);
+      minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, setup_.newton, workspace_, extras);
   x = base_ + d;
   for (Eigen::Index i = 0; i < x.size(); ++i)
     if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
