@@ -149,7 +149,7 @@ class ConditionReader {
         warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
         continue;
       }
-      check_defined<Dim>(value.function, vertices_of_body(body), {0}, node["value"]);
+      check_defined<Dim>(value.function, vertices_of_body(body), {setup_.time.t0}, node["value"]);
       if (!value.is_zero) conditions.push_back({body, value.function});
     }
     return conditions;

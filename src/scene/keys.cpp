@@ -168,7 +168,7 @@ constexpr Key kKeys[] = {
      "of Newmark: a step that would create more than this part of the energy is taken by implicit Euler"},
     {"/time/quasistatic", read, "boolean", "false", "", "no inertia: each step is an equilibrium", basic},
     {"/time/allow_jumps", read, "boolean", "false", "",
-     "without inertia: a body may move by more than the scene is wide in a step; else the run stops there"},
+     "without inertia: a body that nothing holds may go farther than ten times the scene's extent; else the run stops there"},
     {"/time/step_cuts", read, "natural", "0", "",
      "a step whose solve fails is cut in half, so many times over, at most 20; 0: the run stops"},
 

@@ -63,7 +63,7 @@ double available_energy(const Setup<Dim>& setup) {
     if (setup.body_acceleration) energy += mass * setup.body_acceleration(X, setup.time.t0).cwiseAbs().dot(high - low);
     for (const auto& condition : setup.initial_velocity)
       if (condition.body == mesh.body(c)) {
-        energy += mass / 2 * condition.value(X, 0).squaredNorm();
+        energy += mass / 2 * condition.value(X, setup.time.t0).squaredNorm();
         break;
       }
   }

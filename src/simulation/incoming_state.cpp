@@ -40,7 +40,7 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
 /// Value of the first condition that names the body of one of the vertex's cells; the last cell's body wins.
 template <int Dim>
 VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<Dim>& mesh, const Space& space,
-               int obstacle_vertices) {
+               int obstacle_vertices, double t0) {
   VectorX field = VectorX::Zero(Dim * (num_nodes(mesh, space) + obstacle_vertices));
   if (conditions.empty()) return field;
   const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
@@ -48,7 +48,7 @@ VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<
     for (const auto& condition : conditions) {
       if (condition.body != mesh.body(c)) continue;
       for_each_node(mesh.cell(c), space, mesh.vertex_slots(),
-                    [&](int node) { field.segment<Dim>(Dim * node) = condition.value(rest[node], 0); });
+                    [&](int node) { field.segment<Dim>(Dim * node) = condition.value(rest[node], t0); });
       break;
     }
   return field;
@@ -126,7 +126,9 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   state.t = setup.time.t0;
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
   const std::vector<Vec<Dim>> rest = node_rest_positions(state.mesh, state.space);
-  const auto sampled = [&](const auto& conditions) { return sample(conditions, state.mesh, state.space, obstacles); };
+  const auto sampled = [&](const auto& conditions) {
+    return sample(conditions, state.mesh, state.space, obstacles, setup.time.t0);
+  };
   VectorX x = sampled(setup.initial_displacement);
   for (std::size_t v = 0; v < rest.size(); ++v) vertex_of<Dim>(x, static_cast<int>(v)) += rest[v];
   x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);

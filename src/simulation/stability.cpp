@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "energy/elastic/point.hpp"
@@ -16,6 +17,7 @@ namespace itr {
 namespace {
 
 constexpr double kSlender = 0.25;     ///< thickness by diagonal, below which bodies buckle at strains below some 0.2
+constexpr double kLayers = 4;         ///< of elements through the thickness, from which linear ones hardly keep up what buckles
 constexpr double kStart = 1e-3;       ///< of a way through a body, where it begins
 constexpr double kCompressed = 1e-9;  ///< stress by modulus
 constexpr double kNegligible = 0.02;  ///< of the largest part of the way that straight edges cannot follow
@@ -67,7 +69,15 @@ bool meets(const Mesh<3>& mesh, FacetId f, const Vec<3>& p, const Vec<3>& q) {
   return segment_intersects_triangle(p, q, mesh.rest(facet[0]), mesh.rest(facet[1]), mesh.rest(facet[2]));
 }
 
-/// Bodies with a part that is thin against the body, by straight ways from facets through the body.
+/// Mean length of a facet's edges at rest, as if it were regular [m].
+template <int Dim>
+double edge_length(const Mesh<Dim>& mesh, FacetId f) {
+  const double measure = facet_measure(mesh, f);
+  return Dim == 2 ? measure : std::sqrt(measure * 4 / std::sqrt(3.0));
+}
+
+/// Bodies with a part that is thin against the body and has few elements through its thickness, by straight ways from facets
+/// through the body.
 template <int Dim>
 std::set<int> slender_bodies(const Mesh<Dim>& mesh) {
   const std::map<int, BodySize> sizes = body_sizes(mesh);
@@ -80,7 +90,7 @@ std::set<int> slender_bodies(const Mesh<Dim>& mesh) {
   for (FacetId f = 0; f < mesh.facet_slots() && slender.size() < sizes.size(); ++f) {
     const Inside<Dim> inside = inside_of(mesh, f);
     if (slender.contains(inside.body)) continue;
-    const double length = kSlender * sizes.at(inside.body).diagonal;
+    const double length = std::min(kSlender * sizes.at(inside.body).diagonal, kLayers * edge_length(mesh, f));
     const Vec<Dim> p = inside.center + kStart * length * inside.inward, q = inside.center + length * inside.inward;
     Box<Dim> way;
     way.include(p);

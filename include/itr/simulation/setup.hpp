@@ -75,7 +75,7 @@ struct PressureCondition {
 template <int Dim>
 struct InitialCondition {
   int body = 0;
-  SpaceTimeFunction<Dim> value;  ///< evaluated at t = 0
+  SpaceTimeFunction<Dim> value;  ///< evaluated at t0
 };
 
 /// Vertices whose forces are summed: on surfaces, of bodies, or of obstacles. Each counts once.
