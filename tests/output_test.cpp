@@ -559,7 +559,7 @@ TEST_F(OutputTest, FindsCurvesInObstaclesThatTheirChordsDoNotReach) {
     writer.finish("finished");
     return certify(folder).violations.size();
   };
-  // The parabola's height at 1/4 is -0.3, its chord's -0.2.
+  // At x = 1/4 the parabola is at -0.3, its chord at -0.2.
   EXPECT_EQ(violations(-1, 0.25, -0.300001), 0u);
   EXPECT_EQ(violations(-1, 0.25, -0.299), 1u + 1u) << "the edge crosses, and its end is beyond";
   EXPECT_EQ(violations(0.25, 0.26, -0.25), 2u) << "wholly between curve and chord";

@@ -72,7 +72,7 @@ void expect_proofs_to_agree_with_samples(int n) {
     if (is_proven) EXPECT_GT(distance, 0) << trial;
     if (distance > 8.0 / n) EXPECT_TRUE(is_proven) << trial << ", " << distance;
     ++(is_proven ? apart : touching);
-    // Moved onto each other in one point, which the two share.
+    // Let the two share one point.
     Vec<Dim> where = Vec<Dim>::Constant(0.6 / (Dim - 1));
     where[0] = 0.4;
     EXPECT_FALSE(are_apart<Dim>(a, moved<Dim>(b, value<Dim>(a, where) - value<Dim>(b, where)))) << trial;

@@ -391,7 +391,7 @@ Patches<Dim> true_surface(const StoredFrame& frame, const Surface<Dim>& surface,
   return result;
 }
 
-/// What lies wholly between a curve and its chords, where neither is crossed.
+/// Finds vertices between a curve and its chords, where neither is crossed.
 void check_beyond_chords(const Surface<2>& surface, const Patches<2>& all, const std::string& name,
                          std::vector<std::string>& violations) {
   for (std::size_t i = 0; i < all.patches.size(); ++i) {
@@ -402,7 +402,7 @@ void check_beyond_chords(const Surface<2>& surface, const Patches<2>& all, const
     const auto halves = parts_of(all.patches[i]);
     for (std::size_t j = 0; j < all.facets.size(); ++j) {
       const auto& other = all.facets[j];
-      const bool has_points = surface.is_obstacle(other) && other[0] != other[1];  // its ends are there as points
+      const bool has_points = surface.is_obstacle(other) && other[0] != other[1];  // ends are tested as points
       if (has_points || num_shared(all.facets[i], other) > 0) continue;
       const Vec<2>& p = surface.x[other[0]];
       if ((p.array() < box.min.array()).any() || (p.array() > box.max.array()).any()) continue;
