@@ -541,6 +541,30 @@ TEST_F(OutputTest, FindsCellsOfNoVolumeAtRest) {
   EXPECT_EQ(certify(folder).violations, std::vector<std::string>{"frames/000000.h5: at rest cell 1 is inverted"});
 }
 
+TEST_F(OutputTest, FindsCurvesInObstaclesThatTheirChordsDoNotReach) {
+  const Space space({{0, 1}});
+  Plane plane;
+  VectorX x(18);  // and the node of the lowest edge
+  x << plane.x, 0.5, -0.4;
+  plane.x = x;
+  plane.v = VectorX::Zero(18);
+  plane.density.assign(4, 0);
+  const auto violations = [&](double a, double b, double height) {
+    plane.obstacle_x = {{a, height}, {b, height}};
+    fs::remove_all(folder);
+    Writer writer = make_writer();
+    FrameView<2> view = plane.view();
+    view.space = &space;
+    writer.write(view, report_of(0));
+    writer.finish("finished");
+    return certify(folder).violations.size();
+  };
+  // At x = 1/4 the parabola is at -0.3, its chord at -0.2.
+  EXPECT_EQ(violations(-1, 0.25, -0.300001), 0u);
+  EXPECT_EQ(violations(-1, 0.25, -0.299), 1u + 1u) << "the edge crosses, and its end is beyond";
+  EXPECT_EQ(violations(0.25, 0.26, -0.25), 2u) << "wholly between curve and chord";
+}
+
 TEST_F(OutputTest, FindsPositionsThatAreNotNumbers) {
   Plane plane;
   plane.x[5] = std::nan("");

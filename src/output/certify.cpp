@@ -17,6 +17,7 @@
 #include "geometry/bvh.hpp"
 #include "geometry/closed_surface.hpp"
 #include "geometry/predicates.hpp"
+#include "geometry/quadratic_patch.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
 #include "itr/fem/space.hpp"
@@ -352,6 +353,93 @@ void measure_overhangs(const StoredFrame& frame, const Surface<Dim>& surface, Ce
     }
 }
 
+/// The true boundary of the bodies, then the obstacles, whose edges and vertices are triangles without an area in 3D.
+template <int Dim>
+struct Patches {
+  std::vector<std::array<int, Dim>> facets;
+  std::vector<QuadraticPatch<Dim>> patches;
+  std::vector<char> is_curved;
+};
+
+template <int Dim>
+Patches<Dim> true_surface(const StoredFrame& frame, const Surface<Dim>& surface, const Space& space) {
+  Patches<Dim> result;
+  const auto& x = surface.x;
+  const auto add = [&](const std::array<int, Dim>& facet) {
+    bool is_curved = false;
+    std::array<Vec<Dim>, Dim> corners;
+    for (int k = 0; k < Dim; ++k) corners[k] = x[facet[k]];
+    result.patches.push_back(quadratic_patch<Dim>(corners, [&](int i, int j) -> Vec<Dim> {
+      const int at = surface.is_obstacle(facet) ? kNone : space.find(facet[i], facet[j]);
+      is_curved = is_curved || at != kNone;
+      return at != kNone ? x[num_vertices(frame) + at] : Vec<Dim>((corners[i] + corners[j]) / 2);
+    }));
+    result.facets.push_back(facet);
+    result.is_curved.push_back(is_curved);
+  };
+  for (const auto& facet : boundary_facets<Dim>(frame.simplices)) add(facet);
+  for (const auto& facet : facets_of(surface))
+    if (surface.is_obstacle(facet)) add(facet);
+  if constexpr (Dim == 3)
+    for (const auto& [a, b] : surface.edges)
+      if (surface.is_obstacle(std::array{a, b})) add({a, b, b});
+  for (int v = surface.num_body_vertices; v < static_cast<int>(x.size()); ++v) {
+    std::array<int, Dim> point;
+    point.fill(v);
+    add(point);
+  }
+  return result;
+}
+
+/// Finds vertices between a curve and its chords, where neither is crossed.
+void check_beyond_chords(const Surface<2>& surface, const Patches<2>& all, const std::string& name,
+                         std::vector<std::string>& violations) {
+  for (std::size_t i = 0; i < all.patches.size(); ++i) {
+    if (!all.is_curved[i]) continue;
+    Box<2> box;
+    for (const auto& row : all.patches[i].at)
+      for (const Vec<2>& p : row) box.include(p);
+    const auto halves = parts_of(all.patches[i]);
+    for (std::size_t j = 0; j < all.facets.size(); ++j) {
+      const auto& other = all.facets[j];
+      const bool has_points = surface.is_obstacle(other) && other[0] != other[1];  // ends are tested as points
+      if (has_points || num_shared(all.facets[i], other) > 0) continue;
+      const Vec<2>& p = surface.x[other[0]];
+      if ((p.array() < box.min.array()).any() || (p.array() > box.max.array()).any()) continue;
+      if (is_beyond_chord(halves[0], p) || is_beyond_chord(halves[1], p))
+        violations.push_back(fmt::format("{}: vertex ({}) is between curve {} and its chords", name, surface.name(other[0]),
+                                         surface.name(all.facets[i])));
+    }
+  }
+}
+
+/// Proves by Bernstein bounds that true curves meet nothing. Neighbours in the surface are left to the cells.
+template <int Dim>
+void check_curves(const StoredFrame& frame, const Surface<Dim>& surface, const std::string& name,
+                  std::vector<std::string>& violations) {
+  const Space space = space_of(frame);
+  if (space.is_linear() || surface.has_proxy) return;
+  const Patches<Dim> all = true_surface(frame, surface, space);
+  std::vector<Box<Dim>> boxes(all.patches.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    for (const auto& row : all.patches[i].at)
+      for (const Vec<Dim>& p : row) boxes[i].include(p);
+  const Bvh<Dim> tree(boxes);
+  std::vector<int> hits;
+  for (int i = 0; i < static_cast<int>(boxes.size()); ++i) {
+    if (!all.is_curved[i]) continue;
+    hits.clear();
+    tree.query(boxes[i], hits);
+    for (const int j : hits) {
+      if ((all.is_curved[j] && j <= i) || num_shared(all.facets[i], all.facets[j]) > 0) continue;
+      if (!are_apart(all.patches[i], all.patches[j]))
+        violations.push_back(fmt::format("{}: curve {} is not proven to be apart from {}", name, surface.name(all.facets[i]),
+                                         surface.name(all.facets[j])));
+    }
+  }
+  if constexpr (Dim == 2) check_beyond_chords(surface, all, name, violations);
+}
+
 template <int Dim>
 void check_frame(const StoredFrame& frame, const std::string& name, Certificate& certificate) {
   std::vector<std::string>& violations = certificate.violations;
@@ -368,6 +456,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   const Surface<Dim> surface = make_surface<Dim>(frame);
   check_surface(surface, name, violations);
   if (violations.size() == before) check_insides(surface, name, violations);
+  check_curves(frame, surface, name, violations);
   measure_overhangs(frame, surface, certificate);
 }
 
