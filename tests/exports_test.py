@@ -70,7 +70,7 @@ def main():
     root, shared, static = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3]
     headers = public_headers(root / "include")
     words = set(re.findall(r"\w+", "\n".join(headers.values())))
-    entities = {entity(symbol) for symbol in symbols(static)} - {None}
+    entities = {entity(symbol) for symbol in symbols("--extern-only", static)} - {None}
     names = {name for name in entities if name_of(name) in words}
     if "--write" in sys.argv:
         write_map(root / "src/itr.map", names)

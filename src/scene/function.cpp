@@ -30,7 +30,8 @@ struct SceneUnits {
   explicit SceneUnits(const Node& node)
       : length(node.document().units.factor("m")),
         time(node.document().units.factor("s")),
-        value{node.document().file.string(), node.pointer(), abbreviate(node.json()), "a value there"} {}
+        value{node.document().file.string(), node.pointer(), node.exists() ? abbreviate(node.json()) : "nothing",
+              "a value there"} {}
 
   /// Throws InputError: the value is not finite at X and t.
   template <int Dim>

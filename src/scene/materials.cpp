@@ -116,11 +116,12 @@ class MaterialReader {
   void require(const char* key, ScalarValue value, bool (*is_met)(double), const char* expected) {
     const Node node = node_[key];
     const Units& units = node.document().units;
-    requirements_.push_back({std::move(value),
-                             is_met,
-                             {node.document().file.string(), node.pointer(), abbreviate(node.json()), expected},
-                             units.factor(node.unit()),
-                             units.factor("m")});
+    requirements_.push_back(
+        {std::move(value),
+         is_met,
+         {node.document().file.string(), node.pointer(), node.exists() ? abbreviate(node.json()) : "nothing", expected},
+         units.factor(node.unit()),
+         units.factor("m")});
     if (!requirements_.back().value.function) requirements_.back().check(Vec<3>::Zero());
   }
 
