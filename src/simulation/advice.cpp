@@ -329,7 +329,8 @@ template <int Dim>
 double driven_speed(const Setup<Dim>& setup, const MeshFigures<Dim>& figures) {
   const TimeOptions& time = setup.time;
   double speed = 0;
-  for (const auto& condition : setup.initial_velocity) speed = std::max(speed, condition.value(figures.center, setup.time.t0).norm());
+  for (const auto& condition : setup.initial_velocity)
+    speed = std::max(speed, condition.value(figures.center, setup.time.t0).norm());
   if (setup.body_acceleration) {
     const double a = setup.body_acceleration(figures.center, time.t0).norm(), duration = time.dt * time.steps;
     speed = std::max(speed, std::min(a * duration, std::sqrt(2 * a * figures.size)));

@@ -16,9 +16,9 @@ namespace itr {
 
 namespace {
 
-constexpr double kSlender = 0.25;     ///< thickness by diagonal, below which bodies buckle at strains below some 0.2
-constexpr double kLayers = 4;         ///< of elements through the thickness, from which linear ones hardly keep up what buckles
-constexpr double kStart = 1e-3;       ///< of a way through a body, where it begins
+constexpr double kSlender = 0.25;  ///< thickness by diagonal, below which bodies buckle at strains below some 0.2
+constexpr double kLayers = 4;      ///< of elements through the thickness, from which linear ones hardly keep up what buckles
+constexpr double kStart = 1e-3;    ///< of a way through a body, where it begins
 constexpr double kCompressed = 1e-9;  ///< stress by modulus
 constexpr double kNegligible = 0.02;  ///< of the largest part of the way that straight edges cannot follow
 

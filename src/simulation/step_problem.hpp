@@ -113,7 +113,7 @@ class StepProblem {
   struct Solution {
     VectorX x, increment;
   };
-  std::shared_ptr<LeastMotion<Dim>> least_motion_;  ///< null: inertia or conditions hold all bodies
+  std::shared_ptr<LeastMotion<Dim>> least_motion_;    ///< null: inertia or conditions hold all bodies
   VectorX base_;                                      ///< positions at the start of the step
   Solution solution_;                                 ///< of the last solve
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number

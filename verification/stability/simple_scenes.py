@@ -635,10 +635,14 @@ DECK = ("ring", "load", "rest", "flight", "rollers", "load", "turned", "settle",
         "crack_faces")
 
 
+def kind_of(index):
+    return DECK[index % len(DECK)]
+
+
 def draw_scene(seed, index, kind=None):
     """The scene of this number; each draws from its own random numbers, so that any can be made alone."""
     rng = np.random.default_rng([seed, index])
-    kind = kind or DECK[index % len(DECK)]
+    kind = kind or kind_of(index)
     for _ in range(200):
         try:
             return KINDS[kind](rng)

@@ -18,7 +18,7 @@ constexpr double kSurelyTooLittle = 0.9;                          ///< share of 
 constexpr int kBoundIterations = 1, kBoundContactIterations = 2;  ///< of Newton, for a vertex alone
 
 /// Of the barrier's energy around an edit: what its weights, which depend on the mesh, can feign as a gain.
-constexpr double kBarrierNoise = 2;
+constexpr double kBarrierNoise = 1;
 
 /// Both sides of a comparison on one support.
 template <int Dim>
