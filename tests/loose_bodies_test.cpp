@@ -136,6 +136,20 @@ TEST(LooseBodies, AreConnectedPartsIn3D) {
   EXPECT_NEAR(weights, 1, 1e-14);
 }
 
+TEST(HeldBodies, ThatLoadsCarryAwayStopTheRunSoon) {
+  auto setup = square_above_a_table(1e6);
+  setup.contact.enabled = false;
+  setup.obstacles = {};
+  setup.dirichlet.push_back({1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }});
+  setup.neumann.push_back({3, [](const Vec<2>&, double) { return Vec<2>(1e10, 0); }});
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const auto result = simulation.advance();
+  EXPECT_FALSE(result.ok);
+  EXPECT_LE(result.report.newton_iterations, 100);
+  EXPECT_NE(result.reason.find("no equilibrium"), std::string::npos) << result.reason;
+}
+
 TEST(HeldBodies, TurnByNinetyDegreesInAStep) {
   itr::Setup<2> setup;
   setup.mesh = make_square(2, 0.2);

@@ -326,11 +326,12 @@ NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
       follow_least_motion(sum, iterate);
       return changed;
     };
+  }
+  if (!terms_.has_inertia && !setup_.time.allow_jumps)
     extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
       has_flown = has_flown_away(d);
       return !has_flown && (!before || before(progress));
     };
-  }
   constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
   const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
   CorrectedSystem corrected(system(), [&](ConstVectorView iterate, const DofMap& dofs) {
@@ -359,23 +360,31 @@ void StepProblem<Dim>::follow_least_motion(const EnergySum& sum, const VectorX& 
   least_motion_->follow(gradient, sizes, dofs_);
 }
 
-/// Whether a body that nothing holds has gone farther than anything of the scene could meet it.
+/// Whether a body that nothing holds, or any vertex, has gone farther than anything of the scene could meet it.
 template <int Dim>
 bool StepProblem<Dim>::has_flown_away(const VectorX& d) const {
-  constexpr double kFar = 10;  ///< times the extent of bodies, obstacles and targets
-  if (setup_.time.allow_jumps) return false;
+  constexpr double kFar = 10, kFarthest = 100;  ///< times the extent of bodies, obstacles and targets
   Eigen::AlignedBox<double, Dim> box;
   for (Eigen::Index i = 0; i < base_.size(); i += Dim) box.extend(Vec<Dim>(base_.template segment<Dim>(i)));
-  for (Eigen::Index i = 0; i < base_.size(); i += Dim)
-    if (dofs_.unknown[i] == kNone) box.extend(Vec<Dim>(held_.target.template segment<Dim>(i)));
-  const double limit = kFar * box.diagonal().norm();
-  for (const auto& part : least_motion_->parts())
-    if (d.template segment<Dim>(Dim * part.nodes.front()).norm() > limit) return true;
-  return false;
+  for (Eigen::Index i = 0; i < base_.size(); ++i)
+    if (dofs_.unknown[i] == kNone && held_.held[i]) {
+      Vec<Dim> place = base_.template segment<Dim>(i - i % Dim);
+      place[i % Dim] = held_.target[i];
+      box.extend(place);
+    }
+  const double extent = box.diagonal().norm();
+  if (d.template lpNorm<Eigen::Infinity>() > kFarthest * extent) return true;
+  return least_motion_ && std::any_of(least_motion_->parts().begin(), least_motion_->parts().end(), [&](const auto& part) {
+           return d.template segment<Dim>(Dim * part.nodes.front()).norm() > kFar * extent;
+         });
 }
 
 template <int Dim>
 std::string StepProblem<Dim>::describe_flight() const {
+  if (!least_motion_)
+    return "loads move bodies that their conditions hold by a hundred times the extent of the scene: they exceed what the "
+           "bodies "
+           "can carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)";
   std::string place;
   const Eigen::Index first = Dim * least_motion_->parts().front().nodes.front();
   for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.3g}", c ? ", " : "", setup_.units.from_si(base_[first + c], "m"));
