@@ -42,6 +42,17 @@ inline int count_lines(const fs::path& path) {
   return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
 }
 
+/// Waits for a condition, on a loaded machine too; false if it does not come true within minutes.
+template <class Condition>
+bool wait_until(const Condition& condition) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(5);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+  return true;
+}
+
 /// `itr run`, or another command, its output in a file.
 class Command {
  public:
@@ -112,9 +123,7 @@ class InterruptTest : public ::testing::Test {
 
   /// Lets it run until steps.jsonl has that many lines, then sends the signal.
   static int stop_at(const Command& command, const fs::path& directory, int lines, int signal) {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (count_lines(directory / "steps.jsonl") < lines && std::chrono::steady_clock::now() < deadline)
-      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    EXPECT_TRUE(wait_until([&] { return count_lines(directory / "steps.jsonl") >= lines; })) << command.said();
     command.send(signal);
     return command.wait();
   }

@@ -146,14 +146,12 @@ TEST_F(InterruptTest, TheSecondSignalIsHeardWithinRemeshing) {
   const Case slow = slow_remeshing();
   const fs::path run = folder / "run";
   const Command command = start(arguments(slow, run, 0));
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (count_lines(run / "steps.jsonl") < 1 && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ASSERT_TRUE(wait_until([&] { return count_lines(run / "steps.jsonl") >= 1; })) << command.said();
   const int steps = count_lines(run / "steps.jsonl");
   std::this_thread::sleep_for(std::chrono::seconds(2));
   command.send(SIGINT);
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  EXPECT_NE(command.said().find("finishing the step; again to stop now"), std::string::npos) << command.said();
+  const auto heard = [&] { return command.said().find("finishing the step; again to stop now") != std::string::npos; };
+  EXPECT_TRUE(wait_until(heard)) << command.said();
   const auto second = std::chrono::steady_clock::now();
   command.send(SIGINT);
   EXPECT_EQ(command.wait(), 3) << command.said();
@@ -169,9 +167,7 @@ TEST_F(InterruptTest, ATerminatedRunSavesTheLastWholeStep) {
   const Case slow = slow_remeshing();
   const fs::path run = folder / "run";
   const Command command = start(arguments(slow, run, 30));
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (count_lines(run / "steps.jsonl") < 1 && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ASSERT_TRUE(wait_until([&] { return count_lines(run / "steps.jsonl") >= 1; })) << command.said();
   std::this_thread::sleep_for(std::chrono::seconds(2));
   const int steps = count_lines(run / "steps.jsonl");
   const auto signal = std::chrono::steady_clock::now();
@@ -196,9 +192,7 @@ TEST_F(InterruptTest, ATerminatedRunDoesNotWaitForAFactorisation) {
                    "/solver/linear/solver=\"eigen:ldlt\""}};
   const fs::path run = folder / "run";
   const Command command = start(arguments(slow, run, 30));
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(120);
-  while (count_lines(run / "steps.jsonl") < 1 && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ASSERT_TRUE(wait_until([&] { return count_lines(run / "steps.jsonl") >= 1; })) << command.said();
   std::this_thread::sleep_for(std::chrono::seconds(2));
   const int steps = count_lines(run / "steps.jsonl");
   const auto signal = std::chrono::steady_clock::now();

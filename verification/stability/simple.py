@@ -34,7 +34,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 import simple_scenes  # noqa: E402
 from harness import stored  # noqa: E402
 
-TIME_LIMIT = 30  # seconds of a run, after which it counts as stopped
+TIME_LIMIT = 120  # seconds of a run, after which it counts as stopped
 VERDICTS = ("right", "said", "wrong without a word", "stopped")
 # Advice before the first step speaks of scenes, not of a result that is off.
 ADVICE = ("bodies span", "is unusual", "thin, with about", "nu = ", "bodies fall along", "at the start is below", "d-hat = ",
