@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <string>
 
 #include "curved_run.hpp"
 #include "random_tets.hpp"
@@ -84,6 +86,38 @@ TEST(Stability, APulledStripStaysLinear) {
   setup.remesh.enabled = true;
   setup.dirichlet[1].displacement = [](const Vec<2>&, double t) { return Vec<2>(0.2 * t, 0); };
   EXPECT_TRUE(run(setup).state.space.is_linear());
+}
+
+/// A clamped column of square section, pushed beyond its buckling load in one static solve: two ways to bend whose
+/// eigenvalues nearly agree.
+TEST(Stability, NoSolverLeavesASquareColumnStraight) {
+  constexpr int kAlong = 20;
+  constexpr double kSide = 0.08;
+  itr::Setup<3> setup;
+  const auto at = [](int i, int j, int k) { return Vec<3>(static_cast<double>(i) / kAlong, kSide * j / 2, kSide * k / 2); };
+  setup.mesh = make_cubes(kAlong, at, [](int, int j, int k) { return j < 2 && k < 2 ? 1 : kNone; });
+  setup.materials[1] = {.youngs_modulus = 1e6, .poisson_ratio = 0.3, .density = 1000};
+  setup.dirichlet = {{0, {true, true, true}, [](const Vec<3>&, double) { return Vec<3>(0, 0, 0); }},
+                     {1, {true, true, true}, [](const Vec<3>&, double) { return Vec<3>(-0.06, 0, 0); }}};
+  setup.time = {.dt = 1, .steps = 1};
+  setup.time.quasistatic = true;
+  setup.choose_defaults();
+  linear::Registry registry;
+  registry.allow_mpi_start();
+  for (const double push : {0.045, 0.055, 0.1}) {
+    setup.dirichlet[1].displacement = [push](const Vec<3>&, double) { return Vec<3>(-push, 0, 0); };
+    std::map<std::string, double> energy;
+    for (const char* solver : {"eigen:ldlt", "eigen:cg", "belos:muelu"}) {
+      if (!registry.find(solver).available) continue;
+      setup.linear.solvers = {solver};
+      Simulation<3> simulation(setup, registry);
+      const StepResult step = simulation.advance();
+      EXPECT_TRUE(step.ok) << solver << ": " << step.reason;
+      energy[solver] = step.report.energy.elastic;
+    }
+    for (const auto& [solver, joules] : energy)
+      EXPECT_NEAR(joules, energy["eigen:ldlt"], 1e-6 * joules) << solver << ", pushed by " << push;
+  }
 }
 
 /// All sides of a regular mesh's squares are its shortest edges: whether one is longer is round-off.

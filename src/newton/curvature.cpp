@@ -4,16 +4,24 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+
+#include "core/noise.hpp"
 
 namespace itr {
 
 namespace {
 
-/// A vector that is orthogonal to no eigenvector but by accident, whatever the symmetry of the scene.
+/// Orients eigenvectors: orthogonal to none of them but by accident, whatever the symmetry of the scene.
 VectorX vector_without_symmetry(int unknowns) {
   VectorX v(unknowns);
   for (int i = 0; i < unknowns; ++i) v[i] = 1 + 0.5 * std::sin(i + 1.0);
   return v.normalized();
+}
+
+/// Has about as much of each eigenvector, so that Lanczos' method finds all of them soon.
+VectorX vector_of_noise(int unknowns) {
+  return VectorX::NullaryExpr(unknowns, [](Eigen::Index i) { return noise(static_cast<std::uint64_t>(i)); }).normalized();
 }
 
 bool has_solved(const linear::SolveReport& report) {
@@ -117,6 +125,7 @@ std::optional<double> find_negative_curvature_by_products(NewtonSystem& system,
   constexpr double kNegative = -1e-7;  // theta: what solves resolve
   constexpr double kSame = 1e-14;      // relative difference of H and P that is round-off
   constexpr double kSettled = 0.2;     // uncertainty of a negative theta, relative
+  constexpr double kCertain = 1e-4;    // of a positive one: less certain, it hides another that the start has little of
   constexpr double kShift = 1e-10;     // of a projected Hessian that has no factor, by the largest entry
   assemble(PsdProjection::none);
   const NewtonSystem::Product H = system.product();
@@ -124,7 +133,7 @@ std::optional<double> find_negative_curvature_by_products(NewtonSystem& system,
   assemble(PsdProjection::clamp);
   const NewtonSystem::Product projected = system.product();
   if (!H || !projected) return std::nullopt;
-  const VectorX start = vector_without_symmetry(unknowns);
+  const VectorX start = vector_of_noise(unknowns);
   VectorX Hv(unknowns), Pv(unknowns);
   H(start, Hv);
   projected(start, Pv);
@@ -142,10 +151,11 @@ std::optional<double> find_negative_curvature_by_products(NewtonSystem& system,
   if (!lanczos.begin(start)) return std::nullopt;
   for (int k = 0; k < kMostVectors && lanczos.extend(); ++k) {
     const double least = lanczos.least(), off = lanczos.uncertainty();
-    if (least < kNegative ? off < -kSettled * least : off < kSettled * least) break;
+    if (least < kNegative ? off < -kSettled * least : off < kCertain * least) break;
   }
   if (!(lanczos.least() < kNegative)) return 0;
   v = lanczos.eigenvector();
+  if (v.dot(vector_without_symmetry(unknowns)) < 0) v = -v;
   H(v, Hv);
   return v.dot(Hv);
 }
