@@ -14,6 +14,7 @@
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
+#include "held_turn.hpp"
 #include "itr/core/error.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 #include "newton/corrected_system.hpp"
@@ -266,6 +267,7 @@ template <int Dim>
 NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
   if (summary.converged()) return summary;
   const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
+  if (const std::string turn = describe_turn(); !turn.empty()) summary.message = turn + "; " + summary.message;
   summary.message +=
       diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling}, summary, sum, x, workspace_);
   return summary;
@@ -347,7 +349,8 @@ NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
   solution_ = {x, std::move(d)};
   if (has_flown) {
     summary.termination = Termination::no_descent;
-    summary.message = describe_flight();
+    const std::string turn = describe_turn();
+    summary.message = turn.empty() ? describe_flight() : turn;
     return summary;
   }
   return explained(std::move(summary), sum, x);
@@ -393,6 +396,19 @@ std::string StepProblem<Dim>::describe_flight() const {
       "no "
       "equilibrium; hold it (a point, or rollers on a side), or take dynamics (/time/quasistatic = false)",
       place);
+}
+
+/// A turn of held vertices from which bodies find no way, or nothing.
+template <int Dim>
+std::string StepProblem<Dim>::describe_turn() const {
+  constexpr double kLarge = 120;  ///< [degrees]
+  const HeldTurn turn = find_largest_turn<Dim>(cells_, dofs_, base_, held_.target);
+  if (!(turn.degrees > kLarge)) return {};
+  return fmt::format(
+      "the step turns held vertices, such as {}, by {:.4g} degrees: straight ways to the other side of a turn press "
+      "bodies "
+      "flat, and the side of half a turn is not told; smaller steps (/time/dt, or /time/step_cuts) turn by less",
+      turn.vertex, turn.degrees);
 }
 
 /// x minus the positions at the start of the step; of the last solution without the round-off of x.

@@ -86,6 +86,7 @@ class StepProblem {
   void follow_least_motion(const EnergySum& sum, const VectorX& d);
   bool has_flown_away(const VectorX& d) const;
   std::string describe_flight() const;
+  std::string describe_turn() const;
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
   void reset_system();

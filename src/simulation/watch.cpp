@@ -3,11 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "geometry/rotation.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -27,16 +26,6 @@ double stiffness(const Setup<Dim>& setup) {
   for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
     if (setup.mesh.is_cell_alive(c)) sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
   return sum;
-}
-
-/// Of the rotation that is nearest to F [degrees].
-double rotation_angle(const Mat<2>& F) {
-  return std::abs(std::atan2(F(1, 0) - F(0, 1), F(0, 0) + F(1, 1))) * 180 / std::numbers::pi;
-}
-double rotation_angle(const Mat<3>& F) {
-  const Eigen::JacobiSVD<Mat<3>> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double cosine = ((svd.matrixU() * svd.matrixV().transpose()).trace() - 1) / 2;
-  return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
 }  // namespace

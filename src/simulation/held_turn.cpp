@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#include "held_turn.hpp"
+
+#include <Eigen/Geometry>
+#include <array>
+#include <map>
+#include <vector>
+
+#include "geometry/rotation.hpp"
+#include "mesh/connected_parts.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kRigid = 1e-3;  ///< of the set's size: what a rotation and a translation may miss
+
+template <int Dim>
+bool is_held(const DofMap& dofs, int node) {
+  for (int c = 0; c < Dim; ++c)
+    if (dofs.unknown[Dim * node + c] != kNone) return false;
+  return true;
+}
+
+/// Edges of cells whose both ends are held.
+template <int Dim>
+std::vector<std::array<int, 2>> held_edges(const CellSet<Dim>& cells, const DofMap& dofs) {
+  std::vector<std::array<int, 2>> edges;
+  const auto add = [&](const auto& corners) {
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = i + 1; j <= Dim; ++j)
+        if (is_held<Dim>(dofs, corners[i]) && is_held<Dim>(dofs, corners[j])) edges.push_back({corners[i], corners[j]});
+  };
+  for (const auto& element : cells.elements) add(element.vertices);
+  for (const auto& element : cells.curved_elements) add(element.nodes);
+  return edges;
+}
+
+/// Angle of the rigid motion of vertices [degrees], or 0 where they have none.
+template <int Dim>
+double angle_of(const std::vector<int>& vertices, ConstVectorView from, ConstVectorView to) {
+  using Points = Eigen::Matrix<double, Dim, Eigen::Dynamic>;
+  const auto n = static_cast<Eigen::Index>(vertices.size());
+  Points a(Dim, n), b(Dim, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    a.col(i) = from.segment<Dim>(Dim * vertices[i]);
+    b.col(i) = to.segment<Dim>(Dim * vertices[i]);
+  }
+  const Eigen::Matrix<double, Dim + 1, Dim + 1> motion = Eigen::umeyama(a, b, false);
+  const Mat<Dim> rotation = motion.template topLeftCorner<Dim, Dim>();
+  const Points missed = (rotation * a).colwise() + motion.template topRightCorner<Dim, 1>() - b;
+  const double size = (a.rowwise().maxCoeff() - a.rowwise().minCoeff()).norm();
+  return missed.colwise().norm().maxCoeff() < kRigid * size ? rotation_angle(rotation) : 0;
+}
+
+}  // namespace
+
+template <int Dim>
+HeldTurn find_largest_turn(const CellSet<Dim>& cells, const DofMap& dofs, ConstVectorView from, ConstVectorView to) {
+  const std::vector<std::array<int, 2>> edges = held_edges(cells, dofs);
+  const std::vector<int> part_of = connected_parts<2>(cells.rest.size(), std::span<const std::array<int, 2>>(edges));
+  std::map<int, std::vector<int>> parts;
+  for (int v = 0; v < static_cast<int>(cells.rest.size()); ++v)
+    if (is_held<Dim>(dofs, v)) parts[part_of[v]].push_back(v);
+  HeldTurn largest;
+  for (const auto& [part, vertices] : parts) {
+    if (vertices.size() < Dim) continue;
+    const double degrees = angle_of<Dim>(vertices, from, to);
+    if (degrees > largest.degrees) largest = {degrees, vertices.front()};
+  }
+  return largest;
+}
+
+template HeldTurn find_largest_turn<2>(const CellSet<2>&, const DofMap&, ConstVectorView, ConstVectorView);
+template HeldTurn find_largest_turn<3>(const CellSet<3>&, const DofMap&, ConstVectorView, ConstVectorView);
+
+}  // namespace itr
