@@ -186,10 +186,11 @@ Box<Dim> box_of(const Mesh<Dim>& mesh) {
   return box;
 }
 
-/// Reaches ten times as far as the bodies do, seen from above their middle.
+/// One edge or triangle that reaches a thousand times as far as the bodies do, seen from above their middle: an edge inside
+/// of the plane would add pairs to those of the faces beside it, whose barrier pushes sideways.
 template <int Dim>
 void read_flat(const Node& geometry, const Box<Dim>& bodies, ObstacleGeometry<Dim>& out) {
-  constexpr double kReach = 10;
+  constexpr double kReach = 1e3;
   Vec<Dim> point = Vec<Dim>::Zero(), normal = Vec<Dim>::Unit(1);
   const auto read_point = [](const Node& node, Vec<Dim>& result) {
     const std::vector<double> values = node.numbers();
@@ -217,9 +218,9 @@ void read_flat(const Node& geometry, const Box<Dim>& bodies, ObstacleGeometry<Di
     Eigen::Index least = 0;
     normal.cwiseAbs().minCoeff(&least);
     const Vec<3> a = reach * normal.cross(Vec<3>(Vec<3>::Unit(least))).normalized(), b = normal.cross(a);
-    points = {middle - a - b, middle + a - b, middle + a + b, middle - a + b};
-    surface.edges = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 2}};
-    surface.triangles = {{0, 1, 2}, {0, 2, 3}};
+    points = {middle - std::sqrt(3.0) * a - b, middle + std::sqrt(3.0) * a - b, middle + 2 * b};
+    surface.edges = {{0, 1}, {1, 2}, {2, 0}};
+    surface.triangles = {{0, 1, 2}};
   }
   surface.is_used.assign(points.size(), true);
   append<Dim>(surface, points, Vec<Dim>::Zero(), read_obstacle_id(geometry["surface_selection"]), out);

@@ -73,8 +73,8 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
   add_loads(setup, time.time_after(time.first_step + 1), actions);
   if (time.steps > 1) add_loads(setup, time.time_after(time.first_step + time.steps), actions);
   if (!actions.is_any()) return;
-  double farthest = history.x[0].template lpNorm<Eigen::Infinity>();
-  for (const Vec<Dim>& X : setup.obstacles.rest) farthest = std::max(farthest, X.template lpNorm<Eigen::Infinity>());
+  const Eigen::Index bodies = history.x[0].size() - Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
+  const double farthest = history.x[0].head(bodies).template lpNorm<Eigen::Infinity>();
   const double spacing = kSpacing * farthest;
   double motion = actions.motion, strain = 0;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
