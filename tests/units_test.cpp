@@ -287,7 +287,7 @@ template <int Dim>
 Json remeshed(const System& by, bool with_tolerance) {
   Json json = {{"space", {{"remesh", {{"enabled", true}}}}}};
   json["space"]["remesh"]["relative_tolerance"] = Dim == 2 ? 1e-3 : 1e-2;
-  if (with_tolerance) json["space"]["remesh"]["split"]["acceptance_tolerance"] = (Dim == 2 ? 1e-3 : 3e-3) / by.joule();
+  if (with_tolerance) json["space"]["remesh"]["split"]["acceptance_tolerance"] = 1e-3 / by.joule();
   return json;
 }
 

@@ -3,6 +3,7 @@
 
 #include "itr/core/parallel.hpp"
 #include "itr/energy/elastic/laws.hpp"
+#include "mass_block.hpp"
 
 namespace itr {
 
@@ -143,13 +144,7 @@ void InertiaEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 
 template <int Dim>
 void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
-  constexpr int kDofs = Dim * (Dim + 1);
-  const ElementMass<Dim> unit_mass(kind_, 1);
-  Mat<kDofs> unit = Mat<kDofs>::Zero();
-  for (int i = 0; i <= Dim; ++i)
-    for (int j = 0; j <= Dim; ++j)
-      for (int c = 0; c < Dim; ++c) unit(Dim * i + c, Dim * j + c) = unit_mass.off + (i == j ? unit_mass.extra : 0);
-  sink.add_multiples<Dim>(cells_, mass_, unit);
+  sink.add_multiples<Dim>(cells_, mass_, unit_mass_block<Dim>(kind_));
   if (curved_mass_.empty()) return;
   std::vector<double> factors;  // and what else the blocks follow from, beside their stencils
   for (const CurvedMass& curved : curved_mass_) factors.push_back(curved.mass);

@@ -4,8 +4,12 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
+#include <span>
 
+#include "mass_block.hpp"
 #include "mesh/connected_parts.hpp"
 
 namespace itr {
@@ -46,68 +50,104 @@ bool has_free_motion(const std::vector<int>& nodes, ConstVectorView x, const std
   return !(eigenvalues[0] > kHeld * eigenvalues[kRigidModes<Dim> - 1]);
 }
 
-}  // namespace
+/// f(part, nodes, scalar mass matrix) for each cell of a loose part.
+template <int Dim, typename F>
+void for_each_mass(const CellSet<Dim>& cells, const LooseParts<Dim>& loose, const F& f) {
+  const ElementMass<Dim> unit(MassKind::consistent, 1);
+  Mat<Dim + 1> linear = Mat<Dim + 1>::Constant(unit.off);
+  linear.diagonal().array() += unit.extra;
+  for (std::size_t e = 0; e < cells.elements.size(); ++e)
+    if (const int part = loose.of_element[e]; part != kNone)
+      f(part, cells.elements[e].vertices, (loose.mass[e] * linear).eval());
+  for (std::size_t e = 0; e < cells.curved_elements.size(); ++e)
+    if (const int part = loose.of_curved[e]; part != kNone) {
+      const auto& element = cells.curved_elements[e];
+      f(part, element.nodes,
+        (loose.curved_mass[e] * constant_quadratic_mass<Dim>(MassKind::consistent, element.curved)).eval());
+    }
+}
 
+/// The centre of mass of each part at positions x.
 template <int Dim>
-std::vector<typename LeastMotion<Dim>::Part> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x,
-                                                              const std::vector<char>& held,
-                                                              const std::map<int, Material>& materials) {
-  using Part = typename LeastMotion<Dim>::Part;
+std::vector<Vec<Dim>> centres_of_mass(const CellSet<Dim>& cells, const LooseParts<Dim>& loose, ConstVectorView x) {
+  std::vector<Vec<Dim>> centres(loose.parts.size(), Vec<Dim>(Vec<Dim>::Zero()));
+  for_each_mass<Dim>(cells, loose, [&](int part, const auto& nodes, const auto& mass) {
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      centres[part] += mass.row(static_cast<Eigen::Index>(k)).sum() * x.segment<Dim>(Dim * nodes[k]);
+  });
+  return centres;
+}
+
+/// Corners of all cells, elements first.
+template <int Dim>
+std::vector<std::array<int, Dim + 1>> corners_of(const CellSet<Dim>& cells) {
   std::vector<std::array<int, Dim + 1>> corners;
   for (const auto& element : cells.elements) corners.push_back(element.vertices);
   for (const auto& element : cells.curved_elements) {
     corners.emplace_back();
     std::copy_n(element.nodes.begin(), Dim + 1, corners.back().begin());
   }
-  const std::vector<int> part_of =
+  return corners;
+}
+
+/// All connected parts, loose or not.
+template <int Dim>
+LooseParts<Dim> find_parts(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
+  const std::vector<std::array<int, Dim + 1>> corners = corners_of(cells);
+  const std::vector<int> part_of_vertex =
       connected_parts<Dim + 1>(cells.rest.size(), std::span<const std::array<int, Dim + 1>>(corners));
-  std::vector<double> weight(cells.rest.size(), 0);
-  std::vector<int> part_of_node(cells.rest.size(), kNone);
-  std::vector<double> modulus;
-  const auto add = [&](const auto& nodes, int part, int body, double volume) {
-    if (static_cast<std::size_t>(part) >= modulus.size()) modulus.resize(part + 1, 0);
-    modulus[part] = std::max(modulus[part], materials.at(body).youngs_modulus);
-    for (const int node : nodes) {
-      weight[node] += volume / static_cast<double>(nodes.size());
-      part_of_node[node] = part;
-    }
+  LooseParts<Dim> all;
+  std::map<int, int> numbers;  // parts without cells, such as single vertices, have none
+  std::vector<double> total;
+  std::vector<std::set<int>> nodes;
+  const auto add = [&](const auto& of, int body, double volume, std::vector<int>& part_of, std::vector<double>& masses) {
+    const auto [entry, is_new] = numbers.try_emplace(part_of_vertex[of[0]], static_cast<int>(all.parts.size()));
+    if (is_new) all.parts.emplace_back(), total.push_back(0), nodes.emplace_back();
+    const int part = entry->second;
+    const Material& material = materials.at(body);
+    const double mass = volume * (material.density > 0 ? material.density : 1);
+    all.parts[part].modulus = std::max(all.parts[part].modulus, material.youngs_modulus);
+    total[part] += mass;
+    nodes[part].insert(of.begin(), of.end());
+    part_of.push_back(part);
+    masses.push_back(mass);
   };
-  for (const auto& element : cells.elements)
-    add(element.vertices, part_of[element.vertices[0]], element.body, element.volume);
-  for (const auto& element : cells.curved_elements)
-    add(element.nodes, part_of[element.nodes[0]], element.body, element.volume);
-  std::vector<Part> parts(modulus.size());
-  for (std::size_t node = 0; node < part_of_node.size(); ++node) {
-    if (part_of_node[node] == kNone) continue;
-    parts[part_of_node[node]].nodes.push_back(static_cast<int>(node));
-    parts[part_of_node[node]].weights.push_back(weight[node]);
-  }
-  std::vector<Part> loose;
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    Part& part = parts[p];
-    if (part.nodes.empty()) continue;
-    double volume = 0;
-    Vec<Dim> centre = Vec<Dim>::Zero();
+  for (const auto& e : cells.elements) add(e.vertices, e.body, e.volume, all.of_element, all.mass);
+  for (const auto& e : cells.curved_elements) add(e.nodes, e.body, e.volume, all.of_curved, all.curved_mass);
+  for (std::size_t e = 0; e < all.mass.size(); ++e) all.mass[e] /= total[all.of_element[e]];
+  for (std::size_t e = 0; e < all.curved_mass.size(); ++e) all.curved_mass[e] /= total[all.of_curved[e]];
+  for (std::size_t p = 0; p < nodes.size(); ++p) all.parts[p].nodes.assign(nodes[p].begin(), nodes[p].end());
+  return all;
+}
+
+}  // namespace
+
+template <int Dim>
+LooseParts<Dim> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x, const std::vector<char>& held,
+                                 const std::map<int, Material>& materials) {
+  LooseParts<Dim> all = find_parts(cells, materials);
+  const std::vector<Vec<Dim>> centres = centres_of_mass(cells, all, x);
+  std::vector<LoosePart<Dim>> loose;
+  std::vector<int> number(all.parts.size(), kNone);
+  for (std::size_t p = 0; p < all.parts.size(); ++p) {
+    LoosePart<Dim>& part = all.parts[p];
     Eigen::AlignedBox<double, Dim> box;
-    for (std::size_t k = 0; k < part.nodes.size(); ++k) {
-      const Vec<Dim> place = x.segment<Dim>(Dim * part.nodes[k]);
-      volume += part.weights[k];
-      centre += part.weights[k] * place;
-      box.extend(place);
-    }
-    centre /= volume;
+    for (const int node : part.nodes) box.extend(Vec<Dim>(x.segment<Dim>(Dim * node)));
     part.size = box.diagonal().norm();
-    if (!has_free_motion<Dim>(part.nodes, x, held, centre, part.size / 2)) continue;
-    for (double& w : part.weights) w /= volume;
-    part.modulus = modulus[p] * std::pow(part.size, Dim - 2);
+    if (!has_free_motion<Dim>(part.nodes, x, held, centres[p], part.size / 2)) continue;
+    part.modulus *= std::pow(part.size, Dim - 2);
+    number[p] = static_cast<int>(loose.size());
     loose.push_back(std::move(part));
   }
-  return loose;
+  all.parts = std::move(loose);
+  for (std::vector<int>* of : {&all.of_element, &all.of_curved})
+    for (int& part : *of) part = number[part];
+  return all;
 }
 
 template <int Dim>
 void LeastMotion<Dim>::follow(ConstVectorView gradient, ConstVectorView sizes, const DofMap& dofs) {
-  for (Part& part : parts_) {
+  for (LoosePart<Dim>& part : loose_.parts) {
     double acting = 0, left = 0;
     for (const int node : part.nodes)
       for (int c = 0; c < Dim; ++c) {
@@ -122,11 +162,18 @@ void LeastMotion<Dim>::follow(ConstVectorView gradient, ConstVectorView sizes, c
 
 template <int Dim>
 void LeastMotion<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
-  for (const Part& part : parts_)
-    for (std::size_t k = 0; k < part.nodes.size(); ++k) {
-      const Mat<Dim> block = part.stiffness * part.weights[k] * Mat<Dim>::Identity();
-      sink.add<Dim>(std::array{part.nodes[k]}, block.data());
-    }
+  const auto factors = [&](const std::vector<int>& part_of, const std::vector<double>& masses) {
+    std::vector<double> stiffness(masses.size(), 0);
+    for (std::size_t e = 0; e < masses.size(); ++e)
+      if (part_of[e] != kNone) stiffness[e] = loose_.parts[part_of[e]].stiffness * masses[e];
+    return stiffness;
+  };
+  sink.add_multiples<Dim>(cells_, factors(loose_.of_element, loose_.mass), unit_mass_block<Dim>(MassKind::consistent));
+  const std::vector<double> curved = factors(loose_.of_curved, loose_.curved_mass);
+  sink.add_curved_multiples<Dim>(
+      cells_, curved, {}, [&](std::size_t e) -> const auto& {
+        return constant_quadratic_mass<Dim>(MassKind::consistent, cells_.curved_elements[e].curved);
+      });
 }
 
 template <int Dim>
@@ -138,39 +185,41 @@ bool LeastMotion<Dim>::get_single_ways(ConstVectorView, ConstVectorView dx, Vect
 template <int Dim>
 MatrixX LeastMotion<Dim>::rigid_motions(ConstVectorView x, const DofMap& dofs) const {
   constexpr double kLeast = 1e-12;  ///< of the largest: a motion of which held dofs leave less is none
-  using Motions = Eigen::Matrix<double, Dim, kRigidModes<Dim>>;
-  MatrixX motions = MatrixX::Zero(x.size(), kRigidModes<Dim> * static_cast<Eigen::Index>(parts_.size()));
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    const Part& part = parts_[p];
-    Vec<Dim> centre = Vec<Dim>::Zero();
-    for (std::size_t k = 0; k < part.nodes.size(); ++k) centre += part.weights[k] * x.segment<Dim>(Dim * part.nodes[k]);
-    const auto at = [&](int node) {
-      Motions rows = rigid_modes(Vec<Dim>(x.segment<Dim>(Dim * node) - centre), part.size / 2);
-      for (int c = 0; c < Dim; ++c)
-        if (dofs.unknown[Dim * node + c] == kNone) rows.row(c).setZero();
-      return rows;
-    };
-    Mat<kRigidModes<Dim>> gram = Mat<kRigidModes<Dim>>::Zero();
-    for (std::size_t k = 0; k < part.nodes.size(); ++k) {
-      const Motions rows = at(part.nodes[k]);
-      gram += part.stiffness * part.weights[k] * rows.transpose() * rows;
+  constexpr int kModes = kRigidModes<Dim>;
+  using Motions = Eigen::Matrix<double, Dim, kModes>;
+  const std::vector<Vec<Dim>> centres = centres_of_mass(cells_, loose_, x);
+  const auto at = [&](int part, int node) {
+    Motions rows = rigid_modes(Vec<Dim>(x.segment<Dim>(Dim * node) - centres[part]), loose_.parts[part].size / 2);
+    for (int c = 0; c < Dim; ++c)
+      if (dofs.unknown[Dim * node + c] == kNone) rows.row(c).setZero();
+    return rows;
+  };
+  std::vector<Mat<kModes>> gram(loose_.parts.size(), Mat<kModes>(Mat<kModes>::Zero()));
+  for_each_mass<Dim>(cells_, loose_, [&](int part, const auto& nodes, const auto& mass) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      Motions product = Motions::Zero();
+      for (std::size_t j = 0; j < nodes.size(); ++j)
+        product += mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * at(part, nodes[j]);
+      gram[part] += loose_.parts[part].stiffness * at(part, nodes[i]).transpose() * product;
     }
-    const Eigen::SelfAdjointEigenSolver<Mat<kRigidModes<Dim>>> solver(gram);
-    Mat<kRigidModes<Dim>> normal = Mat<kRigidModes<Dim>>::Zero();
-    for (int k = 0; k < kRigidModes<Dim>; ++k)
-      if (const double value = solver.eigenvalues()[k]; value > kLeast * solver.eigenvalues()[kRigidModes<Dim> - 1])
+  });
+  MatrixX motions = MatrixX::Zero(x.size(), kModes * static_cast<Eigen::Index>(gram.size()));
+  for (int p = 0; p < static_cast<int>(gram.size()); ++p) {
+    const Eigen::SelfAdjointEigenSolver<Mat<kModes>> solver(gram[p]);
+    Mat<kModes> normal = Mat<kModes>::Zero();
+    for (int k = 0; k < kModes; ++k)
+      if (const double value = solver.eigenvalues()[k]; value > kLeast * solver.eigenvalues()[kModes - 1])
         normal.col(k) = solver.eigenvectors().col(k) / std::sqrt(value);
-    for (const int node : part.nodes)
-      motions.template block<Dim, kRigidModes<Dim>>(Dim * node, kRigidModes<Dim> * static_cast<Eigen::Index>(p)) =
-          at(node) * normal;
+    for (const int node : loose_.parts[p].nodes)
+      motions.template block<Dim, kModes>(Dim * node, kModes * p) = at(p, node) * normal;
   }
   return motions;
 }
 
-#define ITR_INSTANTIATE(Dim)                                          \
-  template class LeastMotion<Dim>;                                    \
-  template std::vector<LeastMotion<Dim>::Part> find_loose_parts<Dim>( \
-      const CellSet<Dim>&, ConstVectorView, const std::vector<char>&, const std::map<int, Material>&);
+#define ITR_INSTANTIATE(Dim)                                                                                     \
+  template class LeastMotion<Dim>;                                                                               \
+  template LooseParts<Dim> find_loose_parts<Dim>(const CellSet<Dim>&, ConstVectorView, const std::vector<char>&, \
+                                                 const std::map<int, Material>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

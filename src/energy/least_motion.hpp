@@ -10,25 +10,36 @@
 
 namespace itr {
 
+/// A connected part of bodies with a free rigid motion.
+template <int Dim>
+struct LoosePart {
+  std::vector<int> nodes;
+  double size = 0;       ///< diagonal of its box [m]
+  double modulus = 0;    ///< largest, times size^(Dim - 2) [N/m]
+  double stiffness = 0;  ///< sigma, times the scaling
+};
+
+/// The loose parts of a set of cells, and what each cell has of their mass.
+template <int Dim>
+struct LooseParts {
+  std::vector<LoosePart<Dim>> parts;
+  std::vector<int> of_element, of_curved;  ///< index of the part, or kNone
+  std::vector<double> mass, curved_mass;   ///< of the part's mass; their sum over a part is 1
+  bool empty() const { return parts.empty(); }
+};
+
 /// sigma / 2 |d - d_k|^2 in the mass norm about the iterate d_k itself, for bodies that conditions do not hold: no energy
 /// and no force, only stiffness. A Newton step is then the one of least motion among those that lower the energy alike,
 /// where the Hessian alone is singular.
 template <int Dim>
 class LeastMotion final : public Energy {
  public:
-  /// A connected part of bodies with a free rigid motion.
-  struct Part {
-    std::vector<int> nodes;
-    std::vector<double> weights;  ///< parts of the volume; their sum is 1
-    double size = 0;              ///< diagonal of its box [m]
-    double modulus = 0;           ///< largest, times size^(Dim - 2) [N/m]
-    double stiffness = 0;         ///< sigma, times the scaling
-  };
-
-  explicit LeastMotion(std::vector<Part> parts, double scaling) : parts_(std::move(parts)), scaling_(scaling) {}
+  /// `cells` must outlive this.
+  LeastMotion(const CellSet<Dim>& cells, LooseParts<Dim> loose, double scaling)
+      : cells_(cells), loose_(std::move(loose)), scaling_(scaling) {}
   /// Sets sigma from the gradient and the absolute forces at the iterate. It fades with the forces that are left.
   void follow(ConstVectorView gradient, ConstVectorView sizes, const DofMap& dofs);
-  const std::vector<Part>& parts() const { return parts_; }
+  const std::vector<LoosePart<Dim>>& parts() const { return loose_.parts; }
   /// The rigid motions of the parts at positions x, without their held dofs, as columns over all dofs; orthonormal in this
   /// term's Hessian.
   MatrixX rigid_motions(ConstVectorView x, const DofMap& dofs) const;
@@ -41,15 +52,15 @@ class LeastMotion final : public Energy {
   bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
 
  private:
-  std::vector<Part> parts_;
+  const CellSet<Dim>& cells_;
+  LooseParts<Dim> loose_;
   double scaling_;
 };
 
 /// The connected parts of which `held` dofs leave a rigid motion free, at positions x. A rank of conditions, not a count:
 /// rollers and single points hold what they hold.
 template <int Dim>
-std::vector<typename LeastMotion<Dim>::Part> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x,
-                                                              const std::vector<char>& held,
-                                                              const std::map<int, Material>& materials);
+LooseParts<Dim> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x, const std::vector<char>& held,
+                                 const std::map<int, Material>& materials);
 
 }  // namespace itr

@@ -212,7 +212,7 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
   potential_.elastic()->set_quadrature_levels(levels);
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
     if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials); !loose.empty())
-      least_motion_ = std::make_shared<LeastMotion<Dim>>(std::move(loose), terms_.scaling);
+      least_motion_ = std::make_shared<LeastMotion<Dim>>(cells_, std::move(loose), terms_.scaling);
   reset_system();
 }
 
@@ -313,6 +313,53 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
   return minimize_from(x, sum, extras);
 }
 
+/// Bodies that only contact and friction hold begin a step without the contact that will hold them, and slide off before
+/// the next round unless friction is lagged where contact forces are new.
+template <int Dim>
+bool StepProblem<Dim>::relags_on_the_way() const {
+  return least_motion_ && potential_.has_friction();
+}
+
+/// Minimises like minimize_lagged(), but lags friction anew as often as contact forces on a body double or halve on the way.
+template <int Dim>
+NewtonSummary StepProblem<Dim>::minimize_with_new_contact(VectorX& x, VectorX way_to_start) {
+  constexpr int kMostLags = 200;
+  constexpr double kChange = 2;
+  NewtonSummary all;
+  for (int k = 0; k <= kMostLags; ++k) {
+    const std::vector<double> before = contact_forces_on_loose_parts(x);
+    if (k < kMostLags)
+      is_lag_outdated_ = [this, before](const VectorX& iterate) {
+        const std::vector<double> now = contact_forces_on_loose_parts(iterate);
+        return !std::equal(now.begin(), now.end(), before.begin(),
+                           [](double a, double b) { return a <= kChange * b && b <= kChange * a; });
+      };
+    NewtonSummary summary = minimize_lagged(x, std::exchange(way_to_start, {}));
+    is_lag_outdated_ = nullptr;
+    summary.add_effort(all);
+    all = std::move(summary);
+    if (!std::exchange(was_lag_outdated_, false)) break;
+    lagged_.friction = potential_.lag_friction(x, workspace_);
+  }
+  return all;
+}
+
+/// Norms of the contact forces, scaled.
+template <int Dim>
+std::vector<double> StepProblem<Dim>::contact_forces_on_loose_parts(const VectorX& x) {
+  VectorX gradient = VectorX::Zero(x.size());
+  EnergySum sum;
+  potential_.add_to(sum, lagged_, [](const Traits& term) { return term.kind == TermKind::contact; });
+  sum.add_gradient(x, gradient, workspace_);
+  std::vector<double> forces;
+  for (const auto& part : least_motion_->parts()) {
+    double squared = 0;
+    for (const int node : part.nodes) squared += gradient.template segment<Dim>(Dim * node).squaredNorm();
+    forces.push_back(std::sqrt(squared));
+  }
+  return forces;
+}
+
 /// Minimises over the increment from the positions at the start of the step.
 template <int Dim>
 NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras) {
@@ -332,7 +379,8 @@ NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
   if (!terms_.has_inertia && !setup_.time.allow_jumps)
     extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
       has_flown = has_flown_away(d);
-      return !has_flown && (!before || before(progress));
+      was_lag_outdated_ = !has_flown && is_lag_outdated_ && is_lag_outdated_(base_ + d);
+      return !has_flown && !was_lag_outdated_ && (!before || before(progress));
     };
   constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
   const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
@@ -523,7 +571,8 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
       x = start;
     }
   }
-  NewtonSummary summary = minimize_lagged(x, std::move(way_to_start));
+  NewtonSummary summary = relags_on_the_way() ? minimize_with_new_contact(x, std::move(way_to_start))
+                                              : minimize_lagged(x, std::move(way_to_start));
   rounds_ = 1;
   summary.assembly_seconds += lagging_seconds;
   const int rounds = most_rounds();

@@ -82,6 +82,9 @@ class StepProblem {
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
   NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {});
+  bool relags_on_the_way() const;
+  NewtonSummary minimize_with_new_contact(VectorX& x, VectorX way_to_start);
+  std::vector<double> contact_forces_on_loose_parts(const VectorX& x);
   NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras);
   void follow_least_motion(const EnergySum& sum, const VectorX& d);
   bool has_flown_away(const VectorX& d) const;
@@ -119,8 +122,10 @@ class StepProblem {
   Solution solution_;                                 ///< of the last solve
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
-  VectorX norm_weights_;  ///< of NewtonNorm, once needed
-  Lagged lagged_;         ///< of the last solve
+  VectorX norm_weights_;                                   ///< of NewtonNorm, once needed
+  Lagged lagged_;                                          ///< of the last solve
+  std::function<bool(const VectorX& x)> is_lag_outdated_;  ///< ends a solve at x; empty: nothing does
+  bool was_lag_outdated_ = false;                          ///< what ended the last solve
   ProblemCache<Dim>& cache_;
   unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this
   int rounds_ = 0;          ///< of the last solve

@@ -441,7 +441,8 @@ def wild(rng):
 
 
 def stack(rng):
-    """A body above another one above the ground: both sink by their weight, without inertia."""
+    """A body above another one above the ground: both sink by their weight, without inertia. Friction keeps the upper one: without
+    it the lower one tilts towards where the upper one is heavier, and that one slides off."""
     draw = Draw(rng)
     plan = Plan(draw, pick(rng, ["static", "quasistatic"]))
     choose_time(plan, None)
@@ -451,7 +452,7 @@ def stack(rng):
     gaps = [draw.size * log_uniform(rng, 1e-3, 0.3) for _ in range(2)]
     plan.gravity = np.zeros(draw.dim)
     plan.gravity[1] = -GRAVITY
-    draw.more["contact"] = gap_contact(rng)
+    draw.more["contact"] = gap_contact(rng) | {"friction_coefficient": 0.3}
     up = [0.0] * draw.dim
     up[1] = float(draw.extent[1] + gaps[1])
     draw.is_unit_mesh = False
