@@ -163,6 +163,8 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
   const Json line = Json::parse(text_of(folder / "steps.jsonl"));
   EXPECT_EQ(keys_of(line), (std::vector<std::string>{"step",
                                                      "t",
+                                                     "order",
+                                                     "cut_steps",
                                                      "vertices",
                                                      "elements",
                                                      "unknowns",

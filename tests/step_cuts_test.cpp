@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "itr/linear/registry.hpp"
 #include "simulation_scenes.hpp"
@@ -18,6 +19,12 @@ Setup<2> hurried_impact(TimeOptions time) {
   setup.time.steps = 6;
   setup.newton.max_iterations = 5;
   return setup;
+}
+
+/// Of the integrator that takes the `count`th step after BDF has begun or a step was cut.
+int order_after(const TimeOptions& time, int count) {
+  if (time.integrator == Integrator::newmark) return 2;
+  return time.integrator == Integrator::bdf ? std::min(count, time.bdf_order) : 1;
 }
 
 class StepCuts : public ::testing::TestWithParam<TimeOptions> {};
@@ -37,17 +44,32 @@ TEST_P(StepCuts, GoOnWhereWholeStepsFailAndSayThatTheyDid) {
   Simulation<2> parts(setup, registry, Logger([&](LogLevel level, std::string_view text) {
                         warnings += level == LogLevel::warning && text.find("cutting") != text.npos;
                       }));
-  int cut = 0;
+  int cut = 0, since = 0;
   while (!parts.finished()) {
     result = parts.advance();
     ASSERT_TRUE(result.ok) << result.reason;
-    cut += result.report.cut_steps > 0;
+    const bool is_cut = result.report.cut_steps > 0;
+    cut += is_cut;
+    since = is_cut ? 0 : since + 1;
+    EXPECT_EQ(result.report.order, is_cut ? 1 : order_after(GetParam(), since));
     EXPECT_EQ(result.report.step, parts.state().step);
     EXPECT_EQ(parts.state().t, 0.01 * parts.state().step);
     expect_valid(parts);
   }
   EXPECT_GE(cut, 1);
   EXPECT_GE(warnings, cut);
+}
+
+TEST(Order, BeginsWith1AgainWhenTheStepChanges) {
+  linear::Registry registry;
+  auto setup = free_square(2);
+  setup.time = {.integrator = Integrator::bdf, .bdf_order = 3, .dt = 0.01, .steps = 20};
+  Simulation<2> simulation(setup, registry);
+  EXPECT_EQ(simulation.report().order, 0);  // no step yet
+  std::vector<int> orders;
+  for (const double dt : {0.01, 0.01, 0.01, 0.01, 0.02, 0.02, 0.02, 0.02})
+    orders.push_back(simulation.advance(dt).report.order);
+  EXPECT_EQ(orders, (std::vector<int>{1, 2, 3, 3, 1, 2, 3, 3}));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, StepCuts,
@@ -69,6 +91,7 @@ TEST(StaticCuts, AreSmallerLoads) {
   ASSERT_TRUE(result.ok) << result.reason;
   EXPECT_TRUE(simulation.finished());
   EXPECT_GE(result.report.cut_steps, 2);
+  EXPECT_EQ(result.report.order, 0);
   EXPECT_EQ(simulation.state().t, 1);
   for (int f = 0; f < simulation.state().mesh.facet_slots(); ++f) {
     if (simulation.state().mesh.facet_tag(f) != 4) continue;

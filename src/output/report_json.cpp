@@ -90,9 +90,9 @@ std::string common_members(const StepReport& r) {
 
 std::string step_json(const StepReport& report) {
   return fmt::format(
-      R"({{"step":{},"t":{},{},"residual_worth":{},"split_tolerance":{},"best_refused_split":{},"trial_seconds":{}}})",
-      report.step, number(report.t), common_members(report), number(report.residual_worth), number(report.split_tolerance),
-      number(report.best_refused_split), number(report.trial_seconds));
+      R"({{"step":{},"t":{},"order":{},"cut_steps":{},{},"residual_worth":{},"split_tolerance":{},"best_refused_split":{},"trial_seconds":{}}})",
+      report.step, number(report.t), report.order, report.cut_steps, common_members(report), number(report.residual_worth),
+      number(report.split_tolerance), number(report.best_refused_split), number(report.trial_seconds));
 }
 
 void Totals::add(const StepReport& report) {

@@ -103,8 +103,9 @@ py::dict describe(const itr::StepReport& r) {
                   "linear_solves"_a = r.linear_solves, "factorizations"_a = r.factorizations, "splits"_a = r.splits.accepted,
                   "curves"_a = r.curves.accepted, "straightens"_a = r.straightens.accepted,
                   "collapses"_a = r.collapses.accepted, "swaps"_a = r.swaps.accepted, "smooths"_a = r.smooths.accepted,
-                  "cut_steps"_a = r.cut_steps, "history_loss"_a = r.history_loss, "min_distance"_a = r.min_distance,
-                  "min_volume_ratio"_a = r.min_volume_ratio, "seconds"_a = r.seconds.total, "energy"_a = energies(r.energy));
+                  "order"_a = r.order, "cut_steps"_a = r.cut_steps, "history_loss"_a = r.history_loss,
+                  "min_distance"_a = r.min_distance, "min_volume_ratio"_a = r.min_volume_ratio,
+                  "seconds"_a = r.seconds.total, "energy"_a = energies(r.energy));
 }
 
 /// Listeners of Python's are called under its lock, which a step does not hold.

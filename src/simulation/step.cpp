@@ -119,6 +119,7 @@ class StepAttempt {
     next_.history.damp_next = damped;
     report_.step = next_.step;
     report_.t = next_.t;
+    report_.order = TimeIntegrator(setup_.time).accuracy(next_.history);
   }
 
   /// On success `after` is the state after the step, and `start` (unless null) that before it, on its mesh. The first solve

@@ -57,6 +57,12 @@ int TimeIntegrator::order(const History& history) const {
   return std::min<int>(depth(), static_cast<int>(history.x.size()));
 }
 
+int TimeIntegrator::accuracy(const History& history) const {
+  if (options_.is_static) return 0;
+  if (is_newmark(history)) return options_.newmark_gamma == 0.5 ? 2 : 1;
+  return order(history);
+}
+
 VectorX TimeIntegrator::predicted_increment(const History& history) const {
   const double h = options_.dt;
   if (is_newmark(history)) return h * history.v[0] + h * h * (0.5 - options_.newmark_beta) * history.a[0];

@@ -48,6 +48,7 @@ struct StepReport {
   double residual_worth = 0;      ///< gain of one more Newton iteration at the end, by the quadratic model [J]
   double trial_seconds = 0;       ///< median over the trials of these operations; 0 where there were none
   int refined_quadrature = 0;     ///< cells with curved edges whose elastic energy has a finer quadrature
+  int order = 0;                  ///< of accuracy of the integrator that took it, see TimeIntegrator::accuracy
   int cut_steps = 0;              ///< smaller steps that it was cut into, see TimeOptions::step_cuts; 0: it was not
   int damped_steps = 0;           ///< Newmark only: 1 if taken by implicit Euler, to keep energy from growing
   double min_distance = 0;        ///< over contact pairs nearer than dhat; infinity where there are none [m]

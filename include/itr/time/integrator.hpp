@@ -25,6 +25,8 @@ class TimeIntegrator {
 
   /// How many past states the next step uses: BDF starts with order 1 and grows as states become available.
   int order(const History& history) const;
+  /// Order of accuracy of the next step's velocities: 0 in statics, 1 for implicit Euler and the first step of BDF.
+  int accuracy(const History& history) const;
   /// How many past states need to be kept.
   int depth() const;
   /// Whether the next step is one of the trapezoidal rule: no dissipation, so a bad step can create energy.
