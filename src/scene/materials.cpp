@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -75,7 +76,7 @@ class MaterialReader {
   }
 
   /// At the barycenters of the elements that have the material.
-  Material checked(const std::vector<Vec<3>>& points) {
+  Material checked(const std::vector<Vec<3>>& points, std::vector<std::string>& warnings) const {
     for (const Requirement& requirement : requirements_)
       if (requirement.value.function)
         for (const Vec<3>& X : points) requirement.check(X);
@@ -86,6 +87,7 @@ class MaterialReader {
       return most;
     };
     Material material = material_;
+    if (lambda_) set_lame(points, material, warnings);
     // Remeshing and quadrature ask at other points than these.
     const auto guard = [&](SpaceFunction& f) {
       if (!f) return;
@@ -142,33 +144,59 @@ class MaterialReader {
     material_.poisson_ratio = nu.constant;
     material_.youngs_modulus_at = E.function;
     material_.poisson_ratio_at = nu.function;
-    material_.plane_strain = node_["plane_strain"].boolean(false);
-    if (material_.plane_strain && dimension_ == 3) node_["plane_strain"].fail("true in a 3D scene", "it in 2D only");
+    read_plane_strain();
     require("E", E, is_positive, "a number > 0");
     require("nu", nu, is_poisson_ratio, "a number of (-1, 0.5)");
   }
 
+  void read_plane_strain() {
+    material_.plane_strain = node_["plane_strain"].boolean(false);
+    if (material_.plane_strain && dimension_ == 3) node_["plane_strain"].fail("true in a 3D scene", "it in 2D only");
+  }
+
   void read_lame() {
     if (node_.has("E") || node_.has("nu")) node_.fail("E and nu, or lambda and mu, not both");
-    if (node_.has("plane_strain")) node_["plane_strain"].fail("it beside lambda and mu", "it with E and nu only");
     for (const char* key : {"lambda", "mu"})
       if (!node_.has(key)) node_[key].fail("both of lambda and mu");
-    const ScalarValue lambda = read_required("lambda"), mu = read_required("mu");
-    require("mu", mu, is_positive, "a number > 0");
-    // Of 3 lambda + 2 mu over mu, so that the check has one value to show.
-    const auto bulk = [lambda, mu](const Vec<3>& X) { return 3 * lambda(X) + 2 * mu(X); };
-    const auto poisson = [lambda, mu](const Vec<3>& X) { return lambda(X) / (2 * (lambda(X) + mu(X))); };
-    const auto young = [mu, poisson](const Vec<3>& X) { return 2 * mu(X) * (1 + poisson(X)); };
-    const bool varies = lambda.function || mu.function;
+    read_plane_strain();
+    lambda_ = read_required("lambda");
+    mu_ = read_required("mu");
+    require("mu", *mu_, is_positive, "a number > 0");
+    const bool in_plane = dimension_ == 2 && !material_.plane_strain;
+    // A multiple of the bulk modulus over a positive number, so that the check has one value to show.
+    const auto bulk = [lambda = *lambda_, mu = *mu_, in_plane](const Vec<3>& X) {
+      return in_plane ? lambda(X) + mu(X) : 3 * lambda(X) + 2 * mu(X);
+    };
+    const bool varies = lambda_->function || mu_->function;
     require("lambda", {bulk(Vec<3>::Zero()), varies ? SpaceFunction(bulk) : SpaceFunction()}, is_positive,
-            "3 lambda + 2 mu > 0");
-    material_.plane_strain = dimension_ == 2;  // the formula that gives lambda back, as it is used as given
-    if (varies) {
-      material_.youngs_modulus_at = young;
-      material_.poisson_ratio_at = poisson;
+            in_plane ? "lambda + mu > 0" : "3 lambda + 2 mu > 0");
+  }
+
+  /// Whether lambda and mu are those of no material in plane stress: its nu would be 0.5 or more.
+  bool is_beyond_plane_stress(const std::vector<Vec<3>>& points) const {
+    const auto is_beyond = [&](const Vec<3>& X) { return (*lambda_)(X) >= 2 * (*mu_)(X); };
+    if (!lambda_->function && !mu_->function) return is_beyond(Vec<3>::Zero());
+    return std::any_of(points.begin(), points.end(), is_beyond);
+  }
+
+  /// Sets E and nu that give lambda and mu back: energies take these as they are given.
+  void set_lame(const std::vector<Vec<3>>& points, Material& material, std::vector<std::string>& warnings) const {
+    if (dimension_ == 2 && !material.plane_strain && is_beyond_plane_stress(points)) {
+      material.plane_strain = true;
+      warnings.push_back(node_["lambda"].pointer() +
+                         ": of 2 mu or more, which no material has in plane stress: taken as plane strain");
+    }
+    const bool is_plane_stress = dimension_ == 2 && !material.plane_strain;
+    const auto poisson = [lambda = *lambda_, mu = *mu_, is_plane_stress](const Vec<3>& X) {
+      return lambda(X) / (is_plane_stress ? lambda(X) + 2 * mu(X) : 2 * (lambda(X) + mu(X)));
+    };
+    const auto young = [mu = *mu_, poisson](const Vec<3>& X) { return 2 * mu(X) * (1 + poisson(X)); };
+    if (lambda_->function || mu_->function) {
+      material.youngs_modulus_at = young;
+      material.poisson_ratio_at = poisson;
     } else {
-      material_.youngs_modulus = young(Vec<3>::Zero());
-      material_.poisson_ratio = poisson(Vec<3>::Zero());
+      material.youngs_modulus = young(Vec<3>::Zero());
+      material.poisson_ratio = poisson(Vec<3>::Zero());
     }
   }
 
@@ -191,6 +219,7 @@ class MaterialReader {
   int dimension_;
   Material material_;
   std::vector<Requirement> requirements_;
+  std::optional<ScalarValue> lambda_, mu_;  ///< instead of E and nu
 };
 
 /// Barycenters of a body's elements.
@@ -227,7 +256,7 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id
     MaterialReader reader(node, Dim);
-    for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body);
+    for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body, warnings);
     return materials;
   }
   for (const Node& entry : node.items()) {
@@ -237,7 +266,7 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
     if (!entry.has("id")) ids = {0};
     for (const int id : ids) {
       const auto of_body = points.find(id);
-      const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second);
+      const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second, warnings);
       if (!materials.insert_or_assign(id, material).second)
         warnings.push_back(entry.pointer() + ": replaces the material before it of id " + std::to_string(id));
     }
