@@ -7,6 +7,7 @@ usage: PYTHONPATH=BUILD_DIR/python python_test.py SOURCE_DIR
 import ctypes
 import gc
 import inspect
+import json
 import pathlib
 import shutil
 import subprocess
@@ -644,6 +645,36 @@ class Files(unittest.TestCase):
             self.assertIn("results of an earlier run", str(caught.exception))
             simulation.record(folder / "run", overwrite=True)
             self.assertEqual(len(list((folder / "run/frames").glob("*.h5"))), 1)
+
+    def test_records_steps_whose_listener_raises(self):
+        class Mine(Exception):
+            pass
+
+        def listener(change):
+            raise Mine
+
+        with tempfile.TemporaryDirectory() as folder:
+            simulation = make_simulation(**REMESH)
+            simulation.fix("left", [0, 0])
+            simulation.set_traction("right", [0, -2000.0])
+            simulation.record(folder)
+            simulation.on_mesh_change(listener)
+            raised = 0
+            for _ in range(5):
+                try:
+                    simulation.step()
+                except Mine:
+                    raised += 1
+            self.assertGreater(raised, 0)
+            self.assertEqual(simulation.steps, 5)
+            lines = (pathlib.Path(folder) / "steps.jsonl").read_text().splitlines()
+            self.assertEqual([json.loads(line)["step"] for line in lines], list(range(6)))
+            self.assertEqual(len(list((pathlib.Path(folder) / "frames").glob("*.h5"))), 6)
+
+            simulation.on_iteration(lambda *_: False)  # a step that is dropped is not one
+            with self.assertRaises(itr.Cancelled):
+                simulation.step()
+            self.assertEqual(len((pathlib.Path(folder) / "steps.jsonl").read_text().splitlines()), 6)
 
     def test_meshio(self):
         try:

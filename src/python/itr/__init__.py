@@ -178,9 +178,12 @@ class Simulation:
 
     def step(self, dt: Optional[float] = None) -> dict:
         """Takes one step of length dt [s], by default that of the step before. Returns `report`. Raises StepFailed."""
-        self._do(self._simulation.step, dt)
-        if self._recorder:
-            self._recorder.add(self._simulation)
+        before, recorder = self.steps, self._recorder
+        try:
+            self._do(self._simulation.step, dt)
+        finally:  # a step may be done when a listener raises, which may also begin a record of its own
+            if recorder and recorder is self._recorder and self.steps > before:
+                recorder.add(self._simulation)
         return self.report
 
     def adapt(self, dt: Optional[float] = None) -> None:
