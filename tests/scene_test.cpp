@@ -2,7 +2,9 @@
 // Keys of a scene: what they set, and which values are refused.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "scene_folder.hpp"
 #include "simulation/step_problem.hpp"
@@ -148,6 +150,49 @@ TEST_F(SceneTest, MaterialsOfAllLaws) {
   const auto mooney = material(R"({"type": "MooneyRivlin3Param", "c1": 4, "c2": 2, "c3": 1, "d1": 50})");
   EXPECT_EQ(mooney.mooney_rivlin.volume_d, 50);
   EXPECT_DOUBLE_EQ(mooney.youngs_modulus, 9 * 100 * 6 / (300 + 6.));
+}
+
+TEST_F(SceneTest, NumbersThatNoDoubleHoldAreNamedByTheirPointer) {
+  const auto failure_of = [&](const std::string& text) {
+    write("scene.json", text);
+    try {
+      read(folder_ / "scene.json");
+    } catch (const InputError& error) {
+      return error.parts();
+    }
+    return InputError::Parts{};
+  };
+  const InputError::Parts in_list =
+      failure_of(R"({"a": {"b": [1, {"c": 2}, []]}, "time": {"x~y/z": [0, {"d": [[], 3]}, [4, 1e999]]}})");
+  EXPECT_EQ(in_list.place, "/time/x~0y~1z/2/1");
+  EXPECT_EQ(in_list.found, "1e999");
+  EXPECT_EQ(failure_of(R"({"solver": {}, "time": {"dt": -1e400, "tend": 1}})").place, "/time/dt");
+}
+
+TEST_F(SceneTest, FilesOfTheWorkingFolderAreTakenWithAWord) {
+  const fs::path before = fs::current_path();
+  fs::create_directories(folder_ / "elsewhere");
+  write("elsewhere/only_here.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n");
+  write("elsewhere/shared.json", "{}");
+  const json scene = square(
+      {{"geometry",
+        json::array({{{"mesh", "only_here.obj"}, {"volume_selection", 1}},
+                     {{"mesh", "square.obj"}, {"volume_selection", 1}, {"transformation", {{"translation", {3, 0}}}}}})},
+       {"common", "shared.json"}});
+  write("scene.json", scene.dump());
+  write("elsewhere/scene.json",
+        square({{"geometry", json::array({{{"mesh", "only_here.obj"}, {"volume_selection", 1}}})}}).dump());
+  fs::current_path(folder_ / "elsewhere");
+  const auto told_of = [](const fs::path& file) {
+    std::set<std::string> places;
+    for (const std::string& text : read(file).warnings)
+      if (text.find("working folder") != text.npos) places.insert(text.substr(0, text.find(':')));
+    return places;
+  };
+  EXPECT_EQ(told_of(folder_ / "scene.json"), (std::set<std::string>{"/common", "/geometry/0/mesh"}));
+  EXPECT_EQ(told_of("scene.json"), std::set<std::string>());
+  EXPECT_EQ(told_of(folder_ / "elsewhere/scene.json"), std::set<std::string>());
+  fs::current_path(before);
 }
 
 TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {

@@ -21,6 +21,37 @@ std::string read_text(const fs::path& file, const std::string& asking_file, cons
   return std::move(text).str();
 }
 
+/// The pointer of the first number in valid JSON that no double holds.
+std::string find_overflow(const std::string& text) {
+  struct Level {
+    bool is_list;
+    std::size_t index = 0;
+    std::string key{};
+  };
+  std::vector<Level> levels;
+  const auto note = [&](int, Json::parse_event_t event, Json& parsed) {
+    using Event = Json::parse_event_t;
+    if (event == Event::object_start || event == Event::array_start) {
+      levels.push_back({event == Event::array_start});
+      return true;
+    }
+    if (event == Event::key) {
+      levels.back().key = escape_token(parsed.get<std::string>());
+      return true;
+    }
+    if (event != Event::value) levels.pop_back();
+    if (!levels.empty()) ++levels.back().index;
+    return true;
+  };
+  try {
+    (void)Json::parse(text, note);
+  } catch (const Json::exception&) {  // at the number
+  }
+  std::string pointer;
+  for (const Level& level : levels) pointer += "/" + (level.is_list ? std::to_string(level.index) : level.key);
+  return pointer.empty() ? "/" : pointer;
+}
+
 Json parse(const std::string& text, const fs::path& file) {
   try {
     Json json = Json::parse(text);
@@ -33,7 +64,10 @@ Json parse(const std::string& text, const fs::path& file) {
     if (const auto colon = what.find(": "); colon != std::string::npos) what = what.substr(colon + 2);
     throw InputError({file.string(), "line " + std::to_string(line), what, "JSON"});
   } catch (const Json::out_of_range& error) {  // a number that no double holds
-    throw InputError({file.string(), "/", error.what(), "finite numbers"});
+    const std::string_view what = error.what();
+    const auto first = what.find('\''), last = what.rfind('\'');
+    const std::string_view number = first < last ? what.substr(first + 1, last - first - 1) : what;
+    throw InputError({file.string(), find_overflow(text), std::string(number), "a number that a double holds"});
   }
 }
 
@@ -57,7 +91,7 @@ void apply_patch(Json& args, const Json& patch, const fs::path& file) {
 }
 
 /// Merges `args` (of `file`, with root_path set) over what its `common` names; `chain` are the files being merged.
-Json apply_common(Json args, const fs::path& file, std::vector<fs::path> chain) {
+Json apply_common(Json args, const fs::path& file, std::vector<fs::path> chain, std::vector<std::string>& warnings) {
   if (!args.contains("common")) {
     if (args.contains("patch"))
       throw InputError({file.string(), "/patch", "a patch without \"common\"", "both or neither: it would not be applied"});
@@ -68,6 +102,7 @@ Json apply_common(Json args, const fs::path& file, std::vector<fs::path> chain) 
   if (common.empty()) return args;
 
   const fs::path base_file = resolve_path(common, string_member(args, "root_path", file), file);
+  warn_of_working_folder("/common", common, string_member(args, "root_path", file), file, warnings);
   const fs::path identity = fs::weakly_canonical(base_file);
   if (std::find(chain.begin(), chain.end(), identity) != chain.end())
     throw InputError(
@@ -77,7 +112,7 @@ Json apply_common(Json args, const fs::path& file, std::vector<fs::path> chain) 
   Json base = parse(read_text(base_file, file.string(), "/common"), base_file);
   const std::string base_root = string_member(base, "root_path", base_file);
   base["root_path"] = base_root.empty() ? base_file.string() : resolve_path(base_root, base_file, base_file).string();
-  Json merged = apply_common(std::move(base), base_file, std::move(chain));
+  Json merged = apply_common(std::move(base), base_file, std::move(chain), warnings);
 
   const Json explicit_root = merged["root_path"];
   const Json patch = args.value("patch", Json::array());
@@ -110,6 +145,8 @@ void apply_override(Json& args, const Override& override) {
   Json value;
   try {
     value = Json::parse(override.value);
+  } catch (const Json::out_of_range&) {
+    refuse_override(override, override.value, "numbers that a double holds");
   } catch (const Json::exception&) {
     refuse_override(override, "'" + override.value + "'", "JSON (a string needs its quotes: '\"text\"')");
   }
@@ -140,10 +177,12 @@ void remove_null_members(Json& json) {
 Document load_document(const fs::path& file, const std::vector<Override>& overrides) {
   Json args = parse(read_text(file, file.string(), ""), file);
   if (string_member(args, "root_path", file).empty()) args["root_path"] = file.string();
-  args = apply_common(std::move(args), file, {fs::weakly_canonical(file)});
+  std::vector<std::string> warnings;
+  args = apply_common(std::move(args), file, {fs::weakly_canonical(file)}, warnings);
   for (const Override& override : overrides) apply_override(args, override);
 
   Document document{file, string_member(args, "root_path", file), std::move(args)};
+  document.warnings = std::move(warnings);
   document.json.erase("root_path");
   remove_null_members(document.json);
   return document;

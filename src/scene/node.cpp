@@ -37,14 +37,38 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-fs::path resolve_path(const fs::path& path, const fs::path& root, const fs::path& scene_file) {
-  if (path.empty() || path.is_absolute()) return path;
+namespace {
+
+/// The path below the folder that relative paths start from.
+fs::path below_folder(const fs::path& path, const fs::path& root, const fs::path& scene_file) {
   std::error_code ignored;
   // A root_path that names a folder of somebody else's computer: the scene's own folder is what was meant.
   const fs::path& base = fs::exists(root, ignored) ? root : scene_file;
   const fs::path folder = fs::is_directory(base, ignored) ? base : base.parent_path();
-  const fs::path below = (folder / path).lexically_normal();
-  return !fs::exists(below, ignored) && fs::exists(path, ignored) ? path : below;
+  return (folder / path).lexically_normal();
+}
+
+bool is_in_working_folder_only(const fs::path& path, const fs::path& below) {
+  std::error_code ignored;
+  return !fs::exists(below, ignored) && fs::exists(path, ignored);
+}
+
+}  // namespace
+
+fs::path resolve_path(const fs::path& path, const fs::path& root, const fs::path& scene_file) {
+  if (path.empty() || path.is_absolute()) return path;
+  const fs::path below = below_folder(path, root, scene_file);
+  return is_in_working_folder_only(path, below) ? path : below;
+}
+
+void warn_of_working_folder(const std::string& place, const fs::path& path, const fs::path& root, const fs::path& scene_file,
+                            std::vector<std::string>& warnings) {
+  if (path.empty() || path.is_absolute()) return;
+  const fs::path below = below_folder(path, root, scene_file);
+  if (!is_in_working_folder_only(path, below)) return;
+  std::error_code ignored;
+  warnings.push_back(place + ": there is no '" + below.string() + "'; taken from the working folder, '" +
+                     (fs::current_path(ignored) / path).lexically_normal().string() + "'");
 }
 
 fs::path Document::resolve(const std::string& path) const { return resolve_path(path, root, file); }

@@ -21,7 +21,8 @@ struct Document {
   std::filesystem::path file;  ///< the outermost scene file
   std::filesystem::path root;  ///< effective root_path
   Json json;
-  Units units{};  ///< of its numbers
+  Units units{};                        ///< of its numbers
+  std::vector<std::string> warnings{};  ///< of where files of `common` were found
 
   /// Absolute, else relative to `root`, else (if only there is such a file) to the working directory. Unlike in
   /// PolyFEM the root comes first: what a scene means must not depend on where the command is run.
@@ -30,6 +31,9 @@ struct Document {
 
 std::filesystem::path resolve_path(const std::filesystem::path& path, const std::filesystem::path& root,
                                    const std::filesystem::path& scene_file);
+/// Warns of a path that is there from the working folder only.
+void warn_of_working_folder(const std::string& place, const std::filesystem::path& path, const std::filesystem::path& root,
+                            const std::filesystem::path& scene_file, std::vector<std::string>& warnings);
 
 /// One reference token of a JSON pointer, escaped.
 std::string escape_token(std::string_view token);

@@ -93,20 +93,26 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   return setup;
 }
 
+/// f(value, what it is) for each value of the scene that names a file.
+template <typename Function>
+void for_each_file(const Node& root, const Geometries& geometries, const Function& f) {
+  for (const auto* list : {&geometries.bodies, &geometries.obstacles})
+    for (const Node& geometry : *list)
+      if (!is_flat_obstacle(geometry)) f(geometry["mesh"], MeshFiles::kMesh);
+  if (!has_collision_mesh(root)) return;
+  const Node node = root["contact"]["collision_mesh"];
+  f(node["mesh"], MeshFiles::kMesh);
+  f(node["linear_map"], MeshFiles::kWeights);
+}
+
 std::string make_identity(const Node& root, const Geometries& geometries, MeshFiles& files) {
   Json identity = root.json();
   identity.erase("output");
   identity.erase("tests");
   if (identity.contains("solver") && identity["solver"].is_object()) identity["solver"].erase("max_threads");
   Json hashes = Json::object();
-  for (const auto* list : {&geometries.bodies, &geometries.obstacles})
-    for (const Node& geometry : *list)
-      if (!is_flat_obstacle(geometry)) hashes[geometry["mesh"].pointer()] = files.hash(geometry["mesh"], MeshFiles::kMesh);
-  if (has_collision_mesh(root)) {
-    const Node node = root["contact"]["collision_mesh"];
-    hashes[node["mesh"].pointer()] = files.hash(node["mesh"], MeshFiles::kMesh);
-    hashes[node["linear_map"].pointer()] = files.hash(node["linear_map"], MeshFiles::kWeights);
-  }
+  for_each_file(root, geometries,
+                [&](const Node& name, const char* what) { hashes[name.pointer()] = files.hash(name, what); });
   identity["files"] = std::move(hashes);
   return identity.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -157,6 +163,10 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   scene.max_threads = root["solver"]["max_threads"].integer_at_least(0, 0);
   scene.directory = root["output"]["directory"].string("");
   scene.identity = make_identity(root, geometries, files);
+  scene.warnings.insert(scene.warnings.end(), document.warnings.begin(), document.warnings.end());
+  for_each_file(root, geometries, [&](const Node& name, const char*) {
+    warn_of_working_folder(name.pointer(), name.string(""), document.root, document.file, scene.warnings);
+  });
   document.units.dim = find_dimension(geometries, files);
   scene.output = read_output(root);
   if (document.units.dim == 2)
