@@ -154,7 +154,7 @@ TEST(HeldMotion, GivesUpWhereItIsBlocked) {
   EXPECT_FALSE(motion.is_stuck());
   parts.begin(50);
   EXPECT_TRUE(motion.is_stuck());
-  EXPECT_NE(motion.describe_way_left().find("up to 1 m"), std::string::npos) << motion.describe_way_left();
+  EXPECT_NE(motion.describe_way_left().find("100 % of their way is left"), std::string::npos) << motion.describe_way_left();
 }
 
 TEST(HeldMotion, PutsDofsAtTheirTargetsWithinTheTolerance) {

@@ -27,6 +27,7 @@ void HeldMotion::plan() {
   for (Eigen::Index i = 0; i < x.size(); ++i)
     if (task_.dofs.unknown[i] == kNone) remaining[i] = target_[i] - x[i];
   way_left_ = remaining.lpNorm<1>();
+  if (!(whole_way_ > 0)) whole_way_ = way_left_;
   if (!(way_left_ > 0)) return;
   if (remaining.norm() < task_.options.step_tolerance && finish(remaining)) return;
   state_ = waits ? State::waiting : State::advancing;
@@ -57,11 +58,8 @@ bool HeldMotion::is_stuck() {
 }
 
 std::string HeldMotion::describe_way_left() const {
-  double longest = 0;
-  for (Eigen::Index i = 0; i < at_.x().size(); ++i)
-    if (task_.dofs.unknown[i] == kNone) longest = std::max(longest, std::abs(target_[i] - at_.x()[i]));
   std::ostringstream text;
-  text << "held vertices cannot reach their targets, up to " << longest << " m are left";
+  text << "held vertices cannot reach their targets, " << 100 * way_left_ / whole_way_ << " % of their way is left";
   return text.str();
 }
 

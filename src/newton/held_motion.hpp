@@ -57,6 +57,7 @@ class HeldMotion {
   bool waits_next_ = false;
   PrescribedMotion motion_;
   double way_left_ = 0;                                               ///< sum over dofs
+  double whole_way_ = 0;                                              ///< the same at the start
   double way_left_before_ = std::numeric_limits<double>::infinity();  ///< when is_stuck looked last
   double penalty_ = 0;
   int blocked_ = 0;  ///< iterations in a row that brought them no nearer

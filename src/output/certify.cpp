@@ -479,6 +479,7 @@ Certificate certify(const fs::path& directory) {
       continue;
     }
     const StoredFrame frame = read_frame(file);
+    certificate.units = frame.units;
     if (frame.dim == 2) {
       check_frame<2>(frame, name, certificate);
     } else {

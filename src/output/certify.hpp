@@ -8,14 +8,17 @@
 #include <string>
 #include <vector>
 
+#include "itr/core/units.hpp"
+
 namespace itr::output {
 
 struct Certificate {
   int frames = 0;
   std::vector<std::string> violations;  ///< one line each: frame, what, which ids; also of arrays that are damaged
   /// How far curved edges of the surface leave their chords, which is what is checked, and how far where something else is
-  /// nearer to these chords than that [m].
+  /// nearer to these chords than that, in the frames' units.
   double overhang = 0, blocked_overhang = 0;
+  Units units{};  ///< of the frames
   bool passed() const { return violations.empty() && frames > 0; }
 };
 

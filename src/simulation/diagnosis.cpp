@@ -116,8 +116,9 @@ void Diagnosis<Dim>::name_residual_at(int vertex, const EnergySum& sum) {
     largest = force.norm();
     name = term->name();
   }
-  text_ << "; the largest residual, " << total.norm() << " N, is at vertex " << named_cell(std::array{vertex})
-        << ", where the largest force, " << largest << " N, is that of the term '" << name << '\'';
+  text_ << "; the largest residual, " << scope_.units.text(total.norm(), "N") << ", is at vertex "
+        << named_cell(std::array{vertex}) << ", where the largest force, " << scope_.units.text(largest, "N")
+        << ", is that of the term '" << name << '\'';
 }
 
 std::span<const int> vertices_of(const ContactStencil& stencil) {
@@ -170,8 +171,8 @@ void Diagnosis<Dim>::name_nearest_pair_at(int vertex) {
     nearest = stencil;
   }
   if (std::isfinite(least))
-    text_ << "; its contact pair " << named_pair(nearest.kind, vertices_of(nearest)) << " has the distance " << least
-          << " m";
+    text_ << "; its contact pair " << named_pair(nearest.kind, vertices_of(nearest)) << " has the distance "
+          << scope_.units.text(least, "m");
 }
 
 }  // namespace

@@ -16,8 +16,9 @@ struct SolveScope {
   const CellSet<Dim>& cells;
   const IncrementalPotential<Dim>& potential;
   const ContactSurface<Dim>& surface;
-  int num_obstacles;  ///< vertices of obstacles, the last ones
-  double scaling;     ///< of energies (alpha h^2) [s^2]
+  int num_obstacles;   ///< vertices of obstacles, the last ones
+  double scaling;      ///< of energies (alpha h^2) [s^2]
+  const Units& units;  ///< of what is said
 };
 
 /// Of a solve that ended at x: the cell or pair that limits its last step, and the cell, the pair and the term at the

@@ -172,7 +172,7 @@ double mass_moment(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Vec
 }
 
 /// Logs what the transfer could not keep.
-void tell(const HistoryTransferReport& transfer, double extent, int step, const Logger& logger) {
+void tell(const HistoryTransferReport& transfer, double extent, int step, const Units& units, const Logger& logger) {
   if (transfer.not_converged > 0)
     logger.warning(
         fmt::format("step {}: {} of the past positions are valid on the new mesh, but not the nearest to the old "
@@ -181,8 +181,8 @@ void tell(const HistoryTransferReport& transfer, double extent, int step, const 
   if (transfer.with_barriers > 0)
     logger.debug(fmt::format("step {}: barriers kept {} of the past positions valid", step, transfer.with_barriers));
   if (transfer.lost_positions > kLossWorthTelling * extent)
-    logger.warning(
-        fmt::format("step {}: the new mesh loses {:.2e} kg m of the integral of rho x", step, transfer.lost_positions));
+    logger.warning(fmt::format("step {}: the new mesh loses {} of the integral of rho x", step,
+                               units.text(transfer.lost_positions, "kg m", 3)));
 }
 
 /// `operate(mesh, fields, context, options, memory, strata)` on the state's mesh, and carries the state over.
@@ -242,7 +242,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   const HistoryTransferReport transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh,
                                                           state.space, touched, tools.cache.system.solver(), state.history);
   report.history_loss = transfer.loss / problem.scaling();
-  tell(transfer, mass_moment(setup, state.mesh, x), state.step, tools.logger);
+  tell(transfer, mass_moment(setup, state.mesh, x), state.step, setup.units, tools.logger);
   return renumbering;
 }
 

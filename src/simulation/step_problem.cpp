@@ -268,16 +268,16 @@ NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum
   if (summary.converged()) return summary;
   const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
   if (const std::string turn = describe_turn(); !turn.empty()) summary.message = turn + "; " + summary.message;
-  summary.message +=
-      diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling}, summary, sum, x, workspace_);
+  summary.message += diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
+                                    sum, x, workspace_);
   return summary;
 }
 
 template <int Dim>
 std::string StepProblem<Dim>::describe_effort(const NewtonSummary& summary) {
   const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
-  return itr::describe_effort<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling}, summary, rounds_,
-                                   workspace_);
+  return itr::describe_effort<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
+                                   rounds_, workspace_);
 }
 
 /// One solve with `lagged_`. Adaptive stiffness balances the terms before held dofs move: so it is in the
