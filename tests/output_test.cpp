@@ -199,7 +199,7 @@ TEST_F(OutputTest, StepLineHasExactlyThePromisedNames) {
   EXPECT_EQ(keys_of(line["energy"]),
             (std::vector<std::string>{"inertia", "elastic", "body", "contact", "friction", "total"}));
   EXPECT_EQ(keys_of(line["seconds"]), (std::vector<std::string>{"assembly", "linear_solve", "line_search", "ccd", "remesh",
-                                                                "projection", "output", "total"}));
+                                                                "projection", "output", "rest", "total"}));
   EXPECT_EQ(keys_of(line["splits"]), (std::vector<std::string>{"tried", "relaxed", "accepted", "refused"}));
   EXPECT_EQ(line["splits"]["refused"], (Json{{"long_ring", 1}, {"energy", 2}}));
   EXPECT_TRUE(line["collapses"]["refused"].empty());

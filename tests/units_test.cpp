@@ -5,12 +5,14 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <sstream>
 
 #include "core/hdf5.hpp"
@@ -402,6 +404,57 @@ TEST_F(UnitsTest, ExplainAndRunSpeakInThem) {
   EXPECT_EQ(file.read_text_attribute("/fields/x", "unit"), "mm");
   EXPECT_EQ(file.read_text_attribute("/fields/stress", "unit"), "MPa");
   EXPECT_EQ(file.read_text_attribute("/fields/elastic_density", "unit"), "mJ/mm^2");
+}
+
+TEST_F(UnitsTest, CertificatesAndFailedSolvesSpeakInThem) {
+  const System by = in<2>(kCentimetres);
+  const Json curved = {{"space", {{"discr_order", 2}}}};
+  const fs::path folder = write<2>(by, scene<2>(by, curved));
+  const std::regex in_metres("[0-9] m\\b");
+  run(folder);
+  EXPECT_EQ(itr(fmt::format("certify {}/run", folder.string())), 0) << said_;
+  EXPECT_TRUE(std::regex_search(said_, std::regex("by at most [0-9.e-]+ cm, and by [0-9.e-]+ cm"))) << said_;
+  EXPECT_FALSE(std::regex_search(said_, in_metres)) << said_;
+
+  const std::string hurried = "--overwrite --set /solver/nonlinear/max_iterations=1";
+  EXPECT_EQ(itr(fmt::format("run {0}/scene.json -o {0}/run {1}", folder.string(), hurried)), 3) << said_;
+  EXPECT_NE(said_.find("the largest residual"), std::string::npos) << said_;
+  EXPECT_FALSE(std::regex_search(said_, in_metres)) << said_;
+  EXPECT_FALSE(std::regex_search(said_, std::regex("[0-9] N\\b"))) << said_;
+}
+
+TEST_F(UnitsTest, SecondsAddUpToTheTimeOfTheRun) {
+  const System by = in<2>(kMetres);
+  const fs::path folder = write<2>(by, scene<2>(by));
+  const auto start = std::chrono::steady_clock::now();
+  run(folder);
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const auto check = [&](const char* line, const Json& seconds) {
+    double sum = 0;
+    for (const auto& [name, part] : seconds.items()) {
+      EXPECT_GE(part.get<double>(), -1e-6) << name << " in " << line;
+      if (name != "total") sum += part.get<double>();
+    }
+    EXPECT_NEAR(sum, seconds["total"].get<double>(), 1e-9) << line;
+  };
+  const Json summary = Json::parse(text(folder / "run/summary.json"))["seconds"];
+  check("summary", summary);
+  std::istringstream lines(text(folder / "run/steps.jsonl"));
+  double steps = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const Json seconds = Json::parse(line)["seconds"];
+    check(line.c_str(), seconds);
+    steps += seconds["total"].get<double>();
+  }
+  const double total = summary["total"];
+  EXPECT_GT(total, steps);
+  EXPECT_LT(total, wall);
+  EXPECT_GT(total, 0.3 * wall);  // starting the process is outside
+
+  run(folder, fmt::format("--resume --set /time/tend={}", 0.03 / by.s));
+  const Json resumed = Json::parse(text(folder / "run/summary.json"))["seconds"];
+  check("resumed", resumed);
+  EXPECT_GT(resumed["total"].get<double>(), total);
 }
 
 TEST_F(UnitsTest, MeshInUnitsOfItsOwn) {

@@ -16,6 +16,7 @@
 #include <optional>
 #include <stop_token>
 #include <thread>
+#include <utility>
 
 #include "core/timer.hpp"
 #include "itr/core/error.hpp"
@@ -215,12 +216,12 @@ template <int Dim>
 class Run {
  public:
   Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
-      linear::Registry& registry, Warnings& warnings)
+      linear::Registry& registry, Warnings& warnings, double start)
       : directory_(std::move(directory)),
         with_report_(options.report),
         simulation_(std::move(setup), registry, make_logger(warnings)) {
     for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
-    const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity};
+    const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity, start};
     if (const auto saved = find_resumable(directory_, options)) {
       writer_ = std::make_unique<output::Writer>(directory_, scene.output, info, restore(*saved, scene, options));
       warnings.set_writer(writer_.get());
@@ -242,6 +243,7 @@ class Run {
     try {
       outcome = advance(at_output, advice);
       if (outcome != kFinished && !is_saved_) save();
+      writer_->add_output(std::exchange(output_seconds_, 0));
       writer_->finish(outcome, simulation_.solver_name_in_use());
     } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
       const std::string of_output =
@@ -414,6 +416,7 @@ class Run {
 }  // namespace
 
 int run(const RunOptions& options) {
+  const double start = seconds_now();
   scene::Scene scene = scene::read(options.scene, options.overrides);
   Warnings warnings;
   for (const auto& warning : scene.warnings) warnings.add(warning);
@@ -432,7 +435,7 @@ int run(const RunOptions& options) {
         if (this_launch().rank > 0) return serve(registry, solver.name);
         for (const auto& warning : solver.warnings) warnings.add(warning);
         const RankSession session(registry, solver.name);
-        return Run(std::move(setup), scene, directory, options, num_threads(), registry, warnings).run();
+        return Run(std::move(setup), scene, directory, options, num_threads(), registry, warnings, start).run();
       },
       scene.setup);
 }

@@ -18,6 +18,9 @@ std::string step_json(const StepReport& report);
 class Totals {
  public:
   void add(const StepReport& report);
+  /// Sets the seconds of the whole run.
+  void set_seconds(double total) { total_.seconds.total = total; }
+  void add_output(double seconds) { total_.seconds.output += seconds; }
   /// All of it as numbers, for a checkpoint, and back. Throws InputError for a wrong length.
   std::vector<double> save() const;
   void restore(const std::vector<double>& values);

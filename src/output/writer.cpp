@@ -74,6 +74,11 @@ struct Writer::Impl {
   static std::string frame_name(int step) { return fmt::format("frames/{:06}.h5", step); }
   bool is_due(int step) const { return step % std::max(options.skip_frames, 1) == 0; }
 
+  /// Seconds of all steps become those of the whole run so far, and of what it was resumed from.
+  void count_wall_time() {
+    if (info.start) totals.set_seconds(seconds_before + seconds_now() - *info.start);
+  }
+
   /// A state that was saved at a step which is not to be stored gives way to the next frame: a run that was interrupted
   /// leaves what one that was not leaves.
   void drop_unasked_frame() {
@@ -87,6 +92,7 @@ struct Writer::Impl {
     const std::string name = frame_name(step);
     if (checkpoint) {
       sync_frames();
+      count_wall_time();
       const std::vector<double> saved_totals = totals.save();
       const Progress progress{info.scene_identity, info.backend, saved_totals, steps.size()};
       const auto add = [&](hdf5::File& file) { write_checkpoint(file, *checkpoint, progress, options.units); };
@@ -139,6 +145,7 @@ struct Writer::Impl {
   DisplacementNorms norms;
   WarningList warnings;
   std::vector<std::string> unsynced;
+  double seconds_before = 0;  ///< of the runs before --resume
   int last_stored = kNone;
   double last_checkpoint = 0;
 };
@@ -151,6 +158,7 @@ Writer::Writer(fs::path directory, OutputOptions options, RunInfo info, const Ch
     : impl_(std::make_unique<Impl>(std::move(directory), options, std::move(info), checkpoint.state.step,
                                    checkpoint.log_bytes)) {
   impl_->totals.restore(checkpoint.totals);
+  impl_->seconds_before = impl_->totals.report().seconds.total;
   const State<Dim>& state = checkpoint.state;
   impl_->norms = displacement_norms(state.mesh, state.history.x[0], state.space);
 }
@@ -195,9 +203,12 @@ int Writer::warnings() const { return impl_->warnings.count(); }
 
 const StepReport& Writer::totals() const { return impl_->totals.report(); }
 
+void Writer::add_output(double seconds) { impl_->totals.add_output(seconds); }
+
 void Writer::finish(const std::string& outcome, const std::string& solver) {
   impl_->series.write();
   if (impl_->options.vtu) write_vtu_series(impl_->directory);
+  impl_->count_wall_time();
   const std::string& used = solver.empty() ? impl_->info.backend : solver;
   write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, impl_->options.units, outcome, used,
                                                                            impl_->norms, impl_->warnings.summary_members()));

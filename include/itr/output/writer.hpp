@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "itr/output/checkpoint.hpp"
@@ -25,7 +26,8 @@ struct RunInfo {
   std::string scene;    ///< path of the scene file
   std::string backend;  ///< solver that was used
   int threads = 1;
-  std::string scene_identity{};  ///< the part of the scene that a resumed run must share
+  std::string scene_identity{};   ///< the part of the scene that a resumed run must share
+  std::optional<double> start{};  ///< when the run began, by its monotonic clock [s]; empty: only steps are timed
 };
 
 /// The writer of a run. Every file is complete or absent; steps.jsonl is flushed after each line. Throws InputError if the
@@ -53,6 +55,8 @@ class Writer {
   int warnings() const;  ///< how many there were, before --resume too
   /// Sums over the run as in summary.json, steps before --resume included.
   const StepReport& totals() const;
+  /// Counts time that was spent on output after the last line.
+  void add_output(double seconds);
   /// `outcome` is "finished" or the reason why the simulation stopped, `solver` who solved at the end (empty: the backend).
   /// Writes summary.json with totals, threads, versions and norms of the last frame.
   void finish(const std::string& outcome, const std::string& solver = {});
