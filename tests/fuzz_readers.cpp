@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Damaged files, so many a reader: whatever is in one, reading it ends, in an InputError or in what is there. Meant to run
 // under the sanitizers, which turn what is wrong into a crash. HDF5 1.10.8 itself crashes on some files whose metadata are
-// damaged (H5F__accum_read, from H5Lexists: seeds 3 and 7 of hdf5-weights); those of seed 1 are got over.
+// damaged (H5F__accum_read, from H5Lexists: seeds 3 and 7 of hdf5-weights); those of seed 1 are got over. It also reads past
+// messages with attributes, and frees not all of what it has read: asan.supp and lsan.supp name these.
 // usage: fuzz_readers [CASES [SEED [READER]]]
 #include <unistd.h>
 

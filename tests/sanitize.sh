@@ -10,7 +10,7 @@ build=build/$preset
 tests=(remesh_test remesh_curved_test remesh_curved_prediction_test remesh_curved_run_test remesh_curved_contact_test candidates_test curved_host_test change_log_test reuse_test newton_parts_test remesh_3d_test remesh_decision_test remesh_allocation_test prospect_test history_transfer_test simulation_test host_test embed_test mesh_change_test bad_input_test hdf5_test)
 examples=(own_time_loop own_energy_term own_material own_solver contact_only transfer two_threads coupling)
 # HDF5 asks for as much memory as a damaged file says, and gets over not having it.
-export OMP_NUM_THREADS=1 ASAN_OPTIONS=allocator_may_return_null=1 TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=4" UBSAN_OPTIONS=print_stacktrace=1
+export OMP_NUM_THREADS=1 ASAN_OPTIONS="allocator_may_return_null=1 suppressions=$PWD/tests/asan.supp" LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp print_suppressions=0" TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=4" UBSAN_OPTIONS=print_stacktrace=1
 case $preset in asan) sanitizer=address,undefined ;; tsan) sanitizer=thread ;; *) echo "asan or tsan, not $preset" >&2; exit 2 ;; esac
 
 cmake --preset "$preset" && cmake --build --preset "$preset" --target "${tests[@]}" fuzz_readers -- -j "$jobs" || exit 1
