@@ -477,7 +477,14 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
   EXPECT_EQ(refused(R"({"geometry": [{"mesh": "square.obj", "volume_selection": 1}, {"type": "ground", "unit": "mm"}]})"),
             "/geometry/1/unit");
 
-  const std::array<std::pair<const char*, const char*>, 14> warnings = {{
+  const std::array<std::pair<const char*, const char*>, 17> warnings = {{
+      {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 8, "value": [0, 1]}, {"id": 8, "value": [0, 2]}]}})",
+       "/boundary_conditions/obstacle_displacements/1: an entry before it"},
+      {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 8, "value": [0, 1]}],
+                                   "dirichlet_boundary": [{"id": 8, "value": [0, 2]}]}})",
+       "/boundary_conditions/dirichlet_boundary/0: an entry before it"},
+      {R"({"boundary_conditions": {"dirichlet_boundary": [{"id": 1, "value": [0, 0]}, {"id": 1, "value": [0, 2]}]}})",
+       "/boundary_conditions/dirichlet_boundary/1: an entry before it"},
       {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 3, "value": [0, 1]}]}})",
        "3 is a surface of a body, which this does not move"},
       {R"({"contact": {"enabled": false}})", "/contact/enabled: not true"},

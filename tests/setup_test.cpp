@@ -3,13 +3,19 @@
 // can be cancelled.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "simulation/advice.hpp"
+#include "simulation/step_problem.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {
@@ -254,6 +260,90 @@ TEST(Advice, SaysWhatWillHappenAndWhatLooksWrong) {
   EXPECT_TRUE(has(find_suspicious(Simulation<2>(setup, registry)), "are densities in kg/m^3?"));
   setup.time.quasistatic = true;
   EXPECT_TRUE(has(find_suspicious(Simulation<2>(setup, registry)), "only contact can keep them in place"));
+}
+
+/// Sentences of find_suspicious that have these words.
+int count_words(const itr::Setup<2>& setup, const std::string& words) {
+  linear::Registry registry;
+  int count = 0;
+  for (const std::string& line : find_suspicious(Simulation<2>(setup, registry))) count += line.find(words) != line.npos;
+  return count;
+}
+
+DirichletCondition<2> held(int tag, std::array<bool, 2> components, SpaceTimeFunction<2> displacement) {
+  return {tag, components, std::move(displacement)};
+}
+SpaceTimeFunction<2> constant(double x, double y) {
+  return [=](const Vec<2>&, double) { return Vec<2>(x, y); };
+}
+
+TEST(Advice, NamesHeldCornersThatContradictEachOther) {
+  itr::Setup<2> setup = good_setup();
+  tag_sides(setup.mesh, 0.2);
+  setup.time.quasistatic = true;
+  const std::string words = "contradict each other";
+  setup.dirichlet = {held(1, {true, true}, constant(0, 0)), held(3, {true, true}, constant(0.1, 0))};
+  EXPECT_EQ(count_words(setup, words), 0) << "opposite sides";
+  setup.dirichlet = {held(1, {true, true}, constant(0, 0)), held(2, {true, true}, constant(0, 0)),
+                     held(4, {true, false}, constant(0, 7))};
+  EXPECT_EQ(count_words(setup, words), 0) << "the same, or of another component";
+  setup.dirichlet.push_back(held(3, {true, true}, constant(0.01, 0)));
+  EXPECT_EQ(count_words(setup,
+                        "ids 2 and 3 contradict each other at 1 vertices that both hold, by up to 0.01 m at (0.2, 0): "
+                        "that of 3 counts"),
+            1);
+  EXPECT_EQ(count_words(setup, "ids 3 and 4 contradict each other at 1 vertices"), 1);
+  EXPECT_EQ(count_words(setup, words), 2);
+  const HeldDofs<2> taken = held_dofs(setup, setup.mesh, 0.01);
+  for (VertexId v = 0; v < setup.mesh.num_vertices(); ++v)
+    if (setup.mesh.rest(v) == Vec<2>(0.2, 0)) {
+      EXPECT_EQ(taken.target[2 * v], 0.2 + 0.01);
+    }
+  // One that moves away from the other later only.
+  setup.dirichlet = {held(1, {true, true}, constant(0, 0)),
+                     held(2, {true, true}, [](const Vec<2>&, double t) { return Vec<2>(t > 0.055 ? t : 0, 0); })};
+  EXPECT_EQ(count_words(setup, words), 1);
+}
+
+TEST(Advice, NamesTimesThatStepsAreLongerThan) {
+  itr::Setup<2> setup = good_setup();
+  tag_sides(setup.mesh, 0.2);
+  const std::string to_and_fro = "goes to and fro", crosses = "in which bodies cross", swings = "come to rest";
+  const auto wave = [](double period) -> SpaceTimeFunction<2> {
+    return [=](const Vec<2>&, double t) { return Vec<2>(1e-3 * std::sin(2 * std::numbers::pi * t / period), 0); };
+  };
+  for (const double period : {1.0, 0.1, 0.04}) {
+    setup.dirichlet = {held(1, {true, true}, wave(period))};
+    EXPECT_EQ(count_words(setup, to_and_fro), 0) << period;
+  }
+  for (const double period : {0.02, 0.01, 0.005, 0.0037}) {
+    setup.dirichlet = {held(1, {true, true}, wave(period))};
+    EXPECT_EQ(count_words(setup, to_and_fro), 1) << period;
+  }
+  setup.dirichlet = {held(1, {true, true}, [](const Vec<2>&, double t) { return Vec<2>(t > 0.033 ? 1e-3 : 0, 0); })};
+  EXPECT_EQ(count_words(setup, to_and_fro), 0) << "a jump is there at the end of a step";
+  setup.dirichlet.clear();
+  setup.obstacles.motions = {wave(0.01)};
+  setup.obstacles.motion = {0, 0};
+  EXPECT_EQ(count_words(setup, to_and_fro), 1);
+  setup.obstacles.motions = {wave(1)};
+  setup.neumann = {{3, [](const Vec<2>&, double t) { return Vec<2>(std::abs(t - 0.0251) < 1e-3 ? 1 : 0, 0); }}};
+  EXPECT_EQ(count_words(setup, to_and_fro), 1) << "a pulse that no end of a step sees";
+  setup.neumann.clear();
+
+  setup.body_acceleration = constant(0, -9.81);
+  EXPECT_EQ(count_words(setup, crosses), 0);
+  setup.time.dt = 10;
+  EXPECT_EQ(count_words(setup, crosses), 1);
+  setup.body_acceleration = nullptr;
+  EXPECT_EQ(count_words(setup, crosses), 0);
+
+  setup.obstacles.motion = {kNone, kNone};
+  setup.dirichlet = {held(1, {true, true}, constant(0, 0))};
+  setup.initial_displacement = {{1, [](const Vec<2>& X, double) { return Vec<2>(0, 0.01 * X[0]); }}};
+  EXPECT_EQ(count_words(setup, swings), 1);
+  setup.time.dt = 0.01;
+  EXPECT_EQ(count_words(setup, swings), 0);
 }
 
 }  // namespace

@@ -103,6 +103,19 @@ class ConditionReader {
     }
   }
 
+  /// Of obstacles that an entry of `displacements` moves already; two Dirichlet conditions of one id are told of elsewhere.
+  void warn_of_second_motions(const std::vector<Node>& displacements) {
+    std::set<int> moved;
+    const auto id_of = [&](const Node& node) { return is_all(node["id"]) ? kNoTag : read_condition_id(node["id"]); };
+    const auto warn = [&](const Node& node) {
+      warnings_.push_back(node.pointer() + ": an entry before it, in obstacle_displacements, has the same id and wins");
+    };
+    for (const Node& node : displacements)
+      if (obstacle_ids_.contains(id_of(node)) && !moved.insert(id_of(node)).second) warn(node);
+    for (const Node& node : boundary_["dirichlet_boundary"].items())
+      if (moved.contains(id_of(node))) warn(node);
+  }
+
   /// The first entry with an obstacle's id moves it; obstacle_displacements come before dirichlet_boundary.
   void read_motions(ObstacleGeometry<Dim>& geometry) {
     std::vector<Node> entries = boundary_["obstacle_displacements"].items();
@@ -115,6 +128,7 @@ class ConditionReader {
         warnings_.push_back(node["id"].pointer() + ": " + std::to_string(id) +
                             " is a surface of a body, which this does not move; obstacles: " + id_list(obstacle_ids_));
       }
+    warn_of_second_motions(entries);
     for (const Node& node : boundary_["dirichlet_boundary"].items()) entries.push_back(node);
     Obstacles<Dim>& obstacles = geometry.obstacles;
     std::vector<char> is_taken(obstacles.rest.size(), false);

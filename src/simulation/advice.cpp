@@ -12,7 +12,9 @@
 
 #include "barrier_stiffness.hpp"
 #include "geometry/measures.hpp"
+#include "simulation/held_corners.hpp"
 #include "simulation/resolution.hpp"
+#include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
 #include "sizes.hpp"
 
@@ -324,34 +326,11 @@ double damping_of(const TimeOptions& time, double phase) {
   return std::abs((2.0 + std::sqrt(1.0 + 2.0 * i * phase)) / (3.0 - 2.0 * i * phase));  // the root of BDF2
 }
 
-/// Fastest that anything is driven [m/s]: at the start, by gravity over the size of the scene, by what is prescribed.
-template <int Dim>
-double driven_speed(const Setup<Dim>& setup, const MeshFigures<Dim>& figures) {
-  const TimeOptions& time = setup.time;
-  double speed = 0;
-  for (const auto& condition : setup.initial_velocity)
-    speed = std::max(speed, condition.value(figures.center, setup.time.t0).norm());
-  if (setup.body_acceleration) {
-    const double a = setup.body_acceleration(figures.center, time.t0).norm(), duration = time.dt * time.steps;
-    speed = std::max(speed, std::min(a * duration, std::sqrt(2 * a * figures.size)));
-  }
-  constexpr int kSamples = 20;
-  VectorX before = held_dofs(setup, setup.mesh, time.t0).target;
-  for (int i = 1; i <= kSamples; ++i) {
-    const VectorX after = held_dofs(setup, setup.mesh, time.t0 + time.dt * time.steps * i / kSamples).target;
-    const VectorX way = after - before;
-    for (Eigen::Index k = 0; k + Dim <= way.size(); k += Dim)
-      speed = std::max(speed, way.template segment<Dim>(k).norm() * kSamples / (time.dt * time.steps));
-    before = after;
-  }
-  return speed;
-}
-
 /// Whether impacts or loads are strong enough for waves: by the strain that they make, a speed over that of waves.
 template <int Dim>
 bool has_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, double wave_speed) {
   constexpr double kStrain = 1e-3;
-  if (driven_speed(setup, figures) > kStrain * wave_speed) return true;
+  if (driven_speed(setup, figures.size, figures.center) > kStrain * wave_speed) return true;
   double softest = kInfinity;
   for (const auto& [body, volume] : volumes_by_body(setup.mesh))
     softest = std::min(softest, setup.materials.at(body).youngs_modulus);
@@ -403,6 +382,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_hard_meshes(setup, figures, found);
   find_wrong_gravity(setup, figures, found);
   find_held(setup, found);
+  find_contradictions(setup, found);
   find_held_loads(setup, found);
   find_odd_stiffness(setup, found);
   find_loose_bodies(setup, found);
@@ -410,6 +390,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_loose_tolerance(simulation, found);
   find_near_surfaces(simulation, found);
   find_unresolved(simulation, found);
+  find_long_steps(setup, figures.size, figures.center, found);
   return found;
 }
 
