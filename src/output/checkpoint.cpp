@@ -18,6 +18,7 @@ constexpr std::int64_t kFormat = 7;
 /// In SI units, where the frame is in others: of the vertices, and of the state.
 constexpr const char* kRest = "/checkpoint/rest";
 constexpr const char* kTime = "/checkpoint/t";
+constexpr const char* kDoublings = "/checkpoint/doublings";  ///< of flat obstacles
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -281,6 +282,8 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   if (!state.quadrature.empty())
     file.write("/checkpoint/quadrature_levels", std::vector<std::int64_t>(state.quadrature.begin(), state.quadrature.end()),
                0);
+  if (!state.doublings.empty())
+    file.write(kDoublings, std::vector<std::int64_t>(state.doublings.begin(), state.doublings.end()), 0);
   const BarrierStiffness& stiffness = state.stiffness;
   file.write("/checkpoint/barrier_stiffness",
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
@@ -350,6 +353,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
                           "0 to " + std::to_string(kMostClosedLevel)});
     state.quadrature.assign(levels.begin(), levels.end());
   }
+  if (file.contains(kDoublings)) state.doublings = read_ints(saved.file, file, kDoublings);
   const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;
   if (stiffness.size() != 3)
     throw InputError(

@@ -35,7 +35,7 @@ constexpr Key kKeys[] = {
     {"/geometry/*/mesh", read, "path", "", "",
      "mesh file: .msh (Gmsh 2.2 or 4.1), .obj or .ply; relative to the scene's folder; required", basic},
     {"/geometry/*/type", read, "mesh|mesh_array|plane|ground|mesh_sequence", "\"mesh\"", "",
-     "mesh_array makes copies; plane and ground are flat obstacles that reach a thousand times as far as the bodies and need no file; "
+     "mesh_array makes copies; plane and ground are flat obstacles without end, which need no file; "
      "mesh_sequence is not supported yet"},
     {"/geometry/*/name", read, "string", "", "", "for /output/forces"},
     {"/geometry/*/enabled", read, "boolean", "true", "", "false: as if the entry were not there, its file is not opened"},

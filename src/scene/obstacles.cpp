@@ -186,11 +186,11 @@ Box<Dim> box_of(const Mesh<Dim>& mesh) {
   return box;
 }
 
-/// One edge or triangle that reaches a thousand times as far as the bodies do, seen from above their middle: an edge inside
-/// of the plane would add pairs to those of the faces beside it, whose barrier pushes sideways.
+/// One edge or triangle that reaches ten times as far as the bodies do at the start, seen from above their middle: an edge
+/// inside of the plane would add pairs to those of the faces beside it, whose barrier pushes sideways.
 template <int Dim>
 void read_flat(const Node& geometry, const Box<Dim>& bodies, ObstacleGeometry<Dim>& out) {
-  constexpr double kReach = 1e3;
+  constexpr double kReach = 10;
   Vec<Dim> point = Vec<Dim>::Zero(), normal = Vec<Dim>::Unit(1);
   const auto read_point = [](const Node& node, Vec<Dim>& result) {
     const std::vector<double> values = node.numbers();
@@ -223,6 +223,7 @@ void read_flat(const Node& geometry, const Box<Dim>& bodies, ObstacleGeometry<Di
     surface.triangles = {{0, 1, 2}};
   }
   surface.is_used.assign(points.size(), true);
+  out.obstacles.flats.push_back(static_cast<int>(out.obstacles.rest.size()));
   append<Dim>(surface, points, Vec<Dim>::Zero(), read_obstacle_id(geometry["surface_selection"]), out);
 }
 

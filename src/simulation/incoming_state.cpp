@@ -10,6 +10,7 @@
 
 #include "itr/core/error.hpp"
 #include "mesh/validate.hpp"
+#include "simulation/flat_obstacles.hpp"
 #include "simulation/invariants.hpp"
 
 namespace itr {
@@ -89,6 +90,12 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
   for (const VectorX& v : history.v) check("velocities", v);
   for (const VectorX& a : history.a) check("accelerations", a);
   if (state.deviation.size() > 0) check("deviation", state.deviation);
+  if (!state.doublings.empty())
+    require_size("doublings of flat obstacles", state.doublings.size(), setup.obstacles.flats.size());
+  for (const int times : state.doublings)
+    if (times < 0 || times > FlatObstacles<Dim>::kMostDoublings)
+      refuse_state("doublings of flat obstacles", std::to_string(times),
+                   fmt::format("0 to {}", FlatObstacles<Dim>::kMostDoublings));
 }
 
 }  // namespace

@@ -120,6 +120,11 @@ void check_obstacles(const Obstacles<Dim>& obstacles) {
              fmt::format("kNone, or 0 to {} - 1", motions));
   for (std::size_t i = 0; i < obstacles.motions.size(); ++i)
     if (!obstacles.motions[i]) refuse(element("obstacles.motions", i), "no function", "one of position and time");
+  const int corners = Dim, vertices = static_cast<int>(obstacles.rest.size());
+  for (std::size_t i = 0; i < obstacles.flats.size(); ++i)
+    if (obstacles.flats[i] < 0 || obstacles.flats[i] > vertices - corners)
+      refuse(element("obstacles.flats", i), std::to_string(obstacles.flats[i]),
+             fmt::format("the first of {} vertices, of {}", corners, vertices));
 }
 
 template <typename List, typename Member>

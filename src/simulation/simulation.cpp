@@ -15,6 +15,7 @@
 #include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
 #include "linear/choice.hpp"
+#include "simulation/flat_obstacles.hpp"
 #include "simulation/step.hpp"
 #include "unsupported.hpp"
 #include "watch.hpp"
@@ -56,6 +57,7 @@ struct Simulation<Dim>::Impl {
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
   Watch<Dim> watch;
+  std::optional<FlatObstacles<Dim>> flats;
 
   StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger}; }
 
@@ -113,6 +115,59 @@ struct Simulation<Dim>::Impl {
       put_back();
       throw;
     }
+  }
+
+  /// Gives the flat obstacles of the setup the size that they have in the state, also where a step did not lead on.
+  class FlatsOfState {
+   public:
+    explicit FlatsOfState(Impl& impl) : impl_(impl) {}
+    FlatsOfState(const FlatsOfState&) = delete;
+    FlatsOfState& operator=(const FlatsOfState&) = delete;
+    ~FlatsOfState() { impl_.flats->stretch(impl_.state->doublings, impl_.setup.obstacles); }
+
+   private:
+    Impl& impl_;
+  };
+
+  /// Where nodes are now, where they fly, and where they are held at the end of the step.
+  std::vector<VectorX> places_of_step(const State<Dim>& before) const {
+    std::vector<VectorX> places = {before.history.x[0]};
+    if (!setup.time.is_static && !setup.time.quasistatic)
+      places.push_back(TimeIntegrator(setup.time).predictor(before.history));
+    const HeldDofs<Dim> held = held_dofs(setup, before.mesh, setup.time.time_after(before.step + 1), before.space);
+    VectorX target = before.history.x[0];
+    for (Eigen::Index i = 0; i < target.size(); ++i)
+      if (held.held[i]) target[i] = held.target[i];
+    places.push_back(std::move(target));
+    return places;
+  }
+
+  /// The state before a step in which bodies come to these places: with larger flat obstacles if these must be, else null.
+  std::shared_ptr<const State<Dim>> with_room(const State<Dim>& before, const std::vector<VectorX>& places, double times) {
+    const std::vector<int> doublings = flats->find_doublings(before, places, times);
+    if (doublings.empty()) return nullptr;
+    flats->stretch(doublings, setup.obstacles);
+    return std::make_shared<const State<Dim>>(flats->doubled(before, doublings, setup.obstacles));
+  }
+
+  /// take(before) makes `end` of the state before, which stays on flat obstacles: it is taken again on larger ones if bodies
+  /// came near a border that was far from where they were expected.
+  template <typename Take>
+  StepResult step_with_room(const State<Dim>& end, const Take& take) {
+    constexpr double kAhead = 3, kAtEnd = 1.1;
+    std::shared_ptr<const State<Dim>> start = state;
+    if (!flats->empty())
+      if (auto larger = with_room(*start, places_of_step(*start), kAhead)) start = std::move(larger);
+    StepResult result = take(*start);
+    while (result.ok && !flats->empty()) {
+      auto larger = with_room(*start, {end.history.x[0]}, kAtEnd);
+      if (!larger) break;
+      start = std::move(larger);
+      const StepReport effort = result.report;
+      result = take(*start);
+      result.report.add_effort(effort);
+    }
+    return result;
   }
 
   void tell(const State<Dim>& before, const StepResult& result) {
@@ -212,6 +267,7 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   if (impl_->setup.consistent_initial_acceleration && !state->history.a.empty())
     set_consistent_acceleration(impl_->setup, *state, *impl_->cache);
   impl_->state = std::move(state);
+  impl_->flats.emplace(impl_->setup.obstacles);
   impl_->set_forces_at_rest();
 }
 
@@ -239,7 +295,9 @@ StepResult Simulation<Dim>::adapt(double dt) {
     const typename Impl::Inside inside(*impl_, Phase::in_step);
     State<Dim> end;
     const auto start = std::make_shared<State<Dim>>();
-    StepResult adapted = take_step(impl_->tools(), *impl_->state, end, false, start.get());
+    const typename Impl::FlatsOfState flats(*impl_);
+    StepResult adapted = impl_->step_with_room(
+        end, [&](const State<Dim>& now) { return take_step(impl_->tools(), now, end, false, start.get()); });
     if (!adapted.ok || adapted.renumbering.empty()) return adapted;
     before = impl_->change_to(start);
     ++impl_->mesh_revision;
@@ -263,14 +321,16 @@ StepResult Simulation<Dim>::advance() {
   {
     const typename Impl::Inside inside(*impl_, Phase::in_step);
     auto end = std::make_shared<State<Dim>>();
-    result = take_step_in_parts(impl_->tools(), *impl_->state, *end);
+    const typename Impl::FlatsOfState flats(*impl_);
+    result =
+        impl_->step_with_room(*end, [&](const State<Dim>& now) { return take_step_in_parts(impl_->tools(), now, *end); });
     if (!result.ok) return result;
     before = impl_->change_to(std::move(end));
   }
   impl_->forces = result.forces;
   impl_->report = result.report;
+  if (!result.renumbering.empty()) ++impl_->mesh_revision;  // whatever a listener throws
   impl_->watch.look(impl_->setup, *impl_->state, result.report, impl_->logger);
-  if (!result.renumbering.empty()) ++impl_->mesh_revision;
   impl_->tell(*before, result);
   return result;
 }
@@ -309,6 +369,7 @@ void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
   if (snapshot.owner != impl_->identity)
     throw InputError({"", "saved state", "one of another simulation", "one that this simulation has saved"});
   impl_->state = std::const_pointer_cast<State<Dim>>(snapshot.state);  // change_to leaves it as it is
+  impl_->flats->stretch(impl_->state->doublings, impl_->setup.obstacles);
   ++impl_->mesh_revision;
   impl_->setup.time = snapshot.time;
   impl_->scale_tolerances();
@@ -323,6 +384,7 @@ void Simulation<Dim>::restore(State<Dim> state) {
   if (impl_->state->space.is_linear() && !state.space.is_linear()) refuse_unsupported(impl_->setup, state);
   if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
   impl_->change_to(std::make_shared<State<Dim>>(std::move(state)));
+  impl_->flats->stretch(impl_->state->doublings, impl_->setup.obstacles);
   ++impl_->mesh_revision;
   impl_->report.reset();
   impl_->set_forces_at_rest();

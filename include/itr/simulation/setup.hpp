@@ -37,6 +37,9 @@ struct Obstacles {
   std::vector<std::array<int, 3>> triangles;    ///< 3D only
   std::vector<int> motion;                      ///< per vertex: index into `motions`, or kNone for a fixed one
   std::vector<SpaceTimeFunction<Dim>> motions;  ///< displacement from rest [m]
+  /// First vertices of planes without end, an edge in 2D and a regular triangle in 3D. A simulation makes them larger before
+  /// bodies come near their borders.
+  std::vector<int> flats{};
 };
 
 /// A surface that collides in place of the bodies' boundary. Its vertices are displaced by `weights` times the displacements

@@ -39,6 +39,7 @@ struct State {
   Strata<Dim> strata;           ///< of the mesh, once remeshing has found them
   linear::FactorRecord factor;  ///< factor that may serve the next step
   VectorX deviation;            ///< x - x-hat of the last step, where the next one begins [m]; empty before the first
+  std::vector<int> doublings;   ///< how often each of Obstacles::flats was made twice as large; empty: none was
   double stored_energy = 0;     ///< largest elastic and contact energy at the end of a step so far [J]
   double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };

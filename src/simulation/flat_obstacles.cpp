@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+#include "simulation/flat_obstacles.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace itr {
+
+namespace {
+
+int doublings_of(const std::vector<int>& doublings, std::size_t flat) { return doublings.empty() ? 0 : doublings[flat]; }
+
+/// Unit normal of the edge or triangle with these corners.
+template <typename Corner>
+auto normal_of(const Corner& corner) {
+  const auto side = (corner(1) - corner(0)).eval();
+  if constexpr (side.RowsAtCompileTime == 2)
+    return Vec<2>(-side[1], side[0]).normalized();
+  else
+    return Vec<3>(side.cross(corner(2) - corner(0))).normalized();
+}
+
+}  // namespace
+
+template <int Dim>
+void FlatObstacles<Dim>::stretch(const std::vector<int>& doublings, Obstacles<Dim>& obstacles) const {
+  for (std::size_t f = 0; f < flats_.size(); ++f) {
+    const int times = doublings_of(doublings, f);
+    Vec<Dim> middle = Vec<Dim>::Zero();
+    for (int k = 0; k < kVertices; ++k) middle += rest_[flats_[f] + k] / kVertices;
+    for (int v = flats_[f]; v < flats_[f] + kVertices; ++v)
+      obstacles.rest[v] = times == 0 ? rest_[v] : Vec<Dim>(middle + std::ldexp(1.0, times) * (rest_[v] - middle));
+  }
+}
+
+template <int Dim>
+std::vector<int> FlatObstacles<Dim>::find_doublings(const State<Dim>& state, const std::vector<VectorX>& positions,
+                                                    double times) const {
+  const Eigen::Index obstacles = Dim * static_cast<Eigen::Index>(rest_.size());
+  const Eigen::Index bodies = state.history.x[0].size() - obstacles;
+  std::vector<int> doublings = state.doublings;
+  doublings.resize(flats_.size(), 0);
+  bool is_enough = true;
+  for (std::size_t f = 0; f < flats_.size(); ++f) {
+    const auto corner = [&](int k) -> Vec<Dim> {
+      return state.history.x[0].template segment<Dim>(bodies + Dim * (flats_[f] + k));
+    };
+    Vec<Dim> middle = Vec<Dim>::Zero();
+    for (int k = 0; k < kVertices; ++k) middle += corner(k) / kVertices;
+    const Vec<Dim> normal = normal_of([&](int k) { return corner(k); });
+    double farthest = 0;
+    for (const VectorX& x : positions)
+      for (Eigen::Index i = 0; i < x.size() - obstacles; i += Dim) {
+        const Vec<Dim> arm = x.template segment<Dim>(i) - middle;
+        farthest = std::max(farthest, (arm - arm.dot(normal) * normal).norm());
+      }
+    // Of the edge's end, or of the triangle's sides: half as far as its corners.
+    double reach = std::ldexp((corner(0) - middle).norm() / (Dim - 1), doublings[f] - doublings_of(state.doublings, f));
+    while (reach < times * farthest && doublings[f] < kMostDoublings) {
+      reach *= 2;
+      ++doublings[f];
+      is_enough = false;
+    }
+  }
+  return is_enough ? std::vector<int>() : doublings;
+}
+
+template <int Dim>
+State<Dim> FlatObstacles<Dim>::doubled(const State<Dim>& state, const std::vector<int>& doublings,
+                                       const Obstacles<Dim>& obstacles) const {
+  State<Dim> result = state;
+  const Eigen::Index bodies = state.history.x[0].size() - Dim * static_cast<Eigen::Index>(rest_.size());
+  const auto stretch = [&](std::size_t f, VectorX& field, bool are_positions) {
+    const double factor = std::ldexp(1.0, doublings[f] - doublings_of(state.doublings, f));
+    auto of_flat = field.segment(bodies + Dim * flats_[f], Dim * kVertices).reshaped(Dim, kVertices);
+    const Vec<Dim> middle = of_flat.rowwise().mean();
+    for (int k = 0; k < kVertices; ++k) {
+      const int v = flats_[f] + k;
+      if (are_positions && obstacles.motion[v] == kNone)
+        of_flat.col(k) = obstacles.rest[v];
+      else
+        of_flat.col(k) = middle + factor * (of_flat.col(k) - middle);
+    }
+  };
+  for (std::size_t f = 0; f < flats_.size(); ++f) {
+    if (doublings[f] == doublings_of(state.doublings, f)) continue;
+    for (VectorX& x : result.history.x) stretch(f, x, true);
+    for (VectorX& v : result.history.v) stretch(f, v, false);
+    for (VectorX& a : result.history.a) stretch(f, a, false);
+  }
+  result.doublings = doublings;
+  return result;
+}
+
+template class FlatObstacles<2>;
+template class FlatObstacles<3>;
+
+}  // namespace itr
