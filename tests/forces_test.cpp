@@ -129,6 +129,34 @@ TEST(Forces, OfASupportBalanceDamping) {
   expect_forces_change_momentum<2>(setup, no_loads<2>);
 }
 
+/// A block that lands on a table while contact is damped: bodies and table exert on each other what changes the momentum.
+template <int Dim>
+void expect_damped_contact_in_forces() {
+  Setup<Dim> setup = block<Dim>();
+  add_table(setup);
+  setup.damping.push_back({.term = DampingOptions::Term::contact, .coefficient = 0.02, .lagging_rounds = 3});
+  setup.initial_velocity.push_back({1, [](const Vec<Dim>&, double) { return Vec<Dim>(-Vec<Dim>::Unit(1)); }});
+  auto simulation = simulate(setup);
+  double damped = 0;
+  for (int step = 0; step < 5; ++step) {
+    const Vec<Dim> before(asked(simulation).momentum.data());
+    const StepResult result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    damped = std::max(damped, result.report.energy.damping);
+    const AskedFields fields = asked(simulation);
+    const Vec<Dim> change = (Vec<Dim>(fields.momentum.data()) - before) / setup.time.dt;
+    const Vec<Dim> contact = sum<Dim>(fields.forces.contact);
+    EXPECT_LT((change + weight<Dim>() * Vec<Dim>::Unit(1) - contact).norm(), 1e-7 * weight<Dim>()) << step;
+    EXPECT_LT((sum<Dim>(result.forces.obstacle_contact) + contact).norm(), 1e-10 * (1 + contact.norm())) << step;
+  }
+  EXPECT_GT(damped, 1e-3 * weight<Dim>() * kSize);
+}
+
+TEST(Forces, OfContactHaveItsDamping) {
+  expect_damped_contact_in_forces<2>();
+  expect_damped_contact_in_forces<3>();
+}
+
 TEST(Forces, OfASupportBalancePressure) {
   auto setup = hanging_block<2>();
   constexpr double p = 3000;

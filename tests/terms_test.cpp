@@ -102,7 +102,9 @@ TEST(Terms, OfTheTableAreThoseThatAreSummed) {
       {TermKind::friction, [](auto& c) { c.contact.friction_coefficient = 0; }},
       {TermKind::friction, [](auto& c) { c.contact.friction_iterations = 0; }},
       {TermKind::pressure, [](auto& c) { c.loads.pressures.clear(); }},
-      {TermKind::damping, [](auto& c) { c.damping.clear(); }}};
+      {TermKind::damping, [](auto& c) { c.damping.clear(); }},
+      {TermKind::contact_damping, [](auto& c) { c.damping.clear(); }},
+      {TermKind::contact_damping, [](auto& c) { c.contact.enabled = false; }}};
   const auto compare = [](const TrialScene& scene) {
     const auto summed = summed_terms(scene);
     std::size_t count = 0;

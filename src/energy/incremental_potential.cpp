@@ -103,8 +103,8 @@ typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstV
       lagged.damping.push_back(
           std::make_shared<DampingEnergy<Dim>>(*elastic_, x, options.coefficient, velocity(), workspace));
     else if (contact_)
-      lagged.damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(*contact_, on_surface(x), options.coefficient,
-                                                                             velocity_of_surface(), workspace)));
+      lagged.contact_damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(
+          *contact_, on_surface(x), options.coefficient, velocity_of_surface(), workspace)));
   }
   if (is_in(TermKind::follower, *terms_)) lagged.follower = terms_->follower(x);
   return lagged;

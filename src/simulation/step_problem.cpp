@@ -471,7 +471,7 @@ int StepProblem<Dim>::most_rounds() const {
   int rounds = 1;
   if (potential_.has_friction())
     rounds = setup_.contact.friction_iterations < 0 ? std::numeric_limits<int>::max() : setup_.contact.friction_iterations;
-  if (!lagged_.damping.empty())
+  if (!lagged_.damping.empty() || !lagged_.contact_damping.empty())
     for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
   if (has_lagged_loads()) rounds = std::max(rounds, kPressureRounds);
   return rounds;

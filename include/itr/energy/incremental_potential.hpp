@@ -41,7 +41,7 @@ class IncrementalPotential {
   struct Lagged {
     std::shared_ptr<const Energy> friction;
     std::shared_ptr<PressureEnergy<Dim>> pressure;
-    std::vector<std::shared_ptr<const Energy>> damping;
+    std::vector<std::shared_ptr<const Energy>> damping, contact_damping;
     std::shared_ptr<const Energy> follower;
   };
   /// Those lagged at x.
@@ -64,6 +64,7 @@ class IncrementalPotential {
     visit(TermKind::friction, lagged.friction);
     visit(TermKind::pressure, lagged.pressure);
     for (const auto& term : lagged.damping) visit(TermKind::damping, term);
+    for (const auto& term : lagged.contact_damping) visit(TermKind::contact_damping, term);
   }
   /// Adds those to a sum of which `is_asked(traits)` holds.
   template <typename F>

@@ -41,8 +41,8 @@ struct PotentialTerms {
 };
 
 /// In the order in which they are summed.
-enum class TermKind { inertia, elastic, loads, host, follower, contact, friction, pressure, damping };
-inline constexpr std::size_t kNumTermKinds = 9;
+enum class TermKind { inertia, elastic, loads, host, follower, contact, friction, pressure, damping, contact_damping };
+inline constexpr std::size_t kNumTermKinds = 10;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
@@ -80,6 +80,13 @@ template <int Dim>
 bool is_bounded(const Material& material) {
   return material.law != MaterialLaw::own && material.law != MaterialLaw::mooney_rivlin && !material.has_varying_moduli() &&
          !material.density_at && material.lame_lambda(Dim) >= 0;
+}
+
+/// Whether the Hessian of such a term is damped.
+template <int Dim>
+bool has_damping(const PotentialTerms<Dim>& terms, DampingOptions::Term damped) {
+  return std::any_of(terms.damping.begin(), terms.damping.end(),
+                     [&](const DampingOptions& options) { return options.term == damped; });
 }
 
 /// By kind.
@@ -149,10 +156,20 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .force = ForceEntry::applied,
      .has_no_potential = true},
     {.kind = TermKind::damping,
-     .is_in = [](const PotentialTerms<Dim>& terms) { return !terms.damping.empty(); },
+     .is_in = [](const PotentialTerms<Dim>& terms) { return has_damping(terms, DampingOptions::Term::elastic); },
      .energy = EnergyEntry::damping,
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
      .needs_velocities = true},
+    {.kind = TermKind::contact_damping,  // bodies and obstacles exert it on each other, as they do contact
+     .is_in =
+         [](const PotentialTerms<Dim>& terms) {
+           return terms.contact.enabled && has_damping(terms, DampingOptions::Term::contact);
+         },
+     .energy = EnergyEntry::damping,
+     .force = ForceEntry::contact,
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
+     .needs_velocities = true,
+     .is_between_bodies = true},
 }};
 
 static_assert([] {
