@@ -53,6 +53,28 @@ TEST(CInterface, SaysWhatIsWrongAndGoesOn) {
   EXPECT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
 }
 
+TEST(CInterface, ResultantTakesNamesAndIdsAndRefusesOthers) {
+  CBlock block(R"({"contact": {"enabled": true, "dhat": 1e-3}})", [](itr_model* model) {
+    const double wall[] = {0.2005, -1, 0.2005, 1};
+    const int edge[] = {0, 1};
+    return itr_model_add_obstacle(model, "wall", 2, wall, 1, edge, 0, nullptr, nullptr);
+  });
+  ASSERT_EQ(itr_watch_forces(block.simulation, 1), ITR_SUCCESS);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
+  const double about[] = {0, 0};
+  double force[2], other[2], moment;
+  for (const char* part : {"left", "wall", "1", "2", "boundary:1", "obstacle:2", "body:0", "0"})
+    EXPECT_EQ(itr_resultant(block.simulation, part, about, force, &moment), ITR_SUCCESS) << part;
+  for (const char* part : {"lefd", "7", "", "body:1", "boundary:wall"})
+    EXPECT_EQ(itr_resultant(block.simulation, part, about, force, &moment), ITR_BAD_INPUT) << part;
+  EXPECT_EQ(itr_resultant(block.simulation, "wall", about, force, &moment), ITR_SUCCESS);
+  EXPECT_EQ(itr_resultant_of_id(block.simulation, 2, about, other, &moment), ITR_SUCCESS);
+  EXPECT_GT(force[0], 0);  // the block pushes it away
+  EXPECT_EQ(other[0], force[0]);
+  EXPECT_EQ(itr_resultant_of_id(block.simulation, 7, about, force, &moment), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_resultant_of_id(nullptr, 2, about, force, &moment), ITR_BAD_INPUT);
+}
+
 TEST(CInterface, AnswersAnErrorWithoutASimulation) {
   EXPECT_TRUE(std::isnan(itr_time(nullptr)));
   EXPECT_EQ(itr_steps(nullptr), -1);

@@ -2,7 +2,11 @@
 // The facade over both dimensions: arrays in, steps, arrays out, errors that name a place.
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <limits>
 #include <optional>
 
@@ -143,6 +147,41 @@ TEST(Facade, MovesObstaclesByArraysAndFunctions) {
     EXPECT_LT(xx, 0);
   }
   EXPECT_LE(simulation.as<2>().setup().obstacles.motions.size(), 3u);  // places are used again
+}
+
+/// A scene of a square (body 1, surface 8) on a ground (obstacle 2, named) after some steps.
+AnySimulation square_on_ground() {
+  const std::string file = std::string(::testing::TempDir()) + "itr_square_" + std::to_string(::getpid()) + ".json";
+  std::ofstream(file) << R"({"geometry": [{"mesh": ")" ITR_SOURCE_DIR
+                         R"(/examples/meshes/square.msh", "name": "block", "volume_selection": 1, "surface_selection": 8},
+      {"type": "ground", "height": -0.5005, "surface_selection": 2, "name": "table"}],
+      "materials": [{"id": 1, "type": "NeoHookean", "E": 1e6, "nu": 0.3, "rho": 1000}],
+      "boundary_conditions": {"rhs": [0, 9.81]}, "time": {"dt": 0.01, "time_steps": 5, "integrator": "ImplicitEuler"},
+      "contact": {"enabled": true, "dhat": 1e-3}})";
+  const Model model = Model::from_scene(file);
+  std::remove(file.c_str());
+  return AnySimulation(model);
+}
+
+TEST(Facade, ResultantTakesWhatOutputForcesTakes) {
+  AnySimulation simulation = square_on_ground();
+  simulation.watch_forces(true);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(simulation.step().ok);
+  const double up = simulation.resultant("table").force[1];
+  EXPECT_LT(up, -1);  // the body presses it down
+  for (const char* text : {"2", "obstacle:2", "obstacle:table"}) EXPECT_EQ(simulation.resultant(text).force[1], up) << text;
+  EXPECT_EQ(simulation.resultant(2).force[1], up);
+  for (const char* text : {"block", "1", "body:1", "body:block", "8", "boundary:8"})
+    EXPECT_NEAR(simulation.resultant(text).force[1], -up, 1e-10 * std::abs(up)) << text;
+  EXPECT_EQ(simulation.resultant(8).force[1], simulation.resultant("8").force[1]);
+  const std::array<std::string, 3> both = {"table", "2", "block"};
+  EXPECT_NEAR(simulation.resultant(both, std::array{0.0, 0.0}).force[1], 0, 1e-10 * std::abs(up));
+  for (const char* text : {"7", "tables", "", "body:2", "obstacle:1", "boundary:table", "block "})
+    EXPECT_THROW(simulation.resultant(text), InputError) << text;
+  EXPECT_THROW(simulation.resultant(7), InputError);
+  EXPECT_THROW(simulation.resultant(-1), InputError);
+  EXPECT_THROW(simulation.resultant(std::span<const std::string>(), std::array{0.0, 0.0}), InputError);
+  EXPECT_THROW(simulation.set_traction("7", std::vector<double>()), InputError);
 }
 
 TEST(Facade, ReadsScenes) {

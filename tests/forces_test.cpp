@@ -250,6 +250,28 @@ TEST(Resultants, AreTheRateOfMomentum) {
   expect_resultants<3>();
 }
 
+TEST(Resultants, RefuseWhatNothingHas) {
+  auto setup = block<2>();
+  add_table(setup);
+  setup.fields.applied_forces = true;
+  auto simulation = simulate(setup);
+  ASSERT_TRUE(simulation.advance().ok);
+  EXPECT_NO_THROW(resultant<2>(simulation, std::array{1, 3}, Vec<2>::Zero()));
+  EXPECT_THROW(resultant<2>(simulation, std::array{1, 77}, Vec<2>::Zero()), InputError);
+  EXPECT_THROW(resultant<2>(simulation, {}, Vec<2>::Zero()), InputError);
+  const auto refused = [&](const ForceTarget& target) {
+    EXPECT_THROW(force_sums(simulation.state(), simulation.forces(), target), InputError);
+    auto with_curve = setup;
+    with_curve.fields.curves = {target};
+    EXPECT_THROW(simulate(with_curve), InputError);
+  };
+  refused({.name = "none"});
+  refused({.name = "surface", .surfaces = {77}});
+  refused({.name = "body", .bodies = {1, 2}});
+  refused({.name = "obstacle", .obstacle_vertices = {0, 2}});
+  refused({.name = "obstacle", .obstacle_vertices = {-1}});
+}
+
 TEST(Resultants, HaveTheMomentOfTheForces) {
   auto setup = block<2>();
   setup.fields.applied_forces = true;

@@ -224,6 +224,22 @@ class Conditions(unittest.TestCase):
         simulation.step()
         np.testing.assert_allclose(simulation.forces("applied"), 0)
 
+    def test_resultants_are_of_names_and_ids(self):
+        model = make_model(contact={"enabled": True, "dhat": 1e-3})
+        wall = model.add_obstacle("wall", [[0.2005, -1], [0.2005, 1]], edges=[[0, 1]])
+        simulation = itr.Simulation(model)
+        simulation.watch_forces()
+        simulation.step()
+        force = simulation.resultant("wall")[0]
+        self.assertGreater(force[0], 0)  # the block pushes it away
+        for parts in (wall, str(wall), np.int64(wall), [wall], ["wall", wall], f"obstacle:{wall}", "obstacle:wall"):
+            np.testing.assert_array_equal(simulation.resultant(parts)[0], force)
+        for parts in (0, "0", "body:0"):
+            np.testing.assert_allclose(simulation.resultant(parts)[0], -force, rtol=1e-10)
+        for parts in (77, "77", -1, "lefd", ["left", 77], "body:1", 1.5, None, []):
+            with self.subTest(parts), self.assertRaises(itr.InputError):
+                simulation.resultant(parts)
+
     def test_pressures_and_accelerations_are_constants_arrays_or_functions(self):
         for method, constant, shape in (("set_pressure", 50.0, (16,)), ("set_acceleration", [1.0, -10.0], (16, 2))):
             results = []

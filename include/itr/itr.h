@@ -248,10 +248,15 @@ ITR_C_API const double* itr_forces(const itr_simulation* simulation, itr_force k
 ITR_C_API itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* von_mises);
 /** Copies Cauchy's stress, num_cells * dimension * dimension numbers, row by row [Pa]. */
 ITR_C_API itr_status itr_get_stress(itr_simulation* simulation, size_t length, double* stress);
-/** Sum of all kinds of forces on a boundary, or of bodies on an obstacle: force [N], `dimension` numbers, and moment about a
- * point [N m], one number in 2D and three in 3D. */
-ITR_C_API itr_status itr_resultant(itr_simulation* simulation, const char* boundary, const double* about, double* force,
+/** Sum of all kinds of forces on a boundary or a body, or of bodies on an obstacle: force [N], `dimension` numbers, and
+ * moment about a point [N m], one number in 2D and three in 3D. A part is a name or an id ("3"), looked for among
+ * boundaries, then obstacles, then bodies; "boundary:3", "obstacle:3" and "body:3" look among these alone. ITR_BAD_INPUT for
+ * what nothing has. */
+ITR_C_API itr_status itr_resultant(itr_simulation* simulation, const char* part, const double* about, double* force,
                                    double* moment);
+/** The same by id. */
+ITR_C_API itr_status itr_resultant_of_id(itr_simulation* simulation, int id, const double* about, double* force,
+                                         double* moment);
 
 /** Energies of the last step by term [J]. `host` sums the terms of the program. */
 typedef struct itr_energies {

@@ -337,8 +337,8 @@ void add_simulation(py::module_& m) {
              return copied(std::vector<double>(values.begin(), values.end()), s.dimension());
            })
       .def("resultant",
-           [](const AnySimulation& s, const std::vector<std::string>& boundaries, const Doubles& about) {
-             const auto sum = s.resultant(boundaries, view(about));
+           [](const AnySimulation& s, const std::vector<std::string>& parts, const Doubles& about) {
+             const auto sum = s.resultant(parts, view(about));
              return py::make_tuple(copied(sum.force, 1), copied(sum.moment, 1));
            })
       .def("save", [](const AnySimulation& s) { return Saved{s.save()}; })

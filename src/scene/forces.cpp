@@ -13,8 +13,7 @@ namespace {
 template <int Dim>
 class ForceReader {
  public:
-  ForceReader(const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles, const Mesh<Dim>& mesh)
-      : geometries_(geometries), obstacles_(obstacles), mesh_(mesh) {}
+  ForceReader(const PartNames& parts, const Mesh<Dim>& mesh) : parts_(parts), mesh_(mesh) {}
 
   ForceTarget read(const Node& node) const {
     ForceTarget target;
@@ -24,7 +23,7 @@ class ForceReader {
     for (const Node& id : node["surfaces"].items()) target.surfaces.push_back(surface(id));
     for (const Node& id : node["bodies"].items()) target.bodies.push_back(body(id));
     std::set<int> vertices;
-    for (const Node& id : node["obstacles"].items()) vertices.merge(obstacle(id));
+    for (const Node& id : node["obstacles"].items()) vertices.insert(obstacle(id).begin(), obstacle(id).end());
     target.obstacle_vertices.assign(vertices.begin(), vertices.end());
     if (target.surfaces.empty() && target.bodies.empty() && vertices.empty())
       node.fail("no surfaces, bodies or obstacles", "at least one of them");
@@ -52,12 +51,7 @@ class ForceReader {
   }
 
   int body(const Node& node) const {
-    if (node.json().is_string()) {
-      const Node selection = named(node, geometries_.bodies)["volume_selection"];
-      if (!selection.exists() || !selection.json().is_number())
-        node.fail("the name of a geometry whose volume_selection is a number, or an id");
-      return read_id(selection, 0);
-    }
+    if (node.json().is_string()) return named(node, parts_.bodies);
     std::set<int> ids;
     for (CellId c = 0; c < mesh_.cell_slots(); ++c) ids.insert(mesh_.body(c));
     const int id = read_id(node, 0);
@@ -65,48 +59,56 @@ class ForceReader {
     return id;
   }
 
-  std::set<int> obstacle(const Node& node) const {
-    std::set<int> vertices;
-    if (node.json().is_string()) {
-      const std::string pointer = named(node, geometries_.obstacles).pointer();
-      for (std::size_t i = 0; i < geometries_.obstacles.size(); ++i)
-        if (geometries_.obstacles[i].pointer() == pointer) take(obstacles_.part, static_cast<int>(i), vertices);
-      return vertices;
-    }
-    take(obstacles_.id, read_id(node, 0), vertices);
-    std::set<int> ids(obstacles_.id.begin(), obstacles_.id.end());
-    ids.erase(kNoTag);
-    if (vertices.empty()) refuse(node, "the surface_selection of an obstacle, or its name", ids);
-    return vertices;
+  const std::vector<int>& obstacle(const Node& node) const {
+    if (node.json().is_string()) return named(node, parts_.obstacles);
+    const auto found = parts_.obstacles_by_id.find(read_id(node, 0));
+    if (found != parts_.obstacles_by_id.end()) return found->second;
+    std::set<int> ids;
+    for (const auto& [id, vertices] : parts_.obstacles_by_id) ids.insert(id);
+    refuse(node, "the surface_selection of an obstacle, or its name", ids);
   }
 
-  static void take(const std::vector<int>& keys, int key, std::set<int>& vertices) {
-    for (std::size_t v = 0; v < keys.size(); ++v)
-      if (keys[v] == key) vertices.insert(static_cast<int>(v));
-  }
-
-  static const Node& named(const Node& node, const std::vector<Node>& geometries) {
+  template <typename Part>
+  static const Part& named(const Node& node, const std::map<std::string, Part>& parts) {
+    const auto found = parts.find(node.string(""));
+    if (found != parts.end()) return found->second;
     std::string names;
-    for (const Node& geometry : geometries) {
-      const std::string name = geometry["name"].string("");
-      if (name == node.string("")) return geometry;
-      if (!name.empty()) names += (names.empty() ? "" : ", ") + name;
-    }
+    for (const auto& [name, part] : parts) names += (names.empty() ? "" : ", ") + name;
     node.fail(abbreviate(node.json()) + ", which no /geometry/*/name is",
               names.empty() ? "an id: there are no names" : names);
   }
 
-  const Geometries& geometries_;
-  const ObstacleGeometry<Dim>& obstacles_;
+  const PartNames& parts_;
   const Mesh<Dim>& mesh_;
 };
 
 }  // namespace
 
 template <int Dim>
-std::vector<ForceTarget> read_forces(const Node& root, const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles,
-                                     const Mesh<Dim>& mesh) {
-  const ForceReader<Dim> reader(geometries, obstacles, mesh);
+PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles) {
+  PartNames parts;
+  for (const Node& geometry : geometries.bodies) {
+    const Node selection = geometry["volume_selection"];
+    const std::string name = geometry["name"].string("");
+    if (!name.empty() && selection.exists() && selection.json().is_number())
+      parts.bodies.emplace(name, read_id(selection, 0));
+  }
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < geometries.obstacles.size(); ++i)
+    if (const std::string name = geometries.obstacles[i]["name"].string(""); !name.empty()) first.emplace(name, i);
+  for (const auto& [name, part] : first) {
+    std::vector<int>& vertices = parts.obstacles[name];
+    for (std::size_t v = 0; v < obstacles.part.size(); ++v)
+      if (obstacles.part[v] == static_cast<int>(part)) vertices.push_back(static_cast<int>(v));
+  }
+  for (std::size_t v = 0; v < obstacles.id.size(); ++v)
+    if (obstacles.id[v] != kNoTag) parts.obstacles_by_id[obstacles.id[v]].push_back(static_cast<int>(v));
+  return parts;
+}
+
+template <int Dim>
+std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, const Mesh<Dim>& mesh) {
+  const ForceReader<Dim> reader(parts, mesh);
   std::vector<ForceTarget> targets;
   std::set<std::string> names;
   for (const Node& node : root["output"]["forces"].items()) {
@@ -116,7 +118,11 @@ std::vector<ForceTarget> read_forces(const Node& root, const Geometries& geometr
   return targets;
 }
 
-template std::vector<ForceTarget> read_forces(const Node&, const Geometries&, const ObstacleGeometry<2>&, const Mesh<2>&);
-template std::vector<ForceTarget> read_forces(const Node&, const Geometries&, const ObstacleGeometry<3>&, const Mesh<3>&);
+#define ITR_INSTANTIATE(Dim)                                                      \
+  template PartNames name_parts(const Geometries&, const ObstacleGeometry<Dim>&); \
+  template std::vector<ForceTarget> read_forces(const Node&, const PartNames&, const Mesh<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
 
 }  // namespace itr::scene

@@ -3,12 +3,16 @@
 #pragma once
 
 #include "geometry.hpp"
+#include "itr/scene/scene.hpp"
 
 namespace itr::scene {
 
+/// A name that several geometries have is that of the first. Bodies whose `volume_selection` is no number have none.
+template <int Dim>
+PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles);
+
 /// Throws InputError for what nothing has, and for names that are there twice.
 template <int Dim>
-std::vector<ForceTarget> read_forces(const Node& root, const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles,
-                                     const Mesh<Dim>& mesh);
+std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, const Mesh<Dim>& mesh);
 
 }  // namespace itr::scene

@@ -76,7 +76,8 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
 }
 
 template <int Dim>
-Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
+Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles& files, PartNames& parts,
+                      std::vector<std::string>& warnings) {
   Setup<Dim> setup;
   setup.units = root.document().units;
   setup.mesh = read_bodies<Dim>(geometries, files, warnings);
@@ -85,7 +86,8 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
       for (const char* key : {"translation", "dimensions", "scale"})
         warn_of_components(geometry["transformation"][key], Dim, warnings, true);
   ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, warnings);
-  std::vector<ForceTarget> curves = read_forces<Dim>(root, geometries, obstacles, setup.mesh);
+  parts = name_parts<Dim>(geometries, obstacles);
+  std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, setup.mesh);
   read_model<Dim>(root, std::move(obstacles), setup, warnings);
   setup.fields.curves = std::move(curves);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
@@ -170,9 +172,9 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   document.units.dim = find_dimension(geometries, files);
   scene.output = read_output(root);
   if (document.units.dim == 2)
-    scene.setup = read_setup<2>(root, geometries, files, scene.warnings);
+    scene.setup = read_setup<2>(root, geometries, files, scene.parts, scene.warnings);
   else
-    scene.setup = read_setup<3>(root, geometries, files, scene.warnings);
+    scene.setup = read_setup<3>(root, geometries, files, scene.parts, scene.warnings);
   return scene;
 }
 

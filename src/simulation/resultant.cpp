@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "itr/simulation/resultant.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <set>
 
 #include "itr/core/error.hpp"
 #include "itr/fem/cell_set.hpp"
+#include "simulation/force_target.hpp"
 
 namespace itr {
 
@@ -38,7 +43,33 @@ std::vector<char> nodes_of(const State<Dim>& state, std::span<const int> surface
   return is_on;
 }
 
+void refuse_unknown_ids(std::span<const int> ids, const std::set<int>& known, const std::string& place, const char* what) {
+  for (const int id : ids)
+    if (!known.contains(id))
+      throw InputError(
+          {"", place, fmt::format("{}, which nothing has", id),
+           known.empty() ? fmt::format("{}: there is none", what) : fmt::format("{}: {}", what, fmt::join(known, ", "))});
+}
+
 }  // namespace
+
+template <int Dim>
+void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_t obstacle_vertices,
+                    const std::string& place) {
+  if (target.surfaces.empty() && target.bodies.empty() && target.obstacle_vertices.empty())
+    throw InputError({"", place, "no surfaces, bodies or obstacles", "at least one of them"});
+  std::set<int> surfaces, bodies;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.is_facet_alive(f) && mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    if (mesh.is_cell_alive(c)) bodies.insert(mesh.body(c));
+  refuse_unknown_ids(target.surfaces, surfaces, place, "the id of a surface");
+  refuse_unknown_ids(target.bodies, bodies, place, "the id of a body");
+  for (const int v : target.obstacle_vertices)
+    if (v < 0 || static_cast<std::size_t>(v) >= obstacle_vertices)
+      throw InputError(
+          {"", place, std::to_string(v), fmt::format("a vertex of the obstacles, 0 to {} - 1", obstacle_vertices)});
+}
 
 template <int Dim>
 ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
@@ -49,6 +80,8 @@ ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, co
       throw InputError({"", "fields", "not all kinds of forces",
                         "contact_forces, friction_forces, reaction_forces and applied_forces for a resultant"});
   const VectorX& x = state.history.x[0];
+  refuse_unknown(target, state.mesh, static_cast<std::size_t>(x.size()) / Dim - static_cast<std::size_t>(bodies),
+                 "forces of '" + target.name + "'");
   const Vec<Dim> about(target.about.data());
   const std::vector<char> is_on = nodes_of(state, target.surfaces, target.bodies);
   ForceSums<Dim> sums;
@@ -76,14 +109,15 @@ ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, co
 
 template <int Dim>
 Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about) {
-  ForceTarget target;
+  ForceTarget target{.name = "resultant"};
   target.surfaces.assign(tags.begin(), tags.end());
   std::copy(about.begin(), about.end(), target.about.begin());
   return force_sums(simulation.state(), simulation.forces(), target).all;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                             \
-  template Resultant<Dim> resultant<Dim>(const Simulation<Dim>&, std::span<const int>, const Vec<Dim>&); \
+#define ITR_INSTANTIATE(Dim)                                                                                \
+  template void refuse_unknown<Dim>(const ForceTarget&, const Mesh<Dim>&, std::size_t, const std::string&); \
+  template Resultant<Dim> resultant<Dim>(const Simulation<Dim>&, std::span<const int>, const Vec<Dim>&);    \
   template ForceSums<Dim> force_sums<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -9,6 +9,7 @@
 
 #include "itr/core/error.hpp"
 #include "itr/fem/space.hpp"
+#include "simulation/force_target.hpp"
 
 namespace itr {
 
@@ -189,6 +190,8 @@ void Setup<Dim>::validate() const {
   StepSetup<Dim>::validate();
   check_materials(*this);
   check_proxy(*this);
+  for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
+    refuse_unknown(this->fields.curves[i], mesh, this->obstacles.rest.size(), element("fields.curves", i));
   linear.validate();
   for (const auto& [name, list] :
        {std::pair{"initial_displacement", &initial_displacement}, std::pair{"initial_velocity", &initial_velocity},

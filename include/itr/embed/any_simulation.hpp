@@ -138,17 +138,19 @@ class AnySimulation {
   /// Turns the computation of forces after each step on or off. It costs a few gradients a step.
   void watch_forces(bool watched);
   const NodalForces& forces() const;  ///< dimension numbers a node [N]; empty unless watched
-  /// Sum of all forces on boundaries [N] and its moment about a point [N m], see itr::resultant. Forces must be watched.
+  /// Sum of all forces on parts [N] and its moment about a point [N m], see itr::resultant. Forces must be watched.
   struct Resultants {
     std::vector<double> force, moment;  ///< dimension numbers; one in 2D, three in 3D
   };
-  /// The resultant on several boundaries and obstacles together: of what acts on boundaries, and of what bodies do to
-  /// obstacles.
-  Resultants resultant(std::span<const std::string> boundaries, std::span<const double> about) const;
-  Resultants resultant(const std::string& boundary) const;  ///< about the origin
-  std::vector<double> elastic_density() const;              ///< by cell, of rest volume [J/m^Dim]
-  std::vector<double> von_mises() const;                    ///< by cell [Pa]
-  std::vector<double> stress() const;                       ///< Cauchy's by cell, dimension^2 numbers, row by row [Pa]
+  /// The resultant on several parts together: of what acts on boundaries and bodies, and of what bodies do to obstacles. A
+  /// part is a name or an id (`"3"`), looked for among boundaries, then obstacles, then bodies; `"boundary:3"`,
+  /// `"obstacle:3"` and `"body:3"` look among these alone. Throws InputError for what nothing has.
+  Resultants resultant(std::span<const std::string> parts, std::span<const double> about) const;
+  Resultants resultant(const std::string& part) const;  ///< about the origin
+  Resultants resultant(int id) const;                   ///< the same
+  std::vector<double> elastic_density() const;          ///< by cell, of rest volume [J/m^Dim]
+  std::vector<double> von_mises() const;                ///< by cell [Pa]
+  std::vector<double> stress() const;                   ///< Cauchy's by cell, dimension^2 numbers, row by row [Pa]
 
   /// A saved state, see Snapshot.
   using Saved = std::variant<Snapshot<2>, Snapshot<3>>;

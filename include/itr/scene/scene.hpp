@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
@@ -19,13 +20,21 @@ struct Override {
   std::string value;  ///< JSON text
 };
 
+/// Names and ids of bodies and obstacles, as /output/forces takes them.
+struct PartNames {
+  std::map<std::string, int> bodies;                  ///< ids by name
+  std::map<std::string, std::vector<int>> obstacles;  ///< vertices by name
+  std::map<int, std::vector<int>> obstacles_by_id;    ///< vertices by `surface_selection`
+};
+
 struct Scene {
   std::variant<Setup<2>, Setup<3>> setup;  ///< the dimension is chosen here, once
   OutputOptions output;
   int max_threads = 0;                ///< solver/max_threads; 0: all
   std::string directory;              ///< output/directory, may be empty
   std::vector<std::string> warnings;  ///< on values that are legal and suspicious
-  std::string identity;               ///< JSON of all that the results depend on: the merged scene, hashes of its files
+  PartNames parts;
+  std::string identity;  ///< JSON of all that the results depend on: the merged scene, hashes of its files
 };
 
 /// One difference between two identities, with its JSON pointer, and what it is of.

@@ -19,7 +19,7 @@ struct Resultant {
 /// Returns the sum of contact, friction, reactions, tractions, pressures and forces of the program on the vertices of the
 /// boundary facets with these tags, and its moment about `about` [m]. A vertex counts once, also if other facets share it.
 /// Over the whole boundary, together with body forces and the program's forces inside, it is the rate of the bodies'
-/// momentum. Throws InputError if the setup does not ask for the four kinds of forces.
+/// momentum. Throws InputError for tags that no facet has, and if the setup does not ask for the four kinds of forces.
 template <int Dim>
 Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int> tags, const Vec<Dim>& about);
 
@@ -28,7 +28,8 @@ template <int Dim>
 struct ForceSums {
   Resultant<Dim> contact, friction, reaction, all;  ///< all: with tractions, pressures and the program's forces
 };
-/// Obstacles have contact and friction only: the forces of the bodies on them. Throws InputError as above.
+/// Obstacles have contact and friction only: the forces of the bodies on them. Throws InputError as above, also for bodies
+/// and vertices of obstacles that are not there.
 template <int Dim>
 ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target);
 

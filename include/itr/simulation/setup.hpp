@@ -84,10 +84,10 @@ struct InitialCondition {
 /// Vertices whose forces are summed: on surfaces, of bodies, or of obstacles. Each counts once.
 struct ForceTarget {
   std::string name;
-  std::vector<int> surfaces;           ///< tags of boundary facets
-  std::vector<int> bodies;             ///< ids
-  std::vector<int> obstacle_vertices;  ///< indices into Obstacles::rest
-  std::array<double, 3> about{};       ///< point of moments [m]
+  std::vector<int> surfaces{};           ///< tags of boundary facets
+  std::vector<int> bodies{};             ///< ids
+  std::vector<int> obstacle_vertices{};  ///< indices into Obstacles::rest
+  std::array<double, 3> about{};         ///< point of moments [m]
 };
 
 /// Fields that observers get beside positions, velocities and elastic density. Others are not computed.

@@ -14,6 +14,7 @@ array, which index, what was found and what was expected.
 
 from __future__ import annotations
 
+import operator
 import tempfile
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, Optional, Sequence, Union
 
@@ -390,10 +391,13 @@ class Simulation:
         return self._simulation.forces(FORCES.index(kind))
 
     def resultant(
-        self, boundaries: Union[str, Iterable[str]], about: Optional[Sequence[float]] = None
+        self, parts: Union[str, int, Iterable[Union[str, int]]], about: Optional[Sequence[float]] = None
     ) -> tuple[Array, Array]:
-        """Force [N] and moment [N m] of all kinds on boundaries, and of bodies on obstacles. Forces must be watched."""
-        names = [boundaries] if isinstance(boundaries, str) else list(boundaries)
+        """Force [N] and moment [N m] of all kinds on boundaries and bodies, and of bodies on obstacles.
+
+        A part is a name or an id, looked for among boundaries, then obstacles, then bodies; "boundary:3", "obstacle:3" and
+        "body:3" look among these alone. InputError for what nothing has. Forces must be watched."""
+        names = [_part(part) for part in ([parts] if isinstance(parts, str) or not np.iterable(parts) else parts)]
         return self._simulation.resultant(names, np.zeros(self.dimension) if about is None else about)
 
     def save(self) -> Saved:
@@ -447,6 +451,16 @@ class Simulation:
         from ._convert import to_dolfinx
 
         return to_dolfinx(self, comm)
+
+
+def _part(part: Any) -> str:
+    """The text of a name or an id."""
+    if isinstance(part, str):
+        return part
+    try:
+        return str(operator.index(part))
+    except TypeError:
+        raise InputError(f"resultant: found {part!r}; expected a name or an id") from None
 
 
 def _ints(name: str, values: Any) -> Array:

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "itr/simulation/setup.hpp"
+
+namespace itr {
+
+/// Throws InputError at `place` for a target that names nothing, or a surface, a body or a vertex of an obstacle that is not
+/// there.
+template <int Dim>
+void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_t obstacle_vertices,
+                    const std::string& place);
+
+}  // namespace itr
