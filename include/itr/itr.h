@@ -239,7 +239,14 @@ ITR_C_API itr_status itr_get_facets(itr_simulation* simulation, size_t length, i
 ITR_C_API itr_status itr_get_facet_boundaries(itr_simulation* simulation, size_t length, int* ids);
 
 /** Kinds of forces on vertices. */
-typedef enum itr_force { ITR_CONTACT = 0, ITR_FRICTION = 1, ITR_REACTION = 2, ITR_APPLIED = 3 } itr_force;
+typedef enum itr_force {
+  ITR_CONTACT = 0, /**< with its damping */
+  ITR_FRICTION = 1,
+  ITR_REACTION = 2,
+  ITR_APPLIED = 3,
+  ITR_BODY = 4,    /**< body forces */
+  ITR_RESIDUAL = 5 /**< what the solve left of the sum of all forces and inertia */
+} itr_force;
 /** Turns the computation of forces on or off. It costs a few gradients a step. */
 ITR_C_API itr_status itr_watch_forces(itr_simulation* simulation, int watched);
 /** Forces of one kind, num_nodes * dimension [N]; NULL before the first step in which they are watched. */

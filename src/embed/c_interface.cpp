@@ -362,8 +362,9 @@ itr_status itr_watch_forces(itr_simulation* simulation, int watched) {
 const double* itr_forces(const itr_simulation* simulation, itr_force kind) {
   if (!simulation) return nullptr;
   const itr::NodalForces& forces = simulation->simulation.forces();
-  const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
-  if (kind < ITR_CONTACT || kind > ITR_APPLIED || kinds[kind]->size() == 0) return nullptr;
+  const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction,
+                                       &forces.applied, &forces.body,     &forces.residual};
+  if (kind < ITR_CONTACT || kind > ITR_RESIDUAL || kinds[kind]->size() == 0) return nullptr;
   return kinds[kind]->data();
 }
 itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* von_mises) {

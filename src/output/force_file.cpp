@@ -12,14 +12,16 @@ namespace itr::output {
 
 namespace {
 
-constexpr const char* kKinds[] = {"contact", "friction", "reaction", "all"};
+constexpr const char* kKinds[] = {"contact", "friction", "reaction", "all", "body", "residual", "remeshing"};
 
-std::string header(std::size_t columns) {
+/// Of the columns that a curve has.
+std::string header(const ForceCurvePoint& curve) {
+  const std::size_t columns = curve.kinds.front().size();
   const std::vector<const char*> names = columns == 3 ? std::vector<const char*>{"x", "y", "moment"}
                                                       : std::vector<const char*>{"x", "y", "z", "mx", "my", "mz"};
   std::string text = "step,t,name";
-  for (const char* kind : kKinds)
-    for (const char* name : names) text += fmt::format(",{}_{}", kind, name);
+  for (std::size_t k = 0; k < curve.kinds.size(); ++k)
+    for (std::size_t c = 0; c < curve.kinds[k].size(); ++c) text += fmt::format(",{}_{}", kKinds[k], names[c]);
   return text;
 }
 
@@ -57,7 +59,7 @@ void ForceFile::add(int step, double t, const std::vector<ForceCurvePoint>& curv
   if (curves.empty()) return;
   if (!file_) {
     file_.emplace(path_, 0);
-    file_->append(header(curves.front().kinds.front().size()));
+    file_->append(header(curves.front()));
   }
   size_before_ = file_->size();
   for (std::string& line : lines_of(step, t, curves)) file_->append(std::move(line));
@@ -86,7 +88,7 @@ std::string stored_forces(const std::filesystem::path& directory) {
   for (const auto& path : stored_frames(directory)) {
     const StoredForces forces = read_frame_forces(path);
     if (forces.curves.empty()) break;  // all frames of a run have them, or none: the others need not be opened
-    if (text.empty()) text = header(forces.curves.front().kinds.front().size()) + '\n';
+    if (text.empty()) text = header(forces.curves.front()) + '\n';
     for (const std::string& line : lines_of(forces.step, forces.t, forces.curves)) text += line + '\n';
   }
   return text;

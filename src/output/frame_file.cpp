@@ -331,17 +331,15 @@ StoredForces read_frame_forces(const std::filesystem::path& path) {
   if (!file.contains(kForceSums)) return forces;
   const hdf5::Table<double> sums = file.read_doubles(kForceSums);
   std::istringstream names(file.read_text_attribute(kForceSums, "names"));
+  for (std::string name; std::getline(names, name, ',');) forces.curves.push_back({name, {}});
+  constexpr std::size_t kOfFirstVersion = 4, kKinds = std::tuple_size_v<decltype(ForceCurvePoint::kinds)>;
+  const auto rows = static_cast<std::size_t>(sums.rows());
+  const std::size_t kinds = rows == kOfFirstVersion * forces.curves.size() ? kOfFirstVersion : kKinds;
+  if (rows != kinds * forces.curves.size())
+    throw InputError({path.string(), kForceSums, std::to_string(rows) + " rows", std::to_string(kKinds) + " a name"});
   auto next = sums.values.begin();
-  for (std::string name; std::getline(names, name, ',');) {
-    ForceCurvePoint curve{name, {}};
-    for (auto& kind : curve.kinds) {
-      if (sums.values.end() - next < sums.columns)
-        throw InputError({path.string(), kForceSums, std::to_string(sums.rows()) + " rows", "four a name"});
-      kind.assign(next, next + sums.columns);
-      next += sums.columns;
-    }
-    forces.curves.push_back(std::move(curve));
-  }
+  for (ForceCurvePoint& curve : forces.curves)
+    for (std::size_t k = 0; k < kinds; ++k, next += sums.columns) curve.kinds[k].assign(next, next + sums.columns);
   return forces;
 }
 

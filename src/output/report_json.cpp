@@ -72,6 +72,17 @@ std::string versions_json() {
                      release);
 }
 
+/// The momentum that edits changed, of all bodies; empty where none did.
+std::string remeshing_json(const StepReport& r) {
+  if (r.remeshing.empty()) return "";
+  std::vector<double> sum(r.remeshing.front().linear.size());
+  for (const MomentumChange& change : r.remeshing)
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += change.linear[i];
+  std::string numbers;
+  for (const double value : sum) numbers += (numbers.empty() ? "" : ",") + number(value);
+  return fmt::format(R"("remeshing_momentum":[{}],)", numbers);
+}
+
 /// What a step's line and the summary have in common.
 std::string common_members(const StepReport& r) {
   return fmt::format(
@@ -91,9 +102,10 @@ std::string common_members(const StepReport& r) {
 
 std::string step_json(const StepReport& report) {
   return fmt::format(
-      R"({{"step":{},"t":{},"order":{},"cut_steps":{},{},"residual_worth":{},"split_tolerance":{},"best_refused_split":{},"trial_seconds":{}}})",
-      report.step, number(report.t), report.order, report.cut_steps, common_members(report), number(report.residual_worth),
-      number(report.split_tolerance), number(report.best_refused_split), number(report.trial_seconds));
+      R"({{"step":{},"t":{},"order":{},"cut_steps":{},{},{}"residual_worth":{},"split_tolerance":{},"best_refused_split":{},"trial_seconds":{}}})",
+      report.step, number(report.t), report.order, report.cut_steps, common_members(report), remeshing_json(report),
+      number(report.residual_worth), number(report.split_tolerance), number(report.best_refused_split),
+      number(report.trial_seconds));
 }
 
 void Totals::add(const StepReport& report) {

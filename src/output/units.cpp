@@ -28,6 +28,8 @@ StepReport in_units(StepReport report, const Units& units) {
                         &report.energy_before_remesh, &report.history_loss, &report.split_tolerance,
                         &report.best_refused_split, &report.residual_worth})
     *value /= energy;
+  for (MomentumChange& change : report.remeshing)
+    for (double& value : change.linear) value /= units.factor("kg m/s");
   report.t /= units.factor("s");
   report.min_distance /= units.factor("m");
   return report;

@@ -331,7 +331,8 @@ void add_simulation(py::module_& m) {
       .def("forces",
            [](const AnySimulation& s, int kind) -> py::object {
              const itr::NodalForces& forces = s.forces();
-             const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
+             const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction,
+                                                  &forces.applied, &forces.body,     &forces.residual};
              const itr::VectorX& values = *kinds[kind];
              if (values.size() == 0) return py::none();
              return copied(std::vector<double>(values.begin(), values.end()), s.dimension());

@@ -85,7 +85,8 @@ namespace {
 template <int Dim>
 ForceCurvePoint curve_point(const ForceSums<Dim>& sums, const std::string& name) {
   ForceCurvePoint point{name, {}};
-  const std::array<const Resultant<Dim>*, 4> kinds{&sums.contact, &sums.friction, &sums.reaction, &sums.all};
+  const std::array<const Resultant<Dim>*, 7> kinds{&sums.contact, &sums.friction, &sums.reaction, &sums.all,
+                                                   &sums.body,    &sums.residual, &sums.remeshing};
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     point.kinds[k].assign(kinds[k]->force.begin(), kinds[k]->force.end());
     point.kinds[k].insert(point.kinds[k].end(), kinds[k]->moment.begin(), kinds[k]->moment.end());

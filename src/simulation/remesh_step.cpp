@@ -11,6 +11,7 @@
 #include "itr/remesh/remesher.hpp"
 #include "itr/time/integrator.hpp"
 #include "simulation/history_transfer.hpp"
+#include "simulation/momentum_change.hpp"
 
 namespace itr {
 
@@ -238,10 +239,15 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   std::size_t next = 0;
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
-  if (!remeshed.coarsened()) return renumbering;  // refinement alone: interpolation is exact
+  const auto tell_momentum = [&] { report.remeshing = momentum_changes(setup, before, state, touched); };
+  if (!remeshed.coarsened()) {  // refinement alone: interpolation is exact
+    tell_momentum();
+    return renumbering;
+  }
   const HistoryTransferReport transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh,
                                                           state.space, touched, tools.cache.system.solver(), state.history);
   report.history_loss = transfer.loss / problem.scaling();
+  tell_momentum();
   tell(transfer, mass_moment(setup, state.mesh, x), state.step, setup.units, tools.logger);
   return renumbering;
 }

@@ -4,20 +4,17 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <set>
 
 #include "itr/core/error.hpp"
 #include "itr/fem/cell_set.hpp"
 #include "simulation/force_target.hpp"
+#include "simulation/moment.hpp"
 
 namespace itr {
 
 namespace {
-
-Vec<1> moment(const Vec<2>& arm, const Vec<2>& f) { return Vec<1>(arm[0] * f[1] - arm[1] * f[0]); }
-Vec<3> moment(const Vec<3>& arm, const Vec<3>& f) { return arm.cross(f); }
 
 template <int Dim>
 void add_force(const Vec<Dim>& f, const Vec<Dim>& arm, Resultant<Dim>& sum) {
@@ -75,7 +72,7 @@ template <int Dim>
 ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
   const std::array<const VectorX*, 4> kinds{&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
   const int bodies = num_nodes(state.mesh, state.space);
-  for (const VectorX* kind : kinds)
+  for (const VectorX* kind : {kinds[0], kinds[1], kinds[2], kinds[3], &forces.body, &forces.residual})
     if (kind->size() != Eigen::Index{Dim} * bodies)
       throw InputError({"", "fields", "not all kinds of forces",
                         "contact_forces, friction_forces, reaction_forces and applied_forces for a resultant"});
@@ -95,6 +92,14 @@ ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, co
     Vec<Dim> all = Vec<Dim>::Zero();
     for (const VectorX* kind : kinds) all += of(*kind);
     add_force<Dim>(all, arm, sums.all);
+    add_force<Dim>(of(forces.body), arm, sums.body);
+    add_force<Dim>(of(forces.residual), arm, sums.residual);
+  }
+  for (const MomentumChange& change : forces.remeshing) {
+    if (std::find(target.bodies.begin(), target.bodies.end(), change.body) == target.bodies.end()) continue;
+    const Vec<Dim> f(change.linear.data());
+    sums.remeshing.force += f;
+    sums.remeshing.moment += Vec < Dim == 2 ? 1 : 3 > (change.angular.data()) - moment(about, f);
   }
   for (const int o : target.obstacle_vertices) {
     const Vec<Dim> arm = x.template segment<Dim>(Dim * (bodies + o)) - about;

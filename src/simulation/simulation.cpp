@@ -241,8 +241,12 @@ struct Simulation<Dim>::Impl {
     const Inside inside(*this, Phase::in_step);
     StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
                              state->quadrature);
-    forces = problem.forces(state->history.x[0]);
-    forces.reaction.setZero();
+    forces = problem.forces_at_start(state->history.x[0]);
+  }
+
+  /// Adds to forces what edits changed of the momentum in a step.
+  void add_remeshing(const StepReport& report, NodalForces& to) const {
+    if (setup.fields.any_forces()) add_changes(report.remeshing, 1 / setup.time.dt, to.remeshing);
   }
 };
 
@@ -302,6 +306,7 @@ StepResult Simulation<Dim>::adapt(double dt) {
     before = impl_->change_to(start);
     ++impl_->mesh_revision;
     impl_->set_forces_at_rest();
+    impl_->add_remeshing(adapted.report, impl_->forces);
     return adapted;
   });
   if (!result.ok) return result;
@@ -327,6 +332,7 @@ StepResult Simulation<Dim>::advance() {
     if (!result.ok) return result;
     before = impl_->change_to(std::move(end));
   }
+  impl_->add_remeshing(result.report, result.forces);
   impl_->forces = result.forces;
   impl_->report = result.report;
   if (!result.renumbering.empty()) ++impl_->mesh_revision;  // whatever a listener throws

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "itr/energy/point_forces.hpp"
 #include "simulation/step.hpp"
 
 namespace itr {
@@ -27,6 +28,46 @@ StepSetup<Dim> halved(const StepSetup<Dim>& setup, const State<Dim>& state) {
   return half;
 }
 
+/// Adds forces, half of them, to those on another mesh of the bodies; they stay at their points.
+template <int Dim>
+void add_half(const NodalForces& forces, const State<Dim>& of, const State<Dim>& now, NodalForces& sum) {
+  const bool same = of.mesh.vertex_slots() == now.mesh.vertex_slots() && of.space == now.space &&
+                    node_rest_positions(of.mesh, of.space) == node_rest_positions(now.mesh, now.space);
+  Workspace workspace;
+  const CellSet<Dim> cells = same ? CellSet<Dim>() : whole_mesh(now.mesh, {}, now.space);
+  const auto add = [&](const VectorX& field, VectorX& to) {
+    if (field.size() == 0) return;
+    if (same) {
+      to += field / 2;
+      return;
+    }
+    if (const auto term = point_forces<Dim>(of.mesh, VectorX(field / -2), of.space)(cells, 0, 1))
+      term->add_gradient(to, to, workspace);
+  };
+  add(forces.contact, sum.contact);
+  add(forces.friction, sum.friction);
+  add(forces.reaction, sum.reaction);
+  add(forces.applied, sum.applied);
+  add(forces.body, sum.body);
+  add(forces.residual, sum.residual);
+  sum.obstacle_contact += forces.obstacle_contact / 2;
+  sum.obstacle_friction += forces.obstacle_friction / 2;
+}
+
+/// Forces of two halves of a step: of their impulses over the whole. Without inertia there are none, and those at the end
+/// balance.
+template <int Dim>
+NodalForces mean_forces(const StepSetup<Dim>& setup, const NodalForces& first, const State<Dim>& middle,
+                        const NodalForces& second, const State<Dim>& end) {
+  if (setup.time.quasistatic || setup.time.is_static) return second;
+  NodalForces mean = second;
+  for (VectorX* field : {&mean.contact, &mean.friction, &mean.reaction, &mean.applied, &mean.body, &mean.residual,
+                         &mean.obstacle_contact, &mean.obstacle_friction})
+    *field /= 2;
+  add_half(first, middle, end, mean);
+  return mean;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -43,6 +84,7 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& bef
   if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);
   StepReport effort = whole.report;
   NodalForces forces;
+  State<Dim> middle;
   MeshRenumbering renumbering;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
@@ -51,7 +93,8 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& bef
     result.report.add_effort(effort);
     if (!result.ok) return result;
     effort = result.report;
-    forces = std::move(result.forces);
+    forces = i == 0 ? std::move(result.forces) : mean_forces(setup, forces, middle, result.forces, part);
+    if (i == 0 && setup.fields.any_forces()) middle = part;
     if (!result.renumbering.empty())
       renumbering = renumbering.empty() ? std::move(result.renumbering) : compose(renumbering, result.renumbering);
   }

@@ -697,11 +697,29 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
     applied.add(std::make_shared<LoadEnergy<Dim>>(cells_, setup_.materials, tractions, terms_.scaling));
     add(ForceEntry::applied, applied);
     get(applied, forces.applied, nullptr);
+    EnergySum body;
+    body.add(std::make_shared<LoadEnergy<Dim>>(cells_, setup_.materials, Loads<Dim>{terms_.loads.acceleration, {}, {}},
+                                               terms_.scaling));
+    get(body, forces.body, nullptr);
   }
   if (!asked.reaction_forces && !all) return forces;
-  get(potential_.sum(lagged_), forces.reaction, nullptr);
-  for (Eigen::Index i = 0; i < bodies; ++i) forces.reaction[i] = dofs_.unknown[i] == kNone ? -forces.reaction[i] : 0;
+  get(potential_.sum(lagged_), forces.residual, nullptr);
+  forces.reaction = VectorX::Zero(bodies);
+  for (Eigen::Index i = 0; i < bodies; ++i)
+    if (dofs_.unknown[i] == kNone) forces.reaction[i] = -std::exchange(forces.residual[i], 0.0);
   return forces;
+}
+
+template <int Dim>
+NodalForces StepProblem<Dim>::forces_at_start(const VectorX& x) {
+  Lagged at_x = potential_.lag(x, workspace_);
+  lagged_ = {};
+  lagged_.pressure = std::move(at_x.pressure);
+  lagged_.follower = std::move(at_x.follower);
+  NodalForces result = forces(x);
+  result.reaction.setZero();
+  result.residual.setZero();
+  return result;
 }
 
 template <int Dim>

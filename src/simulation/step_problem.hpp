@@ -60,8 +60,10 @@ class StepProblem {
   /// A direction in which the energy has negative curvature at x; empty where there is none.
   VectorX find_instability(const VectorX& x);
   double min_distance(const VectorX& x);
-  /// At a solution x, those that the setup asks for, as they were in the solve.
+  /// At a solution x, those that the setup asks for, as they were in the solve. Remeshing aside.
   NodalForces forces(const VectorX& x);
+  /// Those of bodies that start from x: no step has led there, so that neither reactions, friction nor residual are known.
+  NodalForces forces_at_start(const VectorX& x);
   /// Of all terms but inertia, where the bodies are at x and move with v [N]. Lags what is lagged there.
   VectorX total_force(const VectorX& x, const VectorX& v);
   /// What the integrator (the trapezoidal rule or implicit Euler) adds to the mechanical energy by a step to x [J]: its work

@@ -25,6 +25,15 @@ struct StepSeconds {
   StepSeconds& operator+=(const StepSeconds& other);
 };
 
+/// What edits changed of a body's momentum, and of its moment about the origin.
+struct MomentumChange {
+  int body = 0;
+  std::vector<double> linear;   ///< Dim numbers [kg m/s]
+  std::vector<double> angular;  ///< 1 in 2D, 3 in 3D [kg m^2/s]
+};
+/// Adds changes by body.
+void add_changes(const std::vector<MomentumChange>& changes, double factor, std::vector<MomentumChange>& sum);
+
 struct StepReport {
   int step = 0;
   double t = 0;  ///< [s]
@@ -40,6 +49,10 @@ struct StepReport {
   /// What the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]: not
   /// gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
   double history_loss = 0;
+  /// By body that edits touched: momentum that they changed, as impulses over the step. The rate of momentum (the
+  /// acceleration of the integrator, from the momenta that were reported) times dt is that of the forces plus these. Empty
+  /// without inertia.
+  std::vector<MomentumChange> remeshing;
   OperationCount splits, curves, straightens, collapses, swaps, smooths;
   int bound_by_dhat = 0;          ///< surface edges that were not split because the halves would be below dhat
   int reverted_remeshes = 0;      ///< all of a step's operations were dropped, as the state on the new mesh failed
@@ -57,27 +70,32 @@ struct StepReport {
   double processor_seconds = 0;  ///< of the whole process, all threads, from begin to end of the step, without output
   double peak_rss_mb = 0;
 
-  /// Adds the effort of what came before: iterations, operations, forgotten history, damped and cut steps, seconds,
-  /// processor seconds.
+  /// Adds the effort of what came before: iterations, operations, forgotten history and momentum, damped and cut steps,
+  /// seconds, processor seconds.
   void add_effort(const StepReport& before);
   /// Of a mesh that was dropped: none of the operations was accepted.
   void forget_operations();
 };
 
-/// Forces on the bodies' vertices at the end of a step, interleaved [N]; 2D: by thickness. Their sum with the elastic forces
-/// and the loads is mass times acceleration. Empty where not asked for.
+/// Forces on the bodies' vertices at the end of a step, interleaved [N]; 2D: by thickness. Of a dynamic step that was cut
+/// they are the means over its parts. The sum of all over the bodies, the residual subtracted and the remeshing added, is
+/// the rate of momentum. Empty where not asked for.
 struct NodalForces {
-  VectorX contact, friction;
+  VectorX contact, friction;  ///< contact with its damping
   VectorX reaction;  ///< of what holds a vertex in its prescribed directions; 0 elsewhere, and before the first step
   VectorX applied;   ///< of tractions, pressures and what the program adds; not of body forces
+  VectorX body;      ///< body forces; asked for with `applied`
+  VectorX residual;  ///< sum of all forces and inertia that the solve left where nothing is held; asked for with `reaction`
   VectorX obstacle_contact, obstacle_friction;  ///< on the obstacles' vertices
+  std::vector<MomentumChange> remeshing;        ///< StepReport::remeshing by dt: forces [N] and moments [N m]
 };
 
 /// What acts on a ForceTarget: on each line force (Dim numbers) [N] and moment (1 in 2D, 3 in 3D) [N m], of contact,
-/// friction, reactions, and all (with tractions, pressures and what the program adds).
+/// friction, reactions, all (with tractions, pressures and what the program adds), body forces, the residual, and what edits
+/// changed of the momentum of its bodies.
 struct ForceCurvePoint {
   std::string name;
-  std::array<std::vector<double>, 4> kinds;
+  std::array<std::vector<double>, 7> kinds;  ///< the last three are empty where a stored frame does not have them
 };
 
 /// Fields that a scene may ask for (FieldOptions); empty where it does not.

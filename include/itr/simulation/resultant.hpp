@@ -27,6 +27,8 @@ Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int>
 template <int Dim>
 struct ForceSums {
   Resultant<Dim> contact, friction, reaction, all;  ///< all: with tractions, pressures and the program's forces
+  Resultant<Dim> body, residual;                    ///< NodalForces: body forces, and what the solve left
+  Resultant<Dim> remeshing;                         ///< NodalForces::remeshing of the target's bodies
 };
 /// Obstacles have contact and friction only: the forces of the bodies on them. Throws InputError as above, also for bodies
 /// and vertices of obstacles that are not there.

@@ -40,7 +40,7 @@ Compiled = Any
 """A function of C's calling convention: from a ctypes library, from numba.cfunc, or an address. Several threads call it within
 a step, without Python's lock."""
 
-FORCES = ("contact", "friction", "reaction", "applied")
+FORCES = ("contact", "friction", "reaction", "applied", "body", "residual")
 
 
 class StepFailed(RuntimeError):
