@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "itr/core/error.hpp"
+#include "output/file_list.hpp"
 #include "run.hpp"
 
 namespace itr::cli {
@@ -41,8 +42,12 @@ output::ReportSummary report_study(const fs::path& directory, const fs::path& fi
 }  // namespace
 
 int report(const std::string& directory, std::string file, const output::ReportOptions& options) {
-  if (file.empty()) file = (fs::path(directory) / "report.html").string();
   const bool is_study = fs::exists(fs::path(directory) / "study.json");
+  if (file.empty()) {
+    file = (fs::path(directory) / kReportFile).string();
+    if (!is_study && output::is_foreign(directory, kReportFile))
+      throw InputError({file, "file", "one that no run wrote", "-o FILE, or that this file is moved away"});
+  }
   const auto summary = is_study ? report_study(directory, file, options) : output::write_report(directory, file, options);
   fmt::print("{}: {} {}, {:.1f} MB; opens in a browser\n", file, summary.frames, is_study ? "runs" : "frames", summary.mb);
   for (const auto& note : summary.notes) fmt::print("{}\n", note);

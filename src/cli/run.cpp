@@ -179,9 +179,10 @@ void check_units(const Units& units, const RunOptions& options, const output::Sa
 }
 
 /// The state to go on from; none without --resume or where the folder has no frames.
-std::optional<output::SavedState> find_resumable(const std::string& directory, const RunOptions& options) {
+std::optional<output::SavedState> find_resumable(const output::Folder& folder, const RunOptions& options) {
+  const std::string directory = folder.path().string();
   if (!options.resume) {
-    if (!options.overwrite && output::has_results(directory))
+    if (!options.overwrite && folder.has_results())
       throw InputError({directory, "output folder", "results of an earlier run",
                         "--overwrite to replace them, --resume to go on, or another folder (-o)"});
     return std::nullopt;
@@ -200,6 +201,15 @@ std::optional<output::SavedState> find_older(const std::string& directory, const
   }
 }
 
+/// Names of what the folder gets beside what each run writes.
+template <int Dim>
+std::vector<std::string> further_files(const Setup<Dim>& setup, const RunOptions& options) {
+  std::vector<std::string> names;
+  if (!setup.fields.curves.empty()) names.emplace_back("forces.csv");
+  if (options.report) names.emplace_back(kReportFile);
+  return names;
+}
+
 /// Opens a lock while it lives.
 class Unlocked {
  public:
@@ -215,21 +225,32 @@ class Unlocked {
 template <int Dim>
 class Run {
  public:
-  Run(Setup<Dim> setup, const scene::Scene& scene, std::string directory, const RunOptions& options, int threads,
+  Run(Setup<Dim> setup, const scene::Scene& scene, output::Folder folder, const RunOptions& options, int threads,
       linear::Registry& registry, Warnings& warnings, double start)
-      : directory_(std::move(directory)),
+      : directory_(folder.path().string()),
         with_report_(options.report),
         simulation_(std::move(setup), registry, make_logger(warnings)) {
     for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
-    const output::RunInfo info{options.scene.string(), simulation_.solver_name(), threads, scene.identity, start};
-    if (const auto saved = find_resumable(directory_, options)) {
-      writer_ = std::make_unique<output::Writer>(directory_, scene.output, info, restore(*saved, scene, options));
+    const output::RunInfo info{options.scene.string(),
+                               simulation_.solver_name(),
+                               threads,
+                               scene.identity,
+                               start,
+                               further_files(simulation_.setup(), options)};
+    if (const auto saved = find_resumable(folder, options)) {
+      const auto checkpoint = restore(*saved, scene, options);
+      writer_ = std::make_unique<output::Writer>(std::move(folder), scene.output, info, checkpoint);
       warnings.set_writer(writer_.get());
+      if (const int count = writer_->removed_files(); count > 0)
+        spdlog::info("removed from {}: {} files of the run that goes on, written after this state or at its end", directory_,
+                     count);
       is_saved_ = true;
       spdlog::info("going on after step {}", simulation_.state().step);
     } else {
-      writer_ = std::make_unique<output::Writer>(directory_, scene.output, info);
+      writer_ = std::make_unique<output::Writer>(std::move(folder), scene.output, info);
       warnings.set_writer(writer_.get());
+      if (const int count = writer_->removed_files(); count > 0)
+        spdlog::info("removed from {}: {} files of an earlier run, and no others", directory_, count);
       write(simulation_.report());
     }
   }
@@ -428,6 +449,8 @@ int run(const RunOptions& options) {
   registry.allow_mpi_start();
   return std::visit(
       [&](auto& setup) {
+        std::optional<output::Folder> folder;
+        if (this_launch().rank == 0) folder.emplace(directory);
         setup.linear.dump_folder = options.dump_folder;
         setup.linear.dump_every = options.dump_every;
         setup.newton.cancel = &stop_now;
@@ -435,7 +458,7 @@ int run(const RunOptions& options) {
         if (this_launch().rank > 0) return serve(registry, solver.name);
         for (const auto& warning : solver.warnings) warnings.add(warning);
         const RankSession session(registry, solver.name);
-        return Run(std::move(setup), scene, directory, options, num_threads(), registry, warnings, start).run();
+        return Run(std::move(setup), scene, std::move(*folder), options, num_threads(), registry, warnings, start).run();
       },
       scene.setup);
 }

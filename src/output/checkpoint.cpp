@@ -248,12 +248,6 @@ linear::FactorRecord read_factor(const fs::path& path, const hdf5::File& file) {
 
 }  // namespace
 
-bool has_results(const fs::path& directory) {
-  std::error_code ignored;
-  return !stored_frames(directory).empty() || fs::exists(directory / "steps.jsonl", ignored) ||
-         fs::exists(directory / "summary.json", ignored);
-}
-
 template <int Dim>
 void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress& progress, const Units& units) {
   std::vector<std::int64_t> tags;

@@ -2,11 +2,15 @@
 #include "files.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <regex>
 #include <system_error>
+#include <utility>
 
 #include "itr/core/error.hpp"
 
@@ -35,7 +39,7 @@ bool write_all(int descriptor, std::string_view bytes) {
 
 /// Puts a file in the place of another. Where there is one already they change places: ext4 writes what replaces a file to
 /// the disk at once (auto_da_alloc), which takes longer than a small step.
-bool replace(const fs::path& temporary, const fs::path& path) {
+bool exchange(const fs::path& temporary, const fs::path& path) {
 #ifdef RENAME_EXCHANGE
   if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) == 0) {
     ::unlink(temporary.c_str());
@@ -47,19 +51,70 @@ bool replace(const fs::path& temporary, const fs::path& path) {
 
 }  // namespace
 
-void write_file(const fs::path& path, std::string_view bytes, Durability durability) {
-  const fs::path temporary = path.string() + ".tmp";
-  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0) fail(path);
-  const bool is_written = write_all(descriptor, bytes) && (durability == Durability::process || ::fsync(descriptor) == 0);
+Successor::Successor(fs::path path) : path_(std::move(path)) {
+  constexpr int kMostTries = 1000;  // each name that is taken already is somebody's file
+  for (int i = 0; i < kMostTries && descriptor_ < 0; ++i) {
+    temporary_ = fmt::format("{}.{}-{}.tmp", path_.string(), ::getpid(), i);
+    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor_ < 0 && errno != EEXIST) break;
+  }
+  if (descriptor_ < 0) fail(path_);
+}
+
+Successor::~Successor() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+/// With errno as the reason.
+void Successor::refuse() {
   const int reason = errno;
-  const bool is_closed = ::close(descriptor) == 0;  // some file systems report a full disk only here
-  if (is_written && is_closed && replace(temporary, path)) return;
-  if (!is_written) errno = reason;
-  const int first_reason = errno;
-  ::unlink(temporary.c_str());
-  errno = first_reason;
-  fail(path);
+  ::unlink(temporary_.c_str());
+  errno = reason;
+  fail(path_);
+}
+
+void Successor::write(std::string_view bytes) {
+  if (!write_all(descriptor_, bytes)) refuse();
+}
+
+void Successor::copy(const fs::path& source, std::size_t size) {
+  constexpr std::size_t kPart = 1 << 16;
+  const int from = ::open(source.c_str(), O_RDONLY | O_CLOEXEC);
+  if (from < 0) fail(source);
+  std::string part(std::min(size, kPart), '\0');
+  bool is_copied = true;
+  while (is_copied && size > 0) {
+    const ssize_t count = ::read(from, part.data(), std::min(size, part.size()));
+    if (count < 0 && errno == EINTR) continue;
+    if (count == 0) errno = EIO;  // shorter than its writer says
+    is_copied = count > 0 && write_all(descriptor_, std::string_view(part).substr(0, static_cast<std::size_t>(count)));
+    if (is_copied) size -= static_cast<std::size_t>(count);
+  }
+  const int reason = errno;
+  ::close(from);
+  errno = reason;
+  if (!is_copied) refuse();
+}
+
+void Successor::replace(Durability durability) {
+  if (durability == Durability::power && ::fsync(descriptor_) != 0) refuse();
+  if (::close(std::exchange(descriptor_, -1)) != 0) refuse();  // some file systems report a full disk only here
+  if (!exchange(temporary_, path_)) refuse();
+  temporary_.clear();
+}
+
+std::pair<std::string, int> file_of_successor(const std::string& name) {
+  static const std::regex pattern("(.+)\\.([0-9]{1,9})-[0-9]+\\.tmp");
+  std::smatch parts;
+  if (!std::regex_match(name, parts, pattern)) return {};
+  return {parts[1], std::stoi(parts[2])};
+}
+
+void write_file(const fs::path& path, std::string_view bytes, Durability durability) {
+  Successor file(path);
+  file.write(bytes);
+  file.replace(durability);
 }
 
 void sync(const fs::path& path) {

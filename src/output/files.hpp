@@ -6,11 +6,35 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace itr::output {
 
 /// Whether a file has to survive the loss of power, not only of the process: waiting for the disk costs more than a 2D step.
 enum class Durability { process, power };
+
+/// The successor of a file while it is written, under a name of its own. Without `replace` it is removed again.
+class Successor {
+ public:
+  explicit Successor(std::filesystem::path path);
+  ~Successor();
+  Successor(const Successor&) = delete;
+  Successor& operator=(const Successor&) = delete;
+  void write(std::string_view bytes);
+  /// Writes the first `size` bytes of another file.
+  void copy(const std::filesystem::path& source, std::size_t size);
+  /// Takes the place of the file.
+  void replace(Durability durability = Durability::process);
+
+ private:
+  [[noreturn]] void refuse();
+
+  std::filesystem::path path_, temporary_;
+  int descriptor_ = -1;
+};
+
+/// The file that a name of a successor is for, and the process that writes it; empty: the name is of another kind.
+std::pair<std::string, int> file_of_successor(const std::string& name);
 
 /// Replaces the file by `bytes`.
 void write_file(const std::filesystem::path& path, std::string_view bytes, Durability durability = Durability::process);

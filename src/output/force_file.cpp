@@ -48,6 +48,7 @@ std::size_t length_until(const std::filesystem::path& path, int last_step) {
 }  // namespace
 
 ForceFile::ForceFile(std::filesystem::path directory, int last_step) : path_(std::move(directory) / kForceFile) {
+  if (last_step < 0) return;
   const std::size_t keep = length_until(path_, last_step);
   if (keep > 0)
     file_.emplace(path_, keep);

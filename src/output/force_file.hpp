@@ -16,7 +16,7 @@ constexpr const char* kForceFile = "forces.csv";
 
 class ForceFile {
  public:
-  /// Keeps the lines of steps up to `last_step`; -1: none, and no file.
+  /// Keeps the lines of steps up to `last_step`; -1: there is no file yet.
   ForceFile(std::filesystem::path directory, int last_step);
   /// Without curves: nothing, and no file.
   void add(int step, double t, const std::vector<ForceCurvePoint>& curves);

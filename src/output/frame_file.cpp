@@ -2,12 +2,12 @@
 #include "frame_file.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <sstream>
 #include <string>
 
 #include "core/check.hpp"
 #include "drawn_cells.hpp"
+#include "file_list.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
 #include "units.hpp"
@@ -275,10 +275,7 @@ std::vector<std::filesystem::path> stored_frames(const std::filesystem::path& di
   std::vector<std::filesystem::path> files;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(directory / "frames", error)) {
-    const std::string stem = entry.path().stem().string();
-    const bool is_number = !stem.empty() && stem.size() < 10 &&
-                           std::all_of(stem.begin(), stem.end(), [](unsigned char c) { return std::isdigit(c); });
-    if (is_number && entry.path().extension() == ".h5") files.push_back(entry.path());
+    if (step_of_name("frames/" + entry.path().filename().string()) >= 0) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return step_of_frame(a) < step_of_frame(b); });
   return files;

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "deflate.hpp"
+#include "file_list.hpp"
 #include "files.hpp"
 #include "force_file.hpp"
 #include "itr/core/error.hpp"
@@ -267,6 +268,8 @@ class Page {
 ReportSummary write_report(const fs::path& directory, const fs::path& file, const ReportOptions& options) {
   Page page(directory, options);
   const std::string html = page.text();
+  if (std::error_code none; fs::equivalent(fs::absolute(file).parent_path(), directory, none))
+    add_to_file_list(directory, file.filename().string());
   write_file(file, html);
   ReportSummary summary = page.summary();
   summary.mb = static_cast<double>(html.size()) / 1e6;

@@ -85,6 +85,8 @@ VectorX displacement(const FrameView<Dim>& frame) {
 
 }  // namespace
 
+std::string vtu_name(int step) { return fmt::format("vtu/{:06}.vtu", step); }
+
 template <int Dim>
 void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step, const Units& units) {
   const Mesh<Dim>& mesh = frame.mesh;
@@ -129,13 +131,13 @@ void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& fra
   std::filesystem::create_directories(directory / "vtu", error);
   if (error)
     throw InputError({(directory / "vtu").string(), "output folder", error.message(), "a folder that can be written"});
-  write_file(directory / "vtu" / fmt::format("{:06}.vtu", step), text);
+  write_file(directory / vtu_name(step), text);
 }
 
 void write_vtu_series(const std::filesystem::path& directory) {
   std::string text = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n";
   for (const auto& frame : stored_frames(directory)) {
-    const std::string name = fmt::format("vtu/{:06}.vtu", step_of_frame(frame));
+    const std::string name = vtu_name(step_of_frame(frame));
     if (std::filesystem::exists(directory / name))
       text += fmt::format("<DataSet timestep=\"{}\" file=\"{}\"/>\n", read_frame_sizes(frame).t, name);
   }

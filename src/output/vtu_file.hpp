@@ -10,6 +10,9 @@
 
 namespace itr::output {
 
+/// Relative to the run's folder.
+std::string vtu_name(int step);
+
 /// Writes DIR/vtu/NNNNNN.vtu: bodies at their present positions, with all fields of the frame. Vectors and tensors are of
 /// space, with zeros out of the plane.
 template <int Dim>

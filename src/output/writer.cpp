@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "checkpoint.hpp"
 #include "core/timer.hpp"
+#include "file_list.hpp"
 #include "files.hpp"
 #include "force_file.hpp"
 #include "frame_file.hpp"
@@ -24,43 +26,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_leftover(const fs::path& path) { return path.extension() == ".tmp"; }
+constexpr const char* kVtuSeries = "sim.pvd";
 
-/// A folder may hold an earlier, longer run; its frames must not pass for ours. Only files that a run writes are removed:
-/// frames after `last_step` and what was being written when a run was killed.
-void remove_frames_after(const fs::path& directory, int last_step) {
-  std::vector<fs::path> stale;
-  for (const fs::path& path : stored_frames(directory))
-    if (step_of_frame(path) > last_step) stale.push_back(path);
-  for (const fs::path& folder : {directory, directory / "frames"})
-    for (const auto& entry : fs::directory_iterator(folder))
-      if (is_leftover(entry.path())) stale.push_back(entry.path());
-  for (const fs::path& path : stale) fs::remove(path);
-}
-
-void prepare(const fs::path& directory, int last_step) {
-  try {
-    fs::create_directories(directory / "frames");
-    if (last_step < 0)
-      for (const char* name : {"sim.h5", "sim.xdmf", "steps.jsonl"}) fs::remove(directory / name);
-    fs::remove(directory / "summary.json");
-    remove_frames_after(directory, last_step);
-  } catch (const fs::filesystem_error& error) {
-    throw InputError({directory.string(), "output folder", error.code().message(), "a folder that can be written"});
-  }
+/// Names of all files that a run writes beside its frames.
+std::vector<std::string> files_of_run(const OutputOptions& options, const RunInfo& info) {
+  std::vector<std::string> names = {"sim.h5", "sim.xdmf", "steps.jsonl", "summary.json"};
+  if (options.vtu) names.emplace_back(kVtuSeries);
+  names.insert(names.end(), info.files.begin(), info.files.end());
+  return names;
 }
 
 }  // namespace
 
 struct Writer::Impl {
   /// Keeps frames up to `last_step` (-1: none) and the first `log_bytes` of steps.jsonl.
-  Impl(fs::path folder, OutputOptions output_options, RunInfo run_info, int last_step, std::size_t log_bytes)
-      : directory((prepare(folder, last_step), std::move(folder))),
+  Impl(Folder output_folder, OutputOptions output_options, RunInfo run_info, int last_step, std::size_t log_bytes)
+      : folder(std::move(output_folder)),
+        directory(folder.path()),
         options(output_options),
         info(std::move(run_info)),
+        removed_files(prepare(last_step)),
         series(directory),
         steps(directory / "steps.jsonl", log_bytes),
-        forces(directory, last_step) {
+        forces(directory, folder.owns(kForceFile) ? last_step : -1) {
     for (const fs::path& path : stored_frames(directory)) {
       const FrameSizes sizes = read_frame_sizes(path);
       last_stored = step_of_frame(path);
@@ -69,6 +57,14 @@ struct Writer::Impl {
     }
     last_checkpoint = seconds_now();
     if (last_step >= 0) warnings.restore(directory / "steps.jsonl");
+  }
+
+  /// Returns how many files were removed.
+  int prepare(int last_step) {
+    const std::vector<std::string> names = files_of_run(options, info);
+    if (last_step < 0) return folder.begin(names);
+    folder.resume(names, last_step);
+    return folder.remove_after(last_step);
   }
 
   static std::string frame_name(int step) { return fmt::format("frames/{:06}.h5", step); }
@@ -85,11 +81,13 @@ struct Writer::Impl {
     if (last_stored < 0 || is_due(last_stored)) return;
     series.drop_last();
     fs::remove(directory / frame_name(last_stored));
+    if (options.vtu) fs::remove(directory / vtu_name(last_stored));
   }
 
   template <int Dim>
   void store(const FrameView<Dim>& frame, int step, double t, const State<Dim>* checkpoint) {
     const std::string name = frame_name(step);
+    folder.claim(name);
     if (checkpoint) {
       sync_frames();
       count_wall_time();
@@ -101,7 +99,7 @@ struct Writer::Impl {
       last_checkpoint = seconds_now();
     } else {
       frames.write(directory / name, frame, step, t, options.units);
-      unsynced.push_back(name);
+      if (!first_unsynced) first_unsynced = step;
     }
   }
 
@@ -121,7 +119,10 @@ struct Writer::Impl {
       if (!frame.asked->stress.empty()) asked.push_back("stress");
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
-    if (options.vtu) write_vtu(directory, frame, step, options.units);
+    if (options.vtu) {
+      folder.claim(vtu_name(step));
+      write_vtu(directory, frame, step, options.units);
+    }
     const bool is_quadratic = frame.space && !frame.space->is_linear();
     series.add({frame_name(step), options.units.from_si(t, "s"), Dim, nodes, frame.mesh.num_cells(), is_quadratic,
                 drawn_nodes(frame), std::move(asked)});
@@ -129,14 +130,19 @@ struct Writer::Impl {
 
   /// What a checkpoint relies on has to be on the disk before it.
   void sync_frames() {
-    for (const std::string& name : unsynced) sync(directory / name);
+    if (first_unsynced)
+      for (int step = *first_unsynced; step <= last_stored; ++step)
+        if (is_due(step)) sync(directory / frame_name(step));
     sync(directory / "steps.jsonl");
-    unsynced.clear();
+    first_unsynced.reset();
   }
 
+  Folder folder;
   fs::path directory;
   OutputOptions options;
   RunInfo info;
+  int last_stored = kNone;
+  int removed_files = 0;
   TimeSeries series;
   LineFile steps;
   ForceFile forces;
@@ -144,19 +150,21 @@ struct Writer::Impl {
   Totals totals;
   DisplacementNorms norms;
   WarningList warnings;
-  std::vector<std::string> unsynced;
-  double seconds_before = 0;  ///< of the runs before --resume
-  int last_stored = kNone;
+  double seconds_before = 0;          ///< of the runs before --resume
+  std::optional<int> first_unsynced;  ///< step of the first frame that may not be on the disk
   double last_checkpoint = 0;
 };
 
+Writer::Writer(Folder folder, OutputOptions options, RunInfo info)
+    : impl_(std::make_unique<Impl>(std::move(folder), options, std::move(info), -1, 0)) {}
+
 Writer::Writer(fs::path directory, OutputOptions options, RunInfo info)
-    : impl_(std::make_unique<Impl>(std::move(directory), options, std::move(info), -1, 0)) {}
+    : Writer(Folder(std::move(directory)), options, std::move(info)) {}
 
 template <int Dim>
-Writer::Writer(fs::path directory, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint)
-    : impl_(std::make_unique<Impl>(std::move(directory), options, std::move(info), checkpoint.state.step,
-                                   checkpoint.log_bytes)) {
+Writer::Writer(Folder folder, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint)
+    : impl_(
+          std::make_unique<Impl>(std::move(folder), options, std::move(info), checkpoint.state.step, checkpoint.log_bytes)) {
   impl_->totals.restore(checkpoint.totals);
   impl_->seconds_before = impl_->totals.report().seconds.total;
   const State<Dim>& state = checkpoint.state;
@@ -164,6 +172,8 @@ Writer::Writer(fs::path directory, OutputOptions options, RunInfo info, const Ch
 }
 
 Writer::~Writer() = default;
+
+int Writer::removed_files() const { return impl_->removed_files; }
 
 bool Writer::is_checkpoint_due(int step) const {
   return impl_->is_due(step) && (step == 0 || seconds_now() - impl_->last_checkpoint >= impl_->options.checkpoint_period);
@@ -177,6 +187,7 @@ void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const 
   if (const std::string warnings = impl_->warnings.take_new(); !warnings.empty())
     line.insert(line.size() - 1, ",\"warnings\":" + warnings);
   impl_->steps.append(std::move(line));
+  if (frame.asked && !frame.asked->curves.empty()) impl_->folder.claim(kForceFile);
   if (frame.asked) impl_->forces.add(report.step, units.from_si(report.t, "s"), in_units(frame.asked->curves, units));
   impl_->totals.add(report);
   impl_->norms = displacement_norms(frame.mesh, frame.x, frame.space ? *frame.space : Space());
@@ -215,7 +226,7 @@ void Writer::finish(const std::string& outcome, const std::string& solver) {
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                     \
-  template Writer::Writer(fs::path, OutputOptions, RunInfo, const Checkpoint<Dim>&);             \
+  template Writer::Writer(Folder, OutputOptions, RunInfo, const Checkpoint<Dim>&);               \
   template void Writer::write<Dim>(const FrameView<Dim>&, const StepReport&, const State<Dim>*); \
   template void Writer::save<Dim>(const FrameView<Dim>&, const State<Dim>&);
 ITR_INSTANTIATE(2)

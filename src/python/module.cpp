@@ -218,12 +218,13 @@ class Recorder {
  public:
   Recorder(AnySimulation& simulation, std::filesystem::path directory, int every, bool overwrite) : directory_(directory) {
     if (every < 1) throw itr::InputError({"", "every", std::to_string(every), "a number > 0"});
-    if (!overwrite && itr::output::has_results(directory))
+    itr::output::Folder folder(directory);
+    if (!overwrite && folder.has_results())
       throw itr::InputError(
           {directory.string(), "folder", "results of an earlier run", "another folder, or overwrite=True"});
     with(simulation, [&](auto& s) {
       const itr::output::RunInfo info{"a program", s.solver_name(), itr::num_threads()};
-      writer_ = std::make_unique<itr::output::Writer>(directory_, itr::OutputOptions{every}, info);
+      writer_ = std::make_unique<itr::output::Writer>(std::move(folder), itr::OutputOptions{every}, info);
       write(s, s.report());
     });
   }

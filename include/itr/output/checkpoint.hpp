@@ -23,9 +23,6 @@ struct SavedState {
   std::vector<std::string> passed_over{};  ///< what is wrong with newer ones, a sentence each
 };
 
-/// Whether a run has left something in the folder.
-bool has_results(const std::filesystem::path& directory);
-
 /// The newest state in DIR/frames, of a step before `before`, that can be read; none where there are no frames. Throws
 /// InputError where there are frames but none of them has a state that can be read (another version wrote them, or they are
 /// damaged). Its arrays are read by read_checkpoint, which may find damage still.

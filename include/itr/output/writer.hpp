@@ -7,8 +7,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "itr/output/checkpoint.hpp"
+#include "itr/output/folder.hpp"
 #include "itr/output/options.hpp"
 #include "itr/simulation/frame.hpp"
 
@@ -28,18 +30,24 @@ struct RunInfo {
   int threads = 1;
   std::string scene_identity{};   ///< the part of the scene that a resumed run must share
   std::optional<double> start{};  ///< when the run began, by its monotonic clock [s]; empty: only steps are timed
+  /// Names that the folder gets too: forces.csv, report.html. Where one is taken, the run is refused before it begins.
+  std::vector<std::string> files{};
 };
 
 /// The writer of a run. Every file is complete or absent; steps.jsonl is flushed after each line. Throws InputError if the
 /// folder is unwritable or full. Files that were written before stay readable.
 class Writer {
  public:
-  /// Begins a new run and removes files of an earlier one.
+  /// Begins a new run and removes files of an earlier one, no others.
+  Writer(Folder folder, OutputOptions options, RunInfo info);
   Writer(std::filesystem::path directory, OutputOptions options, RunInfo info);
   /// Goes on after a saved state of this folder. Files that were written after that state are removed.
   template <int Dim>
-  Writer(std::filesystem::path directory, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint);
+  Writer(Folder folder, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint);
   ~Writer();
+
+  /// How many files of an earlier run, or of steps after the saved state, were removed.
+  int removed_files() const;
 
   /// Whether it is time for the next stored step to be a checkpoint.
   bool is_checkpoint_due(int step) const;
