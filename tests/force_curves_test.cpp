@@ -92,6 +92,30 @@ TEST_F(ForceCurvesTest, BalanceAndSurviveResume) {
   EXPECT_EQ(text("parts/forces.csv"), whole);
 }
 
+/// Rows of steps without a frame have no other place than the file.
+TEST_F(ForceCurvesTest, NoRowIsLostThatFramesDoNotHave) {
+  ASSERT_EQ(press("run", "--set /time/tend=0.15 --set /output/paraview/skip_frame=4"), 0) << said_;
+  const fs::path file = folder_ / "run/forces.csv";
+  const std::string whole = text("run/forces.csv"), command = "forces " + (folder_ / "run").string();
+  const auto write = [&](const std::string& rows) { std::ofstream(file, std::ios::binary) << rows; };
+  ASSERT_EQ(itr(command), 0) << said_;
+  EXPECT_EQ(text("run/forces.csv"), whole);
+
+  const std::size_t fourth = whole.find("\n4,") + 1, fifth = whole.find("\n5,") + 1;
+  write(whole.substr(0, fourth) + whole.substr(fifth));  // rows that a frame has come back, at their place
+  ASSERT_EQ(itr(command), 0) << said_;
+  EXPECT_EQ(text("run/forces.csv"), whole);
+  write(whole.substr(0, whole.size() - 1));  // without the end of the last line
+  ASSERT_EQ(itr(command), 0) << said_;
+  EXPECT_EQ(text("run/forces.csv"), whole);
+
+  const std::string noted = whole.substr(0, fifth) + "# a note\n" + whole.substr(fifth);
+  write(noted);
+  EXPECT_EQ(itr(command), 2);
+  EXPECT_NE(said_.find("forces.csv: line "), std::string::npos) << said_;
+  EXPECT_EQ(text("run/forces.csv"), noted);
+}
+
 TEST_F(ForceCurvesTest, RefuseWhatNothingHas) {
   const auto refused = [&](const char* forces, const char* words) {
     EXPECT_EQ(press("none", "", forces), 2) << said_;

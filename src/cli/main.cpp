@@ -74,8 +74,9 @@ int certify(const std::string& directory) {
 }
 
 int forces(const std::string& directory) {
-  const int frames = output::rewrite_forces(directory);
-  fmt::print("{}/{}: the forces of {} frames\n", directory, output::kForceFile, frames);
+  const output::ForceRows forces = output::rewrite_forces(directory);
+  fmt::print("{}/{}: {} rows, {} of them added from {} frames\n", directory, output::kForceFile, forces.rows, forces.added,
+             forces.frames);
   return cli::done;
 }
 
@@ -171,7 +172,7 @@ int dispatch(int argc, char** argv) {
   report_command
       ->add_option("--max-mb", report_options.max_mb, "of the file (default: 30): leaves out cells inside, then frames")
       ->check(CLI::PositiveNumber);
-  auto* curves = app.add_subcommand("forces", "forces.csv again, from the frames of a run with /output/forces");
+  auto* curves = app.add_subcommand("forces", "completes forces.csv from the frames of a run with /output/forces");
   curves->add_option("directory", directory, "result folder")->required();
   auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   study::Options study_options;

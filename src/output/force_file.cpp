@@ -3,10 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
 #include <fstream>
+#include <map>
+#include <utility>
 
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
+#include "itr/output/folder.hpp"
 
 namespace itr::output {
 
@@ -45,6 +50,41 @@ std::size_t length_until(const std::filesystem::path& path, int last_step) {
   return length;
 }
 
+struct Row {
+  std::string name, line;
+};
+using RowList = std::map<int, std::vector<Row>>;  ///< by step
+
+/// The row that a line is, by its step; none where it has other columns than the header.
+std::optional<std::pair<int, Row>> parse_row(const std::string& line, const std::string& head) {
+  const std::size_t first = line.find(','), second = line.find(',', first + 1), third = line.find(',', second + 1);
+  if (std::count(line.begin(), line.end(), ',') != std::count(head.begin(), head.end(), ',')) return std::nullopt;
+  int step = 0;
+  const auto [end, error] = std::from_chars(line.data(), line.data() + first, step);
+  if (error != std::errc() || end != line.data() + first || step < 0) return std::nullopt;
+  return std::pair{step, Row{line.substr(second + 1, third - second - 1), line}};
+}
+
+/// The rows of a folder's forces.csv, none without one. Throws InputError where a line is none: to write the file anew would
+/// lose it.
+RowList read_rows(const std::filesystem::path& directory, const std::string& head) {
+  const std::filesystem::path path = directory / kForceFile;
+  const bool was_killed = !std::filesystem::exists(directory / "summary.json");
+  RowList rows;
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    if (file.eof() && was_killed) break;  // a part of a row
+    if (number == 1 && line == head) continue;
+    auto row = number == 1 ? std::nullopt : parse_row(line, head);
+    if (!row)
+      throw InputError({path.string(), fmt::format("line {}", number), line,
+                        number == 1 ? head : "a row of the columns of line 1, or that this file is moved away"});
+    rows[row->first].push_back(std::move(row->second));
+  }
+  return rows;
+}
+
 }  // namespace
 
 ForceFile::ForceFile(std::filesystem::path directory, int last_step) : path_(std::move(directory) / kForceFile) {
@@ -70,15 +110,43 @@ void ForceFile::drop_last() {
   if (file_) file_->shorten(size_before_);
 }
 
-int rewrite_forces(const std::filesystem::path& directory) {
-  std::vector<StoredForces> stored;
-  for (const auto& path : stored_frames(directory))
-    if (StoredForces forces = read_frame_forces(path); !forces.curves.empty()) stored.push_back(std::move(forces));
-  if (stored.empty())
+ForceRows rewrite_forces(const std::filesystem::path& directory) {
+  ForceRows count;
+  RowList from_frames;
+  std::size_t columns = 0;
+  for (const auto& path : stored_frames(directory)) {
+    const StoredForces forces = read_frame_forces(path);
+    if (forces.curves.empty()) continue;
+    ++count.frames;
+    columns = forces.curves.front().kinds.front().size();
+    std::vector<std::string> lines = lines_of(forces.step, forces.t, forces.curves);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      from_frames[forces.step].push_back({forces.curves[i].name, std::move(lines[i])});
+  }
+  if (from_frames.empty())
     throw InputError({directory.string(), "frames", "none with forces", "a run of a scene with /output/forces"});
-  ForceFile file(directory, -1);
-  for (const StoredForces& forces : stored) file.add(forces.step, forces.t, forces.curves);
-  return static_cast<int>(stored.size());
+  Folder folder(directory);
+  folder.resume({kForceFile}, from_frames.rbegin()->first);
+  const std::string head = header(columns);
+  RowList rows = read_rows(directory, head);
+  for (auto& [step, of_step] : from_frames) {
+    for (Row& row : of_step) {
+      const auto same = std::find_if(rows[step].begin(), rows[step].end(), [&](const Row& r) { return r.name == row.name; });
+      if (same != rows[step].end()) {
+        *same = std::move(row);
+      } else {
+        rows[step].push_back(std::move(row));
+        ++count.added;
+      }
+    }
+  }
+  std::string text = head + '\n';
+  for (const auto& [step, of_step] : rows) {
+    for (const Row& row : of_step) text += row.line + '\n';
+    count.rows += static_cast<int>(of_step.size());
+  }
+  write_file(directory / kForceFile, text);
+  return count;
 }
 
 std::string stored_forces(const std::filesystem::path& directory) {

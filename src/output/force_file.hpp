@@ -29,9 +29,15 @@ class ForceFile {
   std::size_t size_before_ = 0;
 };
 
-/// forces.csv of a folder again, from what its frames have. Returns how many frames had forces. Throws InputError where none
-/// has.
-int rewrite_forces(const std::filesystem::path& directory);
+struct ForceRows {
+  int frames = 0;  ///< that have forces
+  int rows = 0;    ///< of the file
+  int added = 0;   ///< to it
+};
+
+/// Puts what frames have into the forces.csv of a folder. Rows of steps that have no frame stay. Throws InputError, and
+/// changes nothing, where no frame has forces, the file has lines that are no rows, or a run is at work in the folder.
+ForceRows rewrite_forces(const std::filesystem::path& directory);
 
 /// Text as forces.csv has it: of that file, its whole lines, or where there is none of the frames. Empty: no forces are
 /// stored.
