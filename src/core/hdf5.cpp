@@ -246,12 +246,6 @@ void File::write_attribute(const std::string& object, const char* name, const st
   require(attribute.is_valid() && H5Awrite(attribute.id(), type.id(), &start) >= 0, object + ", " + name);
 }
 
-void File::link_file(const std::string& name, const std::string& relative_path) {
-  const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
-  H5Pset_create_intermediate_group(links.id(), 1);
-  require(H5Lcreate_external(relative_path.c_str(), "/", file_.id(), name.c_str(), links.id(), H5P_DEFAULT) >= 0, name);
-}
-
 void File::unlink(const std::string& name) {
   std::erase_if(written_, [&](const auto& entry) { return entry.first == name || entry.first.starts_with(name + "/"); });
   require(H5Ldelete(file_.id(), name.c_str(), H5P_DEFAULT) >= 0, name);

@@ -86,8 +86,6 @@ class File {
   void write_attribute(const std::string& object, const char* name, std::span<const std::int64_t> values);
   /// Text of a dataset that is there: its unit, say.
   void write_attribute(const std::string& object, const char* name, const std::string& text);
-  /// Link `name` here to the root of another file, by a path relative to this file's folder.
-  void link_file(const std::string& name, const std::string& relative_path);
   void unlink(const std::string& name);
   void write_text(const std::string& name, const std::string& text);
   bool has_written(const std::string& name) const { return written_.contains(name); }

@@ -3,18 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
-#include "core/hdf5.hpp"
-#include "core/timer.hpp"
-#include "files.hpp"
-
 namespace itr::output {
 
 namespace {
-
-constexpr double kMostShare = 0.02;  // of the time, that replacing sim.xdmf may take
-constexpr std::size_t kGrowth = 16;  // or it is replaced when a 16th of the frames is new: O(n log n) bytes in all
 
 std::string data_item(const FrameEntry& entry, const std::string& set, const std::string& shape, const char* type) {
   return fmt::format("<DataItem Dimensions=\"{}\" NumberType=\"{}\" Precision=\"8\" Format=\"HDF\">{}:{}</DataItem>", shape,
@@ -75,66 +66,30 @@ constexpr const char* kHead =
     "    <Grid Name=\"simulation\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
 constexpr const char* kTail = "    </Grid>\n  </Domain>\n</Xdmf>\n";
 
-std::string link_name(const std::string& file) { return "/frames/" + std::filesystem::path(file).stem().string(); }
+std::vector<std::string> names_of(const std::vector<FrameEntry>& entries) {
+  std::vector<std::string> names;
+  for (const FrameEntry& entry : entries) names.push_back(entry.file);
+  return names;
+}
 
 }  // namespace
 
-/// sim.h5 as it is made in memory: a frame adds one link.
-struct TimeSeries::Links {
-  explicit Links(const std::filesystem::path& path) : file(hdf5::File::create(path)) {}
-  hdf5::File file;
-};
-
-TimeSeries::TimeSeries(std::filesystem::path directory) : directory_(std::move(directory)) {
-  const hdf5::Session session;
-  links_ = std::make_unique<Links>(directory_ / "sim.h5");
-}
-
-TimeSeries::~TimeSeries() {
-  const hdf5::Session session;
-  links_.reset();
-}
-
-void TimeSeries::append(const FrameEntry& entry) {
-  const hdf5::Session session;
-  links_->file.link_file(link_name(entry.file), entry.file);
-  files_.push_back(entry.file);
-  text_ += grid(entry);
-  text_ends_.push_back(text_.size());
+TimeSeries::TimeSeries(const std::filesystem::path& directory, const std::vector<FrameEntry>& stored)
+    : links_(directory / "sim.h5", names_of(stored)), text_(directory / "sim.xdmf", kHead, kTail) {
+  for (const FrameEntry& entry : stored) text_.append(grid(entry));
+  if (!stored.empty()) text_.write();
 }
 
 void TimeSeries::add(const FrameEntry& entry) {
-  append(entry);
-  write_links();
-  const bool is_far_behind = (files_.size() - num_written_) * kGrowth >= files_.size();
-  if (is_far_behind || write_seconds_ <= kMostShare * (seconds_now() - last_write_)) write_text();
+  links_.append(entry.file);
+  text_.add(grid(entry));
 }
 
 void TimeSeries::drop_last() {
-  const hdf5::Session session;
-  links_->file.unlink(link_name(files_.back()));
-  files_.pop_back();
-  num_written_ = std::min(num_written_, files_.size());
-  text_ends_.pop_back();
-  text_.resize(text_ends_.empty() ? 0 : text_ends_.back());
+  links_.drop_last();
+  text_.drop_last();
 }
 
-void TimeSeries::write_text() {
-  const double start = seconds_now();
-  write_file(directory_ / "sim.xdmf", kHead + text_ + kTail);
-  num_written_ = files_.size();
-  last_write_ = seconds_now();
-  write_seconds_ = last_write_ - start;
-}
-
-void TimeSeries::write_links() {
-  const hdf5::Session session;
-  write_file(directory_ / "sim.h5", links_->file.image());
-}
-
-void TimeSeries::write() {
-  write_links();
-  write_text();
-}
+void TimeSeries::write() { text_.write(); }
 
 }  // namespace itr::output

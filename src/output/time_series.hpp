@@ -3,9 +3,11 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
+
+#include "frame_links.hpp"
+#include "series_text.hpp"
 
 namespace itr::output {
 
@@ -20,15 +22,12 @@ struct FrameEntry {
   std::vector<std::string> asked;  ///< fields that not every frame has, see kAskedFields
 };
 
-/// Both files are replaced as a whole, so that they are readable at any moment. sim.h5 follows at every frame. The text of
-/// sim.xdmf is much longer, and replacing it every time would cost O(n^2), so it follows as long as that takes a small share
-/// of the time that passes, or in steps that grow with its length.
+/// Both files are readable at any moment. A frame costs the same however many there are: sim.h5 grows by a link, and
+/// sim.xdmf follows in intervals that double, see SeriesText.
 class TimeSeries {
  public:
-  explicit TimeSeries(std::filesystem::path directory);
-  ~TimeSeries();
-  /// Takes in a frame that was stored earlier; the files follow with the next write or add.
-  void append(const FrameEntry& entry);
+  /// Begins both files anew with frames that are stored already; sim.xdmf is there from the first frame on.
+  TimeSeries(const std::filesystem::path& directory, const std::vector<FrameEntry>& stored);
   /// Takes in a new frame.
   void add(const FrameEntry& entry);
   /// Leaves out the newest frame.
@@ -37,17 +36,8 @@ class TimeSeries {
   void write();
 
  private:
-  struct Links;
-  void write_links();
-  void write_text();
-
-  std::filesystem::path directory_;
-  std::unique_ptr<Links> links_;
-  std::vector<std::string> files_;
-  std::vector<std::size_t> text_ends_;  ///< length of text_ after each frame
-  std::string text_;                    ///< of the grids
-  std::size_t num_written_ = 0;         ///< frames that sim.xdmf has
-  double last_write_ = 0, write_seconds_ = 0;
+  FrameLinks links_;
+  SeriesText text_;
 };
 
 }  // namespace itr::output

@@ -10,7 +10,6 @@
 
 #include "drawn_cells.hpp"
 #include "files.hpp"
-#include "frame_file.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
 #include "units.hpp"
@@ -134,14 +133,11 @@ void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& fra
   write_file(directory / vtu_name(step), text);
 }
 
-void write_vtu_series(const std::filesystem::path& directory) {
-  std::string text = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n";
-  for (const auto& frame : stored_frames(directory)) {
-    const std::string name = vtu_name(step_of_frame(frame));
-    if (std::filesystem::exists(directory / name))
-      text += fmt::format("<DataSet timestep=\"{}\" file=\"{}\"/>\n", read_frame_sizes(frame).t, name);
-  }
-  write_file(directory / "sim.pvd", text + "</Collection>\n</VTKFile>\n");
+const std::string kVtuSeriesHead = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n";
+const std::string kVtuSeriesTail = "</Collection>\n</VTKFile>\n";
+
+std::string vtu_series_entry(int step, double t) {
+  return fmt::format("<DataSet timestep=\"{}\" file=\"{}\"/>\n", t, vtu_name(step));
 }
 
 template void write_vtu(const std::filesystem::path&, const FrameView<2>&, int, const Units&);

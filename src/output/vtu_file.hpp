@@ -18,7 +18,9 @@ std::string vtu_name(int step);
 template <int Dim>
 void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step, const Units& units);
 
-/// Writes DIR/sim.pvd: the files of DIR/vtu with the times of DIR/frames.
-void write_vtu_series(const std::filesystem::path& directory);
+/// The parts of sim.pvd, the series of these files with their times.
+extern const std::string kVtuSeriesHead, kVtuSeriesTail;
+/// `t` in the units of the run.
+std::string vtu_series_entry(int step, double t);
 
 }  // namespace itr::output

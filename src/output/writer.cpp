@@ -26,12 +26,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kVtuSeries = "sim.pvd";
+const std::string kSeries = "sim.xdmf", kVtuSeries = "sim.pvd";
 
 /// Names of all files that a run writes beside its frames.
 std::vector<std::string> files_of_run(const OutputOptions& options, const RunInfo& info) {
-  std::vector<std::string> names = {"sim.h5", "sim.xdmf", "steps.jsonl", "summary.json"};
-  if (options.vtu) names.emplace_back(kVtuSeries);
+  std::vector<std::string> names = {"sim.h5", kSeries, SeriesText::part_name(kSeries), "steps.jsonl", "summary.json"};
+  if (options.vtu) names.insert(names.end(), {kVtuSeries, SeriesText::part_name(kVtuSeries)});
   names.insert(names.end(), info.files.begin(), info.files.end());
   return names;
 }
@@ -45,26 +45,45 @@ struct Writer::Impl {
         directory(folder.path()),
         options(output_options),
         info(std::move(run_info)),
-        removed_files(prepare(last_step)),
-        series(directory),
-        steps(directory / "steps.jsonl", log_bytes),
+        stored(begin(last_step)),
+        series(directory, stored),
+        steps(directory / "steps.jsonl", (remove_after(last_step), log_bytes)),
         forces(directory, folder.owns(kForceFile) ? last_step : -1) {
-    for (const fs::path& path : stored_frames(directory)) {
-      const FrameSizes sizes = read_frame_sizes(path);
-      last_stored = step_of_frame(path);
-      series.append({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.is_quadratic,
-                     sizes.drawn_nodes, sizes.asked});
-    }
+    if (options.vtu) begin_vtu_series();
+    stored = {};
     last_checkpoint = seconds_now();
     if (last_step >= 0) warnings.restore(directory / "steps.jsonl");
   }
 
-  /// Returns how many files were removed.
-  int prepare(int last_step) {
+  /// Returns the frames to go on from.
+  std::vector<FrameEntry> begin(int last_step) {
     const std::vector<std::string> names = files_of_run(options, info);
-    if (last_step < 0) return folder.begin(names);
+    std::vector<FrameEntry> entries;
+    if (last_step < 0) {
+      removed_files = folder.begin(names);
+      return entries;
+    }
     folder.resume(names, last_step);
-    return folder.remove_after(last_step);
+    for (const fs::path& path : stored_frames(directory)) {
+      if (step_of_frame(path) > last_step) break;
+      const FrameSizes sizes = read_frame_sizes(path);
+      last_stored = step_of_frame(path);
+      entries.push_back({frame_name(last_stored), sizes.t, sizes.dim, sizes.vertices, sizes.cells, sizes.is_quadratic,
+                         sizes.drawn_nodes, sizes.asked});
+    }
+    return entries;
+  }
+
+  /// When nothing links these frames any more.
+  void remove_after(int last_step) {
+    if (last_step >= 0) removed_files = folder.remove_after(last_step);
+  }
+
+  void begin_vtu_series() {
+    vtu_series.emplace(directory / kVtuSeries, kVtuSeriesHead, kVtuSeriesTail);
+    for (const FrameEntry& entry : stored)
+      if (const int step = step_of_name(entry.file); fs::exists(directory / vtu_name(step)))
+        vtu_series->append(vtu_series_entry(step, entry.t));
   }
 
   static std::string frame_name(int step) { return fmt::format("frames/{:06}.h5", step); }
@@ -81,7 +100,7 @@ struct Writer::Impl {
     if (last_stored < 0 || is_due(last_stored)) return;
     series.drop_last();
     fs::remove(directory / frame_name(last_stored));
-    if (options.vtu) fs::remove(directory / vtu_name(last_stored));
+    if (vtu_series && fs::remove(directory / vtu_name(last_stored))) vtu_series->drop_last();
   }
 
   template <int Dim>
@@ -119,9 +138,10 @@ struct Writer::Impl {
       if (!frame.asked->stress.empty()) asked.push_back("stress");
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
-    if (options.vtu) {
+    if (vtu_series) {
       folder.claim(vtu_name(step));
       write_vtu(directory, frame, step, options.units);
+      vtu_series->add(vtu_series_entry(step, options.units.from_si(t, "s")));
     }
     const bool is_quadratic = frame.space && !frame.space->is_linear();
     series.add({frame_name(step), options.units.from_si(t, "s"), Dim, nodes, frame.mesh.num_cells(), is_quadratic,
@@ -143,7 +163,9 @@ struct Writer::Impl {
   RunInfo info;
   int last_stored = kNone;
   int removed_files = 0;
+  std::vector<FrameEntry> stored;  ///< while the series are begun
   TimeSeries series;
+  std::optional<SeriesText> vtu_series;
   LineFile steps;
   ForceFile forces;
   FrameFiles frames;
@@ -218,7 +240,7 @@ void Writer::add_output(double seconds) { impl_->totals.add_output(seconds); }
 
 void Writer::finish(const std::string& outcome, const std::string& solver) {
   impl_->series.write();
-  if (impl_->options.vtu) write_vtu_series(impl_->directory);
+  if (impl_->vtu_series) impl_->vtu_series->write();
   impl_->count_wall_time();
   const std::string& used = solver.empty() ? impl_->info.backend : solver;
   write_file(impl_->directory / "summary.json", impl_->totals.summary_json(impl_->info, impl_->options.units, outcome, used,
