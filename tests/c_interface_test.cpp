@@ -97,6 +97,33 @@ TEST(CInterface, AnswersAnErrorWithoutASimulation) {
   EXPECT_EQ(itr_get_statistics(block.simulation, nullptr), ITR_BAD_INPUT);
 }
 
+/// Two triangles that touch along an edge, with vertices of their own: values, tractions and forces by vertex of one are not
+/// those of the other.
+TEST(CInterface, KeepsVerticesThatCoincideApart) {
+  itr_model* model = itr_model_create(2);
+  const double vertices[] = {0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 1, 1};
+  const int cells[] = {0, 1, 2, 3, 5, 4}, touching[] = {1, 2, 4, 3};
+  EXPECT_EQ(itr_model_set_mesh(model, 6, vertices, 2, cells, nullptr), ITR_SUCCESS);
+  EXPECT_EQ(itr_model_add_boundary(model, "touching", 2, touching, nullptr), ITR_SUCCESS) << itr_model_message(model);
+  EXPECT_EQ(itr_model_set_options(model, kOptions), ITR_SUCCESS);
+  itr_simulation* s = nullptr;
+  EXPECT_EQ(itr_simulation_create(model, nullptr, nullptr, &s), ITR_SUCCESS) << itr_model_message(model);
+  std::vector<double> values(12, 0);
+  for (int v = 0; v < 6; ++v) values[2 * v] = v < 3 ? -0.01 : 0.02;
+  const int mask[] = {1, 1}, free[] = {0, 0};
+  EXPECT_EQ(itr_fix_values(s, "touching", mask, 12, values.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_step(s, 0.01), ITR_SUCCESS) << itr_simulation_message(s);
+  for (const int v : {1, 2, 3, 4}) EXPECT_NEAR(itr_positions(s)[2 * v] - vertices[2 * v], values[2 * v], 1e-15) << v;
+  EXPECT_EQ(itr_fix(s, "touching", free, nullptr, nullptr), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_traction_values(s, "touching", 12, values.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_watch_forces(s, 1), ITR_SUCCESS);
+  EXPECT_EQ(itr_step(s, 0.01), ITR_SUCCESS) << itr_simulation_message(s);
+  for (const int v : {1, 2, 3, 4})
+    EXPECT_NEAR(itr_forces(s, ITR_APPLIED)[2 * v], values[2 * v] / std::sqrt(2.0), 1e-12) << v;
+  itr_simulation_destroy(s);
+  itr_model_destroy(model);
+}
+
 TEST(CInterface, ChecksTheLengthsOfArrays) {
   CBlock block;
   itr_simulation* s = block.simulation;

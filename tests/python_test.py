@@ -373,6 +373,115 @@ class CompiledFunctions(unittest.TestCase):
         self.assertIn("found a function; expected a compiled one", str(caught.exception))
 
 
+class Cracks(unittest.TestCase):
+    """The faces of a crack coincide at rest: what is asked of one is not asked of the other."""
+
+    def crack(self, remesh=None, size=8):
+        """A unit square with a crack along y = 1/2 from the left side to the middle."""
+        vertices = [(i / size, j / size) for j in range(size + 1) for i in range(size + 1)]
+        at = lambda i, j: j * (size + 1) + i  # noqa: E731
+        twin = {at(i, size // 2): len(vertices) + i for i in range(size // 2)}
+        vertices += [vertices[v] for v in twin]
+        cells = []
+        for j in range(size):
+            for i in range(size):
+                a, b, c, d = (v if j < size // 2 else twin.get(v, v)
+                              for v in (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)))
+                cells += [(a, b, c), (a, c, d)]
+        self.lower = list(twin)
+        self.upper = list(twin.values())
+        tip = at(size // 2, size // 2)
+        model = itr.Model(np.array(vertices), np.array(cells))
+        model.add_boundary("right", box=([1, 0], [1, 1]))
+        faces = [face + [tip] for face in (self.lower, self.upper)]
+        model.add_boundary("faces", facets=np.array([pair for face in faces for pair in zip(face, face[1:])]))
+        model.set_options({**OPTIONS, "time": {"dt": 1, "time_steps": 5, "quasistatic": True}})
+        if remesh:
+            model.set_options({"space": {"remesh": {"enabled": True, **remesh}}})
+        simulation = itr.Simulation(model)
+        simulation.fix("right", [0, 0])
+        simulation.watch_forces()
+        return simulation
+
+    def sides(self, simulation):
+        """By vertex 1 above the crack and at its upper face, -1 below and at the lower one, 0 on the line ahead of it."""
+        rest, cells = simulation.rest_positions, simulation.cells
+        side = np.sign(rest[:, 1] - 0.5)
+        on = (np.abs(rest[:, 1] - 0.5) < 1e-9) & (rest[:, 0] < 0.5 - 1e-9)
+        for cell in cells:
+            for v in cell[on[cell]]:
+                side[v] = np.sign(rest[cell].mean(axis=0)[1] - 0.5)
+        return side, on
+
+    def test_values_by_vertex_are_of_their_face(self):
+        simulation = self.crack()
+        u = np.zeros_like(simulation.rest_positions)
+        u[self.lower, 1], u[self.upper, 1] = -0.02, 0.02
+        simulation.fix("faces", u)
+        simulation.step()
+        moved = simulation.positions - simulation.rest_positions
+        np.testing.assert_allclose(moved[self.lower + self.upper], u[self.lower + self.upper], atol=1e-15)
+
+    def test_tractions_act_on_their_face_while_the_mesh_changes(self):
+        for remesh in (None, {"split": {"acceptance_tolerance": 1e-2}}):
+            simulation = self.crack(remesh)
+            f = np.zeros_like(simulation.rest_positions)
+            f[self.lower, 1], f[self.upper, 1] = -500, 500
+            simulation.set_traction("faces", f)
+            simulation.step()
+            side, on = self.sides(simulation)
+            applied = simulation.forces("applied")[:, 1]
+            force = 500 * (4 - 0.5) / 8  # it falls to 0 at the tip, along the last edge
+            for one in (-1, 1):
+                own = applied[on & (side == one)].sum()
+                self.assertLess(one * own, force + 1e-9)
+                self.assertGreater(one * own, force - 500 / 8)  # the tip has the rest
+            if remesh:
+                self.assertGreater(simulation.report["splits"], 0)
+
+    def test_forces_stay_at_their_face_while_vertices_go(self):
+        simulation = self.crack({"split": {"acceptance_tolerance": 1}, "collapse": {"rel_max_edge_length": 2}})
+        f = np.zeros_like(simulation.rest_positions)
+        f[self.lower[0], 1], f[self.upper[0], 1] = -500, 500
+        simulation.set_forces(f)
+        simulation.step()
+        self.assertGreater(simulation.report["collapses"], 0)
+        side, _ = self.sides(simulation)
+        applied = simulation.forces("applied")[:, 1]
+        for one in (-1, 1):
+            self.assertAlmostEqual(applied[side == one].sum(), one * 500, delta=1e-6)
+        mouth = np.abs(simulation.rest_positions - [0, 0.5]).max(axis=1) < 1e-9
+        self.assertGreater(np.ptp(simulation.positions[mouth, 1]), 0.1)
+
+    def test_what_is_new_comes_from_its_face(self):
+        simulation = self.crack({"split": {"acceptance_tolerance": 1e-3}})
+        f = np.zeros_like(simulation.rest_positions)
+        f[self.lower, 1], f[self.upper, 1] = -500, 500
+        simulation.set_traction("faces", f)
+
+        def facet_sides():
+            side, on = self.sides(simulation)
+            return [side[facet[on[facet]]].sum() for facet in simulation.facets]
+
+        before = [self.sides(simulation)[0], facet_sides()]
+        seen = [0]
+
+        def listen(change):
+            side, on = self.sides(simulation)
+            carried, facets = change.interpolate(before[0]), facet_sides()
+            self.assertGreaterEqual((carried * side)[on].min(), 0.0)
+            self.assertGreater((carried * side)[on].mean(), 0.8)
+            for facet, parent in enumerate(change.facet_parent):
+                self.assertGreaterEqual(facets[facet] * before[1][parent], 0)
+            seen[0] += 1
+            before[:] = [side, facets]
+
+        simulation.on_mesh_change(listen)
+        for _ in range(2):
+            simulation.step()
+        self.assertGreater(seen[0], 0)
+
+
 class Remeshing(unittest.TestCase):
     def setUp(self):
         self.simulation = make_simulation(**REMESH)

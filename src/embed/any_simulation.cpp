@@ -97,8 +97,8 @@ struct AnySimulation::Impl {
     }
     /// Of values by vertex linear on the cells of the present mesh, of values by node quadratic along its curved edges.
     template <int Components = Dim>
-    std::function<Vec<Components>(const Vec<Dim>& X, double t)> nodal(const std::string& name,
-                                                                      std::span<const double> values) {
+    std::function<Vec<Components>(const RestPoint<Dim>& X, double t)> nodal(const std::string& name,
+                                                                            std::span<const double> values) {
       const auto by_node = static_cast<std::size_t>(Components * itr::num_nodes(mesh(), space()));
       const bool is_by_node = values.size() == by_node;
       check_array(name, values, is_by_node ? by_node : static_cast<std::size_t>(Components * mesh().vertex_slots()));
@@ -107,7 +107,7 @@ struct AnySimulation::Impl {
         locator_revision = simulation.mesh_revision();
       }
       return [f = nodal_function<Dim>(locator, as_field(values), is_by_node ? space() : Space())](
-                 const Vec<Dim>& X, double) { return Vec<Components>(f(X)); };
+                 const RestPoint<Dim>& X, double) { return Vec<Components>(f(X)); };
     }
     /// Puts a term in the place of the one of its name; a null one goes.
     void set_term(const std::string& name, TermFactory<Dim> term) {
@@ -347,7 +347,8 @@ void AnySimulation::set_pressure(const std::string& boundary, std::span<const do
   const int tag = impl_->tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const auto value = d.template nodal<1>("pressures", pressures);
-    replace(d.simulation.conditions().pressure, {tag, [=](const Vec<Dim>& X, double t) { return value(X, t)[0]; }}, false);
+    replace(d.simulation.conditions().pressure, {tag, [=](const RestPoint<Dim>& X, double t) { return value(X, t)[0]; }},
+            false);
   });
 }
 

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
+#include "geometry/measures.hpp"
 #include "itr/energy/load.hpp"
 
 namespace itr {
@@ -21,18 +22,22 @@ struct LoadPoint {
   }
 };
 
-/// Calls visit(point, force) with the share of the total `weight * load` that acts at each point.
+inline double facet_area(const std::array<Vec<2>, 2>& p) { return (p[1] - p[0]).norm(); }
+inline double facet_area(const std::array<Vec<3>, 3>& p) { return 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm(); }
+
+/// Calls visit(point, force) with the share of the total `weight * load` that acts at each point of a cell or a facet of a
+/// connected part.
 template <int Dim, std::size_t Vertices, typename Load, typename Visit>
-void for_each_load_point(const std::array<Vec<Dim>, Vertices>& rest, double weight, const Load& load, const Visit& visit) {
+void for_each_load_point(const std::array<Vec<Dim>, Vertices>& rest, int part, double weight, const Load& load,
+                         const Visit& visit) {
   using Point = LoadPoint<Vertices>;
+  Vec<Dim> inward = Vec<Dim>::Zero();  // of a cell not needed: the points are inside
+  if constexpr (Vertices == Dim) inward = inward_normal(rest);
   for (std::size_t q = 0; q < Vertices; ++q) {
     Vec<Dim> X = Vec<Dim>::Zero();
     for (std::size_t k = 0; k < Vertices; ++k) X += (k == q ? Point::kNear : Point::kFar) * rest[k];
-    visit(q, Vec<Dim>(weight / Vertices * load(X)));
+    visit(q, Vec<Dim>(weight / Vertices * load(RestPoint<Dim>(X, inward, part))));
   }
 }
-
-inline double facet_area(const std::array<Vec<2>, 2>& p) { return (p[1] - p[0]).norm(); }
-inline double facet_area(const std::array<Vec<3>, 3>& p) { return 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm(); }
 
 }  // namespace itr

@@ -39,49 +39,53 @@ class PointForces final : public Energy, public IncrementalTerm {
   double scale_;
 };
 
+/// The forces on the nodes of a mesh.
 template <int Dim>
 struct Points {
-  std::vector<Vec<Dim>> X;
+  VectorX all;                    ///< on all nodes [N]
+  CellSet<Dim> cells;             ///< of the mesh
+  std::vector<RestPoint<Dim>> X;  ///< of the nodes with a force
   std::vector<Vec<Dim>> force;
-  std::vector<int> body;  ///< of one of the cells of the vertex
   Bvh<Dim> tree;
 };
 
-constexpr double kInside = -1e-9;  ///< least weight of a point in a cell
+/// Least cosine of a point's inward direction to the inner normals of a cell that is at its inward side, to round-off.
+constexpr double kFaces = -1e-6;
 
-/// Adds the forces of the points that are in some cell of the set: each to the cell that it is deepest in, by the values of
-/// its shape functions there.
+/// Adds the forces of the points whose inward side is in some cell of the set, by the values of its shape functions there.
+/// At the rim of a patch this leaves out forces on held nodes, which do no work.
 template <int Dim>
 void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& forces) {
   struct Best {
-    double depth;
+    Fit<Dim> fit;
     bool is_curved;
     std::size_t element;
     std::array<double, Dim + 1> weights;
   };
   std::map<int, Best> best;
   std::vector<int> hits;
-  const auto look_in = [&](bool is_curved, std::size_t e, const int* vertices, int body, const Mat<Dim>& inverse_edges) {
+  const auto look_in = [&](bool is_curved, std::size_t e, const int* vertices, int part, const Mat<Dim>& inverse_edges) {
     Box<Dim> box;
     for (int k = 0; k <= Dim; ++k) box.include(cells.rest[vertices[k]]);
     hits.clear();
     points.tree.query(box.inflated(1e-9 * (box.max - box.min).norm()), hits);
     for (const int i : hits) {
-      if (points.body[i] != body) continue;
-      const auto weights = barycentric_weights<Dim>(cells.rest[vertices[0]], inverse_edges, points.X[i]);
-      const double depth = *std::min_element(weights.begin(), weights.end());
-      if (depth < kInside) continue;
-      const auto [it, is_new] = best.try_emplace(i, Best{depth, is_curved, e, weights});
-      if (!is_new && depth > it->second.depth) it->second = {depth, is_curved, e, weights};
+      if (points.X[i].part != part) continue;
+      auto weights = barycentric_weights<Dim>(cells.rest[vertices[0]], inverse_edges, points.X[i]);
+      const Fit<Dim> fit = fit_of<Dim>(points.X[i], weights, inverse_edges);
+      if (!fit.has || fit.facing < kFaces) continue;
+      tidy(weights);
+      const auto [it, is_new] = best.try_emplace(i, Best{fit, is_curved, e, weights});
+      if (!is_new && fit.is_better_than(it->second.fit)) it->second = {fit, is_curved, e, weights};
     }
   };
   for (std::size_t e = 0; e < cells.elements.size(); ++e) {
     const auto& element = cells.elements[e];
-    look_in(false, e, element.vertices.data(), element.body, element.inverse_edges);
+    look_in(false, e, element.vertices.data(), element.part, element.inverse_edges);
   }
   for (std::size_t e = 0; e < cells.curved_elements.size(); ++e) {
     const auto& element = cells.curved_elements[e];
-    look_in(true, e, element.nodes.data(), element.body, element.inverse_edges);
+    look_in(true, e, element.nodes.data(), element.part, element.inverse_edges);
   }
   for (const auto& [i, place] : best) {
     if (!place.is_curved) {
@@ -96,43 +100,45 @@ void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& 
   }
 }
 
-/// Whether the points are the first vertices of the set, one by one.
+/// Whether the set has the cells of a mesh, with its nodes for its first ones.
 template <int Dim>
-bool are_vertices(const std::vector<Vec<Dim>>& X, const std::vector<Vec<Dim>>& rest) {
-  return X.size() <= rest.size() && std::equal(X.begin(), X.end(), rest.begin());
+bool has_cells_of(const CellSet<Dim>& mesh, const CellSet<Dim>& cells) {
+  return mesh.rest.size() <= cells.rest.size() &&
+         std::ranges::equal(mesh.elements, cells.elements, {}, &CellSet<Dim>::Element::vertices,
+                            &CellSet<Dim>::Element::vertices) &&
+         std::ranges::equal(mesh.curved_elements, cells.curved_elements, {}, &CellSet<Dim>::CurvedElement::nodes,
+                            &CellSet<Dim>::CurvedElement::nodes) &&
+         std::equal(mesh.rest.begin(), mesh.rest.end(), cells.rest.begin());
 }
 
 }  // namespace
 
 template <int Dim>
 TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces, const Space& space) {
-  const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
-  const auto n = static_cast<int>(nodes.size());
+  const int n = num_nodes(mesh, space);
   if (forces.size() != Eigen::Index{Dim} * n)
     throw InputError({"", "forces", std::to_string(forces.size()) + " numbers",
                       std::to_string(Dim * n) + ", " + std::to_string(Dim) + " a node"});
-  const auto all = std::make_shared<std::vector<Vec<Dim>>>();
-  const auto given = std::make_shared<const VectorX>(forces);
   const auto loaded = std::make_shared<Points<Dim>>();
+  loaded->all = forces;
+  loaded->cells = whole_mesh(mesh, {}, space);
   std::vector<Box<Dim>> boxes;
   for (int v = 0; v < n; ++v) {
-    const Vec<Dim> f = forces.segment<Dim>(Dim * v), X = nodes[v];
+    const Vec<Dim> f = forces.segment<Dim>(Dim * v);
     if (!f.allFinite())
       throw InputError({"", "forces[" + std::to_string(v) + "]", "a number that is not finite", "numbers"});
-    all->push_back(X);
     if (f.isZero(0)) continue;
-    loaded->X.push_back(X);
+    const int edge = v - mesh.vertex_slots();
+    loaded->X.push_back(edge < 0 ? mesh.point(v) : mesh.middle(space.curved_edges()[edge]));
     loaded->force.push_back(f);
-    const VertexId end = v < mesh.vertex_slots() ? v : space.curved_edges()[v - mesh.vertex_slots()][0];
-    loaded->body.push_back(mesh.cells_of(end).empty() ? 0 : mesh.body(mesh.cells_of(end)[0]));
-    boxes.push_back({X, X});
+    boxes.push_back({loaded->X.back(), loaded->X.back()});
   }
   loaded->tree.build(boxes);
   return [=](const CellSet<Dim>& cells, double, double scale) -> std::shared_ptr<const Energy> {
     if (loaded->X.empty()) return nullptr;
     VectorX nodal = VectorX::Zero(Dim * static_cast<Eigen::Index>(cells.rest.size()));
-    if (are_vertices<Dim>(*all, cells.rest))
-      nodal.head(given->size()) = *given;
+    if (has_cells_of(loaded->cells, cells))
+      nodal.head(loaded->all.size()) = loaded->all;
     else
       add_located(*loaded, cells, nodal);
     if (nodal.isZero(0)) return nullptr;

@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "geometry/measures.hpp"
 #include "itr/fem/quadrature.hpp"
 #include "project_block.hpp"
 
@@ -78,6 +79,18 @@ CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, D
   return weights;
 }
 
+/// Of a facet, the first of whose nodes are its corners.
+template <int Dim, std::size_t N>
+RestPoint<Dim> middle_of(const std::array<int, N>& nodes, int part, const CellSet<Dim>& cells) {
+  std::array<Vec<Dim>, Dim> corners;
+  Vec<Dim> middle = Vec<Dim>::Zero();
+  for (int k = 0; k < Dim; ++k) {
+    corners[k] = cells.rest[nodes[k]];
+    middle += corners[k] / Dim;
+  }
+  return {middle, inward_normal(corners), part};
+}
+
 }  // namespace
 
 template <int Dim>
@@ -87,16 +100,14 @@ PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>&
   for (const auto& facet : cells.facets)
     for (const auto& [tag, pressure] : loads.pressures) {
       if (tag != facet.tag) continue;
-      Vec<Dim> middle = Vec<Dim>::Zero();
-      for (const int v : facet.vertices) middle += cells.rest[v] / Dim;
+      const RestPoint<Dim> middle = middle_of(facet.vertices, facet.part, cells);
       facets_.push_back({facet.vertices, pressure(middle)});
       origin_ += middle;
     }
   for (const auto& facet : cells.curved_facets)
     for (const auto& [tag, pressure] : loads.pressures) {
       if (tag != facet.tag) continue;
-      Vec<Dim> middle = Vec<Dim>::Zero();
-      for (int k = 0; k < Dim; ++k) middle += cells.rest[facet.nodes[k]] / Dim;
+      const RestPoint<Dim> middle = middle_of(facet.nodes, facet.part, cells);
       curved_facets_.push_back({facet.nodes, facet.curved, pressure(middle)});
       origin_ += middle;
     }

@@ -12,7 +12,8 @@ CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extr
   set.num_vertices = static_cast<int>(set.rest.size());
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
-    typename CellSet<Dim>::CurvedElement element{{}, 0, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), c};
+    typename CellSet<Dim>::CurvedElement element{{}, 0,           mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c),
+                                                 c,  mesh.part(c)};
     if (!space.is_linear()) element.curved = find_nodes<Dim>(mesh.cell(c), node_of, element.nodes);
     if (element.curved)
       set.curved_elements.push_back(element);
@@ -21,12 +22,12 @@ CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extr
   }
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
-    typename CellSet<Dim>::CurvedFacet facet{{}, 0, mesh.facet_tag(f)};
+    typename CellSet<Dim>::CurvedFacet facet{{}, 0, mesh.facet_tag(f), mesh.part_of_vertex(mesh.facet(f)[0])};
     if (!space.is_linear()) facet.curved = find_nodes<Dim - 1>(mesh.facet(f), node_of, facet.nodes);
     if (facet.curved)
       set.curved_facets.push_back(facet);
     else
-      set.facets.push_back({mesh.facet(f), mesh.facet_tag(f)});
+      set.facets.push_back({mesh.facet(f), mesh.facet_tag(f), facet.part});
   }
   return set;
 }

@@ -5,20 +5,23 @@
 #include <numeric>
 
 #include "geometry/bvh.hpp"
+#include "itr/fem/cell_set.hpp"
 #include "itr/fem/quadratic.hpp"
 
 namespace itr {
 
 namespace {
-constexpr double kAtVertex = 1e-13;  ///< of weights: nearer to a vertex is there
-constexpr double kReach = 1e-12;     ///< of the extent: how far from a box a point may be by round-off
+constexpr double kAtVertex = 1e-13;                                       ///< of weights: nearer to a vertex is there
+constexpr double kAtFacet = 1e-9;                                         ///< of weights: nearer to a facet is on it
+constexpr double kRoundOff = 8 * std::numeric_limits<double>::epsilon();  ///< of positions
+constexpr double kReach = 1e-12;  ///< of the extent: how far from a box a point may be by round-off
 }  // namespace
 
 template <int Dim>
 struct Locator<Dim>::Impl {
   struct Cell {
     CellId id;
-    int body;
+    int body, part;
     std::array<VertexId, Dim + 1> vertices;
     Vec<Dim> origin;
     Mat<Dim> inverse_edges;
@@ -36,16 +39,31 @@ struct Locator<Dim>::Impl {
       for (const int v : mesh.cell(c)) box.include(mesh.rest(v));
       all.include(box);
       boxes.push_back(box);
-      cells.push_back({c, mesh.body(c), mesh.cell(c), mesh.rest(mesh.cell(c)[0]), mesh.inverse_rest_edges(c)});
+      cells.push_back({c, mesh.body(c), mesh.part(c), mesh.cell(c), mesh.rest(mesh.cell(c)[0]), mesh.inverse_rest_edges(c)});
     }
     if (!ids.empty()) extent = (all.max - all.min).norm();
     tree.build(boxes);
   }
 };
 
-namespace {
+template <int Dim>
+Fit<Dim> fit_of(const RestPoint<Dim>& X, const std::array<double, Dim + 1>& weights, const Mat<Dim>& inverse_edges) {
+  Fit<Dim> fit;
+  fit.depth = *std::min_element(weights.begin(), weights.end());
+  const double length = X.inward.norm();
+  if (!(length > 0)) return fit;
+  fit.has = true;
+  fit.facing = 2;
+  for (int k = 0; k <= Dim; ++k) {
+    const Vec<Dim> gradient = barycentric_gradient<Dim>(inverse_edges, k);
+    const double steepness = gradient.norm();
+    const double tolerance = kAtFacet + kRoundOff * steepness * X.template lpNorm<Eigen::Infinity>();
+    fit.has = fit.has && weights[k] >= -tolerance;
+    if (weights[k] <= tolerance) fit.facing = std::min(fit.facing, gradient.dot(X.inward) / (steepness * length));
+  }
+  return fit;
+}
 
-/// Within the cell; at a vertex exactly there.
 template <std::size_t N>
 void tidy(std::array<double, N>& weights) {
   double sum = 0;
@@ -54,6 +72,10 @@ void tidy(std::array<double, N>& weights) {
   if (std::find(weights.begin(), weights.end(), 1.0) != weights.end())
     for (double& w : weights) w = w == 1 ? 1 : 0;
 }
+template void tidy(std::array<double, 3>&);
+template void tidy(std::array<double, 4>&);
+
+namespace {
 
 template <int Dim>
 std::vector<CellId> alive_cells(const Mesh<Dim>& mesh) {
@@ -75,18 +97,18 @@ template <int Dim>
 Locator<Dim>::Locator(Locator&&) noexcept = default;
 
 template <int Dim>
-typename Locator<Dim>::Place Locator<Dim>::find(const Vec<Dim>& X, int body) const {
+typename Locator<Dim>::Place Locator<Dim>::find(const RestPoint<Dim>& X, int body) const {
   Place best;
-  double depth = -std::numeric_limits<double>::infinity();
+  Fit<Dim> best_fit;
   std::vector<int> hits;
   double reach = kReach * impl_->extent;
   const auto look = [&](int i) {
     const auto& cell = impl_->cells[i];
-    if (body != kNone && cell.body != body) return;
+    if ((body != kNone && cell.body != body) || (X.part != kNone && cell.part != X.part)) return;
     const auto weights = barycentric_weights<Dim>(cell.origin, cell.inverse_edges, X);
-    const double least = *std::min_element(weights.begin(), weights.end());
-    if (least <= depth && best.cell != kNone) return;
-    depth = least;
+    const Fit<Dim> fit = fit_of<Dim>(X, weights, cell.inverse_edges);
+    if (best.cell != kNone && !fit.is_better_than(best_fit)) return;
+    best_fit = fit;
     best = {cell.id, cell.vertices, weights};
   };
   for (; best.cell == kNone && reach < 4 * impl_->extent; reach *= 1000) {
@@ -95,6 +117,7 @@ typename Locator<Dim>::Place Locator<Dim>::find(const Vec<Dim>& X, int body) con
     for (const int i : hits) look(i);
   }
   for (std::size_t i = 0; best.cell == kNone && i < impl_->cells.size(); ++i) look(static_cast<int>(i));
+  if (best.cell == kNone && X.part != kNone) return find(RestPoint<Dim>(X, X.inward, kNone), body);
   if (best.cell != kNone) tidy(best.weights);
   return best;
 }
@@ -105,12 +128,12 @@ int Locator<Dim>::num_vertices() const {
 }
 
 template <int Dim>
-std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
-                                                         Space space) {
+std::function<VectorX(const RestPoint<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
+                                                               Space space) {
   const int vertices = locator->num_vertices();
   const int components = static_cast<int>(values.size()) / std::max(1, vertices + space.num_curved());
   return [locator = std::move(locator), values = std::move(values), space = std::move(space), vertices,
-          components](const Vec<Dim>& X) {
+          components](const RestPoint<Dim>& X) {
     const auto place = locator->find(X);
     const auto at = [&](int node) { return values.segment(components * node, components); };
     VectorX sum = VectorX::Zero(components);
@@ -128,7 +151,9 @@ std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const L
 
 template class Locator<2>;
 template class Locator<3>;
-template std::function<VectorX(const Vec<2>&)> nodal_function<2>(std::shared_ptr<const Locator<2>>, VectorX, Space);
-template std::function<VectorX(const Vec<3>&)> nodal_function<3>(std::shared_ptr<const Locator<3>>, VectorX, Space);
+template Fit<2> fit_of(const RestPoint<2>&, const std::array<double, 3>&, const Mat<2>&);
+template Fit<3> fit_of(const RestPoint<3>&, const std::array<double, 4>&, const Mat<3>&);
+template std::function<VectorX(const RestPoint<2>&)> nodal_function<2>(std::shared_ptr<const Locator<2>>, VectorX, Space);
+template std::function<VectorX(const RestPoint<3>&)> nodal_function<3>(std::shared_ptr<const Locator<3>>, VectorX, Space);
 
 }  // namespace itr

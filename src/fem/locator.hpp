@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -21,6 +22,26 @@ std::array<double, Dim + 1> barycentric_weights(const Vec<Dim>& origin, const Ma
   return weights;
 }
 
+/// How well a simplex has a point: cells that share the point differ in which of them lies at its inward side.
+template <int Dim>
+struct Fit {
+  bool has = false;    ///< the point is in the closed simplex, to round-off
+  double facing = -2;  ///< least cosine of the inward direction to the inner normals of the facets that the point is on
+  double depth = -std::numeric_limits<double>::infinity();  ///< least weight
+  bool is_better_than(const Fit& other) const {
+    if (has != other.has) return has;
+    if (has && facing != other.facing) return facing > other.facing;
+    return depth > other.depth;
+  }
+};
+/// Of a simplex by the inverse of its edges, with the point's weights in it. Without an inward direction the depth decides.
+template <int Dim>
+Fit<Dim> fit_of(const RestPoint<Dim>& X, const std::array<double, Dim + 1>& weights, const Mat<Dim>& inverse_edges);
+
+/// Moves weights into the simplex, and to exactly 1 and 0 at a vertex.
+template <std::size_t N>
+void tidy(std::array<double, N>& weights);
+
 /// Finds cells by rest positions. It copies what it needs: the mesh may change afterwards.
 template <int Dim>
 class Locator {
@@ -36,9 +57,9 @@ class Locator {
     std::array<VertexId, Dim + 1> vertices{};  ///< of the cell
     std::array<double, Dim + 1> weights{};     ///< barycentric: >= 0, of sum 1; exactly 1 and 0 at a vertex
   };
-  /// The cell that has X [m], of those that share it the one it is deepest in; outside of all, a nearest one. `body`: among
-  /// the cells of this body only, kNone: of any.
-  Place find(const Vec<Dim>& X, int body = kNone) const;
+  /// The cell that has X [m], of those that share it the one at its inward side; outside of all, a nearest one. Only cells
+  /// of the point's connected part count if there are any, and of `body` unless this is kNone.
+  Place find(const RestPoint<Dim>& X, int body = kNone) const;
   /// Length of nodal fields: the vertex slots of the mesh.
   int num_vertices() const;
 
@@ -50,8 +71,8 @@ class Locator {
 /// The function of rest position with these values at the nodes of `space`, on cells linear or, along curved edges,
 /// quadratic. `values`: `components` for each node, interleaved. Several threads may call the result at a time.
 template <int Dim>
-std::function<VectorX(const Vec<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
-                                                         Space space = {});
+std::function<VectorX(const RestPoint<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
+                                                               Space space = {});
 
 extern template class Locator<2>;
 extern template class Locator<3>;

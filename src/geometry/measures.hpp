@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <array>
 #include <cmath>
@@ -26,6 +27,10 @@ template <int Dim>
 double simplex_volume(const std::array<Vec<Dim>, Dim + 1>& p) {
   return simplex_volume<Dim>(edge_matrix<Dim>(p));
 }
+
+/// A normal of a facet, of any length, into its body.
+inline Vec<2> inward_normal(const std::array<Vec<2>, 2>& p) { return {p[0][1] - p[1][1], p[1][0] - p[0][0]}; }
+inline Vec<3> inward_normal(const std::array<Vec<3>, 3>& p) { return (p[2] - p[0]).cross(p[1] - p[0]); }
 
 /// 1 for a regular simplex, 0 for a flat one, negative for an inverted one: its volume by that of the regular one of the
 /// same root mean square edge. (Parthasarathy, Graichen & Hathaway 1994 compare such measures.)

@@ -10,6 +10,7 @@
 #include "core/check.hpp"
 #include "geometry/measures.hpp"
 #include "itr/core/error.hpp"
+#include "mesh/connected_parts.hpp"
 
 namespace itr {
 
@@ -53,7 +54,7 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
     for (const int v : cells[c])
       if (v < 0 || v >= vertex_slots())
         throw InputError({"", place(), "vertex index " + std::to_string(v), "0 to " + std::to_string(vertex_slots() - 1)});
-    add_cell(cells[c], body[c]);
+    add_cell(cells[c], body[c], kNone);
     if (!(volume_.back() > 0 && std::isfinite(volume_.back())))
       throw InputError({"", place(), "rest volume " + std::to_string(volume_.back()),
                         "a positive, finite one (not degenerate or inverted)"});
@@ -68,6 +69,8 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
   }
   for (const auto& [key, entry] : facets)
     if (entry.first == 1) add_facet(entry.second, kNoTag);
+  const std::vector<int> part = connected_parts<Dim + 1>(rest_.size(), cells_);
+  for (std::size_t c = 0; c < cells_.size(); ++c) part_[c] = part[cells_[c][0]];
 }
 
 template <int Dim>
@@ -108,16 +111,39 @@ void Mesh<Dim>::update_geometry(CellId c) {
 }
 
 template <int Dim>
-void Mesh<Dim>::add_cell(const Cell& cell, int body) {
+void Mesh<Dim>::add_cell(const Cell& cell, int body, int part) {
   const int c = cell_slots();
   cells_.push_back(cell);
   body_.push_back(body);
+  part_.push_back(part);
   volume_.push_back(0);
   quality_.push_back(0);
   inverse_edges_.emplace_back();
   update_geometry(c);
   for (const int v : cell) cells_of_[v].push_back(c);
   ++num_cells_;
+}
+
+template <int Dim>
+Vec<Dim> Mesh<Dim>::barycenter(CellId c) const {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const VertexId v : cells_[c]) sum += rest_[v];
+  return sum / (Dim + 1);
+}
+
+template <int Dim>
+RestPoint<Dim> Mesh<Dim>::point(VertexId v) const {
+  if (cells_of_[v].empty()) return rest_[v];
+  const CellId c = cells_of_[v][0];
+  return {rest_[v], barycenter(c) - rest_[v], part_[c]};
+}
+
+template <int Dim>
+RestPoint<Dim> Mesh<Dim>::middle(const EdgeKey& edge) const {
+  const Vec<Dim> X = (rest_[edge[0]] + rest_[edge[1]]) / 2;
+  for (const CellId c : cells_of_[edge[0]])
+    if (std::find(cells_[c].begin(), cells_[c].end(), edge[1]) != cells_[c].end()) return {X, barycenter(c) - X, part_[c]};
+  return X;
 }
 
 template <int Dim>
@@ -258,10 +284,11 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
       if (v == kNewVertex) v = created;
     return ids;
   };
+  const int part = edit.removed_cells.empty() ? kNone : part_[edit.removed_cells[0]];
   for (const CellId c : edit.removed_cells) remove_cell(c);
   for (const FacetId f : edit.removed_facets) remove_facet(f);
   for (const auto& cell : edit.inserted_cells) {
-    add_cell(resolve(cell.vertices), cell.body);
+    add_cell(resolve(cell.vertices), cell.body, part);
     ITR_CHECK(volume_.back() > 0, volume_.back());
   }
   for (const auto& facet : edit.inserted_facets) add_facet(resolve(facet.vertices), facet.tag);
@@ -307,6 +334,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
     const int to = map.cell[c] = cells++;
     cells_[to] = renumber(cells_[c]);
     body_[to] = body_[c];
+    part_[to] = part_[c];
     volume_[to] = volume_[c];
     quality_[to] = quality_[c];
     inverse_edges_[to] = inverse_edges_[c];
@@ -327,6 +355,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
   vertex_tag_.resize(vertices);
   cells_.resize(cells);
   body_.resize(cells);
+  part_.resize(cells);
   volume_.resize(cells);
   quality_.resize(cells);
   inverse_edges_.resize(cells);

@@ -5,6 +5,7 @@
 
 #include "fem/locator.hpp"
 #include "geometry/bvh.hpp"
+#include "geometry/measures.hpp"
 #include "itr/geometry/distance.hpp"
 
 namespace itr {
@@ -26,6 +27,13 @@ double squared_distance(const Vec<3>& p, const Mesh<3>& mesh, FacetId f) {
   return point_triangle_distance_squared(p, mesh.rest(a), mesh.rest(b), mesh.rest(c));
 }
 
+template <int Dim>
+std::array<Vec<Dim>, Dim> rest_of(const Mesh<Dim>& mesh, const typename MeshTypes<Dim>::Facet& facet) {
+  std::array<Vec<Dim>, Dim> corners;
+  for (int k = 0; k < Dim; ++k) corners[k] = mesh.rest(facet[k]);
+  return corners;
+}
+
 /// The facets of `before` that are gone, to look up where new ones lie.
 template <int Dim>
 class LostFacets {
@@ -42,14 +50,16 @@ class LostFacets {
     tree_.build(boxes);
   }
 
-  /// The nearest one with this tag.
-  FacetId find(const Vec<Dim>& X, int tag) const {
+  /// The nearest one with this tag that looks to the same side of the same connected part.
+  FacetId find(const RestPoint<Dim>& X, int tag) const {
     std::vector<int> hits;
     tree_.query({X, X}, hits);
     FacetId nearest = kNone;
     double least = std::numeric_limits<double>::infinity();
     for (const int i : hits) {
-      if (before_.facet_tag(lost_[i]) != tag) continue;
+      const auto& facet = before_.facet(lost_[i]);
+      if (before_.facet_tag(lost_[i]) != tag || before_.part_of_vertex(facet[0]) != X.part) continue;
+      if (inward_normal(rest_of(before_, facet)).dot(X.inward) <= 0) continue;
       const double distance = squared_distance(X, before_, lost_[i]);
       if (distance >= least) continue;
       least = distance;
@@ -112,7 +122,8 @@ MeshChange<Dim> describe_change(const Mesh<Dim>& before, const Mesh<Dim>& mesh, 
     if (change.facet_parent[f] != kNone) continue;
     Vec<Dim> middle = Vec<Dim>::Zero();
     for (const int v : mesh.facet(f)) middle += mesh.rest(v) / Dim;
-    change.facet_parent[f] = lost.find(middle, mesh.facet_tag(f));
+    const RestPoint<Dim> point(middle, inward_normal(rest_of(mesh, mesh.facet(f))), mesh.part_of_vertex(mesh.facet(f)[0]));
+    change.facet_parent[f] = lost.find(point, mesh.facet_tag(f));
   }
 
   std::vector<VertexId> stayed(mesh.vertex_slots(), kNone);
@@ -125,7 +136,7 @@ MeshChange<Dim> describe_change(const Mesh<Dim>& before, const Mesh<Dim>& mesh, 
       entries.emplace_back(v, stayed[v], 1);
       continue;
     }
-    const auto place = locator.find(mesh.rest(v), mesh.body(mesh.cells_of(v)[0]));
+    const auto place = locator.find(mesh.point(v), mesh.body(mesh.cells_of(v)[0]));
     for (int k = 0; k <= Dim; ++k)
       if (place.weights[k] > 0) entries.emplace_back(v, place.vertices[k], place.weights[k]);
   }

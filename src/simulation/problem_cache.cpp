@@ -26,7 +26,9 @@ bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   if (!std::equal(obstacles.begin(), obstacles.end(), cells.rest.begin() + bodies)) return false;
   if (!space.is_linear()) return has_cells_of(mesh);
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (cells.elements[c].vertices != mesh.cell(c) || cells.elements[c].body != mesh.body(c)) return false;
+    if (cells.elements[c].vertices != mesh.cell(c) || cells.elements[c].body != mesh.body(c) ||
+        cells.elements[c].part != mesh.part(c))
+      return false;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (cells.facets[f].vertices != mesh.facet(f) || cells.facets[f].tag != mesh.facet_tag(f)) return false;
   return true;
@@ -40,8 +42,9 @@ bool MeshScope<Dim>::has_cells_of(const Mesh<Dim>& mesh) const {
     return std::ranges::equal(a, b, [&](const auto& p, const auto& q) { return ((p.*members == q.*members) && ...); });
   };
   using Cells = CellSet<Dim>;
-  return same(cells.elements, other.elements, &Cells::Element::vertices, &Cells::Element::body) &&
-         same(cells.curved_elements, other.curved_elements, &Cells::CurvedElement::nodes, &Cells::CurvedElement::body) &&
+  return same(cells.elements, other.elements, &Cells::Element::vertices, &Cells::Element::body, &Cells::Element::part) &&
+         same(cells.curved_elements, other.curved_elements, &Cells::CurvedElement::nodes, &Cells::CurvedElement::body,
+              &Cells::CurvedElement::part) &&
          same(cells.facets, other.facets, &Cells::BoundaryFacet::vertices, &Cells::BoundaryFacet::tag) &&
          same(cells.curved_facets, other.curved_facets, &Cells::CurvedFacet::nodes, &Cells::CurvedFacet::tag);
 }

@@ -34,18 +34,18 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   };
   const double before = std::max(setup.time.t0, t - setup.time.dt);
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.rest(v), t).norm());
-  const auto add_held = [&](const Vec<Dim>& X, const DirichletCondition<Dim>& condition) {
+    if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.point(v), t).norm());
+  const auto add_held = [&](const RestPoint<Dim>& X, const DirichletCondition<Dim>& condition) {
     const Vec<Dim> there = condition.displacement(X, t);
     raise(actions.displacement, there.norm());
     if (!setup.time.is_static) raise(actions.motion, (there - condition.displacement(X, before)).norm());
   };
   for (const auto& condition : setup.dirichlet)
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-      if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.rest(v), condition);
+      if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.point(v), condition);
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
-    const Vec<Dim> X = mesh.rest(mesh.facet(f)[0]);
+    const RestPoint<Dim> X = mesh.point(mesh.facet(f)[0]);
     for (const auto& condition : setup.dirichlet)
       if (condition.tag == mesh.facet_tag(f)) add_held(X, condition);
     for (const auto& condition : setup.neumann)

@@ -97,15 +97,15 @@ template <int Dim>
 Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
   Loads<Dim> loads;
   if (setup.body_acceleration)
-    loads.acceleration = [f = setup.body_acceleration, t](const Vec<Dim>& X) {
+    loads.acceleration = [f = setup.body_acceleration, t](const RestPoint<Dim>& X) {
       return finite<Dim, Vec<Dim>>(f(X, t), "body force", X, t);
     };
   for (const auto& condition : setup.neumann)
-    loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const Vec<Dim>& X) {
+    loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const RestPoint<Dim>& X) {
       return finite<Dim, Vec<Dim>>(f(X, t), "traction", X, t);
     });
   for (const auto& condition : setup.pressure)
-    loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const Vec<Dim>& X) {
+    loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const RestPoint<Dim>& X) {
       return finite<Dim, double>(f(X, t), "pressure", X, t);
     });
   return loads;
@@ -120,10 +120,10 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
     if (std::none_of(by_tag.begin(), by_tag.end(), [&](const auto* c) { return c->tag == condition.tag; }))
       by_tag.push_back(&condition);
   std::sort(by_tag.begin(), by_tag.end(), [](const auto* a, const auto* b) { return a->tag < b->tag; });
-  const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
   const auto hold = [&](int v, const DirichletCondition<Dim>& condition) {
-    const Vec<Dim> target =
-        rest[v] + finite<Dim, Vec<Dim>>(condition.displacement(rest[v], t), "prescribed displacement", rest[v], t);
+    const int edge = v - mesh.vertex_slots();
+    const RestPoint<Dim> X = edge < 0 ? mesh.point(v) : mesh.middle(space.curved_edges()[edge]);
+    const Vec<Dim> target = X + finite<Dim, Vec<Dim>>(condition.displacement(X, t), "prescribed displacement", X, t);
     for (int c = 0; c < Dim; ++c) {
       if (!condition.components[c]) continue;
       result.held[Dim * v + c] = 1;

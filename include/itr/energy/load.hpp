@@ -24,9 +24,9 @@ constexpr double near_vertex() {
 /// What acts on a body at one time: functions of rest position, which several threads may call at once.
 template <int Dim>
 struct Loads {
-  std::function<Vec<Dim>(const Vec<Dim>& X)> acceleration;  ///< body force by mass [m/s^2]; empty: none
-  std::vector<std::pair<int, std::function<Vec<Dim>(const Vec<Dim>& X)>>> tractions;  ///< by facet tag [N/m^(Dim-1)]
-  std::vector<std::pair<int, std::function<double(const Vec<Dim>& X)>>> pressures;    ///< the same, see PressureEnergy
+  std::function<Vec<Dim>(const RestPoint<Dim>& X)> acceleration;  ///< body force by mass [m/s^2]; empty: none
+  std::vector<std::pair<int, std::function<Vec<Dim>(const RestPoint<Dim>& X)>>> tractions;  ///< by facet tag [N/m^(Dim-1)]
+  std::vector<std::pair<int, std::function<double(const RestPoint<Dim>& X)>>> pressures;    ///< the same, see PressureEnergy
   bool has_dead_loads() const { return acceleration || !tractions.empty(); }
 };
 

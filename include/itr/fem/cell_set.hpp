@@ -18,10 +18,12 @@ struct CellSet {
     int body;
     double volume;           ///< rest volume [m^Dim]
     Mat<Dim> inverse_edges;  ///< inverse of the matrix of rest edges
+    int part = kNone;        ///< Mesh::part
   };
   struct BoundaryFacet {
     std::array<int, Dim> vertices;  ///< local ids
     int tag;
+    int part = kNone;  ///< of its cell
   };
   /// A cell with at least one curved edge.
   struct CurvedElement {
@@ -31,12 +33,14 @@ struct CellSet {
     double volume;           ///< rest volume [m^Dim]
     Mat<Dim> inverse_edges;  ///< inverse of the matrix of rest edges
     CellId cell;             ///< in the mesh
+    int part = kNone;        ///< Mesh::part
   };
   /// A boundary facet with at least one curved edge.
   struct CurvedFacet {
     std::array<int, kQuadraticNodes<Dim - 1>> nodes;  ///< as those of a curved element
     CurvedEdges curved;
     int tag;
+    int part = kNone;  ///< of its cell
   };
   int num_vertices = 0;        ///< length of fields / Dim; may exceed the cells' vertices (obstacles)
   std::vector<Vec<Dim>> rest;  ///< per local vertex
@@ -157,7 +161,7 @@ Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>:
 /// A straight cell of a mesh with the ids of its vertices there.
 template <int Dim>
 typename CellSet<Dim>::Element element_of(const Mesh<Dim>& mesh, CellId c) {
-  return {mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)};
+  return {mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), mesh.part(c)};
 }
 template <int Dim>
 Vec<Dim> rest_barycenter(const Mesh<Dim>& mesh, CellId c) {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "itr/core/types.hpp"
+#include "itr/mesh/rest_point.hpp"
 
 namespace itr {
 
@@ -162,6 +163,9 @@ class Mesh {
   const Vec<Dim>& rest(VertexId v) const { return rest_[v]; }
   const Cell& cell(CellId c) const { return cells_[c]; }
   int body(CellId c) const { return body_[c]; }
+  /// The number of the part of the mesh that shared vertices connect, as it was made. Edits keep it.
+  int part(CellId c) const { return part_[c]; }
+  int part_of_vertex(VertexId v) const { return cells_of_[v].empty() ? kNone : part_[cells_of_[v][0]]; }
   double volume(CellId c) const { return volume_[c]; }    ///< rest area (2D) or volume (3D)
   double quality(CellId c) const { return quality_[c]; }  ///< simplex_quality of the rest shape
   /// Inverse of the matrix whose columns are the rest edges X_1 - X_0, ..., X_Dim - X_0.
@@ -181,6 +185,10 @@ class Mesh {
   std::span<const CellId> cells_of(VertexId v) const { return cells_of_[v]; }
   std::span<const FacetId> facets_of(VertexId v) const { return facets_of_[v]; }
   bool is_boundary(VertexId v) const { return !facets_of_[v].empty(); }
+  /// The vertex as a point of the body that it belongs to.
+  RestPoint<Dim> point(VertexId v) const;
+  /// The middle of an edge of alive cells, likewise.
+  RestPoint<Dim> middle(const EdgeKey& edge) const;
 
   /// Cells that hold both ends of the edge, ascending.
   std::vector<CellId> cells_of_edge(const EdgeKey& edge) const;
@@ -235,7 +243,8 @@ class Mesh {
   std::string find_defect() const;
 
  private:
-  void add_cell(const Cell& cell, int body);
+  void add_cell(const Cell& cell, int body, int part);
+  Vec<Dim> barycenter(CellId c) const;
   void add_facet(const Facet& facet, int tag);
   void remove_cell(CellId c);
   void remove_facet(FacetId f);
@@ -247,7 +256,7 @@ class Mesh {
   std::vector<char> vertex_alive_;
   std::vector<int> vertex_tag_;
   std::vector<Cell> cells_;
-  std::vector<int> body_;
+  std::vector<int> body_, part_;
   std::vector<double> volume_, quality_;
   std::vector<Mat<Dim>> inverse_edges_;
   std::vector<Facet> facets_;

@@ -25,9 +25,10 @@
 
 namespace itr {
 
-/// A vector-valued function of rest position X [m] and time t [s].
+/// A vector-valued function of rest position X [m] and time t [s]. A function may tell apart points of one position by the
+/// other members of X; most take `const Vec<Dim>& X`.
 template <int Dim>
-using SpaceTimeFunction = std::function<Vec<Dim>(const Vec<Dim>& X, double t)>;
+using SpaceTimeFunction = std::function<Vec<Dim>(const RestPoint<Dim>& X, double t)>;
 
 /// Collision-only geometry that moves as prescribed: no unknowns.
 template <int Dim>
@@ -72,7 +73,7 @@ struct NeumannCondition {
 template <int Dim>
 struct PressureCondition {
   int tag = 0;
-  std::function<double(const Vec<Dim>& X, double t)> pressure;
+  std::function<double(const RestPoint<Dim>& X, double t)> pressure;
 };
 
 template <int Dim>

@@ -189,14 +189,15 @@ void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
     scratch_.cells.mark(c);
     if (is_after_ && std::find(edit_.removed_cells.begin(), edit_.removed_cells.end(), c) != edit_.removed_cells.end())
       continue;
-    add_cell(mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c), c);
+    add_cell(mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c), c, mesh_.part(c));
   }
   if (!is_after_) return;
   for (const auto& cell : edit_.inserted_cells) {
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = cells_.rest[local(cell.vertices[k])];
     const Mat<Dim> edges = edge_matrix<Dim>(p);
-    add_cell(cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), kNone);
+    add_cell(cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), kNone,
+             mesh_.part(edit_.removed_cells[0]));
   }
 }
 
@@ -215,8 +216,8 @@ CurvedEdges LocalProblem<Dim>::find_nodes(const std::array<VertexId, SimplexDim 
 
 template <int Dim>
 void LocalProblem<Dim>::add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume,
-                                 const Mat<Dim>& inverse_edges, CellId c) {
-  typename CellSet<Dim>::CurvedElement curved{{}, 0, body, volume, inverse_edges, c};
+                                 const Mat<Dim>& inverse_edges, CellId c, int part) {
+  typename CellSet<Dim>::CurvedElement curved{{}, 0, body, volume, inverse_edges, c, part};
   curved.curved = find_nodes<Dim>(cell, curved.nodes);
   if (curved.curved) {
     cells_.curved_elements.push_back(curved);
@@ -224,18 +225,18 @@ void LocalProblem<Dim>::add_cell(const typename MeshTypes<Dim>::Cell& cell, int 
   }
   std::array<int, Dim + 1> vertices;
   for (int k = 0; k <= Dim; ++k) vertices[k] = local(cell[k]);
-  cells_.elements.push_back({vertices, body, volume, inverse_edges});
+  cells_.elements.push_back({vertices, body, volume, inverse_edges, part});
 }
 
 template <int Dim>
-void LocalProblem<Dim>::add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag) {
-  typename CellSet<Dim>::CurvedFacet curved{{}, 0, tag};
+void LocalProblem<Dim>::add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag, int part) {
+  typename CellSet<Dim>::CurvedFacet curved{{}, 0, tag, part};
   curved.curved = find_nodes<Dim - 1>(facet, curved.nodes);
   if (curved.curved) {
     cells_.curved_facets.push_back(curved);
     return;
   }
-  typename CellSet<Dim>::BoundaryFacet loaded{{}, tag};
+  typename CellSet<Dim>::BoundaryFacet loaded{{}, tag, part};
   for (int k = 0; k < Dim; ++k) loaded.vertices[k] = local(facet[k]);
   cells_.facets.push_back(loaded);
 }
@@ -250,11 +251,12 @@ void LocalProblem<Dim>::add_loaded_facets() {
       const auto& facet = mesh_.facet(f);
       const auto is_known = [&](VertexId w) { return scratch_.known[w]; };
       if (facet[0] != v.id || !std::all_of(facet.begin() + 1, facet.end(), is_known) || is_removed(f)) continue;
-      add_loaded_facet(facet, mesh_.facet_tag(f));
+      add_loaded_facet(facet, mesh_.facet_tag(f), mesh_.part_of_vertex(v.id));
     }
   }
   if (!is_after_) return;
-  for (const auto& facet : edit_.inserted_facets) add_loaded_facet(facet.vertices, facet.tag);
+  for (const auto& facet : edit_.inserted_facets)
+    add_loaded_facet(facet.vertices, facet.tag, mesh_.part(edit_.removed_cells[0]));
 }
 
 /// Holds the node of an edge as held_dofs() does: by the facets at the edge, after the edit those that it has then, and by

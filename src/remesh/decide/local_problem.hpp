@@ -116,8 +116,9 @@ class LocalProblem {
   template <int SimplexDim>
   CurvedEdges find_nodes(const std::array<VertexId, SimplexDim + 1>& vertices,
                          std::array<int, kQuadraticNodes<SimplexDim>>& nodes);
-  void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume, const Mat<Dim>& inverse_edges, CellId c);
-  void add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag);
+  void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume, const Mat<Dim>& inverse_edges, CellId c,
+                int part);
+  void add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag, int part);
   EdgeKey edge_of(const LocalVertex& node) const;
   /// The node of an edge on the side of the comparison that this is, or kNone.
   VertexId node_of(VertexId a, VertexId b) const;

@@ -130,7 +130,8 @@ double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
     return after ? RemeshFields<Dim>::after(field, edit, v) : Vec<Dim>(field.segment<Dim>(Dim * v));
   };
   const auto rest = [&](VertexId v) { return rest_after(state.mesh, edit, v); };
-  QuadraticModel<Dim> before(context), after(context);
+  const int part = state.mesh.part(edit.removed_cells[0]);
+  QuadraticModel<Dim> before(context, part), after(context, part);
   for (const CellId c : edit.removed_cells)
     before.add_cell(corners_of(state, state.mesh.cell(c)), state.mesh.body(c), kNone);
   for (const auto& cell : edit.inserted_cells) {
@@ -174,7 +175,7 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
   if (!is_predictable(context) || context.mass == MassKind::lumped || !context.loads.tractions.empty() ||
       std::any_of(around.begin(), around.end(), varies))
     return predict_gain<Dim>(state, make_split<Dim>(mesh, edge));
-  QuadraticModel<Dim> model(context);
+  QuadraticModel<Dim> model(context, mesh.part_of_vertex(edge[0]));
   for (const CellId c : around) {
     const auto& cell = mesh.cell(c);
     const auto b = static_cast<int>(std::find(cell.begin(), cell.end(), edge[1]) - cell.begin());
@@ -230,7 +231,7 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const auto around = mesh.cells_of_edge(edge);
   const auto is_hard = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
   if (std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
-  QuadraticModel<Dim> model(context);
+  QuadraticModel<Dim> model(context, mesh.part_of_vertex(edge[0]));
   for (const CellId c : around) {
     if (mesh.is_curved(c)) {
       model.add_mixed_cell(state, c, edge);
@@ -312,7 +313,7 @@ double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>:
     models.add_still_cell(curved, body);
     return models.energy();
   }
-  QuadraticModel<Dim> model(state.context);
+  QuadraticModel<Dim> model(state.context, state.mesh.part_of_vertex(cell[0]));
   model.add_cell(corners_of(state, cell), body, kNone);
   return model.energy();
 }

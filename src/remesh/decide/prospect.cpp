@@ -23,7 +23,7 @@ std::optional<Vec<Dim>> uniform_acceleration(const Mesh<Dim>& mesh, const Loads<
   if (!loads.acceleration) return Vec<Dim>::Zero();
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
     if (!mesh.is_vertex_alive(v)) continue;
-    const Vec<Dim> own = loads.acceleration(mesh.rest(v));
+    const Vec<Dim> own = loads.acceleration(mesh.point(v));
     if (all && *all != own) return std::nullopt;
     all = own;
   }

@@ -24,7 +24,8 @@ namespace itr {
 template <int Dim>
 class QuadraticModel {
  public:
-  explicit QuadraticModel(const StepContext<Dim>& context) : context_(context) {}
+  /// Of cells of one connected part.
+  QuadraticModel(const StepContext<Dim>& context, int part) : context_(context), part_(part) {}
 
   struct Corners {
     std::array<Vec<Dim>, Dim + 1> rest, x, predictor;
@@ -119,7 +120,8 @@ class QuadraticModel {
       hessian_.diagonal().array() += 16 * 4 * kFourth * mass;
     }
     if (context_.loads.acceleration)
-      gradient_ -= context_.scaling * 4 * kSecond * mass * context_.loads.acceleration((at.rest[a] + at.rest[b]) / 2);
+      gradient_ -= context_.scaling * 4 * kSecond * mass *
+                   context_.loads.acceleration(mesh.middle({mesh.cell(c)[a], mesh.cell(c)[b]}));
   }
   /// The same where other edges of the cell are curved, by the rules of quadrature that energy and mass have.
   void add_mixed_cell(const RemeshState<Dim>& state, CellId c, const EdgeKey& edge) {
@@ -151,14 +153,16 @@ class QuadraticModel {
         hessian_.diagonal().array() += weight * bubble;
       }
       if (context_.loads.acceleration)
-        gradient_ -= context_.scaling * weight * context_.loads.acceleration((mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2);
+        gradient_ -= context_.scaling * weight * context_.loads.acceleration(mesh.middle(edge));
     }
   }
   /// Adds a facet at the edge.
   void add_curved_facet(const std::array<Vec<Dim>, Dim>& rest, const Vec<Dim>& middle, int tag) {
     constexpr double kSecond = 1.0 / (Dim * (Dim + 1));
     for (const auto& [loaded, traction] : context_.loads.tractions)
-      if (loaded == tag) gradient_ -= context_.scaling * 4 * kSecond * facet_area(rest) * traction(middle);
+      if (loaded == tag)
+        gradient_ -=
+            context_.scaling * 4 * kSecond * facet_area(rest) * traction(RestPoint<Dim>(middle, inward_normal(rest), part_));
   }
 
   void add_facet(const std::array<Vec<Dim>, Dim>& rest, const std::array<Vec<Dim>, Dim>& x, int tag, int moving) {
@@ -195,7 +199,7 @@ class QuadraticModel {
   }
   template <std::size_t N>
   void add_load(const std::array<Vec<Dim>, N>& rest, const std::array<Vec<Dim>, N>& x, double weight,
-                const std::function<Vec<Dim>(const Vec<Dim>&)>& load, int moving) {
+                const std::function<Vec<Dim>(const RestPoint<Dim>&)>& load, int moving) {
     using Point = LoadPoint<N>;
     std::array<Vec<Dim>, N> u;
     Vec<Dim> sum = Vec<Dim>::Zero();
@@ -203,7 +207,7 @@ class QuadraticModel {
       u[k] = x[k] - rest[k];
       sum += u[k];
     }
-    for_each_load_point<Dim>(rest, weight, load, [&](std::size_t q, const Vec<Dim>& force) {
+    for_each_load_point<Dim>(rest, part_, weight, load, [&](std::size_t q, const Vec<Dim>& force) {
       energy_ -= force.dot(Point::at(q, u, sum));
       if (moving != kNone) gradient_ -= (static_cast<int>(q) == moving ? Point::kNear : Point::kFar) * force;
     });
@@ -225,6 +229,7 @@ class QuadraticModel {
   }
 
   const StepContext<Dim>& context_;
+  int part_;
   double energy_ = 0;
   Vec<Dim> gradient_ = Vec<Dim>::Zero();
   Mat<Dim> hessian_ = Mat<Dim>::Zero();
@@ -247,7 +252,10 @@ template <int Dim>
 class MovingModels {
  public:
   MovingModels(const RemeshState<Dim>& state, std::span<const VertexId> vertices)
-      : state_(state), vertices_(vertices), still_(state.context), moving_(vertices.size(), still_) {}
+      : state_(state),
+        vertices_(vertices),
+        still_(state.context, state.mesh.part_of_vertex(vertices[0])),
+        moving_(vertices.size(), still_) {}
   void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body) {
     const auto corners = corners_of(state_, cell);
     const typename QuadraticModel<Dim>::CellAt at(state_.context, corners, body);
