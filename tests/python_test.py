@@ -469,8 +469,7 @@ class Cracks(unittest.TestCase):
         def listen(change):
             side, on = self.sides(simulation)
             carried, facets = change.interpolate(before[0]), facet_sides()
-            self.assertGreaterEqual((carried * side)[on].min(), 0.0)
-            self.assertGreater((carried * side)[on].mean(), 0.8)
+            self.assertGreater((carried * side)[on].min(), 0)
             for facet, parent in enumerate(change.facet_parent):
                 self.assertGreaterEqual(facets[facet] * before[1][parent], 0)
             seen[0] += 1

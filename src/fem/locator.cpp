@@ -117,6 +117,25 @@ typename Locator<Dim>::Place Locator<Dim>::find(const RestPoint<Dim>& X, int bod
     for (const int i : hits) look(i);
   }
   for (std::size_t i = 0; best.cell == kNone && i < impl_->cells.size(); ++i) look(static_cast<int>(i));
+  if (best_fit.has && best_fit.depth < 0) {  // a cell that shares the facet, edge or vertex has the point inside
+    const Place at_side = best;
+    const auto shares_all = [&](const auto& vertices) {
+      for (int k = 0; k <= Dim; ++k)
+        if (at_side.weights[k] > kAtFacet &&
+            std::find(vertices.begin(), vertices.end(), at_side.vertices[k]) == vertices.end())
+          return false;
+      return true;
+    };
+    for (const int i : hits) {
+      const auto& cell = impl_->cells[i];
+      if ((body != kNone && cell.body != body) || !shares_all(cell.vertices)) continue;
+      const auto weights = barycentric_weights<Dim>(cell.origin, cell.inverse_edges, X);
+      const double depth = *std::min_element(weights.begin(), weights.end());
+      if (depth <= best_fit.depth) continue;
+      best_fit.depth = depth;
+      best = {cell.id, cell.vertices, weights};
+    }
+  }
   if (best.cell == kNone && X.part != kNone) return find(RestPoint<Dim>(X, X.inward, kNone), body);
   if (best.cell != kNone) tidy(best.weights);
   return best;
