@@ -278,6 +278,8 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
                0);
   if (!state.doublings.empty())
     file.write(kDoublings, std::vector<std::int64_t>(state.doublings.begin(), state.doublings.end()), 0);
+  if (!state.chords.empty())
+    file.write("/checkpoint/chord_levels", std::vector<std::int64_t>(state.chords.begin(), state.chords.end()), 0);
   const BarrierStiffness& stiffness = state.stiffness;
   file.write("/checkpoint/barrier_stiffness",
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
@@ -348,6 +350,14 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
     state.quadrature.assign(levels.begin(), levels.end());
   }
   if (file.contains(kDoublings)) state.doublings = read_ints(saved.file, file, kDoublings);
+  if (file.contains("/checkpoint/chord_levels")) {
+    const auto levels = read_ints(saved.file, file, "/checkpoint/chord_levels");
+    for (const int level : levels)
+      if (level < 0 || level > kMostHalvings)
+        throw InputError({saved.file.string(), "/checkpoint/chord_levels", std::to_string(level),
+                          "0 to " + std::to_string(kMostHalvings)});
+    state.chords.assign(levels.begin(), levels.end());
+  }
   const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;
   if (stiffness.size() != 3)
     throw InputError(

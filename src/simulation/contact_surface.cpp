@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/contact_surface.hpp"
 
+#include <algorithm>
 #include <numeric>
 #include <utility>
+
+#include "fem/refined_chords.hpp"
 
 namespace itr {
 
@@ -30,19 +33,10 @@ std::vector<typename Mesh<Dim>::Facet> boundary_chords(const Mesh<Dim>& mesh, co
   return chords;
 }
 
-}  // namespace
-
+/// The surface through all nodes and these points, and the obstacles.
 template <int Dim>
-ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space) {
-  std::vector<Vec<Dim>> points(num_nodes(mesh, space));
-  for (std::size_t i = 0; i < points.size(); ++i) points[i] = vertex_of<Dim>(x, static_cast<int>(i));
-  return {std::move(points), boundary_chords(mesh, space)};
-}
-
-template <int Dim>
-CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space) {
-  std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
-  const auto chords = boundary_chords(mesh, space);
+CollisionSurface chord_surface(const std::vector<typename Mesh<Dim>::Facet>& chords, std::vector<Vec<Dim>> rest,
+                               const Obstacles<Dim>& obstacles) {
   std::vector<std::array<int, 2>> edges;
   std::vector<std::array<int, 3>> triangles;
   std::vector<char> counts(rest.size(), 0);
@@ -54,6 +48,57 @@ CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& 
       triangles.push_back(facet);
   }
   return with_obstacles<Dim>(std::move(edges), std::move(triangles), {}, std::move(rest), std::move(counts), obstacles);
+}
+
+/// A combination of nodes.
+template <int Dim, typename Weights, typename At>
+Vec<Dim> combined(const Weights& weights, const At& at) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const auto& [node, weight] : weights) sum += weight * at(node);
+  return sum;
+}
+
+template <int Dim>
+ContactSurface<Dim> refined_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space,
+                                    const ChordLevels& levels) {
+  const RefinedChords<Dim> chords = refine_chords(mesh, space, levels);
+  std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
+  const int nodes = static_cast<int>(rest.size()), own = nodes + static_cast<int>(chords.points.size());
+  const int others = static_cast<int>(obstacles.rest.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int node = 0; node < nodes; ++node) entries.emplace_back(node, node, 1);
+  for (int point = nodes; point < own; ++point) {
+    const auto& weights = chords.points[point - nodes];
+    for (const auto& [node, weight] : weights) entries.emplace_back(point, node, weight);
+    rest.push_back(combined<Dim>(weights, [&](int node) { return rest[node]; }));
+  }
+  for (int o = 0; o < others; ++o) entries.emplace_back(own + o, nodes + o, 1);
+  typename VertexMap<Dim>::Weights weights(own + others, nodes + others);
+  weights.setFromTriplets(entries.begin(), entries.end());
+  return {chord_surface<Dim>(chords.facets, std::move(rest), obstacles),
+          std::make_shared<VertexMap<Dim>>(weights, VectorX::Zero(Dim * (own + others)))};
+}
+
+bool has_refined(const ChordLevels& levels) {
+  return std::any_of(levels.begin(), levels.end(), [](int level) { return level > 0; });
+}
+
+}  // namespace
+
+template <int Dim>
+ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space, const ChordLevels& levels) {
+  std::vector<Vec<Dim>> points(num_nodes(mesh, space));
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = vertex_of<Dim>(x, static_cast<int>(i));
+  if (!has_refined(levels)) return {std::move(points), boundary_chords(mesh, space)};
+  const RefinedChords<Dim> chords = refine_chords(mesh, space, levels);
+  for (const auto& weights : chords.points)
+    points.push_back(combined<Dim>(weights, [&](int node) { return vertex_of<Dim>(x, node); }));
+  return {std::move(points), chords.facets};
+}
+
+template <int Dim>
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space) {
+  return chord_surface<Dim>(boundary_chords(mesh, space), node_rest_positions(mesh, space), obstacles);
 }
 
 /// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
@@ -78,7 +123,9 @@ std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, con
 }
 
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space) {
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space,
+                                    const ChordLevels& levels) {
+  if (!setup.proxy && has_refined(levels)) return refined_surface(mesh, setup.obstacles, space, levels);
   if (!setup.proxy) return {collision_surface(mesh, setup.obstacles, space), nullptr};
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   std::vector<int> points(proxy.rest.size());
@@ -86,14 +133,14 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
   std::vector<char> counts(proxy.rest.size(), 1);
   return {
       with_obstacles<Dim>(proxy.edges, proxy.triangles, std::move(points), proxy.rest, std::move(counts), setup.obstacles),
-      proxy_map(setup, mesh, space)};
+      proxy_map(setup, mesh, space), true};
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                       \
-  template ClosedSurface<Dim> body_boundary(const Mesh<Dim>&, ConstVectorView, const Space&);                      \
+  template ClosedSurface<Dim> body_boundary(const Mesh<Dim>&, ConstVectorView, const Space&, const ChordLevels&);  \
   template CollisionSurface collision_surface(const Mesh<Dim>&, const Obstacles<Dim>&, const Space&);              \
   template std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&); \
-  template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&);
+  template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const ChordLevels&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

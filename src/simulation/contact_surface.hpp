@@ -6,6 +6,7 @@
 
 #include "geometry/closed_surface.hpp"
 #include "itr/energy/contact/surface.hpp"
+#include "itr/fem/chord_levels.hpp"
 #include "itr/fem/space.hpp"
 #include "itr/fem/vertex_map.hpp"
 #include "itr/simulation/setup.hpp"
@@ -17,16 +18,19 @@ namespace itr {
 template <int Dim>
 CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space = {});
 
-/// The boundary of the bodies through all nodes, at positions x of these [m].
+/// The boundary of the bodies through all nodes and the points of refined chords, at positions x of the nodes [m].
 template <int Dim>
-ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space = {});
+ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space = {},
+                                 const ChordLevels& levels = {});
 
 /// What can touch in a simulation, and where it is.
 template <int Dim>
 struct ContactSurface {
-  CollisionSurface surface;  ///< its vertices: those of the mesh or of the proxy, then those of the obstacles
-  /// See proxy_map; null without a proxy: the vertices of `surface` are those of mesh and obstacles.
+  /// Its vertices: the nodes and the points of refined chords, or those of the proxy, then those of the obstacles.
+  CollisionSurface surface;
+  /// From nodes and obstacles to these. Null where they are the same: without a proxy and refined chords.
   std::shared_ptr<const VertexMap<Dim>> map;
+  bool is_proxy = false;
 
   VectorX positions(ConstVectorView x) const { return map ? map->positions(x) : VectorX(x); }
   VectorX motion(ConstVectorView dx) const { return map ? map->motion(dx) : VectorX(dx); }
@@ -36,8 +40,9 @@ struct ContactSurface {
 template <int Dim>
 std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
 
-/// The proxy's surface where the setup has one, else the boundary of the compact mesh; with the obstacles.
+/// The proxy's surface where the setup has one, else the boundary of the compact mesh with its chords; with the obstacles.
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {},
+                                    const ChordLevels& levels = {});
 
 }  // namespace itr

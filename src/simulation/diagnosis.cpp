@@ -71,7 +71,8 @@ class Diagnosis {
     return named(vertices, x_, middle_of<Dim>(vertices, x_), "");
   }
   std::string named_pair(PairKind kind, std::span<const int> vertices) const {
-    return named(vertices, on_surface_, place_of_pair<Dim>(kind, vertices, on_surface_), scope_.surface.map ? "proxy " : "");
+    return named(vertices, on_surface_, place_of_pair<Dim>(kind, vertices, on_surface_),
+                 scope_.surface.is_proxy ? "proxy " : "");
   }
   const ContactEnergy<Dim>* contact() const { return scope_.potential.contact().get(); }
 

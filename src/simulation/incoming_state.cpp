@@ -10,6 +10,7 @@
 
 #include "itr/core/error.hpp"
 #include "mesh/validate.hpp"
+#include "simulation/chord_bound.hpp"
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/invariants.hpp"
 
@@ -32,7 +33,7 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
     throw InputError({"", "initial state", what + (" inside of a body, at " + describe(p)), "surfaces that do not touch"});
   };
   const VectorX& x = state.history.x[0];
-  const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.space);
+  const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.space, state.chords);
   for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
   for (Eigen::Index i = Dim * num_nodes(state.mesh, state.space); i < x.size(); i += Dim)
     if (const Vec<Dim> p = x.segment<Dim>(i); boundary.touches(p) || boundary.winding(p) != 0) refuse("an obstacle", p);
@@ -103,7 +104,7 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!setup.contact.enabled) return;
-  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.space);
+  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.space, state.chords);
   const CollisionSurface& surface = contact.surface;
   const VectorX x = contact.positions(state.history.x[0]);
   const auto corners = [&](const auto& primitive) {
@@ -140,6 +141,7 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   for (std::size_t v = 0; v < rest.size(); ++v) vertex_of<Dim>(x, static_cast<int>(v)) += rest[v];
   x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);
   state.history.x = {std::move(x)};
+  state.chords = settled_chords(setup, state.mesh, state.space, {}, state.history.x);
   state.history.v = {sampled(setup.initial_velocity)};
   if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
   return state;
@@ -160,12 +162,15 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!state.quadrature.empty())
     require_size("saved levels of quadrature", state.quadrature.size(),
                  whole_mesh(mesh, {}, state.space).curved_elements.size());
+  if (!state.chords.empty())
+    require_size("saved levels of chords", state.chords.size(), static_cast<std::size_t>(state.space.num_curved()));
   if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
   for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
                                     std::pair("barrier stiffness", state.stiffness.value)})
     if (!std::isfinite(value)) refuse_state(std::string("saved ") + name, fmt::format("{}", value), "a number");
   for (std::size_t age = 0; age < state.history.x.size(); ++age)
-    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.space); !violation.empty())
+    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.space, state.chords);
+        !violation.empty())
       refuse_state(age == 0 ? "saved positions" : fmt::format("saved positions of {} steps before", age), violation,
                    "positions without inversions and intersections");
 }

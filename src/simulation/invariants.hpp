@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "itr/fem/chord_levels.hpp"
 #include "itr/fem/space.hpp"
 #include "itr/simulation/setup.hpp"
 
@@ -12,6 +13,7 @@ namespace itr {
 /// oriented everywhere; with contact, surfaces do not cross, and no body or obstacle is inside of a body. Linear in the size
 /// of the mesh but for a tree of its surface.
 template <int Dim>
-std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const Space& space = {});
+std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const Space& space = {},
+                           const ChordLevels& chords = {});
 
 }  // namespace itr

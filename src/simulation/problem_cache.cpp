@@ -8,16 +8,17 @@
 namespace itr {
 
 template <int Dim>
-MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space)
-    : space(space), cells(whole_mesh(mesh, setup.obstacles.rest, space)), diagonal(rest_diagonal(mesh)) {
-  if (setup.contact.enabled) surface = contact_surface(setup, mesh, space);
+MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& chords)
+    : space(space), chords(chords), cells(whole_mesh(mesh, setup.obstacles.rest, space)), diagonal(rest_diagonal(mesh)) {
+  if (setup.contact.enabled) surface = contact_surface(setup, mesh, space, chords);
 }
 
 template <int Dim>
-bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& asked) const {
+bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& asked,
+                           const ChordLevels& asked_chords) const {
   const auto& obstacles = setup.obstacles.rest;
   const int bodies = num_nodes(mesh, space);
-  if (space != asked || cells.num_vertices != bodies + static_cast<int>(obstacles.size()) ||
+  if (space != asked || chords != asked_chords || cells.num_vertices != bodies + static_cast<int>(obstacles.size()) ||
       static_cast<int>(cells.elements.size() + cells.curved_elements.size()) != mesh.cell_slots() ||
       static_cast<int>(cells.facets.size() + cells.curved_facets.size()) != mesh.facet_slots())
     return false;
@@ -51,8 +52,9 @@ bool MeshScope<Dim>::has_cells_of(const Mesh<Dim>& mesh) const {
 
 template <int Dim>
 std::shared_ptr<MeshScope<Dim>> ProblemCache<Dim>::scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh,
-                                                            const Space& space) {
-  if (!scope || !scope->is_of(setup, mesh, space)) scope = std::make_shared<MeshScope<Dim>>(setup, mesh, space);
+                                                            const Space& space, const ChordLevels& chords) {
+  if (!scope || !scope->is_of(setup, mesh, space, chords))
+    scope = std::make_shared<MeshScope<Dim>>(setup, mesh, space, chords);
   return scope;
 }
 

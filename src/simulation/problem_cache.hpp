@@ -12,11 +12,13 @@ namespace itr {
 template <int Dim>
 struct MeshScope {
   /// The mesh must be compact.
-  MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
-  /// Whether this is of such a mesh and space, obstacles included: the same vertices, cells, facets, tags and curved edges.
-  bool is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space) const;
+  MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {}, const ChordLevels& chords = {});
+  /// Whether this is of such a mesh and space, obstacles included: the same vertices, cells, facets, tags, curved edges and
+  /// levels of their chords.
+  bool is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& chords) const;
 
   Space space;
+  ChordLevels chords;
   CellSet<Dim> cells;
   ContactSurface<Dim> surface;  ///< empty without contact
   double diagonal;              ///< of the bodies at rest [m]
@@ -33,7 +35,8 @@ struct ProblemCache {
   template <typename Solver>
   explicit ProblemCache(Solver& solver) : system(solver) {}
   /// The newest scope, where it is of that mesh; else a new one.
-  std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
+  std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {},
+                                           const ChordLevels& chords = {});
 
   SparseSystem system;       ///< with its pattern, analysis and factors
   unsigned long served = 0;  ///< problems that the system was reset for, so many; it is the last one's

@@ -10,6 +10,7 @@
 #include "itr/energy/point_forces.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "itr/time/integrator.hpp"
+#include "simulation/chord_bound.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/momentum_change.hpp"
 
@@ -86,6 +87,20 @@ QuadratureLevels levels_by_element(const QuadratureLevels& by_slot, const std::v
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
     if (has_curved_edge(state.mesh, state.space, c)) levels.push_back(by_cell[c]);
   return levels;
+}
+
+/// Gives curves that are still there their chords, and the others those that their positions ask for.
+template <int Dim>
+void carry_chords(const StepSetup<Dim>& setup, const State<Dim>& before, const std::vector<VertexId>& number,
+                  const VectorX& x, State<Dim>& state) {
+  ChordLevels levels(before.chords.empty() ? 0 : state.space.num_curved(), 0);
+  for (std::size_t i = 0; i < before.chords.size(); ++i) {
+    const auto& [a, b] = before.space.curved_edges()[i];
+    if (number[a] == kNone || number[b] == kNone) continue;
+    if (const int at = state.space.find(number[a], number[b]); at != kNone) levels[at] = before.chords[i];
+  }
+  state.chords = settled_chords<Dim>(setup, state.mesh, state.space, std::move(levels), {&x, 1});
+  state.chords = settled_chords<Dim>(setup, state.mesh, state.space, std::move(state.chords), state.history.x);
 }
 
 template <int Dim>
@@ -242,10 +257,12 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   const auto tell_momentum = [&] { report.remeshing = momentum_changes(setup, before, state, touched); };
   if (!remeshed.coarsened()) {  // refinement alone: interpolation is exact
     tell_momentum();
+    carry_chords(setup, before, renumbering.vertex, x, state);
     return renumbering;
   }
   const HistoryTransferReport transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh,
                                                           state.space, touched, tools.cache.system.solver(), state.history);
+  carry_chords(setup, before, renumbering.vertex, x, state);
   report.history_loss = transfer.loss / problem.scaling();
   tell_momentum();
   tell(transfer, mass_moment(setup, state.mesh, x), state.step, setup.units, tools.logger);
@@ -278,7 +295,7 @@ std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tool
                                                       double least_volume, const State<Dim>& before, State<Dim>& state,
                                                       VectorX& x, StepReport& report) {
   const StepProblem<Dim> problem(tools.setup, before.mesh, before.space, before.history, before.t, tools.cache,
-                                 before.stiffness, before.quadrature);
+                                 before.stiffness, before.quadrature, before.chords);
   x = before.history.x[0];
   state = before;
   auto renumbering = change_and_project(tools, problem, before, state, x, report, [&](auto&&... all) {

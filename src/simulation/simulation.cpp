@@ -186,7 +186,7 @@ struct Simulation<Dim>::Impl {
     made.elements = state->mesh.num_cells();
     const VectorX& x = state->history.x[0];
     StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
-                             state->quadrature);
+                             state->quadrature, state->chords);
     made.unknowns = problem.dofs().num_unknowns;
     made.energy = problem.report(x);
     made.energy_before_remesh = made.energy.total;
@@ -240,7 +240,7 @@ struct Simulation<Dim>::Impl {
     if (!setup.fields.any_forces()) return;
     const Inside inside(*this, Phase::in_step);
     StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
-                             state->quadrature);
+                             state->quadrature, state->chords);
     forces = problem.forces_at_start(state->history.x[0]);
   }
 

@@ -139,11 +139,16 @@ std::vector<EdgeKey> find_edges_that_lock(const StepTools<Dim>& tools, const Sta
   History history = state.history;
   for (auto* fields : {&history.x, &history.v, &history.a})
     for (VectorX& field : *fields) field = in_space(mesh, state.space, curved, field);
+  ChordLevels chords(state.chords.empty() ? 0 : curved.num_curved(), 0);
+  for (std::size_t i = 0; i < state.chords.size(); ++i) {
+    const auto& [a, b] = state.space.curved_edges()[i];
+    chords[curved.find(a, b)] = state.chords[i];
+  }
   const linear::FactorRecord record = tools.solver.record();
   ProblemCache<Dim> cache(tools.solver);
   VectorX way;
   {
-    StepProblem<Dim> problem(tools.setup, mesh, curved, history, state.t, cache, state.stiffness);
+    StepProblem<Dim> problem(tools.setup, mesh, curved, history, state.t, cache, state.stiffness, {}, chords);
     way = problem.find_instability(in_space(mesh, state.space, curved, x));
   }
   tools.solver.restore(record);

@@ -17,6 +17,7 @@
 #include "core/process.hpp"
 #include "core/timer.hpp"
 #include "newton/round_off.hpp"
+#include "simulation/chord_bound.hpp"
 #include "simulation/energy_guard.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
@@ -61,9 +62,9 @@ std::string reason_of(const NewtonSummary& summary) {
 /// Finds what is violated by the present positions, or by those that the history holds.
 template <int Dim>
 std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
-  std::string violation = find_violation(setup, state.mesh, x, state.space);
+  std::string violation = find_violation(setup, state.mesh, x, state.space, state.chords);
   for (const VectorX& past : state.history.x)
-    if (violation.empty()) violation = find_violation(setup, state.mesh, past, state.space);
+    if (violation.empty()) violation = find_violation(setup, state.mesh, past, state.space, state.chords);
   return violation;
 }
 
@@ -130,8 +131,7 @@ class StepAttempt {
       const ScopedTimer timer(report_.seconds.linear_solve);
       tools_.solver.restore(before_.factor);
     }
-    make_problem();
-    NewtonSummary summary = solve(expected());
+    NewtonSummary summary = solve_between_chords(expected());
     if (!summary.converged()) {
       // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
       const bool is_stuck = summary.termination == Termination::no_descent ||
@@ -162,7 +162,46 @@ class StepAttempt {
   void make_problem() {
     const ScopedTimer timer(report_.seconds.assembly);
     problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.space, next_.history, next_.t, tools_.cache,
-                                                  next_.stiffness, next_.quadrature);
+                                                  next_.stiffness, next_.quadrature, next_.chords);
+  }
+
+  /// Solves from x, and again from there with more chords as long as curves leave theirs too far.
+  NewtonSummary solve_between_chords(const VectorX& expected = {}) {
+    constexpr int kMostSolves = 8;
+    const VectorX start = x_;
+    make_problem();
+    NewtonSummary summary = solve(expected);
+    for (int solves = 1; summary.converged(); ++solves) {
+      const ChordDemand demand = find_chord_demand(setup_, next_.mesh, next_.space, next_.chords, x_);
+      if (demand.excess <= 1) return summary;
+      if (demand.levels == next_.chords || solves == kMostSolves || !may_have(demand.levels, start)) {
+        warn(
+            fmt::format("curved edges leave the chords that contact acts on by {:.2g} times of what they may (a quarter of "
+                        "d-hat, half of the gap) and can have no shorter chords: a finer mesh helps",
+                        demand.excess));
+        return summary;
+      }
+      ChordLevels fewer = std::exchange(next_.chords, demand.levels);
+      VectorX solution = std::exchange(x_, start);
+      auto problem_before = std::move(problem_);
+      make_problem();
+      NewtonSummary with_more = solve(expected);
+      if (!with_more.converged() && with_more.termination != Termination::cancelled) {
+        warn("keeping the chords of curved edges as they were, the step with more of them failed: " + reason_of(with_more));
+        next_.chords = std::move(fewer);
+        x_ = std::move(solution);
+        problem_ = std::move(problem_before);
+        return summary;
+      }
+      summary = with_more;
+    }
+    return summary;
+  }
+
+  /// Whether surfaces with these levels of chords are apart at x.
+  bool may_have(const ChordLevels& levels, const VectorX& x) const {
+    const ContactSurface<Dim> contact = contact_surface(setup_, next_.mesh, next_.space, levels);
+    return !has_intersection<Dim>(contact.surface, contact.positions(x));
   }
 
   bool has_inertia() const { return !setup_.time.quasistatic && !setup_.time.is_static; }
@@ -222,8 +261,7 @@ class StepAttempt {
       auto renumbering = remesh_and_project(tools_, *problem_before, unchanged, next_, x_, report_, may_curve);
       if (!renumbering) break;
       renumbering_ = std::move(*renumbering);
-      make_problem();
-      const NewtonSummary summary = solve();
+      const NewtonSummary summary = solve_between_chords();
       if (summary.termination == Termination::cancelled) return summary;
       const std::string failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
       if (failure.empty()) return std::nullopt;
@@ -266,8 +304,7 @@ class StepAttempt {
           curve_and_project(tools_, *problem_before, std::span<const EdgeKey>(edges), unchanged, next_, x_, effort);
       std::string failure = "contact lets no edge become curved";
       if (renumbering) {
-        make_problem();
-        const NewtonSummary summary = solve();
+        const NewtonSummary summary = solve_between_chords();
         if (summary.termination == Termination::cancelled) return summary;
         failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
       }
@@ -318,6 +355,7 @@ class StepAttempt {
     if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
     TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
+    next_.chords = lowered_chords<Dim>(setup_, next_.mesh, next_.space, next_.chords, next_.history.x);
     after = std::move(next_);  // before_ may be the same, and is not needed any more
     clock_.tell(report_);
     report_.peak_rss_mb = peak_rss_mb();

@@ -181,10 +181,10 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
 template <int Dim>
 StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history,
                               double t, ProblemCache<Dim>& cache, const BarrierStiffness& stiffness,
-                              const QuadratureLevels& levels)
+                              const QuadratureLevels& levels, const ChordLevels& chords)
     : setup_(setup),
       terms_(potential_terms(setup, history, t)),
-      scope_(cache.scope_of(setup, mesh, space)),
+      scope_(cache.scope_of(setup, mesh, space, chords)),
       cells_(scope_->cells),
       surface_(scope_->surface),
       workspace_(scope_->workspace),

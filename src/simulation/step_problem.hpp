@@ -39,10 +39,12 @@ template <int Dim>
 class StepProblem {
  public:
   /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
-  /// `stiffness`, which the barrier starts from where it is adaptive, and `levels` of quadrature, which the solve may raise.
+  /// `stiffness`, which the barrier starts from where it is adaptive, `levels` of quadrature, which the solve may raise, and
+  /// those of `chords`.
   /// Problems may share a cache and solve in turn, each as if alone.
   StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history, double t,
-              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {});
+              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {},
+              const ChordLevels& chords = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
   /// the first round they are lagged at `lagged_x`. Newton begins where the bodies are `expected` (empty: nowhere), if the

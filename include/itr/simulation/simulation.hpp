@@ -11,6 +11,7 @@
 #include "itr/core/log.hpp"
 #include "itr/energy/contact/stiffness.hpp"
 #include "itr/energy/elastic/elastic.hpp"
+#include "itr/fem/chord_levels.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/linear/reuse.hpp"
 #include "itr/mesh/strata.hpp"
@@ -35,6 +36,7 @@ struct State {
   double t = 0;                 ///< [s]
   BarrierStiffness stiffness;   ///< where it is adaptive
   QuadratureLevels quadrature;  ///< of the elastic energy, by cell with curved edges
+  ChordLevels chords;           ///< that contact acts on
   RemeshMemory remesh_memory;   ///< operations that remeshing refused and need not try again
   Strata<Dim> strata;           ///< of the mesh, once remeshing has found them
   linear::FactorRecord factor;  ///< factor that may serve the next step

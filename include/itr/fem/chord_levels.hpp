@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace itr {
+
+/// How often the two chords of each curved edge are halved, by curved edge of a space. Empty: no chord is.
+using ChordLevels = std::vector<std::uint8_t>;
+inline constexpr int kMostHalvings = 7;  ///< of a chord
+
+}  // namespace itr

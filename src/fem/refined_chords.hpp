@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "itr/fem/chord_levels.hpp"
+#include "itr/fem/space.hpp"
+
+namespace itr {
+
+/// The boundary as simplices between nodes and further points of its curves, which are fixed combinations of nodes.
+/// Simplices of neighbours meet at common points whatever their levels.
+template <int Dim>
+struct RefinedChords {
+  using Facet = typename MeshTypes<Dim>::Facet;
+  using Coordinates = std::array<double, Dim>;  ///< barycentric, in a facet of the mesh
+  using Weights = std::vector<std::pair<int, double>>;
+
+  std::vector<Facet> facets;                              ///< oriented as the boundary; ids of nodes, then of points
+  std::vector<FacetId> parents;                           ///< by facet: the facet of the mesh that it is a part of
+  std::vector<std::array<Coordinates, Dim>> coordinates;  ///< by facet: of its corners in the parent
+  std::vector<Weights> points;                            ///< nodes that a point combines, with their weights
+};
+
+template <int Dim>
+RefinedChords<Dim> refine_chords(const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels);
+
+}  // namespace itr

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: MIT
+#include "simulation/chord_bound.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fem/chords.hpp"
+#include "fem/refined_chords.hpp"
+#include "geometry/bvh.hpp"
+#include "itr/geometry/distance.hpp"
+#include "simulation/contact_surface.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr double kOfActivation = 0.25;  ///< of dhat, which a curve in contact may leave its chords by
+constexpr double kOfGap = 0.5;          ///< of the gap, shared by two curves that face each other
+constexpr double kLeastChord = 2;       ///< in dhat: ends of shorter chords would push each other
+constexpr int kMostRounds = 8;
+/// A halving is taken back where curves would stay this much below the bound without it.
+constexpr double kSlack = 4;
+constexpr double kGainOfHalving = 4;  ///< a curve leaves chords of half the length by a quarter
+
+template <int Dim>
+using Corners = std::array<Vec<Dim>, Dim>;
+
+double distance_squared(const Corners<2>& a, const Corners<2>& b) {
+  return std::min({point_edge_distance_squared<2>(a[0], b[0], b[1]), point_edge_distance_squared<2>(a[1], b[0], b[1]),
+                   point_edge_distance_squared<2>(b[0], a[0], a[1]), point_edge_distance_squared<2>(b[1], a[0], a[1])});
+}
+double distance_squared(const Corners<3>& a, const Corners<3>& b) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    least = std::min({least, point_triangle_distance_squared(a[i], b[0], b[1], b[2]),
+                      point_triangle_distance_squared(b[i], a[0], a[1], a[2])});
+    for (int j = 0; j < 3; ++j)
+      least = std::min(least, edge_edge_distance_squared(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]));
+  }
+  return least;
+}
+
+/// A bound on how far a quadratic patch leaves the flat simplex of its corners [m]. `bulges`: by how much the middles of its
+/// edges leave those of the simplex. Along the simplex nothing is left unless the patch turns back on itself.
+template <int Dim>
+double height_over(const Corners<Dim>& corners, const std::array<Vec<Dim>, Dim*(Dim - 1) / 2>& bulges) {
+  double shortest = std::numeric_limits<double>::infinity(), longest_bulge = 0;
+  for (int i = 0; i < Dim; ++i)
+    for (int j = 0; j < i; ++j) shortest = std::min(shortest, (corners[i] - corners[j]).norm());
+  for (const Vec<Dim>& bulge : bulges) longest_bulge = std::max(longest_bulge, bulge.norm());
+  const Vec<Dim> normal = unit_normal(corners);
+  const bool is_across = 4 * longest_bulge <= shortest && !normal.isZero();
+  double largest = 0, sum = 0;
+  for (const Vec<Dim>& bulge : bulges) {
+    const double height = is_across ? std::abs(bulge.dot(normal)) : bulge.norm();
+    largest = std::max(largest, height);
+    sum += height;
+  }
+  constexpr double kMostOfSum = 4.0 / 3;  // of 4 times the products of barycentric coordinates
+  return std::min(sum, kMostOfSum * largest);
+}
+
+template <int Dim>
+class ChordBound {
+ public:
+  ChordBound(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels,
+             const VectorX& x)
+      : setup_(setup),
+        mesh_(mesh),
+        space_(space),
+        levels_(levels),
+        x_(x),
+        chords_(refine_chords(mesh, space, levels)),
+        own_(static_cast<int>(chords_.facets.size())) {
+    const int nodes = num_nodes(mesh, space);
+    points_.reserve(chords_.points.size());
+    for (const auto& weights : chords_.points) {
+      Vec<Dim>& point = points_.emplace_back(Vec<Dim>::Zero());
+      for (const auto& [node, weight] : weights) point += weight * at(node);
+    }
+    for (const auto& facet : chords_.facets) {
+      Corners<Dim>& corners = corners_.emplace_back();
+      for (int k = 0; k < Dim; ++k) corners[k] = facet[k] < nodes ? at(facet[k]) : points_[facet[k] - nodes];
+    }
+    for (int i = 0; i < own_; ++i) heights_.push_back(height_of(i));
+    heights_.resize(own_ + add_obstacles(nodes), 0);
+    std::vector<Box<Dim>> boxes(corners_.size());
+    for (std::size_t i = 0; i < boxes.size(); ++i)
+      for (const Vec<Dim>& p : corners_[i]) boxes[i].include(p);
+    tree_.build(boxes);
+  }
+
+  /// By slot of facets: how far curves leave their chords, times `factor`, by how far they may.
+  std::vector<double> excess(double factor = 1) const {
+    std::vector<double> result(mesh_.facet_slots(), 0);
+    std::vector<int> hits;
+    for (int i = 0; i < own_; ++i) {
+      const double height = factor * heights_[i];
+      if (height == 0) continue;
+      Box<Dim> box;
+      for (const Vec<Dim>& p : corners_[i]) box.include(p);
+      hits.clear();
+      tree_.query(box.inflated(height / kOfActivation), hits);  // whatever is farther off allows that height
+      double& worst = result[chords_.parents[i]];
+      for (const int j : hits)
+        if (const double most = are_neighbours(i, j) ? 0 : allowed(i, j); most > 0) worst = std::max(worst, height / most);
+    }
+    return result;
+  }
+
+  ChordDemand demand() const {
+    ChordDemand result{levels_, 0};
+    result.levels.resize(space_.num_curved(), 0);
+    const std::vector<double> excess = this->excess();
+    for (FacetId f = 0; f < mesh_.facet_slots(); ++f) {
+      result.excess = std::max(result.excess, excess[f]);
+      if (excess[f] <= 1) continue;
+      int lowest = kMostHalvings;
+      for_each_curve(f, [&](int edge) { lowest = std::min(lowest, level(edge)); });
+      const double halvings = std::ceil(std::log(excess[f]) / std::log(kGainOfHalving));
+      const int target =
+          halvings < kMostHalvings - lowest ? lowest + std::max(1, static_cast<int>(halvings)) : kMostHalvings;
+      for_each_curve(f, [&](int edge) {
+        const int most = std::max(level(edge), std::min(target, most_halvings(edge)));
+        result.levels[edge] = std::max<std::uint8_t>(result.levels[edge], static_cast<std::uint8_t>(most));
+      });
+    }
+    return result;
+  }
+
+  /// Curves of which a halving can be taken back, for these positions.
+  std::vector<char> find_lowerable() const {
+    std::vector<char> result(space_.num_curved(), 0);
+    for (int edge = 0; edge < space_.num_curved(); ++edge) result[edge] = level(edge) > 0;
+    const std::vector<double> excess = this->excess(kSlack * kGainOfHalving);
+    for (FacetId f = 0; f < mesh_.facet_slots(); ++f)
+      if (excess[f] > 1) for_each_curve(f, [&](int edge) { result[edge] = 0; });
+    return result;
+  }
+
+ private:
+  Vec<Dim> at(int node) const { return vertex_of<Dim>(x_, node); }
+  int level(int edge) const { return levels_.empty() ? 0 : levels_[edge]; }
+
+  double height_of(int i) const {
+    const auto& facet = mesh_.facet(chords_.parents[i]);
+    const auto& coordinates = chords_.coordinates[i];
+    std::array<Vec<Dim>, Dim*(Dim - 1) / 2> bulges;
+    bool is_curved = false;
+    int edge = 0;
+    for (int k = 0; k < Dim; ++k)
+      for (int l = 0; l < k; ++l) {
+        Vec<Dim>& bulge = bulges[edge++] = Vec<Dim>::Zero();
+        for (int a = 0; a < Dim; ++a)
+          for (int b = 0; b < a; ++b) {
+            const int node = space_.node_of(facet[a], facet[b], mesh_.vertex_slots());
+            if (node == kNone) continue;
+            is_curved = true;
+            const double along_a = coordinates[k][a] - coordinates[l][a], along_b = coordinates[k][b] - coordinates[l][b];
+            bulge -= along_a * along_b * (at(node) - (at(facet[a]) + at(facet[b])) / 2);
+          }
+      }
+    return is_curved ? height_over<Dim>(corners_[i], bulges) : 0;
+  }
+
+  /// Adds the obstacles' primitives as simplices, of which some have no extent, and returns how many there are.
+  std::size_t add_obstacles(int nodes) {
+    const auto& obstacles = setup_.obstacles;
+    const auto add = [&](const auto& ids) {
+      Corners<Dim>& corners = corners_.emplace_back();
+      for (int k = 0; k < Dim; ++k) corners[k] = at(nodes + ids[std::min<std::size_t>(k, ids.size() - 1)]);
+    };
+    for (const auto& triangle : obstacles.triangles)
+      if constexpr (Dim == 3) add(triangle);
+    for (const auto& edge : obstacles.edges) add(edge);
+    for (int v = 0; v < static_cast<int>(obstacles.rest.size()); ++v) add(std::array{v});
+    return corners_.size() - own_;
+  }
+
+  bool are_neighbours(int i, int j) const {
+    if (j >= own_) return false;
+    const auto &a = mesh_.facet(chords_.parents[i]), &b = mesh_.facet(chords_.parents[j]);
+    return std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end();
+  }
+
+  double allowed(int i, int j) const {
+    const double gap = std::sqrt(distance_squared(corners_[i], corners_[j])), dhat = setup_.contact.activation_distance;
+    const double of_gap = heights_[j] > 0 ? kOfGap / 2 * gap : kOfGap * gap;
+    return gap < dhat ? std::min(kOfActivation * dhat, of_gap) : of_gap;
+  }
+
+  /// Calls visit(edge) for the curved edges of a facet.
+  template <typename Visit>
+  void for_each_curve(FacetId f, const Visit& visit) const {
+    const auto& facet = mesh_.facet(f);
+    for (int i = 0; i < Dim; ++i)
+      for (int j = 0; j < i; ++j)
+        if (const int edge = space_.find(facet[i], facet[j]); edge != kNone) visit(edge);
+  }
+
+  int most_halvings(int edge) const {
+    const auto& [a, b] = space_.curved_edges()[edge];
+    const Vec<Dim> middle = at(mesh_.vertex_slots() + edge);
+    const double chord =
+        std::min({(middle - at(a)).norm(), (at(b) - middle).norm(), (mesh_.rest(a) - mesh_.rest(b)).norm() / 2});
+    const double halvings = std::floor(std::log2(chord / (kLeastChord * setup_.contact.activation_distance)));
+    return static_cast<int>(std::clamp<double>(halvings, 0, kMostHalvings));
+  }
+
+  const StepSetup<Dim>& setup_;
+  const Mesh<Dim>& mesh_;
+  const Space& space_;
+  const ChordLevels& levels_;
+  const VectorX& x_;
+  RefinedChords<Dim> chords_;
+  int own_;  ///< simplices of bodies
+  std::vector<Vec<Dim>> points_;
+  std::vector<Corners<Dim>> corners_;  ///< of simplices, then of obstacles
+  std::vector<double> heights_;        ///< by simplex: how far the curve leaves it [m]
+  Bvh<Dim> tree_;
+};
+
+template <int Dim>
+bool has_chords(const StepSetup<Dim>& setup, const Space& space) {
+  return setup.contact.enabled && !setup.proxy && !space.is_linear();
+}
+
+/// The form in which levels are compared: empty where all are 0.
+ChordLevels normalized(ChordLevels levels) {
+  if (std::all_of(levels.begin(), levels.end(), [](int level) { return level == 0; })) levels.clear();
+  return levels;
+}
+
+}  // namespace
+
+template <int Dim>
+ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space,
+                              const ChordLevels& levels, const VectorX& x) {
+  if (!has_chords(setup, space)) return {levels, 0};
+  ChordDemand demand = ChordBound<Dim>(setup, mesh, space, levels, x).demand();
+  demand.levels = normalized(std::move(demand.levels));
+  return demand;
+}
+
+template <int Dim>
+ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, ChordLevels levels,
+                           std::span<const VectorX> positions) {
+  for (const VectorX& x : positions)
+    for (int round = 0; round < kMostRounds; ++round) {
+      ChordLevels more = find_chord_demand(setup, mesh, space, levels, x).levels;
+      if (more == levels) break;
+      levels = std::move(more);
+    }
+  return levels;
+}
+
+template <int Dim>
+ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels,
+                           std::span<const VectorX> positions) {
+  if (levels.empty() || !has_chords(setup, space)) return levels;
+  std::vector<char> lowerable(levels.size(), 1);
+  for (const VectorX& x : positions) {
+    const std::vector<char> here = ChordBound<Dim>(setup, mesh, space, levels, x).find_lowerable();
+    for (std::size_t edge = 0; edge < levels.size(); ++edge) lowerable[edge] &= here[edge];
+  }
+  ChordLevels fewer = levels;
+  for (std::size_t edge = 0; edge < levels.size(); ++edge)
+    if (lowerable[edge]) --fewer[edge];
+  fewer = normalized(std::move(fewer));
+  if (fewer == levels) return levels;
+  const ContactSurface<Dim> contact = contact_surface(setup, mesh, space, fewer);
+  const bool is_free = std::none_of(positions.begin(), positions.end(), [&](const VectorX& x) {
+    return has_intersection<Dim>(contact.surface, contact.positions(x));
+  });
+  return is_free ? fewer : levels;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                        \
+  template ChordDemand find_chord_demand(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const ChordLevels&, \
+                                         const VectorX&);                                                           \
+  template ChordLevels settled_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, ChordLevels,           \
+                                      std::span<const VectorX>);                                                    \
+  template ChordLevels lowered_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const ChordLevels&,    \
+                                      std::span<const VectorX>);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// How far curved edges and faces may leave the chords that contact acts on: by a quarter of dhat where they are in contact,
+// and by half of the gap, so that no point of a curve is inside of what its chords are apart from.
+#pragma once
+
+#include <span>
+
+#include "itr/fem/chord_levels.hpp"
+#include "itr/fem/space.hpp"
+#include "itr/simulation/setup.hpp"
+
+namespace itr {
+
+struct ChordDemand {
+  ChordLevels levels;  ///< with those halvings that the bound asks for, and that chords of twice dhat leave room for
+  double excess = 0;   ///< largest ratio of how far a curve leaves its chords to how far it may: the bound holds up to 1
+};
+
+/// What curves at positions x ask for, whose chords have these levels. No chord is made longer.
+template <int Dim>
+ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space,
+                              const ChordLevels& levels, const VectorX& x);
+
+/// The same levels with as many halvings as curves at all of these positions ask for.
+template <int Dim>
+ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, ChordLevels levels,
+                           std::span<const VectorX> positions);
+
+/// The same levels with one halving less where curves stay far within the bound at all of these positions, and surfaces
+/// do not meet.
+template <int Dim>
+ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels,
+                           std::span<const VectorX> positions);
+
+}  // namespace itr
