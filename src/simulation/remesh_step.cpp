@@ -10,7 +10,6 @@
 #include "itr/energy/point_forces.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "itr/time/integrator.hpp"
-#include "simulation/chord_bound.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/momentum_change.hpp"
 
@@ -89,18 +88,16 @@ QuadratureLevels levels_by_element(const QuadratureLevels& by_slot, const std::v
   return levels;
 }
 
-/// Gives curves that are still there their chords, and the others those that their positions ask for.
+/// Gives curves that are still there their chords.
 template <int Dim>
-void carry_chords(const StepSetup<Dim>& setup, const State<Dim>& before, const std::vector<VertexId>& number,
-                  const VectorX& x, State<Dim>& state) {
+ChordLevels carried_chords(const State<Dim>& before, const std::vector<VertexId>& number, const State<Dim>& state) {
   ChordLevels levels(before.chords.empty() ? 0 : state.space.num_curved(), 0);
   for (std::size_t i = 0; i < before.chords.size(); ++i) {
     const auto& [a, b] = before.space.curved_edges()[i];
     if (number[a] == kNone || number[b] == kNone) continue;
     if (const int at = state.space.find(number[a], number[b]); at != kNone) levels[at] = before.chords[i];
   }
-  state.chords = settled_chords<Dim>(setup, state.mesh, state.space, std::move(levels), {&x, 1});
-  state.chords = settled_chords<Dim>(setup, state.mesh, state.space, std::move(state.chords), state.history.x);
+  return levels;
 }
 
 template <int Dim>
@@ -235,6 +232,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
   state.space = space_of(nodes, renumbering.vertex);
+  state.chords = carried_chords(before, renumbering.vertex, state);
   state.quadrature = levels_by_element(fields.levels, renumbering.cell, state);
   const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
@@ -257,12 +255,10 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   const auto tell_momentum = [&] { report.remeshing = momentum_changes(setup, before, state, touched); };
   if (!remeshed.coarsened()) {  // refinement alone: interpolation is exact
     tell_momentum();
-    carry_chords(setup, before, renumbering.vertex, x, state);
     return renumbering;
   }
   const HistoryTransferReport transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh,
                                                           state.space, touched, tools.cache.system.solver(), state.history);
-  carry_chords(setup, before, renumbering.vertex, x, state);
   report.history_loss = transfer.loss / problem.scaling();
   tell_momentum();
   tell(transfer, mass_moment(setup, state.mesh, x), state.step, setup.units, tools.logger);

@@ -131,6 +131,7 @@ class StepAttempt {
       const ScopedTimer timer(report_.seconds.linear_solve);
       tools_.solver.restore(before_.factor);
     }
+    if (x_start.size() > 0) settle_chords();
     NewtonSummary summary = solve_between_chords(expected());
     if (!summary.converged()) {
       // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
@@ -198,10 +199,30 @@ class StepAttempt {
     return summary;
   }
 
-  /// Whether surfaces with these levels of chords are apart at x.
+  /// Whether surfaces with these levels of chords are apart at x, and at past positions.
   bool may_have(const ChordLevels& levels, const VectorX& x) const {
     const ContactSurface<Dim> contact = contact_surface(setup_, next_.mesh, next_.space, levels);
-    return !has_intersection<Dim>(contact.surface, contact.positions(x));
+    const auto is_free = [&](const VectorX& at) { return !has_intersection<Dim>(contact.surface, contact.positions(at)); };
+    return is_free(x) && std::all_of(next_.history.x.begin(), next_.history.x.end(), is_free);
+  }
+
+  /// Gives the curves of another mesh the chords that they ask for. Remeshing lets chords touch, not curves: where more
+  /// chords would meet something, the solve begins where the step does, or is left with those that remeshing saw.
+  void settle_chords() {
+    if (!setup_.contact.enabled || next_.space.is_linear()) return;
+    const auto settled = [&](const ChordLevels& levels, std::span<const VectorX> positions) {
+      return settled_chords<Dim>(setup_, next_.mesh, next_.space, levels, positions);
+    };
+    const ChordLevels of_history = settled(next_.chords, next_.history.x), of_all = settled(of_history, {&x_, 1});
+    if (of_all.empty()) return next_.chords.clear();
+    if (may_have(of_all, x_)) {
+      next_.chords = of_all;
+    } else if (may_have(of_history, next_.history.x[0])) {
+      next_.chords = of_history;
+      x_ = next_.history.x[0];
+    } else {
+      next_.chords.clear();
+    }
   }
 
   bool has_inertia() const { return !setup_.time.quasistatic && !setup_.time.is_static; }
@@ -261,6 +282,7 @@ class StepAttempt {
       auto renumbering = remesh_and_project(tools_, *problem_before, unchanged, next_, x_, report_, may_curve);
       if (!renumbering) break;
       renumbering_ = std::move(*renumbering);
+      settle_chords();
       const NewtonSummary summary = solve_between_chords();
       if (summary.termination == Termination::cancelled) return summary;
       const std::string failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
@@ -304,6 +326,7 @@ class StepAttempt {
           curve_and_project(tools_, *problem_before, std::span<const EdgeKey>(edges), unchanged, next_, x_, effort);
       std::string failure = "contact lets no edge become curved";
       if (renumbering) {
+        settle_chords();
         const NewtonSummary summary = solve_between_chords();
         if (summary.termination == Termination::cancelled) return summary;
         failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
