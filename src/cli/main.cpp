@@ -67,7 +67,9 @@ int certify(const std::string& directory) {
              certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
   if (certificate.overhang > 0)
     fmt::print(
-        "curved edges of the surface leave their chords, which are what is checked, by at most {:.2g} {}, and by {:.2g} {} "
+        "curved edges, which are checked as curves, leave the chords through their nodes by at most {:.2g} {}, and by "
+        "{:.2g} "
+        "{} "
         "where something else is nearer than that\n",
         certificate.overhang, certificate.units.length(), certificate.blocked_overhang, certificate.units.length());
   return certificate.passed() ? cli::done : cli::certificate_failed;

@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "fem/chords.hpp"
 #include "frame_file.hpp"
@@ -30,11 +31,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+template <std::size_t N, std::size_t M>
+int num_shared(const std::array<int, N>& a, const std::array<int, M>& b) {
+  return static_cast<int>(
+      std::count_if(a.begin(), a.end(), [&](int v) { return std::find(b.begin(), b.end(), v) != b.end(); }));
+}
+
 /// Vertices of bodies or of their proxy, then of obstacles, and the surface simplices on them.
 template <int Dim>
 struct Surface {
   std::vector<Vec<Dim>> x;
   int num_body_vertices = 0;
+  std::vector<EdgeKey> curved;  ///< edges whose nodes are the last of the bodies' vertices; empty with a proxy
   std::vector<std::array<int, Dim>> own_facets;  ///< of bodies, oriented outward, or of the proxy, as they come
   bool has_proxy = false;
   const char* own = "";  ///< before the number of a vertex that is no obstacle's
@@ -44,6 +52,18 @@ struct Surface {
   template <std::size_t N>
   bool is_obstacle(const std::array<int, N>& simplex) const {
     return simplex[0] >= num_body_vertices;
+  }
+  /// Whether the curves of two simplices, one a chord, are checked in their place (check_curves): those of facets that
+  /// share no vertex.
+  template <std::size_t N, std::size_t M>
+  bool are_seen_as_curves(const std::array<int, N>& a, const std::array<int, M>& b) const {
+    const int first_node = num_body_vertices - static_cast<int>(curved.size());
+    const auto is_node = [&](int v) { return v >= first_node && v < num_body_vertices; };
+    if (std::none_of(a.begin(), a.end(), is_node) && std::none_of(b.begin(), b.end(), is_node)) return false;
+    const auto ends = [&](int v) { return is_node(v) ? curved[v - first_node] : EdgeKey{v, v}; };
+    return std::none_of(a.begin(), a.end(), [&](int v) {
+      return std::any_of(b.begin(), b.end(), [&](int w) { return num_shared(ends(v), ends(w)) > 0; });
+    });
   }
   std::string name(int v) const {
     return v < num_body_vertices ? own + std::to_string(v) : fmt::format("obstacle {}", v - num_body_vertices);
@@ -154,6 +174,7 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
     add_facets(facets, surface);
   }
   surface.num_body_vertices = static_cast<int>(surface.x.size());
+  if (!frame.has_proxy) surface.curved = space_of(frame).curved_edges();
   add_surface(frame.obstacles, surface);
   return surface;
 }
@@ -208,12 +229,6 @@ std::vector<Box<Dim>> boxes_of(const std::vector<Vec<Dim>>& x, const std::vector
   return boxes;
 }
 
-template <std::size_t N, std::size_t M>
-int num_shared(const std::array<int, N>& a, const std::array<int, M>& b) {
-  return static_cast<int>(
-      std::count_if(a.begin(), a.end(), [&](int v) { return std::find(b.begin(), b.end(), v) != b.end(); }));
-}
-
 /// Whether an edge and a triangle with one common vertex lie on each other: in one plane, and the edge within the triangle's
 /// angle at that vertex. Exact.
 bool is_folded(const Surface<3>& surface, const std::array<int, 2>& edge, const std::array<int, 3>& triangle) {
@@ -255,6 +270,7 @@ void check_surface(const Surface<2>& surface, const std::string& name, std::vect
     for (const int j : hits) {
       if (!surface.is_obstacle(edges[j]) && j <= i) continue;
       const auto &a = edges[i], &b = edges[j];
+      if (surface.are_seen_as_curves(a, b)) continue;
       const bool meet = num_shared(a, b) > 0
                             ? is_folded(surface, a, b)
                             : segments_intersect(surface.x[a[0]], surface.x[a[1]], surface.x[b[0]], surface.x[b[1]]);
@@ -275,6 +291,7 @@ void check_surface(const Surface<3>& surface, const std::string& name, std::vect
       const auto& t = surface.triangles[j];
       const int shared = num_shared(e, t);
       if ((surface.is_obstacle(e) && surface.is_obstacle(t)) || shared > 1) continue;
+      if (surface.are_seen_as_curves(e, t)) continue;
       const auto& x = surface.x;
       const bool meet =
           shared == 1 ? is_folded(surface, e, t) : segment_intersects_triangle(x[e[0]], x[e[1]], x[t[0]], x[t[1]], x[t[2]]);
@@ -284,16 +301,18 @@ void check_surface(const Surface<3>& surface, const std::string& name, std::vect
   }
 }
 
-/// What is wholly inside, where nothing crosses. A surface of obstacles may hold bodies: it is a container.
+/// What is wholly inside, where nothing crosses. A surface of obstacles may hold bodies: it is a container. `in_hollows`:
+/// vertices that chords have inside and curves have not.
 template <int Dim>
-void check_insides(const Surface<Dim>& surface, const std::string& name, std::vector<std::string>& violations) {
+void check_insides(const Surface<Dim>& surface, const std::set<int>& in_hollows, const std::string& name,
+                   std::vector<std::string>& violations) {
   const ClosedSurface<Dim> closed(surface.x, surface.own_facets);
   const std::string what = surface.has_proxy ? "the proxy" : "a body";
   const int first = surface.has_proxy ? 0 : surface.num_body_vertices;
   for (int v = first; v < static_cast<int>(surface.x.size()); ++v) {
     if (closed.is_vertex(v)) continue;
     const bool touches = closed.touches(surface.x[v]);
-    if (touches || closed.winding(surface.x[v]) % 2 != 0)
+    if (touches || (closed.winding(surface.x[v]) + static_cast<int>(in_hollows.count(v))) % 2 != 0)
       violations.push_back(
           fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v), touches ? "on" : "inside of", what));
   }
@@ -391,9 +410,10 @@ Patches<Dim> true_surface(const StoredFrame& frame, const Surface<Dim>& surface,
   return result;
 }
 
-/// Finds vertices between a curve and its chords, where neither is crossed.
-void check_beyond_chords(const Surface<2>& surface, const Patches<2>& all, const std::string& name,
-                         std::vector<std::string>& violations) {
+/// Calls visit(vertex, curve, is_hollow) for vertices between a curve and its chords, where neither is crossed. `is_hollow`:
+/// the curve lies on the body's side of the chord.
+template <typename Visit>
+void for_each_beyond_chord(const Surface<2>& surface, const Patches<2>& all, const Visit& visit) {
   for (std::size_t i = 0; i < all.patches.size(); ++i) {
     if (!all.is_curved[i]) continue;
     Box<2> box;
@@ -406,20 +426,26 @@ void check_beyond_chords(const Surface<2>& surface, const Patches<2>& all, const
       if (has_points || num_shared(all.facets[i], other) > 0) continue;
       const Vec<2>& p = surface.x[other[0]];
       if ((p.array() < box.min.array()).any() || (p.array() > box.max.array()).any()) continue;
-      if (is_beyond_chord(halves[0], p) || is_beyond_chord(halves[1], p))
-        violations.push_back(fmt::format("{}: vertex ({}) is between curve {} and its chords", name, surface.name(other[0]),
-                                         surface.name(all.facets[i])));
+      for (const auto& half : halves)
+        if (is_beyond_chord(half, p)) visit(other[0], i, orientation(half.at[0][0], half.at[1][1], half.at[0][1]) > 0);
     }
   }
 }
 
+std::set<int> find_in_hollows(const Surface<2>& surface, const Patches<2>& all) {
+  std::set<int> found;
+  for_each_beyond_chord(surface, all, [&](int vertex, std::size_t, bool is_hollow) {
+    if (is_hollow) found.insert(vertex);
+  });
+  return found;
+}
+/// Says of no vertex of 3D that it is in a hollow, which is the safe side.
+std::set<int> find_in_hollows(const Surface<3>&, const Patches<3>&) { return {}; }
+
 /// Proves by Bernstein bounds that true curves meet nothing. Neighbours in the surface are left to the cells.
 template <int Dim>
-void check_curves(const StoredFrame& frame, const Surface<Dim>& surface, const std::string& name,
+void check_curves(const Surface<Dim>& surface, const Patches<Dim>& all, const std::string& name,
                   std::vector<std::string>& violations) {
-  const Space space = space_of(frame);
-  if (space.is_linear() || surface.has_proxy) return;
-  const Patches<Dim> all = true_surface(frame, surface, space);
   std::vector<Box<Dim>> boxes(all.patches.size());
   for (std::size_t i = 0; i < boxes.size(); ++i)
     for (const auto& row : all.patches[i].at)
@@ -437,7 +463,12 @@ void check_curves(const StoredFrame& frame, const Surface<Dim>& surface, const s
                                          surface.name(all.facets[j])));
     }
   }
-  if constexpr (Dim == 2) check_beyond_chords(surface, all, name, violations);
+  if constexpr (Dim == 2)
+    for_each_beyond_chord(surface, all, [&](int vertex, std::size_t curve, bool is_hollow) {
+      if (!is_hollow)
+        violations.push_back(fmt::format("{}: vertex ({}) is between curve {} and its chords", name, surface.name(vertex),
+                                         surface.name(all.facets[curve])));
+    });
 }
 
 template <int Dim>
@@ -455,8 +486,10 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   check_cells<Dim>(frame, frame.x, "", name, violations);
   const Surface<Dim> surface = make_surface<Dim>(frame);
   check_surface(surface, name, violations);
-  if (violations.size() == before) check_insides(surface, name, violations);
-  check_curves(frame, surface, name, violations);
+  Patches<Dim> curves;
+  if (!surface.curved.empty()) curves = true_surface(frame, surface, space_of(frame));
+  if (violations.size() == before) check_insides(surface, find_in_hollows(surface, curves), name, violations);
+  check_curves(surface, curves, name, violations);
   measure_overhangs(frame, surface, certificate);
 }
 

@@ -15,8 +15,8 @@ namespace itr::output {
 struct Certificate {
   int frames = 0;
   std::vector<std::string> violations;  ///< one line each: frame, what, which ids; also of arrays that are damaged
-  /// How far curved edges of the surface leave their chords, which is what is checked, and how far where something else is
-  /// nearer to these chords than that, in the frames' units.
+  /// How far curved edges of the surface leave the chords through their nodes, and how far where something else is nearer to
+  /// these chords than that, in the frames' units. The curves themselves are checked.
   double overhang = 0, blocked_overhang = 0;
   Units units{};  ///< of the frames
   bool passed() const { return violations.empty() && frames > 0; }

@@ -353,9 +353,9 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   if (file.contains("/checkpoint/chord_levels")) {
     const auto levels = read_ints(saved.file, file, "/checkpoint/chord_levels");
     for (const int level : levels)
-      if (level < 0 || level > kMostHalvings)
+      if (level < 0 || level > kMostHalvings<Dim>)
         throw InputError({saved.file.string(), "/checkpoint/chord_levels", std::to_string(level),
-                          "0 to " + std::to_string(kMostHalvings)});
+                          "0 to " + std::to_string(kMostHalvings<Dim>)});
     state.chords.assign(levels.begin(), levels.end());
   }
   const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;

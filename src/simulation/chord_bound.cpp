@@ -116,11 +116,11 @@ class ChordBound {
     for (FacetId f = 0; f < mesh_.facet_slots(); ++f) {
       result.excess = std::max(result.excess, excess[f]);
       if (excess[f] <= 1) continue;
-      int lowest = kMostHalvings;
+      int lowest = kMostHalvings<Dim>;
       for_each_curve(f, [&](int edge) { lowest = std::min(lowest, level(edge)); });
       const double halvings = std::ceil(std::log(excess[f]) / std::log(kGainOfHalving));
       const int target =
-          halvings < kMostHalvings - lowest ? lowest + std::max(1, static_cast<int>(halvings)) : kMostHalvings;
+          halvings < kMostHalvings<Dim> - lowest ? lowest + std::max(1, static_cast<int>(halvings)) : kMostHalvings<Dim>;
       for_each_curve(f, [&](int edge) {
         const int most = std::max(level(edge), std::min(target, most_halvings(edge)));
         result.levels[edge] = std::max<std::uint8_t>(result.levels[edge], static_cast<std::uint8_t>(most));
@@ -205,7 +205,7 @@ class ChordBound {
     const double chord =
         std::min({(middle - at(a)).norm(), (at(b) - middle).norm(), (mesh_.rest(a) - mesh_.rest(b)).norm() / 2});
     const double halvings = std::floor(std::log2(chord / (kLeastChord * setup_.contact.activation_distance)));
-    return static_cast<int>(std::clamp<double>(halvings, 0, kMostHalvings));
+    return static_cast<int>(std::clamp<double>(halvings, 0, kMostHalvings<Dim>));
   }
 
   const StepSetup<Dim>& setup_;

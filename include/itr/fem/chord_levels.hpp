@@ -8,6 +8,7 @@ namespace itr {
 
 /// How often the two chords of each curved edge are halved, by curved edge of a space. Empty: no chord is.
 using ChordLevels = std::vector<std::uint8_t>;
-inline constexpr int kMostHalvings = 7;  ///< of a chord
+template <int Dim>
+inline constexpr int kMostHalvings = Dim == 2 ? 7 : 4;  ///< of a chord
 
 }  // namespace itr
