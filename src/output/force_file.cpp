@@ -113,12 +113,12 @@ void ForceFile::drop_last() {
 ForceRows rewrite_forces(const std::filesystem::path& directory) {
   ForceRows count;
   RowList from_frames;
-  std::size_t columns = 0;
+  std::string head;
   for (const auto& path : stored_frames(directory)) {
     const StoredForces forces = read_frame_forces(path);
     if (forces.curves.empty()) continue;
     ++count.frames;
-    columns = forces.curves.front().kinds.front().size();
+    head = header(forces.curves.front());
     std::vector<std::string> lines = lines_of(forces.step, forces.t, forces.curves);
     for (std::size_t i = 0; i < lines.size(); ++i)
       from_frames[forces.step].push_back({forces.curves[i].name, std::move(lines[i])});
@@ -127,7 +127,6 @@ ForceRows rewrite_forces(const std::filesystem::path& directory) {
     throw InputError({directory.string(), "frames", "none with forces", "a run of a scene with /output/forces"});
   Folder folder(directory);
   folder.resume({kForceFile}, from_frames.rbegin()->first);
-  const std::string head = header(columns);
   RowList rows = read_rows(directory, head);
   for (auto& [step, of_step] : from_frames) {
     for (Row& row : of_step) {
