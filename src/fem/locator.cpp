@@ -53,14 +53,15 @@ Fit<Dim> fit_of(const RestPoint<Dim>& X, const std::array<double, Dim + 1>& weig
   const double length = X.inward.norm();
   if (!(length > 0)) return fit;
   fit.has = true;
-  fit.facing = 2;
+  double least = 2;
   for (int k = 0; k <= Dim; ++k) {
     const Vec<Dim> gradient = barycentric_gradient<Dim>(inverse_edges, k);
     const double steepness = gradient.norm();
     const double tolerance = kAtFacet + kRoundOff * steepness * X.template lpNorm<Eigen::Infinity>();
     fit.has = fit.has && weights[k] >= -tolerance;
-    if (weights[k] <= tolerance) fit.facing = std::min(fit.facing, gradient.dot(X.inward) / (steepness * length));
+    if (weights[k] <= tolerance) least = std::min(least, gradient.dot(X.inward) / (steepness * length));
   }
+  fit.facing = least < 2 ? least : 0;
   return fit;
 }
 

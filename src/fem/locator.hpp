@@ -25,8 +25,10 @@ std::array<double, Dim + 1> barycentric_weights(const Vec<Dim>& origin, const Ma
 /// How well a simplex has a point: cells that share the point differ in which of them lies at its inward side.
 template <int Dim>
 struct Fit {
-  bool has = false;    ///< the point is in the closed simplex, to round-off
-  double facing = -2;  ///< least cosine of the inward direction to the inner normals of the facets that the point is on
+  bool has = false;  ///< the point is in the closed simplex, to round-off
+  /// Least cosine of the inward direction to the inner normals of the facets that the point is on; 0 inside, so that a cell
+  /// with the point on its rim, at the right side, goes before one that overlaps it.
+  double facing = -2;
   double depth = -std::numeric_limits<double>::infinity();  ///< least weight
   bool is_better_than(const Fit& other) const {
     if (has != other.has) return has;
