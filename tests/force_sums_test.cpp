@@ -108,7 +108,7 @@ struct RandomScene {
     if (with("elastic damping"))
       setup.damping.push_back({DampingOptions::Term::elastic, 5e-3, 1 + static_cast<int>(random() % 3)});
     if (!setup.time.is_static && with("cut steps", 0.3)) {
-      setup.newton.max_iterations = 3 + static_cast<int>(random() % 3);
+      setup.newton.max_iterations = 4 + static_cast<int>(random() % 4);
       setup.time.step_cuts = 8;
     }
     const Vec<Dim> speed = some_vector(0.5);
@@ -166,15 +166,17 @@ struct RandomScene {
     auto& remesh = setup.remesh;
     remesh.enabled = with("remeshing");
     if (remesh.enabled) {
-      remesh.split.acceptance_tolerance = 1e-5;
-      remesh.collapse.acceptance_tolerance = -1e-3;
+      remesh.split.acceptance_tolerance = Dim == 2 ? 1e-4 : 1e-2;
+      remesh.split.max_depth = 1;
+      remesh.split.min_edge_length = kSize / 8;
+      remesh.collapse.acceptance_tolerance = Dim == 2 ? -1e-3 : -1e-2;
       remesh.collapse.rel_max_edge_length = 1.5;
       remesh.swap.enabled = remesh.smooth.enabled = with("swaps and smoothing");
       if (with("history interpolated", 0.3)) remesh.history = HistoryRule::interpolated;
       remesh.curve.enabled = remesh.straighten.enabled = is_curved || with("curving", 0.3);
       is_curved |= remesh.curve.enabled;
     } else if (with("density varies", 0.3)) {
-      setup.materials[1].density_at = [](const double* X) { return 800 + 2000 * X[0]; };
+      setup.materials[1].density_at = [](const Vec<3>& X) { return 800 + 2000 * X[0]; };
     }
     if (!is_curved) setup.lump_mass = with("lumped", 0.3);
   }
@@ -238,7 +240,7 @@ struct RandomScene {
       setup.contact.friction_iterations = 1 + static_cast<int>(random() % 3);
     }
     if (with("contact damping"))
-      setup.damping.push_back({DampingOptions::Term::contact, 5e-3, 1 + static_cast<int>(random() % 3)});
+      setup.damping.push_back({DampingOptions::Term::contact, 1e-3, 1 + static_cast<int>(random() % 3)});
   }
 };
 
@@ -286,6 +288,7 @@ Sum<Dim> rate_of_momentum(const Setup<Dim>& setup, const State<Dim>& before, con
 }
 
 struct Tally {
+  double kept = 0, changed = 0;  ///< most momentum that edits changed, by that of the bodies, without and with interpolation
   int steps = 0, failed = 0, cut = 0, remeshed = 0, in_contact = 0, with_friction = 0;
 };
 
@@ -310,7 +313,11 @@ void expect_sums(const Setup<Dim>& setup, const State<Dim>& before, const State<
   const bool has_inertia = !setup.time.quasistatic && !setup.time.is_static;
   if (has_inertia) rate = rate_of_momentum(setup, before, after, result.report);
   Vec<Dim> expected = sum.total - residual.total;
-  for (const MomentumChange& change : forces.remeshing) expected += Vec<Dim>(change.linear.data());
+  Vec<Dim> by_edits = Vec<Dim>::Zero();
+  for (const MomentumChange& change : forces.remeshing) by_edits += Vec<Dim>(change.linear.data());
+  expected += by_edits;
+  double& most = setup.remesh.history == HistoryRule::function ? tally.kept : tally.changed;
+  if (rate.size > 0) most = std::max(most, by_edits.norm() / rate.size);
   EXPECT_LE((rate.total - expected).norm(), kTolerance * (sum.size + residual.size) + 1e-13 * rate.size)
       << "rate " << rate.total.transpose() << ", forces " << sum.total.transpose() << ", sizes " << sum.size << " and "
       << rate.size << ", residual " << residual.total.transpose();
@@ -322,7 +329,7 @@ void run(unsigned seed, Tally& tally) {
   RandomScene<Dim> scene(seed);
   SCOPED_TRACE(scene.words.str());
   auto simulation = simulate(scene.setup);
-  for (int step = 0; step < 4; ++step) {
+  for (int step = 0; step < (Dim == 2 ? 3 : 2); ++step) {
     const State<Dim> before = simulation.state();
     const StepResult result = simulation.advance();
     ++tally.steps;
@@ -343,12 +350,14 @@ template <int Dim>
 void run_all(unsigned first, unsigned count) {
   Tally tally;
   for (unsigned seed = first; seed < first + count; ++seed) {
+    if (std::getenv("ITR_TELL")) std::fprintf(stderr, "seed %u\n", seed);
     run<Dim>(seed, tally);
     if (::testing::Test::HasFailure()) break;
   }
   if (std::getenv("ITR_TELL"))
-    std::fprintf(stderr, "%d steps, %d failed, %d cut, %d remeshed, %d in contact, %d with friction\n", tally.steps,
-                 tally.failed, tally.cut, tally.remeshed, tally.in_contact, tally.with_friction);
+    std::fprintf(stderr, "%d steps, %d failed, %d cut, %d remeshed, %d in contact, %d with friction, edits %g, %g\n",
+                 tally.steps, tally.failed, tally.cut, tally.remeshed, tally.in_contact, tally.with_friction, tally.kept,
+                 tally.changed);
 }
 
 unsigned first_seed() { return std::getenv("ITR_SEED") ? static_cast<unsigned>(std::atoi(std::getenv("ITR_SEED"))) : 1; }
@@ -356,8 +365,8 @@ unsigned seeds(unsigned count) {
   return std::getenv("ITR_SEEDS") ? static_cast<unsigned>(std::atoi(std::getenv("ITR_SEEDS"))) : count;
 }
 
-TEST(ForceSums, AreTheRateOfMomentum2D) { run_all<2>(first_seed(), seeds(60)); }
-TEST(ForceSums, AreTheRateOfMomentum3D) { run_all<3>(first_seed(), seeds(30)); }
+TEST(ForceSums, AreTheRateOfMomentum2D) { run_all<2>(first_seed(), seeds(40)); }
+TEST(ForceSums, AreTheRateOfMomentum3D) { run_all<3>(first_seed(), seeds(20)); }
 
 }  // namespace
 }  // namespace itr
