@@ -124,7 +124,10 @@ TEST_F(FolderTest, ReportsReplaceNoFileOfSomebodyElse) {
   EXPECT_EQ(refused.wait(), 2) << refused.said();
   EXPECT_EQ(text_of(run / "report.html"), "mine");
   fs::remove(run / "report.html");
+  std::ofstream(run / "itr-files.txt", std::ios::app) << "frames/0000";  // as a run that is killed may leave it
   for (int i = 0; i < 2; ++i) EXPECT_EQ(Command({run.string()}, folder / "log", 0, {"report"}).wait(), 0);
+  ASSERT_EQ(start(short_run(run) + Arguments{"--overwrite"}).wait(), 0);
+  EXPECT_FALSE(fs::exists(run / "report.html"));
 }
 
 TEST_F(FolderTest, WithoutOverwriteNothingOfARunIsReplaced) {
@@ -151,6 +154,21 @@ TEST_F(FolderTest, WhatAKilledRunWasWritingIsRemoved) {
   EXPECT_EQ(results_of(run).size(), 9u);
 }
 
+TEST_F(FolderTest, ARunThatIsKilledWhileItRemovesTheOneBeforeIsBegunAgain) {
+  const fs::path run = folder / "run", fresh = folder / "fresh";
+  ASSERT_EQ(start(short_run(run, 20)).wait(), 0);
+  put(run / "frames/notes.txt");
+  std::ofstream(run / "itr-files.txt", std::ios::app) << "removing\n";
+  for (const char* name : {"steps.jsonl", "frames/000000.h5", "frames/000001.h5"}) fs::remove(run / name);
+  const Command command = start(short_run(run) + Arguments{"--resume"});
+  ASSERT_EQ(command.wait(), 0) << command.said();
+  ASSERT_EQ(start(short_run(fresh)).wait(), 0);
+  expect_same_results(fresh, run);
+  std::set<std::string> expected = names_in(fresh);
+  expected.insert("frames/notes.txt");
+  EXPECT_EQ(names_in(run), expected);
+}
+
 /// Versions before 25 November 2026 left no list.
 TEST_F(FolderTest, AFolderWithoutAListIsStillOfARun) {
   const fs::path run = folder / "run", fresh = folder / "fresh";
@@ -174,10 +192,14 @@ TEST_F(FolderTest, TwoRunsInOneFolderAreRefusedUntilTheFirstHasEnded) {
   const fs::path run = folder / "run";
   Case longer = kStopped;
   longer.steps = 100000;
+  longer.sets.push_back(R"(/output/forces=[{"name":"ball","bodies":1}])");
   const Command first(arguments(longer, run, 0), folder / "first");
   while (count_lines(run / "steps.jsonl") < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   for (const Arguments& how : {Arguments{}, Arguments{"--overwrite"}, Arguments{"--resume"}}) {
     const int lines = count_lines(run / "steps.jsonl");
+    const Command forces({run.string()}, folder / "log", 0, {"forces"});
+    EXPECT_EQ(forces.wait(), 2);
+    EXPECT_NE(forces.said().find("another run at work"), std::string::npos) << forces.said();
     const Command second = start(arguments(longer, run, 0) + how);
     EXPECT_EQ(second.wait(), 2);
     EXPECT_NE(second.said().find("another run at work"), std::string::npos) << second.said();

@@ -767,8 +767,23 @@ class Files(unittest.TestCase):
             with self.assertRaises(itr.InputError) as caught:
                 make_simulation().record(folder / "run")
             self.assertIn("results of an earlier run", str(caught.exception))
+            (folder / "run/frames/notes.tmp").write_text("mine")
             simulation.record(folder / "run", overwrite=True)
             self.assertEqual(len(list((folder / "run/frames").glob("*.h5"))), 1)
+            self.assertEqual((folder / "run/frames/notes.tmp").read_text(), "mine")
+
+    def test_one_at_a_time_records_in_a_folder(self):
+        with tempfile.TemporaryDirectory() as folder:
+            first, second = make_simulation(), make_simulation()
+            first.record(folder)
+            with self.assertRaises(itr.InputError) as caught:
+                second.record(folder, overwrite=True)
+            self.assertIn(str(folder), str(caught.exception))
+            first.step()
+            self.assertEqual(len(list(pathlib.Path(folder, "frames").glob("*.h5"))), 2)
+            del first
+            second.record(folder, overwrite=True)
+            self.assertEqual(len(list(pathlib.Path(folder, "frames").glob("*.h5"))), 1)
 
     def test_records_steps_whose_listener_raises(self):
         class Mine(Exception):

@@ -92,6 +92,7 @@ FileList read_file_list(const fs::path& directory) {
                       "another folder (-o), or that this file is moved away"});
   while (std::getline(file, line) && !file.eof()) {  // one that a killed run began has no end, and names no file yet
     if (is_name_of_run(line)) list.names.insert(line);
+    if (line == kRemovalLine) list.is_being_removed = true;
     if (!line.starts_with(kProcessLine)) continue;
     list.last_process = number_of(std::string_view(line).substr(kProcessLine.size()));
     list.processes.insert(list.last_process);
@@ -113,7 +114,8 @@ bool is_foreign(const fs::path& directory, const std::string& name) {
 }
 
 void add_to_file_list(const fs::path& directory, const std::string& name) {
-  const std::string line = name + '\n';
+  if (!fs::exists(directory / kFileList) || read_file_list(directory).names.contains(name)) return;
+  const std::string line = '\n' + name + '\n';  // the line before may have no end, where a run was killed
   const int descriptor = ::open((directory / kFileList).c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (descriptor < 0) return;
   [[maybe_unused]] const ssize_t written = ::write(descriptor, line.data(), line.size());

@@ -13,11 +13,14 @@ constexpr const char* kFileList = "itr-files.txt";
 /// First line of the list.
 constexpr std::string_view kFileListHead = "Files that itr run wrote here: it removes and replaces no others.\n";
 constexpr std::string_view kProcessLine = "process ";
+/// Stands in a list while its files are removed.
+constexpr std::string_view kRemovalLine = "removing";
 
 struct FileList {
   std::set<std::string> names;  ///< relative to the folder; only such as runs write
   std::set<int> processes;
   int last_process = 0;
+  bool is_being_removed = false;  ///< a run began to remove all of these files
 };
 
 /// The step of a frame's name, frames/NNNNNN.h5 or vtu/NNNNNN.vtu; -1: of another file.

@@ -49,6 +49,17 @@ bool exchange(const fs::path& temporary, const fs::path& path) {
   return ::rename(temporary.c_str(), path.c_str()) == 0;
 }
 
+/// Calls fsync or syncfs for what has this name.
+void sync_by(int (*call)(int), const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) fail(path);
+  const bool is_synced = call(descriptor) == 0 || errno == EINVAL;  // a file system that knows no such thing
+  const int reason = errno;
+  ::close(descriptor);
+  errno = reason;
+  if (!is_synced) fail(path);
+}
+
 }  // namespace
 
 Successor::Successor(fs::path path) : path_(std::move(path)) {
@@ -117,15 +128,9 @@ void write_file(const fs::path& path, std::string_view bytes, Durability durabil
   file.replace(durability);
 }
 
-void sync(const fs::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) fail(path);
-  const bool is_synced = ::fsync(descriptor) == 0 || errno == EINVAL;  // a file system that knows no such thing
-  const int reason = errno;
-  ::close(descriptor);
-  errno = reason;
-  if (!is_synced) fail(path);
-}
+void sync(const fs::path& path) { sync_by(::fsync, path); }
+
+void sync_file_system(const fs::path& folder) { sync_by(::syncfs, folder); }
 
 LineFile::LineFile(fs::path path, std::size_t keep) : path_(std::move(path)), size_(keep) {
   descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);

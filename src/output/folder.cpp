@@ -39,10 +39,10 @@ std::vector<fs::path> missing_folders(const fs::path& directory) {
 
 /// Whether the open file still has its name: another process may have removed it before we locked it.
 bool is_named(int descriptor, const fs::path& path) {
-  struct stat open {
-  }, named{};
-  return ::fstat(descriptor, &open) == 0 && ::stat(path.c_str(), &named) == 0 && open.st_ino == named.st_ino &&
-         open.st_dev == named.st_dev;
+  using Status = struct stat;
+  Status locked = {}, named = {};
+  return ::fstat(descriptor, &locked) == 0 && ::stat(path.c_str(), &named) == 0 && locked.st_ino == named.st_ino &&
+         locked.st_dev == named.st_dev;
 }
 
 /// Opens the list and locks it.
@@ -57,7 +57,9 @@ int open_locked(const fs::path& directory) {
     if (!is_taken) continue;
     const int process = read_file_list(directory).last_process;
     throw InputError({directory.string(), "output folder",
-                      "another run at work in it" + (process > 0 ? fmt::format(" (process {})", process) : ""),
+                      "another run at work in it" + (process == ::getpid() ? " (in this process)"
+                                                     : process > 0         ? fmt::format(" (process {})", process)
+                                                                           : ""),
                       "that it has ended, or another folder (-o)"});
   }
 }
@@ -73,6 +75,7 @@ struct Folder::Impl {
     size_before = size();
     try {
       list = read_file_list(directory);
+      if (list.is_being_removed) remove_all();
       if (size_before == 0)
         append(list_text(list.names) + process_line());
       else
@@ -97,7 +100,8 @@ struct Folder::Impl {
   }
 
   std::size_t size() const {
-    struct stat status {};
+    using Status = struct stat;
+    Status status = {};
     return ::fstat(descriptor, &status) == 0 ? static_cast<std::size_t>(status.st_size) : 0;
   }
 
@@ -106,8 +110,13 @@ struct Folder::Impl {
     return ::pread(descriptor, &last, 1, static_cast<off_t>(size_before) - 1) == 1 && last == '\n';
   }
 
+  /// All of the text, or nothing.
   void append(const std::string& text) const {
+    const std::size_t before = size();
     if (::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size())) return;
+    const int reason = errno;
+    [[maybe_unused]] const int cut = ::ftruncate(descriptor, static_cast<off_t>(before));
+    errno = reason;
     throw InputError({(directory / kFileList).string(), "file", std::generic_category().message(errno),
                       "a folder that can be written, with space left"});
   }
@@ -170,6 +179,19 @@ struct Folder::Impl {
     }
   }
 
+  /// Removes all files of the list, and empties it. A run that is killed meanwhile leaves the rest to the next one.
+  int remove_all() {
+    const std::set<std::string> there = files_there(directory, list);
+    std::vector<std::string> names(there.begin(), there.end());
+    // Frames come last, so that no series has links to what is gone.
+    std::stable_partition(names.begin(), names.end(), [](const std::string& name) { return step_of_name(name) < 0; });
+    const int count = remove(names);
+    if (::ftruncate(descriptor, 0) != 0) throw unusable(directory, std::generic_category().message(errno));
+    size_before = 0;
+    list = {};
+    return count;
+  }
+
   void make_frames() const {
     std::error_code error;
     fs::create_directories(directory / "frames", error);
@@ -196,15 +218,13 @@ bool Folder::has_results() const { return !files_there(impl_->directory, impl_->
 
 int Folder::begin(const std::vector<std::string>& names) {
   impl_->require_own(names);
-  const std::set<std::string> there = files_there(impl_->directory, impl_->list);
-  const int count = impl_->remove({there.begin(), there.end()});
+  impl_->has_begun = true;
+  if (!impl_->list.names.empty()) impl_->append(fmt::format("{}\n", kRemovalLine));
+  const int count = impl_->remove_all();
   std::error_code none;
   for (const char* folder : {"frames", "vtu"}) fs::remove(impl_->directory / folder, none);  // if nothing is left there
-  impl_->has_begun = true;
-  if (::ftruncate(impl_->descriptor, 0) != 0) throw unusable(impl_->directory, std::generic_category().message(errno));
   impl_->append(Impl::list_text(names) + Impl::process_line());
   impl_->own = {names.begin(), names.end()};
-  impl_->list = {};
   impl_->make_frames();
   return count;
 }

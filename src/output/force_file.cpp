@@ -111,6 +111,7 @@ void ForceFile::drop_last() {
 }
 
 ForceRows rewrite_forces(const std::filesystem::path& directory) {
+  Folder folder(directory);
   ForceRows count;
   RowList from_frames;
   std::string head;
@@ -125,7 +126,6 @@ ForceRows rewrite_forces(const std::filesystem::path& directory) {
   }
   if (from_frames.empty())
     throw InputError({directory.string(), "frames", "none with forces", "a run of a scene with /output/forces"});
-  Folder folder(directory);
   folder.resume({kForceFile}, from_frames.rbegin()->first);
   RowList rows = read_rows(directory, head);
   for (auto& [step, of_step] : from_frames) {

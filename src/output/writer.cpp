@@ -46,10 +46,11 @@ struct Writer::Impl {
         options(output_options),
         info(std::move(run_info)),
         stored(begin(last_step)),
-        series(directory, stored),
-        steps(directory / "steps.jsonl", (remove_after(last_step), log_bytes)),
-        forces(directory, folder.owns(kForceFile) ? last_step : -1) {
+        steps(directory / "steps.jsonl", log_bytes),
+        forces(directory, folder.owns(kForceFile) ? last_step : -1),
+        series(directory, stored) {
     if (options.vtu) begin_vtu_series();
+    if (last_step >= 0) removed_files = folder.remove_after(last_step);  // nothing names these frames any more
     stored = {};
     last_checkpoint = seconds_now();
     if (last_step >= 0) warnings.restore(directory / "steps.jsonl");
@@ -72,11 +73,6 @@ struct Writer::Impl {
                          sizes.drawn_nodes, sizes.asked});
     }
     return entries;
-  }
-
-  /// When nothing links these frames any more.
-  void remove_after(int last_step) {
-    if (last_step >= 0) removed_files = folder.remove_after(last_step);
   }
 
   void begin_vtu_series() {
@@ -150,9 +146,12 @@ struct Writer::Impl {
 
   /// What a checkpoint relies on has to be on the disk before it.
   void sync_frames() {
-    if (first_unsynced)
-      for (int step = *first_unsynced; step <= last_stored; ++step)
-        if (is_due(step)) sync(directory / frame_name(step));
+    constexpr int kFew = 32;
+    const int every = std::max(options.skip_frames, 1);
+    if (first_unsynced && last_stored - *first_unsynced > kFew * every)
+      sync_file_system(directory / "frames");
+    else if (first_unsynced)
+      for (int step = *first_unsynced; step <= last_stored; step += every) sync(directory / frame_name(step));
     sync(directory / "steps.jsonl");
     first_unsynced.reset();
   }
@@ -164,10 +163,10 @@ struct Writer::Impl {
   int last_stored = kNone;
   int removed_files = 0;
   std::vector<FrameEntry> stored;  ///< while the series are begun
-  TimeSeries series;
-  std::optional<SeriesText> vtu_series;
   LineFile steps;
   ForceFile forces;
+  TimeSeries series;
+  std::optional<SeriesText> vtu_series;
   FrameFiles frames;
   Totals totals;
   DisplacementNorms norms;

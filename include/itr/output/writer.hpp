@@ -40,6 +40,7 @@ class Writer {
  public:
   /// Begins a new run and removes files of an earlier one, no others.
   Writer(Folder folder, OutputOptions options, RunInfo info);
+  /// As above, in the folder that is or will be there.
   Writer(std::filesystem::path directory, OutputOptions options, RunInfo info);
   /// Goes on after a saved state of this folder. Files that were written after that state are removed.
   template <int Dim>

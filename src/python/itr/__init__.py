@@ -14,6 +14,7 @@ array, which index, what was found and what was expected.
 
 from __future__ import annotations
 
+import gc
 import operator
 import tempfile
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, Optional, Sequence, Union
@@ -412,8 +413,9 @@ class Simulation:
 
     def record(self, folder: str, every: int = 1, overwrite: bool = False) -> None:
         """Stores this state and from now on each `every`-th step in `folder`, as `itr run` does: for `write_report`, ParaView and
-        `itr certify`. A restored state ends it."""
+        `itr certify`. A restored state ends it. No other run, nor simulation that records, may be at work in the folder."""
         self._recorder = None
+        gc.collect()  # one that nobody has any more may hold the folder still
         self._recorder = _itr.Recorder(self._simulation, str(folder), every, overwrite)
 
     def write_report(self, file: str, every: int = 1, max_mb: float = 30) -> list[str]:
