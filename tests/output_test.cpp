@@ -346,6 +346,14 @@ TEST_F(OutputTest, AFrameCostsTheSameHoweverManyThereAre) {
   EXPECT_EQ(count_of(text_of(folder / "sim.pvd"), "<DataSet "), kFrames);
 }
 
+/// A run that is killed goes on from a frame, and would leave out the VTU file of that.
+TEST_F(OutputTest, NoFrameIsStoredBeforeItsVtuFile) {
+  Writer writer(folder, {1, 30, true}, {"scene", "eigen:ldlt", 1});
+  std::ofstream(folder / "vtu") << "a file stands where the folder would";
+  EXPECT_THROW(writer.write(Plane().view(), report_of(0)), InputError);
+  EXPECT_FALSE(fs::exists(folder / "frames/000000.h5"));
+}
+
 TEST_F(OutputTest, LeavesNoTemporaryFilesAndNoFramesOfAnEarlierRun) {
   {
     Writer earlier = make_writer();

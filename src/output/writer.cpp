@@ -102,6 +102,10 @@ struct Writer::Impl {
   template <int Dim>
   void store(const FrameView<Dim>& frame, int step, double t, const State<Dim>* checkpoint) {
     const std::string name = frame_name(step);
+    if (vtu_series && step != last_stored) {  // before the frame: a run that goes on from that would not write it
+      folder.claim(vtu_name(step));
+      write_vtu(directory, frame, step, options.units);
+    }
     folder.claim(name);
     if (checkpoint) {
       sync_frames();
@@ -134,11 +138,7 @@ struct Writer::Impl {
       if (!frame.asked->stress.empty()) asked.push_back("stress");
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
-    if (vtu_series) {
-      folder.claim(vtu_name(step));
-      write_vtu(directory, frame, step, options.units);
-      vtu_series->add(vtu_series_entry(step, options.units.from_si(t, "s")));
-    }
+    if (vtu_series) vtu_series->add(vtu_series_entry(step, options.units.from_si(t, "s")));
     const bool is_quadratic = frame.space && !frame.space->is_linear();
     series.add({frame_name(step), options.units.from_si(t, "s"), Dim, nodes, frame.mesh.num_cells(), is_quadratic,
                 drawn_nodes(frame), std::move(asked)});
