@@ -423,6 +423,16 @@ TEST_F(UnitsTest, CertificatesAndFailedSolvesSpeakInThem) {
   EXPECT_FALSE(std::regex_search(said_, std::regex("[0-9] N\\b"))) << said_;
 }
 
+TEST_F(UnitsTest, PlacesAndStiffnessesAreInThem) {
+  const System by = in<2>(kTonnes);
+  const fs::path folder = write<2>(by, scene<2>(by));
+  const std::string explain = fmt::format("run {0}/scene.json -o {0}/run --overwrite --set ", folder.string());
+  EXPECT_EQ(itr(explain + "/geometry/1/height=50"), 2) << said_;
+  EXPECT_TRUE(std::regex_search(said_, std::regex("intersect \\(in mm\\): edge \\([^)]*\\b[1-9][0-9]+[.,)]"))) << said_;
+  EXPECT_EQ(itr(explain + "/solver/contact/barrier_stiffness=100 --set /time/tend=0.005"), 0) << said_;
+  EXPECT_NE(said_.find("barrier stiffness 100 is "), std::string::npos) << said_;
+}
+
 TEST_F(UnitsTest, SecondsAddUpToTheTimeOfTheRun) {
   const System by = in<2>(kMetres);
   const fs::path folder = write<2>(by, scene<2>(by));

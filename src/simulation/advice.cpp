@@ -144,11 +144,12 @@ void find_odd_stiffness(const Setup<Dim>& setup, std::vector<std::string>& found
   const double low = barrier_stiffness_for(setup, contact, softest), high = barrier_stiffness_for(setup, contact, stiffest);
   if (contact.barrier_stiffness >= low / kStiffnessRange && contact.barrier_stiffness <= kStiffnessRange * high) return;
   const bool is_stiff = contact.barrier_stiffness > high;
-  found.push_back(
-      fmt::format("barrier stiffness {:.3g} is {:.2g} times what suits the {} body, {:.3g}: Newton may take many "
-                  "times the iterations{}",
-                  contact.barrier_stiffness, contact.barrier_stiffness / (is_stiff ? high : low),
-                  is_stiff ? "stiffest" : "softest", is_stiff ? high : low, is_stiff ? "" : ", and gaps are narrow"));
+  const double unit = barrier_unit(setup.units, contact);
+  found.push_back(fmt::format(
+      "barrier stiffness {:.3g} is {:.2g} times what suits the {} body, {:.3g}: Newton may take many "
+      "times the iterations{}",
+      contact.barrier_stiffness / unit, contact.barrier_stiffness / (is_stiff ? high : low),
+      is_stiff ? "stiffest" : "softest", (is_stiff ? high : low) / unit, is_stiff ? "" : ", and gaps are narrow"));
 }
 
 template <int Dim>

@@ -90,11 +90,10 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
   for (const auto& [body, material] : setup.materials) stiffest = std::max(stiffest, material.youngs_modulus);
   contact.barrier_stiffness = barrier_stiffness_for(setup, contact, stiffest);
   const Units& units = setup.units;
-  const double unit = contact.convergent ? units.factor("Pa") : units.factor("J") / std::pow(units.factor("m"), 4);
   return fmt::format(
       "barrier stiffness {:.3g}: a tenth of the stiffest modulus, {}; "
       "/solver/contact/barrier_stiffness sets another",
-      contact.barrier_stiffness / unit, units.text(stiffest, "Pa", 3));
+      contact.barrier_stiffness / barrier_unit(units, contact), units.text(stiffest, "Pa", 3));
 }
 
 /// A thousandth of the thinnest body, a tenth of the shortest surface edge, and less than the gap at the start.

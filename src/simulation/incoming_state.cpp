@@ -19,9 +19,9 @@ namespace itr {
 namespace {
 
 template <int Dim>
-std::string describe(const Vec<Dim>& p) {
-  std::string text = "(";
-  for (int c = 0; c < Dim; ++c) text += (c ? ", " : "") + std::to_string(p[c]);
+std::string describe(const Vec<Dim>& p, const Units& units) {
+  std::string text;
+  for (int c = 0; c < Dim; ++c) text += fmt::format("{}{:.6g}", c ? ", " : "(", units.from_si(p[c], "m"));
   return text + ")";
 }
 
@@ -29,8 +29,10 @@ std::string describe(const Vec<Dim>& p) {
 template <int Dim>
 void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   if (setup.proxy) return;
-  const auto refuse = [](const char* what, const Vec<Dim>& p) {
-    throw InputError({"", "initial state", what + (" inside of a body, at " + describe(p)), "surfaces that do not touch"});
+  const auto refuse = [&](const char* what, const Vec<Dim>& p) {
+    throw InputError({"", "initial state",
+                      fmt::format("{} inside of a body, at {} {}", what, describe(p, setup.units), setup.units.length()),
+                      "surfaces that do not touch"});
   };
   const VectorX& x = state.history.x[0];
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.space, state.chords);
@@ -109,7 +111,8 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   const VectorX x = contact.positions(state.history.x[0]);
   const auto corners = [&](const auto& primitive) {
     std::string text;
-    for (const int v : primitive) text.append(text.empty() ? "" : "-").append(describe<Dim>(x.segment<Dim>(Dim * v)));
+    for (const int v : primitive)
+      text.append(text.empty() ? "" : "-").append(describe<Dim>(x.segment<Dim>(Dim * v), setup.units));
     return text;
   };
   constexpr std::size_t kMostNamed = 5;
@@ -122,7 +125,8 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
              (Dim == 2 ? "edge " + corners(surface.edges[second]) : "triangle " + corners(surface.triangles[second]));
   }
   if (pairs.size() > kMostNamed) found += "; and more";
-  throw InputError({"", "initial state", "surfaces that intersect: " + found, "surfaces that do not touch"});
+  throw InputError({"", "initial state", "surfaces that intersect (in " + setup.units.length() + "): " + found,
+                    "surfaces that do not touch"});
 }
 
 template <int Dim>
