@@ -367,6 +367,23 @@ TYPED_TEST(VolumeTerms, DampingIsTheStiffnessTimesVelocity) {
   }
 }
 
+TYPED_TEST(VolumeTerms, DampingForcesOfFastBodiesAddUp) {
+  constexpr int Dim = TypeParam::value;
+  const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});
+  std::mt19937 random(14);
+  const VectorX lagged = perturbed(cells, random, 0.2);
+  const ElasticEnergy<Dim> elastic(cells, kMaterials, 0.25);
+  Workspace workspace;
+  const DampingEnergy<Dim> energy(elastic, lagged, 0.02, {8, lagged}, workspace);
+  VectorX x = lagged;  // all go by 1 m, and by a billionth of that apart
+  for (double& place : x) place += 1 + 1e-9 * std::uniform_real_distribution<double>(-1, 1)(random);
+  const VectorX gradient = gradient_of(energy, x);
+  Vec<Dim> total = Vec<Dim>::Zero();
+  for (Eigen::Index i = 0; i < gradient.size(); i += Dim) total += gradient.segment<Dim>(i);
+  EXPECT_GT(gradient.norm(), 0);
+  EXPECT_LE(total.norm(), 1e-13 * gradient.template lpNorm<1>());
+}
+
 TYPED_TEST(VolumeTerms, VolumeBarrierGradientMatchesDifferences) {
   constexpr int Dim = TypeParam::value;
   const CellSet<Dim> cells = whole_mesh(two_cells<Dim>(), {});

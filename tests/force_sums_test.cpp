@@ -166,7 +166,7 @@ struct RandomScene {
     auto& remesh = setup.remesh;
     remesh.enabled = with("remeshing");
     if (remesh.enabled) {
-      remesh.split.acceptance_tolerance = Dim == 2 ? 1e-4 : 1e-2;
+      remesh.split.acceptance_tolerance = Dim == 2 ? number(1e-5, 1e-4) : 1e-2;
       remesh.split.max_depth = 1;
       remesh.split.min_edge_length = kSize / 8;
       remesh.collapse.acceptance_tolerance = Dim == 2 ? -1e-3 : -1e-2;
@@ -240,7 +240,7 @@ struct RandomScene {
       setup.contact.friction_iterations = 1 + static_cast<int>(random() % 3);
     }
     if (with("contact damping"))
-      setup.damping.push_back({DampingOptions::Term::contact, 1e-3, 1 + static_cast<int>(random() % 3)});
+      setup.damping.push_back({DampingOptions::Term::contact, number(1e-3, 5e-3), 1 + static_cast<int>(random() % 3)});
   }
 };
 
@@ -321,7 +321,7 @@ void expect_sums(const Setup<Dim>& setup, const State<Dim>& before, const State<
   EXPECT_LE((rate.total - expected).norm(), kTolerance * (sum.size + residual.size) + 1e-13 * rate.size)
       << "rate " << rate.total.transpose() << ", forces " << sum.total.transpose() << ", sizes " << sum.size << " and "
       << rate.size << ", residual " << residual.total.transpose();
-  EXPECT_LE(residual.size, 1e-6 * (sum.size + rate.size));
+  EXPECT_LE(residual.size, 1e-4 * (sum.size + rate.size));
 }
 
 template <int Dim>

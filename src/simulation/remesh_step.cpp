@@ -252,16 +252,13 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   std::size_t next = 0;
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
-  const auto tell_momentum = [&] { report.remeshing = momentum_changes(setup, before, state, touched); };
-  if (!remeshed.coarsened()) {  // refinement alone: interpolation is exact
-    tell_momentum();
-    return renumbering;
+  if (remeshed.coarsened()) {  // else interpolation is exact
+    const auto transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh, state.space,
+                                           touched, tools.cache.system.solver(), state.history);
+    report.history_loss = transfer.loss / problem.scaling();
+    tell(transfer, mass_moment(setup, state.mesh, x), state.step, setup.units, tools.logger);
   }
-  const HistoryTransferReport transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh,
-                                                          state.space, touched, tools.cache.system.solver(), state.history);
-  report.history_loss = transfer.loss / problem.scaling();
-  tell_momentum();
-  tell(transfer, mass_moment(setup, state.mesh, x), state.step, setup.units, tools.logger);
+  report.remeshing = momentum_changes(setup, before, state, touched);
   return renumbering;
 }
 

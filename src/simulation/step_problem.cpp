@@ -580,6 +580,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
   std::vector<VectorX> previous = {lagged_x};  // newest last
   VectorX best = x;
   Lagged best_lagged = lagged_;
+  BarrierStiffness best_stiffness = stiffness_;
   double least = std::numeric_limits<double>::infinity();
   int best_round = 0, round = 1;
   RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
@@ -604,10 +605,15 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
       least = norm;
       best = x;
       best_lagged = lagged_;
+      best_stiffness = stiffness_;
       best_round = round;
     } else if (round - best_round >= kPatience) {
       x = best;
       lagged_ = best_lagged;
+      if (adaptive_) {
+        stiffness_ = best_stiffness;
+        potential_.contact()->set_stiffness(stiffness_.value);
+      }
       end = RoundsEnd::stalled;
       break;
     }
