@@ -13,8 +13,8 @@ DampingEnergy<Dim>::DampingEnergy(const Energy& damped, ConstVectorView lagged_x
 
 namespace {
 
-/// Calls f(vertices, K, d) for each block, with displacements d from `origin` less their mean: K takes no notice of that,
-/// but its round-off would not be the opposite at the other vertices.
+/// Calls f(vertices, K, d) for each block, with displacements d from `origin` less their mean, which K takes no notice of:
+/// its round-off would not be the opposite at the other vertices. Forces lose their mean for the same reason.
 template <int Dim, typename F>
 void for_each_motion(const QuadraticBlocks<Dim>& blocks, ConstVectorView x, const VectorX& origin, const F& f) {
   Eigen::Matrix<double, Dim, Eigen::Dynamic> d;
@@ -42,6 +42,9 @@ void add_forces(const QuadraticBlocks<Dim>& blocks, ConstVectorView x, const Vec
   VectorX force;
   for_each_motion<Dim>(blocks, x, origin, [&](std::span<const int> vertices, const auto& K, const auto& d) {
     force.noalias() = scale * (K * d);
+    auto by_vertex = force.template reshaped<Eigen::ColMajor>(Dim, static_cast<Eigen::Index>(vertices.size()));
+    const Vec<Dim> mean = by_vertex.rowwise().mean();
+    by_vertex.colwise() -= mean;
     for (std::size_t k = 0; k < vertices.size(); ++k)
       gradient.segment<Dim>(Dim * vertices[k]) += force.segment<Dim>(Dim * static_cast<Eigen::Index>(k));
   });
