@@ -119,7 +119,7 @@ const std::vector<Refusal> kRefusals = {
     {"a line for a body", geometry("line.obj"), "scene.json", "/geometry/0/mesh", "without cells", "triangles"},
     {"a surface for a body", geometry("surface.obj"), "scene.json", "/geometry/0/mesh", "surface", "tetrahedra"},
     {"element without material", material("id", 2), "scene.json", "/materials", "which elements 0, 1 have", "every body"},
-    {"intersecting surfaces", overlapping(), "scene.json", "initial state", "(1.000000, 1.000000)", "do not touch"},
+    {"intersecting surfaces", overlapping(), "scene.json", "initial state", "(in m): edge (0, 0)-(0, 1)", "do not touch"},
     {"no time step", {{"time", {{"dt", nullptr}}}}, "scene.json", "/time", "tend", "two of tend, dt and time_steps"},
     {"contradicting times", {{"time", {{"time_steps", 3}}}}, "scene.json", "/time", "3", "tend = t0 + dt * time_steps"},
     {"wrong time key", {{"time", {{"step", 0.1}}}}, "scene.json", "/time/step", "unknown key", "time_steps"},
