@@ -12,7 +12,7 @@
 namespace itr {
 
 struct ChordDemand {
-  ChordLevels levels;  ///< with those halvings that the bound asks for, and that chords of twice dhat leave room for
+  ChordLevels levels;  ///< with those halvings that the bound asks for, and that dhat leaves room for
   double excess = 0;   ///< largest ratio of how far a curve leaves its chords to how far it may: the bound holds up to 1
 };
 

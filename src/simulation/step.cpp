@@ -183,10 +183,10 @@ class StepAttempt {
         return summary;
       }
       ChordLevels fewer = std::exchange(next_.chords, demand.levels);
-      VectorX solution = std::exchange(x_, start);
+      VectorX solution = std::exchange(x_, start);  // where the next solve begins, if the way there is free
       auto problem_before = std::move(problem_);
       make_problem();
-      NewtonSummary with_more = solve(expected);
+      NewtonSummary with_more = solve(solution);
       if (!with_more.converged() && with_more.termination != Termination::cancelled) {
         warn("keeping the chords of curved edges as they were, the step with more of them failed: " + reason_of(with_more));
         next_.chords = std::move(fewer);

@@ -567,7 +567,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
     const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
     if (expected.size() > 0 && may_move && is_better_start(start, x)) {
-      way_to_start = start - x;
+      if (terms_.has_inertia) way_to_start = start - x;
       x = start;
     }
   }
