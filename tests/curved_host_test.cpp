@@ -210,8 +210,8 @@ void expect_report_of_retries(double speed, double dt, int max_iterations, int s
 }
 
 TEST(CurvedHost, RetriesAreToldTogether) {
-  expect_report_of_retries(50, 0.001, 12, 3, 1, true);
-  expect_report_of_retries(200, 0.0005, 20, 1, 3, false);
+  expect_report_of_retries(200, 0.0005, 18, 2, 1, true);
+  expect_report_of_retries(150, 0.0005, 10, 0, 2, false);
 }
 
 /// The first two leave edges curved whose straightening nearly inverts cells.
