@@ -2,6 +2,7 @@
 // Distances between stored frames on different meshes, against integrals by hand.
 #include "output/distance.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,7 +48,7 @@ class DistanceTest : public testing::Test {
     AskedFields asked;
     asked.kinetic_energy = {2.5};
     asked.momentum.assign(Dim, 0.5 * step);
-    const fs::path path = folder / "frames" / (std::to_string(step) + ".h5");
+    const fs::path path = folder / fmt::format("frames/{:06}.h5", step);
     write_frame<Dim>(path, {mesh, x, v, density, obstacles, edges, triangles, &asked, {}, &space}, step, 0.1 * step);
     return path;
   }

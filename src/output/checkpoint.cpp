@@ -18,6 +18,8 @@ constexpr std::int64_t kFormat = 7;
 /// In SI units, where the frame is in others: of the vertices, and of the state.
 constexpr const char* kRest = "/checkpoint/rest";
 constexpr const char* kTime = "/checkpoint/t";
+constexpr const char* kQuadratureLevels = "/checkpoint/quadrature_levels";
+constexpr const char* kChordLevels = "/checkpoint/chord_levels";
 constexpr const char* kDoublings = "/checkpoint/doublings";  ///< of flat obstacles
 
 std::string field_name(const char* kind, std::size_t age) {
@@ -54,6 +56,16 @@ std::vector<int> read_ints(const fs::path& path, const hdf5::File& file, const s
   std::vector<int> numbers;
   for (const std::int64_t value : file.read_integers(name).values) numbers.push_back(as_int(path, name, value));
   return numbers;
+}
+
+/// Levels from 0 to `most`, or none where the file has none.
+std::vector<int> read_levels(const fs::path& path, const hdf5::File& file, const char* name, int most) {
+  if (!file.contains(name)) return {};
+  std::vector<int> levels = read_ints(path, file, name);
+  for (const int level : levels)
+    if (level < 0 || level > most)
+      throw InputError({path.string(), name, std::to_string(level), "0 to " + std::to_string(most)});
+  return levels;
 }
 
 Space read_space(const fs::path& path, const hdf5::File& file) {
@@ -274,12 +286,11 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   write_fields("a", state.history.a);
   if (state.deviation.size() > 0) write_fields("deviation", {state.deviation});
   if (!state.quadrature.empty())
-    file.write("/checkpoint/quadrature_levels", std::vector<std::int64_t>(state.quadrature.begin(), state.quadrature.end()),
-               0);
+    file.write(kQuadratureLevels, std::vector<std::int64_t>(state.quadrature.begin(), state.quadrature.end()), 0);
   if (!state.doublings.empty())
     file.write(kDoublings, std::vector<std::int64_t>(state.doublings.begin(), state.doublings.end()), 0);
   if (!state.chords.empty())
-    file.write("/checkpoint/chord_levels", std::vector<std::int64_t>(state.chords.begin(), state.chords.end()), 0);
+    file.write(kChordLevels, std::vector<std::int64_t>(state.chords.begin(), state.chords.end()), 0);
   const BarrierStiffness& stiffness = state.stiffness;
   file.write("/checkpoint/barrier_stiffness",
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
@@ -341,23 +352,11 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.v = read_fields(file, "v");
   state.history.a = read_fields(file, "a");
   if (auto deviation = read_fields(file, "deviation"); !deviation.empty()) state.deviation = std::move(deviation[0]);
-  if (file.contains("/checkpoint/quadrature_levels")) {
-    const auto levels = read_ints(saved.file, file, "/checkpoint/quadrature_levels");
-    for (const int level : levels)
-      if (level < 0 || level > kMostClosedLevel)
-        throw InputError({saved.file.string(), "/checkpoint/quadrature_levels", std::to_string(level),
-                          "0 to " + std::to_string(kMostClosedLevel)});
-    state.quadrature.assign(levels.begin(), levels.end());
-  }
+  const std::vector<int> quadrature = read_levels(saved.file, file, kQuadratureLevels, kMostClosedLevel);
+  state.quadrature.assign(quadrature.begin(), quadrature.end());
   if (file.contains(kDoublings)) state.doublings = read_ints(saved.file, file, kDoublings);
-  if (file.contains("/checkpoint/chord_levels")) {
-    const auto levels = read_ints(saved.file, file, "/checkpoint/chord_levels");
-    for (const int level : levels)
-      if (level < 0 || level > kMostHalvings<Dim>)
-        throw InputError({saved.file.string(), "/checkpoint/chord_levels", std::to_string(level),
-                          "0 to " + std::to_string(kMostHalvings<Dim>)});
-    state.chords.assign(levels.begin(), levels.end());
-  }
+  const std::vector<int> chords = read_levels(saved.file, file, kChordLevels, kMostHalvings<Dim>);
+  state.chords.assign(chords.begin(), chords.end());
   const std::vector<double> stiffness = file.read_doubles("/checkpoint/barrier_stiffness").values;
   if (stiffness.size() != 3)
     throw InputError(

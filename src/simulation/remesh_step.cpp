@@ -198,6 +198,14 @@ void tell(const HistoryTransferReport& transfer, double extent, int step, const 
                                units.text(transfer.lost_positions, "kg m", 3)));
 }
 
+template <int Dim>
+std::vector<CellId> removed_cells(const Mesh<Dim>& before, const Mesh<Dim>& now) {
+  std::vector<CellId> removed;
+  for (CellId c = 0; c < before.cell_slots(); ++c)
+    if (!now.is_cell_alive(c)) removed.push_back(c);
+  return removed;
+}
+
 /// `operate(mesh, fields, context, options, memory, strata)` on the state's mesh, and carries the state over.
 template <int Dim, typename Operate>
 std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
@@ -221,9 +229,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   }
 
   const ScopedTimer timer(report.seconds.projection);
-  TouchedCells touched;
-  for (int c = 0; c < before.mesh.cell_slots(); ++c)
-    if (!state.mesh.is_cell_alive(c)) touched.old_cells.push_back(c);
+  TouchedCells touched{removed_cells(before.mesh, state.mesh), {}};
   const auto nodes = state.mesh.nodes();
   auto map = state.mesh.compact();
   state.strata.compact(map);
