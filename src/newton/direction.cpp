@@ -102,9 +102,15 @@ void Direction::note_definiteness() {
   indefinite_ += was_indefinite_;
 }
 
+/// Whether the Hessian may have become another one since it was assembled: in the first step of a solve, for example.
+bool Direction::was_long_step() const {
+  constexpr double kLong = 1e-3;  ///< of the whole way
+  return known_at_ != at_.revision() && step_.is_set && step_.way.norm() > kLong * at_.x().norm();
+}
+
 bool Direction::is_hessian_indefinite() {
   if (task_.options.indefinite == IndefiniteHessian::accept || !task_.has_unknowns()) return false;
-  const bool is_open = is_loose_ || (task_.extras.must_be_minimum && known_at_ == kNone);
+  const bool is_open = is_loose_ || (task_.extras.must_be_minimum && (known_at_ == kNone || was_long_step()));
   if (!was_indefinite_ && !is_open) return false;
   if (was_indefinite_ && known_at_ == at_.revision()) return true;
   assemble(PsdProjection::none);

@@ -42,6 +42,7 @@ class Direction {
   void begin_step();
   ConstVectorView right_hand_side();
   void note_definiteness();
+  bool was_long_step() const;
   bool fail(const std::string& reason);
 
   const Task& task_;
