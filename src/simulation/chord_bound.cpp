@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kOfActivation = 0.25;  ///< of dhat, which a curve in contact may leave its chords by
 constexpr double kOfGap = 0.5;          ///< of the gap, shared by two curves that face each other
-constexpr double kLeastChord = 1.25;  ///< in dhat: ends of shorter chords would push each other
+constexpr double kLeastChord = 1.25;    ///< in dhat: ends of shorter chords would push each other
 constexpr int kMostRounds = 8;
 /// A halving is taken back where curves would stay this much below the bound without it.
 constexpr double kSlack = 4;
