@@ -19,7 +19,7 @@ optional=(
   libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
   gfortran doxygen pkg-config python3-dev pybind11-dev python3-pip
-  chromium chromium-driver firefox-esr
+  chromium chromium-driver firefox-esr strace
   python3-vtk9 xvfb xauth libgl1-mesa-dri
   python3-pil python3-dolfinx python3-meshio python3-scipy python3-sympy
 )
