@@ -139,7 +139,7 @@ MeshRenumbering changed_at_random(Mesh<Dim>& mesh, int edits, std::mt19937& rand
   return {std::move(vertex), std::move(cell), std::move(facet)};
 }
 
-/// Of the cells of one mesh and the cells at a vertex of another.
+/// Whether cell c of `a` overlaps a cell at v of `b`.
 template <int Dim>
 bool share_volume(const Mesh<Dim>& a, CellId c, const Mesh<Dim>& b, VertexId v) {
   OverlapIntegrals<Dim> integrals;

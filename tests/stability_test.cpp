@@ -3,6 +3,7 @@
 // elements are too stiff.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -116,6 +117,11 @@ TEST(Stability, NoSolverLeavesASquareColumnStraight) {
         const StepResult step = simulation.advance();
         EXPECT_TRUE(step.ok) << solver << ": " << step.reason;
         energy[solver] = step.report.energy.elastic;
+        double bent = 0;
+        for (VertexId v = 0; v < simulation.state().mesh.vertex_slots(); ++v)
+          bent = std::max(
+              bent, (simulation.state().history.x[0].segment<3>(3 * v) - simulation.state().mesh.rest(v)).tail<2>().norm());
+        EXPECT_GT(bent, 0.5 * kSide) << solver << ", pushed by " << push << ", nu " << nu;
       }
       for (const auto& [solver, joules] : energy)
         EXPECT_NEAR(joules, energy["eigen:ldlt"], 1e-6 * joules) << solver << ", pushed by " << push << ", nu " << nu;

@@ -292,12 +292,12 @@ template <int Dim>
 void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.contact.enabled) return;
-  const ContactSurface<Dim> contact = contact_surface(setup, simulation.state().mesh, simulation.state().space);
-  const CollisionSurface& surface = contact.surface;
+  const State<Dim>& state = simulation.state();
   const double dhat = setup.contact.activation_distance;
   Workspace workspace;
-  const ContactEnergy<Dim> energy(surface, setup.contact, 1, 1);
-  const double gap = energy.min_distance(contact.positions(simulation.state().history.x[0]), workspace);
+  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.space, state.chords);
+  const ContactEnergy<Dim> energy(contact.surface, setup.contact, 1, 1);
+  const double gap = energy.min_distance(contact.positions(state.history.x[0]), workspace);
   if (gap < dhat)
     found.push_back(fmt::format("gap {} at the start is below d-hat = {}: surfaces push each other from the start",
                                 setup.units.text(gap, "m", 6), setup.units.text(dhat, "m", 6)));
@@ -310,8 +310,8 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
           setup.units.text(dhat, "m"), 100 * dhat / size.thickness, body, setup.units.text(size.thickness, "m"),
           dhat > kLarge * size.thickness ? "tens of" : "some"));
   double shortest = kInfinity;
-  const std::vector<Vec<Dim>> rest =
-      setup.proxy ? setup.proxy->rest : node_rest_positions(simulation.state().mesh, simulation.state().space);
+  const std::vector<Vec<Dim>> rest = setup.proxy ? setup.proxy->rest : node_rest_positions(state.mesh, state.space);
+  const CollisionSurface surface = contact_surface(setup, state.mesh, state.space).surface;  // of nodes alone
   for (const auto& [a, b] : surface.edges)
     if (surface.counts[a]) shortest = std::min(shortest, (rest[a] - rest[b]).norm());
   if (dhat > shortest)

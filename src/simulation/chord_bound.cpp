@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "fem/chords.hpp"
 #include "fem/refined_chords.hpp"
@@ -65,20 +66,17 @@ template <int Dim>
 class ChordBound {
  public:
   ChordBound(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels,
-             const VectorX& x)
+             const RefinedChords<Dim>& chords, const VectorX& x)
       : setup_(setup),
         mesh_(mesh),
         space_(space),
         levels_(levels),
         x_(x),
-        chords_(refine_chords(mesh, space, levels)),
+        chords_(chords),
         own_(static_cast<int>(chords_.facets.size())) {
     const int nodes = num_nodes(mesh, space);
     points_.reserve(chords_.points.size());
-    for (const auto& weights : chords_.points) {
-      Vec<Dim>& point = points_.emplace_back(Vec<Dim>::Zero());
-      for (const auto& [node, weight] : weights) point += weight * at(node);
-    }
+    for (const auto& weights : chords_.points) points_.push_back(combined<Dim>(weights, [&](int node) { return at(node); }));
     for (const auto& facet : chords_.facets) {
       Corners<Dim>& corners = corners_.emplace_back();
       for (int k = 0; k < Dim; ++k) corners[k] = facet[k] < nodes ? at(facet[k]) : points_[facet[k] - nodes];
@@ -101,10 +99,10 @@ class ChordBound {
       Box<Dim> box;
       for (const Vec<Dim>& p : corners_[i]) box.include(p);
       hits.clear();
-      tree_.query(box.inflated(height / kOfActivation), hits);  // whatever is farther off allows that height
+      tree_.query(box.inflated(2 * height / kOfGap), hits);  // a gap that is larger allows that height
       double& worst = result[chords_.parents[i]];
       for (const int j : hits)
-        if (const double most = are_neighbours(i, j) ? 0 : allowed(i, j); most > 0) worst = std::max(worst, height / most);
+        if (!are_neighbours(i, j)) worst = std::max(worst, height / allowed(i, j));
     }
     return result;
   }
@@ -117,10 +115,11 @@ class ChordBound {
       result.excess = std::max(result.excess, excess[f]);
       if (excess[f] <= 1) continue;
       int lowest = kMostHalvings<Dim>;
-      for_each_curve(f, [&](int edge) { lowest = std::min(lowest, level(edge)); });
+      for_each_curve(f, [&](int edge) {
+        if (level(edge) < most_halvings(edge)) lowest = std::min(lowest, level(edge));
+      });
       const double halvings = std::ceil(std::log(excess[f]) / std::log(kGainOfHalving));
-      const int target =
-          halvings < kMostHalvings<Dim> - lowest ? lowest + std::max(1, static_cast<int>(halvings)) : kMostHalvings<Dim>;
+      const int target = static_cast<int>(std::min<double>(kMostHalvings<Dim>, lowest + halvings));
       for_each_curve(f, [&](int edge) {
         const int most = std::max(level(edge), std::min(target, most_halvings(edge)));
         result.levels[edge] = std::max<std::uint8_t>(result.levels[edge], static_cast<std::uint8_t>(most));
@@ -213,7 +212,7 @@ class ChordBound {
   const Space& space_;
   const ChordLevels& levels_;
   const VectorX& x_;
-  RefinedChords<Dim> chords_;
+  const RefinedChords<Dim>& chords_;
   int own_;  ///< simplices of bodies
   std::vector<Vec<Dim>> points_;
   std::vector<Corners<Dim>> corners_;  ///< of simplices, then of obstacles
@@ -238,7 +237,7 @@ template <int Dim>
 ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space,
                               const ChordLevels& levels, const VectorX& x) {
   if (!has_chords(setup, space)) return {levels, 0};
-  ChordDemand demand = ChordBound<Dim>(setup, mesh, space, levels, x).demand();
+  ChordDemand demand = ChordBound<Dim>(setup, mesh, space, levels, refine_chords(mesh, space, levels), x).demand();
   demand.levels = normalized(std::move(demand.levels));
   return demand;
 }
@@ -260,9 +259,11 @@ ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
                            std::span<const VectorX> positions) {
   if (levels.empty() || !has_chords(setup, space)) return levels;
   std::vector<char> lowerable(levels.size(), 1);
+  const RefinedChords<Dim> chords = refine_chords(mesh, space, levels);
   for (const VectorX& x : positions) {
-    const std::vector<char> here = ChordBound<Dim>(setup, mesh, space, levels, x).find_lowerable();
+    const std::vector<char> here = ChordBound<Dim>(setup, mesh, space, levels, chords, x).find_lowerable();
     for (std::size_t edge = 0; edge < levels.size(); ++edge) lowerable[edge] &= here[edge];
+    if (std::none_of(lowerable.begin(), lowerable.end(), [](char is) { return is; })) return levels;
   }
   ChordLevels fewer = levels;
   for (std::size_t edge = 0; edge < levels.size(); ++edge)

@@ -50,14 +50,6 @@ CollisionSurface chord_surface(const std::vector<typename Mesh<Dim>::Facet>& cho
   return with_obstacles<Dim>(std::move(edges), std::move(triangles), {}, std::move(rest), std::move(counts), obstacles);
 }
 
-/// A combination of nodes.
-template <int Dim, typename Weights, typename At>
-Vec<Dim> combined(const Weights& weights, const At& at) {
-  Vec<Dim> sum = Vec<Dim>::Zero();
-  for (const auto& [node, weight] : weights) sum += weight * at(node);
-  return sum;
-}
-
 template <int Dim>
 ContactSurface<Dim> refined_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space,
                                     const ChordLevels& levels) {

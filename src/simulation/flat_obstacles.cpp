@@ -1,26 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/flat_obstacles.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <utility>
+
+#include "fem/chords.hpp"
 
 namespace itr {
 
 namespace {
 
 int doublings_of(const std::vector<int>& doublings, std::size_t flat) { return doublings.empty() ? 0 : doublings[flat]; }
-
-/// Unit normal of the edge or triangle with these corners.
-template <typename Corner>
-auto normal_of(const Corner& corner) {
-  const auto side = (corner(1) - corner(0)).eval();
-  if constexpr (side.RowsAtCompileTime == 2)
-    return Vec<2>(-side[1], side[0]).normalized();
-  else
-    return Vec<3>(side.cross(corner(2) - corner(0))).normalized();
-}
 
 }  // namespace
 
@@ -44,20 +35,21 @@ std::vector<int> FlatObstacles<Dim>::find_doublings(const State<Dim>& state, con
   doublings.resize(flats_.size(), 0);
   bool is_enough = true;
   for (std::size_t f = 0; f < flats_.size(); ++f) {
-    const auto corner = [&](int k) -> Vec<Dim> {
-      return state.history.x[0].template segment<Dim>(bodies + Dim * (flats_[f] + k));
-    };
+    std::array<Vec<Dim>, kVertices> corners;
     Vec<Dim> middle = Vec<Dim>::Zero();
-    for (int k = 0; k < kVertices; ++k) middle += corner(k) / kVertices;
-    const Vec<Dim> normal = normal_of([&](int k) { return corner(k); });
+    for (int k = 0; k < kVertices; ++k) {
+      corners[k] = state.history.x[0].template segment<Dim>(bodies + Dim * (flats_[f] + k));
+      middle += corners[k] / kVertices;
+    }
+    const Vec<Dim> normal = unit_normal(corners);
     double farthest = 0;
     for (const VectorX& x : positions)
       for (Eigen::Index i = 0; i < x.size() - obstacles; i += Dim) {
         const Vec<Dim> arm = x.template segment<Dim>(i) - middle;
         farthest = std::max(farthest, (arm - arm.dot(normal) * normal).norm());
       }
-    // Of the edge's end, or of the triangle's sides: half as far as its corners.
-    double reach = std::ldexp((corner(0) - middle).norm() / (Dim - 1), doublings[f] - doublings_of(state.doublings, f));
+    // An edge's ends are its corners, a triangle's sides are half as far as these.
+    double reach = std::ldexp((corners[0] - middle).norm() / (Dim - 1), doublings[f] - doublings_of(state.doublings, f));
     while (reach < times * farthest && doublings[f] < kMostDoublings) {
       reach *= 2;
       ++doublings[f];

@@ -13,7 +13,7 @@ class FlatObstacles {
  public:
   static constexpr int kMostDoublings = 40;
 
-  /// Those of obstacles as they are at the start, which have never been doubled.
+  /// Keeps the flats of obstacles as they are at the start, never doubled.
   explicit FlatObstacles(const Obstacles<Dim>& obstacles) : flats_(obstacles.flats), rest_(obstacles.rest) {}
 
   bool empty() const { return flats_.empty(); }

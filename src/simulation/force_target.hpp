@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "itr/simulation/resultant.hpp"
 #include "itr/simulation/setup.hpp"
 
 namespace itr {
@@ -12,5 +13,9 @@ namespace itr {
 template <int Dim>
 void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_t obstacle_vertices,
                     const std::string& place);
+
+/// Sums forces like force_sums(), for a target that was checked.
+template <int Dim>
+ForceSums<Dim> sum_forces(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target);
 
 }  // namespace itr

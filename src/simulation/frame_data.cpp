@@ -8,8 +8,8 @@
 #include "cell_stress.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "itr/energy/inertia.hpp"
-#include "itr/simulation/resultant.hpp"
 #include "simulation/contact_surface.hpp"
+#include "simulation/force_target.hpp"
 
 namespace itr {
 
@@ -155,7 +155,7 @@ void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, const State<Dim>& sta
   if (options.reaction_forces) asked.forces.reaction = all.reaction;
   if (options.applied_forces) asked.forces.applied = all.applied;
   for (const ForceTarget& target : options.curves)
-    asked.curves.push_back(curve_point(force_sums(state, all, target), target.name));
+    asked.curves.push_back(curve_point(sum_forces(state, all, target), target.name));
   if (options.von_mises || options.stress) {
     CellStress stress = stress_of<Dim>(cells, data.x, state.quadrature, setup());
     if (options.von_mises) asked.von_mises = std::move(stress.von_mises);

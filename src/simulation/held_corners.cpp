@@ -9,29 +9,22 @@
 #include <utility>
 
 #include "itr/core/error.hpp"
+#include "simulation/step_terms.hpp"
 
 namespace itr {
 
 namespace {
 
+constexpr double kResolved = 1e-12;  ///< of the bodies' diagonal
+
 template <int Dim>
 using Conditions = std::vector<const DirichletCondition<Dim>*>;
 
-/// The first condition of each id, in the order in which later ones win.
-template <int Dim>
-Conditions<Dim> by_id(const Setup<Dim>& setup) {
-  std::map<int, const DirichletCondition<Dim>*> first;
-  for (const auto& condition : setup.dirichlet) first.try_emplace(condition.tag, &condition);
-  Conditions<Dim> all;
-  for (const auto& [tag, condition] : first) all.push_back(condition);
-  return all;
-}
-
-/// Those that hold each vertex.
+/// Conditions that hold each vertex, the winner last.
 template <int Dim>
 std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
   const Mesh<Dim>& mesh = setup.mesh;
-  const Conditions<Dim> all = by_id(setup);
+  const Conditions<Dim> all = conditions_by_tag<Dim>(setup);
   std::vector<Conditions<Dim>> holding(mesh.vertex_slots());
   const auto add = [&](VertexId v, const DirichletCondition<Dim>* condition) {
     std::erase(holding[v], condition);
@@ -47,11 +40,11 @@ std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
   return holding;
 }
 
-/// Largest difference of what two conditions ask for in a component that both hold, at the ends of the first, the middle and
-/// the last step.
+/// Largest difference of the displacements that two conditions prescribe in a component that both hold, at the ends of the
+/// first, the middle and the last step. Less than `resolved` [m] is none.
 template <int Dim>
-double difference(const DirichletCondition<Dim>& a, const DirichletCondition<Dim>& b, const Vec<Dim>& X,
-                  const TimeOptions& time) {
+double difference(const DirichletCondition<Dim>& a, const DirichletCondition<Dim>& b, const RestPoint<Dim>& X,
+                  const TimeOptions& time, double resolved) {
   constexpr double kRounding = 1e-9;
   double largest = 0;
   for (const int step : {1, (time.steps + 1) / 2, time.steps}) {
@@ -60,7 +53,8 @@ double difference(const DirichletCondition<Dim>& a, const DirichletCondition<Dim
     for (int c = 0; c < Dim; ++c) {
       if (!a.components[c] || !b.components[c]) continue;
       const double by = std::abs(of_a[c] - of_b[c]);
-      if (by > kRounding * std::max(std::abs(of_a[c]), std::abs(of_b[c]))) largest = std::max(largest, by);
+      if (by > std::max(resolved, kRounding * std::max(std::abs(of_a[c]), std::abs(of_b[c]))))
+        largest = std::max(largest, by);
     }
   }
   return largest;
@@ -78,13 +72,14 @@ template <int Dim>
 void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& found) {
   std::map<std::pair<int, int>, Contradiction> all;  // of the id that loses and of the one that wins
   const std::vector<Conditions<Dim>> holding = by_vertex(setup);
+  const double resolved = kResolved * rest_diagonal(setup.mesh);
   for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v)
     for (std::size_t i = 0; i < holding[v].size(); ++i)
       for (std::size_t j = i + 1; j < holding[v].size(); ++j) {
         const auto &loser = *holding[v][i], &winner = *holding[v][j];
         double by = 0;
         try {
-          by = difference(loser, winner, setup.mesh.rest(v), setup.time);
+          by = difference<Dim>(loser, winner, setup.mesh.point(v), setup.time, resolved);
         } catch (const InputError&) {  // the step that asks for it says so
           continue;
         }

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "held_turn.hpp"
 
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <array>
 #include <map>
+#include <span>
 #include <vector>
 
 #include "geometry/rotation.hpp"
@@ -13,6 +17,8 @@ namespace itr {
 
 namespace {
 
+constexpr double kLarge = 120;   ///< [degrees]
+constexpr double kFlat = 1e-12;  ///< of squares: vertices on a line
 constexpr double kRigid = 1e-3;  ///< of the set's size: what a rotation and a translation may miss
 
 template <int Dim>
@@ -46,6 +52,11 @@ double angle_of(const std::vector<int>& vertices, ConstVectorView from, ConstVec
     a.col(i) = from.segment<Dim>(Dim * vertices[i]);
     b.col(i) = to.segment<Dim>(Dim * vertices[i]);
   }
+  if constexpr (Dim == 3) {  // points of a line do not tell a turn about it
+    const Points arms = a.colwise() - a.rowwise().mean();
+    const Eigen::SelfAdjointEigenSolver<Mat<3>> spread(Mat<3>(arms * arms.transpose()));
+    if (!(spread.eigenvalues()[1] > kFlat * spread.eigenvalues()[2])) return 0;
+  }
   const Eigen::Matrix<double, Dim + 1, Dim + 1> motion = Eigen::umeyama(a, b, false);
   const Mat<Dim> rotation = motion.template topLeftCorner<Dim, Dim>();
   const Points missed = (rotation * a).colwise() + motion.template topRightCorner<Dim, 1>() - b;
@@ -56,22 +67,26 @@ double angle_of(const std::vector<int>& vertices, ConstVectorView from, ConstVec
 }  // namespace
 
 template <int Dim>
-HeldTurn find_largest_turn(const CellSet<Dim>& cells, const DofMap& dofs, ConstVectorView from, ConstVectorView to) {
+std::string describe_large_turn(const CellSet<Dim>& cells, const DofMap& dofs, ConstVectorView from, ConstVectorView to) {
   const std::vector<std::array<int, 2>> edges = held_edges(cells, dofs);
   const std::vector<int> part_of = connected_parts<2>(cells.rest.size(), std::span<const std::array<int, 2>>(edges));
   std::map<int, std::vector<int>> parts;
   for (int v = 0; v < static_cast<int>(cells.rest.size()); ++v)
     if (is_held<Dim>(dofs, v)) parts[part_of[v]].push_back(v);
-  HeldTurn largest;
+  double largest = 0;
+  int vertex = kNone;
   for (const auto& [part, vertices] : parts) {
-    if (vertices.size() < Dim) continue;
-    const double degrees = angle_of<Dim>(vertices, from, to);
-    if (degrees > largest.degrees) largest = {degrees, vertices.front()};
+    const double degrees = vertices.size() < Dim ? 0 : angle_of<Dim>(vertices, from, to);
+    if (degrees > largest) largest = degrees, vertex = vertices.front();
   }
-  return largest;
+  if (!(largest > kLarge)) return {};
+  return fmt::format(
+      "the step turns held vertices, such as {}, by {:.4g} degrees: straight ways to the other side of a turn press bodies "
+      "flat, and the side of half a turn is not told; smaller steps (/time/dt, or /time/step_cuts) turn by less",
+      vertex, largest);
 }
 
-template HeldTurn find_largest_turn<2>(const CellSet<2>&, const DofMap&, ConstVectorView, ConstVectorView);
-template HeldTurn find_largest_turn<3>(const CellSet<3>&, const DofMap&, ConstVectorView, ConstVectorView);
+template std::string describe_large_turn<2>(const CellSet<2>&, const DofMap&, ConstVectorView, ConstVectorView);
+template std::string describe_large_turn<3>(const CellSet<3>&, const DofMap&, ConstVectorView, ConstVectorView);
 
 }  // namespace itr

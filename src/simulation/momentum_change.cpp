@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/momentum_change.hpp"
 
+#include <map>
 #include <set>
 
 #include "itr/energy/inertia.hpp"
@@ -16,22 +17,25 @@ struct Momentum {
   Vec<Dim == 2 ? 1 : 3> angular = Vec < Dim == 2 ? 1 : 3 > ::Zero();
 };
 
-/// Momentum of a body whose nodes move with v.
+/// Momentum by body, of some bodies, whose nodes move with v.
 template <int Dim>
-Momentum<Dim> momentum_of(const StepSetup<Dim>& setup, CellSet<Dim> cells, int body, const VectorX& x, const VectorX& v) {
-  std::erase_if(cells.elements, [&](const auto& element) { return element.body != body; });
-  std::erase_if(cells.curved_elements, [&](const auto& element) { return element.body != body; });
-  VectorX product = VectorX::Zero(v.size());
-  InertiaEnergy<Dim>(cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
-                     VectorX::Zero(v.size()))
-      .add_mass_product(v, product);
-  Momentum<Dim> momentum;
-  for (Eigen::Index i = 0; i < v.size(); i += Dim) {
-    const Vec<Dim> p = product.segment<Dim>(i);
-    momentum.linear += p;
-    momentum.angular += moment(Vec<Dim>(x.segment<Dim>(i)), p);
-  }
-  return momentum;
+std::map<int, Momentum<Dim>> momenta_of(const StepSetup<Dim>& setup, const CellSet<Dim>& cells, const std::set<int>& bodies,
+                                        const VectorX& x, const VectorX& v) {
+  std::map<int, Momentum<Dim>> momenta;
+  for (const int body : bodies) momenta[body];
+  const InertiaEnergy<Dim> inertia(cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+                                   VectorX::Zero(v.size()));
+  inertia.for_each_mass([&](int body, const auto& nodes, const auto& mass) {
+    const auto found = momenta.find(body);
+    if (found == momenta.end()) return;
+    const auto product = (at_nodes<Dim>(nodes, v) * mass).eval();
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const Vec<Dim> p = product.col(static_cast<Eigen::Index>(k));
+      found->second.linear += p;
+      found->second.angular += moment(Vec<Dim>(x.segment<Dim>(Dim * nodes[k])), p);
+    }
+  });
+  return momenta;
 }
 
 }  // namespace
@@ -43,24 +47,18 @@ std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const 
   std::set<int> bodies;
   for (const CellId c : touched.old_cells) bodies.insert(before.mesh.body(c));
   for (const CellId c : touched.new_cells) bodies.insert(after.mesh.body(c));
-  struct Side {
-    CellSet<Dim> cells;
-    VectorX x, v;
-  };
   // The integrator's acceleration from the history is linear in the end velocity, of which none is left here.
-  const auto side_of = [&](const State<Dim>& state) {
+  const auto momenta = [&](const State<Dim>& state) {
     const Eigen::Index dofs = Eigen::Index{Dim} * num_nodes(state.mesh, state.space);
     const VectorX& x = state.history.x[0];
     const VectorX free = -setup.time.dt * TimeIntegrator(setup.time).acceleration(VectorX::Zero(x.size()), state.history);
-    return Side{whole_mesh(state.mesh, {}, state.space), x.head(dofs), free.head(dofs)};
+    return momenta_of<Dim>(setup, whole_mesh(state.mesh, {}, state.space), bodies, x.head(dofs), free.head(dofs));
   };
-  const Side old_side = side_of(before), new_side = side_of(after);
+  const auto were = momenta(before), are = momenta(after);
   std::vector<MomentumChange> changes;
   for (const int body : bodies) {
-    const auto was = momentum_of<Dim>(setup, old_side.cells, body, old_side.x, old_side.v);
-    const auto is = momentum_of<Dim>(setup, new_side.cells, body, new_side.x, new_side.v);
-    const Vec<Dim> linear = is.linear - was.linear;
-    const Vec<Dim == 2 ? 1 : 3> angular = is.angular - was.angular;
+    const Vec<Dim> linear = are.at(body).linear - were.at(body).linear;
+    const Vec<Dim == 2 ? 1 : 3> angular = are.at(body).angular - were.at(body).angular;
     changes.push_back({body, {linear.begin(), linear.end()}, {angular.begin(), angular.end()}});
   }
   return changes;

@@ -6,8 +6,8 @@
 
 namespace itr {
 
-/// What edits changed, between two states at the start of a step, of the momentum that bodies would have at its end without
-/// forces: of the bodies of `touched`, as an impulse over the step.
+/// Changes by edits, between two states at the start of a step, of the momentum that bodies would have at its end without
+/// forces: for the bodies of `touched`, as an impulse over the step.
 template <int Dim>
 std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const State<Dim>& before, const State<Dim>& after,
                                              const TouchedCells& touched);

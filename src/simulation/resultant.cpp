@@ -70,6 +70,14 @@ void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_
 
 template <int Dim>
 ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
+  const auto nodes = static_cast<std::size_t>(state.history.x[0].size()) / Dim;
+  refuse_unknown(target, state.mesh, nodes - static_cast<std::size_t>(num_nodes(state.mesh, state.space)),
+                 "forces of '" + target.name + "'");
+  return sum_forces(state, forces, target);
+}
+
+template <int Dim>
+ForceSums<Dim> sum_forces(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
   const std::array<const VectorX*, 4> kinds{&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
   const int bodies = num_nodes(state.mesh, state.space);
   for (const VectorX* kind : {kinds[0], kinds[1], kinds[2], kinds[3], &forces.body, &forces.residual})
@@ -77,8 +85,6 @@ ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, co
       throw InputError({"", "fields", "not all kinds of forces",
                         "contact_forces, friction_forces, reaction_forces and applied_forces for a resultant"});
   const VectorX& x = state.history.x[0];
-  refuse_unknown(target, state.mesh, static_cast<std::size_t>(x.size()) / Dim - static_cast<std::size_t>(bodies),
-                 "forces of '" + target.name + "'");
   const Vec<Dim> about(target.about.data());
   const std::vector<char> is_on = nodes_of(state, target.surfaces, target.bodies);
   ForceSums<Dim> sums;
@@ -123,6 +129,7 @@ Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int>
 #define ITR_INSTANTIATE(Dim)                                                                                \
   template void refuse_unknown<Dim>(const ForceTarget&, const Mesh<Dim>&, std::size_t, const std::string&); \
   template Resultant<Dim> resultant<Dim>(const Simulation<Dim>&, std::span<const int>, const Vec<Dim>&);    \
+  template ForceSums<Dim> sum_forces<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);       \
   template ForceSums<Dim> force_sums<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -163,7 +163,9 @@ struct Simulation<Dim>::Impl {
       auto larger = with_room(*start, {end.history.x[0]}, kAtEnd);
       if (!larger) break;
       start = std::move(larger);
-      const StepReport effort = result.report;
+      StepReport effort = result.report;
+      effort.forget_operations();  // of a mesh that is dropped
+      effort.damped_steps = 0;
       result = take(*start);
       result.report.add_effort(effort);
     }

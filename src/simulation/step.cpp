@@ -450,7 +450,8 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
   // Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
   std::optional<MeshRenumbering> renumbering;
   for (int retry = 0; retry < kMostRetries && !result.ok && !nearly_inverted.empty(); ++retry) {
-    if (retry > 0) {  // what is around those cells has not helped
+    result.report.forget_operations();  // the state that they led to is gone
+    if (retry > 0) {                    // what is around those cells has not helped
       nearly_inverted.resize(before.mesh.cell_slots());
       std::iota(nearly_inverted.begin(), nearly_inverted.end(), 0);
     }

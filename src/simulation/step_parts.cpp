@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <vector>
 
-#include "itr/energy/point_forces.hpp"
+#include "fem/locator.hpp"
 #include "simulation/step.hpp"
 
 namespace itr {
@@ -28,21 +30,34 @@ StepSetup<Dim> halved(const StepSetup<Dim>& setup, const State<Dim>& state) {
   return half;
 }
 
+/// Weights of the nodes of one mesh, as columns, at the nodes of another.
+template <int Dim>
+Eigen::SparseMatrix<double> weights_between(const State<Dim>& of, const State<Dim>& now) {
+  const Locator<Dim> locator(now.mesh);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int node = 0; node < num_nodes(of.mesh, of.space); ++node) {
+    const int edge = node - of.mesh.vertex_slots();
+    const RestPoint<Dim> X = edge < 0 ? of.mesh.point(node) : of.mesh.middle(of.space.curved_edges()[edge]);
+    for_each_weight<Dim>(locator.find(X), now.space, now.mesh.vertex_slots(),
+                         [&](int other, double weight) { entries.emplace_back(other, node, weight); });
+  }
+  Eigen::SparseMatrix<double> weights(num_nodes(now.mesh, now.space), num_nodes(of.mesh, of.space));
+  weights.setFromTriplets(entries.begin(), entries.end());
+  return weights;
+}
+
 /// Adds forces, half of them, to those on another mesh of the bodies; they stay at their points.
 template <int Dim>
 void add_half(const NodalForces& forces, const State<Dim>& of, const State<Dim>& now, NodalForces& sum) {
   const bool same = of.mesh.vertex_slots() == now.mesh.vertex_slots() && of.space == now.space &&
                     node_rest_positions(of.mesh, of.space) == node_rest_positions(now.mesh, now.space);
-  Workspace workspace;
-  const CellSet<Dim> cells = same ? CellSet<Dim>() : whole_mesh(now.mesh, {}, now.space);
+  const Eigen::SparseMatrix<double> weights = same ? Eigen::SparseMatrix<double>() : weights_between(of, now);
   const auto add = [&](const VectorX& field, VectorX& to) {
     if (field.size() == 0) return;
-    if (same) {
+    if (same)
       to += field / 2;
-      return;
-    }
-    if (const auto term = point_forces<Dim>(of.mesh, VectorX(field / -2), of.space)(cells, 0, 1))
-      term->add_gradient(to, to, workspace);
+    else
+      to.reshaped(Dim, weights.rows()) += 0.5 * field.reshaped(Dim, weights.cols()) * weights.transpose();
   };
   add(forces.contact, sum.contact);
   add(forces.friction, sum.friction);

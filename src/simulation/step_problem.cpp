@@ -14,9 +14,11 @@
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
+#include "flight_guard.hpp"
 #include "held_turn.hpp"
 #include "itr/core/error.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
+#include "lagging_rounds.hpp"
 #include "newton/corrected_system.hpp"
 #include "newton/curvature.hpp"
 
@@ -24,37 +26,13 @@ namespace itr {
 
 namespace {
 
-constexpr double kFixedPoint = 1e-12;       ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
-constexpr std::size_t kLongestCycle = 16;   ///< rounds that are remembered
-constexpr int kPressureRounds = 50;         ///< most, where pressure has no potential
-constexpr double kLoadsWorthSaying = 1e-2;  ///< of what loads may be off: less is not said
+constexpr std::size_t kLongestCycle = 16;       ///< rounds that are remembered
+constexpr int kPressureRounds = 50;             ///< most, where pressure has no potential
+constexpr double kLoadsWorthSaying = 1e-2;      ///< of what loads may be off: less is not said
 constexpr double kFrictionWorthSaying = 1e-2;   ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                   ///< rounds without a smaller residual after which lagging will not converge
-constexpr double kSameState = 1e-3;             ///< of a solve's step tolerance: states nearer than that are one
 constexpr double kEnergyResolution = 1e-14;     ///< of moduli times volume
 constexpr double kVolumeRatioTolerance = 1e-3;  ///< relative, of the bound that is reported
-
-/// How rounds of lagging end.
-enum class RoundsEnd {
-  settled,  ///< another round changes nothing, to the solver's tolerances
-  asked,    ///< as many as the scene asks for, or forces to its tolerance
-  most,     ///< as many as there may be
-  cycle,    ///< an earlier round has been reached again
-  stalled   ///< forces have not come nearer for long
-};
-
-const char* to_string(RoundsEnd end) {
-  switch (end) {
-    case RoundsEnd::most:
-      return "out of rounds";
-    case RoundsEnd::cycle:
-      return "in a cycle";
-    case RoundsEnd::stalled:
-      return "not coming nearer";
-    default:
-      return "";
-  }
-}
 
 double& entry_of(EnergyReport& report, EnergyEntry entry) {
   const std::array<double*, kNumEnergyEntries> by_entry{&report.inertia,  &report.elastic, &report.body, &report.contact,
@@ -62,121 +40,7 @@ double& entry_of(EnergyReport& report, EnergyEntry entry) {
   return *by_entry[static_cast<std::size_t>(entry)];
 }
 
-/// Lagging need not converge: it can go round in circles, and then every further round repeats an earlier one.
-std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
-                                      double diagonal) {
-  const double last = (x - previous.back()).lpNorm<Eigen::Infinity>();
-  if (last <= kFixedPoint * diagonal) return RoundsEnd::settled;
-  const bool has_met = std::any_of(previous.begin(), previous.end() - 1,
-                                   [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
-  if (!has_met) return std::nullopt;
-  return (x - previous.back()).norm() <= step_tolerance ? RoundsEnd::settled : RoundsEnd::cycle;
-}
-
 }  // namespace
-
-namespace {
-
-/// Throws InputError for a value of a program's function that is not finite; those of scenes name their keys themselves.
-template <int Dim, typename Value>
-Value finite(const Value& value, const char* what, const Vec<Dim>& X, double t) {
-  bool is_finite = false;
-  if constexpr (std::is_same_v<Value, double>)
-    is_finite = std::isfinite(value);
-  else
-    is_finite = value.allFinite();
-  if (is_finite) return value;
-  std::string place;
-  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:g}", c ? ", " : "", X[c]);
-  throw InputError({"", what, fmt::format("no finite value at X = ({}) m, t = {:g} s", place, t), "a value there"});
-}
-
-}  // namespace
-
-template <int Dim>
-Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
-  Loads<Dim> loads;
-  if (setup.body_acceleration)
-    loads.acceleration = [f = setup.body_acceleration, t](const RestPoint<Dim>& X) {
-      return finite<Dim, Vec<Dim>>(f(X, t), "body force", X, t);
-    };
-  for (const auto& condition : setup.neumann)
-    loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const RestPoint<Dim>& X) {
-      return finite<Dim, Vec<Dim>>(f(X, t), "traction", X, t);
-    });
-  for (const auto& condition : setup.pressure)
-    loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const RestPoint<Dim>& X) {
-      return finite<Dim, double>(f(X, t), "pressure", X, t);
-    });
-  return loads;
-}
-
-template <int Dim>
-HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space) {
-  const int bodies = num_nodes(mesh, space), total = bodies + static_cast<int>(setup.obstacles.rest.size());
-  HeldDofs<Dim> result{std::vector<char>(Dim * total, 0), VectorX::Zero(Dim * total)};
-  std::vector<const DirichletCondition<Dim>*> by_tag;
-  for (const auto& condition : setup.dirichlet)
-    if (std::none_of(by_tag.begin(), by_tag.end(), [&](const auto* c) { return c->tag == condition.tag; }))
-      by_tag.push_back(&condition);
-  std::sort(by_tag.begin(), by_tag.end(), [](const auto* a, const auto* b) { return a->tag < b->tag; });
-  const auto hold = [&](int v, const DirichletCondition<Dim>& condition) {
-    const int edge = v - mesh.vertex_slots();
-    const RestPoint<Dim> X = edge < 0 ? mesh.point(v) : mesh.middle(space.curved_edges()[edge]);
-    const Vec<Dim> target = X + finite<Dim, Vec<Dim>>(condition.displacement(X, t), "prescribed displacement", X, t);
-    for (int c = 0; c < Dim; ++c) {
-      if (!condition.components[c]) continue;
-      result.held[Dim * v + c] = 1;
-      result.target[Dim * v + c] = target[c];
-    }
-  };
-  for (const auto* condition : by_tag)
-    for (int f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
-        for_each_node(mesh.facet(f), space, mesh.vertex_slots(), [&](int node) { hold(node, *condition); });
-  for (const auto* condition : by_tag)
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-      if (mesh.vertex_tag(v) != kNoTag && mesh.vertex_tag(v) == condition->tag) hold(v, *condition);
-  for (const auto* condition : by_tag)
-    for (int edge = 0; edge < space.num_curved(); ++edge)
-      if (const int tag = mesh.edge_tag(space.curved_edges()[edge]); tag != kNoTag && tag == condition->tag)
-        hold(mesh.vertex_slots() + edge, *condition);
-  for (int o = 0; o < total - bodies; ++o) {
-    const Vec<Dim>& X = setup.obstacles.rest[o];
-    const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
-    result.target.template segment<Dim>(Dim * (bodies + o)) =
-        motion == kNone
-            ? X
-            : Vec<Dim>(X + finite<Dim, Vec<Dim>>(setup.obstacles.motions[motion](X, t), "motion of an obstacle", X, t));
-    for (int c = 0; c < Dim; ++c) result.held[Dim * (bodies + o) + c] = 1;
-  }
-  return result;
-}
-
-template <int Dim>
-double rest_diagonal(const Mesh<Dim>& mesh) {
-  Eigen::AlignedBox<double, Dim> box;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    if (mesh.is_vertex_alive(v)) box.extend(mesh.rest(v));
-  return box.diagonal().norm();
-}
-
-template <int Dim>
-PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t) {
-  const TimeIntegrator integrator(setup.time);
-  return {.materials = setup.materials,
-          .loads = loads_at(setup, t),
-          .has_inertia = !setup.time.quasistatic && !setup.time.is_static,
-          .mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent,
-          .quadrature_degree = setup.quadrature_degree,
-          .scaling = integrator.scaling(history),
-          .contact = setup.contact,
-          .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
-          .velocity_rate = integrator.velocity_rate(history),
-          .host = setup.terms,
-          .t = t,
-          .follower = {}};
-}
 
 template <int Dim>
 StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history,
@@ -267,7 +131,8 @@ template <int Dim>
 NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
   if (summary.converged()) return summary;
   const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
-  if (const std::string turn = describe_turn(); !turn.empty()) summary.message = turn + "; " + summary.message;
+  if (const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target); !turn.empty())
+    summary.message = turn + "; " + summary.message;
   summary.message += diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
                                     sum, x, workspace_);
   return summary;
@@ -280,10 +145,11 @@ std::string StepProblem<Dim>::describe_effort(const NewtonSummary& summary) {
                                    rounds_, workspace_);
 }
 
-/// One solve with `lagged_`. Adaptive stiffness balances the terms before held dofs move: so it is in the
-/// regression values of peers' scenes.
+/// One solve with `lagged_`, which `ends_at(x)`, if given, ends at an iterate. Adaptive stiffness balances the terms before
+/// held dofs move: so it is in the regression values of peers' scenes.
 template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start) {
+NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start,
+                                                const std::function<bool(const VectorX& x)>& ends_at) {
   const EnergySum sum = potential_.sum(lagged_);
   if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
   NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
@@ -298,7 +164,7 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
     potential_.elastic()->refine_quadrature(x);
     extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
   }
-  if (!adaptive_) return minimize_from(x, sum, extras);
+  if (!adaptive_) return minimize_from(x, sum, std::move(extras), ends_at);
   initialize_stiffness(x);
   x = start_of_solve(x);
   bool is_first = true;
@@ -310,38 +176,32 @@ NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
     if (changed) potential_.contact()->set_stiffness(stiffness_.value);
     return changed || refined;
   };
-  return minimize_from(x, sum, extras);
+  return minimize_from(x, sum, std::move(extras), ends_at);
 }
 
-/// Bodies that only contact and friction hold begin a step without the contact that will hold them, and slide off before
-/// the next round unless friction is lagged where contact forces are new.
+/// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will hold
+/// them, and slide off before the next round unless friction is lagged where contact forces are new: here it is lagged
+/// again as often as those on a body double or halve on the way.
 template <int Dim>
-bool StepProblem<Dim>::relags_on_the_way() const {
-  return least_motion_ && potential_.has_friction();
-}
-
-/// Minimises like minimize_lagged(), but lags friction anew as often as contact forces on a body double or halve on the way.
-template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_with_new_contact(VectorX& x, VectorX way_to_start) {
+NewtonSummary StepProblem<Dim>::minimize_first(VectorX& x, VectorX way_to_start) {
   constexpr int kMostLags = 200;
   constexpr double kChange = 2;
   NewtonSummary all;
-  for (int k = 0; k <= kMostLags; ++k) {
-    const std::vector<double> before = contact_forces_on_loose_parts(x);
-    if (k < kMostLags)
-      is_lag_outdated_ = [this, before](const VectorX& iterate) {
+  const auto is_near = [](double a, double b) { return a <= kChange * b && b <= kChange * a; };
+  for (int lags = least_motion_ && potential_.has_friction() ? kMostLags : 0;; --lags) {
+    bool is_outdated = false;
+    std::function<bool(const VectorX&)> ends_at;
+    if (lags > 0)
+      ends_at = [&, lagged = contact_forces_on_loose_parts(x)](const VectorX& iterate) {
         const std::vector<double> now = contact_forces_on_loose_parts(iterate);
-        return !std::equal(now.begin(), now.end(), before.begin(),
-                           [](double a, double b) { return a <= kChange * b && b <= kChange * a; });
+        return is_outdated = !std::equal(now.begin(), now.end(), lagged.begin(), is_near);
       };
-    NewtonSummary summary = minimize_lagged(x, std::exchange(way_to_start, {}));
-    is_lag_outdated_ = nullptr;
+    NewtonSummary summary = minimize_lagged(x, std::exchange(way_to_start, {}), ends_at);
     summary.add_effort(all);
     all = std::move(summary);
-    if (!std::exchange(was_lag_outdated_, false)) break;
+    if (!is_outdated) return all;
     lagged_.friction = potential_.lag_friction(x, workspace_);
   }
-  return all;
 }
 
 /// Norms of the contact forces, scaled.
@@ -362,11 +222,11 @@ std::vector<double> StepProblem<Dim>::contact_forces_on_loose_parts(const Vector
 
 /// Minimises over the increment from the positions at the start of the step.
 template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras) {
+NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras,
+                                              const std::function<bool(const VectorX& x)>& ends_at) {
   VectorX d = increment_of(x);
   const VectorX target = held_.target - base_;
   EnergySum all = sum;
-  bool has_flown = false;
   if (least_motion_) {
     all.add(least_motion_);
     follow_least_motion(sum, d);
@@ -376,12 +236,18 @@ NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
       return changed;
     };
   }
+  enum class EndedBy { solver, flight, caller } ended_by = EndedBy::solver;
+  std::optional<FlightGuard<Dim>> guard;
   if (!terms_.has_inertia && !setup_.time.allow_jumps)
-    extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
-      has_flown = has_flown_away(d);
-      was_lag_outdated_ = !has_flown && is_lag_outdated_ && is_lag_outdated_(base_ + d);
-      return !has_flown && !was_lag_outdated_ && (!before || before(progress));
-    };
+    guard.emplace(base_, dofs_, held_.target,
+                  least_motion_ ? std::span(least_motion_->parts()) : std::span<const LoosePart<Dim>>());
+  extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
+    if (guard && guard->has_flown(d))
+      ended_by = EndedBy::flight;
+    else if (ends_at && ends_at(base_ + d))
+      ended_by = EndedBy::caller;
+    return ended_by == EndedBy::solver && (!before || before(progress));
+  };
   constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
   const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
   CorrectedSystem corrected(system(), [&](ConstVectorView iterate, const DofMap& dofs) {
@@ -395,10 +261,11 @@ NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
     if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
   if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
   solution_ = {x, std::move(d)};
-  if (has_flown) {
+  if (ended_by == EndedBy::caller) return summary;
+  if (ended_by == EndedBy::flight) {
     summary.termination = Termination::no_descent;
-    const std::string turn = describe_turn();
-    summary.message = turn.empty() ? describe_flight() : turn;
+    const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target);
+    summary.message = turn.empty() ? guard->describe(setup_.units) : turn;
     return summary;
   }
   return explained(std::move(summary), sum, x);
@@ -409,54 +276,6 @@ void StepProblem<Dim>::follow_least_motion(const EnergySum& sum, const VectorX& 
   VectorX gradient = VectorX::Zero(d.size()), sizes = gradient;
   EnergyOfIncrement(sum, base_).add_gradient_and_sizes(d, gradient, sizes, workspace_);
   least_motion_->follow(gradient, sizes, dofs_);
-}
-
-/// Whether a body that nothing holds, or any vertex, has gone farther than anything of the scene could meet it.
-template <int Dim>
-bool StepProblem<Dim>::has_flown_away(const VectorX& d) const {
-  constexpr double kFar = 10, kFarthest = 100;  ///< times the extent of bodies, obstacles and targets
-  Eigen::AlignedBox<double, Dim> box;
-  for (Eigen::Index i = 0; i < base_.size(); i += Dim) box.extend(Vec<Dim>(base_.template segment<Dim>(i)));
-  for (Eigen::Index i = 0; i < base_.size(); ++i)
-    if (dofs_.unknown[i] == kNone && held_.held[i]) {
-      Vec<Dim> place = base_.template segment<Dim>(i - i % Dim);
-      place[i % Dim] = held_.target[i];
-      box.extend(place);
-    }
-  const double extent = box.diagonal().norm();
-  if (d.template lpNorm<Eigen::Infinity>() > kFarthest * extent) return true;
-  return least_motion_ && std::any_of(least_motion_->parts().begin(), least_motion_->parts().end(), [&](const auto& part) {
-           return d.template segment<Dim>(Dim * part.nodes.front()).norm() > kFar * extent;
-         });
-}
-
-template <int Dim>
-std::string StepProblem<Dim>::describe_flight() const {
-  if (!least_motion_)
-    return "loads move bodies that their conditions hold by a hundred times the extent of the scene: they exceed what the "
-           "bodies "
-           "can carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)";
-  std::string place;
-  const Eigen::Index first = Dim * least_motion_->parts().front().nodes.front();
-  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.3g}", c ? ", " : "", setup_.units.from_si(base_[first + c], "m"));
-  return fmt::format(
-      "loads push a body that its conditions do not hold, such as the one at ({}), and nothing comes in its way: there is "
-      "no "
-      "equilibrium; hold it (a point, or rollers on a side), or take dynamics (/time/quasistatic = false)",
-      place);
-}
-
-/// A turn of held vertices from which bodies find no way, or nothing.
-template <int Dim>
-std::string StepProblem<Dim>::describe_turn() const {
-  constexpr double kLarge = 120;  ///< [degrees]
-  const HeldTurn turn = find_largest_turn<Dim>(cells_, dofs_, base_, held_.target);
-  if (!(turn.degrees > kLarge)) return {};
-  return fmt::format(
-      "the step turns held vertices, such as {}, by {:.4g} degrees: straight ways to the other side of a turn press "
-      "bodies "
-      "flat, and the side of half a turn is not told; smaller steps (/time/dt, or /time/step_cuts) turn by less",
-      turn.vertex, turn.degrees);
 }
 
 /// x minus the positions at the start of the step; of the last solution without the round-off of x.
@@ -571,8 +390,7 @@ NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
       x = start;
     }
   }
-  NewtonSummary summary = relags_on_the_way() ? minimize_with_new_contact(x, std::move(way_to_start))
-                                              : minimize_lagged(x, std::move(way_to_start));
+  NewtonSummary summary = minimize_first(x, std::move(way_to_start));
   rounds_ = 1;
   summary.assembly_seconds += lagging_seconds;
   const int rounds = most_rounds();
@@ -799,12 +617,8 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   return least;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                            \
-  template class StepProblem<Dim>;                                                                      \
-  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                     \
-  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double);     \
-  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double, const Space&); \
-  template double rest_diagonal<Dim>(const Mesh<Dim>&);                                                 \
+#define ITR_INSTANTIATE(Dim)       \
+  template class StepProblem<Dim>; \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

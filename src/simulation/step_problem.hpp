@@ -10,30 +10,9 @@
 #include "itr/simulation/setup.hpp"
 #include "itr/time/integrator.hpp"
 #include "simulation/problem_cache.hpp"
+#include "simulation/step_terms.hpp"
 
 namespace itr {
-
-/// Loads of a setup at time t.
-template <int Dim>
-Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
-
-/// What acts in the step that ends at time t, as every scope of it sees it.
-template <int Dim>
-PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t);
-
-/// Which dofs of nodes are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two
-/// conditions the one with the larger tag wins.
-template <int Dim>
-struct HeldDofs {
-  std::vector<char> held;
-  VectorX target;  ///< only entries of held dofs mean anything
-};
-template <int Dim>
-HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space = {});
-
-/// Of the bounding box of the bodies at rest [m].
-template <int Dim>
-double rest_diagonal(const Mesh<Dim>& mesh);
 
 template <int Dim>
 class StepProblem {
@@ -64,7 +43,7 @@ class StepProblem {
   double min_distance(const VectorX& x);
   /// At a solution x, those that the setup asks for, as they were in the solve. Remeshing aside.
   NodalForces forces(const VectorX& x);
-  /// Those of bodies that start from x: no step has led there, so that neither reactions, friction nor residual are known.
+  /// Forces on bodies that start from x: no step has led there, so that neither reactions, friction nor residual are known.
   NodalForces forces_at_start(const VectorX& x);
   /// Of all terms but inertia, where the bodies are at x and move with v [N]. Lags what is lagged there.
   VectorX total_force(const VectorX& x, const VectorX& v);
@@ -85,15 +64,13 @@ class StepProblem {
  private:
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
-  NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {});
-  bool relags_on_the_way() const;
-  NewtonSummary minimize_with_new_contact(VectorX& x, VectorX way_to_start);
+  NewtonSummary minimize_first(VectorX& x, VectorX way_to_start);
+  NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {},
+                                const std::function<bool(const VectorX& x)>& ends_at = {});
   std::vector<double> contact_forces_on_loose_parts(const VectorX& x);
-  NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras);
+  NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras,
+                              const std::function<bool(const VectorX& x)>& ends_at);
   void follow_least_motion(const EnergySum& sum, const VectorX& d);
-  bool has_flown_away(const VectorX& d) const;
-  std::string describe_flight() const;
-  std::string describe_turn() const;
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
   void reset_system();
@@ -126,10 +103,8 @@ class StepProblem {
   Solution solution_;                                 ///< of the last solve
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
-  VectorX norm_weights_;                                   ///< of NewtonNorm, once needed
-  Lagged lagged_;                                          ///< of the last solve
-  std::function<bool(const VectorX& x)> is_lag_outdated_;  ///< ends a solve at x; empty: nothing does
-  bool was_lag_outdated_ = false;                          ///< what ended the last solve
+  VectorX norm_weights_;  ///< of NewtonNorm, once needed
+  Lagged lagged_;         ///< of the last solve
   ProblemCache<Dim>& cache_;
   unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this
   int rounds_ = 0;          ///< of the last solve

@@ -38,6 +38,20 @@ class InertiaEnergy final : public Energy, public IncrementalTerm {
   void add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const override;
   /// y += M x.
   void add_mass_product(ConstVectorView x, VectorView y) const;
+  /// Calls f(body, nodes, mass matrix of a component) for each cell.
+  template <typename F>
+  void for_each_mass(const F& f) const {
+    for (std::size_t e = 0; e < mass_.size(); ++e) {
+      const ElementMass<Dim> mass(kind_, mass_[e]);
+      Mat<Dim + 1> matrix = Mat<Dim + 1>::Constant(mass.off);
+      matrix.diagonal().array() += mass.extra;
+      f(cells_.elements[e].body, cells_.elements[e].vertices, matrix);
+    }
+    for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
+      const auto& element = cells_.curved_elements[e];
+      f(element.body, element.nodes, (curved_mass_[e].mass * matrices_[curved_mass_[e].matrix]).eval());
+    }
+  }
 
  private:
   const CellSet<Dim>& cells_;

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "itr/core/types.hpp"
+
+namespace itr {
+
+/// How rounds of lagging end.
+enum class RoundsEnd {
+  settled,  ///< another round changes nothing, to the solver's tolerances
+  asked,    ///< as many as the scene asks for, or forces to its tolerance
+  most,     ///< as many as there may be
+  cycle,    ///< an earlier round has been reached again
+  stalled   ///< forces have not come nearer for long
+};
+
+const char* to_string(RoundsEnd end);
+
+/// Whether rounds that reached x, after `previous` (newest last), are over. Lagging need not converge: it can go round in
+/// circles, and then every further round repeats an earlier one. `diagonal`: of the bodies [m].
+std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
+                                      double diagonal);
+
+}  // namespace itr

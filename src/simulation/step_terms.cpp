@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+#include "simulation/step_terms.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "itr/core/error.hpp"
+
+namespace itr {
+
+namespace {
+
+/// Throws InputError for a value of a program's function that is not finite; those of scenes name their keys themselves.
+template <int Dim, typename Value>
+Value finite(const Value& value, const char* what, const Vec<Dim>& X, double t) {
+  bool is_finite = false;
+  if constexpr (std::is_same_v<Value, double>)
+    is_finite = std::isfinite(value);
+  else
+    is_finite = value.allFinite();
+  if (is_finite) return value;
+  std::string place;
+  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:g}", c ? ", " : "", X[c]);
+  throw InputError({"", what, fmt::format("no finite value at X = ({}) m, t = {:g} s", place, t), "a value there"});
+}
+
+}  // namespace
+
+template <int Dim>
+Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
+  Loads<Dim> loads;
+  if (setup.body_acceleration)
+    loads.acceleration = [f = setup.body_acceleration, t](const RestPoint<Dim>& X) {
+      return finite<Dim, Vec<Dim>>(f(X, t), "body force", X, t);
+    };
+  for (const auto& condition : setup.neumann)
+    loads.tractions.emplace_back(condition.tag, [f = condition.traction, t](const RestPoint<Dim>& X) {
+      return finite<Dim, Vec<Dim>>(f(X, t), "traction", X, t);
+    });
+  for (const auto& condition : setup.pressure)
+    loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const RestPoint<Dim>& X) {
+      return finite<Dim, double>(f(X, t), "pressure", X, t);
+    });
+  return loads;
+}
+
+template <int Dim>
+std::vector<const DirichletCondition<Dim>*> conditions_by_tag(const StepSetup<Dim>& setup) {
+  std::map<int, const DirichletCondition<Dim>*> first;
+  for (const auto& condition : setup.dirichlet) first.try_emplace(condition.tag, &condition);
+  std::vector<const DirichletCondition<Dim>*> all;
+  for (const auto& [tag, condition] : first) all.push_back(condition);
+  return all;
+}
+
+template <int Dim>
+HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space) {
+  const int bodies = num_nodes(mesh, space), total = bodies + static_cast<int>(setup.obstacles.rest.size());
+  HeldDofs<Dim> result{std::vector<char>(Dim * total, 0), VectorX::Zero(Dim * total)};
+  const std::vector<const DirichletCondition<Dim>*> by_tag = conditions_by_tag(setup);
+  const auto hold = [&](int v, const DirichletCondition<Dim>& condition) {
+    const int edge = v - mesh.vertex_slots();
+    const RestPoint<Dim> X = edge < 0 ? mesh.point(v) : mesh.middle(space.curved_edges()[edge]);
+    const Vec<Dim> target = X + finite<Dim, Vec<Dim>>(condition.displacement(X, t), "prescribed displacement", X, t);
+    for (int c = 0; c < Dim; ++c) {
+      if (!condition.components[c]) continue;
+      result.held[Dim * v + c] = 1;
+      result.target[Dim * v + c] = target[c];
+    }
+  };
+  for (const auto* condition : by_tag)
+    for (int f = 0; f < mesh.facet_slots(); ++f)
+      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
+        for_each_node(mesh.facet(f), space, mesh.vertex_slots(), [&](int node) { hold(node, *condition); });
+  for (const auto* condition : by_tag)
+    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+      if (mesh.vertex_tag(v) != kNoTag && mesh.vertex_tag(v) == condition->tag) hold(v, *condition);
+  for (const auto* condition : by_tag)
+    for (int edge = 0; edge < space.num_curved(); ++edge)
+      if (const int tag = mesh.edge_tag(space.curved_edges()[edge]); tag != kNoTag && tag == condition->tag)
+        hold(mesh.vertex_slots() + edge, *condition);
+  for (int o = 0; o < total - bodies; ++o) {
+    const Vec<Dim>& X = setup.obstacles.rest[o];
+    const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
+    result.target.template segment<Dim>(Dim * (bodies + o)) =
+        motion == kNone
+            ? X
+            : Vec<Dim>(X + finite<Dim, Vec<Dim>>(setup.obstacles.motions[motion](X, t), "motion of an obstacle", X, t));
+    for (int c = 0; c < Dim; ++c) result.held[Dim * (bodies + o) + c] = 1;
+  }
+  return result;
+}
+
+template <int Dim>
+double rest_diagonal(const Mesh<Dim>& mesh) {
+  Eigen::AlignedBox<double, Dim> box;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    if (mesh.is_vertex_alive(v)) box.extend(mesh.rest(v));
+  return box.diagonal().norm();
+}
+
+template <int Dim>
+PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t) {
+  const TimeIntegrator integrator(setup.time);
+  return {.materials = setup.materials,
+          .loads = loads_at(setup, t),
+          .has_inertia = !setup.time.quasistatic && !setup.time.is_static,
+          .mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+          .quadrature_degree = setup.quadrature_degree,
+          .scaling = integrator.scaling(history),
+          .contact = setup.contact,
+          .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
+          .velocity_rate = integrator.velocity_rate(history),
+          .host = setup.terms,
+          .t = t,
+          .follower = {}};
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                            \
+  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                     \
+  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double);     \
+  template std::vector<const DirichletCondition<Dim>*> conditions_by_tag<Dim>(const StepSetup<Dim>&);   \
+  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double, const Space&); \
+  template double rest_diagonal<Dim>(const Mesh<Dim>&);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr
