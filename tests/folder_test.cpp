@@ -81,7 +81,7 @@ TEST_F(FolderTest, ARunThatWouldReplaceAFileOfSomebodyElseIsRefused) {
   }
 }
 
-/// Also a file that was put there after the run.
+/// A file that was put there after the run is somebody else's, too.
 TEST_F(FolderTest, ARefusedRunLeavesTheOneBefore) {
   const fs::path run = folder / "run";
   ASSERT_EQ(start(short_run(run)).wait(), 0);
@@ -194,7 +194,7 @@ TEST_F(FolderTest, TwoRunsInOneFolderAreRefusedUntilTheFirstHasEnded) {
   longer.steps = 100000;
   longer.sets.push_back(R"(/output/forces=[{"name":"ball","bodies":1}])");
   const Command first(arguments(longer, run, 0), folder / "first");
-  while (count_lines(run / "steps.jsonl") < 3) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_TRUE(wait_until([&] { return count_lines(run / "steps.jsonl") >= 3; })) << "the run does not go on";
   for (const Arguments& how : {Arguments{}, Arguments{"--overwrite"}, Arguments{"--resume"}}) {
     const int lines = count_lines(run / "steps.jsonl");
     const Command forces({run.string()}, folder / "log", 0, {"forces"});

@@ -6,7 +6,9 @@ usage: kill_test.py ITR EXAMPLES
 """
 
 import pathlib
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -23,7 +25,7 @@ SERIES = {"sim.xdmf": "./Domain/Grid/Grid", "sim.pvd": "./Collection/DataSet"}
 
 
 def run(itr, scene, folder, steps, *mode, kill=None):
-    """Its exit status; `kill`: a call and its number."""
+    """Exit status and what the run said; `kill`: a call and its number."""
     command = [itr, "run", scene, "-o", folder, "--threads", "1", *mode, "--set", f'/time={{"dt":2e-5,"time_steps":{steps}}}']
     for text in SETS:
         command += ["--set", text]
@@ -40,12 +42,16 @@ def linked_frames(folder):
 
 
 def check_readable(folder):
-    """All that is there: each link of sim.h5 leads to a frame."""
+    """All that is there: each link of sim.h5 leads to a frame, and series name files that are there."""
     linked = linked_frames(folder) if (folder / "sim.h5").exists() else {}
     for name, path in SERIES.items():
         if (folder / name).exists():
-            parts = len(ElementTree.parse(folder / name).findall(path))
+            tree = ElementTree.parse(folder / name)
+            parts = len(tree.findall(path))
             assert 2 * parts >= len(linked) - 1, (name, parts, len(linked))
+            text = (folder / name).read_text()
+            for file in set(re.findall(r"(?:frames|vtu)/\d+\.\w+", text)):
+                assert (folder / file).exists(), f"{name} names {file}"
     for frame in folder.glob("frames/*.h5"):
         h5py.File(frame).close()
 
@@ -67,8 +73,10 @@ def check_kills(itr, scene, work):
                 shutil.rmtree(killed, ignore_errors=True)
                 if mode:
                     shutil.copytree(short, killed)
-                if run(itr, scene, killed, LONG, *mode, kill=(call, number))[0] == 0:
+                status, said = run(itr, scene, killed, LONG, *mode, kill=(call, number))
+                if status == 0:
                     break  # there are not so many of these calls
+                assert status in (-signal.SIGKILL, 128 + signal.SIGKILL), said
                 count += 1
                 what = f"{mode} killed at {call} {number}"
                 try:

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -43,6 +44,7 @@ struct Surface {
   std::vector<Vec<Dim>> x;
   int num_body_vertices = 0;
   std::vector<EdgeKey> curved;  ///< edges whose nodes are the last of the bodies' vertices; empty with a proxy
+  std::map<std::array<int, 2>, std::vector<int>> third_corners;  ///< 3D: by edge, of the bodies' facets beside it
   std::vector<std::array<int, Dim>> own_facets;  ///< of bodies, oriented outward, or of the proxy, as they come
   bool has_proxy = false;
   const char* own = "";  ///< before the number of a vertex that is no obstacle's
@@ -53,17 +55,33 @@ struct Surface {
   bool is_obstacle(const std::array<int, N>& simplex) const {
     return simplex[0] >= num_body_vertices;
   }
-  /// Whether the curves of two simplices, one a chord, are checked in their place (check_curves): those of facets that
-  /// share no vertex.
+  bool is_node(int v) const { return v >= num_body_vertices - static_cast<int>(curved.size()) && v < num_body_vertices; }
+  /// Corners of the facet or edge that a chord is a part of.
+  template <std::size_t N>
+  std::vector<int> corners_of(const std::array<int, N>& chord) const {
+    std::vector<int> corners;
+    for (const int v : chord) {
+      const EdgeKey ends = is_node(v) ? curved[v - num_body_vertices + static_cast<int>(curved.size())] : EdgeKey{v, v};
+      corners.insert(corners.end(), ends.begin(), ends.end());
+    }
+    std::sort(corners.begin(), corners.end());
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    return corners;
+  }
+  /// Whether the curves of two simplices, one of them with a node, are checked in their place: check_curves does so for
+  /// facets that share no vertex. In 3D an edge is a part of each facet beside it.
   template <std::size_t N, std::size_t M>
   bool are_seen_as_curves(const std::array<int, N>& a, const std::array<int, M>& b) const {
-    const int first_node = num_body_vertices - static_cast<int>(curved.size());
-    const auto is_node = [&](int v) { return v >= first_node && v < num_body_vertices; };
-    if (std::none_of(a.begin(), a.end(), is_node) && std::none_of(b.begin(), b.end(), is_node)) return false;
-    const auto ends = [&](int v) { return is_node(v) ? curved[v - first_node] : EdgeKey{v, v}; };
-    return std::none_of(a.begin(), a.end(), [&](int v) {
-      return std::any_of(b.begin(), b.end(), [&](int w) { return num_shared(ends(v), ends(w)) > 0; });
-    });
+    const auto has_node = [&](const auto& simplex) {
+      return std::any_of(simplex.begin(), simplex.end(), [&](int v) { return is_node(v); });
+    };
+    if (!has_node(a) && !has_node(b)) return false;
+    const std::vector<int> of_a = corners_of(a), of_b = corners_of(b);
+    const auto is_of_b = [&](int v) { return std::find(of_b.begin(), of_b.end(), v) != of_b.end(); };
+    if (std::any_of(of_a.begin(), of_a.end(), is_of_b)) return false;
+    if (Dim == 2 || of_a.size() > 2 || is_obstacle(a)) return true;
+    const auto beside = third_corners.find({of_a[0], of_a[1]});
+    return beside != third_corners.end() && !std::all_of(beside->second.begin(), beside->second.end(), is_of_b);
   }
   std::string name(int v) const {
     return v < num_body_vertices ? own + std::to_string(v) : fmt::format("obstacle {}", v - num_body_vertices);
@@ -168,7 +186,14 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
     surface.own_facets = facets_of(surface);
   } else {
     surface.x = points<Dim>(frame.x);
-    surface.own_facets = chords<Dim>(boundary_facets<Dim>(frame.simplices), space_of(frame), num_vertices(frame));
+    const auto boundary = boundary_facets<Dim>(frame.simplices);
+    surface.own_facets = chords<Dim>(boundary, space_of(frame), num_vertices(frame));
+    if constexpr (Dim == 3)
+      for (const auto& f : boundary)
+        for (int k = 0; k < 3; ++k) {
+          const auto [first, last] = std::minmax(f[k], f[(k + 1) % 3]);
+          surface.third_corners[{first, last}].push_back(f[(k + 2) % 3]);
+        }
     auto facets = surface.own_facets;
     for (auto& facet : facets) std::sort(facet.begin(), facet.end());
     add_facets(facets, surface);
@@ -301,8 +326,8 @@ void check_surface(const Surface<3>& surface, const std::string& name, std::vect
   }
 }
 
-/// What is wholly inside, where nothing crosses. A surface of obstacles may hold bodies: it is a container. `in_hollows`:
-/// vertices that chords have inside and curves have not.
+/// Finds vertices inside of bodies, where no surfaces cross. A surface of obstacles may hold bodies: it is a container.
+/// `in_hollows`: vertices that chords have inside and curves have not.
 template <int Dim>
 void check_insides(const Surface<Dim>& surface, const std::set<int>& in_hollows, const std::string& name,
                    std::vector<std::string>& violations) {

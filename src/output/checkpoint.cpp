@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 7;
+constexpr std::int64_t kFormat = 8;
 /// In SI units, where the frame is in others: of the vertices, and of the state.
 constexpr const char* kRest = "/checkpoint/rest";
 constexpr const char* kTime = "/checkpoint/t";

@@ -9,7 +9,6 @@
 #include <charconv>
 #include <fstream>
 #include <utility>
-#include <vector>
 
 #include "itr/core/error.hpp"
 
@@ -114,7 +113,7 @@ bool is_foreign(const fs::path& directory, const std::string& name) {
 }
 
 void add_to_file_list(const fs::path& directory, const std::string& name) {
-  if (!fs::exists(directory / kFileList) || read_file_list(directory).names.contains(name)) return;
+  if (!is_name_of_run(name) || !fs::exists(directory / kFileList) || read_file_list(directory).names.contains(name)) return;
   const std::string line = '\n' + name + '\n';  // the line before may have no end, where a run was killed
   const int descriptor = ::open((directory / kFileList).c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (descriptor < 0) return;

@@ -77,16 +77,8 @@ Successor::~Successor() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-/// With errno as the reason.
-void Successor::refuse() {
-  const int reason = errno;
-  ::unlink(temporary_.c_str());
-  errno = reason;
-  fail(path_);
-}
-
 void Successor::write(std::string_view bytes) {
-  if (!write_all(descriptor_, bytes)) refuse();
+  if (!write_all(descriptor_, bytes)) fail(path_);
 }
 
 void Successor::copy(const fs::path& source, std::size_t size) {
@@ -105,13 +97,13 @@ void Successor::copy(const fs::path& source, std::size_t size) {
   const int reason = errno;
   ::close(from);
   errno = reason;
-  if (!is_copied) refuse();
+  if (!is_copied) fail(path_);
 }
 
 void Successor::replace(Durability durability) {
-  if (durability == Durability::power && ::fsync(descriptor_) != 0) refuse();
-  if (::close(std::exchange(descriptor_, -1)) != 0) refuse();  // some file systems report a full disk only here
-  if (!exchange(temporary_, path_)) refuse();
+  if (durability == Durability::power && ::fsync(descriptor_) != 0) fail(path_);
+  if (::close(std::exchange(descriptor_, -1)) != 0) fail(path_);  // some file systems report a full disk only here
+  if (!exchange(temporary_, path_)) fail(path_);
   temporary_.clear();
 }
 

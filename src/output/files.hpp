@@ -27,8 +27,6 @@ class Successor {
   void replace(Durability durability = Durability::process);
 
  private:
-  [[noreturn]] void refuse();
-
   std::filesystem::path path_, temporary_;
   int descriptor_ = -1;
 };

@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <deque>
-#include <optional>
 #include <system_error>
 
 #include "file_list.hpp"
@@ -110,7 +109,7 @@ struct Folder::Impl {
     return ::pread(descriptor, &last, 1, static_cast<off_t>(size_before) - 1) == 1 && last == '\n';
   }
 
-  /// All of the text, or nothing.
+  /// Appends all of the text, or throws and leaves the list as it was.
   void append(const std::string& text) const {
     const std::size_t before = size();
     if (::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size())) return;
@@ -156,7 +155,7 @@ struct Folder::Impl {
           refuse(name);
   }
 
-  /// What runs that were killed were writing.
+  /// Temporary files of runs that were killed while they wrote.
   std::vector<fs::path> leftovers() const {
     std::vector<fs::path> found;
     std::error_code none;
@@ -168,7 +167,7 @@ struct Folder::Impl {
     return found;
   }
 
-  /// Files of a run, not counted are those that were never whole.
+  /// Removes files of a run and its leftovers; returns how many of them were whole.
   int remove(const std::vector<std::string>& names) const {
     try {
       for (const fs::path& path : leftovers()) fs::remove(path);
@@ -267,7 +266,5 @@ void Folder::claim(const std::string& name) {
     if (last.size() > kLast) last.pop_front();
   }
 }
-
-bool has_results(const fs::path& directory) { return !files_there(directory, read_file_list(directory)).empty(); }
 
 }  // namespace itr::output

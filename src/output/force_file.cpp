@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kKinds[] = {"contact", "friction", "reaction", "all", "body", "residual", "remeshing"};
 
-/// Of the columns that a curve has.
+/// Names the columns that a curve has.
 std::string header(const ForceCurvePoint& curve) {
   const std::size_t columns = curve.kinds.front().size();
   const std::vector<const char*> names = columns == 3 ? std::vector<const char*>{"x", "y", "moment"}

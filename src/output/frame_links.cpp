@@ -79,7 +79,7 @@ std::string hard_link(const std::string& name, std::uint64_t header) {
   return message(kLink, number(1, 1) + number(0, 1) + number(name.size(), 1) + name + number(header, 8));
 }
 
-/// To the root of another file.
+/// A link to the root of another file.
 std::string external_link(const std::string& name, const std::string& file) {
   constexpr int kHasType = 8, kExternal = 64;
   const std::string target = number(0, 1) + file + '\0' + "/" + '\0';
@@ -146,7 +146,7 @@ void FrameLinks::append(const std::string& file) {
     messages_ += link;
     return;
   }
-  // What has no link to it yet comes first.
+  // The new page comes first: nothing links it yet.
   write(last_page_ + 1, link_page(last_page_ + 1, link, false));
   write(0, first_page(last_page_ + 2));
   write(last_page_, link_page(last_page_, messages_, true));

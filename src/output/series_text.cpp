@@ -49,6 +49,7 @@ void SeriesText::add(std::string part) {
 void SeriesText::drop_last() {
   parts_.shorten(length_before_);
   --count_;
+  written_ = 0;  // the file names what is taken back: the next part replaces it
 }
 
 void SeriesText::write() {

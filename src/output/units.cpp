@@ -28,8 +28,11 @@ StepReport in_units(StepReport report, const Units& units) {
                         &report.energy_before_remesh, &report.history_loss, &report.split_tolerance,
                         &report.best_refused_split, &report.residual_worth})
     *value /= energy;
-  for (MomentumChange& change : report.remeshing)
-    for (double& value : change.linear) value /= units.factor("kg m/s");
+  const double momentum = units.factor("kg m/s"), angular = units.factor("kg m^2/s");
+  for (MomentumChange& change : report.remeshing) {
+    for (double& value : change.linear) value /= momentum;
+    for (double& value : change.angular) value /= angular;
+  }
   report.t /= units.factor("s");
   report.min_distance /= units.factor("m");
   return report;

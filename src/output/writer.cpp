@@ -80,6 +80,7 @@ struct Writer::Impl {
     for (const FrameEntry& entry : stored)
       if (const int step = step_of_name(entry.file); fs::exists(directory / vtu_name(step)))
         vtu_series->append(vtu_series_entry(step, entry.t));
+    if (!stored.empty()) vtu_series->write();
   }
 
   static std::string frame_name(int step) { return fmt::format("frames/{:06}.h5", step); }

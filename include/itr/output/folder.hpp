@@ -39,7 +39,4 @@ class Folder {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether a run has left something in the folder.
-bool has_results(const std::filesystem::path& directory);
-
 }  // namespace itr::output
