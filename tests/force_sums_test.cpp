@@ -288,8 +288,8 @@ Sum<Dim> rate_of_momentum(const Setup<Dim>& setup, const State<Dim>& before, con
 }
 
 struct Tally {
-  double kept = 0, changed = 0;  ///< most momentum that edits changed, by that of the bodies, without and with interpolation
-  int steps = 0, failed = 0, cut = 0, remeshed = 0, in_contact = 0, with_friction = 0;
+  double kept = 0;  ///< most momentum that edits changed, by that of the bodies, where history is no interpolation
+  int failed = 0, cut = 0, remeshed = 0, in_contact = 0, with_friction = 0;
 };
 
 template <int Dim>
@@ -316,8 +316,8 @@ void expect_sums(const Setup<Dim>& setup, const State<Dim>& before, const State<
   Vec<Dim> by_edits = Vec<Dim>::Zero();
   for (const MomentumChange& change : forces.remeshing) by_edits += Vec<Dim>(change.linear.data());
   expected += by_edits;
-  double& most = setup.remesh.history == HistoryRule::function ? tally.kept : tally.changed;
-  if (rate.size > 0) most = std::max(most, by_edits.norm() / rate.size);
+  if (rate.size > 0 && setup.remesh.history == HistoryRule::function)
+    tally.kept = std::max(tally.kept, by_edits.norm() / rate.size);
   EXPECT_LE((rate.total - expected).norm(), kTolerance * (sum.size + residual.size) + 1e-13 * rate.size)
       << "rate " << rate.total.transpose() << ", forces " << sum.total.transpose() << ", sizes " << sum.size << " and "
       << rate.size << ", residual " << residual.total.transpose();
@@ -329,17 +329,12 @@ void run(unsigned seed, Tally& tally) {
   RandomScene<Dim> scene(seed);
   SCOPED_TRACE(scene.words.str());
   linear::Registry registry;
-  Simulation<Dim> simulation(scene.setup, registry, Logger([](LogLevel level, std::string_view text) {
-                               if (level == LogLevel::warning && std::getenv("ITR_TELL"))
-                                 std::fprintf(stderr, "%.*s\n", static_cast<int>(text.size()), text.data());
-                             }));
+  Simulation<Dim> simulation(scene.setup, registry);
   for (int step = 0; step < (Dim == 2 ? 3 : 2); ++step) {
     const State<Dim> before = simulation.state();
     const StepResult result = simulation.advance();
-    ++tally.steps;
     if (!result.ok) {
       ++tally.failed;
-      if (std::getenv("ITR_TELL")) std::fprintf(stderr, "%s\n  %s\n", scene.words.str().c_str(), result.reason.c_str());
       return;
     }
     tally.cut += result.report.cut_steps > 0;
@@ -350,27 +345,18 @@ void run(unsigned seed, Tally& tally) {
   }
 }
 
+/// Scenes may stop before their end; enough of them must do what the sums are about.
 template <int Dim>
-void run_all(unsigned first, unsigned count) {
+void run_all(unsigned count) {
   Tally tally;
-  for (unsigned seed = first; seed < first + count; ++seed) {
-    if (std::getenv("ITR_TELL")) std::fprintf(stderr, "seed %u\n", seed);
-    run<Dim>(seed, tally);
-    if (::testing::Test::HasFailure()) break;
-  }
-  if (std::getenv("ITR_TELL"))
-    std::fprintf(stderr, "%d steps, %d failed, %d cut, %d remeshed, %d in contact, %d with friction, edits %g, %g\n",
-                 tally.steps, tally.failed, tally.cut, tally.remeshed, tally.in_contact, tally.with_friction, tally.kept,
-                 tally.changed);
+  for (unsigned seed = 1; seed <= count && !::testing::Test::HasFailure(); ++seed) run<Dim>(seed, tally);
+  EXPECT_LT(tally.failed, static_cast<int>(count) / 2);
+  for (const int covered : {tally.cut, tally.remeshed, tally.in_contact, tally.with_friction}) EXPECT_GT(covered, 2);
+  EXPECT_LT(tally.kept, 1e-12) << "edits change the momentum by round-off";
 }
 
-unsigned first_seed() { return std::getenv("ITR_SEED") ? static_cast<unsigned>(std::atoi(std::getenv("ITR_SEED"))) : 1; }
-unsigned seeds(unsigned count) {
-  return std::getenv("ITR_SEEDS") ? static_cast<unsigned>(std::atoi(std::getenv("ITR_SEEDS"))) : count;
-}
-
-TEST(ForceSums, AreTheRateOfMomentum2D) { run_all<2>(first_seed(), seeds(40)); }
-TEST(ForceSums, AreTheRateOfMomentum3D) { run_all<3>(first_seed(), seeds(20)); }
+TEST(ForceSums, AreTheRateOfMomentum2D) { run_all<2>(40); }
+TEST(ForceSums, AreTheRateOfMomentum3D) { run_all<3>(20); }
 
 }  // namespace
 }  // namespace itr

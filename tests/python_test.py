@@ -766,9 +766,14 @@ class Files(unittest.TestCase):
             self.assertIn("every 2nd", simulation.write_report(folder / "run.html", every=2)[0])
             with self.assertRaises(itr.InputError) as caught:
                 make_simulation().record(folder / "run")
+            self.assertIn("another run", str(caught.exception))
+            del simulation
+            other = make_simulation()
+            with self.assertRaises(itr.InputError) as caught:
+                other.record(folder / "run")
             self.assertIn("results of an earlier run", str(caught.exception))
             (folder / "run/frames/notes.tmp").write_text("mine")
-            simulation.record(folder / "run", overwrite=True)
+            other.record(folder / "run", overwrite=True)
             self.assertEqual(len(list((folder / "run/frames").glob("*.h5"))), 1)
             self.assertEqual((folder / "run/frames/notes.tmp").read_text(), "mine")
 

@@ -477,8 +477,10 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
   EXPECT_EQ(refused(R"({"geometry": [{"mesh": "square.obj", "volume_selection": 1}, {"type": "ground", "unit": "mm"}]})"),
             "/geometry/1/unit");
 
-  const std::array<std::pair<const char*, const char*>, 17> warnings = {{
+  const std::array<std::pair<const char*, const char*>, 18> warnings = {{
       {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 8, "value": [0, 1]}, {"id": 8, "value": [0, 2]}]}})",
+       "/boundary_conditions/obstacle_displacements/1: an entry before it"},
+      {R"({"boundary_conditions": {"obstacle_displacements": [{"id": "all", "value": [0, 1]}, {"id": 8, "value": [0, 2]}]}})",
        "/boundary_conditions/obstacle_displacements/1: an entry before it"},
       {R"({"boundary_conditions": {"obstacle_displacements": [{"id": 8, "value": [0, 1]}],
                                    "dirichlet_boundary": [{"id": 8, "value": [0, 2]}]}})",

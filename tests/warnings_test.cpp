@@ -113,18 +113,19 @@ TEST_F(WarningsTest, SmallerTolerancesGiveNoLargerErrors) {
   };
   ASSERT_EQ(run("tasks/press.json", press + "--set /space/remesh/relative_tolerance=1e-5").status, 0);
   const double reference = force();
+  constexpr double kStarved = 0.03;
   double larger = 1e300;
   for (const char* tolerance : {"1e-2", "1e-3", "1e-4", "1e-5", "1e-6", ""}) {
     const std::string set = *tolerance ? std::string("--set '/solver/nonlinear={\"x_delta\": ") + tolerance + "}'" : "";
     const Said said = run("tasks/press.json", press + set);
     ASSERT_EQ(said.status, 0) << said.text;
     const double error = std::abs(force() / reference - 1);
-    EXPECT_LE(error, larger + 1e-2)
-        << tolerance;  // where remeshing starves, about 5 % are the mesh's whatever the tolerance
+    EXPECT_LE(error, larger + 2e-3) << tolerance;
     if (error > 0.02) {
       EXPECT_TRUE(said.has("Newton ended where one more iteration would gain")) << tolerance << said.text;
     }
-    larger = error;
+    // Where remeshing starves, about 5 % are the mesh's whatever the tolerance, and errors do not compare.
+    larger = error > kStarved ? 1e300 : error;
   }
   EXPECT_LT(larger, 0.02);
 }

@@ -256,12 +256,12 @@ ITR_C_API itr_status itr_get_von_mises(itr_simulation* simulation, size_t length
 /** Copies Cauchy's stress, num_cells * dimension * dimension numbers, row by row [Pa]. */
 ITR_C_API itr_status itr_get_stress(itr_simulation* simulation, size_t length, double* stress);
 /** Sum of all kinds of forces on a boundary or a body, or of bodies on an obstacle: force [N], `dimension` numbers, and
- * moment about a point [N m], one number in 2D and three in 3D. A part is a name or an id ("3"), looked for among
- * boundaries, then obstacles, then bodies; "boundary:3", "obstacle:3" and "body:3" look among these alone. ITR_BAD_INPUT for
- * what nothing has. */
+ * moment about a point [N m], one number in 2D and three in 3D. A part is a name or an id ("3"): names are tried
+ * before ids, and of each those of boundaries, then obstacles, then bodies; "boundary:3", "obstacle:3" and "body:3" look
+ * among these alone. ITR_BAD_INPUT for what nothing has. */
 ITR_C_API itr_status itr_resultant(itr_simulation* simulation, const char* part, const double* about, double* force,
                                    double* moment);
-/** The same by id. */
+/** Resultant on the part with this id, whatever has it for its name. */
 ITR_C_API itr_status itr_resultant_of_id(itr_simulation* simulation, int id, const double* about, double* force,
                                          double* moment);
 

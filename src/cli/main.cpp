@@ -68,9 +68,7 @@ int certify(const std::string& directory) {
   if (certificate.overhang > 0)
     fmt::print(
         "curved edges, which are checked as curves, leave the chords through their nodes by at most {:.2g} {}, and by "
-        "{:.2g} "
-        "{} "
-        "where something else is nearer than that\n",
+        "{:.2g} {} where something else is nearer than that\n",
         certificate.overhang, certificate.units.length(), certificate.blocked_overhang, certificate.units.length());
   return certificate.passed() ? cli::done : cli::certificate_failed;
 }

@@ -22,6 +22,7 @@
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/output/writer.hpp"
+#include "output/force_file.hpp"
 #include "ranks.hpp"
 #include "report.hpp"
 #include "simulation/advice.hpp"
@@ -205,7 +206,7 @@ std::optional<output::SavedState> find_older(const std::string& directory, const
 template <int Dim>
 std::vector<std::string> further_files(const Setup<Dim>& setup, const RunOptions& options) {
   std::vector<std::string> names;
-  if (!setup.fields.curves.empty()) names.emplace_back("forces.csv");
+  if (!setup.fields.curves.empty()) names.emplace_back(output::kForceFile);
   if (options.report) names.emplace_back(kReportFile);
   return names;
 }
@@ -351,6 +352,7 @@ class Run {
     try {
       if (!is_saved_)
         simulation_.observe(before_, [&](const FrameView<Dim>& frame) { writer_->save(frame, *before_.state); });
+      writer_->add_output(std::exchange(output_seconds_, 0));
       writer_->finish(outcome, "");
     } catch (const InputError& error) {
       outcome += fmt::format("; its files could not all be written: {}", error.what());
@@ -449,8 +451,6 @@ int run(const RunOptions& options) {
   registry.allow_mpi_start();
   return std::visit(
       [&](auto& setup) {
-        std::optional<output::Folder> folder;
-        if (this_launch().rank == 0) folder.emplace(directory);
         setup.linear.dump_folder = options.dump_folder;
         setup.linear.dump_every = options.dump_every;
         setup.newton.cancel = &stop_now;
@@ -458,7 +458,8 @@ int run(const RunOptions& options) {
         if (this_launch().rank > 0) return serve(registry, solver.name);
         for (const auto& warning : solver.warnings) warnings.add(warning);
         const RankSession session(registry, solver.name);
-        return Run(std::move(setup), scene, std::move(*folder), options, num_threads(), registry, warnings, start).run();
+        return Run(std::move(setup), scene, output::Folder(directory), options, num_threads(), registry, warnings, start)
+            .run();
       },
       scene.setup);
 }

@@ -4,11 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <numeric>
-#include <set>
-#include <string_view>
 
 #include "arrays.hpp"
 #include "fem/locator.hpp"
@@ -16,7 +13,9 @@
 #include "itr/core/parallel.hpp"
 #include "itr/energy/point_forces.hpp"
 #include "itr/simulation/resultant.hpp"
+#include "named_parts.hpp"
 #include "simulation/cell_stress.hpp"
+#include "simulation/force_target.hpp"
 
 namespace itr {
 
@@ -129,16 +128,7 @@ struct AnySimulation::Impl {
 
   std::shared_ptr<linear::Registry> registry;
   std::vector<std::string> warnings;  ///< before `of`, which fills it
-  std::map<std::string, int> boundaries;
-  bool any_id = false;  ///< boundaries are named by their ids
-  /// What resultant() takes.
-  struct Part {
-    const char* kind;
-    std::string name;  ///< or id
-    ForceTarget target;
-  };
-  std::vector<Part> parts;      ///< names before ids, boundaries before obstacles before bodies
-  std::set<int> condition_ids;  ///< that facets or vertices have
+  NamedParts parts;
   std::variant<Of<2>, Of<3>> of;
   bool remeshes = false;
   int max_threads = 0;
@@ -165,8 +155,8 @@ struct AnySimulation::Impl {
         of(model.dimension_ == 2 ? Either(make<2>(model, *registry, logger, warnings))
                                  : Either(make<3>(model, *registry, logger, warnings))),
         max_threads(model.max_threads()) {
+    std::map<std::string, int> boundaries;
     for (const auto& part : model.boundaries_) boundaries[part.name] = part.id;
-    any_id = model.scene_.has_value();
     scene::PartNames named = model.scene_ ? model.scene_->parts : scene::PartNames();
     int first = 0;
     for (const auto& part : model.obstacles_) {
@@ -179,59 +169,11 @@ struct AnySimulation::Impl {
     }
     visit([&](auto& d) {
       remeshes = d.simulation.setup().remesh.enabled;
-      list_parts(d.mesh(), named);
+      parts = NamedParts(d.mesh(), boundaries, named, model.scene_.has_value());
     });
   }
 
-  /// Lists what conditions and resultant() may name. Edits of the mesh keep the ids.
-  void list_parts(const auto& mesh, const scene::PartNames& named) {
-    std::set<int> surfaces, bodies;
-    for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
-    for (CellId c = 0; c < mesh.cell_slots(); ++c) bodies.insert(mesh.body(c));
-    condition_ids = surfaces;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-      if (mesh.vertex_tag(v) != kNoTag) condition_ids.insert(mesh.vertex_tag(v));
-    for (const auto& [name, id] : boundaries) parts.push_back({"boundary", name, {.surfaces = {id}}});
-    for (const auto& [name, vertices] : named.obstacles)
-      parts.push_back({"obstacle", name, {.obstacle_vertices = vertices}});
-    for (const auto& [name, id] : named.bodies) parts.push_back({"body", name, {.bodies = {id}}});
-    for (const int id : surfaces) parts.push_back({"boundary", std::to_string(id), {.surfaces = {id}}});
-    for (const auto& [id, vertices] : named.obstacles_by_id)
-      parts.push_back({"obstacle", std::to_string(id), {.obstacle_vertices = vertices}});
-    for (const int id : bodies) parts.push_back({"body", std::to_string(id), {.bodies = {id}}});
-  }
-
-  /// The first part that is called `text`, or else `kind:name`.
-  const ForceTarget& part(const std::string& text) const {
-    for (const Part& part : parts)
-      if (part.name == text) return part.target;
-    for (const Part& part : parts)
-      if (std::string(part.kind) + ":" + part.name == text) return part.target;
-    std::string known;
-    const char* kind = "";
-    for (const Part& part : parts) {
-      known +=
-          std::string(known.empty() ? "" : ", ") + (std::string_view(kind) == part.kind ? "" : part.kind + std::string(" "));
-      known += "'" + part.name + "'";
-      kind = part.kind;
-    }
-    refuse("resultant", "'" + text + "', which nothing has", "a name or the id of a surface, obstacle or body: " + known);
-  }
-
-  int tag(const std::string& name) const {
-    if (const auto found = boundaries.find(name); found != boundaries.end()) return found->second;
-    int id = 0;
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
-    const bool is_id = error == std::errc() && end == name.data() + name.size();
-    if (any_id && is_id && condition_ids.contains(id)) return id;
-    std::string known;
-    for (const auto& [other, ignored] : boundaries) known += (known.empty() ? "'" : ", '") + other + "'";
-    for (const int other : any_id ? condition_ids : std::set<int>())
-      known += (known.empty() ? "" : ", ") + std::to_string(other);
-    refuse("boundary", "'" + name + "'",
-           known.empty() ? "none: there are none" : (any_id ? "the id of a surface or of points: " : "") + known);
-  }
+  Resultants sum(ForceTarget target, std::span<const double> about) const;
 
   template <typename D>
   static const std::vector<int>& obstacle(const D& d, const std::string& name) {
@@ -305,21 +247,21 @@ void hold(Setup<Dim>& setup, int tag, std::span<const int> mask, SpaceTimeFuncti
 }  // namespace
 
 void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement) {
-  const int tag = impl_->tag(boundary);
+  const int tag = impl_->parts.tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     hold<Dim>(d.simulation.conditions(), tag, mask, as_vector<Dim>(of("displacement", boundary), std::move(displacement)));
   });
 }
 
 void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, std::span<const double> displacements) {
-  const int tag = impl_->tag(boundary);
+  const int tag = impl_->parts.tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     hold<Dim>(d.simulation.conditions(), tag, mask, d.nodal("displacements", displacements));
   });
 }
 
 void AnySimulation::set_traction(const std::string& boundary, HostFunction traction) {
-  const int tag = impl_->tag(boundary);
+  const int tag = impl_->parts.tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     NeumannCondition<Dim> condition{tag, as_vector<Dim>(of("traction", boundary), std::move(traction))};
     const bool is_null = !condition.traction;
@@ -328,14 +270,14 @@ void AnySimulation::set_traction(const std::string& boundary, HostFunction tract
 }
 
 void AnySimulation::set_traction(const std::string& boundary, std::span<const double> tractions) {
-  const int tag = impl_->tag(boundary);
+  const int tag = impl_->parts.tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     replace(d.simulation.conditions().neumann, {tag, d.nodal("tractions", tractions)}, false);
   });
 }
 
 void AnySimulation::set_pressure(const std::string& boundary, HostFunction pressure) {
-  const int tag = impl_->tag(boundary);
+  const int tag = impl_->parts.tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const bool is_null = !pressure;
     const auto value = as_function<Dim, 1>(of("pressure", boundary), std::move(pressure));
@@ -344,7 +286,7 @@ void AnySimulation::set_pressure(const std::string& boundary, HostFunction press
 }
 
 void AnySimulation::set_pressure(const std::string& boundary, std::span<const double> pressures) {
-  const int tag = impl_->tag(boundary);
+  const int tag = impl_->parts.tag(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const auto value = d.template nodal<1>("pressures", pressures);
     replace(d.simulation.conditions().pressure, {tag, [=](const RestPoint<Dim>& X, double t) { return value(X, t)[0]; }},
@@ -538,30 +480,27 @@ const NodalForces& AnySimulation::forces() const {
   return impl_->visit([](const auto& d) -> const NodalForces& { return d.simulation.forces(); });
 }
 
-AnySimulation::Resultants AnySimulation::resultant(std::span<const std::string> parts, std::span<const double> about) const {
-  return impl_->visit([&]<int Dim>(const Impl::Of<Dim>& d) {
+AnySimulation::Resultants AnySimulation::Impl::sum(ForceTarget target, std::span<const double> about) const {
+  return visit([&]<int Dim>(const Of<Dim>& d) {
     check_array("about", about, Dim);
-    ForceTarget target{.name = "resultant"};
     std::copy(about.begin(), about.end(), target.about.begin());
-    if (parts.empty()) refuse("resultant", "no boundary, obstacle or body", "at least one");
-    std::set<int> vertices;
-    for (const std::string& text : parts) {
-      const ForceTarget& part = impl_->part(text);
-      target.surfaces.insert(target.surfaces.end(), part.surfaces.begin(), part.surfaces.end());
-      target.bodies.insert(target.bodies.end(), part.bodies.begin(), part.bodies.end());
-      vertices.insert(part.obstacle_vertices.begin(), part.obstacle_vertices.end());
-    }
-    target.obstacle_vertices.assign(vertices.begin(), vertices.end());
-    if (forces().contact.size() == 0) refuse("forces", "none", "forces that are watched, and a step since");
-    const auto sum = force_sums<Dim>(d.simulation.state(), d.simulation.forces(), target).all;
+    if (d.simulation.forces().contact.size() == 0) refuse("forces", "none", "forces that are watched, and a step since");
+    const auto sum = sum_forces<Dim>(d.simulation.state(), d.simulation.forces(), target).all;
     return Resultants{{sum.force.begin(), sum.force.end()}, {sum.moment.begin(), sum.moment.end()}};
   });
+}
+AnySimulation::Resultants AnySimulation::resultant(std::span<const std::string> parts, std::span<const double> about) const {
+  return impl_->sum(impl_->parts.target(parts), about);
 }
 AnySimulation::Resultants AnySimulation::resultant(const std::string& part) const {
   const std::array<double, 3> origin{};
   return resultant(std::span(&part, 1), std::span(origin).first(static_cast<std::size_t>(dimension())));
 }
-AnySimulation::Resultants AnySimulation::resultant(int id) const { return resultant(std::to_string(id)); }
+AnySimulation::Resultants AnySimulation::resultant(int id, std::span<const double> about) const {
+  const std::array<double, 3> origin{};
+  return impl_->sum(impl_->parts.target(id),
+                    about.empty() ? std::span(origin).first(static_cast<std::size_t>(dimension())) : about);
+}
 
 std::vector<double> AnySimulation::elastic_density() const {
   std::vector<double> values;

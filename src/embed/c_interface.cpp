@@ -373,17 +373,21 @@ itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* 
 itr_status itr_get_stress(itr_simulation* simulation, size_t length, double* stress) {
   return with(simulation, [&](itr::AnySimulation& s) { copy(s.stress(), "stress", length, stress); });
 }
+static void copy_resultant(const itr::AnySimulation::Resultants& sum, double* force, double* moment) {
+  copy(sum.force, "force", force);
+  copy(sum.moment, "moment", moment);
+}
 itr_status itr_resultant(itr_simulation* simulation, const char* part, const double* about, double* force, double* moment) {
   return with(simulation, [&](itr::AnySimulation& s) {
     require(part, "part");
     const std::string name = part;
-    const auto sum = s.resultant(std::span(&name, 1), array("about", about, dimension_of(simulation)));
-    copy(sum.force, "force", force);
-    copy(sum.moment, "moment", moment);
+    copy_resultant(s.resultant(std::span(&name, 1), array("about", about, dimension_of(simulation))), force, moment);
   });
 }
 itr_status itr_resultant_of_id(itr_simulation* simulation, int id, const double* about, double* force, double* moment) {
-  return itr_resultant(simulation, std::to_string(id).c_str(), about, force, moment);
+  return with(simulation, [&](itr::AnySimulation& s) {
+    copy_resultant(s.resultant(id, array("about", about, dimension_of(simulation))), force, moment);
+  });
 }
 
 itr_status itr_get_energies(itr_simulation* simulation, itr_energies* energies) {

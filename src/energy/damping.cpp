@@ -32,7 +32,11 @@ void for_each_motion(const QuadraticBlocks<Dim>& blocks, ConstVectorView x, cons
 template <int Dim>
 double work(const QuadraticBlocks<Dim>& blocks, ConstVectorView x, const VectorX& origin) {
   double sum = 0;
-  for_each_motion<Dim>(blocks, x, origin, [&](auto, const auto& K, const auto& d) { sum += d.dot(K * d); });
+  VectorX force;
+  for_each_motion<Dim>(blocks, x, origin, [&](auto, const auto& K, const auto& d) {
+    force.noalias() = K * d;
+    sum += d.dot(force);
+  });
   return sum / 2;
 }
 

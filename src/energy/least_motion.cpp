@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 #include <span>
+#include <tuple>
+#include <type_traits>
+#include <utility>
 
 #include "mass_block.hpp"
 #include "mesh/connected_parts.hpp"
@@ -99,16 +101,17 @@ LooseParts<Dim> find_parts(const CellSet<Dim>& cells, const std::map<int, Materi
   LooseParts<Dim> all;
   std::map<int, int> numbers;  // parts without cells, such as single vertices, have none
   std::vector<double> total;
-  std::vector<std::set<int>> nodes;
+  std::vector<char> is_in(cells.rest.size(), 0);
   const auto add = [&](const auto& of, int body, double volume, std::vector<int>& part_of, std::vector<double>& masses) {
     const auto [entry, is_new] = numbers.try_emplace(part_of_vertex[of[0]], static_cast<int>(all.parts.size()));
-    if (is_new) all.parts.emplace_back(), total.push_back(0), nodes.emplace_back();
+    if (is_new) all.parts.emplace_back(), total.push_back(0);
     const int part = entry->second;
     const Material& material = materials.at(body);
     const double mass = volume * (material.density > 0 ? material.density : 1);
     all.parts[part].modulus = std::max(all.parts[part].modulus, material.youngs_modulus);
     total[part] += mass;
-    nodes[part].insert(of.begin(), of.end());
+    for (const int node : of)
+      if (!std::exchange(is_in[node], 1)) all.parts[part].nodes.push_back(node);
     part_of.push_back(part);
     masses.push_back(mass);
   };
@@ -116,7 +119,7 @@ LooseParts<Dim> find_parts(const CellSet<Dim>& cells, const std::map<int, Materi
   for (const auto& e : cells.curved_elements) add(e.nodes, e.body, e.volume, all.of_curved, all.curved_mass);
   for (std::size_t e = 0; e < all.mass.size(); ++e) all.mass[e] /= total[all.of_element[e]];
   for (std::size_t e = 0; e < all.curved_mass.size(); ++e) all.curved_mass[e] /= total[all.of_curved[e]];
-  for (std::size_t p = 0; p < nodes.size(); ++p) all.parts[p].nodes.assign(nodes[p].begin(), nodes[p].end());
+  for (LoosePart<Dim>& part : all.parts) std::sort(part.nodes.begin(), part.nodes.end());
   return all;
 }
 
@@ -196,11 +199,13 @@ MatrixX LeastMotion<Dim>::rigid_motions(ConstVectorView x, const DofMap& dofs) c
   };
   std::vector<Mat<kModes>> gram(loose_.parts.size(), Mat<kModes>(Mat<kModes>::Zero()));
   for_each_mass<Dim>(cells_, loose_, [&](int part, const auto& nodes, const auto& mass) {
+    std::array<Motions, std::tuple_size_v<std::remove_cvref_t<decltype(nodes)>>> rows;
+    for (std::size_t i = 0; i < nodes.size(); ++i) rows[i] = at(part, nodes[i]);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       Motions product = Motions::Zero();
       for (std::size_t j = 0; j < nodes.size(); ++j)
-        product += mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * at(part, nodes[j]);
-      gram[part] += loose_.parts[part].stiffness * at(part, nodes[i]).transpose() * product;
+        product += mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * rows[j];
+      gram[part] += loose_.parts[part].stiffness * rows[i].transpose() * product;
     }
   });
   MatrixX motions = MatrixX::Zero(x.size(), kModes * static_cast<Eigen::Index>(gram.size()));

@@ -79,7 +79,7 @@ CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, D
   return weights;
 }
 
-/// Of a facet, the first of whose nodes are its corners.
+/// Barycenter of a facet as a point of its body. Its corners are the first of its `nodes`.
 template <int Dim, std::size_t N>
 RestPoint<Dim> middle_of(const std::array<int, N>& nodes, int part, const CellSet<Dim>& cells) {
   std::array<Vec<Dim>, Dim> corners;

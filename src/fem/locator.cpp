@@ -155,16 +155,9 @@ std::function<VectorX(const RestPoint<Dim>& X)> nodal_function(std::shared_ptr<c
   return [locator = std::move(locator), values = std::move(values), space = std::move(space), vertices,
           components](const RestPoint<Dim>& X) {
     const auto place = locator->find(X);
-    const auto at = [&](int node) { return values.segment(components * node, components); };
     VectorX sum = VectorX::Zero(components);
-    for (int k = 0; k <= Dim; ++k)
-      if (place.weights[k] > 0) sum += place.weights[k] * at(place.vertices[k]);
-    if (space.is_linear()) return sum;
-    for_each_edge<Dim>([&](int, int i, int j) {
-      const double product = place.weights[i] * place.weights[j];
-      const int a = place.vertices[i], b = place.vertices[j], curved = product > 0 ? space.find(a, b) : kNone;
-      if (curved != kNone) sum += product * (4 * at(vertices + curved) - 2 * at(a) - 2 * at(b));
-    });
+    for_each_weight<Dim>(place, space, vertices,
+                         [&](int node, double weight) { sum += weight * values.segment(components * node, components); });
     return sum;
   };
 }

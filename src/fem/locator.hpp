@@ -25,7 +25,7 @@ std::array<double, Dim + 1> barycentric_weights(const Vec<Dim>& origin, const Ma
 /// How well a simplex has a point: cells that share the point differ in which of them lies at its inward side.
 template <int Dim>
 struct Fit {
-  bool has = false;  ///< the point is in the closed simplex, to round-off
+  bool has = false;  ///< the point is in the closed simplex, to round-off; false without an inward direction
   /// Least cosine of the inward direction to the inner normals of the facets that the point is on; 0 inside, so that a cell
   /// with the point on its rim, at the right side, goes before one that overlaps it.
   double facing = -2;
@@ -36,7 +36,8 @@ struct Fit {
     return depth > other.depth;
   }
 };
-/// Of a simplex by the inverse of its edges, with the point's weights in it. Without an inward direction the depth decides.
+/// Fit of the simplex with these inverse edges, in which the point X has these weights. Without an inward direction of X the
+/// depth decides.
 template <int Dim>
 Fit<Dim> fit_of(const RestPoint<Dim>& X, const std::array<double, Dim + 1>& weights, const Mat<Dim>& inverse_edges);
 
@@ -69,6 +70,23 @@ class Locator {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Calls visit(node, weight) for the nodes of `space` whose values make up that at a place: weights of shape functions that
+/// are linear on cells or, along curved edges, quadratic. `vertices`: those of the mesh.
+template <int Dim, typename Visit>
+void for_each_weight(const typename Locator<Dim>::Place& place, const Space& space, int vertices, const Visit& visit) {
+  for (int k = 0; k <= Dim; ++k)
+    if (place.weights[k] > 0) visit(place.vertices[k], place.weights[k]);
+  if (space.is_linear()) return;
+  for_each_edge<Dim>([&](int, int i, int j) {
+    const double product = place.weights[i] * place.weights[j];
+    const int a = place.vertices[i], b = place.vertices[j], curved = product > 0 ? space.find(a, b) : kNone;
+    if (curved == kNone) return;
+    visit(vertices + curved, 4 * product);
+    visit(a, -2 * product);
+    visit(b, -2 * product);
+  });
+}
 
 /// The function of rest position with these values at the nodes of `space`, on cells linear or, along curved edges,
 /// quadratic. `values`: `components` for each node, interleaved. Several threads may call the result at a time.

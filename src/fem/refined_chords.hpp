@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,15 @@ struct RefinedChords {
   std::vector<Weights> points;                            ///< nodes that a point combines, with their weights
 };
 
+/// A weighted sum of the values at(node) of nodes.
+template <int Dim, typename Weights, typename At>
+Vec<Dim> combined(const Weights& weights, const At& at) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const auto& [node, weight] : weights) sum += weight * at(node);
+  return sum;
+}
+
+/// Returns the boundary of the mesh in simplices, with the chords of each curved edge halved by its level.
 template <int Dim>
 RefinedChords<Dim> refine_chords(const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels);
 

@@ -218,14 +218,10 @@ class Recorder {
  public:
   Recorder(AnySimulation& simulation, std::filesystem::path directory, int every, bool overwrite) : directory_(directory) {
     if (every < 1) throw itr::InputError({"", "every", std::to_string(every), "a number > 0"});
-    const auto require_none = [&](bool has_results) {
-      if (!overwrite && has_results)
-        throw itr::InputError(
-            {directory.string(), "folder", "results of an earlier run", "another folder, or overwrite=True"});
-    };
-    require_none(itr::output::has_results(directory));
     itr::output::Folder folder(directory);
-    require_none(folder.has_results());
+    if (!overwrite && folder.has_results())
+      throw itr::InputError(
+          {directory.string(), "folder", "results of an earlier run", "another folder, or overwrite=True"});
     with(simulation, [&](auto& s) {
       const itr::output::RunInfo info{"a program", s.solver_name(), itr::num_threads()};
       writer_ = std::make_unique<itr::output::Writer>(std::move(folder), itr::OutputOptions{every}, info);

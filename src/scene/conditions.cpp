@@ -103,15 +103,20 @@ class ConditionReader {
     }
   }
 
-  /// Of obstacles that an entry of `displacements` moves already; two Dirichlet conditions of one id are told of elsewhere.
+  /// Warns of obstacles that an entry of `displacements` moves already; two Dirichlet conditions of one id are told of
+  /// elsewhere.
   void warn_of_second_motions(const std::vector<Node>& displacements) {
     std::set<int> moved;
     const auto id_of = [&](const Node& node) { return is_all(node["id"]) ? kNoTag : read_condition_id(node["id"]); };
     const auto warn = [&](const Node& node) {
-      warnings_.push_back(node.pointer() + ": an entry before it, in obstacle_displacements, has the same id and wins");
+      warnings_.push_back(node.pointer() +
+                          ": an entry before it, in obstacle_displacements, moves the same obstacle and wins");
     };
     for (const Node& node : displacements)
-      if (obstacle_ids_.contains(id_of(node)) && !moved.insert(id_of(node)).second) warn(node);
+      if (is_all(node["id"]))
+        moved = obstacle_ids_;
+      else if (obstacle_ids_.contains(id_of(node)) && !moved.insert(id_of(node)).second)
+        warn(node);
     for (const Node& node : boundary_["dirichlet_boundary"].items())
       if (moved.contains(id_of(node))) warn(node);
   }

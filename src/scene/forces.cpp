@@ -23,7 +23,10 @@ class ForceReader {
     for (const Node& id : node["surfaces"].items()) target.surfaces.push_back(surface(id));
     for (const Node& id : node["bodies"].items()) target.bodies.push_back(body(id));
     std::set<int> vertices;
-    for (const Node& id : node["obstacles"].items()) vertices.insert(obstacle(id).begin(), obstacle(id).end());
+    for (const Node& id : node["obstacles"].items()) {
+      const std::vector<int>& of_id = obstacle(id);
+      vertices.insert(of_id.begin(), of_id.end());
+    }
     target.obstacle_vertices.assign(vertices.begin(), vertices.end());
     if (target.surfaces.empty() && target.bodies.empty() && vertices.empty())
       node.fail("no surfaces, bodies or obstacles", "at least one of them");
@@ -51,7 +54,7 @@ class ForceReader {
   }
 
   int body(const Node& node) const {
-    if (node.json().is_string()) return named(node, parts_.bodies);
+    if (node.json().is_string()) return named(node, parts_.bodies, "of a geometry whose volume_selection is a number");
     std::set<int> ids;
     for (CellId c = 0; c < mesh_.cell_slots(); ++c) ids.insert(mesh_.body(c));
     const int id = read_id(node, 0);
@@ -60,7 +63,7 @@ class ForceReader {
   }
 
   const std::vector<int>& obstacle(const Node& node) const {
-    if (node.json().is_string()) return named(node, parts_.obstacles);
+    if (node.json().is_string()) return named(node, parts_.obstacles, "of an obstacle");
     const auto found = parts_.obstacles_by_id.find(read_id(node, 0));
     if (found != parts_.obstacles_by_id.end()) return found->second;
     std::set<int> ids;
@@ -69,12 +72,12 @@ class ForceReader {
   }
 
   template <typename Part>
-  static const Part& named(const Node& node, const std::map<std::string, Part>& parts) {
+  static const Part& named(const Node& node, const std::map<std::string, Part>& parts, const char* of) {
     const auto found = parts.find(node.string(""));
     if (found != parts.end()) return found->second;
     std::string names;
     for (const auto& [name, part] : parts) names += (names.empty() ? "" : ", ") + name;
-    node.fail(abbreviate(node.json()) + ", which no /geometry/*/name is",
+    node.fail(abbreviate(node.json()) + ", which is no /geometry/*/name " + of,
               names.empty() ? "an id: there are no names" : names);
   }
 

@@ -183,8 +183,9 @@ class MaterialReader {
   void set_lame(const std::vector<Vec<3>>& points, Material& material, std::vector<std::string>& warnings) const {
     if (dimension_ == 2 && !material.plane_strain && is_beyond_plane_stress(points)) {
       material.plane_strain = true;
-      warnings.push_back(node_["lambda"].pointer() +
-                         ": of 2 mu or more, which no material has in plane stress: taken as plane strain");
+      const std::string text =
+          node_["lambda"].pointer() + ": of 2 mu or more, which no material has in plane stress: taken as plane strain";
+      if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
     }
     const bool is_plane_stress = dimension_ == 2 && !material.plane_strain;
     const auto poisson = [lambda = *lambda_, mu = *mu_, is_plane_stress](const Vec<3>& X) {

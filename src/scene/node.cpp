@@ -35,10 +35,6 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-}  // namespace
-
-namespace {
-
 /// The path below the folder that relative paths start from.
 fs::path below_folder(const fs::path& path, const fs::path& root, const fs::path& scene_file) {
   std::error_code ignored;

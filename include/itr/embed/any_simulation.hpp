@@ -143,14 +143,15 @@ class AnySimulation {
     std::vector<double> force, moment;  ///< dimension numbers; one in 2D, three in 3D
   };
   /// The resultant on several parts together: of what acts on boundaries and bodies, and of what bodies do to obstacles. A
-  /// part is a name or an id (`"3"`), looked for among boundaries, then obstacles, then bodies; `"boundary:3"`,
-  /// `"obstacle:3"` and `"body:3"` look among these alone. Throws InputError for what nothing has.
+  /// part is a name or an id (`"3"`): names are tried before ids, and of each those of boundaries, then obstacles, then
+  /// bodies; `"boundary:3"`, `"obstacle:3"` and `"body:3"` look among these alone. Throws InputError for what nothing has.
   Resultants resultant(std::span<const std::string> parts, std::span<const double> about) const;
   Resultants resultant(const std::string& part) const;  ///< about the origin
-  Resultants resultant(int id) const;                   ///< the same
-  std::vector<double> elastic_density() const;          ///< by cell, of rest volume [J/m^Dim]
-  std::vector<double> von_mises() const;                ///< by cell [Pa]
-  std::vector<double> stress() const;                   ///< Cauchy's by cell, dimension^2 numbers, row by row [Pa]
+  /// The resultant on the part with this id, whatever has it for its name; about the origin where no point is given.
+  Resultants resultant(int id, std::span<const double> about = {}) const;
+  std::vector<double> elastic_density() const;  ///< by cell, of rest volume [J/m^Dim]
+  std::vector<double> von_mises() const;        ///< by cell [Pa]
+  std::vector<double> stress() const;           ///< Cauchy's by cell, dimension^2 numbers, row by row [Pa]
 
   /// A saved state, see Snapshot.
   using Saved = std::variant<Snapshot<2>, Snapshot<3>>;

@@ -163,13 +163,6 @@ template <int Dim>
 typename CellSet<Dim>::Element element_of(const Mesh<Dim>& mesh, CellId c) {
   return {mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), mesh.part(c)};
 }
-template <int Dim>
-Vec<Dim> rest_barycenter(const Mesh<Dim>& mesh, CellId c) {
-  Vec<Dim> sum = Vec<Dim>::Zero();
-  for (const int v : mesh.cell(c)) sum += mesh.rest(v);
-  return sum / (Dim + 1);
-}
-
 /// Deformation gradient of an element at interleaved positions x.
 template <int Dim>
 Mat<Dim> deformation_gradient(const typename CellSet<Dim>::Element& element, ConstVectorView x) {

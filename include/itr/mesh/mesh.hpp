@@ -163,9 +163,11 @@ class Mesh {
   const Vec<Dim>& rest(VertexId v) const { return rest_[v]; }
   const Cell& cell(CellId c) const { return cells_[c]; }
   int body(CellId c) const { return body_[c]; }
-  /// The number of the part of the mesh that shared vertices connect, as it was made. Edits keep it.
+  /// The number of the part of the mesh that shared vertices connect, as it was made. Edits keep it; numbers of two meshes
+  /// compare only if edits made one of the other, and a mesh that is read from a file counts anew.
   int part(CellId c) const { return part_[c]; }
   int part_of_vertex(VertexId v) const { return cells_of_[v].empty() ? kNone : part_[cells_of_[v][0]]; }
+  Vec<Dim> barycenter(CellId c) const;                    ///< of the rest shape [m]
   double volume(CellId c) const { return volume_[c]; }    ///< rest area (2D) or volume (3D)
   double quality(CellId c) const { return quality_[c]; }  ///< simplex_quality of the rest shape
   /// Inverse of the matrix whose columns are the rest edges X_1 - X_0, ..., X_Dim - X_0.
@@ -244,7 +246,6 @@ class Mesh {
 
  private:
   void add_cell(const Cell& cell, int body, int part);
-  Vec<Dim> barycenter(CellId c) const;
   void add_facet(const Facet& facet, int tag);
   void remove_cell(CellId c);
   void remove_facet(FacetId f);

@@ -25,7 +25,7 @@ struct StepSeconds {
   StepSeconds& operator+=(const StepSeconds& other);
 };
 
-/// What edits changed of a body's momentum, and of its moment about the origin.
+/// Change of a body's momentum, and of its moment about the origin, by edits of the mesh.
 struct MomentumChange {
   int body = 0;
   std::vector<double> linear;   ///< Dim numbers [kg m/s]

@@ -396,7 +396,7 @@ class Simulation:
     ) -> tuple[Array, Array]:
         """Force [N] and moment [N m] of all kinds on boundaries and bodies, and of bodies on obstacles.
 
-        A part is a name or an id, looked for among boundaries, then obstacles, then bodies; "boundary:3", "obstacle:3" and
+        A part is a name or an id: names are tried before ids, and of each those of boundaries, then obstacles, then bodies; "boundary:3", "obstacle:3" and
         "body:3" look among these alone. InputError for what nothing has. Forces must be watched."""
         names = [_part(part) for part in ([parts] if isinstance(parts, str) or not np.iterable(parts) else parts)]
         return self._simulation.resultant(names, np.zeros(self.dimension) if about is None else about)

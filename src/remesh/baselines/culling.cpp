@@ -18,7 +18,7 @@ std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>
   for (int c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
     const Material& material = context.materials.at(mesh.body(c));
-    const auto moduli = elastic_moduli<Dim>(material, rest_barycenter(mesh, c));
+    const auto moduli = elastic_moduli<Dim>(material, mesh.barycenter(c));
     const auto element = element_of(mesh, c);
     if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
       for_each_gradient<Dim>(curved, element.inverse_edges, fields.x, [&](const Mat<Dim>& F, double share) {

@@ -24,7 +24,7 @@ namespace itr {
 template <int Dim>
 class QuadraticModel {
  public:
-  /// Of cells of one connected part.
+  /// `part`: the connected part of all its cells.
   QuadraticModel(const StepContext<Dim>& context, int part) : context_(context), part_(part) {}
 
   struct Corners {

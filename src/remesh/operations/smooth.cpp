@@ -55,7 +55,7 @@ Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& ask, VertexId vertex
     const auto k = std::find(cell.begin(), cell.end(), vertex) - cell.begin();
     const auto element = element_of(mesh, c);
     const Vec<Dim> gradient = barycentric_gradient<Dim>(element.inverse_edges, static_cast<int>(k));
-    const ElasticModuli moduli = elastic_moduli<Dim>(ask.context().materials.at(element.body), rest_barycenter(mesh, c));
+    const ElasticModuli moduli = elastic_moduli<Dim>(ask.context().materials.at(element.body), mesh.barycenter(c));
     const auto add = [&](const Mat<Dim>& F, double weight) {
       sum += weight *
              (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "named_parts.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <string_view>
+
+#include "arrays.hpp"
+
+namespace itr {
+
+template <int Dim>
+NamedParts::NamedParts(const Mesh<Dim>& mesh, const std::map<std::string, int>& boundaries, const scene::PartNames& named,
+                       bool takes_ids)
+    : boundaries_(boundaries), takes_ids_(takes_ids) {
+  std::set<int> surfaces, bodies;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) bodies.insert(mesh.body(c));
+  if (takes_ids) {
+    tags_ = surfaces;
+    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+      if (mesh.vertex_tag(v) != kNoTag) tags_.insert(mesh.vertex_tag(v));
+  }
+  bool are_ids = false;
+  const auto add = [&](const char* kind, const std::string& name, ForceTarget target) {
+    parts_.push_back({kind, name, are_ids, std::move(target)});
+  };
+  for (const auto& [name, id] : boundaries) add("boundary", name, {.surfaces = {id}});
+  for (const auto& [name, vertices] : named.obstacles) add("obstacle", name, {.obstacle_vertices = vertices});
+  for (const auto& [name, id] : named.bodies) add("body", name, {.bodies = {id}});
+  are_ids = true;
+  for (const int id : surfaces) add("boundary", std::to_string(id), {.surfaces = {id}});
+  for (const auto& [id, vertices] : named.obstacles_by_id)
+    add("obstacle", std::to_string(id), {.obstacle_vertices = vertices});
+  for (const int id : bodies) add("body", std::to_string(id), {.bodies = {id}});
+}
+
+int NamedParts::tag(const std::string& boundary) const {
+  if (const auto found = boundaries_.find(boundary); found != boundaries_.end()) return found->second;
+  int id = 0;
+  const auto [end, error] = std::from_chars(boundary.data(), boundary.data() + boundary.size(), id);
+  const bool is_id = error == std::errc() && end == boundary.data() + boundary.size();
+  if (is_id && tags_.contains(id)) return id;
+  std::vector<std::string> known;
+  for (const auto& [name, ignored] : boundaries_) known.push_back("'" + name + "'");
+  for (const int other : tags_) known.push_back(std::to_string(other));
+  const char* of = takes_ids_ ? "the id of a surface or of points: " : "";
+  refuse("boundary", "'" + boundary + "'",
+         known.empty() ? "none: there are none" : fmt::format("{}{}", of, fmt::join(known, ", ")));
+}
+
+ForceTarget NamedParts::target(std::span<const std::string> parts) const {
+  if (parts.empty()) refuse("resultant", "no boundary, obstacle or body", "at least one");
+  ForceTarget all{.name = "resultant"};
+  std::set<int> vertices;
+  for (const std::string& text : parts) {
+    const ForceTarget& part = find(text);
+    all.surfaces.insert(all.surfaces.end(), part.surfaces.begin(), part.surfaces.end());
+    all.bodies.insert(all.bodies.end(), part.bodies.begin(), part.bodies.end());
+    vertices.insert(part.obstacle_vertices.begin(), part.obstacle_vertices.end());
+  }
+  all.obstacle_vertices.assign(vertices.begin(), vertices.end());
+  return all;
+}
+
+/// The first part that is called `text`, or else `kind:name`.
+const ForceTarget& NamedParts::find(const std::string& text) const {
+  for (const Part& part : parts_)
+    if (part.name == text) return part.target;
+  for (const Part& part : parts_)
+    if (fmt::format("{}:{}", part.kind, part.name) == text) return part.target;
+  refuse_unknown(text);
+}
+
+ForceTarget NamedParts::target(int id) const {
+  const std::string text = std::to_string(id);
+  for (const Part& part : parts_)
+    if (part.is_id && part.name == text) {
+      ForceTarget target = part.target;
+      target.name = "resultant";
+      return target;
+    }
+  refuse_unknown(text);
+}
+
+void NamedParts::refuse_unknown(const std::string& text) const {
+  std::vector<std::string> known;
+  std::string_view kind;
+  for (const Part& part : parts_) {
+    known.push_back(fmt::format("{}'{}'", kind == part.kind ? "" : part.kind + std::string(" "), part.name));
+    kind = part.kind;
+  }
+  refuse("resultant", "'" + text + "', which nothing has",
+         fmt::format("a name or the id of a surface, obstacle or body: {}", fmt::join(known, ", ")));
+}
+
+template NamedParts::NamedParts(const Mesh<2>&, const std::map<std::string, int>&, const scene::PartNames&, bool);
+template NamedParts::NamedParts(const Mesh<3>&, const std::map<std::string, int>&, const scene::PartNames&, bool);
+
+}  // namespace itr
