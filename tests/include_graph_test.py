@@ -27,7 +27,7 @@ MAY_USE = {
     "embed": "core geometry linear mesh fem time energy newton projection remesh simulation output scene",
 }
 
-USERS = {"cli", "python"}  # programs over the library: they may use all of it
+USERS = {"apps", "python"}  # programs over the library: they may use all of it
 
 # What describes a simulation as plain values: open to `scene`, and all that simulation/setup.hpp is made of.
 OPTIONS = {
@@ -59,13 +59,13 @@ PUBLIC = {
 
 # Third-party header -> the modules that may know it.
 WALLS = {
-    r"nlohmann/": {"scene", "output", "cli", "embed"},
+    r"nlohmann/": {"scene", "output", "apps", "embed"},
     r"CGAL/": {"geometry"},
     r"boost/": {"remesh"},
     r"(oneapi/)?tbb/": {"core"},
     r"hdf5\.h|H5": {"core"},
-    r"zlib\.h": {"output"},
-    r"CLI/|spdlog/": {"cli"},
+    r"zlib\.h": {"apps"},
+    r"CLI/|spdlog/": {"apps"},
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(<|")([^>"]+)[>"]', re.MULTILINE)

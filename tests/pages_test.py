@@ -201,7 +201,7 @@ class Study(unittest.TestCase):
         """STUDY.md has the default series above those on request."""
         text = (SOURCE / "STUDY.md").read_text()
         default, _, on_request = text.partition("## The runs of a study")[2].partition("\n## ")[0].partition("**More series**")
-        series = re.findall(r'\{"([\w-]+)", Kind::\w+, (true|false)', (SOURCE / "src/cli/study/plan.cpp").read_text())
+        series = re.findall(r'\{"([\w-]+)", Kind::\w+, (true|false)', (SOURCE / "src/apps/study/plan.cpp").read_text())
         self.assertTrue(series)
         for name, is_default in series:
             self.assertIn(f"`{name}`", default if is_default == "true" else on_request)

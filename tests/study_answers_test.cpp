@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a study says of its runs, of rows made up for it: when it has to say nothing, and that its table and sentences agree.
-#include "cli/study/answers.hpp"
+#include "apps/study/answers.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <cmath>
 #include <map>
 
-#include "cli/study/curves.hpp"
-#include "cli/study/plot.hpp"
-#include "cli/study/rows.hpp"
+#include "apps/study/curves.hpp"
+#include "apps/study/plot.hpp"
+#include "apps/study/rows.hpp"
 #include "mesh/mesh_file.hpp"
 
 namespace itr::cli::study {

@@ -14,7 +14,7 @@
 #include "itr/core/parallel.hpp"
 #include "itr/itr.hpp"
 #include "itr/output/writer.hpp"
-#include "output/report.hpp"
+#include "apps/report/report.hpp"
 
 namespace py = pybind11;
 

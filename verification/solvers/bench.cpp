@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/ranks.hpp"
+#include "apps/itr/ranks.hpp"
 #include "core/timer.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"

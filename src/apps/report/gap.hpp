@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "frame_file.hpp"
+#include "output/frame_file.hpp"
 
 namespace itr::output {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "report_picture.hpp"
+#include "picture.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-# usage: cmake -D FOLDER=src/output/report -D OUTPUT=FILE.cpp -P embed.cmake: the page's files as constants of C++.
+# usage: cmake -D FOLDER=src/apps/report/page -D OUTPUT=FILE.cpp -P embed.cmake: the page's files as constants of C++.
 cmake_policy(VERSION 3.25)
 set(SCRIPTS data.js draw.js plots.js view.js study.js page.js)
-set(text "#include \"output/report_assets.hpp\"\nnamespace itr::output::assets {\n")
+set(text "#include \"apps/report/assets.hpp\"\nnamespace itr::output::assets {\n")
 
 function(add_constant name)
   set(literals "")

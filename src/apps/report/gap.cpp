@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "report_gap.hpp"
+#include "gap.hpp"
 
 #include <algorithm>
 #include <numeric>

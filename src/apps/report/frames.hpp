@@ -11,7 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "frame_file.hpp"
+#include "output/frame_file.hpp"
 
 namespace itr::output {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the file holds: blocks of compressed bytes in base64, see report_frames.cpp for how they are made.
+// What the file holds: blocks of compressed bytes in base64, see frames.cpp for how they are made.
 'use strict';
 
 const NEVER = 1 << 30;

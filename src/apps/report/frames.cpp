@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "report_frames.hpp"
+#include "frames.hpp"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "deflate.hpp"
+#include "gap.hpp"
 #include "itr/core/error.hpp"
-#include "report_gap.hpp"
 
 namespace itr::output {
 

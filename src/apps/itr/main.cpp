@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <thread>
 
+#include "apps/study/study.hpp"
 #include "explain.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
@@ -19,7 +20,6 @@
 #include "report.hpp"
 #include "run.hpp"
 #include "scene/node.hpp"
-#include "study/study.hpp"
 
 namespace {
 

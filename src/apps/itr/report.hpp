@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "output/report.hpp"
+#include "apps/report/report.hpp"
 
 namespace itr::cli {
 

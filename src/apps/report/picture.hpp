@@ -5,7 +5,7 @@
 #include <array>
 #include <string>
 
-#include "frame_file.hpp"
+#include "output/frame_file.hpp"
 
 namespace itr::output {
 

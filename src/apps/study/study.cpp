@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "cli/run.hpp"
+#include "apps/itr/run.hpp"
 #include "itr/core/error.hpp"
 #include "linear/modules.hpp"
 #include "plot.hpp"

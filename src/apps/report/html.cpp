@@ -5,16 +5,16 @@
 #include <fstream>
 #include <sstream>
 
+#include "assets.hpp"
 #include "deflate.hpp"
-#include "file_list.hpp"
-#include "files.hpp"
-#include "force_file.hpp"
+#include "frames.hpp"
 #include "itr/core/error.hpp"
 #include "output/certify.hpp"
-#include "output/report.hpp"
-#include "report_assets.hpp"
-#include "report_frames.hpp"
-#include "report_picture.hpp"
+#include "output/file_list.hpp"
+#include "output/files.hpp"
+#include "output/force_file.hpp"
+#include "picture.hpp"
+#include "report.hpp"
 
 namespace itr::output {
 

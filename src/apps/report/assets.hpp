@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The files of src/output/report, which CMake puts into the library.
+// The files of src/apps/report/page, which CMake puts into the program.
 #pragma once
 
 #include <string_view>
