@@ -24,4 +24,4 @@ build/release/bin/itr_audited run examples/ball_wall.json -o "$audited" --overwr
   --set /contact/friction_coefficient=0.3 --set /space/remesh/split/acceptance_tolerance=1
 build/release/bin/itr_audited certify "$audited"
 
-python3 verification/run.py --quick
+python3 verification/run.py --quick --jobs "${ITR_JOBS:-2}"

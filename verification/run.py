@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: MIT
 """Runs the verification suite: every file of verification/cases is a case with a quantity, a reference and a tolerance.
 
-python3 verification/run.py [--quick] [--page] [--case NAME]... [--build build/release] [--report DIR]
+python3 verification/run.py [--quick] [--page] [--case NAME]... [--jobs N] [--build build/release] [--report DIR]
 
 A full run, or one of some cases, brings verification/report up to date; --quick writes into BUILD/verification, so that it
 never replaces figures of a full run. --page runs nothing and writes the pages anew: how old results are. Exit status: 0 passed, 1 a case failed.
 """
 import argparse
+import concurrent.futures
+import contextlib
 import importlib
 import importlib.util
+import io
 import json
+import multiprocessing
 import os
 import pathlib
 import shutil
@@ -45,10 +49,44 @@ def parse():
     parser.add_argument("--quick", action="store_true", help="smaller and fewer cases: minutes instead of hours")
     parser.add_argument("--page", action="store_true", help="run nothing")
     parser.add_argument("--case", action="append", metavar="NAME", help="only this one; may be given again")
+    parser.add_argument("--jobs", type=int, default=1, help="cases at a time; their seconds are then those of a busy machine")
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
     parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared", help="folder of the paper's scenes")
     parser.add_argument("--report", type=pathlib.Path, help="folder of the report")
     return parser.parse_args()
+
+
+def perform(name, options, build, report):
+    """The entry of a case, which prints its results as they come."""
+    folder = build / ("verification-quick-runs" if options.quick else "verification-runs") / name
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    print(f"{name}", flush=True)
+    start = time.perf_counter()
+    entry = run_case(load_cases()[name], Context(folder, report, build, options.shared, options.quick, name))
+    print(f"  {entry['status']} in {time.perf_counter() - start:.1f} s" + (f": {entry['message']}" if entry["message"] else ""),
+          flush=True)
+    return entry
+
+
+def perform_quietly(*arguments):
+    """The entry of a case, and what it printed: for cases that run beside others."""
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        entry = perform(*arguments)
+    return entry, text.getvalue()
+
+
+def perform_all(chosen, options, build, report):
+    """(name, entry) of each case as it ends."""
+    if options.jobs == 1:
+        yield from ((name, perform(name, options, build, report)) for name in chosen)
+        return
+    with concurrent.futures.ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
+        pending = {pool.submit(perform_quietly, name, options, build, report): name for name in chosen}
+        for done in concurrent.futures.as_completed(pending):
+            entry, text = done.result()
+            print(text, end="", flush=True)
+            yield pending[done], entry
 
 
 def main():
@@ -65,15 +103,8 @@ def main():
     entries = json.loads(stored.read_text())["cases"] if stored.exists() else {}
     found = versions(build)
     ran = {}
-    for name in chosen:
-        folder = build / ("verification-quick-runs" if options.quick else "verification-runs") / name
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        print(f"{name}", flush=True)
-        start = time.perf_counter()
-        ran[name] = run_case(cases[name], Context(folder, report, build, options.shared, options.quick, name))
-        print(f"  {ran[name]['status']} in {time.perf_counter() - start:.1f} s"
-              + (f": {ran[name]['message']}" if ran[name]["message"] else ""), flush=True)
+    for name, entry in perform_all(chosen, options, build, report):
+        ran[name] = entry
         ran[name]["versions"] = {**found, "itr": provenance.made("verification/report/results.json", name)}
     # A case that could not run keeps the figures of when it could.
     entries.update({name: entry for name, entry in ran.items() if entry["status"] != "skipped" or name not in entries})
