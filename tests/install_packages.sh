@@ -5,14 +5,14 @@
 # all of them needs neither root nor a network.
 set -euo pipefail
 
+# ccache is among the first: a compiler that is launched in another way compiles all anew.
 packages=(
-  g++ cmake ninja-build
+  g++ cmake ninja-build ccache
   libeigen3-dev libtbb-dev libhdf5-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
   libcgal-dev libgmp-dev libmpfr-dev
   python3 python3-h5py python3-matplotlib python3-numpy
 )
 optional=(
-  ccache
   libsuitesparse-dev libopenblas-dev
   libmumps-dev libmumps-ptscotch-dev libptscotch-dev libopenmpi-dev openmpi-bin
   libtrilinos-{amesos2,tpetra,shylu,teuchos,kokkos,kokkos-kernels,epetra,epetraext,triutils,zoltan,trilinosss}-dev
