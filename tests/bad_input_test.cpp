@@ -84,7 +84,7 @@ std::string cpp_says(const std::function<void()>& f) {
   }
   return "nothing";
 }
-/// Of a model that is changed, or of its simulation.
+/// Message of a model that is changed, or of its simulation.
 std::string cpp_model(const std::function<void(Model&)>& f) {
   return cpp_says([&] {
     Model model = make_model();

@@ -313,7 +313,7 @@ const itr_term kCFoundation{[](const itr_part* part, const double* x, void*) {
                               });
                             }};
 
-/// The same as one of the library's kind.
+/// Foundation as an energy of the library's kind.
 class Foundation final : public Energy {
  public:
   Foundation(const CellSet<2>& cells, double scale) : cells_(cells) {

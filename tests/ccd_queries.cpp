@@ -140,7 +140,7 @@ void print(const char* setting, const char* name, const Tally& t) {
               t.queries > 0 ? 1e9 * t.seconds / double(t.queries) : 0.0);
 }
 
-/// Of all queries with one setting.
+/// Tallies all queries with one setting.
 Tally run_files(const std::vector<std::filesystem::path>& files, const char* setting, const itr::CcdOptions& options) {
   Tally kinds[2], total;
   for (const auto& file : files) {

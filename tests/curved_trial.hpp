@@ -30,7 +30,7 @@ StepContext<Dim> context_of(unsigned seed) {
   return context;
 }
 
-/// What a trial of an edit asks of a scene, which has a mesh and fields.
+/// View of a scene, which has a mesh and fields, for a trial of an edit.
 template <int Dim>
 struct View {
   Gate<Dim> gate;

@@ -127,7 +127,7 @@ TEST(Edits3D, KeepVerticesWithTagsAndWhatTheyHold) {
   EXPECT_GT(lengths, 10);
 }
 
-/// The same proposals on triangles.
+/// Proposals on triangles follow the same rules.
 TEST(Edits3D, HaveTheSameRulesInTwoDimensions) {
   std::map<Edit<2>::Kind, int> done;
   for (unsigned seed = 0; seed < 10; ++seed) {
@@ -335,7 +335,7 @@ TEST(Edits3D, RefusalsHaveNamesAndReasons) {
   EXPECT_EQ(propose_edge_removal(wide, Strata<3>(wide), {0, 1}, shape_cost(wide), kAnything).refusal, Refusal::long_ring);
 }
 
-/// What the link condition refuses in the volume would make a facet with more than two cells, a cell twice, or other holes.
+/// Collapses that the link condition refuses would make a facet with more than two cells, a cell twice, or other holes.
 TEST(Edits3D, LinkConditionRefusesOnlyWhatChangesTheTopology) {
   const auto faces_of = [](const std::set<Mesh<3>::Cell>& cells) {
     std::set<std::vector<int>> faces;

@@ -16,7 +16,7 @@
 namespace itr {
 namespace {
 
-/// What an InputError says.
+/// Message of an InputError.
 template <typename F>
 std::string message_of(F&& f) {
   try {

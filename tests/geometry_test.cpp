@@ -326,7 +326,7 @@ TYPED_TEST(Geometry, TreeFindsWhatBruteForceFinds) {
   }
 }
 
-/// Of the distance at the start: what is kept until a collision, and by what passes by.
+/// Share of the distance at the start that is kept until a collision, and by points that pass by.
 double least_share(double time) { return time < 1 ? CcdOptions{}.min_separation_ratio : CcdOptions{}.passing_ratio; }
 
 TYPED_TEST(Geometry, CollisionTimesAreNeverLateAndNeverZero) {
@@ -451,7 +451,7 @@ TEST(Ccd, LetsPairsWithinRoundOffMoveApartOnly) {
   EXPECT_EQ(free({0, 0, -1}), 0);
 }
 
-/// What passes by is no collision, however near: only what comes within round-off may be called one.
+/// Points that pass by do not collide, however near: only those within round-off may be called a collision.
 TEST(Ccd, LetsPassBy) {
   std::mt19937 random(3);
   int near = 0, collisions = 0;

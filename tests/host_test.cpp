@@ -103,7 +103,7 @@ TEST(HostLoop, AReferenceToTheStateFollowsIt) {
   EXPECT_EQ(state.step, 4);
 }
 
-/// What they take on meshes of 10^4 vertices: `itr_bench --benchmark_filter=Snapshot`.
+/// Their times on meshes of 10^4 vertices: `itr_bench --benchmark_filter=Snapshot`.
 TEST(HostLoop, SavingAndRestoringCopyNothing) {
   auto simulation = simulate(pressed_block());
   ASSERT_TRUE(simulation.advance(0.01).ok);
@@ -146,7 +146,7 @@ TEST(HostLoop, AMeshIsFoundBeforeIterationsOverAStep) {
   for (int i = 0; i < 2; ++i) {
     apart.restore(start);
     ASSERT_TRUE(apart.advance(0.01).ok);
-    // The same minimum, from another start.
+    // Both reach the same minimum, from different starts.
     EXPECT_LT((apart.state().history.x[0] - whole.state().history.x[0]).lpNorm<Eigen::Infinity>(), 1e-8);
   }
   EXPECT_EQ(changes, 1);
@@ -167,7 +167,7 @@ TEST(Events, AnIterationCanEndTheStep) {
   EXPECT_TRUE(simulation.advance().ok);
 }
 
-/// What a listener keeps stays as it is, and takes the simulation back to before the step.
+/// A state that a listener keeps stays as it is, and takes the simulation back to before the step.
 TEST(Events, AListenerSeesTheStateBeforeTheStep) {
   auto setup = pressed_block();
   setup.time = {.integrator = Integrator::bdf, .bdf_order = 2, .dt = 0.01, .steps = 1000};

@@ -29,7 +29,7 @@ MAY_USE = {
 
 USERS = {"apps", "python"}  # programs over the library: they may use all of it
 
-# What describes a simulation as plain values: open to `scene`, and all that simulation/setup.hpp is made of.
+# Headers that describe a simulation as plain values: open to `scene`, and all that simulation/setup.hpp is made of.
 OPTIONS = {
     "energy/contact/options.hpp",
     "energy/damping_options.hpp",
@@ -45,7 +45,7 @@ OPTIONS = {
 EXTRA = {"scene": OPTIONS | {"simulation/setup.hpp", "simulation/unsupported.hpp"}, "embed": {"itr.h"}}
 SETUP = OPTIONS | {"mesh/mesh.hpp", "core/types.hpp", "core/units.hpp"}
 
-# What a program may include: these, and what they include. include/ has nothing else, as all of it is installed.
+# Headers for programs: these, and those that they include. include/ has nothing else, as all of it is installed.
 PUBLIC = {
     "itr.hpp",
     "itr.h",

@@ -114,8 +114,7 @@ TEST(Explain, SaysWhatIsModelledAndWhy) {
     EXPECT_NE(text.find(line), std::string::npos) << line << "\n" << text;
 }
 
-/// Those that a newcomer begins with say nothing of mistakes, and run. The bar of `twist` is thin, which remeshing does not
-/// hide.
+/// A newcomer's tasks say nothing of mistakes, and run. The bar of `twist` is thin, which remeshing does not hide.
 TEST(Explain, WarnsOfNothingInTheTasks) {
   for (const char* task : {"drop", "press", "roll"}) {
     const std::string text = explain(fmt::format("tasks/{}.json", task));

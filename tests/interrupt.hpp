@@ -175,7 +175,7 @@ inline Json summary_of(const fs::path& directory) {
   return summary;
 }
 
-/// What a killed run leaves: every step of the log but perhaps the last is linked from sim.h5 and readable.
+/// Expects that every step of a killed run's log but perhaps the last is linked from sim.h5 and readable.
 inline void expect_readable(const fs::path& directory) {
   for (const auto& frame : stored_frames(directory)) EXPECT_NO_THROW(read_frame(frame)) << frame;
   const int steps = static_cast<int>(results_of(directory).size());

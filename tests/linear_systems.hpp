@@ -68,14 +68,14 @@ inline System laplacian(int side) {
   return system;
 }
 
-/// Of a case of one solver: gtest takes letters and digits only.
+/// Name of a case of one solver: gtest takes letters and digits only.
 inline std::string as_test_name(std::string name) {
   for (char& c : name)
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
   return name;
 }
 
-/// What `itr solvers` lists; here the program is the test, which lets modules start MPI.
+/// Solvers that `itr solvers` lists; here the program is the test, which lets modules start MPI.
 inline Registry full_registry() {
   Registry registry;
   registry.allow_mpi_start();

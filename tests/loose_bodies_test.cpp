@@ -32,7 +32,7 @@ Setup<2> square_above_a_table(double modulus, const std::string& solver = "eigen
   return setup;
 }
 
-/// Of the mass.
+/// Mean displacement of the mass.
 template <int Dim>
 Vec<Dim> mean_displacement(const Simulation<Dim>& simulation) {
   const auto& state = simulation.state();

@@ -135,7 +135,7 @@ const std::string kTextPly =
     "element face 2\nproperty list uchar int vertex_indices\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n"
     "end_header\n0 0 0 255\n1 0 0 0\n0 1 0 0\n0 0 +1.5 7\n3 1 2 3 0.5\n0 1\n3 0 1 2\n3 0 3 1\n2 3\n";
 
-/// The same with doubles, as tools write it: the header's lines may end in \r\n, what is after it begins at once.
+/// Bytes of a PLY with doubles, as tools write it: the header's lines may end in \r\n, and data begin at once after it.
 std::string binary_ply(const std::string& end = "\n") {
   std::string bytes;
   for (const char* line :

@@ -269,7 +269,7 @@ TEST(Edits, AreMadeWithoutTouchingTheMeshAndCommitWhatTheyPreview) {
     }
     EXPECT_TRUE(edit->removed_vertex == kNone || !mesh.is_vertex_alive(edit->removed_vertex));
     EXPECT_EQ(mesh.find_defect(), "");
-    // What the edit does not name stays where it was, bit for bit.
+    // Vertices that the edit does not name stay where they were, bit for bit.
     for (int c = 0; c < start.cell_slots(); ++c)
       if (std::find(edit->removed_cells.begin(), edit->removed_cells.end(), c) == edit->removed_cells.end()) {
         EXPECT_EQ(mesh.cell(c), start.cell(c));

@@ -108,7 +108,7 @@ TEST(Newton, IsNotDrawnToASaddleByASolverThatAllowsIt) {
   }
 }
 
-/// The same, with the way that PolyFEM goes by an L D L^T: to the saddle, by whatever engine.
+/// Follows PolyFEM's way by an L D L^T to the saddle, with any engine.
 TEST(Newton, TakesIndefiniteDirectionsWithAnySolverWhereAskedTo) {
   linear::Registry registry;
   for (const char* name : {"eigen:llt", "eigen:ldlt", "eigen:lu", "dense"}) {

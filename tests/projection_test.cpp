@@ -211,7 +211,7 @@ TEST(Transfer, KeepsMomentumAndLinearFieldsThroughAThousandCoarseningsIn3D) {
   for (int v = 0; v < state.mesh.vertex_slots(); ++v) ASSERT_NEAR(u(v, 3), linear(state.mesh.rest(v)), 1e-11);
 }
 
-/// What is looked at, and with it the cost, follows the edit and not the mesh.
+/// The visited vertices, and with them the cost, follow the edit and not the mesh.
 TEST(Transfer, PatchDoesNotGrowWithTheMesh) {
   std::vector<Eigen::Index> vertices;
   for (const int n : {10, 14, 20}) {

@@ -878,7 +878,7 @@ class Files(unittest.TestCase):
         self.assertGreater(len(simulation.cells), 18)
         self.assertEqual(mesh.topology.index_map(2).size_local, len(simulation.cells))
         integrate = lambda form: dolfinx.fem.assemble_scalar(dolfinx.fem.form(form))
-        # What they integrate is what the simulation has: volumes by cell, energy, and F = I + grad u of det F > 0.
+        # The integrals are those of the simulation: volumes by cell, energy, and F = I + grad u of det F > 0.
         X, cells = simulation.rest_positions, simulation.cells
         areas = np.abs(np.linalg.det(X[cells[:, 1:]] - X[cells[:, :1]])) / 2
         u, density = functions["displacement"], functions["elastic_density"]

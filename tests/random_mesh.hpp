@@ -82,7 +82,7 @@ inline std::ostream& operator<<(std::ostream& out, Screening screening) {
   return out << kNames[static_cast<int>(screening)];
 }
 
-/// What a TrialScene has beside elasticity, inertia, dead loads and contact with an obstacle at rest.
+/// Terms of a TrialScene beside elasticity, inertia, dead loads and contact with an obstacle at rest.
 struct Terms {
   bool friction = false, held = false, pressure = false, damping = false, second_body = false, lumped = false,
        moving_obstacle = false;
@@ -93,7 +93,7 @@ inline std::ostream& operator<<(std::ostream& out, const Terms& terms) {
              << terms.moving_obstacle;
 }
 
-/// The same with body 3, of facet tag 5, right of it: apart by less than what TrialScene's contact reaches.
+/// Adds body 3, of facet tag 5, right of the mesh: apart by less than the reach of TrialScene's contact.
 inline Mesh<2> with_second_body(const Mesh<2>& first, std::mt19937& random) {
   std::vector<Vec<2>> rest;
   std::vector<std::array<int, 3>> cells;
@@ -165,7 +165,7 @@ struct TrialScene {
   }
 };
 
-/// What local problems on a scene's mesh as it is are made of.
+/// Inputs of local problems on a scene's mesh as it is.
 struct LocalView {
   Gate<2> gate;
   LocalScratch<2> scratch;

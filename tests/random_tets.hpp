@@ -128,7 +128,7 @@ inline Mesh<3> random_tets(int n, std::mt19937& random, bool slivers) {
   return mesh;
 }
 
-/// What no operation may change.
+/// Quantities that no operation may change.
 struct Invariants {
   std::map<int, double> volume, area;           ///< by body; by tag
   std::map<int, double> patch_area;             ///< by patch, interfaces included
@@ -188,7 +188,7 @@ struct Invariants {
         held[strata.vertex(v)].insert({mesh.rest(v)[0], mesh.rest(v)[1], mesh.rest(v)[2]});
   }
 
-  /// What differs, in words; nothing where only round-off does.
+  /// Describes the differences, in words; nothing where only round-off differs.
   std::string difference(const Invariants& other, double tolerance) const {
     const auto near = [&](const auto& a, const auto& b) {
       return std::ranges::equal(a, b, [&](const auto& x, const auto& y) {

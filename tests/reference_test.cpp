@@ -206,7 +206,7 @@ TEST_F(Defaults, OfSetupsAreThoseOfScenes) {
   }
 }
 
-/// What a reader of the repository cannot open is not cited in it.
+/// Sources that a reader of the repository cannot open are not cited in it.
 TEST(Reference, NoCitationsOfWhatIsNotHere) {
   const fs::path root = ITR_SOURCE_DIR;
   const std::string absent[] = {std::string("scene-") + "format", std::string("design ") + "\u00a7",

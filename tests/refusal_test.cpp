@@ -277,7 +277,7 @@ TEST_F(Refusals, SummaryNamesTheSolverThatAutoTook) {
   EXPECT_EQ(summary["solver"], "dense");  // of 8 unknowns
 }
 
-/// What runs, but is perhaps not meant: `run` says so as `explain` does.
+/// Scene that runs, but is perhaps not meant: `run` says so as `explain` does.
 struct Suspicion {
   const char* name;
   Json changes;

@@ -34,7 +34,7 @@ std::optional<Edit<3>> random_edit(const TetScene& scene, const Strata<3>& strat
   }
 }
 
-/// What a patch's test compares: the scene, the patch around a random edit that passes the gate, and both meshes.
+/// Data that a patch's test compares: the scene, the patch around a random edit that passes the gate, and both meshes.
 struct EditedScene {
   const TetScene& scene;
   LocalProblem<3>& before;

@@ -146,7 +146,7 @@ TYPED_TEST(CurvedPrediction, StraighteningIsChargedForWhatItForgets) {
   EXPECT_GT(compared, 30);
 }
 
-/// What edge removals minimise: the energy of the cells that an edit makes, with the nodes that it makes.
+/// Edge removals minimise the energy of the cells that an edit makes, with the nodes that it makes.
 TYPED_TEST(CurvedPrediction, EnergiesOfCellsAreThoseOfPatches) {
   constexpr int Dim = TypeParam::value;
   int curved = 0;

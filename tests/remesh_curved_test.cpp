@@ -80,8 +80,8 @@ TYPED_TEST(Curved, EveryOperationKeepsTheFunctionsOfBothSpaces) {
     EXPECT_GT(done[kind], 30) << static_cast<int>(kind);
 }
 
-/// What an edit sets has what the old functions have there; edges that stay where they are keep their nodes, and all other
-/// fields their bits.
+/// Nodes that an edit sets have the values of the old functions there. Edges that stay where they are keep their nodes, and
+/// all other fields their bits.
 TYPED_TEST(Curved, OperationsInterpolateWhereTheyChangeNodes) {
   constexpr int Dim = TypeParam::value;
   int nodes = 0, kept = 0;

@@ -54,7 +54,7 @@ TEST(DynamicTree, FindsWhatASearchThroughAllBoxesFinds) {
   }
 }
 
-/// What one vertex gains exists: a patch that relaxes to convergence gains no less, in contact too.
+/// The gain of one vertex exists: a patch that relaxes to convergence gains no less, in contact too.
 TEST(Bounds, OfOneVertexNeverExceedWhatAPatchGains) {
   int compared = 0, in_contact = 0;
   for (unsigned seed = 0; compared < 10000; ++seed) {

@@ -42,7 +42,7 @@ struct Remeshed {
   double low = 0, high = 0;
 };
 
-/// What is accepted at the largest tolerance at which anything is, searched below `most` [J].
+/// Remeshes at the largest tolerance at which anything is accepted, searched below `most` [J].
 Remeshed remesh_sharply(const TrialScene& scene, RemeshOptions options, double most) {
   Remeshed result;
   result.low = -most;

@@ -248,7 +248,7 @@ TEST(Prediction, OfTheNewVertexIsWhatRelaxingItAloneGains) {
     const auto edges = scene.mesh.edges();
     const EdgeKey edge = edges[scene.random() % edges.size()];
     const auto edit = make_split(scene.mesh, edge);
-    // Of a patch of nothing but the split cells only the new vertex is free.
+    // In a patch of nothing but the split cells only the new vertex is free.
     LocalView view(scene);
     const auto after = view.problem(edit.removed_cells, edit, true);
     if (after->num_unknowns() != 2) continue;

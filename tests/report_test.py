@@ -434,7 +434,7 @@ class Report(Cases):
         self.browser.click(*below)
         self.assertIn("cell 1\n", self.browser.run("return v.pickText.textContent"))
         self.assertIn("elastic energy density  40 J/m²", self.browser.run("return v.pickText.textContent"))
-        # What is before the plane is gone: its normal looks at us.
+        # Cells before the plane are gone: its normal looks at us.
         self.assertTrue(self.browser.run("return v.pickAt(...v.project([0.05, 0.02, 0])) === null || v.cutPlane[2] === 1"))
         self.assertEqual(self.browser.errors(), [])
 
@@ -514,7 +514,7 @@ class Report(Cases):
             self.assert_seen(*[(place, [255] * 3) for place in outside])
             self.browser.click(*inside[0])
             self.assertIn("cell 0", self.browser.run("return v.pickText.textContent"))
-            # What is behind z = -0.05 is cut flat, also where the curved edge is: at x = 0.45 down to y = -0.14.
+            # Cells behind z = -0.05 are cut flat, also where the curved edge is: at x = 0.45 down to y = -0.14.
             self.browser.run("await v.set({axis: 'z', cut: 0.95})")
             sections = [self.browser.place(0.45, y, -0.05) for y in (-0.02, -0.1, -0.15)]
             self.assert_seen(*[(place, body) for place in sections], within=9)

@@ -176,7 +176,7 @@ TEST_P(Engines, IndefinitenessIsSeenInEveryDirection) {
   EXPECT_LE(residual(system.pattern, system.values, x, b), kAsked);
 }
 
-/// What was solved by iterations has no factor of its own, and what was not asked for is not counted as solved.
+/// A system that was solved by iterations has no factor of its own, and a question alone does not count as a solve.
 TEST_P(Engines, WhatAMatrixIsCanBeAskedAlone) {
   ReusingSolver solver(*direct, true);
   const auto b = load(block().pattern.order);
@@ -224,7 +224,7 @@ TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
   EXPECT_EQ(solver.counts().factorizations, 2);
 }
 
-/// Whoever goes on from a record solves what comes with the same bits.
+/// A solver that goes on from a record solves the next systems with the same bits.
 TEST_P(Engines, ARecordIsAllThatMatters) {
   const auto b = load(block().pattern.order);
   const auto other = registry.create(GetParam());

@@ -39,7 +39,7 @@ template <int Dim>
 Setup<Dim> sliding_body(double unit) {
   Setup<Dim> setup;
   setup.mesh = make_body(unit, static_cast<Mesh<Dim>*>(nullptr));
-  // Of stress, density and energy in kg, s and the unit of length; in 2D by thickness in it too, which drops out.
+  // Units of stress, density and energy in kg, s and the unit of length; in 2D by thickness in it too, which drops out.
   const double stress = Dim == 3 ? 1 / unit : 1, density = stress / (unit * unit), energy = unit * unit;
   setup.materials[1] = {.youngs_modulus = 1e4 * stress, .poisson_ratio = 0.4, .density = 1000 * density};
   setup.time = {.dt = 1e-4, .steps = 12};
@@ -124,7 +124,7 @@ void expect_same_in_all_units(bool remeshed) {
 
 TEST(Scales, FixedMeshIn2dDoesNotSeeTheUnitOfLength) { expect_same_in_all_units<2>(false); }
 TEST(Scales, RemeshedBodyDoesNotSeeTheUnitOfLength) { expect_same_in_all_units<2>(true); }
-// What is symmetric has many edges of one gain, to round-off.
+// Symmetric scenes have many edges of one gain, to round-off.
 TEST(Scales, RoundOffDoesNotChooseBetweenMirrorImages) {
   const auto in_unit = [](double unit) {
     auto setup = sliding_body<2>(unit);

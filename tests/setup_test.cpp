@@ -172,7 +172,7 @@ TEST(SetupDefaults, TolerancesLeftOpenFollowTheSplits) {
   EXPECT_EQ(*chosen.split.min_edge_length, 0);
 }
 
-/// What is chosen is checked as what is given: here a tolerance that underflows.
+/// Chosen values are checked as given ones are: here a tolerance that underflows.
 TEST(SetupDefaults, AreValidated) {
   linear::Registry registry;
   itr::Setup<2> setup = good_setup();

@@ -74,7 +74,7 @@ TEST(Simulation, FreeFallIsExact) {
   }
 }
 
-/// What is left of the gradient where flight leads is below any tolerance in so short a step, but it is all that acts.
+/// The gradient where flight leads is below any tolerance in so short a step, but it is all that acts.
 TEST(Simulation, ForcesActHoweverShortTheStep) {
   auto setup = free_square(2);
   setup.newton = {};
@@ -191,7 +191,7 @@ TEST(MeshScope, IsSharedWhileTheMeshStays) {
   EXPECT_NE(cache.scope_of(setup, mesh), before);
 }
 
-/// What is kept from step to step does not show: a simulation that begins at the step has the same bits.
+/// Caches do not show: a simulation that begins at the step has the same bits.
 TEST(Simulation, OnAMeshThatStaysHasTheBitsOfAFreshOne) {
   const auto setup = large_impact();
   linear::Registry registry;

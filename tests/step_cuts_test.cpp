@@ -21,7 +21,7 @@ Setup<2> hurried_impact(TimeOptions time) {
   return setup;
 }
 
-/// Of the integrator that takes the `count`th step after BDF has begun or a step was cut.
+/// Order of the integrator that takes the `count`th step after BDF has begun or a step was cut.
 int order_after(const TimeOptions& time, int count) {
   if (time.integrator == Integrator::newmark) return 2;
   return time.integrator == Integrator::bdf ? std::min(count, time.bdf_order) : 1;

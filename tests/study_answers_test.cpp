@@ -307,7 +307,7 @@ TEST_F(StudyPlan, HasQuadraticElementsBesideLinearOnes) {
     if (const auto all_settings = settings(run); all_settings.contains("/space/discr_order"))
       order[run.name] = all_settings.at("/space/discr_order");
   EXPECT_EQ(order, (std::map<std::string, std::string>{{"uniform-p2-0", "2"}, {"uniform-p2-1", "2"}}));
-  // Of a scene of quadratic elements the linear series are linear all the same.
+  // The linear series of a scene of quadratic elements are linear all the same.
   options.overrides.push_back({"/space/discr_order", "2"});
   for (const auto& run : all())
     EXPECT_EQ(settings(run)["/space/discr_order"], run.name.starts_with("uniform-p2") ? "2" : "1") << run.name;

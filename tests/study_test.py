@@ -132,7 +132,7 @@ class Study(unittest.TestCase):
             for measure in ("l2", "h1", "energy"):
                 error = runs[name]["errors"][measure]
                 self.assertTrue(error is None or error >= content["worth"][measure], (name, measure))
-        # Of a given reference it is not known, unless a second one is given too.
+        # A given reference's error is not known, unless a second one is given too.
         given = self.folder / "runs/reference"
         study(self.folder / "one", "--series", "uniform", "--reference", given, levels=1)
         self.assertIn("not known", (self.folder / "one/study.md").read_text())

@@ -72,7 +72,7 @@ TEST_F(WarningsTest, AreSaidCountedAndStored) {
   ASSERT_EQ(before["warnings"].size(), 2u);
   EXPECT_NE(before["warnings"][0]["text"].get<std::string>().find("/time/tend"), std::string::npos);
 
-  // What was there before is not lost, nor counted twice.
+  // Warnings from before are not lost, nor counted twice.
   const Said resumed = run("cantilever.json", steps + " --set /time/tend=0.35 --resume");
   EXPECT_EQ(resumed.status, 0) << resumed.text;
   EXPECT_EQ(summary()["warning_count"], 3) << summary()["warnings"];

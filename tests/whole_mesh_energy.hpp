@@ -48,7 +48,7 @@ inline CellId cell_at(const Mesh<2>& mesh, int body, const Vec<2>& X) {
   return best;
 }
 
-/// What two triangles have in common, as a convex polygon (Sutherland & Hodgman 1974).
+/// Common part of two triangles, as a convex polygon (Sutherland & Hodgman 1974).
 inline std::vector<Vec<2>> overlap(const std::array<Vec<2>, 3>& a, const std::array<Vec<2>, 3>& b) {
   std::vector<Vec<2>> polygon(a.begin(), a.end());
   for (int k = 0; k < 3 && !polygon.empty(); ++k) {

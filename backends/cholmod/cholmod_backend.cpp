@@ -178,7 +178,7 @@ class Cholmod {
   /// Flops of AMD's factorisation an unknown, from which the half of them that METIS saves pays for its 3 to 25 microseconds
   /// an unknown in the few factorisations that its order lasts (verification/scaling, verification/solvers).
   static constexpr double kMetisFromFlops = 1.5e5;
-  /// The same where an order has lasted for so many factorisations that it will last for many more.
+  /// Threshold where an order has lasted for so many factorisations that it will last for many more.
   static constexpr double kMetisFromFlopsIfLong = 2.5e4;
   static constexpr int kManyFactorizations = 10;
 

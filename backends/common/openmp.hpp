@@ -24,7 +24,7 @@ class OneOpenMpThread {
     int (*get)() = nullptr;
     void (*set)(int) = nullptr;
   };
-  /// Of the module's own libraries; null where they do without OpenMP.
+  /// Runtime of the module's own libraries; null where they do without OpenMP.
   static const Runtime& runtime() {
     static const Runtime found = [] {
       const Runtime both{find_loaded<int()>("omp_get_max_active_levels"),

@@ -11,7 +11,7 @@
 
 namespace itr::backends {
 
-/// What a library calls an ordering, by our name for it.
+/// Our name of an ordering and the library's number for it.
 using Ordering = std::pair<std::string_view, int>;
 
 /// The library's number for the option ordering=NAME; none for another option or name.

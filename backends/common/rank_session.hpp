@@ -14,7 +14,7 @@
 
 namespace itr::backends {
 
-/// What rank 0 sends: a job for one of its instances.
+/// Command that rank 0 sends: a job for one of its instances.
 struct RankCommand {
   int job = 0;  ///< 0: the session is over
   int instance = 0;
@@ -25,7 +25,7 @@ struct RankCommand {
 class RankSession {
  public:
   bool is_shared() const { return communicator_ != MPI_COMM_NULL; }
-  /// Of rank 0 and those who serve; of this rank alone where nobody does.
+  /// Communicator of rank 0 and those who serve; of this rank alone where nobody does.
   MPI_Comm communicator() const { return is_shared() ? communicator_ : MPI_COMM_SELF; }
   int ranks() const { return ranks_; }
   /// Grows with each session that begins or ends: shared instances of an older one are void.

@@ -26,7 +26,7 @@ constexpr int kBegin = 1, kAnalyze = 2, kFactorize = 3, kSolve = 4, kEnd = 5;
 
 RankSession session;  // under Trilinos' lock
 
-/// What fails on one rank leaves the others waiting for it: all of them end.
+/// Ends all ranks: one that fails leaves the others waiting for it.
 [[noreturn]] void give_up(const std::exception& error) {
   std::fprintf(stderr, "belos:muelu over %d ranks: %s\n", session.ranks(), error.what());
   MPI_Abort(session.communicator(), 1);

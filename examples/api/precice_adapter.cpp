@@ -34,7 +34,7 @@ itr::Model flap() {
   return model;
 }
 
-/// What preCICE knows of the simulation: the vertices of the wet boundary, at rest.
+/// Interface that preCICE knows: the vertices of the wet boundary, at rest.
 struct Interface {
   std::vector<int> vertices;  ///< ours
   std::vector<precice::VertexID> ids;

@@ -24,7 +24,7 @@ InputError unusable(const std::filesystem::path& path, const std::string& place,
   return InputError({path.string(), place, "HDF5 could not do it", expected});
 }
 
-/// Of variable length: what readers such as h5py give out as text and not as bytes.
+/// Makes the type of texts of variable length, which readers such as h5py give out as text and not as bytes.
 Handle text_type() {
   Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_size(type.id(), H5T_VARIABLE);

@@ -76,10 +76,10 @@ class File {
   static File create(const std::filesystem::path& path);
   static File open(const std::filesystem::path& path, OtherFiles others = OtherFiles::refused);
 
-  /// What was written before under this name, of the same shape, is replaced: much cheaper than in a new file.
+  /// Replaces a dataset of this name and shape, which is much cheaper than in a new file.
   void write(const std::string& name, std::span<const double> values, int columns);
   void write(const std::string& name, std::span<const std::int64_t> values, int columns);
-  /// Of the file; what was written before is replaced.
+  /// Writes or replaces an attribute of the file.
   void write_attribute(const char* name, double value);
   void write_attribute(const char* name, std::int64_t value);
   /// The numbers of an attribute of a group or dataset that is there.
@@ -106,7 +106,7 @@ class File {
   std::vector<std::int64_t> read_integers_attribute(const std::string& object, const char* name) const;
   std::string read_text(const std::string& name) const;
   std::string read_text_attribute(const std::string& object, const char* name) const;
-  /// Of a dataset, without reading it.
+  /// Returns a dataset's shape without reading it.
   Shape shape(const std::string& name) const;
   Table<double> read_doubles(const std::string& name) const;
   Table<std::int64_t> read_integers(const std::string& name) const;

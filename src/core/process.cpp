@@ -11,7 +11,7 @@
 namespace itr {
 
 double peak_rss_mb() {
-  // What getrusage knows has the memory of the program that started this one in it.
+  // getrusage counts the memory of the program that started this one, too.
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)
     if (line.starts_with("VmHWM:")) return std::strtod(line.c_str() + 6, nullptr) / 1024;

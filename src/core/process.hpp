@@ -6,7 +6,7 @@ namespace itr {
 
 /// Most memory that this process has held [MB].
 double peak_rss_mb();
-/// Of all its threads [s].
+/// Returns the processor time of all threads of this process [s].
 double processor_seconds_now();
 
 }  // namespace itr

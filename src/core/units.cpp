@@ -33,7 +33,7 @@ double factor_of(std::span<const Named> list, const std::string& name) {
   return found->second;
 }
 
-/// Of length, mass and time.
+/// Exponents of length, mass and time.
 struct Exponents {
   int length = 0, mass = 0, time = 0;
 };

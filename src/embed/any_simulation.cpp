@@ -41,7 +41,7 @@ SpaceTimeFunction<Dim> as_vector(std::string place, HostFunction f) {
 
 std::string of(const std::string& quantity, const std::string& part) { return quantity + " of '" + part + "'"; }
 
-/// What row(0), row(1), ... hold, one after the other.
+/// Joins row(0), row(1), ... one after the other.
 template <typename Row>
 std::vector<int> joined(int count, const Row& row) {
   std::vector<int> ids;
@@ -77,7 +77,7 @@ void replace(std::vector<Condition>& conditions, Condition condition, bool is_nu
 }  // namespace
 
 struct AnySimulation::Impl {
-  /// What belongs to one dimension.
+  /// Simulation and locator of one dimension.
   template <int Dim>
   struct Of {
     Simulation<Dim> simulation;
@@ -94,7 +94,8 @@ struct AnySimulation::Impl {
       if (remeshes && simulation.setup().remesh.curve.enabled)
         refuse(place, "/space/remesh/curve/enabled", "a mesh of which the edges stay straight");
     }
-    /// Of values by vertex linear on the cells of the present mesh, of values by node quadratic along its curved edges.
+    /// Makes the function of values by vertex, linear on the cells of the present mesh, or by node, quadratic along its
+    /// curved edges.
     template <int Components = Dim>
     std::function<Vec<Components>(const RestPoint<Dim>& X, double t)> nodal(const std::string& name,
                                                                             std::span<const double> values) {

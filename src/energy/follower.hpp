@@ -29,7 +29,7 @@ class LinearizedForces final : public Energy {
   double scale_;
 };
 
-/// Those of the program at x, positions of the mesh's vertices and of others after them.
+/// Makes the energy of the program's forces at x: positions of the mesh's vertices and of others after them.
 template <int Dim>
 std::shared_ptr<const Energy> lag_follower(const FollowerForces<Dim>& follower, const Mesh<Dim>& mesh, const VectorX& x,
                                            double t, double scale);

@@ -29,7 +29,7 @@ void add_forces(const std::array<int, Vertices>& vertices, const CellSet<Dim>& c
   });
 }
 
-/// The same on a simplex with curved edges, by the rule for products of two quadratic functions.
+/// Adds forces on a simplex with curved edges, by the rule for products of two quadratic functions.
 template <int Dim, int SimplexDim>
 void add_curved_forces(const std::array<int, kQuadraticNodes<SimplexDim>>& nodes, CurvedEdges curved,
                        const CellSet<Dim>& cells, int part, double measure,

@@ -15,7 +15,7 @@ namespace itr {
 template <std::size_t Vertices>
 struct LoadPoint {
   static constexpr double kNear = near_vertex<Vertices>(), kFar = (1 - kNear) / (Vertices - 1);
-  /// Of a linear function with these values at the vertices, of which `sum` is the sum.
+  /// Value of a linear function with these values at the vertices, of which `sum` is the sum.
   template <typename Value>
   static Value at(std::size_t point, const std::array<Value, Vertices>& values, const Value& sum) {
     return kFar * sum + (kNear - kFar) * values[point];

@@ -31,8 +31,8 @@ Mat<3> cone_gradient(const Mat<3>& p) {
   return gradient;
 }
 
-/// What a unit pressure puts on each corner, up to its sign: area times normal over the number of corners. Of the corners of
-/// curved_corners: that of the whole facet, as if x's normal were everywhere.
+/// Force of a unit pressure on each corner, up to its sign: area times normal over the number of corners. At corners of
+/// curved_corners it is the force on the whole facet, as if x's normal were everywhere.
 Vec<2> corner_share(const Mat<2>& p) {
   const Vec<2> edge = p.col(1) - p.col(0);
   return Vec<2>(edge[1], -edge[0]) / 2;

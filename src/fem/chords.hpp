@@ -9,7 +9,7 @@
 
 namespace itr {
 
-/// Of a facet with these corners; 0 where it has no area.
+/// Unit normal of a facet with these corners; 0 where it has no area.
 inline Vec<2> unit_normal(const std::array<Vec<2>, 2>& p) {
   return Vec<2>(p[1][1] - p[0][1], p[0][0] - p[1][0]).stableNormalized();
 }

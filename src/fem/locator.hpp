@@ -49,7 +49,7 @@ void tidy(std::array<double, N>& weights);
 template <int Dim>
 class Locator {
  public:
-  /// Of some cells, or of all alive ones.
+  /// Indexes some cells, or all alive ones.
   Locator(const Mesh<Dim>& mesh, std::span<const CellId> cells);
   explicit Locator(const Mesh<Dim>& mesh);
   ~Locator();

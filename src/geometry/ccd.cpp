@@ -48,7 +48,7 @@ struct MovingPair {
     for (int k = 0; k < pair_size(kind); ++k) fastest[k < first()] = std::max(fastest[k < first()], motion[k].squaredNorm());
     return std::sqrt(fastest[0]) + std::sqrt(fastest[1]);
   }
-  /// What all have in common brings them no nearer.
+  /// Subtracts the common motion, which brings no two points nearer.
   void subtract_mean() {
     Vec<Dim> mean = Vec<Dim>::Zero();
     for (int k = 0; k < pair_size(kind); ++k) mean += motion[k] / pair_size(kind);
@@ -180,7 +180,7 @@ bool keeps_apart(const MovingPair<Dim>& pair, const Sizes& sizes) {
   return before > 0 && along<Dim>(pair, pair.at(1), direction, 0, sizes).apart >= before;
 }
 
-/// What passes by counts as free only where the whole way is: where it is not, it stops where `min_separation_ratio` says.
+/// Counts a pair that passes by as free only where the whole way is; elsewhere it stops where `min_separation_ratio` says.
 template <int Dim>
 double ccd(MovingPair<Dim> pair, const CcdOptions& options) {
   pair.subtract_mean();

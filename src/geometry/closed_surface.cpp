@@ -22,7 +22,7 @@ int crossing(const Vec<2>& p, const Vec<2>& a, const Vec<2>& b) {
   return right ? (side < 0 ? -1 : 0) : (side > 0 ? 1 : 0);
 }
 
-/// The same for a triangle and the ray along +z: its shadow winds around that of p, and p is below.
+/// Counts the crossing of a triangle with the ray along +z: its shadow winds around that of p, and p is below.
 int crossing(const Vec<3>& p, const Vec<3>& a, const Vec<3>& b, const Vec<3>& c) {
   const Vec<2> q = p.head<2>(), u = a.head<2>(), v = b.head<2>(), w = c.head<2>();
   const int turns = crossing(q, u, v) + crossing(q, v, w) + crossing(q, w, u);

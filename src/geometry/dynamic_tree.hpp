@@ -16,7 +16,7 @@ class DynamicTree {
   /// Items 0 to n - 1; an empty box (min > max) stands for an item that is not there.
   void build(std::span<const Box<Dim>> boxes);
   bool holds(int item) const { return item < static_cast<int>(leaf_of_.size()) && leaf_of_[item] != kNone; }
-  /// Of an item that is there.
+  /// Box of an item that is in the tree.
   const Box<Dim>& box(int item) const { return nodes_[leaf_of_[item]].box; }
   void insert(int item, const Box<Dim>& box);
   void remove(int item);

@@ -24,7 +24,7 @@ class Clipper {
 
   explicit Clipper(Sink& sink) : sink_(sink) {}
 
-  /// What is left of `piece` behind the planes from `plane` on, where a barycentric coordinate of b is not negative.
+  /// Adds the rest of `piece` behind the planes from `plane` on, where a barycentric coordinate of b is not negative.
   void clip(const Piece& piece, int plane) {
     if (plane > Dim) return add(piece);
     Cut cut;

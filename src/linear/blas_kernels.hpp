@@ -31,7 +31,7 @@ class BlasEnvironment {
 /// The kernels of the OpenBLAS among the libraries of a handle of dlopen: "SkylakeX"; empty where there is none.
 std::string blas_kernels(void* handle);
 
-/// What to do about those kernels; empty where they are good.
+/// Advice on slow kernels; empty where they are good.
 std::string advice_on_blas_kernels(const std::string& kernels);
 
 }  // namespace itr::linear

@@ -11,7 +11,7 @@
 
 namespace itr::linear {
 
-/// What decides for one solver over another.
+/// Properties of a matrix that decide between solvers.
 struct MatrixTraits {
   int order = 0;
   std::size_t nonzeros = 0;  ///< of the lower triangle
@@ -26,8 +26,8 @@ struct Pick {
   std::string reason;  ///< "3D and large: supernodal factorisation"
 };
 
-/// What `auto` takes among the solvers that are there; `is_there` is asked about those in question only. A pure function of
-/// its arguments but for `memory_bytes` = 0.
+/// Solver that `auto` takes among those that are there; asks `is_there` about candidates only. Depends on its arguments
+/// alone, but for `memory_bytes` = 0.
 Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char* name)>& is_there);
 /// Among those of the registry that are ready: those that would be refused because MPI does not run count as absent.
 Pick pick_solver(const MatrixTraits& traits, Registry& registry);

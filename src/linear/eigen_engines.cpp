@@ -73,7 +73,7 @@ class LowerTriangleEngine : public Engine {
   virtual Statistics factor_statistics() const = 0;
   ConstColumns in(std::span<const double> B, int columns) const { return {B.data(), matrix_.rows(), columns}; }
   Columns out(std::span<double> X, int columns) const { return {X.data(), matrix_.rows(), columns}; }
-  /// Of factors stored as values with 32-bit row indices.
+  /// Statistics of factors that are stored as values with 32-bit row indices.
   static Statistics sparse_factor(double nonzeros) { return {nonzeros, 12 * nonzeros, 12 * nonzeros}; }
   Sparse matrix_;
   bool factorized_ = false;
@@ -98,8 +98,8 @@ Outcome check_pivots(const Sparse& matrix, const Eigen::SimplicialLDLT<Sparse>& 
   return Outcome::ok;
 }
 
-/// What all of Eigen's solvers share: they hold their factors and solve for columns. Each analysis begins with a new one: a
-/// vector of Eigen 3.4 that finds no memory when it is resized frees what it had twice, unless it was empty.
+/// Common part of Eigen's solvers. Each analysis begins with a new one: a vector of Eigen 3.4 that finds no memory when it
+/// is resized frees its old memory twice, unless it was empty.
 template <typename EigenSolver>
 class EigenEngine : public LowerTriangleEngine {
  public:

@@ -10,7 +10,7 @@
 
 namespace itr {
 
-/// What a file holds, before anything is made of it. Coordinates always three; ids 0-based.
+/// Contents of a mesh file before anything is made of it. Coordinates are always three, ids 0-based.
 struct MeshFile {
   std::vector<Vec<3>> vertices;
   std::vector<std::array<int, 2>> edges;      ///< line elements / `l` polylines / `edge`

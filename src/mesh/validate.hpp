@@ -13,7 +13,7 @@ namespace itr {
 /// pairs of which neither has a vertex with `counts` are skipped. Positions interleaved.
 std::vector<std::array<int, 2>> find_intersections(ConstVectorView positions, std::span<const std::array<int, 2>> edges,
                                                    std::span<const char> counts, std::size_t most);
-/// The same in space: pairs of an edge and a triangle (indices).
+/// Finds pairs of an edge and a triangle that intersect in space (indices).
 std::vector<std::array<int, 2>> find_intersections(ConstVectorView positions, std::span<const std::array<int, 2>> edges,
                                                    std::span<const std::array<int, 3>> triangles,
                                                    std::span<const char> counts, std::size_t most);

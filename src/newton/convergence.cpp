@@ -88,7 +88,7 @@ double Convergence::gradient_asked() const {
   return std::max({options.gradient_tolerance, options.relative_gradient_tolerance * first_gradient_, force_asked()});
 }
 
-/// What acts is the measure, unless the options give another one for gradients.
+/// The forces that act are the measure, unless the options give another one for gradients.
 double Convergence::force_asked() const {
   const NewtonOptions& options = task_.options;
   const bool has_other = options.gradient_tolerance > 0 || options.relative_gradient_tolerance > 0;

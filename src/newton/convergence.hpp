@@ -26,7 +26,7 @@ class Convergence {
   bool is_near(const Step& step) const;
   double gradient_asked() const;
 
-  /// What the last full step promises, or the gradient where no step was computed any more.
+  /// Energy that the last full step promises, or the gradient where no step was computed any more.
   double decrement() const { return decrement_; }
   void note_decrement(const Step& step);
   void foresee_decrement();

@@ -17,7 +17,7 @@ class Direction {
   bool find();
   /// The step of the projected Hessian, once the one of the true Hessian has led nowhere. False if it has been tried.
   bool find_projected();
-  /// The same step with all digits, and later ones too, so that convergence is certain.
+  /// Solves this step and later ones with all digits, so that convergence is certain.
   bool tighten();
 
   Step& step() { return step_; }

@@ -19,7 +19,7 @@ class HeldMotion {
   void plan();
   bool is_done() const { return state_ == State::done; }
   bool is_advancing() const { return state_ == State::advancing; }
-  /// What is asked of them in this iteration. Assembling the Hessian adds what that does to the Newton system.
+  /// Motion asked of the held dofs in this iteration. Assembling the Hessian adds its effect to the Newton system.
   PrescribedMotion& motion() { return motion_; }
 
   /// Whether they have hardly come nearer to their targets in many iterations: something blocks their way for good.

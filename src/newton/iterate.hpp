@@ -12,7 +12,7 @@ class Iterate {
 
   const VectorView& x() const { return x_; }
   double value() const { return value_; }
-  /// Of the last update_gradient.
+  /// Gradient at the last update_gradient.
   const VectorView& gradient() const { return gradient_; }
   bool has_gradient() const { return has_gradient_; }
   double gradient_norm() const { return gradient_norm_; }

@@ -22,7 +22,7 @@ class Norms {
       return kind_ == NewtonNorm::l2 ? g / std::sqrt(weights_[i]) : g / weights_[i];
     });
   }
-  /// The same over all dofs, held ones included.
+  /// Norm over all dofs, held ones included.
   double of_forces(ConstVectorView forces) const {
     double sum = 0, largest = 0;
     for (Eigen::Index i = 0; i < forces.size(); ++i) {
@@ -37,7 +37,7 @@ class Norms {
   double of_step(ConstVectorView step) const {
     return norm(step, [&](double p, Eigen::Index i) { return kind_ == NewtonNorm::l2 ? p * std::sqrt(weights_[i]) : p; });
   }
-  /// Of two fields over the unknowns, whatever the norm.
+  /// Dot product of two fields over the unknowns, whatever the norm.
   double dot(ConstVectorView a, ConstVectorView b) const {
     double sum = 0;
     for (Eigen::Index i = 0; i < a.size(); ++i)

@@ -21,7 +21,7 @@ class Search {
   struct Kept {
     KeptVector candidate, other, ways;
   };
-  /// What is known of a step before the search.
+  /// Knowledge of a step before the search.
   struct Way {
     double share;          ///< that is free
     double slope;          ///< of the energy

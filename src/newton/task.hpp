@@ -6,7 +6,7 @@
 
 namespace itr {
 
-/// What a solve minimises and how. All its parts share it; their vectors are kept in the workspace for the next solve.
+/// Energy that a solve minimises, and how. All parts of the solve share it and keep their vectors in the workspace.
 struct Task {
   const Energy& energy;
   const DofMap& dofs;

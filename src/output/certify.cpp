@@ -499,7 +499,7 @@ void check_curves(const Surface<Dim>& surface, const Patches<Dim>& all, const st
 template <int Dim>
 void check_frame(const StoredFrame& frame, const std::string& name, Certificate& certificate) {
   std::vector<std::string>& violations = certificate.violations;
-  // What is not a number compares false with everything, and every predicate after it would pass.
+  // NaN compares false with everything, and every predicate after it would pass.
   const auto is_finite = [](double value) { return std::isfinite(value); };
   for (const auto* x : {&frame.rest, &frame.x, &frame.obstacles.x, &frame.proxy.x}) {
     if (std::all_of(x->begin(), x->end(), is_finite)) continue;

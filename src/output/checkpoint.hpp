@@ -12,7 +12,7 @@
 
 namespace itr::output {
 
-/// What a run has counted and written when it saves a state.
+/// Counts and texts of a run when it saves a state.
 struct Progress {
   std::string_view scene, backend;  ///< what a resumed run has to have in common with the saved one
   std::span<const double> totals;

@@ -152,7 +152,8 @@ std::array<double, Dim + 1> place(const std::array<Vec<Dim + 1>, Dim + 1>& corne
   return l;
 }
 
-/// Of the difference of two fields over the intersection of their cells, exactly, where one of them has curved edges.
+/// Integrates the difference of two fields over the intersection of their cells, exactly, where one of them has curved
+/// edges.
 template <int Dim>
 class CurvedDifference {
  public:
@@ -243,7 +244,8 @@ Integrals integrate_field(const Cells<Dim>& cells) {
 template <int Dim>
 using Facets = std::vector<std::array<Vec<Dim>, Dim>>;
 
-// Of the surface's extent: by how much chords may leave curved edges (a distance is told to no better), and at most so many.
+// Chords may leave curved edges by this share of the surface's extent (a distance is told to no better), and are at most so
+// many.
 template <int Dim>
 constexpr double kChordError = Dim == 2 ? 1e-7 : 1e-4;
 template <int Dim>

@@ -10,8 +10,8 @@
 
 namespace itr::output {
 
-/// Of a frame from a reference at the same time. Bodies are told apart by their ids, unless only together they have the
-/// same shape.
+/// Distance of a frame from a reference at the same time. Bodies are told apart by their ids, unless only together they have
+/// the same shape.
 struct FrameDistance {
   double l2 = 0;       ///< (integral of |u - u_ref|^2 over the rest bodies)^(1/2) [m^(1 + Dim/2)]
   double h1_semi = 0;  ///< the same of grad u - grad u_ref [m^(Dim/2)]
@@ -31,7 +31,7 @@ FrameDistance frame_distance(const std::filesystem::path& frame, const std::file
 /// InputError where the file is unreadable.
 double flight(const std::filesystem::path& frame);
 
-/// What a frame says of all bodies together, where its scene asked for it (FieldOptions).
+/// Totals over all bodies in a frame, where its scene asked for them (FieldOptions).
 struct FrameTotals {
   int step = 0;
   Units units;                           ///< of all numbers here; below they are named as of SI units
@@ -40,7 +40,7 @@ struct FrameTotals {
   std::vector<double> momentum;          ///< Dim numbers [kg m/s], or none
 };
 
-/// Of each frame in DIR/frames, by step, and its file. Throws InputError where one is unreadable.
+/// Steps of the frames in DIR/frames and their files. Throws InputError where one is unreadable.
 struct ListedFrame {
   std::filesystem::path file;
   FrameTotals totals;

@@ -47,7 +47,7 @@ int step_of_frame(const std::filesystem::path& path);
 /// Datasets of /fields that only a scene which asks for them has.
 constexpr const char* kAskedFields[] = {"contact_force", "friction_force", "reaction_force", "von_mises", "stress"};
 
-/// What an index says of a frame.
+/// Entry of an index for a frame.
 struct FrameSizes {
   double t = 0;                          ///< [s]
   int dim = 0, vertices = 0, cells = 0;  ///< vertices: with the nodes of curved edges
@@ -78,7 +78,7 @@ struct StoredSurface {
   std::vector<std::int64_t> faces;  ///< f x 3
 };
 
-/// What a certificate or a comparison needs of a stored frame. Indices are checked: all within range.
+/// Part of a stored frame that a certificate or a comparison needs. Indices are checked: all within range.
 struct StoredFrame {
   int dim = 0;
   Units units;                          ///< of all numbers here; below they are named as of SI units
@@ -110,7 +110,7 @@ struct StoredField {
   std::vector<double> values;  ///< row-major
 };
 
-/// Those of v, elastic_density and kAskedFields that the frame has.
+/// Reads those of the fields v, elastic_density and kAskedFields that the frame has.
 std::vector<StoredField> read_frame_fields(const std::filesystem::path& path);
 
 }  // namespace itr::output

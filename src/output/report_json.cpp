@@ -83,7 +83,7 @@ std::string remeshing_json(const StepReport& r) {
   return fmt::format(R"("remeshing_momentum":[{}],)", numbers);
 }
 
-/// What a step's line and the summary have in common.
+/// Members that a step's line and the summary share.
 std::string common_members(const StepReport& r) {
   return fmt::format(
       R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"factorizations":{},"linear_solves":{},)"

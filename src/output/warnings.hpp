@@ -18,10 +18,10 @@ class WarningList {
  public:
   /// Passes over what was there before --resume.
   void add(const std::string& text);
-  /// Those that the lines of a steps.jsonl have, into an empty list.
+  /// Restores the warnings in the lines of a steps.jsonl, into an empty list.
   void restore(const std::filesystem::path& log);
   int count() const { return count_; }
-  /// What has come since the last call, as a JSON list; empty: nothing.
+  /// Takes the warnings since the last call, as a JSON list; empty: none.
   std::string take_new();
   /// `"warning_count":3,"warnings":[{"text":"the first of its kind","count":3}]`
   std::string summary_members() const;

@@ -145,7 +145,7 @@ struct Writer::Impl {
                 drawn_nodes(frame), std::move(asked)});
   }
 
-  /// What a checkpoint relies on has to be on the disk before it.
+  /// Brings frames to the disk before the checkpoint that relies on them.
   void sync_frames() {
     constexpr int kFew = 32;
     const int every = std::max(options.skip_frames, 1);

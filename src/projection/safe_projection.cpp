@@ -151,7 +151,7 @@ class InversionGuard final : public Energy {
   std::shared_ptr<const ElasticEnergy<Dim>> elastic_;
 };
 
-/// What must not become worse on the way from the interpolant.
+/// Barriers that must not become worse on the way from the interpolant.
 template <int Dim>
 struct Barriers {
   std::shared_ptr<ElasticEnergy<Dim>> inversion;  ///< asked for steps alone

@@ -184,7 +184,7 @@ class ConstrainedMass {
     }
   }
 
-  /// Of the constraints on a vertex.
+  /// Force of the constraints on a vertex.
   auto force(Eigen::Index v, const Rows& multipliers) const {
     return weights_.row(v).lazyProduct(multipliers.middleRows<Dim + 1>((Dim + 1) * part_[v]));
   }

@@ -10,15 +10,15 @@
 #include <cmath>
 #include <filesystem>
 
+#include "apps/report/report.hpp"
 #include "embed/c_callbacks.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/itr.hpp"
 #include "itr/output/writer.hpp"
-#include "apps/report/report.hpp"
 
 namespace py = pybind11;
 
-/// Of solver modules: in the prefix that the package is installed in (lib/pythonX.Y/site-packages/itr/_itr.so).
+/// Folder of solver modules: in the prefix that the package is installed in (lib/pythonX.Y/site-packages/itr/_itr.so).
 extern "C" const char* itr_installed_backends() {
   static const std::string folder = [] {
     Dl_info info{};
@@ -50,7 +50,7 @@ py::array_t<T> copied(const std::vector<T>& values, int columns) {
   return result;
 }
 
-/// Of values that live as long as `owner` does: no copy, not to be written to.
+/// Shows values that live as long as `owner` does as an array: no copy, not to be written to.
 template <typename Owner>
 py::array_t<double> shared(std::span<const double> values, int columns, Owner owner) {
   const py::capsule base(new Owner(std::move(owner)), [](void* p) { delete static_cast<Owner*>(p); });
@@ -173,7 +173,7 @@ py::object positions(const AnySimulation& s, bool velocities) {
       s.save());
 }
 
-/// Of a step, taken without Python's lock.
+/// Takes a step without Python's lock and returns its outcome.
 template <typename Step>
 py::tuple outcome(const Step& step) {
   itr::StepResult result;

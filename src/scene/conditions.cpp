@@ -198,7 +198,7 @@ class ConditionReader {
     tags.insert(point_tags_.begin(), point_tags_.end());
     return tags_of(node, tags, seen);
   }
-  /// Those of facets: points and obstacles bear no loads.
+  /// Reads tags of facets, since points and obstacles bear no loads.
   std::vector<int> loaded_tags(const Node& node, std::set<int>& seen) {
     const Node id = node["id"];
     if (!is_all(id) && !facet_tags_.contains(read_condition_id(id))) {

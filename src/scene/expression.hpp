@@ -10,7 +10,7 @@
 
 namespace itr::scene {
 
-/// What is wrong with an expression, and where (`what()` has both in words).
+/// Mistake in an expression, and its place (`what()` has both in words).
 class ExpressionError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

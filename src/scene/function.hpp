@@ -24,7 +24,7 @@ struct ValueFunction {
 /// Missing components are 0, extra ones are passed over; `sign` multiplies the value.
 template <int Dim>
 ValueFunction<Dim> read_function(const Node& value, double sign = 1);
-/// The same times a factor of time by component, or one for all; `interpolation` may be absent.
+/// Reads a function times a factor of time by component, or one for all; `interpolation` may be absent.
 template <int Dim>
 ValueFunction<Dim> read_function(const Node& value, const Node& interpolation);
 

@@ -17,7 +17,7 @@ class MeshFiles {
   const MeshFile& get(const Node& geometry);
   static constexpr const char* kMesh = "the path of a mesh file";
   static constexpr const char* kWeights = "the path of an HDF5 file with weights";
-  /// Of the bytes of the file that a value names (FNV-1a), in hexadecimal.
+  /// Hashes the bytes of the file that a value names (FNV-1a), in hexadecimal.
   std::string hash(const Node& name, const char* what);
   /// Its path. InputError there, which expects `what`, if there is no such file.
   static std::filesystem::path find(const Node& name, const char* what);

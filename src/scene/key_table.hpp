@@ -45,7 +45,7 @@ struct RefusedValue {
 };
 std::span<const RefusedValue> refused_values();
 
-/// What a value may be: as the reader checks it and as the schema says it.
+/// Kind of a value, as the reader checks it and as the schema says it.
 struct Kind {
   std::string name;
   void (*check)(const Node&);  ///< null: its reader does
@@ -66,7 +66,8 @@ class KeyTable {
   KeyTable();
   /// Null where there is no such pattern.
   const Entry* find(const std::string& pattern) const;
-  /// Of the value that a pointer of a scene names, or of the list that it is in; null where there is no such key.
+  /// Finds the entry of the value that a pointer of a scene names, or of the list that it is in; null where there is no such
+  /// key.
   const Entry* find_place(const std::string& pointer) const;
   /// Keys that may stand below a pattern, or null if none may.
   const std::set<std::string>* children(const std::string& pattern) const;
@@ -81,7 +82,6 @@ const KeyTable& key_table();
 
 /// The patterns of a row: braces expanded.
 std::vector<std::string> expand(const std::string& pointer);
-/// Of a row's kind.
 Kind kind_of(const Key& key);
 
 }  // namespace itr::scene

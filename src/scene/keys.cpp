@@ -13,7 +13,7 @@ constexpr const char* kPolyfem = "an option of PolyFEM that changes no result he
 constexpr const char* kScheme = "an option of PolyFEM's solvers that changes no converged result";
 constexpr const char* kUnwritten = "output of PolyFEM that is not written here";
 
-// Of what stands in several places.
+// Pointers that stand in several places.
 #define SELECTION "/geometry/*/{volume,surface,point}_selection/*"
 #define CONDITIONS "/boundary_conditions/{dirichlet_boundary,neumann_boundary,pressure_boundary,obstacle_displacements}"
 #define INTERPOLATION CONDITIONS "/*/interpolation/*"

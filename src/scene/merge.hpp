@@ -11,8 +11,7 @@ namespace itr::scene {
 /// override that is no JSON. The result has no `common`, `patch`, `root_path` and no null members.
 Document load_document(const std::filesystem::path& file, const std::vector<Override>& overrides);
 
-/// The same, for a text that a program has made: paths in it are relative to the working directory, `name` is what errors
-/// call it.
+/// Parses a text that a program has made: paths in it are relative to the working directory, and errors call it `name`.
 Document parse_document(const std::string& text, const std::string& name, const std::vector<Override>& overrides);
 
 }  // namespace itr::scene

@@ -63,7 +63,7 @@ class Node {
 
   /// The unit that the table of keys gives the value here, in SI's name; empty: none.
   std::string unit() const;
-  /// The same place, whose numbers and those below are taken as they stand.
+  /// Returns the node with numbers, its own and those below, taken as they stand.
   Node without_units() const;
 
   /// Values with a default for absent ones, in SI units. InputError if the type is another.

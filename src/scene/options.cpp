@@ -58,7 +58,7 @@ void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>
     return;
   }
   const double ratio = duration / options.dt, nearest = std::round(ratio);
-  // Of decimal fractions: 0.07 / 0.01 is a little more than 7.
+  // Decimal fractions are not exact: 0.07 / 0.01 is a little more than 7.
   const bool is_whole = std::abs(ratio - nearest) <= 1e-9 * nearest;
   const double count = is_whole ? nearest : std::ceil(ratio);
   if (count > kMostSteps) dt.fail("at most 1e9 steps");
@@ -214,7 +214,7 @@ void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptio
                             NewtonNorm::euclidean}[nonlinear["norm_type"].choice({"L2", "Linf", "Euclidean"}, 0)];
   const Units& units = root.document().units;
   double gradient_scale = 1, step_scale = 1;
-  // What the scales are multiplied with has the dimension that is missing: a gradient's has that of h^2.
+  // The scales lack a dimension that their tolerances bring: for a gradient, that of h^2.
   double gradient_unit = units.factor("N s^2"), step_unit = units.factor("m");
   if (options.norm != NewtonNorm::euclidean) gradient_unit = units.factor("s^2"), step_unit = 1;
   const auto gradient = [&](const Node& node) { return gradient_scale * gradient_unit * node.non_negative(0); };

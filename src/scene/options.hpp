@@ -9,10 +9,10 @@
 
 namespace itr::scene {
 
-/// Of three dimensions.
+/// Reads the units of length, mass and time.
 Units read_units(const Node& root);
 TimeOptions read_time(const Node& root, std::vector<std::string>& warnings);
-/// What is given, but does nothing as other keys are.
+/// Warns of keys that are given, but do nothing as other keys are.
 void warn_of_idle_keys(const Node& root, const TimeOptions& time, bool has_obstacles, std::vector<std::string>& warnings);
 /// The length that PolyFEM multiplies tolerances with: h, or 1 for statics (CONVENTIONS.md, "Tolerances").
 double characteristic_length(const Node& root, const TimeOptions& time);

@@ -19,7 +19,7 @@ namespace itr::scene {
 
 namespace {
 
-/// Of the surfaces that can touch: the bodies' boundary or its proxy, and the obstacles.
+/// Shortest edge of the surfaces that can touch: the bodies' boundary or its proxy, and the obstacles.
 template <int Dim>
 double shortest_surface_edge(const Setup<Dim>& setup) {
   double shortest = std::numeric_limits<double>::infinity();

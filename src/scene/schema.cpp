@@ -25,7 +25,7 @@ Json object_schema(const std::string& pattern, const std::set<std::string>& chil
   return object;
 }
 
-/// Of the values at a pattern: what check_keys lets pass.
+/// Schema of the values at a pattern: all that check_keys lets pass.
 Json schema_of(const std::string& pattern) {
   const Entry* entry = key_table().find(pattern);
   const std::set<std::string>* children = key_table().children(pattern);
@@ -47,7 +47,7 @@ Json schema_of(const std::string& pattern) {
   return schema;
 }
 
-/// Of a row: where it stands, without the key itself.
+/// Parent of a row's pointer, without the key itself.
 std::string parent_of(const std::string& pointer) {
   int depth = 0;
   for (std::size_t i = pointer.size(); i-- > 0;) {
@@ -78,7 +78,7 @@ std::string row(const Key& key) {
          in_cell(key.meaning) + " |\n";
 }
 
-/// Of a list: what it is was said of the list.
+/// Tells whether a row is of a list's items, which the list's row describes.
 bool is_item(const Key& key) { return std::string(key.pointer).ends_with("/*"); }
 
 std::string tables_of_what_is_read() {
@@ -119,7 +119,7 @@ std::string table_of_basic_keys() {
   return text;
 }
 
-/// What is refused: combinations, values, keys.
+/// Section of refusals: combinations, values, keys.
 std::string section_of_refusals() {
   std::string text =
       "\n## Not there yet\n\nA scene that asks for one of these is refused with a message before anything is computed. "

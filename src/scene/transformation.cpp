@@ -81,7 +81,7 @@ Mat<3> read_rotation(const Node& node, const Mat<3>&) {
   return Eigen::AngleAxisd(kRadians * vector.norm(), vector.normalized()).toRotationMatrix();
 }
 
-/// Of a mesh file [m].
+/// Unit of length of a mesh file [m].
 double unit_of_mesh(const Node& geometry) {
   const std::string unit = geometry["unit"].string("");
   return unit.empty() ? geometry.document().units.factor("m") : Units::length_in_metres(unit);

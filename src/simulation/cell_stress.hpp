@@ -12,7 +12,7 @@ struct CellStress {
   std::vector<double> cauchy;     ///< Dim x Dim a cell, row-major [Pa]
 };
 
-/// Of the present state.
+/// Stress of each cell in the present state.
 template <int Dim>
 CellStress cell_stress(const Simulation<Dim>& simulation);
 

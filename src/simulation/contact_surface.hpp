@@ -23,7 +23,7 @@ template <int Dim>
 ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space = {},
                                  const ChordLevels& levels = {});
 
-/// What can touch in a simulation, and where it is.
+/// Surface that can touch in a simulation, and its positions.
 template <int Dim>
 struct ContactSurface {
   /// Its vertices: the nodes and the points of refined chords, or those of the proxy, then those of the obstacles.

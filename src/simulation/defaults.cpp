@@ -22,7 +22,7 @@ constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, litt
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
 constexpr double kLeastDhat = 0.01;       ///< of that without the gap: what nearly touches presses a little at the start
 constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest
-/// What operations may cost, in split tolerances. Collapses: with less, what contact has left behind stays fine.
+/// Cost that operations may have, in split tolerances. Collapses: with less, meshes stay fine where contact was.
 constexpr double kCollapseShare = 0.01;
 /// Swaps and moves for the sake of the shape: hardly more than round-off, as they gain nothing else.
 constexpr double kShapeShare = 1e-6;
@@ -155,7 +155,7 @@ std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
       split, collapse);
 }
 
-/// Of operations beside splits, from the split's.
+/// Chooses the tolerances of operations beside splits from that of splits.
 void choose_other_tolerances(RemeshOptions& remesh, FollowsStoredEnergy& follows) {
   const double split = *remesh.split.acceptance_tolerance;
   const auto choose = [&](std::optional<double>& tolerance, double share, bool& follows_too) {

@@ -10,7 +10,7 @@
 
 namespace itr {
 
-/// What a solve was of.
+/// Mesh, terms and names that a solve was of.
 template <int Dim>
 struct SolveScope {
   const CellSet<Dim>& cells;
@@ -21,7 +21,7 @@ struct SolveScope {
   const Units& units;  ///< of what is said
 };
 
-/// Of a solve that ended at x: the cell or pair that limits its last step, and the cell, the pair and the term at the
+/// Describes a solve that ended at x: the cell or pair that limits its last step, and the cell, the pair and the term at the
 /// largest residual. `sum`: the terms that were minimised.
 template <int Dim>
 std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary, const EnergySum& sum, const VectorX& x,

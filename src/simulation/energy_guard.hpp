@@ -12,7 +12,7 @@ namespace itr {
 template <int Dim>
 class EnergyGuard {
  public:
-  /// Of a step that starts from `start`. `setup` must outlive this.
+  /// Guards a step that starts from `start`. `setup` must outlive this.
   EnergyGuard(const StepSetup<Dim>& setup, const State<Dim>& start);
   /// Whether the step from `history`, which `problem` describes, may end at x. Always, where implicit Euler takes it.
   bool allows(StepProblem<Dim>& problem, const History& history, const VectorX& x);

@@ -9,9 +9,8 @@
 
 namespace itr {
 
-/// What is wrong with positions of bodies and obstacles, in words, decided exactly; empty: nothing. Cells are positively
-/// oriented everywhere; with contact, surfaces do not cross, and no body or obstacle is inside of a body. Linear in the size
-/// of the mesh but for a tree of its surface.
+/// Finds a violation in positions of bodies and obstacles, in words, decided exactly; empty: none. Cells are positively
+/// oriented everywhere; with contact, surfaces do not cross, and no body or obstacle is inside of a body.
 template <int Dim>
 std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const Space& space = {},
                            const ChordLevels& chords = {});

@@ -9,7 +9,8 @@
 
 namespace itr {
 
-/// What vertices of a patch can touch on their way: their own facets, and all facets and obstacles that come near those.
+/// Surface that vertices of a patch can touch on their way: their own facets, and all facets and obstacles that come near
+/// those.
 template <int Dim>
 struct PatchSurface {
   CollisionSurface surface;  ///< its vertices: those of the patch, then `others`

@@ -35,7 +35,7 @@ bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   return true;
 }
 
-/// The same for cells and facets in a space with curved edges: made anew, since both kinds of each share the mesh's order.
+/// Compares cells and facets in a space with curved edges: made anew, since both kinds of each share the mesh's order.
 template <int Dim>
 bool MeshScope<Dim>::has_cells_of(const Mesh<Dim>& mesh) const {
   const CellSet<Dim> other = whole_mesh(mesh, {}, space);

@@ -8,7 +8,7 @@
 
 namespace itr {
 
-/// What depends on the mesh and on nothing else: problems share it while the mesh stays.
+/// Data that depend on the mesh alone: problems share them while the mesh stays.
 template <int Dim>
 struct MeshScope {
   /// The mesh must be compact.
@@ -28,7 +28,7 @@ struct MeshScope {
   bool has_cells_of(const Mesh<Dim>& mesh) const;
 };
 
-/// What a simulation keeps from step to step, so that it is not made again: it changes no result, only the time.
+/// Data that a simulation keeps from step to step, so that they are not made again: they change no result, only the time.
 template <int Dim>
 struct ProblemCache {
   /// `solver`, a linear::Solver or linear::ReusingSolver, must outlive this.

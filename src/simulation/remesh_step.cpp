@@ -17,7 +17,7 @@ namespace itr {
 
 namespace {
 
-/// Of the mass times the size of the bodies: what round-off explains is not told.
+/// Share of the mass times the size of the bodies that round-off explains: less is not told.
 constexpr double kLossWorthTelling = 1e-12;
 
 /// The bodies' part of a field over bodies and obstacles.
@@ -125,7 +125,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   context.newton = setup.newton;
   context.shortest_edge = tools.initial_edges.shortest;
   context.longest_edge = tools.initial_edges.longest;
-  // Of the convergent form corrections have negative weights: what acts in it may fall below 0.
+  // Corrections of the convergent form have negative weights, so that its energy may fall below 0.
   if (!setup.contact.convergent || energy.contact == 0)
     context.coupling = context.scaling * (energy.contact + energy.friction);
   const int bodies = num_nodes(state.mesh, state.space);

@@ -6,8 +6,8 @@
 
 namespace itr {
 
-/// Of RemeshOptions::relative_tolerance, where the split tolerance follows the energy that is stored so far: that is less
-/// than what bodies can hold, of which the other tolerance is a part.
+/// Share of RemeshOptions::relative_tolerance where the split tolerance follows the energy that is stored so far: that is
+/// less than the energy that bodies can hold, of which the other tolerance is a part.
 inline constexpr double kStoredShare = 0.1;
 
 /// Remeshes state.mesh, around the solution x of `problem`, and carries state.history and x over to the new mesh; `before`

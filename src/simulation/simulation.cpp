@@ -178,7 +178,7 @@ struct Simulation<Dim>::Impl {
     on_mesh_change(describe_change(before.mesh, state->mesh, result.renumbering), before.mesh);
   }
 
-  /// Of the state as it stands.
+  /// Reports the state as it stands.
   StepReport report_of_state() const {
     const Inside inside(*this, Phase::in_step);  // terms and functions of conditions are asked
     StepReport made;
@@ -237,7 +237,7 @@ struct Simulation<Dim>::Impl {
     setup.newton.first_gradient_tolerance = factor * first_newton.first_gradient_tolerance;
   }
 
-  /// Those of a state that no step of this simulation led to.
+  /// Sets the forces of a state that no step of this simulation led to.
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
     const Inside inside(*this, Phase::in_step);
@@ -253,7 +253,7 @@ struct Simulation<Dim>::Impl {
 };
 
 template <int Dim>
-// It is moved: NOLINTNEXTLINE(performance-unnecessary-value-param)
+// NOLINTNEXTLINE(performance-unnecessary-value-param): the setup is moved
 Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger logger) : impl_(std::make_unique<Impl>()) {
   complete(setup, logger);
   impl_->remeshing_is_complete = setup.remesh.enabled;

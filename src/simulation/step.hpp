@@ -7,14 +7,14 @@
 
 namespace itr {
 
-/// Of the mesh that a simulation begins with [m].
+/// Edge lengths of the mesh that a simulation begins with [m].
 struct EdgeLengths {
   double shortest = 0, longest = 0;
 };
 template <int Dim>
 EdgeLengths edge_lengths(const Mesh<Dim>& mesh);
 
-/// What all steps of a simulation share.
+/// Tools that all steps of a simulation share.
 template <int Dim>
 struct StepTools {
   const StepSetup<Dim>& setup;
@@ -31,7 +31,7 @@ template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped = false,
                      State<Dim>* start = nullptr);
 
-/// That, with a step whose solve fails cut into smaller ones, as TimeOptions::step_cuts allows and the logger is told.
+/// Takes a step; one whose solve fails is cut into smaller ones, as TimeOptions::step_cuts allows and the logger is told.
 template <int Dim>
 StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped = false);
 

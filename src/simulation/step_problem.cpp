@@ -322,8 +322,7 @@ double StepProblem<Dim>::change_of(const VectorX& x, const Lagged& now, const F&
   return size > 0 ? change / size : 0;
 }
 
-/// What a step is to say, or to fail for, where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or
-/// nothing.
+/// Warns or fails where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or nothing.
 template <int Dim>
 void StepProblem<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds,
                                      NewtonSummary& summary) {

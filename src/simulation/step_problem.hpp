@@ -45,10 +45,11 @@ class StepProblem {
   NodalForces forces(const VectorX& x);
   /// Forces on bodies that start from x: no step has led there, so that neither reactions, friction nor residual are known.
   NodalForces forces_at_start(const VectorX& x);
-  /// Of all terms but inertia, where the bodies are at x and move with v [N]. Lags what is lagged there.
+  /// Forces of all terms but inertia, where the bodies are at x and move with v [N]. Makes the lagged terms there.
   VectorX total_force(const VectorX& x, const VectorX& v);
-  /// What the integrator (the trapezoidal rule or implicit Euler) adds to the mechanical energy by a step to x [J]: its work
-  /// is a mean of the forces at both ends times the way, the potential's is the integral along it. Friction and loads aside.
+  /// Mechanical energy that the integrator (the trapezoidal rule or implicit Euler) creates by a step to x [J]. Its work is
+  /// a mean of the forces at both ends times the displacement, the potential's the integral along it; friction and loads
+  /// aside.
   double created_energy(const History& history, const VectorX& x);
   /// Kinetic, elastic and contact energy [J].
   double mechanical_energy(const VectorX& x, const VectorX& v);

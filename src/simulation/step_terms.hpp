@@ -15,7 +15,7 @@ namespace itr {
 template <int Dim>
 Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
 
-/// What acts in the step that ends at time t, as every scope of it sees it.
+/// Terms that act in the step that ends at time t, as every scope of it sees them.
 template <int Dim>
 PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t);
 
@@ -33,7 +33,7 @@ std::vector<const DirichletCondition<Dim>*> conditions_by_tag(const StepSetup<Di
 template <int Dim>
 HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space = {});
 
-/// Of the bounding box of the bodies at rest [m].
+/// Diagonal of the bounding box of the bodies at rest [m].
 template <int Dim>
 double rest_diagonal(const Mesh<Dim>& mesh);
 

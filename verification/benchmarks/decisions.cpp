@@ -86,7 +86,7 @@ template <int Dim>
 double bound(Step<Dim>& step, const EdgeKey& edge) {
   return gain_of_vertex<Dim>(step.state, make_split(step.body.mesh, edge), step.scratch);
 }
-/// Of a patch of two rings, refused.
+/// Gain of a trial of a patch of two rings, refused.
 template <int Dim>
 double trial(Step<Dim>& step, const EdgeKey& edge) {
   const auto edit = make_split(step.body.mesh, edge);
@@ -137,7 +137,7 @@ void CheckCollapseInContact(benchmark::State& state) {
   check_collapse<Dim>(state, true);
 }
 
-/// What an accepted split changes: the mesh, fields, strata, and the surface in each stored configuration; the vertices of
+/// Commits an accepted split: it changes the mesh, fields, strata, and the surface in each stored configuration; the vertices of
 /// its cells move.
 template <int Dim>
 void accept(Step<Dim>& step, const EdgeKey& edge, Marks& moved) {

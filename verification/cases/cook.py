@@ -13,7 +13,7 @@ NEEDS = ("dolfinx", "meshio", "h5py", "scipy")
 
 E, NU, TRACTION = 1098500, 0.3, (0, 62500)
 BARS = {300: 0.95, 700: 0.75, 1800: 0.65}
-# What `--case cook` computes on its finest graded mesh (P3, 32 x 32 x 2, grading 2; dolfinx 0.5.2); --quick takes it from here.
+# Energy that `--case cook` computes on its finest graded mesh (P3, 32 x 32 x 2, grading 2; dolfinx 0.5.2); --quick takes it from here.
 STORED_ENERGY = -8568553.102950882
 # Swaps, smoothing, which edges may be split. The bar is for JUDGED; the paper's culling never lets the edges at (48, 60) be
 # tried, where the energy is low but its error large, and is shown for comparison.

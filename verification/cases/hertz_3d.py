@@ -60,7 +60,7 @@ class State:
         self.r = np.linalg.norm(frame.x[here, :2], axis=1)
         self.area, self.pressure = area[here], force[here] / area[here]
         self.force = 4 * float(force[here].sum())
-        # Of Hertz's pressure the mean of r^2 is 2/5 a^2.
+        # The mean of r^2 over Hertz's pressure is 2/5 a^2.
         self.radius = float(np.sqrt(2.5 * (force[here] * self.r**2).sum() / force[here].sum()))
         self.peak = 1.5 * self.force / (np.pi * self.radius**2)
         self.vertices, self.seconds = len(frame.rest), sum(step["processor_seconds"] for step in run.steps)

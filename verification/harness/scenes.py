@@ -33,7 +33,7 @@ def oriented(points, cells):
     return cells
 
 
-# Of a simplex with a node at each edge, in meshio's order.
+# Edges of a simplex with a node at each edge, in meshio's order.
 EDGES = {2: [(0, 1), (1, 2), (0, 2)], 3: [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]}
 
 

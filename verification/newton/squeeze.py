@@ -50,7 +50,7 @@ CASES = [
     ("ball on spikes, to t = 0.45", "spikes3d/drop-ball-noremesh-nref0.json", ["/time/tend=0.45"], True),
 ]
 
-# Of stored counts. Round-off of another compiler sends a squeezed body another way: the bound is no tighter than that.
+# Factors of stored counts. Round-off of another compiler sends a squeezed body another way: the bound is no tighter than that.
 MARGIN = {"iterations": 1.15, "factorizations": 1.15, "worst": 1.5}
 
 REACH = 1e-3  # [m], a scene's default of /contact/dhat

@@ -125,7 +125,7 @@ CURVE_WAYS = [("linear", NO_SWAPS), ("linear, swaps and smoothing", SWAPS), ("cu
               ("curved, swaps and smoothing", ["/space/remesh/curve/enabled=true", *SWAPS])]
 OPERATIONS = ("splits", "curves", "straightens", "collapses", "swaps", "smooths")
 
-# What a case has to reach: least gain [J] (0.8 of the reference's); energy of the last step [J], at most or (value, relative
+# Bars of a case: least gain [J] (0.8 of the reference's); energy of the last step [J], at most or (value, relative
 # deviation); most vertices there; and most processor seconds a step over those of another case, which neither a slow machine
 # nor a busy one changes much.
 BARS = {
@@ -222,7 +222,7 @@ def run(case, options):
         "parts_over_total": parts / total,
         "newton": sum(s["newton_iterations"] for s in steps), "vertices_first": lines[0]["vertices"], "vertices": last["vertices"],
         "energy_total": last["energy"]["total"],
-        # What the projection forgot is lower energy, too, but nothing gained.
+        # The projection's loss lowers the energy, too, but is no gain.
         "gain": sum(s["energy_before_remesh"] - s["energy"]["total"] - s["history_loss"] for s in steps),
         "history_loss": sum(s["history_loss"] for s in steps),
         "trials": sum(counted(s, "relaxed") for s in steps), "accepted": sum(counted(s, "accepted") for s in steps),

@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 from harness import stored  # noqa: E402
 
 STORE = HERE / "references.json"
-# What a clock, the machine or the name of the run decides.
+# Keys that a clock, the machine or the name of the run decides.
 NOT_RESULTS = {"seconds", "processor_seconds", "peak_rss_mb", "trial_seconds", "wall_seconds", "versions", "threads", "scene",
                "itr", "commit", "folder", "host"}
 NOT_BITS = {"checkpoint/totals", "checkpoint/factor_record", "digests"}

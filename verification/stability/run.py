@@ -31,7 +31,7 @@ TIME_LIMIT = 300  # of a run [s]; a limit on processor time would make the kerne
 OTHER_SOLVER = "cholmod:supernodal"
 CERTIFIED, NOT_CERTIFIED = 0, 4  # exit statuses of `itr certify`
 ENERGY_BAR = 1e-6    # growth in a step, by the largest energy of motion, strain and contact so far
-# The same of driven scenes: the forces at the ends of a step bracket its work only where they change one way within it. Over a sharp
+# Growth allowed in driven scenes: the forces at the ends of a step bracket its work only where they change one way within it. Over a sharp
 # corner they do not: 1.3 % there, 0.005 % in steps half as long.
 DRIVEN_ENERGY_BAR = 2e-2
 BALANCE_BAR = 1e-3   # of momentum and forces, by the sum of the forces' sizes

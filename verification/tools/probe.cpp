@@ -99,7 +99,7 @@ void write_matrices(const Setup<Dim>& setup, const MatrixX& displacement, const 
   write_array(folder + "/energy.mtx", MatrixX::Constant(1, 1, elastic.value(x, workspace)));
 }
 
-/// What a TransferMesh refers to.
+/// Mesh and nodes that a TransferMesh refers to.
 template <int Dim>
 struct Body {
   std::vector<Vec<Dim>> rest;

@@ -34,7 +34,7 @@ void parallel_blocks(std::size_t n, std::size_t block, const std::function<void(
 /// Sum of body(begin, end) over the same blocks, added in block order.
 double parallel_sum(std::size_t n, std::size_t block, const std::function<double(std::size_t, std::size_t)>& body);
 
-// The same of any callable object, of which std::function would allocate a copy.
+// Runs any callable object over blocks; std::function would allocate a copy of it.
 template <typename Body>
 void parallel_blocks(std::size_t n, std::size_t block, const Body& body) {
   parallel_blocks(n, block, std::function<void(std::size_t, std::size_t)>(std::cref(body)));

@@ -20,7 +20,7 @@ class Units {
   static std::vector<std::string> length_names();
   static std::vector<std::string> mass_names();
   static std::vector<std::string> time_names();
-  /// Of one of length_names() [m].
+  /// Length of one of length_names() [m].
   static double length_in_metres(const std::string& name);
 
   int dim = 3;            ///< of the scene
@@ -30,7 +30,7 @@ class Units {
   const std::string& mass() const { return mass_.name; }
   const std::string& time() const { return time_.name; }
 
-  /// One of the scene's units of this kind in SI units; 1 for "" and "deg".
+  /// Factor from the scene's unit of this kind to SI units; 1 for "" and "deg".
   double factor(std::string_view unit) const;
   double to_si(double value, std::string_view unit) const { return is_si_ ? value : value * factor(unit); }
   double from_si(double value, std::string_view unit) const { return is_si_ ? value : value / factor(unit); }

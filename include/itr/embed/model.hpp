@@ -35,9 +35,9 @@ class Model {
   /// id a cell. Without ids all cells belong to body 0.
   void set_mesh(std::span<const double> vertices, std::span<const int> cells, std::span<const int> bodies = {});
 
-  /// The same for quadratic cells, which have a node at the middle of each edge: 6 nodes in 2D (edges 01, 12, 20), 10 in 3D
-  /// (01, 12, 20, 03, 13, 23), as in VTK and meshio. Vertices keep their order. Throws InputError for a node off the middle
-  /// of its edge. Sets the option /space/discr_order to 2.
+  /// Sets quadratic cells, which have a node at the middle of each edge: 6 nodes in 2D (edges 01, 12, 20), 10 in 3D (01, 12,
+  /// 20, 03, 13, 23), as in VTK and meshio; vertices keep their order, and /space/discr_order becomes 2. Throws InputError
+  /// for a node off the middle of its edge.
   void set_quadratic_mesh(std::span<const double> nodes, std::span<const int> cells, std::span<const int> bodies = {});
 
   /// Names facets of the mesh's boundary, `dimension` vertices each in any order, and returns their id. A facet belongs to

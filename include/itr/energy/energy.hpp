@@ -76,9 +76,9 @@ class EnergySum final : public Energy {
   void add_gradient_and_sizes(ConstVectorView x, VectorView gradient, VectorView sizes, Workspace& workspace) const override;
   double value_round_off(ConstVectorView x, Workspace& workspace) const override;
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
-  /// Those of the one term that can tell; false where another cuts dx short.
+  /// Asks the one term that can tell; false where another cuts dx short.
   bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
-  /// Of the first term that can tell.
+  /// Asks the first term that can tell.
   bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
                      Workspace& workspace) const override;
 

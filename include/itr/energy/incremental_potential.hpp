@@ -44,7 +44,7 @@ class IncrementalPotential {
     std::vector<std::shared_ptr<const Energy>> damping, contact_damping;
     std::shared_ptr<const Energy> follower;
   };
-  /// Those lagged at x.
+  /// Makes the terms that are lagged at x.
   Lagged lag(ConstVectorView x, Workspace& workspace) const;
   std::shared_ptr<const Energy> lag_friction(ConstVectorView x, Workspace& workspace) const;
   bool has_friction() const;

@@ -21,7 +21,7 @@ constexpr double near_vertex() {
   return 0.5854101966249685;
 }
 
-/// What acts on a body at one time: functions of rest position, which several threads may call at once.
+/// Loads on a body at one time: functions of rest position, which several threads may call at once.
 template <int Dim>
 struct Loads {
   std::function<Vec<Dim>(const RestPoint<Dim>& X)> acceleration;  ///< body force by mass [m/s^2]; empty: none

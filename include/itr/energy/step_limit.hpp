@@ -6,7 +6,7 @@
 
 namespace itr {
 
-/// What limits a step most: asked for where a solve failed, to say why.
+/// Tightest limit of a step: asked for where a solve failed, to say why.
 struct StepLimit {
   double step = 1;            ///< share of the step that it leaves; 1: nothing limits it
   std::string kind;           ///< "cell", "vertex-edge pair", "vertex-triangle pair" or "edge-edge pair"

@@ -72,7 +72,7 @@ struct Stencils {
   bool operator==(const Stencils&) const = default;
 };
 
-/// Those of the straight elements, then those of the curved ones.
+/// Kinds of elements, in their order in a CellSet.
 enum ElementKind { kStraight, kCurved };
 template <int Dim>
 std::vector<Stencils> element_stencils(const CellSet<Dim>& cells) {
@@ -126,7 +126,7 @@ Eigen::Matrix<double, Dim, Dim + 1> barycentric_gradients(const Mat<Dim>& invers
   return gradients;
 }
 
-/// One of them.
+/// Gradient of the barycentric coordinate of corner k.
 template <int Dim>
 Vec<Dim> barycentric_gradient(const Mat<Dim>& inverse_edges, int k) {
   if (k == 0) return -inverse_edges.colwise().sum().transpose();

@@ -24,7 +24,7 @@ struct DofMap {
 
   /// Numbers the dofs that are not `held` in ascending order.
   static DofMap from_held(const std::vector<char>& held);
-  /// The same in place.
+  /// Holds components in place.
   void hold(const std::vector<char>& held);
 };
 
@@ -41,7 +41,7 @@ class SparseAssembler {
   void begin();
   /// Adds to entry (row, column), row >= column.
   void add(int row, int column, double value);
-  /// Of base stencils of one kind.
+  /// Number of base stencils of one kind.
   std::size_t num_stencils(std::size_t kind) const { return kind < stencils_.size() ? stencils_[kind].count() : 0; }
   /// Adds the blocks (column-major, side dim * size) of base stencils of one kind from `first`, a multiple of kBatch, to the
   /// end of its batch.
@@ -51,7 +51,7 @@ class SparseAssembler {
   /// from the stencil and `block`: adds the sum that was kept, if it is of these and the stencils are still those that it
   /// was kept with.
   bool add_kept(std::size_t kind, std::span<const double> factors, std::span<const double> block);
-  /// What is added between the two (to entries of the base pattern only) is kept as the sum of these.
+  /// Begins and ends a part, added to entries of the base pattern only, that is kept as the sum of these blocks.
   void begin_keeping();
   void end_keeping(std::size_t kind, std::span<const double> factors, std::span<const double> block);
 
@@ -65,11 +65,11 @@ class SparseAssembler {
     int column, row;
     double value;
   };
-  /// Of a batch: for entry `nonzero[k]` of the base, the numbers `source[offset[k]..offset[k + 1])` of the blocks.
+  /// Sources of a batch: for entry `nonzero[k]` of the base, the numbers `source[offset[k]..offset[k + 1])` of the blocks.
   struct Gather {
     std::vector<int> nonzero, offset, source;
   };
-  /// What was kept, by the base's entries, and what it is the sum of; without factors: nothing is kept.
+  /// Kept part, by the base's entries, and the blocks that it is the sum of; without factors: nothing is kept.
   struct Kept {
     std::vector<double> sum, factors, block;
   };
@@ -141,7 +141,7 @@ class HessianSink {
   void add_elements(const CellSet<Dim>& cells, const Fill& fill) {
     add_blocks<Dim>(kStraight, cells.elements, fill);
   }
-  /// The same for each curved element, by `fill(e, nodes, block)`: only entries of these nodes count, the others are zero.
+  /// Adds each curved element by `fill(e, nodes, block)`: only entries of these nodes count, the others are zero.
   template <int Dim, typename Fill>
   void add_curved_elements(const CellSet<Dim>& cells, const Fill& fill) {
     const auto& elements = cells.curved_elements;

@@ -13,7 +13,8 @@ namespace itr {
 
 enum class MassKind { consistent, lumped };
 
-/// Of an element of mass m = rho |e| [kg]: consistent m (1 + delta_ij) / ((d + 1) (d + 2)), lumped m delta_ij / (d + 1).
+/// Mass matrix of an element of mass m = rho |e| [kg]: consistent m (1 + delta_ij) / ((d + 1) (d + 2)), lumped m delta_ij /
+/// (d + 1).
 template <int Dim>
 struct ElementMass {
   double off;    ///< entries off the diagonal
@@ -57,7 +58,7 @@ Mat<kQuadraticNodes<Dim>> quadratic_mass(MassKind kind, CurvedEdges curved, std:
   return Mat<kQuadraticNodes<Dim>>((total / diagonal.sum() * diagonal).asDiagonal());
 }
 
-/// The same of constant density, integrated once in a program.
+/// Mass matrix of constant density, integrated once in a program.
 template <int Dim>
 const Mat<kQuadraticNodes<Dim>>& constant_quadratic_mass(MassKind kind, CurvedEdges curved) {
   using Matrices = std::array<Mat<kQuadraticNodes<Dim>>, kAllCurved<Dim> + 1>;

@@ -22,7 +22,7 @@ class VertexMap {
   /// Adds to the gradient with respect to x of a function of y its gradient with respect to y.
   void add_gradient(ConstVectorView gradient, VectorView result) const;
 
-  /// What a vertex of y follows from.
+  /// Vertices of x that a vertex of y follows from, and their weights.
   std::span<const int> sources(int vertex) const { return {weights_.innerIndexPtr() + first(vertex), count(vertex)}; }
   std::span<const double> weights(int vertex) const { return {weights_.valuePtr() + first(vertex), count(vertex)}; }
 

@@ -49,7 +49,7 @@ Mat<4 * Dim> pair_distance_hessian(PairKind kind, const Vec<Dim>* x);
 template <int Dim>
 Eigen::Matrix<double, 4 * Dim, Dim + 2> pair_distance_range(PairKind kind, const PairDistance<Dim>& pair);
 
-/// What the boxes around a pair's two primitives leave of their squared distance: never more than it.
+/// Squared distance of the boxes around a pair's two primitives: never more than theirs.
 template <int Dim>
 double box_distance_squared(PairKind kind, const Vec<Dim>* x);
 

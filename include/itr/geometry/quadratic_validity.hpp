@@ -37,7 +37,7 @@ bool varies_little(const QuadraticCell<Dim>& x, double most);
 template <int Dim>
 double max_positive_step(const QuadraticCell<Dim>& x, const QuadraticCell<Dim>& dx, double tolerance = 0.01);
 
-/// The same as is_positive_everywhere in exact arithmetic, with more subdivisions.
+/// Decides is_positive_everywhere in exact arithmetic, with more subdivisions.
 template <int Dim>
 bool is_positive_everywhere_exact(const QuadraticCell<Dim>& x);
 

@@ -34,7 +34,7 @@ class Registry {
  public:
   /// A table of the built-in solvers. Modules are searched for on first use of another name, and by list().
   Registry();
-  /// The same, with modules searched for in these folders only.
+  /// Searches for modules in these folders only.
   explicit Registry(std::vector<std::filesystem::path> folders);
   ~Registry();
   Registry(Registry&&) noexcept;

@@ -10,7 +10,7 @@
 
 namespace itr::linear {
 
-/// What a factor was made of.
+/// Matrix that a factor was made of.
 struct FactoredMatrix {
   std::shared_ptr<const SparsityPattern> pattern;  ///< never null
   std::vector<double> values;
@@ -30,7 +30,7 @@ struct FactorRecord {
   int pause = 0, next_pause = 1;                 ///< systems that are not tried, now and after the next failure
 };
 
-/// Of all systems since the start.
+/// Counts over all systems since the start.
 struct SolveCounts {
   int factorizations = 0;
   int solves = 0;      ///< systems that were solved

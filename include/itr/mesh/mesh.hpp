@@ -175,8 +175,8 @@ class Mesh {
   const Facet& facet(FacetId f) const { return facets_[f]; }
   int facet_tag(FacetId f) const { return facet_tag_[f]; }
   void set_facet_tag(FacetId f, int tag) { facet_tag_[f] = tag; }
-  /// Of a vertex of the boundary by itself, whatever its facets' tags are. Edits never move nor remove one that has a tag,
-  /// and tag what they put on a boundary edge between two of one tag.
+  /// Tag of a boundary vertex by itself, whatever its facets' tags are. Edits never move nor remove a vertex with a tag, and
+  /// give the tag to a new one on a boundary edge between two that share it.
   int vertex_tag(VertexId v) const { return vertex_tag_[v]; }
   void set_vertex_tag(VertexId v, int tag) { vertex_tag_[v] = tag; }
   /// The tag of both ends of an edge of the surface, all of which conditions with that tag hold; else kNoTag.

@@ -47,7 +47,7 @@ class Strata {
 
   Strata() = default;  ///< not found yet
   explicit Strata(const Mesh<Dim>& mesh, double flatness = kFlatness);
-  /// What find_misfit() says of it decides whether it may be asked.
+  /// Takes a record over; find_misfit() says whether it fits the mesh.
   explicit Strata(const Record& record);
   Record record() const;
   bool empty() const { return vertices_.empty(); }
@@ -82,7 +82,7 @@ class Strata {
   void compact(const typename Mesh<Dim>::Renumbering& map);
   /// First disagreement with what the mesh consists of, in words: a vertex or facet too many or without a patch.
   std::string find_misfit(const Mesh<Dim>& mesh) const;
-  /// That, or with where the mesh is: a vertex off its patch's plane, a facet folded over.
+  /// Finds a misfit, or a vertex off its patch's plane, or a facet folded over.
   std::string find_defect(const Mesh<Dim>& mesh) const;
 
  private:

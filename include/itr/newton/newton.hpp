@@ -48,7 +48,7 @@ class NewtonSystem {
   virtual linear::SystemReport factorize(const Shift& shift) = 0;
   /// Solves with the matrix that was given last.
   virtual linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) = 0;
-  /// The same for every column of B, each on its own unless a system knows better. False where one fails.
+  /// Solves for every column of B, each on its own unless a system knows better. False where one fails.
   virtual bool solve_columns(const MatrixX& B, MatrixX& X);
   /// Whether solve and factorize tell of every matrix that is not positive definite.
   virtual bool tells_definiteness() const { return true; }
@@ -157,7 +157,7 @@ struct NewtonSummary {
   void add_effort(const NewtonSummary& other);
 };
 
-/// What a solve may be given beside its options.
+/// Inputs that a solve may have beside its options.
 struct NewtonExtras {
   std::span<const double> norm_weights{};  ///< D of NewtonNorm by dof; may be empty for the Euclidean one
   /// Called with each accepted iterate; says whether it changed the energy.

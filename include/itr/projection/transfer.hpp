@@ -18,7 +18,7 @@ struct TransferMesh {
   std::span<const Vec<Dim>> rest;                   ///< of vertices and nodes [m]
   std::span<const std::array<int, Dim + 1>> cells;  ///< positive volumes
   std::span<const double> density;                  ///< [kg/m^Dim] a cell
-  /// Of cells with curved edges, as those of a CellSet; both empty where no cell has any.
+  /// Nodes and curved edges of cells, as those of a CellSet; both empty where no edge is curved.
   std::span<const std::array<int, kQuadraticNodes<Dim>>> nodes{};
   std::span<const CurvedEdges> curved{};
 

@@ -61,7 +61,8 @@ struct StepContext : PotentialTerms<Dim> {
   std::map<int, std::array<bool, Dim>> held_components;  ///< by tag of facets and vertices
   NewtonOptions newton;
   double shortest_edge = 0, longest_edge = 0;  ///< of the initial mesh [m]
-  /// Of the terms between bodies, contact and friction, in the solution that is remeshed [J s^2]; infinity: not known.
+  /// Energy of the terms between bodies, contact and friction, in the solution that is remeshed [J s^2]; infinity: not
+  /// known.
   double coupling = std::numeric_limits<double>::infinity();
 
   struct ObstacleGeometry {

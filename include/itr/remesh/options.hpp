@@ -91,7 +91,7 @@ struct RemeshOptions {
   Screening screening = Screening::bounds;
   HistoryRule history = HistoryRule::function;
 
-  /// Of curves and of straightenings [J], filled in.
+  /// Tolerances of curves and of straightenings [J], filled in.
   double curve_tolerance() const { return curve.acceptance_tolerance.value_or(split.acceptance_tolerance.value()); }
   double straighten_tolerance() const {
     return straighten.acceptance_tolerance.value_or(collapse.acceptance_tolerance.value());

@@ -46,8 +46,8 @@ struct StepReport {
   int indefinite = 0;         ///< factorised Hessians with negative eigenvalues, where the solver tells
   EnergyReport energy;
   double energy_before_remesh = 0;  ///< total after the first solve [J]
-  /// What the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]: not
-  /// gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
+  /// Energy that the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]:
+  /// not gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
   double history_loss = 0;
   /// By body that edits touched: momentum that they changed, as impulses over the step. The rate of momentum (the
   /// acceleration of the integrator, from the momenta that were reported) times dt is that of the forces plus these. Empty
@@ -73,7 +73,7 @@ struct StepReport {
   /// Adds the effort of what came before: iterations, operations, forgotten history and momentum, damped and cut steps,
   /// seconds, processor seconds.
   void add_effort(const StepReport& before);
-  /// Of a mesh that was dropped: none of the operations was accepted.
+  /// Forgets the operations of a mesh that was dropped: none of them was accepted.
   void forget_operations();
 };
 
@@ -90,9 +90,9 @@ struct NodalForces {
   std::vector<MomentumChange> remeshing;        ///< StepReport::remeshing by dt: forces [N] and moments [N m]
 };
 
-/// What acts on a ForceTarget: on each line force (Dim numbers) [N] and moment (1 in 2D, 3 in 3D) [N m], of contact,
-/// friction, reactions, all (with tractions, pressures and what the program adds), body forces, the residual, and what edits
-/// changed of the momentum of its bodies.
+/// Forces on a ForceTarget: on each line force (Dim numbers) [N] and moment (1 in 2D, 3 in 3D) [N m], of contact, friction,
+/// reactions, all (with tractions, pressures and forces of the program), body forces, the residual, and the momentum of its
+/// bodies that edits changed.
 struct ForceCurvePoint {
   std::string name;
   std::array<std::vector<double>, 7> kinds;  ///< the last three are empty where a stored frame does not have them

@@ -164,7 +164,7 @@ struct Setup : StepSetup<Dim> {
   ///   millionth.
   /// - A shortest edge to split that is left open becomes 1e-6 of the bodies' diagonal.
   std::vector<std::string> choose_defaults();
-  /// The same for the whole setup, mesh included. A Simulation calls it.
+  /// Validates the whole setup, mesh included. A Simulation calls it.
   void validate() const;
 };
 

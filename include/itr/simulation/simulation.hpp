@@ -65,7 +65,7 @@ struct Snapshot {
   std::shared_ptr<const void> owner;  ///< names the simulation that saved it
 };
 
-/// What a step calls (listeners of iterations, terms, functions of conditions, the log) sees the state before the step,
+/// Callbacks of a step (listeners of iterations, terms, functions of conditions, the log) see the state before the step,
 /// which the step does not write to, and may save it. To step, to restore and to change conditions from there is an
 /// InputError; a listener of mesh changes, called when the step is done, may change conditions.
 template <int Dim>

@@ -44,9 +44,9 @@ class TimeIntegrator {
   /// The positions at which the velocity would vanish: v = velocity_rate * (x - reference).
   VectorX velocity_reference(const History& history) const;
 
-  /// Of the positions x.
+  /// Velocity at the positions x.
   VectorX velocity(const VectorX& x, const History& history) const;
-  /// Of the newest positions plus `increment`, without the round-off of positions.
+  /// Velocity at the newest positions plus `increment`, without the round-off of positions.
   VectorX velocity_after(const VectorX& increment, const History& history) const;
   VectorX acceleration(const VectorX& v, const History& history) const;
   /// Makes x the newest state; `increment` is x minus the newest positions, before it was rounded.

@@ -184,7 +184,8 @@ class Explanation {
     return pairs;
   }
 
-  /// Of the elements; contact adds to it. Held vertices that move through contact are counted as held.
+  /// Traits of the matrix that the elements give; contact adds to it. Held vertices that move through contact are counted as
+  /// held.
   linear::MatrixTraits unknowns() {
     const Space& space = simulation_.state().space;
     const auto held = held_dofs(setup_, setup_.mesh, setup_.time.t0 + setup_.time.dt, space).held;

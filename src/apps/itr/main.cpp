@@ -80,7 +80,7 @@ int forces(const std::string& directory) {
   return cli::done;
 }
 
-/// What `run` and `explain` are told of a scene.
+/// Adds the options of a scene that `run` and `explain` share.
 void add_scene_options(CLI::App& command, cli::RunOptions& options, std::vector<std::string>& sets) {
   command.add_option("scene", options.scene, "scene file (JSON), see SCENES.md")->required();
   command.add_option("-o,--output", options.directory, "result folder (default: the scene's, or results/<scene>)");

@@ -8,7 +8,7 @@
 
 namespace itr::cli {
 
-/// What the launcher's environment says of this process: it is known before any MPI library is loaded.
+/// Place of this process among the launcher's, from its environment: known before any MPI library is loaded.
 struct Launch {
   int rank = 0, ranks = 1;
 };

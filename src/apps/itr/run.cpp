@@ -107,7 +107,7 @@ std::string describe_refusals(const OperationCount& count, const char* name) {
   return text;
 }
 
-/// What remeshing did, and where it did nothing why.
+/// Says how much remeshing did, and where it did nothing why.
 std::string describe_remeshing(const StepReport& totals, const Units& units, int vertices_before, double split_tolerance,
                                double best_refused) {
   const auto count = [](const OperationCount& c, const char* name) {

@@ -15,7 +15,7 @@ class Warnings {
  public:
   /// Says it after "warning:", the first times that there is one of its kind, and passes it on to the writer.
   void add(std::string_view text);
-  /// What was said before the writer was there goes to it, too.
+  /// Passes warnings on to the writer, also those from before it was there.
   void set_writer(output::Writer* writer);
 
  private:

@@ -416,8 +416,8 @@ void FrameEncoder::add_cell_fields(const std::vector<StoredField>& fields, const
 
 namespace {
 
-/// What is left of codes after what is known predicts them: the frames before, along a line if `by_line`, or for what is new
-/// the code before it.
+/// Predicts codes and keeps the differences: from the frames before, along a line if `by_line`, or for new ones from the
+/// code before.
 class Predictor {
  public:
   Predictor(int ids, bool by_line) : last_(ids), before_(ids), by_line_(by_line) {}

@@ -121,7 +121,7 @@ class Eye {
   Point forward_, right_, up_;
 };
 
-/// What is left of a colour where light falls from beside the eye.
+/// Dims a colour where light falls from beside the eye.
 Colour lit(const Colour& colour, const std::array<Point, 3>& p) {
   Point a, b, n;
   for (int k = 0; k < 3; ++k) a[k] = p[1][k] - p[0][k], b[k] = p[2][k] - p[0][k];

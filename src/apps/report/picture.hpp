@@ -20,7 +20,7 @@ inline constexpr std::array<std::array<int, 3>, 9> kColourMap = {{{68, 1, 84},
                                                                   {170, 220, 50},
                                                                   {253, 231, 37}}};
 
-/// What solids are looked at from: angles [degree] about the y axis from z, and above the plane.
+/// Angles from which solids are seen [degree]: about the y axis from z, and above the plane.
 inline constexpr double kAzimuth = 35, kElevation = 20;
 
 /// PNG of the bodies' surface, or cells in 2D, coloured by values of cells, and of obstacles; `low` and `high`: the box to

@@ -14,7 +14,7 @@ struct ReportOptions {
   bool certify = false;  ///< re-checks all stored frames, see certify.hpp, and says so in the page
 };
 
-/// What the file has, and what was left out for its size.
+/// Contents of the file, and what was left out for its size.
 struct ReportSummary {
   int frames = 0, stored = 0;
   double mb = 0;                   ///< of the file, 10^6 bytes

@@ -145,7 +145,7 @@ std::string in_words(const Verdict& verdict) {
   return text + ".";
 }
 
-/// Of the runs with dt and dt/2, against what the mesh leaves.
+/// Compares the runs with dt and dt/2, beside the error of the mesh.
 std::string time_step_answer(const Results& results, const Measure& measure) {
   std::vector<const Row*> steps;
   const Row* space = nullptr;
@@ -249,7 +249,7 @@ std::string choices_table(const Results& results) {
     for (int step = 0; step > -3 * kDecades; --step) {
       const double target = ladder_below(candidates.front().error, step);
       const auto cost = uniform.cost_at(target);
-      // What remeshing's run takes is compared with what a uniform mesh of that error would: so do the answers.
+      // Answers compare remeshing's run with a uniform mesh of its error, as this does.
       const auto is_chosen = [&](const Point& p) {
         return p.error <= target && (is_uniform(*p.row) || !cost || p.cost < *cost);
       };

@@ -11,7 +11,7 @@
 
 namespace itr::cli::study {
 
-/// What one series costs against uniform refinement at equal error: with linear elements, and with quadratic ones.
+/// Cost of one series against uniform refinement at equal error: with linear elements, and with quadratic ones.
 struct Verdict {
   struct Point {
     std::string run;

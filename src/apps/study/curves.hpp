@@ -16,27 +16,27 @@ struct Point {
   double error, cost;
 };
 
-/// Of these series (none: of all that are compared with the reference and vary the mesh), the largest error first. Runs that
-/// are not certified or that flies() names have none, nor has the reference.
+/// Points of these series (none: of all that are compared with the reference and vary the mesh), the largest error first.
+/// Runs that are not certified or that flies() names have none, nor has the reference.
 std::vector<Point> points(const Results& results, const std::vector<std::string>& series, const Measure& measure,
                           const Cost& cost);
-/// The same with those whose errors are not told, at what the reference is worth: they reach that, if not less.
+/// Points with runs whose errors are not told, at the reference's worth: they reach it, if not less.
 std::vector<Point> points_reached(const Results& results, const std::vector<std::string>& series, const Measure& measure,
                                   const Cost& cost);
 
-/// Those that no other run beats in both.
+/// Points that no other run beats in both.
 std::vector<Point> front(const std::vector<Point>& all);
 
-/// What an error costs, by straight lines in logarithms; the cheapest run's cost for larger errors; none for smaller ones.
+/// Cost of an error, by straight lines in logarithms; the cheapest run's cost for larger errors; none for smaller ones.
 std::optional<double> cost_at(const std::vector<Point>& front, double error);
 
-/// Of the logarithm of the error over that of the cost; NaN where all cost the same.
+/// Slope of the logarithm of the error over that of the cost; NaN where all cost the same.
 double slope(const std::vector<Point>& all);
 
 /// Uniform refinement with linear elements: `uniform` and, for boxes in 3D, `rows`.
 const std::vector<std::string>& linear_uniform();
 
-/// Those that answers are about; the others are in tables and plots.
+/// Tells whether answers are about a measure; the others are in tables and plots.
 bool is_judged(const Measure& measure);
 
 /// "0.12 %", "3.1 J"

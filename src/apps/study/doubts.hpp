@@ -11,7 +11,7 @@ namespace itr::cli::study {
 
 inline constexpr double kLargeError = 0.5;  ///< of the reference's size: beyond it a run is no approximation
 
-/// Of a series, fitted over its runs: error = C * size^in_size, error = C * seconds^-in_seconds.
+/// Orders of a series, fitted over its runs: error = C * size^in_size, error = C * seconds^-in_seconds.
 struct Order {
   std::string series, measure;
   double in_size = 0, in_seconds = 0;

@@ -78,7 +78,7 @@ class Source {
       setup.remesh.enabled = true;
       setup.choose_defaults();
       remesh = setup.remesh;
-      // What remeshing would choose holds for all runs: they are to have one limit.
+      // Remeshing's choice holds for all runs: they are to have one limit.
       const double unit = setup.contact.convergent ? units.factor("Pa") : units.factor("J") / std::pow(units.factor("m"), 4);
       if (is_open)
         pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness / unit)}};
@@ -176,7 +176,7 @@ Overrides with_tolerance(const Source& source, const Series& series, double tole
   return all;
 }
 
-/// The same end in steps of dt / parts.
+/// Reaches the same end in steps of dt / parts.
 Overrides with_time_step(const Source& source, int parts, int skip) {
   Overrides all = {{"/output/paraview/skip_frame", std::to_string(skip * parts)}};
   if (source.has("/time/dt"))

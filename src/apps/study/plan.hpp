@@ -58,7 +58,7 @@ struct Plan {
   bool is_static = false;   ///< its t is 1, whatever the unit of time
   bool is_dynamic = false;  ///< has kinetic energy and momentum
   bool has_contact = false, has_friction = false;
-  /// What the others are compared with: the first of these that splits anything; none where Options::reference is.
+  /// Runs to compare with: the first of these that splits anything; none where Options::reference is.
   std::vector<PlannedRun> references;
   std::vector<PlannedRun> runs;  ///< without these
   std::string finest;            ///< uniform level; compared with where no reference finishes

@@ -16,7 +16,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Of the scene's size. A body in motion may well leave the place; one in equilibrium that does is held by nothing.
+// Sizes of the scene that count as flight. A body in motion may well leave the place; one in equilibrium that does is held
+// by nothing.
 constexpr double kFlight = 1, kFlightWithInertia = 100;
 
 const char* status(const Row& row) {

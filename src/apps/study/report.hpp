@@ -47,7 +47,7 @@ struct Results {
 bool is_against_reference(const Row& row);
 /// An error that is not below what the reference is worth; none where it is, or where there is none.
 std::optional<double> told_error(const Results& results, const Row& row, const Measure& measure);
-/// The same as a share of the reference's size; none for measures without one.
+/// Error as a share of the reference's size; none for measures without one.
 std::optional<double> relative_error(const Results& results, const Row& row, const Measure& measure);
 /// Within a scene's size, as far as that can be seen: nothing holds a body that leaves it.
 bool flies(const Results& results, const Row& row);

@@ -65,7 +65,7 @@ std::vector<Moment> read_moments(const fs::path& folder, const Plan& plan) {
   return moments;
 }
 
-/// What identifies the frames of a folder, for as long as nobody writes there.
+/// Text that identifies the frames of a folder, for as long as nobody writes there.
 std::string stamp(const std::vector<Moment>& moments) {
   std::string text;
   for (const auto& moment : moments)

@@ -17,13 +17,13 @@ struct Errors {
   double surface = 0;     ///< largest Hausdorff distance of the bodies' boundaries [m]
   double energy = 0;      ///< root mean square over time: kinetic, elastic, of loads and of contact together [J]
   double momentum = 0;    ///< the same [kg m/s]; both NaN where a run's frames lack kinetic energy or momentum
-  /// What errors of the energy are large or small beside: root mean square over time of the reference's kinetic, elastic and
+  /// Size that errors of the energy are compared with: root mean square over time of the reference's kinetic, elastic and
   /// contact energy [J]. Loads are left out, since the zero of their energy is anywhere.
   double reference_energy = 0;
   int times = 0;
 };
 
-/// What a run has warned of.
+/// Warning of a run.
 struct Warning {
   std::string text;
   int times = 0;

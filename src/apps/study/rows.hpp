@@ -17,7 +17,7 @@ struct RowsOfBox {
   std::array<int, 3> counts(double cells) const;
 };
 
-/// Of a mesh that fills its bounding box; none for others.
+/// Finds the rows of a mesh that fills its bounding box; none for others.
 std::optional<RowsOfBox> find_box(const Mesh<3>& mesh);
 
 /// As Gmsh 2.2, all cells of the body `id`. Throws InputError where the file cannot be written.

@@ -178,7 +178,7 @@ class Study {
     if (!reference.empty()) row.errors = measure_errors(folder_of(row.run.name), reference, plan_);
   }
 
-  /// What the reference is worth, and whether it is one.
+  /// Judges the reference's worth, and whether it is one.
   void judge_reference() {
     const auto take = [&](const Errors& errors, std::string name) {
       results_.worth = errors;

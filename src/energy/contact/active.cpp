@@ -56,7 +56,7 @@ void sort_unique(std::vector<Ids>& ids) {
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
 }
 
-/// What the pairs of one block add: stencils, and features whose overlaps are to be corrected.
+/// Result of one block of pairs: stencils, and features whose overlaps are to be corrected.
 struct Part {
   std::vector<ContactStencil> stencils;
   std::vector<Ids> corners;       ///< (vertex, vertex), smaller first
@@ -125,7 +125,7 @@ class ActiveSet {
     const auto [a, b] = surface_.edges[edge];
     return point_edge_distance_squared<Dim>(at<Dim>(x_, v), at<Dim>(x_, a), at<Dim>(x_, b)) < reach_squared_;
   }
-  /// Of a candidate, which counts for the least distance then.
+  /// Tells whether a candidate is within reach, and lets it count for the least distance then.
   bool is_near(PairKind kind, const std::array<Vec<Dim>, 4>& p, Part& part) const {
     if (!(box_distance_squared<Dim>(kind, p.data()) < reach_squared_)) return false;
     const double squared = pair_distance_squared<Dim>(kind, p.data());
@@ -289,7 +289,7 @@ class ActiveSet {
     if (not_parallel != 1) part.stencils.push_back(edge_vertex(e, v, (1 - not_parallel) * weight));
   }
 
-  /// What is closest between the edge e and the vertex v of the pair's other edge, as features of the pair.
+  /// Finds the closest features of the edge e and the vertex v of the pair's other edge, as features of the pair.
   ClosestFeatures features_of_edge_and_vertex(const EdgePair& pair, int e, int v) const {
     const auto local = [&](int vertex) {
       return static_cast<signed char>(std::find(pair.vertices.begin(), pair.vertices.end(), vertex) - pair.vertices.begin());

@@ -54,7 +54,8 @@ bool collect(std::size_t n, std::size_t most, const Find& find, std::vector<std:
   return true;
 }
 
-/// What overlaps the box, ascending: pairs, and with them the bits of CCD, do not depend on how a tree came about.
+/// Finds items that overlap the box, ascending: pairs, and with them the bits of CCD, do not depend on how a tree came
+/// about.
 template <int Dim>
 void find_overlaps(const Bvh<Dim>& tree, const Box<Dim>& box, std::vector<int>& hits) {
   hits.clear();

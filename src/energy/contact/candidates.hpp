@@ -70,9 +70,9 @@ class ContactCandidates {
   /// for, at most `longest`.
   double update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part,
                 double longest = 1);
-  /// That, whatever was found before, with less room around the motion. Search trees of the surface are used again.
+  /// Finds the pairs of a motion anew with less room around it. Search trees of the surface are used again.
   void foresee(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part);
-  /// Of each kind, for a motion: far motions sweep boxes in which each primitive meets all others.
+  /// Most pairs of each kind for a motion: far motions sweep boxes in which each primitive meets all others.
   static std::size_t most_pairs(const CollisionSurface& surface);
 
   /// The lists that there are in this dimension, each with the kind of its pairs.
@@ -91,7 +91,7 @@ class ContactCandidates {
   /// Makes the pairs hold for x and, where it is given, for the motion by dx. Returns false, and holds nothing, if more than
   /// `most` pairs of a kind do.
   bool hold(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, std::size_t most);
-  /// That by a search, whatever was found before, with this share of the motion for room.
+  /// Searches for the pairs of a motion anew, with this share of the motion for room.
   bool search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double share,
               std::size_t most);
   /// most_pairs(), or more where bodies at rest have more than a quarter of it.
@@ -101,7 +101,7 @@ class ContactCandidates {
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
   static double room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach, double share);
   double room_of(int v, const ConstVectorView* dx, double reach, double room) const;
-  /// Of boxes that are left, or much too roomy.
+  /// Finds the vertices that left their boxes, or whose boxes are much too roomy.
   void find_strays(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double room);
   void build_box(std::size_t i, int v, ConstVectorView x, const ConstVectorView* dx, double reach, double room);
   /// The pairs of a whole search with the present boxes, where all but those of the strays are as they were. Returns false

@@ -70,7 +70,7 @@ void project_to_psd(const Eigen::Matrix<double, Size, Rank>& basis, PsdProjectio
   block.noalias() = modes * values.asDiagonal() * modes.transpose();
 }
 
-/// What is orthogonal to translations of four vertices: columns of Helmert's matrix (x) I.
+/// Basis orthogonal to translations of four vertices: columns of Helmert's matrix (x) I.
 const Eigen::Matrix<double, 12, 9>& relative_motions() {
   static const Eigen::Matrix<double, 12, 9> basis = [] {
     Eigen::Matrix<double, 12, 9> b = Eigen::Matrix<double, 12, 9>::Zero();

@@ -20,7 +20,7 @@ Positions<Dim> gather(const std::array<int, 4>& vertices, int size, ConstVectorV
   return p;
 }
 
-/// Of the pair's primitives the first has so many vertices.
+/// Number of vertices of the pair's first primitive.
 inline int size_of_first(PairKind kind) { return kind == PairKind::edge_edge ? 2 : 1; }
 
 /// Vertices of a candidate: those of its first primitive, then those of the second.

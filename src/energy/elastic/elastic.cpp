@@ -102,7 +102,7 @@ void exact_block(const DisplacementGradient<Dim>& at, const ShapeGradients<Dim>&
     }
 }
 
-/// The same for any law, projected.
+/// Makes the block of a cell's Hessian from the modes of any law, projected.
 template <int Dim>
 void block_of_modes(const EigenSystem<Dim>& system, const ShapeGradients<Dim>& gradients, double weight, PsdProjection psd,
                     ElementBlock<Dim>& block) {

@@ -40,7 +40,7 @@ class NeoHookeanPoint {
     double operator()(const Column& h_i, const Column& h_j, int a, int b) const {
       return c * h_j[a] * h_i[b] + lambda * h_i[a] * h_j[b];
     }
-    /// What is added where a = b.
+    /// Term that is added where a = b.
     template <typename Column>
     double diagonal(const Column& g_i, const Column& g_j) const {
       return mu * g_i.dot(g_j);
@@ -115,7 +115,7 @@ class ElasticPoint {
   EigenSystem<Dim> system_;  ///< of other laws
 };
 
-/// Of a straight element.
+/// Elastic energy of a straight element.
 template <int Dim>
 double elastic_energy(const typename CellSet<Dim>::Element& element, ConstVectorView x, const ElasticModuli& moduli) {
   return element.volume * elastic_density<Dim>(deformation_gradient<Dim>(element, x), moduli);

@@ -50,7 +50,7 @@ class ModalSum {
     weighted_.col(count_) = value * modes_.col(count_);
     ++count_;
   }
-  /// Those of a density's Hessian at a point, `weight` times.
+  /// Adds the modes of a density's Hessian at a point, `weight` times.
   void add(const EigenSystem<Dim>& system, PsdProjection psd, const Nodal<Dim>& gradients, double weight) {
     for (std::size_t k = 0; k < system.values.size(); ++k)
       add(weight * projected(system.values[k], psd), system.modes[k], gradients);

@@ -227,7 +227,7 @@ class Simulation:
         """Warnings about options that are legal and suspicious."""
         return self._simulation.warnings
 
-    # What acts from the next step on.
+    # Conditions and loads that act from the next step on.
 
     def fix(self, boundary: str, displacement: Value, mask: Optional[Sequence[bool]] = None) -> None:
         """Prescribes displacements from rest [m], for the components in `mask`. release() takes it back."""

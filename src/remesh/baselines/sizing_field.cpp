@@ -149,7 +149,7 @@ class SizingField {
     for (const int v : ask_.mesh().facet(f)) piece.rest.add(ask_.mesh().rest(v), v);
     return piece;
   }
-  /// What is at present nearer than dhat to a facet of the surface.
+  /// Finds the pieces that are nearer than dhat to a facet of the surface at present.
   std::vector<Piece> pieces_in_contact(FacetId f) {
     const SurfaceIndex<Dim>& surface = ask_.surface();
     const double dhat = ask_.context().contact.activation_distance;

@@ -10,11 +10,11 @@
 
 namespace itr {
 
-/// What is worth knowing of clearances on this surface [m]: the `span` of its index.
+/// Largest clearance worth knowing on this surface [m]: the `span` of its index.
 template <int Dim>
 double span_of_clearances(const Mesh<Dim>& mesh, const VectorX& x, double dhat);
 
-/// What lies near each facet, and how far away. Found on demand, and kept as long as nothing changes there.
+/// Neighbours of each facet and their distances. Found on demand, and kept as long as nothing changes there.
 template <int Dim>
 class Neighbourhoods {
  public:
@@ -38,7 +38,7 @@ class Neighbourhoods {
   std::vector<Entry> entries_;  ///< by facet
 };
 
-/// What the facets of one patch could touch.
+/// Primitives that the facets of one patch could touch.
 template <int Dim>
 class ContactReach {
  public:

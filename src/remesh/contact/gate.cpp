@@ -56,7 +56,7 @@ bool meet(const SurfacePiece<3>& a, const SurfacePiece<3>& b) { return crosses(a
 template <int Dim>
 bool lies_in(const Vec<Dim>& point, const std::array<Vec<Dim>, Dim + 1>& simplex);
 
-/// Of points on one line (in whose box it is) or in one plane.
+/// Tells whether the point lies in points on one line (in whose box it is) or in one plane.
 bool lies_in_flat(const Vec<2>&, const std::array<Vec<2>, 3>&) { return true; }
 bool lies_in_flat(const Vec<3>& point, const std::array<Vec<3>, 4>& simplex) {
   for (int axis = 0; axis < 3; ++axis) {

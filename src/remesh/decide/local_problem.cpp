@@ -373,8 +373,8 @@ void LocalProblem<Dim>::add_terms() {
   potential.add_to(energy_, potential.lag(x, workspace_));
 }
 
-/// The same where an edge is straightened: its node's shape function times by how much the predictor was off the mean of the
-/// ends.
+/// Adds the history of an edge that is straightened: its node's shape function times by how much the predictor was off the
+/// mean of the ends.
 template <int Dim>
 void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
   const VectorX& predictor = state_.fields.predictor;

@@ -19,7 +19,7 @@
 
 namespace itr {
 
-/// What local problems are made of. Nothing of it changes while one lives, so several may be looked at at once.
+/// Inputs of local problems. None of them changes while a local problem lives, so several may be evaluated at once.
 template <int Dim>
 struct RemeshState {
   const Mesh<Dim>& mesh;
@@ -40,8 +40,8 @@ struct LocalVertex {
 template <int Dim>
 class MotionBound;
 
-/// What one local problem is kept in. The next one finds the room that this one took, so that after a few nothing is
-/// allocated but for damping, pressure and terms of the program, and where an edit forgets history.
+/// Memory of one local problem. The next one finds the room that this one took, so that after a few nothing is allocated but
+/// for damping, pressure and terms of the program, and where an edit forgets history.
 template <int Dim>
 struct LocalStorage {
   CellSet<Dim> cells;
@@ -90,7 +90,7 @@ class LocalProblem {
   /// Whether a cell with curved edges that the edit makes is distorted.
   bool distorts() const;
   double value() { return energy_.value(x_.view(), workspace_); }
-  /// Of the barrier, where the patch can change it; not below 0.
+  /// Energy of the barrier where the patch can change it; not below 0.
   double contact_energy();
   /// Relaxes from the present positions by at most so many Newton iterations.
   NewtonSummary relax(int max_iterations);

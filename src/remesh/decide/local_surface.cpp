@@ -62,7 +62,7 @@ void LocalProblem<Dim>::find_contacts() {
              mesh_.has_nodes(), [&](FacetId f) { return is_removed(f); });
 }
 
-/// What stands around the vertices of what can touch, ascending: facets that stay and primitives of obstacles.
+/// Finds the facets that stay and the primitives of obstacles around the vertices that can touch, ascending.
 template <int Dim>
 void LocalProblem<Dim>::find_stars_of_touching() {
   std::vector<FacetId>& facets = scratch_.near_facets;

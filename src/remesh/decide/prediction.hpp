@@ -15,26 +15,25 @@ double patch_over_vertex(double poisson_ratio) {
   constexpr double kLeast = Dim == 2 ? 1.5 : 2, kGrowth = Dim == 2 ? 0.6 : 0.2;
   return std::max(kLeast, kGrowth / (1 - 2 * poisson_ratio));
 }
-/// The same over the vertex and nodes that a split or a curve sets together, where edges are curved. There patches take
-/// three times as long. In 2D nine of ten gain less, in 3D 19 of 20 (verification/paper).
+/// Factor of a patch over the vertex and nodes that a split or a curve sets together, where edges are curved. In 2D nine of
+/// ten patches gain less, in 3D 19 of 20 (verification/paper); there they take three times as long.
 template <int Dim>
 double patch_over_nodes(double poisson_ratio) {
   constexpr double kLeast = Dim == 2 ? 1.5 : 1.7, kGrowth = Dim == 2 ? 0.35 : 0.17;
   return std::max(kLeast, kGrowth / (1 - 2 * poisson_ratio));
 }
-/// The same factor where the surface changes in contact: relaxing vertices beside the new one gain more there.
+/// Factor where the surface changes in contact: relaxing vertices beside the new one gain more there.
 template <int Dim>
 inline constexpr double kPatchOverVertexInContact = Dim == 2 ? 30 : 10;
 
-/// The same where a split or a curve in contact is predicted without it. Of 3 000 such edges in the paper's masticators none
+/// Factor where a split or a curve in contact is predicted without it. Of 3 000 such edges in the paper's masticators none
 /// was accepted that was predicted to gain less than a tenth of the tolerance; in 3D one, less than a third.
 template <int Dim>
 inline constexpr double kPatchOverPredictionInContact = Dim == 2 ? 10 : 5;
 
-/// What an edit is predicted to gain when only the vertex that it sets relaxes, to second order: a microsecond. Elasticity,
-/// inertia (history interpolated) and dead loads; contact and friction left out. [J, times the scaling]
-/// At curved edges an estimate: each node that the edit sets relaxes by itself, and history is left out.
-/// Infinite where the scene has pressure, damping or terms of the program, of which it knows nothing.
+/// Predicts the gain of an edit by elasticity, inertia (history interpolated) and dead loads when only the vertex that it
+/// sets relaxes, to second order: a microsecond [J, times the scaling]. Infinite where the scene has pressure, damping or
+/// terms of the program; at curved edges an estimate, in which each node relaxes by itself and history is left out.
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 
@@ -50,8 +49,8 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 template <int Dim>
 double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge);
 
-/// The same at cells with curved edges, by the vertex and the nodes that the split adds, together: ½ r^T A^-1 r, and what
-/// finer quadrature changes. NaN where moduli or density vary in space, a facet is loaded or A is indefinite.
+/// Predicts the gain of a split at cells with curved edges by the vertex and the nodes that it adds, together: ½ r^T A^-1 r,
+/// and the change by finer quadrature. NaN where moduli or density vary in space, a facet is loaded or A is indefinite.
 template <int Dim>
 double predict_split_at_curves(const RemeshState<Dim>& state, const EdgeKey& edge);
 

@@ -61,7 +61,7 @@ double energy_at_curves(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   return energy;
 }
 
-/// Of a cell whose edges are so long: isosceles and right-angled in 2D, regular in 3D.
+/// Volume of a cell whose edges are so long: isosceles and right-angled in 2D, regular in 3D.
 template <int Dim>
 double volume_of(double length) {
   return Dim == 2 ? length * length / 2 : length * length * length / (6 * std::sqrt(2.0));

@@ -30,7 +30,7 @@ class QuadraticModel {
   struct Corners {
     std::array<Vec<Dim>, Dim + 1> rest, x, predictor;
   };
-  /// What is the same whichever of a cell's corners moves.
+  /// Data of a cell that do not depend on which of its corners moves.
   struct CellAt {
     CellAt(const StepContext<Dim>& context, const Corners& corners, int body) : at(corners) {
       const Mat<Dim> edges = edge_matrix<Dim>(at.rest);
@@ -52,7 +52,7 @@ class QuadraticModel {
     energy_ += context_.scaling * cell.volume * elastic_density<Dim>(cell.F, cell.moduli);
     add_inertia_and_load(cell, kNone);
   }
-  /// The same where its corner `moving` moves; the response is the cell's.
+  /// Adds a cell whose corner `moving` moves; the response is the cell's.
   void add_cell(const CellAt& cell, const ElasticPoint<Dim>& response, int moving) {
     const double s = context_.scaling, V = cell.volume;
     const Vec<Dim> gradient = barycentric_gradient<Dim>(cell.inverse, moving);
@@ -70,8 +70,8 @@ class QuadraticModel {
       add_cell(cell, ElasticPoint<Dim>(cell.F, cell.moduli), moving);
   }
 
-  /// What splitting a cell of constant moduli at the middle of its edge from corner `a` to `b` changes: both halves deform
-  /// and move as the whole did, so that without loads the energy stays, and the new vertex feels them at once.
+  /// Adds the split of a cell of constant moduli at the middle of its edge from corner `a` to `b`. Both halves deform and
+  /// move as the whole did, so that without loads the energy stays, and the new vertex feels them at once.
   void add_split_cell(const Mesh<Dim>& mesh, CellId c, const Corners& at, int a, int b) {
     const Material& material = context_.materials.at(mesh.body(c));
     const ElasticModuli moduli = elastic_moduli<Dim>(material, at.rest[0]);
@@ -99,8 +99,8 @@ class QuadraticModel {
     }
   }
 
-  /// What the bubble 4 l_a l_b of the edge from corner `a` to `b` feels in a cell of constant moduli. Its gradient is
-  /// linear, 4 (l_a g_b + l_b g_a), and F constant: all integrals are exact but that of a load that varies.
+  /// Adds the bubble 4 l_a l_b of the edge from corner `a` to `b` in a cell of constant moduli. Its gradient is linear,
+  /// 4 (l_a g_b + l_b g_a), and F constant: all integrals are exact but that of a load that varies.
   void add_curved_cell(const Mesh<Dim>& mesh, CellId c, const Corners& at, int a, int b) {
     const Material& material = context_.materials.at(mesh.body(c));
     const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
@@ -123,7 +123,7 @@ class QuadraticModel {
       gradient_ -= context_.scaling * 4 * kSecond * mass *
                    context_.loads.acceleration(mesh.middle({mesh.cell(c)[a], mesh.cell(c)[b]}));
   }
-  /// The same where other edges of the cell are curved, by the rules of quadrature that energy and mass have.
+  /// Adds a cell other edges of which are curved, by the rules of quadrature that energy and mass have.
   void add_mixed_cell(const RemeshState<Dim>& state, CellId c, const EdgeKey& edge) {
     const Mesh<Dim>& mesh = state.mesh;
     const auto cell = curved_cell<Dim>(mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
@@ -173,13 +173,13 @@ class QuadraticModel {
   double energy() const { return energy_; }
   const Vec<Dim>& gradient() const { return gradient_; }
   const Mat<Dim>& hessian() const { return hessian_; }
-  /// What is left of it where the vertex finds its minimum; infinite below where there is none.
+  /// Energy where the vertex finds its minimum; infinitely low where there is none.
   double relaxed() const {
     const Eigen::LLT<Mat<Dim>> llt(hessian_);
     if (llt.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
     return energy_ - 0.5 * gradient_.dot(llt.solve(gradient_));
   }
-  /// The same where some components are held.
+  /// Energy at the minimum over the components that are not held.
   double relaxed(const std::array<bool, Dim>& held) {
     for (int c = 0; c < Dim; ++c)
       if (held[c]) {
@@ -235,7 +235,7 @@ class QuadraticModel {
   Mat<Dim> hessian_ = Mat<Dim>::Zero();
 };
 
-/// Of a cell on vertices of the mesh.
+/// Corners of a cell on vertices of the mesh.
 template <int Dim>
 typename QuadraticModel<Dim>::Corners corners_of(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell) {
   typename QuadraticModel<Dim>::Corners corners;

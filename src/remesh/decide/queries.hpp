@@ -69,7 +69,7 @@ class RemeshQueries {
   bool is_distorted(std::span<const CellId> cells) const;
   /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
   bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
-  /// The same question about a trial's edge.
+  /// Finds out whether a trial's edge is in contact.
   void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;
   /// How much the deformation and the history vary over the cells around an edge or a vertex. No edit gains or
   /// loses energy where both are linear. [J, times the scaling, up to a factor]
@@ -102,8 +102,8 @@ class RemeshQueries {
     return screens() &&
            at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
   }
-  /// The same of a split or a curve that may be in contact, of which the prediction knows nothing. There trials tell, where
-  /// edges are curved unless far too little is promised: their chords bring many edges into contact.
+  /// Tells whether an edit promises too little for a trial. A split or a curve that may be in contact is not judged by its
+  /// prediction, which knows nothing of contact, unless far too little is promised where edges are curved.
   bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance, bool in_contact) const {
     if (in_contact && !may_have_curves()) return false;
     const double factor = in_contact ? kPatchOverPredictionInContact<Dim> : patch_over_refinement(cells);
@@ -124,11 +124,12 @@ class RemeshQueries {
   bool touches_within(const EdgeKey& e, double distance, LocalScratch<Dim>& scratch) const;
   /// How near the surface at an edge comes within a step to what stands still [m].
   double reach(const EdgeKey& e) const;
-  /// That the surface around a trial's edge was read.
+  /// Notes that the surface around a trial's edge was read.
   void note_read(Trial<Dim>& trial) const;
   /// Whether halves of an edge would be shorter than dhat, at rest or now.
   bool has_short_halves(const EdgeKey& e) const;
-  /// The same question about the chords that the split of an edge would bring to the surface beside those halves.
+  /// Tells whether the chords that the split of an edge would bring to the surface beside those halves are shorter than
+  /// dhat.
   bool makes_short_chords(const EdgeKey& e) const;
   RemeshState<Dim> state() const { return state(baseline_ ? baseline_->history() : HistoryRule::function); }
   RemeshState<Dim> state(HistoryRule history) const { return {mesh_, fields_, context_, gate_.present(), history}; }

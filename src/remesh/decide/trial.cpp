@@ -17,7 +17,7 @@ constexpr int kIterationsAfterAcceptance = 100;
 constexpr double kSurelyTooLittle = 0.9;                          ///< share of the required gain, as a prediction
 constexpr int kBoundIterations = 1, kBoundContactIterations = 2;  ///< of Newton, for a vertex alone
 
-/// Of the barrier's energy around an edit: what its weights, which depend on the mesh, can feign as a gain.
+/// Share of the barrier's energy around an edit that its weights, which depend on the mesh, can feign as a gain.
 constexpr double kBarrierNoise = 1;
 
 /// Both sides of a comparison on one support.
@@ -93,7 +93,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
     verdict.touches_contact = found.touches_contact;
     verdict.surface_read.include(found.surface_read);
   };
-  // Of an edit that gains enough: it may still make a cell that is distorted.
+  // Relaxes an edit that gains enough, which may still make a distorted cell.
   const auto finish = [&](LocalProblem<Dim>& after) {
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
     if (edit.kind == Edit<Dim>::Kind::curve && after.distorts()) return Refusal::shape;

@@ -13,7 +13,7 @@
 
 namespace itr {
 
-/// What a preview found, and what there is to commit.
+/// Result of a preview, and the edit to commit.
 template <int Dim>
 struct Verdict {
   Refusal refusal = Refusal::not_asked;
@@ -33,7 +33,7 @@ struct Verdict {
   }
 };
 
-/// What was found about a candidate on the mesh as it was when its wave began.
+/// Findings about a candidate on the mesh as it was when its wave began.
 template <int Dim>
 struct Trial {
   PlaceQueue::Entry candidate;

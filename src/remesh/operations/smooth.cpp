@@ -70,7 +70,7 @@ Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& ask, VertexId vertex
   return sum;
 }
 
-/// What both ways of moving vertices share.
+/// Common part of both operations that move vertices.
 template <int Dim>
 class Mover {
  public:

@@ -131,7 +131,7 @@ class Refiner {
     if (gain > best) best = gain;
   }
 
-  /// Of what was required, the part that the barrier may feign.
+  /// Part of the required gain that the barrier may feign.
   double noise_in(const Verdict<Dim>& verdict, double tolerance) const {
     return std::max(0.0, verdict.required - ask_.context().scaling * tolerance);
   }
@@ -148,7 +148,7 @@ class Refiner {
       if (gain > 0) range.most = signal * std::max(kSameSignal, ask_.context().scaling * tolerance / (kMargin * gain));
     }
     if (trial.in_contact && noise_in(trial.verdict, tolerance) > trial.verdict.required / 2) {
-      // What the barrier feigns grows with its energy, as the signal does.
+      // The barrier feigns more as its energy grows, and so does the signal.
       constexpr double kMostLonger = 10;
       const double short_of = gain > 0 ? trial.verdict.required / (kMargin * gain) : kMostLonger;
       range.least = 0;

@@ -13,7 +13,7 @@
 
 namespace itr {
 
-/// What one commit has changed. Followers see it when the mesh has the edit already.
+/// Changes of one commit. Followers see them when the mesh has the edit already.
 template <int Dim>
 struct Change {
   const Edit<Dim>& edit;

@@ -20,8 +20,8 @@ namespace itr {
 inline constexpr int kSmallestWave = 8, kLargestWave = 256;
 inline constexpr double kTolerableWaste = 0.1;
 
-/// What waves are made for. `rank` gives a candidate its place in the queue, or leaves it out. `look` examines one and may
-/// preview an edit. `settle` may commit it, and adds places to `fresh` that are to be ranked (again).
+/// Operation that waves are made for: `rank` gives a candidate its place in the queue, or leaves it out; `look` examines one
+/// and may preview an edit. `settle` may commit it, and adds places to `fresh` that are to be ranked (again).
 template <typename T, int Dim>
 concept Operation = requires(const T& asked, T& settled, const Place& place, Trial<Dim>& trial, LocalScratch<Dim>& scratch,
                              std::vector<Place>& fresh) {

@@ -10,7 +10,7 @@
 
 namespace itr {
 
-/// What the schedule carries from solve to solve and step to step.
+/// State that the schedule carries from solve to solve and step to step.
 struct BarrierStiffness {
   double value = 1;  ///< kappa
   double largest = std::numeric_limits<double>::infinity();

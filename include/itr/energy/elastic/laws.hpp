@@ -22,7 +22,7 @@ struct ElasticModuli {
   const OwnLaw* own = nullptr;  ///< of MaterialLaw::own: the material's
 };
 
-/// Of a material at rest position X.
+/// Moduli of a material at rest position X.
 template <int Dim>
 ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X);
 /// Density [kg/m^Dim] of a material at rest position X.

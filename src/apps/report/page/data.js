@@ -251,7 +251,7 @@ class Frame {
   }
 }
 
-// Of lines of forces.csv: by name, times and the values of each column after it.
+// Curves in lines of forces.csv: by name, times and the values of each column after it.
 function curvesOf([header, ...lines]) {
   const curves = new Map(), columns = (header ?? '').split(',').slice(3);
   for (const line of lines) {

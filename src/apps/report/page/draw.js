@@ -172,7 +172,7 @@ function triangles(out, frame, x, field, share, cut) {
   if (cut && !inPlane) addSection(out, frame, x, field, share, cut);
 }
 
-// What a plane cuts of the cells: their sections, a hair within what is shown.
+// Adds the sections of cells that a plane cuts, a hair within the cells that are shown.
 function addSection(out, frame, x, field, share, cut) {
   const {run, mesh} = frame, corners = run.cells.columns.slice(0, 4), byCell = field.of === 'cell';
   const heights = new Float32Array(run.meta.counts.vertices);

@@ -23,7 +23,7 @@ function showCertificate({certificate}) {
   document.querySelector('header').append(element);
 }
 
-// Those of one kind, which differ in their numbers, as one; a step of the first leads to its time.
+// Shows warnings of one kind, which differ in their numbers, as one; a step of the first leads to its time.
 function showWarnings(run, onTime) {
   const kinds = new Map();
   const add = (text, count, step) => {
@@ -54,7 +54,7 @@ function showPlots(run, onTime) {
   return plots;
 }
 
-// What fails is said on the page, and pictures stay.
+// Says on the page that something failed; pictures stay.
 function stayWithPictures(error) {
   document.body.classList.remove('with-view');
   document.getElementById('why').textContent = `Pictures only, as there is no 3D drawing here (${error.message}).`;

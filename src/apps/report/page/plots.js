@@ -65,7 +65,7 @@ function roundBetween(low, high) {
   return found;
 }
 
-// What steps.jsonl and the frames' resultants have to show.
+// Plots of steps.jsonl and of the frames' resultants.
 function plotsOf(run) {
   const steps = run.steps, times = steps.map(s => s.t), take = f => steps.map(s => f(s) ?? NaN), list = [];
   const add = (title, unit, series, log = false, at = times) => {

@@ -271,7 +271,7 @@ class View {
     return cut && cut[0] * p[0] + cut[1] * p[1] + cut[2] * p[2] > cut[3] + 1e-6 * cut[4];
   }
 
-  // What was born and what died between the stored frame before and this one.
+  // Finds cells and edges that came and went between the stored frame before and this one.
   async findEdits() {
     const {run, state} = this, f = state.frame, found = {new: [], gone: [], swapped: [], curved: [], straight: []};
     let locator = null;
@@ -460,7 +460,7 @@ class View {
     return vertices.birth[pick.vertex] <= f && f < vertices.death[pick.vertex];
   }
 
-  // What is seen at a point of the stage: {cell, vertex}, ids of the run that stay from frame to frame; null: nothing.
+  // Picks at a point of the stage: {cell, vertex}, ids of the run that stay from frame to frame; null: nothing.
   pickAt(px, py) {
     const t = this.bodies, m = this.matrix, p = t.place, cut = this.cutPlane;
     let best = Infinity, found = null;
