@@ -8,11 +8,14 @@
 #include "energy/load_points.hpp"
 #include "fem/locator.hpp"
 #include "geometry/intersection.hpp"
+#include "itr/core/error.hpp"
 #include "itr/embed/any_simulation.hpp"
 #include "itr/energy/load.hpp"
 #include "itr/energy/point_forces.hpp"
 #include "itr/energy/pressure.hpp"
+#include "itr/linear/registry.hpp"
 #include "itr/simulation/mesh_change.hpp"
+#include "itr/simulation/simulation.hpp"
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 #include "simulation/step_problem.hpp"
@@ -228,6 +231,23 @@ void check_forces() {
 }
 TEST(Cracks, ForcesStayOnTheirBody2D) { check_forces<2>(); }
 TEST(Cracks, ForcesStayOnTheirBody3D) { check_forces<3>(); }
+
+TEST(Cracks, NeedAGapWhereFacesMayTouch) {
+  std::mt19937 random(2);
+  for (int k = 0; k < kMeshes; ++k) {
+    itr::Setup<2> setup;
+    for (const int body : {1, 2, 3}) setup.materials[body] = {.youngs_modulus = 1e5, .poisson_ratio = 0.3, .density = 1000};
+    setup.mesh = cracked<2>(random);
+    setup.contact.enabled = true;
+    try {
+      linear::Registry registry;
+      const Simulation<2> simulation(setup, registry);
+      ADD_FAILURE() << "touching faces are taken for contact";
+    } catch (const InputError& error) {
+      EXPECT_NE(error.parts().expected.find("a gap between the faces of a crack"), std::string::npos) << error.what();
+    }
+  }
+}
 
 /// Two squares of one body id that lie on each other: parts that share no vertex.
 TEST(Cracks, PartsThatOverlapAreToldApart) {

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -103,6 +105,21 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
 
 }  // namespace
 
+namespace {
+
+template <int Dim>
+bool has_coincident_vertices(const CollisionSurface& surface, const VectorX& x) {
+  std::set<std::array<double, Dim>> places;
+  for (const int v : surface.vertices) {
+    std::array<double, Dim> place;
+    for (int c = 0; c < Dim; ++c) place[c] = x[Dim * v + c];
+    if (!places.insert(place).second) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!setup.contact.enabled) return;
@@ -126,7 +143,9 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   }
   if (pairs.size() > kMostNamed) found += "; and more";
   throw InputError({"", "initial state", "surfaces that intersect (in " + setup.units.length() + "): " + found,
-                    "surfaces that do not touch"});
+                    has_coincident_vertices<Dim>(surface, x)
+                        ? "a gap between the faces of a crack, and between bodies that touch, or no contact"
+                        : "surfaces that do not touch"});
 }
 
 template <int Dim>
