@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the table of keys says to others: a JSON Schema, and the page SCENES.md.
+// What the table of keys says to others: a JSON Schema, and the page docs/scenes.md.
 #include <algorithm>
 
 #include "itr/scene/scene.hpp"
@@ -134,17 +134,17 @@ std::string section_of_refusals() {
 constexpr const char* kIntroduction = R"(# Scenes: all keys
 
 A scene is a JSON file in PolyFEM's format. This page is made by `itr schema --markdown` from the table of keys that the reader
-checks scenes against. `itr schema` prints the same as JSON Schema, for editors. [TUTORIAL.md](TUTORIAL.md) builds a first scene,
-[CONVENTIONS.md](CONVENTIONS.md) says what signs, dimensions, laws and tolerances mean, and
-[examples/README.md](examples/README.md) has scenes to start from.
+checks scenes against. `itr schema` prints the same as JSON Schema, for editors. The [tutorial](tutorial.md) builds a first scene,
+the [theory](theory.md) says what signs, dimensions, laws and tolerances mean, and the [examples](../examples/README.md) are
+scenes to start from.
 
 - `*` stands for the elements of a list. A list of one element may be written as that element alone.
 - `{a,b}` stands for either.
 - Units are those of SI. Where `/units` names others, they stand for the unit of the same kind: N/m^2 for MPa with mm, t, s
-  ([CONVENTIONS.md](CONVENTIONS.md#units)).
+  ([units](theory.md#units)).
 - A key that is not on this page is an error. The message names the nearest key that exists.
-- An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^` and the functions that
-  [CONVENTIONS.md](CONVENTIONS.md#expressions) lists.
+- An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^` and
+  [functions](theory.md#expressions).
 
 A file may build on another one. `"common": "base.json"` takes the keys of that file and merges the file's own keys over them:
 objects key by key, lists as a whole, and `null` removes a key. Then `"patch"` is applied, a list of JSON Patch operations. Then
