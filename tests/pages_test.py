@@ -200,7 +200,7 @@ class Study(unittest.TestCase):
     def test_each_series_is_named(self):
         """docs/user-guide.md has the default series above those on request."""
         text = (SOURCE / "docs/user-guide.md").read_text()
-        default, _, on_request = text.partition("## The runs of a study")[2].partition("\n## ")[0].partition("**More series**")
+        default, _, on_request = text.partition("### The runs of a study")[2].partition("\n### ")[0].partition("**More series**")
         series = re.findall(r'\{"([\w-]+)", Kind::\w+, (true|false)', (SOURCE / "src/apps/study/plan.cpp").read_text())
         self.assertTrue(series)
         for name, is_default in series:
