@@ -65,7 +65,7 @@ class Frame:
     def __init__(self, path, field="elastic_density"):
         with h5py.File(path, "r") as file:
             if field != ORDER and field not in file["/fields"]:
-                raise SystemExit(f"{path}: no field {field}; there are {', '.join(file['/fields'])} (SCENES.md, "
+                raise SystemExit(f"{path}: no field {field}; there are {', '.join(file['/fields'])} (docs/scenes.md, "
                                  "/output/paraview/options, says how to ask for others)")
             self.step, self.t = int(file.attrs["step"]), float(file.attrs["t"])
             self.x, self.rest = file["/fields/x"][:], file["/mesh/rest"][:]
@@ -269,7 +269,7 @@ def read_forces(folder):
     """Name -> column -> values over time, of forces.csv."""
     path = folder / "forces.csv"
     if not path.exists():
-        raise SystemExit(f"{path}: not there; expected a run of a scene with /output/forces (SCENES.md)")
+        raise SystemExit(f"{path}: not there; expected a run of a scene with /output/forces (docs/scenes.md)")
     curves = {}
     with open(path, newline="") as file:
         for row in csv.DictReader(file):

@@ -10,6 +10,7 @@ import re
 import sys
 
 SOURCE = pathlib.Path(__file__).resolve().parent.parent
+FOLDERS = {SOURCE, SOURCE / "docs"}
 ALSO = {SOURCE / "examples/README.md", SOURCE / "verification/README.md"}
 
 
@@ -24,7 +25,7 @@ def replaced(match, page):
     target = (page.parent / name).resolve()
     if not name:
         return words
-    if target in ALSO or (target.parent == SOURCE and target.suffix == ".md"):
+    if target in ALSO or (target.parent in FOLDERS and target.suffix == ".md"):
         return f"[{words}]({name})"
     shown = target.relative_to(SOURCE)
     return words if words.strip("`") == str(shown) else f"{words} (`{shown}`)"

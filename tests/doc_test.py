@@ -26,9 +26,9 @@ def main():
         failures = complaints(doxygen, settings)
         if not list(pathlib.Path(folder).glob("html/itr_8h.html")):
             failures.append("no page of itr.h")
-        for page in ["TUTORIAL", "SCENES", "EMBEDDING"]:
+        for page in ["tutorial", "scenes", "embedding"]:
             if not list(pathlib.Path(folder).glob(f"html/md*{page}.html")):
-                failures.append(f"no page of {page}.md")
+                failures.append(f"no page of docs/{page}.md")
         if not list(pathlib.Path(folder).glob("html/search/*.js")):
             failures.append("the site cannot be searched")
         strict = f"INPUT = {first}\nEXTRACT_ALL = NO\nWARN_IF_UNDOCUMENTED = YES\nUSE_MDFILE_AS_MAINPAGE =\n"

@@ -70,7 +70,7 @@ class Links(unittest.TestCase):
             reached.add(page)
             queue += [(page.parent / link.partition("#")[0]).resolve() for link in links(page.read_text())
                       if link.partition("#")[0].endswith(".md") and "://" not in link]
-        top = {path for path in SOURCE.glob("*.md")}
+        top = {*SOURCE.glob("*.md"), *SOURCE.glob("docs/*.md")}
         self.assertEqual(set(), {path.name for path in top - {path.resolve() for path in reached}})
 
 
@@ -127,9 +127,9 @@ def long_functions(path):
 
 
 class Architecture(unittest.TestCase):
-    """ARCHITECTURE.md names files, tests and modules that are there."""
+    """docs/architecture.md names files, tests and modules that are there."""
 
-    text = (SOURCE / "ARCHITECTURE.md").read_text()
+    text = (SOURCE / "docs/architecture.md").read_text()
 
     def test_files_and_tests_exist(self):
         for name in re.findall(r"`((?:src|tests|backends|examples|verification|include)/[\w./*-]+)`", self.text):
@@ -151,7 +151,7 @@ class Architecture(unittest.TestCase):
 
     def test_reasons_of_refusals_are_on_their_page(self):
         names = re.search(r"kNames\[\] = \{(.*?)\}", (SOURCE / "src/remesh/edits/edit_checks.cpp").read_text(), re.DOTALL).group(1)
-        page = (SOURCE / "REMESHING.md").read_text().partition("## Why an operation was refused")[2]
+        page = (SOURCE / "docs/theory.md").read_text().partition("## Why an operation was refused")[2]
         for name in set(re.findall(r"\w+", names)) - {"none", "not_asked", "gone"}:  # these are not counted
             self.assertIn(f"`{name}`", page)
 
@@ -175,9 +175,9 @@ class Quotes(unittest.TestCase):
         found = {row[0]: row for row in rows if row[0] in scenes and len(row) > 5}
         self.assertEqual(set(found), set(scenes))
         ratios = [int(row[4]) for row in found.values()]
-        for page in ["FAQ.md", "verification/README.md"]:
+        for page in ["docs/user-guide.md", "verification/README.md"]:
             self.assertIn(f"{min(ratios)} to {max(ratios)} times as fast", (SOURCE / page).read_text())
-        text = (SOURCE / "FAQ.md").read_text()
+        text = (SOURCE / "docs/user-guide.md").read_text()
         for name in ["masticator h=0.1", "ball-wall 3D to t=0.00132"]:
             self.assertIn(f"{1000 * float(found[name][2]):.0f} ms", text)
 
@@ -198,9 +198,9 @@ class Quotes(unittest.TestCase):
 
 class Study(unittest.TestCase):
     def test_each_series_is_named(self):
-        """STUDY.md has the default series above those on request."""
-        text = (SOURCE / "STUDY.md").read_text()
-        default, _, on_request = text.partition("## The runs of a study")[2].partition("\n## ")[0].partition("**More series**")
+        """docs/user-guide.md has the default series above those on request."""
+        text = (SOURCE / "docs/user-guide.md").read_text()
+        default, _, on_request = text.partition("### The runs of a study")[2].partition("\n### ")[0].partition("**More series**")
         series = re.findall(r'\{"([\w-]+)", Kind::\w+, (true|false)', (SOURCE / "src/apps/study/plan.cpp").read_text())
         self.assertTrue(series)
         for name, is_default in series:
@@ -208,10 +208,10 @@ class Study(unittest.TestCase):
 
 
 class Refusals(unittest.TestCase):
-    """SCENES.md, "Not there yet", has every key and combination that is refused; reference_test holds the page against the code."""
+    """docs/scenes.md, "Not there yet", has every key and combination that is refused; reference_test holds the page against the code."""
 
     def test_each_is_named(self):
-        section = (SOURCE / "SCENES.md").read_text().partition("\n## Not there yet\n")[2].partition("\n## ")[0]
+        section = (SOURCE / "docs/scenes.md").read_text().partition("\n## Not there yet\n")[2].partition("\n## ")[0]
         named = set(re.findall(r"`([^`]+)`", section))
         keys = set(re.findall(r"^- `([^`]+)`", section.partition("\n### Keys with one value\n")[2], re.MULTILINE))
         rows = re.findall(r'\{((?:[A-Z]+ )?"[^"]*"),\s*(?:refused|only),', (SOURCE / "src/scene/keys.cpp").read_text())

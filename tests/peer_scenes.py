@@ -6,7 +6,7 @@
 
 Scenes run as they are, with PolyFEM's default of the barrier stiffness where they leave it open. With --solver all of them run with that engine instead, with several with one after the other: an
 engine changes no result.
-A scene passes if its five norms of the final displacement (CONVENTIONS.md, "Norms"; linf_grad is wrong in the reference and left out)
+A scene passes if its five norms of the final displacement (docs/theory.md, "Norms"; linf_grad is wrong in the reference and left out)
 are within the margin; `miss` says which norm is off and by how much; `refused` is what `itr` does not support, with its reason;
 `stopped` is a simulation that could not go on. Exit status 1 if a scene misses or stops, 0 otherwise.
 """

@@ -25,8 +25,8 @@ std::string text_of(const fs::path& path) {
 }
 
 TEST(Reference, CommittedPageIsTheCurrentOne) {
-  EXPECT_EQ(text_of(fs::path(ITR_SOURCE_DIR) / "SCENES.md"), reference_page())
-      << "build/release/bin/itr schema --markdown > SCENES.md";
+  EXPECT_EQ(text_of(fs::path(ITR_SOURCE_DIR) / "docs/scenes.md"), reference_page())
+      << "build/release/bin/itr schema --markdown > docs/scenes.md";
 }
 
 /// Calls `visit` with every schema of a value that is read.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Every command of TUTORIAL.md runs, the scenes it shows are the committed ones, and the forces it quotes come out to 1 %. The
-decision that REMESHING.md works through and README's figure for quadratic elements come out too.
+"""Every command of docs/tutorial.md runs, the scenes it shows are the committed ones, and the forces it quotes come out to 1 %. The
+decision that docs/theory.md works through and README's figure for quadratic elements come out too.
 
 usage: tutorial_test.py ITR SOURCE_DIR
 """
@@ -26,20 +26,20 @@ def cook(command, source, folder, **sets):
 
 
 def decisions(command, source, folder):
-    """Differences to the two tables of REMESHING.md, "One decision"."""
-    page = (source / "REMESHING.md").read_text()
+    """Differences to the two tables of docs/theory.md, "One decision"."""
+    page = (source / "docs/theory.md").read_text()
     rows = re.findall(r"^\| ([\d ]+) kJ \| (\d) \| (\d) \| (\d) \|", page, re.MULTILINE)
     if len(rows) != 5:
-        yield f"REMESHING.md has {len(rows)} tolerances, not 5"
+        yield f"docs/theory.md has {len(rows)} tolerances, not 5"
     for tolerance, *quoted in rows:
         step, _ = cook(command, source, folder, **{
             "geometry/0/n_refs": 1, "time/tend": 1, "time/dt": 1, "space/remesh/collapse/enabled": "false",
             "space/remesh/split/max_depth": 1, "space/remesh/split/acceptance_tolerance": tolerance.replace(" ", "") + "e3"})
         found = [str(step["splits"][key]) for key in ("tried", "relaxed", "accepted")]
         if found != quoted:
-            yield f"REMESHING.md: {tolerance} kJ gives {found}, not {quoted}"
+            yield f"docs/theory.md: {tolerance} kJ gives {found}, not {quoted}"
         if tolerance == "700" and not f"{round((step['energy_before_remesh'] - step['energy']['total']) / 1000):,} kJ".replace(",", " ") in page:
-            yield "REMESHING.md quotes another gain of the whole mesh"
+            yield "docs/theory.md quotes another gain of the whole mesh"
 
 
 def quadratic(command, source, folder):
@@ -57,7 +57,7 @@ def quadratic(command, source, folder):
 
 def main():
     command, source = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-    page = (source / "TUTORIAL.md").read_text()
+    page = (source / "docs/tutorial.md").read_text()
     shown = [re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL) for kind in ("bash", "json", "text")]
     commands, scenes, outputs = shown
     failures = [f"{name} is not what the page shows" for name, block in zip(["arch.json", "arch3d.json"], scenes)

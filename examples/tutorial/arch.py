@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Meshes of a rubber arch in millimetres, for TUTORIAL.md: arch.msh (triangles) and arch3d.msh (tetrahedra, 8 mm deep).
+"""Meshes of a rubber arch in millimetres, for docs/tutorial.md: arch.msh (triangles) and arch3d.msh (tetrahedra, 8 mm deep).
 
 usage: arch.py [FOLDER]
 """

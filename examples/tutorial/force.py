@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Force on the first obstacle against its displacement, from the frames of runs (TUTORIAL.md).
+"""Force on the first obstacle against its displacement, from the frames of runs (docs/tutorial.md).
 
 usage: force.py RUN... [-o curve.png]      writes RUN/curve.csv, prints the last force of each run, draws all curves
 

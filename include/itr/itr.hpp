@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // All that a program needs to simulate: AnySimulation, the facade of either dimension, and below it Simulation<2> and
-// Simulation<3> with their Setup. EMBEDDING.md is the guide; parts that are of use alone have headers of their own.
+// Simulation<3> with their Setup. docs/embedding.md is the guide; parts that are of use alone have headers of their own.
 #pragma once
 
 #include "itr/core/error.hpp"

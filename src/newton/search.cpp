@@ -88,7 +88,7 @@ bool Search::is_acceptable(double value, double share, const Way& way, const Ste
   if (rule == LineSearch::backtracking && !advancing) return change < 0;
   if (change <= kArmijo * share * slope) return true;
   if (advancing || rule == LineSearch::armijo) return false;
-  // PolyFEM's "RobustArmijo" (CONVENTIONS.md, "Tolerances"; Hager & Zhang): if the energy changes little, in either
+  // PolyFEM's "RobustArmijo" (docs/theory.md, "Tolerances"; Hager & Zhang): if the energy changes little, in either
   // direction, a slope that still falls at the end suffices. This rule refuses full steps to the minimum of a quadratic.
   // So, where the energy changes by round-off alone, a slope that shrinks to half suffices, too: if the end is no higher, or
   // the promised decrease was below round-off.

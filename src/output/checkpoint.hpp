@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The part of a frame from which a run goes on with the same bits (CONVENTIONS.md, "Output"): group /checkpoint beside
+// The part of a frame from which a run goes on with the same bits (docs/theory.md, "Output"): group /checkpoint beside
 // /mesh.
 #pragma once
 

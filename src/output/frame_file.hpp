@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One stored step: frames/NNNNNN.h5 (CONVENTIONS.md, "Output").
+// One stored step: frames/NNNNNN.h5 (docs/theory.md, "Output").
 #pragma once
 
 #include <cstdint>

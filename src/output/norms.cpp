@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Norms of the displacement u = x - X: one centroid point a straight cell, quadrature of degree 2 in others is what the
-// regression scenes' reference values use (CONVENTIONS.md, "Norms").
+// regression scenes' reference values use (docs/theory.md, "Norms").
 #include <algorithm>
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reports as JSON text with the names that CONVENTIONS.md, "Output" promises.
+// Reports as JSON text with the names that docs/theory.md, "Output" promises.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `contact/collision_mesh`: a surface that touches in place of the bodies' boundary (CONVENTIONS.md, "Contact").
+// `contact/collision_mesh`: a surface that touches in place of the bodies' boundary (docs/theory.md, "Contact").
 #pragma once
 
 #include <optional>

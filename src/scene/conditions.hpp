@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `boundary_conditions`, `initial_conditions` and the motion of obstacles (CONVENTIONS.md, "Conditions").
+// `boundary_conditions`, `initial_conditions` and the motion of obstacles (docs/theory.md, "Conditions").
 #pragma once
 
 #include "geometry.hpp"

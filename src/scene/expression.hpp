@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The expression language of scene files (CONVENTIONS.md, "Expressions"): tinyexpr's grammar and functions, and PolyFEM's
+// The expression language of scene files (docs/theory.md, "Expressions"): tinyexpr's grammar and functions, and PolyFEM's
 // additions. Parsed once into a program for a stack of numbers.
 #pragma once
 

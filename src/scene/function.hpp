@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vector values of a scene (CONVENTIONS.md, "Conditions") into functions of rest position and time.
+// Vector values of a scene (docs/theory.md, "Conditions") into functions of rest position and time.
 #pragma once
 
 #include "itr/simulation/setup.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `geometry` of a scene: the bodies' mesh and the obstacles (CONVENTIONS.md, "Meshes").
+// `geometry` of a scene: the bodies' mesh and the obstacles (docs/theory.md, "Meshes").
 #pragma once
 
 #include <map>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The factor g(t) that scales a boundary value over time (CONVENTIONS.md, "Conditions").
+// The factor g(t) that scales a boundary value over time (docs/theory.md, "Conditions").
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of all keys of a scene: what the reader checks against, what the schema and the page SCENES.md are made of.
+// The table of all keys of a scene: what the reader checks against, what the schema and the page docs/scenes.md are made of.
 #pragma once
 
 #include <map>
@@ -26,7 +26,7 @@ enum class Level {
   basic    ///< a first scene of one's own
 };
 
-/// A row. New keys come with their reader and a test; after that `itr schema --markdown > SCENES.md`.
+/// A row. New keys come with their reader and a test; after that `itr schema --markdown > docs/scenes.md`.
 struct Key {
   const char* pointer;  ///< `*` stands for the elements of a list, `{a,b}` for either
   Role role;

@@ -101,7 +101,7 @@ constexpr Key kKeys[] = {
     {"/materials/*", read, "", "", "", "one material"},
     {"/materials/*/type", read,
      "NeoHookean|LinearElasticity|HookeLinearElasticity|SaintVenant|FixedCorotational|MooneyRivlin|MooneyRivlin3Param", "",
-     "", "the law, see CONVENTIONS.md; required", basic},
+     "", "the law, see docs/theory.md; required", basic},
     {"/materials/*/id", read, "id or ids", "0", "", "of cells, as volume_selection or the mesh file gives them", basic},
     {"/materials/*/E", read, "number or expression", "", "Pa", "Young's modulus, > 0", basic},
     {"/materials/*/nu", read, "number or expression", "", "", "Poisson's ratio, in (-1, 0.5)", basic},
@@ -218,7 +218,7 @@ constexpr Key kKeys[] = {
 
     {"/solver/contact/barrier_stiffness", read, "positive or adaptive", "(from the stiffest body and dhat)", "",
      "kappa: [Pa] with use_convergent_formulation; adaptive: follows the forces, as PolyFEM does unless a number is given; "
-     "larger: wider gaps, fewer iterations; CONVENTIONS.md has the default, `itr run` and `itr explain` print it"},
+     "larger: wider gaps, fewer iterations; docs/theory.md has the default, `itr run` and `itr explain` print it"},
     {"/solver/contact/initial_barrier_stiffness", read, "positive", "1", "",
      "where adaptive stiffness begins; given without barrier_stiffness it asks for it"},
     {"/solver/contact/friction_iterations", read, "integer", "1", "",
@@ -241,7 +241,7 @@ constexpr Key kKeys[] = {
     {"/solver/nonlinear/{f_delta,advanced/f_delta}", read, "non_negative", "0", "J s",
      "converged: energy changed by less than this times dt, f_delta_step_tol times in a row"},
     {"/solver/nonlinear/x_delta_tol", read, "non_negative", "0", "",
-     "converged: step below this, times scales that norm_type says (CONVENTIONS.md)"},
+     "converged: step below this, times scales that norm_type says (docs/theory.md)"},
     {"/solver/nonlinear/grad_norm_tol", read, "non_negative", "", "", "converged: gradient below this times such scales"},
     {"/solver/nonlinear/rel_grad_norm_tol", read, "non_negative", "", "", "of the solve's first gradient"},
     {"/solver/nonlinear/rel_x_delta_tol", read, "non_negative", "0", "", "of the solve's first step"},
@@ -299,7 +299,7 @@ constexpr Key kKeys[] = {
     {"/space/remesh/enabled", read, "boolean", "false", "", "in-timestep remeshing", basic},
     {"/space/remesh/type", read, "physics|sizing_field", "\"physics\"", "",
      "what decides about splits and collapses: energies, or lengths of edges, the baseline that the paper compares with "
-     "(REMESHING.md)"},
+     "(docs/theory.md)"},
     {"/space/remesh/sizing_field/rel_min_edge_length", read, "non_negative", "0.01", "",
      "shorter edges are not split, in longest sides of the bodies' box: in contact nothing else ends it"},
     {"/space/remesh/screening", read, "energy-percentile|bounds|none", "\"bounds\"", "",
@@ -309,7 +309,7 @@ constexpr Key kKeys[] = {
      "what an operation is charged for forgetting of the past: what the new mesh cannot represent, or nothing (the paper)"},
     {"/space/remesh/relative_tolerance", read, "positive", "1e-4", "",
      "chooses split and collapse tolerances where split/acceptance_tolerance is not given: this part of the energy that is "
-     "stored so far, or that the scene has (REMESHING.md); `itr run` and `itr explain` print them",
+     "stored so far, or that the scene has (docs/theory.md); `itr run` and `itr explain` print them",
      basic},
     {"/space/remesh/split/enabled", read, "boolean", "true", "", ""},
     {"/space/remesh/split/acceptance_tolerance", read, "positive", "(relative_tolerance chooses)", "J",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `materials` of a scene (CONVENTIONS.md, "Materials").
+// `materials` of a scene (docs/theory.md, "Materials").
 #pragma once
 
 #include <map>

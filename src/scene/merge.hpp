@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From a scene file to one document: `common` and `patch` (SCENES.md), root path, command-line overrides.
+// From a scene file to one document: `common` and `patch` (docs/scenes.md), root path, command-line overrides.
 #pragma once
 
 #include "itr/scene/scene.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Obstacles: collision-only surfaces out of mesh files (CONVENTIONS.md, "Meshes").
+// Obstacles: collision-only surfaces out of mesh files (docs/theory.md, "Meshes").
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

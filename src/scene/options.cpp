@@ -192,7 +192,7 @@ Node first_gradient_node(const Node& nonlinear) {
                                               : nonlinear["advanced"]["first_grad_norm_tol"];
 }
 
-/// CONVENTIONS.md, "Tolerances": tolerances in the paper's sense, Euclidean norms times h.
+/// docs/theory.md, "Tolerances": tolerances in the paper's sense, Euclidean norms times h.
 void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& options) {
   const Node advanced = nonlinear["advanced"];
   const Units& units = nonlinear.document().units;
@@ -204,7 +204,7 @@ void read_paper_tolerances(const Node& nonlinear, double length, NewtonOptions& 
   options.energy_steps = advanced["f_delta_step_tol"].integer_at_least(1, 100);
 }
 
-/// CONVENTIONS.md, "Tolerances": norms that do not depend on the mesh, tolerances times the scene's scales.
+/// docs/theory.md, "Tolerances": norms that do not depend on the mesh, tolerances times the scene's scales.
 void read_main_tolerances(const Node& root, const SceneScale& scale, NewtonOptions& options) {
   const Node nonlinear = root["solver"]["nonlinear"], advanced = root["solver"]["advanced"];
   const Node given_length = advanced["characteristic_length"];

@@ -14,7 +14,7 @@ Units read_units(const Node& root);
 TimeOptions read_time(const Node& root, std::vector<std::string>& warnings);
 /// Warns of keys that are given, but do nothing as other keys are.
 void warn_of_idle_keys(const Node& root, const TimeOptions& time, bool has_obstacles, std::vector<std::string>& warnings);
-/// The length that PolyFEM multiplies tolerances with: h, or 1 for statics (CONVENTIONS.md, "Tolerances").
+/// The length that PolyFEM multiplies tolerances with: h, or 1 for statics (docs/theory.md, "Tolerances").
 double characteristic_length(const Node& root, const TimeOptions& time);
 
 /// `shortest_edge` of the rest surfaces, obstacles included: dhat shrinks below it unless the scene gives it (§6.1).

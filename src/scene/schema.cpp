@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What the table of keys says to others: a JSON Schema, and the page SCENES.md.
+// What the table of keys says to others: a JSON Schema, and the page docs/scenes.md.
 #include <algorithm>
+#include <cctype>
 
 #include "itr/scene/scene.hpp"
 #include "key_table.hpp"
@@ -97,6 +98,25 @@ std::string tables_of_what_is_read() {
   return text;
 }
 
+/// Lists the keys of PolyFEM that do nothing here, those with the same reason together.
+std::string list_of_ignored() {
+  std::vector<std::pair<std::string, std::string>> reasons;
+  for (const Key& key : keys()) {
+    if (key.role != Role::ignored) continue;
+    const auto has_reason = [&](const auto& one) { return one.first == key.meaning; };
+    const auto at = std::find_if(reasons.begin(), reasons.end(), has_reason);
+    std::string pointer = "`";
+    pointer.append(key.pointer).append("`");
+    if (at == reasons.end())
+      reasons.emplace_back(key.meaning, pointer);
+    else
+      at->second += ", " + pointer;
+  }
+  std::string text;
+  for (const auto& [reason, pointers] : reasons) text += "- " + pointers + ": " + reason + "\n";
+  return text;
+}
+
 std::string list_of_others(Role role) {
   std::string text;
   for (const Key& key : keys()) {
@@ -108,15 +128,29 @@ std::string list_of_others(Role role) {
   return text;
 }
 
-/// Where a first scene begins: the basic keys with their whole pointers.
-std::string table_of_basic_keys() {
+/// Makes GitHub's anchor of the section of a parent: letters, digits and underscores of its pointer.
+std::string anchor_of(const std::string& parent) {
+  std::string anchor;
+  for (const char c : parent)
+    if (std::isalnum(static_cast<unsigned char>(c)) || c == '_') anchor += static_cast<char>(std::tolower(c));
+  return anchor;
+}
+
+/// Lists where a first scene begins: the names of the basic keys by section, without what the tables say of them.
+std::string list_of_basic_keys() {
   std::string text =
-      "\n## Basic keys\n\nA first scene needs no others. The tables below have them in bold.\n\n"
-      "| key | unit | meaning |\n|---|---|---|\n";
-  for (const Key& key : keys())
-    if (key.level == Level::basic)
-      text += "| `" + std::string(key.pointer) + "` | " + key.unit + " | " + in_cell(key.meaning) + " |\n";
-  return text;
+      "\n## Basic keys\n\nA first scene has `geometry`, `materials` and `time`, and needs no other keys than these, "
+      "bold in the tables:\n\n";
+  std::string last;
+  for (const Key& key : keys()) {
+    if (key.level != Level::basic) continue;
+    const std::string pointer = key.pointer, parent = parent_of(pointer), name = pointer.substr(parent.size() + 1);
+    if (parent.empty()) continue;
+    text += parent == last ? ", " : (last.empty() ? "- [`" : "\n- [`") + parent + "`](#" + anchor_of(parent) + "): ";
+    text += "`" + name + "`";
+    last = parent;
+  }
+  return text + "\n";
 }
 
 /// Section of refusals: combinations, values, keys.
@@ -134,17 +168,17 @@ std::string section_of_refusals() {
 constexpr const char* kIntroduction = R"(# Scenes: all keys
 
 A scene is a JSON file in PolyFEM's format. This page is made by `itr schema --markdown` from the table of keys that the reader
-checks scenes against. `itr schema` prints the same as JSON Schema, for editors. [TUTORIAL.md](TUTORIAL.md) builds a first scene,
-[CONVENTIONS.md](CONVENTIONS.md) says what signs, dimensions, laws and tolerances mean, and
-[examples/README.md](examples/README.md) has scenes to start from.
+checks scenes against. `itr schema` prints the same as JSON Schema, for editors. The [tutorial](tutorial.md) builds a first scene,
+the [theory](theory.md) says what signs, dimensions, laws and tolerances mean, and the [examples](../examples/README.md) are
+scenes to start from.
 
 - `*` stands for the elements of a list. A list of one element may be written as that element alone.
 - `{a,b}` stands for either.
 - Units are those of SI. Where `/units` names others, they stand for the unit of the same kind: N/m^2 for MPa with mm, t, s
-  ([CONVENTIONS.md](CONVENTIONS.md#units)).
+  ([units](theory.md#units)).
 - A key that is not on this page is an error. The message names the nearest key that exists.
-- An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^` and the functions that
-  [CONVENTIONS.md](CONVENTIONS.md#expressions) lists.
+- An expression is a text of numbers, `x y z` (rest position), `t`, `pi`, `e`, `+ - * / % ^` and
+  [functions](theory.md#expressions).
 
 A file may build on another one. `"common": "base.json"` takes the keys of that file and merges the file's own keys over them:
 objects key by key, lists as a whole, and `null` removes a key. Then `"patch"` is applied, a list of JSON Patch operations. Then
@@ -168,10 +202,10 @@ std::string json_schema() {
 }
 
 std::string reference_page() {
-  return std::string(kIntroduction) + table_of_basic_keys() + tables_of_what_is_read() + section_of_refusals() +
+  return std::string(kIntroduction) + list_of_basic_keys() + tables_of_what_is_read() + section_of_refusals() +
          "\n## Not written\n\nOutput of PolyFEM. A scene that asks for it gets a warning.\n\n" +
          list_of_others(Role::unwritten) + "\n## Without effect\n\nKnown to PolyFEM, and passed over here.\n\n" +
-         list_of_others(Role::ignored);
+         list_of_ignored();
 }
 
 }  // namespace itr::scene

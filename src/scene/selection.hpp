@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which ids parts of a mesh get (CONVENTIONS.md, "Meshes").
+// Which ids parts of a mesh get (docs/theory.md, "Meshes").
 #pragma once
 
 #include <functional>

@@ -14,7 +14,7 @@ using Box = Eigen::AlignedBox<double, Dim>;
 template <int Dim>
 Box<Dim> bounding_box(const std::vector<Vec<Dim>>& points);
 
-/// Applies `advanced/normalize_mesh`, `unit` and `transformation` of a geometry (CONVENTIONS.md, "Meshes"): scale, rotate,
+/// Applies `advanced/normalize_mesh`, `unit` and `transformation` of a geometry (docs/theory.md, "Meshes"): scale, rotate,
 /// translate. Returns whether that turns the orientation round (a mirror).
 template <int Dim>
 bool transform(std::vector<Vec<Dim>>& points, const Node& geometry);

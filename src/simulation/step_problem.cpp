@@ -101,7 +101,7 @@ double StepProblem<Dim>::average_mass() const {
 }
 
 /// Balances the barrier against the other terms at x, dissipation aside. At obstacles the reference implementation's
-/// gradient is their prescribed displacement (CONVENTIONS.md, "Barrier stiffness"): it is part of its schedule.
+/// gradient is their prescribed displacement (docs/theory.md, "Barrier stiffness"): it is part of its schedule.
 template <int Dim>
 void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   VectorX gradient = VectorX::Zero(x.size());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Combinations of features that no simulation takes: one table, for the check and for the page SCENES.md.
+// Combinations of features that no simulation takes: one table, for the check and for the page docs/scenes.md.
 #pragma once
 
 #include <vector>

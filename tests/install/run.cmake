@@ -20,7 +20,7 @@ file(RENAME ${WORK_DIR}/first ${WORK_DIR}/prefix)
 build(tests/install consumer)
 set(shared ${WORK_DIR}/prefix/share)
 foreach(file itr/examples/masticator.json itr/examples/render.py itr/examples/tasks/drop.json doc/itr/README.md
-        doc/itr/SCENES.md doc/itr/CONVENTIONS.md)
+        doc/itr/docs/scenes.md doc/itr/docs/theory.md)
   if(NOT EXISTS ${shared}/${file})
     message(FATAL_ERROR "${file} is not installed")
   endif()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The contact barrier in its convergent form, from its formula (CONVENTIONS.md, "Contact")."""
+"""The contact barrier in its convergent form, from its formula (docs/theory.md, "Contact")."""
 import numpy as np
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Material laws from their formulas (CONVENTIONS.md, "Materials"), written with the operators of a module `m`: `ufl`, or the
+"""Material laws from their formulas (docs/theory.md, "Materials"), written with the operators of a module `m`: `ufl`, or the
 symbolic one of harness.manufactured. They are what our derivatives are held against."""
 import dataclasses
 
 
 def lame(E, nu, dim, plane_strain=False):
-    """mu and lambda of a scene's material (CONVENTIONS.md, "Materials")."""
+    """mu and lambda of a scene's material (docs/theory.md, "Materials")."""
     return E / (2 * (1 + nu)), nu * E / (1 - nu**2) if dim == 2 and not plane_strain else E * nu / ((1 + nu) * (1 - 2 * nu))
 
 

@@ -199,7 +199,8 @@ def page():
     here = [name for name in STUDIES if (HERE / name / "study.json").exists()]
     lines = ["# Speed against error: the paper's scenes", "",
              "Is remeshing faster than a fine fixed mesh? `itr study` answers this for each scene of the paper by running it on many",
-             "meshes ([STUDY.md](../../STUDY.md)). `studies.py` makes this page from the studies, which are in the folders beside it:",
+             "meshes ([user guide](../../docs/user-guide.md#study-speed-against-error)). `studies.py` makes this page from the studies,",
+             "which are in the folders beside it:",
              "a click on a scene shows its page, with a diagram and all numbers.", "",
              "Each line of the table compares one series of runs with uniform refinement by linear elements, the series `uniform`:", "",
              "| column | meaning |", "|---|---|",

@@ -16,7 +16,7 @@ BDF = {1: ([1], 1, 1), 2: ([4, -1], 2, 3), 3: ([18, -9, 2], 6, 11)}  # weights o
 
 
 def small_strain_moduli(material, dim):
-    """mu and lambda of a scene's material at rest (CONVENTIONS.md, "Materials")."""
+    """mu and lambda of a scene's material at rest (docs/theory.md, "Materials")."""
     if material["type"] in ("MooneyRivlin", "MooneyRivlin3Param"):
         # The second isochoric invariant is 1 in 2D, so that its product with the first one acts like the first.
         mu = 2 * (material["c1"] + (material["c2"] if dim == 3 else -material.get("c3", 0.0)))

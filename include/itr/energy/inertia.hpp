@@ -23,7 +23,7 @@ class InertiaEnergy final : public Energy, public IncrementalTerm {
   void renew(const std::map<int, Material>& materials, MassKind kind, ConstVectorView predictor);
 
   /// Adds residual . (x - xhat) + loss, by which the functional becomes 1/2 ||x - xhat_old||^2 for an xhat_old that the
-  /// mesh cannot represent (REMESHING.md, "The rules", rule b): see projection/forgotten_history.hpp.
+  /// mesh cannot represent (docs/theory.md, "The rules", rule b): see projection/forgotten_history.hpp.
   void set_unrepresented_history(ConstVectorView residual, double loss);
 
   /// Gives xhat - base for increments from `base`, where xhat itself would round it away.

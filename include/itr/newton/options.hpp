@@ -33,7 +33,7 @@ struct NewtonProgress {
 };
 
 /// Convergence tests and search of a solve. Absolute tolerances are those of the scene, already multiplied by the factors of
-/// CONVENTIONS.md, "Tolerances". 0 turns a test off. Where none is given, forces are compared with the forces that act.
+/// docs/theory.md, "Tolerances". 0 turns a test off. Where none is given, forces are compared with the forces that act.
 struct NewtonOptions {
   int max_iterations = 3000;
   NewtonNorm norm = NewtonNorm::euclidean;

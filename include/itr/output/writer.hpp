@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Writes the results of a simulation into a folder: frames/NNNNNN.h5, sim.h5, sim.xdmf, steps.jsonl, summary.json
-// (CONVENTIONS.md, "Output"). Reads state, never changes it.
+// (docs/theory.md, "Output"). Reads state, never changes it.
 #pragma once
 
 #include <filesystem>
@@ -16,7 +16,7 @@
 
 namespace itr::output {
 
-/// Norms of the final displacement as CONVENTIONS.md, "Norms" defines them (rest integrals, one centroid point a cell;
+/// Norms of the final displacement as docs/theory.md, "Norms" defines them (rest integrals, one centroid point a cell;
 /// linf_grad is the true maximum).
 struct DisplacementNorms {
   double l2 = 0, h1 = 0, h1_semi = 0, linf = 0, linf_grad = 0, lp = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Options of in-timestep remeshing, with the paper's defaults (REMESHING.md).
+// Options of in-timestep remeshing, with the paper's defaults (docs/theory.md).
 #pragma once
 
 #include <optional>
@@ -70,7 +70,7 @@ struct LocalRelaxationOptions {
   int max_contact_iterations = 4;  ///< the same where the patch touches contact
 };
 
-/// The baseline of REMESHING.md, "The sizing field": lengths of edges decide instead of energies.
+/// The baseline of docs/theory.md, "The sizing field": lengths of edges decide instead of energies.
 struct SizingFieldOptions {
   bool enabled = false;
   /// Shorter rest edges are not split, in longest sides of the bodies' box. In contact nothing else ends the splitting.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reads scene files (PolyFEM's JSON, the keys in SCENES.md) into setups. This is the only module that knows JSON and
+// Reads scene files (PolyFEM's JSON, the keys in docs/scenes.md) into setups. This is the only module that knows JSON and
 // expressions. A wrong scene throws an InputError before anything is computed.
 #pragma once
 
@@ -69,7 +69,7 @@ int read_max_threads(const std::string& options, const std::vector<Override>& ov
 
 /// The JSON Schema (draft 7) of scenes, made from the table that `read` checks keys and values against.
 std::string json_schema();
-/// The page SCENES.md, made from the same table.
+/// The page docs/scenes.md, made from the same table.
 std::string reference_page();
 
 }  // namespace itr::scene

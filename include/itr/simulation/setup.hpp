@@ -159,7 +159,7 @@ struct Setup : StepSetup<Dim> {
   /// - Activation distance 0 becomes a thousandth of the thinnest body, less where edges are short or gaps narrow.
   /// - Barrier stiffness 0 becomes a tenth of the stiffest body's modulus [Pa] in the convergent form, and its equivalent in
   ///   the plain form, unless it is adaptive.
-  /// - An open split tolerance becomes relative_tolerance times an energy of the scene (REMESHING.md).
+  /// - An open split tolerance becomes relative_tolerance times an energy of the scene (docs/theory.md).
   /// - Whoever chose the split tolerance, collapses may cost a hundredth of it, and swaps and moves that improve the shape a
   ///   millionth.
   /// - A shortest edge to split that is left open becomes 1e-6 of the bodies' diagonal.

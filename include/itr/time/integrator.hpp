@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Implicit time integrators as minimisation: predictor x-hat, scaling alpha h^2, and how velocity and acceleration follow
-// from new positions (CONVENTIONS.md, "Time").
+// from new positions (docs/theory.md, "Time").
 #pragma once
 
 #include <vector>

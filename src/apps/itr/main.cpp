@@ -82,7 +82,7 @@ int forces(const std::string& directory) {
 
 /// Adds the options of a scene that `run` and `explain` share.
 void add_scene_options(CLI::App& command, cli::RunOptions& options, std::vector<std::string>& sets) {
-  command.add_option("scene", options.scene, "scene file (JSON), see SCENES.md")->required();
+  command.add_option("scene", options.scene, "scene file (JSON), see docs/scenes.md")->required();
   command.add_option("-o,--output", options.directory, "result folder (default: the scene's, or results/<scene>)");
   command.add_option("--solver", options.solver, "linear solver, see `itr solvers`");
   command.add_option("--threads", options.threads, "number of threads (0: all)")->check(CLI::NonNegativeNumber);
@@ -155,7 +155,7 @@ int dispatch(int argc, char** argv) {
   auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing; takes options of run");
   add_scene_options(*explain, options, sets);
   auto* schema = app.add_subcommand("schema", "JSON Schema of scenes");
-  schema->add_flag("--markdown", as_page, "the same as a page to read: SCENES.md");
+  schema->add_flag("--markdown", as_page, "the same as a page to read: docs/scenes.md");
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();

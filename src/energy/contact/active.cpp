@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which pairs act, and with which weights (CONVENTIONS.md, "Contact"): every pair of primitives once, or area weights (and
+// Which pairs act, and with which weights (docs/theory.md, "Contact"): every pair of primitives once, or area weights (and
 // inclusion-exclusion where the regions of neighbouring primitives overlap: faces - edges + vertices).
 #include <algorithm>
 #include <cmath>

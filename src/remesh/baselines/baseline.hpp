@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The paper's rules in place of ours (REMESHING.md): culling, screening, history, sizing field. A session has a Baseline
+// The paper's rules in place of ours (docs/theory.md): culling, screening, history, sizing field. A session has a Baseline
 // only if its options choose one of them.
 #pragma once
 
@@ -31,7 +31,7 @@ class Baseline {
   /// Volume at rest [m^Dim] that a patch has at least, of bodies with this one (the paper's §4.3).
   double least_patch_volume(double total_volume) const { return options_.local.relative_volume * total_volume; }
 
-  /// Culling: ranks the edges of the mesh as it is (REMESHING.md, "The rules"): elastic energy of an edge = mean over
+  /// Culling: ranks the edges of the mesh as it is (docs/theory.md, "The rules"): elastic energy of an edge = mean over
   /// incident cells, contact energy = mean over its ends; top if either is among the tops, bottom only if both are at the
   /// bottom. Leaves out no edge with another screening than `energy_percentile`.
   void rank(const RemeshQueries<Dim>& ask);

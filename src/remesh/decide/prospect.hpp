@@ -17,7 +17,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
 /// Edges up to this length may collapse [m] ...
 template <int Dim>
 double longest_collapse(const CollapseOptions& options, const StepContext<Dim>& context);
-/// ... if a cell at the edge is no larger than a cell whose edges are that long (REMESHING.md).
+/// ... if a cell at the edge is no larger than a cell whose edges are that long (docs/theory.md).
 template <int Dim>
 bool is_small(const Mesh<Dim>& mesh, CellId cell, double longest);
 /// Whether there is such an edge.

@@ -70,7 +70,7 @@ struct TrialOptions {
   LocalRelaxationOptions local;
 };
 
-/// Computes the decrease of the energy by the edit (REMESHING.md, "The rules", rules a-d; paper eq. 11). Both sides have one
+/// Computes the decrease of the energy by the edit (theory.md, "The rules", rules a-d; paper eq. 11). Both sides have one
 /// support and get the same number of Newton iterations. First the cells of the edit alone relax, where hardly more than the
 /// vertex that the edit sets is free. Their gain is real, so it may accept the edit; if even `patch_over_vertex` times this
 /// gain is too little, it refuses. A trial on a patch decides the rest. Once scratch and verdict have served for similar

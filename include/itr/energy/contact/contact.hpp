@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Contact barrier of IPC (Li et al. 2020) between surface primitives, in both forms of CONVENTIONS.md, "Contact". Pairs are
+// Contact barrier of IPC (Li et al. 2020) between surface primitives, in both forms of docs/theory.md, "Contact". Pairs are
 // a vertex and an edge in 2D, a vertex and a triangle or two edges in 3D.
 #pragma once
 

@@ -8,7 +8,7 @@
 namespace itr {
 
 /// Smoothed Coulomb friction with normal forces, tangents and closest points lagged at the positions where it was made
-/// (CONVENTIONS.md, "Friction").
+/// (docs/theory.md, "Friction").
 template <int Dim>
 class FrictionEnergy final : public Energy {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Barrier stiffness that follows the scene (CONVENTIONS.md, "Barrier stiffness", after IPC's supplement): large enough for
+// Barrier stiffness that follows the scene (docs/theory.md, "Barrier stiffness", after IPC's supplement): large enough for
 // gaps that round-off can resolve, small enough for Newton, and doubled while contacts close below a billionth of the scene.
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Stored-energy densities W(F) of all laws, F = dx/dX of det F = J > 0, d the dimension (CONVENTIONS.md, "Materials"):
+// Stored-energy densities W(F) of all laws, F = dx/dX of det F = J > 0, d the dimension (docs/theory.md, "Materials"):
 //   neo-Hookean             mu/2 (tr F^T F - d - 2 ln J) + lambda/2 (ln J)^2
 //   linear                  mu e:e + lambda/2 (tr e)^2,  e = (F + F^T)/2 - I
 //   St. Venant-Kirchhoff    mu E:E + lambda/2 (tr E)^2,  E = (F^T F - I)/2

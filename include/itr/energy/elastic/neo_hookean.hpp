@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Compressible neo-Hookean density W = mu/2 (tr F^T F - d - 2 ln J) + lambda/2 (ln J)^2 (CONVENTIONS.md, "Materials").
+// Compressible neo-Hookean density W = mu/2 (tr F^T F - d - 2 ln J) + lambda/2 (ln J)^2 (docs/theory.md, "Materials").
 #pragma once
 
 #include "itr/core/types.hpp"
