@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -54,21 +55,17 @@ struct MeshFigures {
       shortest = std::min(shortest, length);
       longest = std::max(longest, length);
     }
-    Vec<Dim> low = Vec<Dim>::Constant(kInfinity), high = -low;
+    Eigen::AlignedBox<double, Dim> box;
     for (CellId c = 0; c < mesh.cell_slots(); ++c) {
       if (!mesh.is_cell_alive(c)) continue;
       std::array<Vec<Dim>, Dim + 1> corners;
-      for (int i = 0; i <= Dim; ++i) {
-        corners[i] = mesh.rest(mesh.cell(c)[i]);
-        low = low.cwiseMin(corners[i]);
-        high = high.cwiseMax(corners[i]);
-      }
+      for (int i = 0; i <= Dim; ++i) box.extend(corners[i] = mesh.rest(mesh.cell(c)[i]));
       const double quality = simplex_quality<Dim>(corners);
       slivers += quality < kSliver;
       if (quality < worst_quality) worst_quality = quality, worst_cell = c;
     }
-    size = (high - low).maxCoeff();
-    const Vec<Dim> middle = (low + high) / 2;  // may lie outside of the bodies, where loads need not be defined
+    size = box.sizes().maxCoeff();
+    const Vec<Dim> middle = box.center();  // may lie outside of the bodies, where loads need not be defined
     center = mesh.rest(0);
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
       if (mesh.is_vertex_alive(v) && (mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);

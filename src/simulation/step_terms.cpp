@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "itr/core/error.hpp"
+#include "mesh/rest_box.hpp"
 
 namespace itr {
 
@@ -102,10 +102,7 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
 
 template <int Dim>
 double rest_diagonal(const Mesh<Dim>& mesh) {
-  Eigen::AlignedBox<double, Dim> box;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    if (mesh.is_vertex_alive(v)) box.extend(mesh.rest(v));
-  return box.diagonal().norm();
+  return rest_box(mesh).diagonal().norm();
 }
 
 template <int Dim>
