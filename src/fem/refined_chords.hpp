@@ -24,6 +24,15 @@ struct RefinedChords {
   std::vector<Weights> points;                            ///< nodes that a point combines, with their weights
 };
 
+/// The chords of all boundary facets (see add_chord_facets), in the order of these.
+template <int Dim>
+std::vector<typename MeshTypes<Dim>::Facet> boundary_chords(const Mesh<Dim>& mesh, const Space& space) {
+  std::vector<typename MeshTypes<Dim>::Facet> chords;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    if (mesh.is_facet_alive(f)) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
+  return chords;
+}
+
 /// A weighted sum of the values at(node) of nodes.
 template <int Dim, typename Weights, typename At>
 Vec<Dim> combined(const Weights& weights, const At& at) {

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/check.hpp"
+#include "mesh/rest_box.hpp"
 
 namespace itr {
 
@@ -145,10 +146,7 @@ std::string_view name(Stratum stratum) {
 
 template <int Dim>
 Strata<Dim>::Strata(const Mesh<Dim>& mesh, double flatness) {
-  Vec<Dim> low = Vec<Dim>::Constant(HUGE_VAL), high = -low;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    if (mesh.is_vertex_alive(v)) low = low.cwiseMin(mesh.rest(v)), high = high.cwiseMax(mesh.rest(v));
-  tolerance_ = mesh.num_vertices() > 0 ? flatness * (high - low).norm() : 0;
+  tolerance_ = mesh.num_vertices() > 0 ? flatness * rest_box(mesh).diagonal().norm() : 0;
 
   auto sheets = find_sheets(mesh);
   find_neighbours<Dim>(sheets);

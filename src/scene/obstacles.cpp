@@ -7,6 +7,7 @@
 #include <set>
 
 #include "geometry.hpp"
+#include "mesh/rest_box.hpp"
 #include "selection.hpp"
 
 namespace itr::scene {
@@ -179,13 +180,6 @@ void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
 }
 
-template <int Dim>
-Box<Dim> box_of(const Mesh<Dim>& mesh) {
-  Box<Dim> box;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) box.extend(mesh.rest(v));
-  return box;
-}
-
 /// One edge or triangle that reaches ten times as far as the bodies do at the start, seen from above their middle: an edge
 /// inside of the plane would add pairs to those of the faces beside it, whose barrier pushes sideways.
 template <int Dim>
@@ -237,7 +231,7 @@ ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& fi
   for (const Node& geometry : geometries.obstacles) {
     const int part = all.part.empty() ? 0 : all.part.back() + 1;
     if (is_flat_obstacle(geometry))
-      read_flat<Dim>(geometry, box_of(bodies), all);
+      read_flat<Dim>(geometry, rest_box(bodies), all);
     else
       read_obstacle<Dim>(geometry, files.get(geometry), all);
     all.part.resize(all.obstacles.rest.size(), part);

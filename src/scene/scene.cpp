@@ -12,6 +12,7 @@
 #include "geometry.hpp"
 #include "materials.hpp"
 #include "merge.hpp"
+#include "mesh/rest_box.hpp"
 #include "options.hpp"
 #include "transformation.hpp"
 
@@ -43,14 +44,6 @@ double shortest_surface_edge(const Setup<Dim>& setup) {
 }
 
 template <int Dim>
-double body_diagonal(const Mesh<Dim>& mesh) {
-  std::vector<Vec<Dim>> points;
-  points.reserve(mesh.vertex_slots());
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) points.push_back(mesh.rest(v));
-  return bounding_box<Dim>(points).diagonal().norm();
-}
-
-template <int Dim>
 std::set<int> body_ids(const Mesh<Dim>& mesh) {
   std::set<int> ids;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) ids.insert(mesh.body(c));
@@ -69,7 +62,7 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
   setup.lagged_load_tolerance = root["solver"]["advanced"]["lagged_load_tolerance"].positive(setup.lagged_load_tolerance);
   setup.order = read_order(root, body_ids(setup.mesh));
   setup.quadrature_degree = read_quadrature_degree(root);
-  setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, body_diagonal(setup.mesh)});
+  setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, rest_box(setup.mesh).diagonal().norm()});
   setup.materials = read_materials(root, setup.mesh, warnings);
   read_conditions<Dim>(root, std::move(obstacles), setup, warnings);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);

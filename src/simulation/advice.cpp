@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -12,6 +13,7 @@
 
 #include "barrier_stiffness.hpp"
 #include "geometry/measures.hpp"
+#include "mesh/connected_parts.hpp"
 #include "simulation/held_corners.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation/step_length.hpp"
@@ -54,21 +56,17 @@ struct MeshFigures {
       shortest = std::min(shortest, length);
       longest = std::max(longest, length);
     }
-    Vec<Dim> low = Vec<Dim>::Constant(kInfinity), high = -low;
+    Eigen::AlignedBox<double, Dim> box;
     for (CellId c = 0; c < mesh.cell_slots(); ++c) {
       if (!mesh.is_cell_alive(c)) continue;
       std::array<Vec<Dim>, Dim + 1> corners;
-      for (int i = 0; i <= Dim; ++i) {
-        corners[i] = mesh.rest(mesh.cell(c)[i]);
-        low = low.cwiseMin(corners[i]);
-        high = high.cwiseMax(corners[i]);
-      }
+      for (int i = 0; i <= Dim; ++i) box.extend(corners[i] = mesh.rest(mesh.cell(c)[i]));
       const double quality = simplex_quality<Dim>(corners);
       slivers += quality < kSliver;
       if (quality < worst_quality) worst_quality = quality, worst_cell = c;
     }
-    size = (high - low).maxCoeff();
-    const Vec<Dim> middle = (low + high) / 2;  // may lie outside of the bodies, where loads need not be defined
+    size = box.sizes().maxCoeff();
+    const Vec<Dim> middle = box.center();  // may lie outside of the bodies, where loads need not be defined
     center = mesh.rest(0);
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
       if (mesh.is_vertex_alive(v) && (mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
@@ -165,20 +163,14 @@ template <int Dim>
 std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   const Mesh<Dim>& mesh = setup.mesh;
   const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
-  std::vector<int> part(mesh.vertex_slots());
-  for (std::size_t v = 0; v < part.size(); ++v) part[v] = static_cast<int>(v);
-  const auto find = [&](int v) {
-    while (part[v] != v) v = part[v] = part[part[v]];
-    return v;
-  };
-  for (const auto& [a, b] : mesh.edges()) part[find(a)] = find(b);
+  const std::vector<int> part = connected_parts<2>(mesh.vertex_slots(), mesh.edges());
   std::set<int> fixed, loose, bodies;
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
     for (int c = 0; c < Dim; ++c)
-      if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(find(v));
+      if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(part[v]);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || fixed.contains(find(mesh.cell(c)[0]))) continue;
-    loose.insert(find(mesh.cell(c)[0]));
+    if (!mesh.is_cell_alive(c) || fixed.contains(part[mesh.cell(c)[0]])) continue;
+    loose.insert(part[mesh.cell(c)[0]]);
     bodies.insert(mesh.body(c));
   }
   return {bodies, static_cast<int>(loose.size())};

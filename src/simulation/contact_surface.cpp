@@ -2,53 +2,14 @@
 #include "simulation/contact_surface.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
+#include "energy/contact/surface_builder.hpp"
 #include "fem/refined_chords.hpp"
 
 namespace itr {
 
 namespace {
-
-/// The surface of what moves with bodies, given by its primitives and rest positions, and the obstacles after it.
-template <int Dim>
-CollisionSurface with_obstacles(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
-                                std::vector<int> points, std::vector<Vec<Dim>> rest, std::vector<char> counts,
-                                const Obstacles<Dim>& obstacles) {
-  const int bodies = static_cast<int>(rest.size()), total = bodies + static_cast<int>(obstacles.rest.size());
-  rest.insert(rest.end(), obstacles.rest.begin(), obstacles.rest.end());
-  counts.resize(total, 0);
-  for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
-  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
-  for (int v = bodies; v < total; ++v) points.push_back(v);
-  return make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
-}
-
-template <int Dim>
-std::vector<typename Mesh<Dim>::Facet> boundary_chords(const Mesh<Dim>& mesh, const Space& space) {
-  std::vector<typename Mesh<Dim>::Facet> chords;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
-  return chords;
-}
-
-/// The surface through all nodes and these points, and the obstacles.
-template <int Dim>
-CollisionSurface chord_surface(const std::vector<typename Mesh<Dim>::Facet>& chords, std::vector<Vec<Dim>> rest,
-                               const Obstacles<Dim>& obstacles) {
-  std::vector<std::array<int, 2>> edges;
-  std::vector<std::array<int, 3>> triangles;
-  std::vector<char> counts(rest.size(), 0);
-  for (const auto& facet : chords) {
-    for (const int v : facet) counts[v] = 1;
-    if constexpr (Dim == 2)
-      edges.push_back(facet);
-    else
-      triangles.push_back(facet);
-  }
-  return with_obstacles<Dim>(std::move(edges), std::move(triangles), {}, std::move(rest), std::move(counts), obstacles);
-}
 
 template <int Dim>
 ContactSurface<Dim> refined_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space,
@@ -67,7 +28,7 @@ ContactSurface<Dim> refined_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>&
   for (int o = 0; o < others; ++o) entries.emplace_back(own + o, nodes + o, 1);
   typename VertexMap<Dim>::Weights weights(own + others, nodes + others);
   weights.setFromTriplets(entries.begin(), entries.end());
-  return {chord_surface<Dim>(chords.facets, std::move(rest), obstacles),
+  return {surface_of_facets<Dim>(chords.facets, std::move(rest), obstacles),
           std::make_shared<VertexMap<Dim>>(weights, VectorX::Zero(Dim * (own + others)))};
 }
 
@@ -90,7 +51,7 @@ ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const
 
 template <int Dim>
 CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space) {
-  return chord_surface<Dim>(boundary_chords(mesh, space), node_rest_positions(mesh, space), obstacles);
+  return surface_of_facets<Dim>(boundary_chords(mesh, space), node_rest_positions(mesh, space), obstacles);
 }
 
 /// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
@@ -120,12 +81,10 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
   if (!setup.proxy && has_refined(levels)) return refined_surface(mesh, setup.obstacles, space, levels);
   if (!setup.proxy) return {collision_surface(mesh, setup.obstacles, space), nullptr};
   const CollisionProxy<Dim>& proxy = *setup.proxy;
-  std::vector<int> points(proxy.rest.size());
-  std::iota(points.begin(), points.end(), 0);
-  std::vector<char> counts(proxy.rest.size(), 1);
-  return {
-      with_obstacles<Dim>(proxy.edges, proxy.triangles, std::move(points), proxy.rest, std::move(counts), setup.obstacles),
-      proxy_map(setup, mesh, space), true};
+  SurfaceBuilder<Dim> builder;
+  for_each_simplex(proxy, 0, [&](const auto& ids) { builder.add(ids); });
+  return {builder.build(proxy.rest, std::vector<char>(proxy.rest.size(), 1), setup.obstacles), proxy_map(setup, mesh, space),
+          true};
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                       \

@@ -9,6 +9,7 @@
 
 #include "barrier_stiffness.hpp"
 #include "itr/simulation/setup.hpp"
+#include "mesh/rest_box.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/step_problem.hpp"
 #include "sizes.hpp"
@@ -52,15 +53,14 @@ double available_energy(const Setup<Dim>& setup) {
   if (!setup.neumann.empty() || !setup.pressure.empty() || !setup.dirichlet.empty() || !setup.obstacles.motions.empty())
     return 0;
   const Mesh<Dim>& mesh = setup.mesh;
-  Vec<Dim> low = mesh.rest(0), high = low;
-  for (const Vec<Dim>& p : setup.obstacles.rest) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) low = low.cwiseMin(mesh.rest(v)), high = high.cwiseMax(mesh.rest(v));
+  auto box = rest_box(mesh);
+  for (const Vec<Dim>& p : setup.obstacles.rest) box.extend(p);
   double energy = 0;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
     const double mass = setup.materials.at(mesh.body(c)).density * mesh.volume(c);
     const Vec<Dim> X = rest_center(mesh, c);
-    if (setup.body_acceleration) energy += mass * setup.body_acceleration(X, setup.time.t0).cwiseAbs().dot(high - low);
+    if (setup.body_acceleration) energy += mass * setup.body_acceleration(X, setup.time.t0).cwiseAbs().dot(box.sizes());
     for (const auto& condition : setup.initial_velocity)
       if (condition.body == mesh.body(c)) {
         energy += mass / 2 * condition.value(X, setup.time.t0).squaredNorm();

@@ -24,19 +24,19 @@ using Conditions = std::vector<const DirichletCondition<Dim>*>;
 template <int Dim>
 std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
   const Mesh<Dim>& mesh = setup.mesh;
-  const Conditions<Dim> all = conditions_by_tag<Dim>(setup);
+  const ConditionsByTag<Dim> all = conditions_by_tag<Dim>(setup);
   std::vector<Conditions<Dim>> holding(mesh.vertex_slots());
   const auto add = [&](VertexId v, const DirichletCondition<Dim>* condition) {
     std::erase(holding[v], condition);
     holding[v].push_back(condition);
   };
-  for (const auto* condition : all)
+  for (const auto& [tag, condition] : all)
     for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
+      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == tag)
         for (const VertexId v : mesh.facet(f)) add(v, condition);
-  for (const auto* condition : all)
+  for (const auto& [tag, condition] : all)
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-      if (mesh.is_vertex_alive(v) && mesh.vertex_tag(v) == condition->tag) add(v, condition);
+      if (mesh.is_vertex_alive(v) && mesh.vertex_tag(v) == tag) add(v, condition);
   return holding;
 }
 

@@ -4,6 +4,7 @@
 #include "projection/safe_projection.hpp"
 #include "projection/transfer_patch.hpp"
 #include "simulation/patch_surface.hpp"
+#include "simulation/step_terms.hpp"
 
 namespace itr {
 
@@ -32,23 +33,12 @@ class HistoryTransfer {
         patch_(make_transfer_patch(old_mesh, old_space, mesh, space, touched, setup.materials, kRings<Dim>)) {
     const auto n = patch_.new_cells.vertices.size();
     prescribed_.assign(Dim * n, 0);
-    const auto hold = [&](std::size_t i, int tag) {
-      for (const auto& condition : setup.dirichlet)
-        if (condition.tag == tag) {
-          for (int c = 0; c < Dim; ++c) prescribed_[Dim * i + c] |= condition.components[c];
-          return;  // the first of a tag counts
-        }
-    };
+    const auto components = held_components(setup);
+    const HeldRule<Dim> rule(components);
     for (std::size_t i = 0; i < n; ++i) {
-      const int v = patch_.new_cells.vertices[i];
-      if (v >= mesh.vertex_slots()) {
-        const EdgeKey& edge = space.curved_edges()[v - mesh.vertex_slots()];
-        for (const FacetId f : mesh.facets_of_edge(edge)) hold(i, mesh.facet_tag(f));
-        if (const int tag = mesh.edge_tag(edge); tag != kNoTag) hold(i, tag);
-        continue;
-      }
-      for (const FacetId f : mesh.facets_of(v)) hold(i, mesh.facet_tag(f));
-      if (mesh.vertex_tag(v) != kNoTag) hold(i, mesh.vertex_tag(v));
+      const int v = patch_.new_cells.vertices[i], node = v - mesh.vertex_slots();
+      const auto tags = node < 0 ? rule.tags_at(mesh, std::array{v}) : rule.tags_at(mesh, space.curved_edges()[node]);
+      for (int c = 0; c < Dim; ++c) prescribed_[Dim * i + c] = tags[c] != kNoTag;
     }
   }
 

@@ -5,6 +5,8 @@
 #include <span>
 #include <unordered_map>
 
+#include "energy/contact/surface_builder.hpp"
+#include "fem/refined_chords.hpp"
 #include "geometry/bvh.hpp"
 
 namespace itr {
@@ -50,13 +52,6 @@ std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const Space& space, c
   return boxes;
 }
 
-template <int Dim>
-std::vector<typename MeshTypes<Dim>::Facet> chords_of(const Mesh<Dim>& mesh, const Space& space) {
-  std::vector<typename MeshTypes<Dim>::Facet> chords;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
-  return chords;
-}
-
 }  // namespace
 
 template <int Dim>
@@ -96,28 +91,18 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
     }
     return it->second;
   };
-  std::vector<std::array<int, 2>> edges;
-  std::vector<std::array<int, 3>> triangles;
-  std::vector<int> points;
-  const auto add = [&](const auto& primitive, int first) {
-    auto ids = primitive;
-    for (int& v : ids) v += first;
+  SurfaceBuilder<Dim> builder;
+  const auto add = [&](auto ids) {
     if (!is_near(ids)) return;
     for (int& v : ids) v = local(v);
-    if constexpr (std::tuple_size_v<std::remove_cvref_t<decltype(primitive)>> == 2)
-      edges.push_back(ids);
-    else
-      triangles.push_back(ids);
+    builder.add(ids);
   };
-  for (const auto& chord : chords_of(mesh, space)) add(chord, 0);  // own ones are near themselves
-  for (const auto& edge : obstacles.edges) add(edge, bodies);
-  for (const auto& triangle : obstacles.triangles) add(triangle, bodies);
-  for (int o = 0; o < static_cast<int>(obstacles.rest.size()); ++o)
-    if (const int v = bodies + o; is_near(std::span(&v, 1))) points.push_back(local(v));
+  for (const auto& chord : boundary_chords(mesh, space)) add(chord);  // own ones are near themselves
+  for_each_simplex(obstacles, bodies, add);
 
   std::vector<char> counts(rest.size(), 0);
   std::copy(moving.begin(), moving.end(), counts.begin());
-  result.surface = make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
+  result.surface = builder.build(rest, std::move(counts));
   return result;
 }
 

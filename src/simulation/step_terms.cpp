@@ -3,12 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "itr/core/error.hpp"
+#include "mesh/rest_box.hpp"
 
 namespace itr {
 
@@ -49,40 +48,46 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
 }
 
 template <int Dim>
-std::vector<const DirichletCondition<Dim>*> conditions_by_tag(const StepSetup<Dim>& setup) {
-  std::map<int, const DirichletCondition<Dim>*> first;
+ConditionsByTag<Dim> conditions_by_tag(const StepSetup<Dim>& setup) {
+  ConditionsByTag<Dim> first;
   for (const auto& condition : setup.dirichlet) first.try_emplace(condition.tag, &condition);
-  std::vector<const DirichletCondition<Dim>*> all;
-  for (const auto& [tag, condition] : first) all.push_back(condition);
-  return all;
+  return first;
+}
+
+template <int Dim>
+typename HeldRule<Dim>::Components held_components(const StepSetup<Dim>& setup) {
+  typename HeldRule<Dim>::Components components;
+  for (const auto& condition : setup.dirichlet) components.try_emplace(condition.tag, condition.components);
+  return components;
 }
 
 template <int Dim>
 HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space) {
   const int bodies = num_nodes(mesh, space), total = bodies + static_cast<int>(setup.obstacles.rest.size());
   HeldDofs<Dim> result{std::vector<char>(Dim * total, 0), VectorX::Zero(Dim * total)};
-  const std::vector<const DirichletCondition<Dim>*> by_tag = conditions_by_tag(setup);
-  const auto hold = [&](int v, const DirichletCondition<Dim>& condition) {
-    const int edge = v - mesh.vertex_slots();
-    const RestPoint<Dim> X = edge < 0 ? mesh.point(v) : mesh.middle(space.curved_edges()[edge]);
-    const Vec<Dim> target = X + finite<Dim, Vec<Dim>>(condition.displacement(X, t), "prescribed displacement", X, t);
+  const ConditionsByTag<Dim> conditions = conditions_by_tag(setup);
+  const auto components = held_components(setup);
+  const HeldRule<Dim> rule(components);
+  const auto hold = [&](int node, const typename HeldRule<Dim>::Tags& tags, const auto& rest) {
+    int tag = kNoTag;
+    Vec<Dim> target;
     for (int c = 0; c < Dim; ++c) {
-      if (!condition.components[c]) continue;
-      result.held[Dim * v + c] = 1;
-      result.target[Dim * v + c] = target[c];
+      if (tags[c] == kNoTag) continue;
+      if (tags[c] != tag) {
+        tag = tags[c];
+        const RestPoint<Dim> X = rest();
+        target = X + finite<Dim, Vec<Dim>>(conditions.at(tag)->displacement(X, t), "prescribed displacement", X, t);
+      }
+      result.held[Dim * node + c] = 1;
+      result.target[Dim * node + c] = target[c];
     }
   };
-  for (const auto* condition : by_tag)
-    for (int f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == condition->tag)
-        for_each_node(mesh.facet(f), space, mesh.vertex_slots(), [&](int node) { hold(node, *condition); });
-  for (const auto* condition : by_tag)
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-      if (mesh.vertex_tag(v) != kNoTag && mesh.vertex_tag(v) == condition->tag) hold(v, *condition);
-  for (const auto* condition : by_tag)
-    for (int edge = 0; edge < space.num_curved(); ++edge)
-      if (const int tag = mesh.edge_tag(space.curved_edges()[edge]); tag != kNoTag && tag == condition->tag)
-        hold(mesh.vertex_slots() + edge, *condition);
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    hold(v, rule.tags_at(mesh, std::array{v}), [&] { return mesh.point(v); });
+  for (int i = 0; i < space.num_curved(); ++i) {
+    const EdgeKey& edge = space.curved_edges()[i];
+    hold(mesh.vertex_slots() + i, rule.tags_at(mesh, edge), [&] { return mesh.middle(edge); });
+  }
   for (int o = 0; o < total - bodies; ++o) {
     const Vec<Dim>& X = setup.obstacles.rest[o];
     const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
@@ -97,10 +102,7 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
 
 template <int Dim>
 double rest_diagonal(const Mesh<Dim>& mesh) {
-  Eigen::AlignedBox<double, Dim> box;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    if (mesh.is_vertex_alive(v)) box.extend(mesh.rest(v));
-  return box.diagonal().norm();
+  return rest_box(mesh).diagonal().norm();
 }
 
 template <int Dim>
@@ -123,7 +125,8 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
 #define ITR_INSTANTIATE(Dim)                                                                            \
   template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                     \
   template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double);     \
-  template std::vector<const DirichletCondition<Dim>*> conditions_by_tag<Dim>(const StepSetup<Dim>&);   \
+  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                          \
+  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                       \
   template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double, const Space&); \
   template double rest_diagonal<Dim>(const Mesh<Dim>&);
 ITR_INSTANTIATE(2)

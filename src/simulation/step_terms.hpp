@@ -2,8 +2,10 @@
 // Terms, loads and held dofs of one time step, as functions of the setup and the time.
 #pragma once
 
+#include <map>
 #include <vector>
 
+#include "fem/held_rule.hpp"
 #include "itr/energy/terms.hpp"
 #include "itr/fem/space.hpp"
 #include "itr/simulation/setup.hpp"
@@ -19,16 +21,21 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
 template <int Dim>
 PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t);
 
-/// Which dofs of nodes are held (Dirichlet and obstacles) and where they are to be at time t. At vertices shared by two
-/// conditions the one with the larger tag wins.
+/// Which dofs of nodes are held (Dirichlet and obstacles) and where they are to be at time t. HeldRule says which condition
+/// counts where there are several.
 template <int Dim>
 struct HeldDofs {
   std::vector<char> held;
   VectorX target;  ///< only entries of held dofs mean anything
 };
-/// The first condition of each tag, in the order in which later ones win.
+/// The first condition of each tag.
 template <int Dim>
-std::vector<const DirichletCondition<Dim>*> conditions_by_tag(const StepSetup<Dim>& setup);
+using ConditionsByTag = std::map<int, const DirichletCondition<Dim>*>;
+template <int Dim>
+ConditionsByTag<Dim> conditions_by_tag(const StepSetup<Dim>& setup);
+/// The components that each of these holds.
+template <int Dim>
+typename HeldRule<Dim>::Components held_components(const StepSetup<Dim>& setup);
 
 template <int Dim>
 HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space = {});

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "baseline.hpp"
+#include "energy/contact/surface_builder.hpp"
 #include "energy/elastic/point.hpp"
 #include "fem/chords.hpp"
 #include "remesh/curved_cell.hpp"
@@ -38,35 +39,19 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.x.size());
   std::vector<double> energies(total, 0);
   if (!context.contact.enabled) return energies;
-  std::vector<std::array<int, 2>> edges;
-  std::vector<std::array<int, 3>> triangles;
-  std::vector<int> points;
-  std::vector<char> counts(total, 0);
+  std::vector<typename MeshTypes<Dim>::Facet> chords;
   for (int f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
     for_each_chord<Dim>(
         mesh.facet(f), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); },
-        [&](const auto& ids) {
-          for (const int v : ids) counts[v] = 1;
-          if constexpr (Dim == 2)
-            edges.push_back(ids);
-          else
-            triangles.push_back(ids);
-        });
+        [&](const auto& chord) { chords.push_back(chord); });
   }
-  for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
-  for (const auto& [a, b, c] : obstacles.triangles) triangles.push_back({bodies + a, bodies + b, bodies + c});
-  std::vector<Vec<Dim>> rest(total);
+  std::vector<Vec<Dim>> rest(bodies);
   for (int v = 0; v < bodies; ++v) rest[v] = mesh.rest(v);
   VectorX x(Dim * total);
   x.head(Dim * bodies) = fields.x.head(Dim * bodies);
-  for (int o = 0; o < total - bodies; ++o) {
-    points.push_back(bodies + o);
-    rest[bodies + o] = obstacles.rest[o];
-    x.segment<Dim>(Dim * (bodies + o)) = obstacles.x[o];
-  }
-  const CollisionSurface surface =
-      make_collision_surface<Dim>(std::move(edges), std::move(triangles), points, rest, std::move(counts));
+  for (int o = 0; o < total - bodies; ++o) x.segment<Dim>(Dim * (bodies + o)) = obstacles.x[o];
+  const CollisionSurface surface = surface_of_facets<Dim>(chords, std::move(rest), obstacles);
   const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {

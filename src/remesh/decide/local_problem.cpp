@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fem/held_rule.hpp"
 #include "geometry/measures.hpp"
 #include "projection/forgotten_history.hpp"
 #include "projection/transfer_patch.hpp"
@@ -25,6 +26,24 @@ void add_to_side(const std::array<VertexId, Dim + 1>& vertices, const CurvedCell
     return number;
   });
 }
+
+/// Facets and tags of vertices after an edit, as HeldRule asks for them.
+template <int Dim>
+struct MeshAfter {
+  const Mesh<Dim>& mesh;
+  const Edit<Dim>& edit;
+
+  int vertex_tag(VertexId v) const { return v == kNewVertex ? edit.value->tag : mesh.vertex_tag(v); }
+  template <std::size_t N, typename F>
+  friend void for_each_facet_tag(const MeshAfter& after, const std::array<VertexId, N>& vertices, const F& f) {
+    for (const auto& facet : after.edit.inserted_facets)
+      if (has_all(facet.vertices, vertices)) f(facet.tag);
+    if (vertices[N - 1] == kNewVertex) return;
+    for (const FacetId facet : after.mesh.facets_of(vertices[0]))
+      if (has_all(after.mesh.facet(facet), vertices) && std::ranges::count(after.edit.removed_facets, facet) == 0)
+        f(after.mesh.facet_tag(facet));
+  }
+};
 
 }  // namespace
 
@@ -259,65 +278,23 @@ void LocalProblem<Dim>::add_loaded_facets() {
     add_loaded_facet(facet.vertices, facet.tag, mesh_.part(edit_.removed_cells[0]));
 }
 
-/// Holds the node of an edge as held_dofs() does: by the facets at the edge, after the edit those that it has then, and by
-/// the tag of both ends.
-template <int Dim>
-template <typename Hold>
-void LocalProblem<Dim>::hold_node(std::size_t i, const EdgeKey& edge, const Hold& hold_components) {
-  const auto holds = [](const auto& ids, const EdgeKey& ends) {
-    return std::all_of(ends.begin(), ends.end(), [&](int v) { return std::find(ids.begin(), ids.end(), v) != ids.end(); });
-  };
-  bool is_on_surface = false;
-  const auto hold_by_facet = [&](int tag) {
-    is_on_surface = true;
-    hold_components(i, tag);
-  };
-  const auto hold_by_ends = [&] {
-    const auto tag_of = [&](VertexId v) { return v == kNewVertex ? edit_.value->tag : mesh_.vertex_tag(v); };
-    const int tag = tag_of(edge[0]);
-    if (is_on_surface && tag != kNoTag && tag == tag_of(edge[1])) hold_components(i, tag);
-  };
-  if (is_after_)
-    for (const auto& facet : edit_.inserted_facets)
-      if (holds(facet.vertices, edge)) hold_by_facet(facet.tag);
-  if (edge[1] == kNewVertex) return hold_by_ends();
-  const auto around = mesh_.cells_of_edge(edge);
-  if (!std::all_of(around.begin(), around.end(), [&](CellId c) { return scratch_.cells[c]; }))
-    std::fill_n(storage_->held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
-  for (const FacetId f : mesh_.facets_of_edge(edge))
-    if (!is_removed(f)) hold_by_facet(mesh_.facet_tag(f));
-  hold_by_ends();
-}
-
 template <int Dim>
 void LocalProblem<Dim>::hold_vertices() {
   std::vector<char>& held = storage_->held;
   held.assign(Dim * vertices_.size(), 0);
-  const auto hold_components = [&](std::size_t i, int tag) {
-    const auto it = state_.context.held_components.find(tag);
-    if (it == state_.context.held_components.end()) return;
-    for (int c = 0; c < Dim; ++c)
-      if (it->second[c]) held[Dim * i + c] = 1;
+  const HeldRule<Dim> rule(state_.context.held_components);
+  const auto tags_at = [&](const auto& ends) {
+    return is_after_ ? rule.tags_at(MeshAfter<Dim>{mesh_, edit_}, ends) : rule.tags_at(mesh_, ends);
   };
+  const auto is_of_patch = [&](CellId c) { return scratch_.cells[c]; };
   for (std::size_t i = 0; i < vertices_.size(); ++i) {
     const LocalVertex v = vertices_[i];
-    if (const EdgeKey edge = edge_of(v); edge[0] != kNone) {
-      hold_node(i, edge, hold_components);
-      continue;
-    }
-    if (v.kind == Kind::created) {
-      for (const auto& facet : edit_.inserted_facets)
-        if (std::find(facet.vertices.begin(), facet.vertices.end(), v.id) != facet.vertices.end())
-          hold_components(i, facet.tag);
-      if (edit_.value->tag != kNoTag) hold_components(i, edit_.value->tag);
-      continue;
-    }
-    const auto around = mesh_.cells_of(v.id);
-    if (!std::all_of(around.begin(), around.end(), [&](CellId c) { return scratch_.cells[c]; }))
-      std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
-    else
-      for (const FacetId f : mesh_.facets_of(v.id)) hold_components(i, mesh_.facet_tag(f));
-    if (mesh_.vertex_tag(v.id) != kNoTag) hold_components(i, mesh_.vertex_tag(v.id));
+    const EdgeKey edge = edge_of(v);
+    const bool is_node = edge[0] != kNone;
+    const bool is_free = is_node ? edge[1] == kNewVertex || std::ranges::all_of(mesh_.cells_of_edge(edge), is_of_patch)
+                                 : v.kind == Kind::created || std::ranges::all_of(mesh_.cells_of(v.id), is_of_patch);
+    const auto tags = is_node ? tags_at(edge) : tags_at(std::array{v.id});
+    for (int c = 0; c < Dim; ++c) held[Dim * i + c] = !is_free || tags[c] != kNoTag;
   }
   dofs_.hold(held);
 }

@@ -126,8 +126,6 @@ class LocalProblem {
   void add_cells(std::span<const CellId> patch);
   void add_loaded_facets();
   void hold_vertices();
-  template <typename Hold>
-  void hold_node(std::size_t i, const EdgeKey& edge, const Hold& hold_components);
   void find_contacts();
   void find_stars_of_touching();
   void add_surface();

@@ -242,19 +242,12 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
     model.add_curved_cell(mesh, c, corners_of(state, cell), place(edge[0]), place(edge[1]));
   }
   const Vec<Dim> middle = (mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2;
-  std::array<bool, Dim> held{};
-  const auto hold_by = [&](int tag) {
-    if (const auto it = context.held_components.find(tag); it != context.held_components.end())
-      for (int c = 0; c < Dim; ++c) held[c] = held[c] || it->second[c];
-  };
-  if (const int tag = mesh.edge_tag(edge); tag != kNoTag) hold_by(tag);
   for (const FacetId f : mesh.facets_of_edge(edge)) {
     std::array<Vec<Dim>, Dim> rest;
     for (int k = 0; k < Dim; ++k) rest[k] = mesh.rest(mesh.facet(f)[k]);
     model.add_curved_facet(rest, middle, mesh.facet_tag(f));
-    hold_by(mesh.facet_tag(f));
   }
-  return -model.relaxed(held);
+  return -model.relaxed(HeldRule<Dim>(context.held_components).tags_at(mesh, edge));
 }
 
 // Motion that the straight edge cannot carry counts as it does in the space before (rule b). There the straightened mesh has

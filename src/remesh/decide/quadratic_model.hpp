@@ -179,10 +179,10 @@ class QuadraticModel {
     if (llt.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
     return energy_ - 0.5 * gradient_.dot(llt.solve(gradient_));
   }
-  /// Energy at the minimum over the components that are not held.
-  double relaxed(const std::array<bool, Dim>& held) {
+  /// Energy at the minimum over the components that no condition of these tags holds.
+  double relaxed(const std::array<int, Dim>& tags) {
     for (int c = 0; c < Dim; ++c)
-      if (held[c]) {
+      if (tags[c] != kNoTag) {
         hessian_.row(c).setZero();
         hessian_.col(c).setZero();
         hessian_(c, c) = 1;

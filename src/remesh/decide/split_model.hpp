@@ -9,6 +9,7 @@
 
 #include <boost/container/small_vector.hpp>
 #include "energy/elastic/point.hpp"
+#include "fem/held_rule.hpp"
 #include "itr/fem/mass.hpp"
 #include "local_problem.hpp"
 #include "remesh/curved_cell.hpp"
@@ -206,24 +207,26 @@ class SplitModel {
     }
   }
 
-  /// As a local problem holds them.
+  /// Facets and tags after the split, as HeldRule asks for them at the new vertex and at edges to it.
+  struct View {
+    const Mesh<Dim>& mesh;
+    EdgeKey split;
+    int vertex_tag(VertexId v) const { return v == kNewVertex ? mesh.edge_tag(split) : mesh.vertex_tag(v); }
+    template <std::size_t N, typename F>
+    friend void for_each_facet_tag(const View& view, const std::array<VertexId, N>& ends, const F& f) {
+      for (const FacetId facet : view.mesh.facets_of_edge(view.split))
+        if (N == 1 || has_all(view.mesh.facet(facet), std::array{ends[0]})) f(view.mesh.facet_tag(facet));
+    }
+  };
+
   void hold() {
-    const auto& held = state_.context.held_components;
-    if (held.empty()) return;
-    const auto hold_by = [&](int tag, std::size_t place) {
-      const auto it = held.find(tag);
-      if (it == held.end()) return;
+    const HeldRule<Dim> rule(state_.context.held_components);
+    const View view{mesh_, edge_};
+    for (std::size_t i = 0; i < ends_.size(); ++i) {
+      const auto tags =
+          i == 0 ? rule.tags_at(view, std::array{kNewVertex}) : rule.tags_at(view, EdgeKey{ends_[i], kNewVertex});
       for (int c = 0; c < Dim; ++c)
-        if (it->second[c]) hold_dof(static_cast<Eigen::Index>(Dim * place) + c);
-    };
-    const int tag = mesh_.edge_tag(edge_);
-    for (const FacetId f : mesh_.facets_of_edge(edge_)) {
-      const auto& facet = mesh_.facet(f);
-      for (std::size_t i = 0; i < ends_.size(); ++i)
-        if (i == 0 || std::find(facet.begin(), facet.end(), ends_[i]) != facet.end()) {
-          hold_by(mesh_.facet_tag(f), i);
-          if (tag != kNoTag && (i == 0 || mesh_.vertex_tag(ends_[i]) == tag)) hold_by(tag, i);
-        }
+        if (tags[c] != kNoTag) hold_dof(static_cast<Eigen::Index>(Dim * i) + c);
     }
   }
   void hold_dof(Eigen::Index i) {

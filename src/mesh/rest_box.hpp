@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "itr/mesh/mesh.hpp"
+
+namespace itr {
+
+/// Holds all vertices at rest [m].
+template <int Dim>
+Eigen::AlignedBox<double, Dim> rest_box(const Mesh<Dim>& mesh) {
+  Eigen::AlignedBox<double, Dim> box;
+  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    if (mesh.is_vertex_alive(v)) box.extend(mesh.rest(v));
+  return box;
+}
+
+}  // namespace itr
