@@ -81,7 +81,8 @@ class Distance(unittest.TestCase):
         self.assertAlmostEqual(last["energy"], differences[1], delta=1e-7)
 
     def test_statics_have_one_time_and_dynamics_need_momentum(self):
-        a, b = (self.run_stretched(stretch, n, {"time": None, "units": {"time": unit}}) for stretch, n, unit in ((0.1, 0, "s"), (0.2, 1, "ms")))
+        a = self.run_stretched(0.1, 0, {"time": None})
+        b = self.run_stretched(0.2, 1, {"time": None, "units": {"time": "ms"}})
         found = distance(a, b)
         self.assertEqual(found["times"], 1)
         self.assertAlmostEqual(found["l2"], 0.5, delta=1e-9)
@@ -95,8 +96,9 @@ class Distance(unittest.TestCase):
 
     def test_bad_input_is_named(self):
         run = self.run_stretched(0.1, 0)
-        self.assertIn(f"{self.folder}/nothing: found no such folder; expected a folder of a run", distance(self.folder / "nothing", run, status=2))
-        self.assertIn("nothing/steps.jsonl: found no such file; expected", distance(run, self.folder / "nothing", status=2))
+        nothing = self.folder / "nothing"
+        self.assertIn(f"{nothing}: found no such folder; expected a folder of a run", distance(nothing, run, status=2))
+        self.assertIn("nothing/steps.jsonl: found no such file; expected", distance(run, nothing, status=2))
         other_times = self.run_stretched(0.1, 0, {"time": {"dt": 0.3, "tend": 0.3, "quasistatic": True}})
         self.assertIn("frames: found no frame at a time of", distance(run, other_times, status=2))
         (self.folder / "square.msh").write_text(SQUARE.replace("2 1 0 0", "2 2 0 0"))
