@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "apps/study/study.hpp"
@@ -16,6 +17,7 @@
 #include "itr_commit.hpp"
 #include "output/certify.hpp"
 #include "output/force_file.hpp"
+#include "output/run_distance.hpp"
 #include "ranks.hpp"
 #include "report.hpp"
 #include "run.hpp"
@@ -77,6 +79,12 @@ int forces(const std::string& directory) {
   const output::ForceRows forces = output::rewrite_forces(directory);
   fmt::print("{}/{}: {} rows, {} of them added from {} frames\n", directory, output::kForceFile, forces.rows, forces.added,
              forces.frames);
+  return cli::done;
+}
+
+int distance(const std::string& directory, const std::string& reference, bool last_only) {
+  const auto found = output::run_distance(directory, reference, last_only ? output::Times::last : output::Times::all);
+  fmt::print("{}\n", output::to_json(found).dump(1));
   return cli::done;
 }
 
@@ -174,6 +182,12 @@ int dispatch(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   auto* curves = app.add_subcommand("forces", "completes forces.csv from the frames of a run with /output/forces");
   curves->add_option("directory", directory, "result folder")->required();
+  std::string reference;
+  bool last_only = false;
+  auto* apart = app.add_subcommand("distance", "errors of a run against another of the same bodies, as one JSON object");
+  apart->add_option("directory", directory, "result folder")->required();
+  apart->add_option("reference", reference, "result folder of the run to compare with")->required();
+  apart->add_flag("--last", last_only, "at the last time that both have stored alone (default: at all of them)");
   auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   study::Options study_options;
   add_study_options(*study, study_options, sets);
@@ -192,6 +206,7 @@ int dispatch(int argc, char** argv) {
   if (*check) return certify(directory);
   if (*report_command) return cli::report(directory, report_file, report_options);
   if (*curves) return forces(directory);
+  if (*apart) return distance(directory, reference, last_only);
   if (*schema) {
     fmt::print("{}{}", as_page ? scene::reference_page() : scene::json_schema(), as_page ? "" : "\n");
     return cli::done;

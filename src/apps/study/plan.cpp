@@ -213,7 +213,6 @@ class Planner {
     plan_.dim = source_.dim;
     plan_.has_contact = source_.has_contact;
     plan_.has_friction = source_.has_friction;
-    plan_.is_static = source_.time.is_static;
     plan_.is_dynamic = !source_.time.is_static && !source_.time.quasistatic;
   }
 

@@ -55,7 +55,6 @@ struct PlannedRun {
 
 struct Plan {
   int dim = 0;
-  bool is_static = false;   ///< its t is 1, whatever the unit of time
   bool is_dynamic = false;  ///< has kinetic energy and momentum
   bool has_contact = false, has_friction = false;
   /// Runs to compare with: the first of these that splits anything; none where Options::reference is.

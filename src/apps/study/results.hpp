@@ -7,21 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "output/run_distance.hpp"
 #include "plan.hpp"
 
 namespace itr::cli::study {
 
-/// Over the times at which both runs have stored frames, but the first.
-struct Errors {
-  double l2 = 0, h1 = 0;  ///< of the displacement and its gradient: root mean square over time, by that of the reference
-  double surface = 0;     ///< largest Hausdorff distance of the bodies' boundaries [m]
-  double energy = 0;      ///< root mean square over time: kinetic, elastic, of loads and of contact together [J]
-  double momentum = 0;    ///< the same [kg m/s]; both NaN where a run's frames lack kinetic energy or momentum
-  /// Size that errors of the energy are compared with: root mean square over time of the reference's kinetic, elastic and
-  /// contact energy [J]. Loads are left out, since the zero of their energy is anywhere.
-  double reference_energy = 0;
-  int times = 0;
-};
+using Errors = output::RunDistance;
 
 /// Warning of a run.
 struct Warning {
@@ -55,6 +46,6 @@ Row read_row(const PlannedRun& run, const std::filesystem::path& folder, const s
 
 /// Distances are kept in the folder until a frame of it or of the reference changes. Throws InputError where the two have no
 /// stored time in common, or bodies of other shapes.
-Errors measure_errors(const std::filesystem::path& folder, const std::filesystem::path& reference, const Plan& plan);
+Errors measure_errors(const std::filesystem::path& folder, const std::filesystem::path& reference);
 
 }  // namespace itr::cli::study

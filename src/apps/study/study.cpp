@@ -175,7 +175,7 @@ class Study {
   void measure(Row& row) {
     if (!row.finished || row.errors || row.run.reference.empty()) return;
     const fs::path reference = reference_of(row);
-    if (!reference.empty()) row.errors = measure_errors(folder_of(row.run.name), reference, plan_);
+    if (!reference.empty()) row.errors = measure_errors(folder_of(row.run.name), reference);
   }
 
   /// Judges the reference's worth, and whether it is one.
@@ -187,7 +187,7 @@ class Study {
     const Row* second = find(kSecondReference);
     if (!second && options_.reference.empty() && !finished(reference_)) second = find(plan_.coarser);
     if (!options_.second_reference.empty() && !options_.reference.empty())
-      take(measure_errors(options_.second_reference, options_.reference, plan_),
+      take(measure_errors(options_.second_reference, options_.reference),
            "the run in `" + options_.second_reference.string() + "`");
     else if (second && second->errors)
       take(*second->errors, fmt::format("`{}` ({}: {} vertices)", second->run.name, second->run.label, second->vertices));
