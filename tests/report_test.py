@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """`itr report` in a real browser: runs of known fields, whose colours must be where they belong; slider, picking, links, cut,
-edits; pictures where there is no WebGL. Skipped (77) without Chromium and its driver; the main ones also run in Firefox where it
+edits; plots alone where there is no WebGL. Skipped (77) without Chromium and its driver; the main ones also run in Firefox where it
 and Xvfb are installed.
 
 usage: report_test.py ITR EXAMPLES
@@ -631,25 +631,17 @@ class Report(Cases):
         self.assertEqual(self.browser.run("return v.state.frame"), 2)
         self.assertEqual(self.browser.errors(), [])
 
-    def test_pictures_where_there_is_no_webgl(self):
+    def test_plots_where_there_is_no_webgl(self):
         self.report(self.plane)
         browser = Browser("--disable-3d-apis")
         try:
             self.assertEqual(browser.open(self.plane / "report.html"), "")
             self.assertIsNone(browser.run("return v"))
-            seen = browser.run("return [...document.querySelectorAll('#pictures img')].map(i => [i.complete && i.naturalWidth, i.offsetWidth > 0])")
-            self.assertEqual(seen, [[640, True]] * 3)
-            self.assertIn("Pictures only", browser.run("return document.getElementById('why').textContent"))
+            self.assertIn("Plots only", browser.run("return document.getElementById('why').textContent"))
+            self.assertTrue(browser.run("return document.getElementById('why').offsetWidth > 0"))
             self.assertGreater(browser.run("return document.querySelectorAll('#plots svg').length"), 3)
-            source = browser.run("return document.querySelector('#pictures img').src")
         finally:
             browser.close()
-        picture = numpy.asarray(Image.open(io.BytesIO(base64.b64decode(source.partition(",")[2]))), float)
-        scale = 0.92 * 640 / 2.5  # of the box of all frames, 2.5 wide
-        place = lambda x, y: (round(320 + scale * (x - 1.25)), round(210 - scale * (y - 0.5)))
-        self.assert_colour(picture, place(0.75, 0.25), colour(0), 3)
-        self.assert_colour(picture, place(0.25, 0.75), colour(1), 3)
-        self.assert_colour(picture, place(1.75, 0.25), [255] * 3, 1)
 
     def test_needs_nothing_beside_it(self):
         self.report(self.plane, "-o", self.folder / "alone.html")
@@ -681,44 +673,13 @@ class Report(Cases):
         self.assertIn("61 of 120 stored frames", self.browser.run("return document.getElementById('foot').textContent"))
         self.assertEqual(self.browser.run("return r.run.frames[r.run.frames.length - 1].step"), 119)
 
-    def test_cells_inside_of_solids_are_left_out_first(self):
-        folder, n = self.folder / "block", 8
-        random = numpy.random.default_rng(1)
-        rest = numpy.array([[i, j, k] for i in range(n) for j in range(n) for k in range(n)], float)
-        at = lambda i, j, k: (i * n + j) * n + k
-        cells = []
-        for i, j, k in numpy.ndindex(n - 1, n - 1, n - 1):
-            for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
-                corner, cell = [i, j, k], [at(i, j, k)]
-                for axis in order:
-                    corner[axis] += 1
-                    cell.append(at(*corner))
-                even = order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-                cells.append(cell if even else [cell[0], cell[1], cell[3], cell[2]])
-        for step in range(30):
-            write_frame(folder, step, step, rest, rest + random.uniform(-0.2, 0.2, rest.shape), cells, random.uniform(1, 2, len(cells)))
-        write_steps(folder, range(30))
-        self.report(folder)
-        size = (folder / "report.html").stat().st_size / 1e6
-        said = self.report(folder, "--max-mb", f"{0.9 * size}").stdout
-        self.assertIn("30 frames", said)
-        self.assertIn("cells inside of solids are left out", said)
-        self.assertLess((folder / "report.html").stat().st_size / 1e6, 0.9 * size)
-        self.open(folder / "report.html", "#view=0,0,1,3.5,3.5,3.5&cut=z,0.9,0")
-        counts = self.browser.run("return [v.frame.mesh.facets.length, v.frame.mesh.cells.length, v.bodies.count]")
-        self.assertEqual(counts[0], 12 * (n - 1) ** 2)
-        self.assertLess(counts[1], len(cells))
-        self.assertGreater(counts[2], counts[0])
-        x, y = self.browser.place(3.5, 3.5, 7)
-        self.see(lambda picture: self.assertLess(picture[y, x].min(), 250))
-        self.assertEqual(self.browser.errors(), [])
-
     def test_positions_are_those_of_the_frames(self):
         folder = self.folder / "masticator"
         subprocess.run([ITR, "run", EXAMPLES / "masticator.json", "-o", folder, "--set", "/time/tend=2.2", "--threads", "1", "--report"],
                        check=True, capture_output=True)
         self.open(folder / "report.html")
         stored = sorted((folder / "frames").glob("*.h5"))
+        said = re.search(r"within (\S+) m of displacements", self.browser.run("return document.getElementById('foot').textContent"))
         for index in (0, 17, len(stored) - 1):
             with h5py.File(stored[index]) as file:
                 x, rest, cells = file["/fields/x"][:], file["/mesh/rest"][:], file["/mesh/simplices"][:]
@@ -732,7 +693,7 @@ class Report(Cases):
             self.assertEqual(got.shape, expected.shape)
             self.assertEqual(len(found["e"]), len(cells))
             difference = numpy.abs(order(got) - order(expected))
-            self.assertLess(difference[:, :4].max(), 2e-4)
+            self.assertLess(difference[:, :4].max(), 1.01 * float(said[1]) + 1e-6)  # with the digits of a float
             self.assertLess((difference[:, 4] / numpy.maximum(order(expected)[:, 4], 1e-6 * expected[:, 4].max() + 1e-300)).max(), 2e-3)
             self.assertLess(numpy.abs(numpy.sort(found["e"]) - numpy.sort(density)).max(), 2e-3 * density.max() + 1e-20)
         self.assertEqual(self.browser.errors(), [])
@@ -788,7 +749,7 @@ class Report(Cases):
         self.assertIn("failed: too <long>", browser.run("return document.querySelector('.words pre').textContent"))
         self.assertEqual(browser.errors(), [])
         self.assertIn("the mesh of fine is left out", self.report(folder, "--max-mb", "0.0001").stdout)
-        self.open(folder / "report.html", "?pictures")
+        self.open(folder / "report.html", "?plots")
         self.assertEqual(browser.run("return [document.getElementById('stored').getBoundingClientRect().width, r.diagrams.length]"), [0, 6])
         self.assertEqual(browser.errors(), [])
 
@@ -800,11 +761,6 @@ class Report(Cases):
         self.open(folder / "report.html")
         self.assertIn("stopped in step", self.browser.run("return document.getElementById('said').textContent"))
         self.assertGreater(self.browser.run("return r.run.frames.length"), 3)
-        self.assertEqual(self.browser.errors(), [])
-
-    def test_the_committed_one_opens(self):
-        self.open(EXAMPLES / "masticator.html")
-        self.assertEqual(self.browser.run("return r.run.frames[r.run.frames.length - 1].step"), 200)
         self.assertEqual(self.browser.errors(), [])
 
     def test_what_cannot_be_shown_is_said(self):

@@ -261,7 +261,7 @@ void add_recorder(py::module_& m) {
       .def("finish", &Recorder::finish)
       .def_property_readonly("directory", &Recorder::directory);
   m.def("write_report", [](const std::string& directory, const std::string& file, int every, double max_mb) {
-    return itr::output::write_report(directory, file, {every, max_mb}).notes;
+    return itr::report::write_report(directory, file, {every, max_mb}).notes;
   });
 }
 

@@ -170,7 +170,7 @@ int dispatch(int argc, char** argv) {
   auto* report_command =
       app.add_subcommand("report", "one HTML file that shows a run, or a study: opens in a browser, from the disk");
   std::string report_file;
-  output::ReportOptions report_options;
+  report::ReportOptions report_options;
   report_command->add_option("directory", directory, "folder of a run that is finished or not, or of a study")->required();
   report_command->add_option("-o,--output", report_file, "the file (default: report.html in the folder)");
   report_command->add_flag("--certify", report_options.certify,
@@ -178,7 +178,7 @@ int dispatch(int argc, char** argv) {
   report_command->add_option("--every", report_options.every, "takes each so many-th of the stored frames")
       ->check(CLI::PositiveNumber);
   report_command
-      ->add_option("--max-mb", report_options.max_mb, "of the file (default: 30): leaves out cells inside, then frames")
+      ->add_option("--max-mb", report_options.max_mb, "of the file (default: 30): takes every 2nd, 4th, ... frame if it were larger")
       ->check(CLI::PositiveNumber);
   auto* curves = app.add_subcommand("forces", "completes forces.csv from the frames of a run with /output/forces");
   curves->add_option("directory", directory, "result folder")->required();

@@ -4,10 +4,10 @@
 
 #include <string_view>
 
-namespace itr::output::assets {
+namespace itr::report::assets {
 
 extern const std::string_view page;    ///< page.html: where `{{NAME}}` stands, something is put in
 extern const std::string_view style;   ///< style.css
 extern const std::string_view script;  ///< all scripts, one after another
 
-}  // namespace itr::output::assets
+}  // namespace itr::report::assets

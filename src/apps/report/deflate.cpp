@@ -3,9 +3,11 @@
 
 #include <zlib.h>
 
+#include <cstdint>
+
 #include "core/check.hpp"
 
-namespace itr::output {
+namespace itr::report {
 
 std::string deflate(std::string_view bytes) {
   uLongf length = compressBound(bytes.size());
@@ -30,9 +32,4 @@ std::string base64(std::string_view bytes) {
   return out;
 }
 
-std::uint32_t crc32_of(std::string_view bytes) {
-  return static_cast<std::uint32_t>(
-      crc32(crc32(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
-}
-
-}  // namespace itr::output
+}  // namespace itr::report

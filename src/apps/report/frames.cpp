@@ -1,44 +1,30 @@
 // SPDX-License-Identifier: MIT
 #include "frames.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "deflate.hpp"
 #include "gap.hpp"
+#include "geometry/measures.hpp"
 #include "itr/core/error.hpp"
 
-namespace itr::output {
+namespace itr::report {
 
 namespace {
 
-constexpr int kFramesOfChunk = 16;    // decoded together: the more, the smaller; the fewer, the sooner the first is seen
-constexpr int kNever = 1 << 30;       // a frame that there is not
 constexpr double kGapShare = 0.02;    // of the bodies' diagonal: gaps beyond are not told apart
 constexpr double kNothing = 1e-9;     // times the largest value: is shown as zero, as its digits are round-off
 constexpr double kShownShare = 0.98;  // of the values of a frame that have colours of their own
 
 enum Kind { vertex_kind, node_kind, obstacle_kind };
 
-std::uint16_t zigzag(std::uint16_t difference) {
-  const auto sign = static_cast<std::int16_t>(difference);
-  return static_cast<std::uint16_t>((difference << 1) ^ (sign >> 15));
-}
-
-/// Low bytes, then high bytes.
-void append_codes(std::string& bytes, const std::vector<std::uint16_t>& codes) {
-  for (const std::uint16_t code : codes) bytes += static_cast<char>(code & 255);
-  for (const std::uint16_t code : codes) bytes += static_cast<char>(code >> 8);
-}
-
-std::string encode_floats(const std::vector<float>& values) {
-  std::string bytes;
-  for (int k = 0; k < 4; ++k)
-    for (const float value : values) bytes += static_cast<char>(std::bit_cast<std::uint32_t>(value) >> (8 * k) & 255);
-  return bytes;
+/// Appends the lowest bytes of all values, then the next ones: deflate finds more to repeat in this order.
+template <typename T>
+void append_planar(std::string& bytes, const std::vector<T>& values) {
+  const auto* from = reinterpret_cast<const char*>(values.data());
+  for (std::size_t k = 0; k < sizeof(T); ++k)
+    for (std::size_t i = 0; i < values.size(); ++i) bytes += from[i * sizeof(T) + k];
 }
 
 double magnitude(const double* values, int columns) {
@@ -65,96 +51,97 @@ LivingRows::Key sorted_key(std::vector<int> ids) {
   return key;
 }
 
-}  // namespace
+void include(std::array<double, 2>& range, double value) {
+  if (!std::isfinite(value)) return;
+  range[0] = std::min(range[0], value);
+  range[1] = std::max(range[1], value);
+}
 
+/// For each facet of the surface the cell that has it; -1: none.
 std::vector<int> cells_of_facets(const StoredFrame& frame) {
   const int dim = frame.dim, corners = dim + 1;
-  const std::size_t nodes = frame.x.size() / dim, facets = frame.surface.size() / dim;
-  std::vector<int> first(nodes + 1), of_vertex(frame.simplices.size());
-  for (const std::int64_t v : frame.simplices) ++first[v + 1];
-  for (std::size_t v = 0; v < nodes; ++v) first[v + 1] += first[v];
-  std::vector<int> next(first.begin(), first.end() - 1);
-  for (std::size_t i = 0; i < frame.simplices.size(); ++i)
-    of_vertex[next[frame.simplices[i]]++] = static_cast<int>(i) / corners;
-  std::vector<int> found(facets, -1);
-  for (std::size_t f = 0; f < facets; ++f) {
-    const std::int64_t* facet = &frame.surface[f * dim];
-    for (int k = first[facet[0]]; k < first[facet[0] + 1] && found[f] < 0; ++k) {
-      const std::int64_t* cell = &frame.simplices[static_cast<std::size_t>(of_vertex[k]) * corners];
-      const bool has_all = std::all_of(facet, facet + dim,
-                                       [&](std::int64_t v) { return std::find(cell, cell + corners, v) != cell + corners; });
-      if (has_all) found[f] = of_vertex[k];
+  using Facet = std::vector<std::int64_t>;
+  std::map<Facet, int> cells;
+  for (std::size_t i = 0; i < frame.surface.size(); i += dim) {
+    Facet facet(frame.surface.begin() + i, frame.surface.begin() + i + dim);
+    std::sort(facet.begin(), facet.end());
+    cells[facet] = -1;
+  }
+  for (std::size_t i = 0; i < frame.simplices.size(); i += corners) {
+    Facet cell(frame.simplices.begin() + i, frame.simplices.begin() + i + corners);
+    std::sort(cell.begin(), cell.end());
+    for (int k = 0; k < corners; ++k) {
+      Facet facet = cell;
+      facet.erase(facet.begin() + k);
+      if (const auto found = cells.find(facet); found != cells.end()) found->second = static_cast<int>(i) / corners;
     }
+  }
+  std::vector<int> found;
+  for (std::size_t i = 0; i < frame.surface.size(); i += dim) {
+    Facet facet(frame.surface.begin() + i, frame.surface.begin() + i + dim);
+    std::sort(facet.begin(), facet.end());
+    found.push_back(cells[facet]);
   }
   return found;
 }
 
-std::string encode_integers(const std::vector<int>& values, int columns) {
-  std::string bytes;
-  const std::size_t rows = columns ? values.size() / columns : 0;
-  std::vector<std::uint32_t> coded(rows);
-  for (int k = 0; k < columns; ++k) {
-    for (std::size_t i = 0; i < rows; ++i) {
-      const int above = i > 0 ? values[(i - 1) * columns + k] : 0;
-      const auto difference = static_cast<std::uint32_t>(values[i * columns + k]) - static_cast<std::uint32_t>(above);
-      coded[i] = (difference << 1) ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(difference) >> 31);
-    }
-    for (int byte = 0; byte < 4; ++byte)
-      for (const std::uint32_t value : coded) bytes += static_cast<char>(value >> (8 * byte) & 255);
-  }
-  return bytes;
-}
+}  // namespace
 
-std::size_t LivingRows::Hash::operator()(const Key& key) const {
-  std::uint64_t hash = 0x9e3779b97f4a7c15;
-  for (const std::uint64_t part : key) {
-    hash = (hash ^ part) * 0xff51afd7ed558ccd;
-    hash ^= hash >> 33;
-  }
-  return hash;
+void LivingRows::begin(int frame) {
+  frame_ = frame;
+  has_born_ = false;
+  before_ = std::move(now_);
+  now_.clear();
 }
 
 int LivingRows::touch(const Key& key, const std::vector<int>& row) {
-  const auto [place, is_new] = ids_.try_emplace(key, size());
-  if (is_new) {
-    columns_ = static_cast<int>(row.size());
-    rows_.insert(rows_.end(), row.begin(), row.end());
-    birth_.push_back(frame_);
-    death_.push_back(kNever);
-    touched_.push_back(frame_);
-    keys_.push_back(key);
+  const auto [place, is_first] = now_.try_emplace(key, size());
+  if (!is_first) return place->second;
+  if (const auto known = before_.find(key); known != before_.end()) {
+    place->second = known->second;
+    before_.erase(known);
+    return place->second;
   }
-  touched_[place->second] = frame_;
+  has_born_ = true;
+  rows_.insert(rows_.end(), row.begin(), row.end());
+  birth_.push_back(frame_);
+  death_.push_back(kNever);
   return place->second;
 }
 
-void LivingRows::end() {
-  changes_ = 0;
-  std::vector<int> now;
-  for (const int id : alive_) {
-    if (touched_[id] == frame_) {
-      now.push_back(id);
-      continue;
-    }
-    death_[id] = frame_;
-    ids_.erase(keys_[id]);
-    keys_[id] = {};
-    ++changes_;
-  }
-  const int first_new = first_unborn_;
-  for (int id = first_new; id < size(); ++id) now.push_back(id);
-  changes_ += size() - first_new;
-  first_unborn_ = size();
-  alive_ = std::move(now);
+bool LivingRows::end() {
+  for (const auto& [key, id] : before_) death_[id] = frame_;
+  return has_born_ || !before_.empty();
 }
 
-std::string LivingRows::encode() const {
-  return encode_integers(rows_, columns_) + encode_integers(birth_, 1) + encode_integers(death_, 1);
+LivingRows::Chosen LivingRows::choose(const std::vector<int>& frames) const {
+  const auto at = [&](int frame) {
+    return static_cast<int>(std::lower_bound(frames.begin(), frames.end(), frame) - frames.begin());
+  };
+  Chosen chosen;
+  for (int id = 0; id < size(); ++id) {
+    const int birth = at(birth_[id]), death = at(death_[id]);
+    const bool is_seen = birth < death;
+    chosen.new_id.push_back(is_seen ? static_cast<int>(chosen.rows.size()) : -1);
+    if (!is_seen) continue;
+    chosen.rows.push_back(id);
+    chosen.birth.push_back(birth);
+    chosen.death.push_back(death);
+  }
+  return chosen;
+}
+
+std::vector<int> LivingRows::column(const Chosen& chosen, int k) const {
+  std::vector<int> values;
+  for (const int id : chosen.rows) values.push_back(rows_[id * columns_ + k]);
+  return values;
 }
 
 void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField>& fields) {
   dim_ = frame.dim;
   units_ = frame.units;
+  cells_ = LivingRows(dim_ + 2);
+  facets_ = LivingRows(dim_ + 1);
   for (int k = 0; k < dim_ && !frame.x.empty(); ++k) {
     origin_[k] = frame.rest[k];
     low_[k] = high_[k] = frame.x[k];
@@ -172,94 +159,9 @@ void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField
   shown_ = largest_;
 }
 
-/// Logarithmic, 512 codes an octave: three digits of all between 10^-21 and 10^17. 0 is zero.
-std::uint16_t FrameEncoder::code(std::size_t field, double value) {
-  if (!(value > 0) || !std::isfinite(value)) return 0;
-  largest_[field] = std::max(largest_[field], value);
-  if (value < kNothing * largest_[field]) return 0;
-  return static_cast<std::uint16_t>(std::clamp(std::round(512 * (std::log2(value) + 70)), 0.0, 65535.0));
-}
-
-/// Values that are not zero: forces and stresses are zero at most places.
-void FrameEncoder::include_shown(std::size_t field, std::vector<double> values) {
-  std::erase_if(values, [](double value) { return !(value > 0) || !std::isfinite(value); });
-  if (values.empty()) return;
-  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(kShownShare * static_cast<double>(values.size()))) - 1;
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  shown_[field] = std::max(shown_[field], values[rank]);
-}
-
-namespace {
-
-void include(std::array<double, 2>& range, double value) {
-  if (!std::isfinite(value)) return;
-  range[0] = std::min(range[0], value);
-  range[1] = std::max(range[1], value);
-}
-
-/// Dim! times the volume of a simplex with these corners.
-double volume_of(const std::array<std::array<double, 3>, 4>& p, int dim) {
-  std::array<std::array<double, 3>, 3> m{};
-  for (int i = 0; i < dim; ++i)
-    for (int k = 0; k < dim; ++k) m[i][k] = p[i + 1][k] - p[0][k];
-  if (dim == 2) return m[0][0] * m[1][1] - m[0][1] * m[1][0];
-  return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-         m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-}
-
-}  // namespace
-
-void FrameEncoder::measure(const StoredFrame& frame, int cell) {
-  std::array<std::array<double, 3>, 4> rest{}, now{};
-  for (int i = 0; i <= dim_; ++i)
-    for (int k = 0; k < dim_; ++k) {
-      const auto at = static_cast<std::size_t>(frame.simplices[static_cast<std::size_t>(cell) * (dim_ + 1) + i]) * dim_ + k;
-      rest[i][k] = frame.rest[at];
-      now[i][k] = frame.x[at];
-    }
-  include(volume_ratios_, volume_of(now, dim_) / volume_of(rest, dim_));
-  double longest = 0;
-  for (int i = 0; i <= dim_; ++i)
-    for (int j = 0; j < i; ++j) {
-      double square = 0;
-      for (int k = 0; k < dim_; ++k) square += (now[i][k] - now[j][k]) * (now[i][k] - now[j][k]);
-      longest = std::max(longest, square);
-    }
-  include(longest_edges_, std::sqrt(longest));
-}
-
-/// Vertices, cells and fields of one frame that a page shows, with their ids.
-struct FrameEncoder::Shown {
-  int nodes, cells, num_curved, num_vertices;
-  std::vector<int> owner;  ///< of facets of the surface
-  std::vector<char> keep_cell, keep_node;
-  std::vector<int> id_of, cell_id;                         ///< -1: not shown
-  std::vector<std::pair<int, int>> order{}, cell_order{};  ///< id, node (nodes of obstacles after the bodies'); id, cell
-
-  Shown(const StoredFrame& frame, bool with_inside)
-      : nodes(static_cast<int>(frame.x.size()) / frame.dim),
-        cells(static_cast<int>(frame.body.size())),
-        num_curved(static_cast<int>(frame.curved_edges.size()) / 2),
-        num_vertices(nodes - num_curved),
-        owner(cells_of_facets(frame)),
-        keep_cell(cells, with_inside || frame.dim == 2),
-        keep_node(nodes, 0),
-        id_of(nodes, -1),
-        cell_id(cells, -1) {
-    const int corners = frame.dim + 1;
-    for (const int cell : owner)
-      if (cell >= 0) keep_cell[cell] = 1;
-    for (int c = 0; c < cells; ++c)
-      if (keep_cell[c])
-        for (int k = 0; k < corners; ++k) keep_node[frame.simplices[c * corners + k]] = 1;
-    for (int e = 0; e < num_curved; ++e)
-      keep_node[num_vertices + e] = keep_node[frame.curved_edges[2 * e]] && keep_node[frame.curved_edges[2 * e + 1]];
-  }
-};
-
 void FrameEncoder::add(const std::filesystem::path& path) {
-  const StoredFrame frame = read_frame(path);
-  std::vector<StoredField> fields = read_frame_fields(path);
+  const StoredFrame frame = output::read_frame(path);
+  std::vector<StoredField> fields = output::read_frame_fields(path);
   if (frames_.empty()) gap_limit_ = kGapShare * diagonal(frame);
   if (std::vector<double> values = gaps(frame, gap_limit_); !values.empty())
     fields.push_back({"gap", "m", 1, std::move(values)});
@@ -271,21 +173,24 @@ void FrameEncoder::add(const std::filesystem::path& path) {
       frame.obstacles.faces != obstacles_.faces)
     throw InputError({path.string(), "/obstacles", "other obstacles", "those of the first frame, at any place"});
 
-  Shown shown(frame, with_inside_);
-  touch_vertices(frame, shown);
-  touch_cells(frame, shown);
-  touch_facets(frame, shown);
-  touch_curved_edges(frame, shown);
-  EncodedFrame entry{step_of_frame(path), read_frame_sizes(path).t, 0, shown.num_vertices, shown.cells, {}};
-  const bool is_changed = vertices_.changes() + cells_.changes() + facets_.changes() + curved_.changes() > 0;
+  Order order;
+  bool is_changed = touch_vertices(frame, order);
+  is_changed = touch_cells(frame, order) || is_changed;
+  is_changed = touch_facets(frame, order) || is_changed;
+  is_changed = touch_curved_edges(frame, order) || is_changed;
+  dim_ == 2 ? measure_cells<2>(frame) : measure_cells<3>(frame);
+  EncodedFrame entry;
+  entry.step = output::step_of_frame(path);
+  entry.t = output::read_frame_sizes(path).t;
+  entry.vertices = static_cast<int>(frame.x.size()) / dim_ - static_cast<int>(frame.curved_edges.size()) / 2;
+  entry.cells = static_cast<int>(frame.body.size());
   if (!frames_.empty()) entry.mesh = frames_.back().mesh + (is_changed ? 1 : 0);
-  Pending pending;
-  add_positions(frame, shown, pending);
-  add_vertex_fields(fields, shown, pending, entry);
-  add_cell_fields(fields, shown, pending);
+  std::string bytes;
+  add_displacements(frame, order, entry, bytes);
+  add_vertex_fields(fields, order, entry, bytes);
+  add_cell_fields(fields, order, bytes);
+  entry.bytes = deflate(bytes);
   frames_.push_back(std::move(entry));
-  pending_.push_back(std::move(pending));
-  if (pending_.size() == kFramesOfChunk) flush();
 }
 
 std::array<double, 3> FrameEncoder::read_point(const std::vector<double>& from, int i) const {
@@ -294,216 +199,207 @@ std::array<double, 3> FrameEncoder::read_point(const std::vector<double>& from, 
   return p;
 }
 
-void FrameEncoder::touch_vertices(const StoredFrame& frame, Shown& shown) {
+bool FrameEncoder::touch_vertices(const StoredFrame& frame, Order& order) {
   // Where vertices coincide, the first of them at a place is the first of them in the next frame.
-  std::unordered_map<LivingRows::Key, int, LivingRows::Hash> repeats;
+  std::map<LivingRows::Key, int> repeats;
   vertices_.begin(static_cast<int>(frames_.size()));
-  const auto touch_vertex = [&](Kind kind, const LivingRows::Key& key, const std::array<double, 3>& rest) {
-    const int known = vertices_.size();
-    const int id = vertices_.touch(key, {kind});
+  const auto touch_vertex = [&](Kind kind, const LivingRows::Key& key, const std::array<double, 3>& rest, int node) {
+    const int known = vertices_.size(), id = vertices_.touch(key, {kind});
     if (id == known) rest_.push_back(rest);
+    order.vertices.emplace_back(id, node);
     return id;
   };
-  for (int i = 0; i < shown.nodes; ++i) {
-    if (!shown.keep_node[i]) continue;
-    const Kind kind = i < shown.num_vertices ? vertex_kind : node_kind;
+  const int nodes = static_cast<int>(frame.x.size()) / dim_;
+  const int num_vertices = nodes - static_cast<int>(frame.curved_edges.size()) / 2;
+  for (int i = 0; i < nodes; ++i) {
+    const Kind kind = i < num_vertices ? vertex_kind : node_kind;
     const std::array<double, 3> rest = read_point(frame.rest, i);
-    LivingRows::Key key = {static_cast<std::uint64_t>(kind), 0};
-    for (int k = 0; k < dim_; ++k) key[2 + k] = std::bit_cast<std::uint64_t>(rest[k] + 0.0);
+    LivingRows::Key key = {static_cast<double>(kind), 0, rest[0], rest[1], rest[2]};
     key[1] = repeats[key]++;
-    shown.id_of[i] = touch_vertex(kind, key, rest);
-    shown.order.emplace_back(shown.id_of[i], i);
+    order.id_of_node.push_back(touch_vertex(kind, key, rest, i));
   }
   const int num_obstacle = static_cast<int>(obstacles_.x.size()) / dim_;
   for (int i = 0; i < num_obstacle; ++i)
-    shown.order.emplace_back(
-        touch_vertex(obstacle_kind, {obstacle_kind, static_cast<std::uint64_t>(i)}, read_point(obstacles_.x, i)),
-        shown.nodes + i);
-  vertices_.end();
-  std::sort(shown.order.begin(), shown.order.end());
+    touch_vertex(obstacle_kind, {obstacle_kind, static_cast<double>(i)}, read_point(obstacles_.x, i), nodes + i);
+  std::sort(order.vertices.begin(), order.vertices.end());
+  return vertices_.end();
 }
 
-void FrameEncoder::touch_cells(const StoredFrame& frame, Shown& shown) {
+bool FrameEncoder::touch_cells(const StoredFrame& frame, Order& order) {
   const int corners = dim_ + 1;
   cells_.begin(static_cast<int>(frames_.size()));
-  for (int c = 0; c < shown.cells; ++c) {
-    if (!shown.keep_cell[c]) continue;
-    measure(frame, c);
+  for (int c = 0; c < static_cast<int>(frame.body.size()); ++c) {
     std::vector<int> row(corners);
-    for (int k = 0; k < corners; ++k) row[k] = shown.id_of[frame.simplices[c * corners + k]];
-    LivingRows::Key key = sorted_key(row);
+    for (int k = 0; k < corners; ++k) row[k] = order.id_of_node[frame.simplices[c * corners + k]];
+    const LivingRows::Key key = sorted_key(row);
     row.push_back(static_cast<int>(frame.body[c]));
-    shown.cell_id[c] = cells_.touch(key, row);
-    shown.cell_order.emplace_back(shown.cell_id[c], c);
+    order.id_of_cell.push_back(cells_.touch(key, row));
+    order.cells.emplace_back(order.id_of_cell.back(), c);
   }
-  cells_.end();
-  std::sort(shown.cell_order.begin(), shown.cell_order.end());
+  std::sort(order.cells.begin(), order.cells.end());
+  return cells_.end();
 }
 
-void FrameEncoder::touch_facets(const StoredFrame& frame, const Shown& shown) {
+bool FrameEncoder::touch_facets(const StoredFrame& frame, const Order& order) {
   facets_.begin(static_cast<int>(frames_.size()));
-  for (std::size_t f = 0; f < shown.owner.size(); ++f) {
-    if (shown.owner[f] < 0) continue;
+  const std::vector<int> owner = cells_of_facets(frame);
+  for (std::size_t f = 0; f < owner.size(); ++f) {
+    if (owner[f] < 0) continue;
     std::vector<int> row(dim_);
-    for (int k = 0; k < dim_; ++k) row[k] = shown.id_of[frame.surface[f * dim_ + k]];
+    for (int k = 0; k < dim_; ++k) row[k] = order.id_of_node[frame.surface[f * dim_ + k]];
     LivingRows::Key key = sorted_key(row);
-    row.push_back(shown.cell_id[shown.owner[f]]);
-    key[dim_] = shown.cell_id[shown.owner[f]];
+    row.push_back(order.id_of_cell[owner[f]]);
+    key[dim_] = row.back();
     facets_.touch(key, row);
   }
-  facets_.end();
+  return facets_.end();
 }
 
-void FrameEncoder::touch_curved_edges(const StoredFrame& frame, const Shown& shown) {
+bool FrameEncoder::touch_curved_edges(const StoredFrame& frame, const Order& order) {
   curved_.begin(static_cast<int>(frames_.size()));
-  for (int e = 0; e < shown.num_curved; ++e) {
-    if (!shown.keep_node[shown.num_vertices + e]) continue;
-    const std::vector<int> row = {shown.id_of[frame.curved_edges[2 * e]], shown.id_of[frame.curved_edges[2 * e + 1]],
-                                  shown.id_of[shown.num_vertices + e]};
+  const std::size_t num_curved = frame.curved_edges.size() / 2, num_vertices = frame.x.size() / dim_ - num_curved;
+  for (std::size_t e = 0; e < num_curved; ++e) {
+    const std::vector<int> row = {order.id_of_node[frame.curved_edges[2 * e]],
+                                  order.id_of_node[frame.curved_edges[2 * e + 1]], order.id_of_node[num_vertices + e]};
     curved_.touch(sorted_key(row), row);
   }
-  curved_.end();
+  return curved_.end();
 }
 
-void FrameEncoder::add_positions(const StoredFrame& frame, const Shown& shown, Pending& pending) {
-  const int nodes = shown.nodes;
-  for (const auto& [id, node] : shown.order) {
-    const std::array<double, 3> now = node < nodes ? read_point(frame.x, node) : read_point(frame.obstacles.x, node - nodes);
-    pending.vertices.push_back(id);
-    double u2 = 0;
-    for (int k = 0; k < dim_ && node < nodes; ++k) u2 += (now[k] - rest_[id][k]) * (now[k] - rest_[id][k]);
-    if (std::isfinite(u2)) largest_u_ = std::max(largest_u_, std::sqrt(u2));
-    for (int k = 0; k < dim_; ++k) {
-      pending.u[k].push_back(now[k] - rest_[id][k]);
-      if (node >= nodes || !std::isfinite(now[k])) continue;
-      low_[k] = std::min(low_[k], now[k]);
-      high_[k] = std::max(high_[k], now[k]);
+template <int Dim>
+void FrameEncoder::measure_cells(const StoredFrame& frame) {
+  for (std::size_t c = 0; c < frame.body.size(); ++c) {
+    std::array<Vec<Dim>, Dim + 1> rest, now;
+    for (int i = 0; i <= Dim; ++i) {
+      const auto at = static_cast<std::size_t>(frame.simplices[c * (Dim + 1) + i]) * Dim;
+      rest[i] = Eigen::Map<const Vec<Dim>>(&frame.rest[at]);
+      now[i] = Eigen::Map<const Vec<Dim>>(&frame.x[at]);
     }
+    include(volume_ratios_, simplex_volume<Dim>(now) / simplex_volume<Dim>(rest));
+    double longest = 0;
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = 0; j < i; ++j) longest = std::max(longest, (now[i] - now[j]).norm());
+    include(longest_edges_, longest);
   }
-  for (const auto& [id, cell] : shown.cell_order) pending.cells.push_back(id);
 }
 
-void FrameEncoder::add_vertex_fields(const std::vector<StoredField>& fields, const Shown& shown, Pending& pending,
-                                     EncodedFrame& entry) {
-  const auto& order = shown.order;
+void FrameEncoder::add_displacements(const StoredFrame& frame, const Order& order, EncodedFrame& entry, std::string& bytes) {
+  const int nodes = static_cast<int>(frame.x.size()) / dim_;
+  for (int k = 0; k < dim_; ++k) {
+    std::array<double, 2> box{INFINITY, -INFINITY};
+    std::vector<double> u;
+    for (const auto& [id, node] : order.vertices) {
+      const double now = node < nodes ? frame.x[node * dim_ + k] : frame.obstacles.x[(node - nodes) * dim_ + k];
+      include(box, u.emplace_back(now - rest_[id][k]));
+      if (node >= nodes || !std::isfinite(now)) continue;
+      low_[k] = std::min(low_[k], now);
+      high_[k] = std::max(high_[k], now);
+    }
+    if (box[0] > box[1]) box = {0, 0};
+    const double range = box[1] - box[0], scale = range > 0 ? 65535 / range : 0;
+    std::vector<std::uint16_t> codes;
+    for (const double value : u)
+      codes.push_back(std::isfinite(value) ? static_cast<std::uint16_t>(std::round((value - box[0]) * scale)) : 0);
+    append_planar(bytes, codes);
+    entry.low[k] = box[0];
+    entry.high[k] = box[1];
+  }
+  for (int i = 0; i < nodes; ++i) {
+    std::array<double, 3> u = read_point(frame.x, i);
+    for (int k = 0; k < dim_; ++k) u[k] -= frame.rest[i * dim_ + k];
+    if (const double length = magnitude(u.data(), dim_); std::isfinite(length)) largest_u_ = std::max(largest_u_, length);
+  }
+}
+
+/// Adds magnitudes, 512 codes an octave: three digits of all between 10^-21 and 10^17. 0 is zero.
+void FrameEncoder::add_values(std::size_t field, std::vector<double> values, std::string& bytes) {
+  for (double& value : values)
+    if (!(value > 0) || !std::isfinite(value)) value = 0;
+  for (const double value : values) largest_[field] = std::max(largest_[field], value);
+  std::vector<std::uint16_t> codes;
+  for (const double value : values)
+    codes.push_back(value == 0 || value < kNothing * largest_[field]
+                        ? 0
+                        : static_cast<std::uint16_t>(std::clamp(std::round(512 * (std::log2(value) + 70)), 0.0, 65535.0)));
+  append_planar(bytes, codes);
+  std::erase(values, 0.0);  // forces and stresses are zero at most places
+  if (values.empty()) return;
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(kShownShare * static_cast<double>(values.size()))) - 1;
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  shown_[field] = std::max(shown_[field], values[rank]);
+}
+
+void FrameEncoder::add_vertex_fields(const std::vector<StoredField>& fields, const Order& order, EncodedFrame& entry,
+                                     std::string& bytes) {
+  const int nodes = static_cast<int>(order.id_of_node.size());
   for (std::size_t i = 0; i < vertex_fields_.size(); ++i) {
-    std::vector<std::uint16_t>& codes = pending.vertex_codes.emplace_back();
     const auto field = std::ranges::find(fields, vertex_fields_[i].name, &StoredField::name);
     const int columns = field != fields.end() ? field->columns : 0;
-    const bool is_there = columns > 0 && field->values.size() == static_cast<std::size_t>(shown.nodes) * columns;
-    std::vector<double> magnitudes(order.size(), 0);
-    for (std::size_t k = 0; k < order.size(); ++k)
-      if (const int node = order[k].second; is_there && node < shown.nodes)
+    const bool is_there = columns > 0 && field->values.size() == static_cast<std::size_t>(nodes) * columns;
+    std::vector<double> magnitudes(order.vertices.size(), 0);
+    for (std::size_t k = 0; k < order.vertices.size(); ++k)
+      if (const int node = order.vertices[k].second; is_there && node < nodes)
         magnitudes[k] = magnitude(&field->values[static_cast<std::size_t>(node) * columns], columns);
-    for (const double value : magnitudes) codes.push_back(code(i, value));
-    include_shown(i, std::move(magnitudes));
+    add_values(i, std::move(magnitudes), bytes);
     if (!is_there || !field->name.ends_with("_force")) continue;
     std::array<double, 3>& sum = entry.forces[field->name];
     for (std::size_t k = 0; k < field->values.size(); ++k) sum[k % dim_] += field->values[k];
   }
 }
 
-void FrameEncoder::add_cell_fields(const std::vector<StoredField>& fields, const Shown& shown, Pending& pending) {
+void FrameEncoder::add_cell_fields(const std::vector<StoredField>& fields, const Order& order, std::string& bytes) {
   for (std::size_t i = 0; i < cell_fields_.size(); ++i) {
-    std::vector<std::uint16_t>& codes = pending.cell_codes.emplace_back();
     const auto field = std::ranges::find(fields, cell_fields_[i].name, &StoredField::name);
-    const bool is_there = field != fields.end() && field->values.size() == static_cast<std::size_t>(shown.cells);
-    for (const auto& [id, cell] : shown.cell_order)
-      codes.push_back(is_there ? code(vertex_fields_.size() + i, field->values[cell]) : 0);
-    if (is_there) include_shown(vertex_fields_.size() + i, field->values);
+    const bool is_there = field != fields.end() && field->values.size() == order.cells.size();
+    std::vector<double> values;
+    for (const auto& [id, cell] : order.cells) values.push_back(is_there ? field->values[cell] : 0);
+    add_values(vertex_fields_.size() + i, std::move(values), bytes);
   }
 }
 
-namespace {
-
-/// Predicts codes and keeps the differences: from the frames before, along a line if `by_line`, or for new ones from the
-/// code before.
-class Predictor {
- public:
-  Predictor(int ids, bool by_line) : last_(ids), before_(ids), by_line_(by_line) {}
-  std::vector<std::uint16_t> differences(const std::vector<int>& ids, const std::vector<int>& ages,
-                                         const std::vector<std::uint16_t>& codes) {
-    std::vector<std::uint16_t> found(codes.size());
-    std::uint16_t neighbour = 0;
-    for (std::size_t i = 0; i < codes.size(); ++i) {
-      const int id = ids[i];
-      int guess = neighbour;
-      if (ages[i] >= 1) guess = last_[id];
-      if (ages[i] >= 2 && by_line_) guess = 2 * last_[id] - before_[id];
-      found[i] = zigzag(static_cast<std::uint16_t>(codes[i] - guess));
-      before_[id] = last_[id];
-      last_[id] = neighbour = codes[i];
-    }
-    return found;
-  }
-
- private:
-  std::vector<std::uint16_t> last_, before_;
-  bool by_line_;
-};
-
-}  // namespace
-
-void FrameEncoder::flush() {
-  if (pending_.empty()) return;
-  EncodedChunk chunk;
-  chunk.count = static_cast<int>(pending_.size());
-  chunk.first = static_cast<int>(frames_.size()) - chunk.count;
-  for (int k = 0; k < dim_; ++k) {
-    double low = INFINITY, high = -INFINITY;
-    for (const Pending& frame : pending_)
-      for (const double u : frame.u[k])
-        if (std::isfinite(u)) low = std::min(low, u), high = std::max(high, u);
-    if (!(low <= high)) low = high = 0;
-    chunk.low[k] = low;
-    chunk.high[k] = high;
-  }
-  const int num_vertices = vertices_.size(), num_cells = cells_.size();
-  std::vector<Predictor> of_u(dim_, Predictor(num_vertices, true));
-  std::vector<Predictor> of_vertices(vertex_fields_.size(), Predictor(num_vertices, false));
-  std::vector<Predictor> of_cells(cell_fields_.size(), Predictor(num_cells, false));
+FrameEncoder::Topology FrameEncoder::topology(const std::vector<int>& frames) const {
+  const LivingRows::Chosen vertices = vertices_.choose(frames), cells = cells_.choose(frames);
+  const LivingRows::Chosen facets = facets_.choose(frames), curved = curved_.choose(frames);
   std::string bytes;
-  for (int f = 0; f < chunk.count; ++f) {
-    const Pending& frame = pending_[f];
-    const auto ages = [&](const LivingRows& rows, const std::vector<int>& ids) {
-      std::vector<int> found;
-      for (const int id : ids) found.push_back(chunk.first + f - std::max(rows.birth(id), chunk.first));
-      return found;
-    };
-    const std::vector<int> vertex_ages = ages(vertices_, frame.vertices), cell_ages = ages(cells_, frame.cells);
-    for (int k = 0; k < dim_; ++k) {
-      const double range = chunk.high[k] - chunk.low[k], scale = range > 0 ? 65535 / range : 0;
-      std::vector<std::uint16_t> codes;
-      for (const double u : frame.u[k])
-        codes.push_back(std::isfinite(u) ? static_cast<std::uint16_t>(std::round((u - chunk.low[k]) * scale)) : 0);
-      append_codes(bytes, of_u[k].differences(frame.vertices, vertex_ages, codes));
-    }
-    for (std::size_t i = 0; i < vertex_fields_.size(); ++i)
-      append_codes(bytes, of_vertices[i].differences(frame.vertices, vertex_ages, frame.vertex_codes[i]));
-    for (std::size_t i = 0; i < cell_fields_.size(); ++i)
-      append_codes(bytes, of_cells[i].differences(frame.cells, cell_ages, frame.cell_codes[i]));
+  for (int k = 0; k < dim_; ++k) {
+    std::vector<float> rest;
+    for (const int id : vertices.rows) rest.push_back(static_cast<float>(rest_[id][k] - origin_[k]));
+    append_planar(bytes, rest);
   }
-  chunk.bytes = deflate(bytes);
-  chunks_.push_back(std::move(chunk));
-  pending_.clear();
+  const auto append = [&](const LivingRows& table, const LivingRows::Chosen& chosen,
+                          const std::vector<const LivingRows::Chosen*>& ids_of) {
+    for (std::size_t k = 0; k < ids_of.size(); ++k) {
+      std::vector<int> column = table.column(chosen, static_cast<int>(k));
+      if (ids_of[k])
+        for (int& value : column) value = ids_of[k]->new_id[value];
+      append_planar(bytes, column);
+    }
+    append_planar(bytes, chosen.birth);
+    append_planar(bytes, chosen.death);
+  };
+  std::vector<const LivingRows::Chosen*> of_cell(dim_ + 1, &vertices), of_facet(dim_, &vertices);
+  of_cell.push_back(nullptr);
+  of_facet.push_back(&cells);
+  append(vertices_, vertices, {nullptr});
+  append(cells_, cells, of_cell);
+  append(facets_, facets, of_facet);
+  append(curved_, curved, {&vertices, &vertices, &vertices});
+  const auto append_corners = [&](const std::vector<std::int64_t>& rows, int columns) {
+    for (int k = 0; k < columns; ++k) {
+      std::vector<int> column;
+      for (std::size_t i = k; i < rows.size(); i += columns) column.push_back(static_cast<int>(rows[i]));
+      append_planar(bytes, column);
+    }
+  };
+  append_corners(obstacles_.edges, 2);
+  append_corners(obstacles_.faces, 3);
+  return {deflate(bytes),
+          {{"vertices", vertices.rows.size()},
+           {"cells", cells.rows.size()},
+           {"facets", facets.rows.size()},
+           {"curved", curved.rows.size()},
+           {"obstacle_edges", obstacles_.edges.size() / 2},
+           {"obstacle_faces", obstacles_.faces.size() / 3}}};
 }
 
-std::string FrameEncoder::topology(std::string& counts) const {
-  std::vector<float> rest;
-  for (int k = 0; k < dim_; ++k)
-    for (const auto& p : rest_) rest.push_back(static_cast<float>(p[k] - origin_[k]));
-  std::vector<int> edges(obstacles_.edges.begin(), obstacles_.edges.end());
-  std::vector<int> faces(obstacles_.faces.begin(), obstacles_.faces.end());
-  counts = fmt::format(R"({{"vertices":{},"cells":{},"facets":{},"curved":{},"obstacle_edges":{},"obstacle_faces":{}}})",
-                       vertices_.size(), cells_.size(), facets_.size(), curved_.size(), edges.size() / 2, faces.size() / 3);
-  return deflate(encode_floats(rest) + vertices_.encode() + cells_.encode() + facets_.encode() + curved_.encode() +
-                 encode_integers(edges, 2) + encode_integers(faces, 3));
-}
-
-std::size_t FrameEncoder::bytes() const {
-  std::size_t sum = 0;
-  for (const EncodedChunk& chunk : chunks_) sum += chunk.bytes.size();
-  return sum;
-}
-
-}  // namespace itr::output
+}  // namespace itr::report

@@ -7,7 +7,7 @@
 #include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
 
-namespace itr::output {
+namespace itr::report {
 
 namespace {
 
@@ -110,4 +110,4 @@ std::vector<double> gaps(const StoredFrame& frame, double most) {
   return frame.dim == 2 ? gaps_in<2>(frame, most) : gaps_in<3>(frame, most);
 }
 
-}  // namespace itr::output
+}  // namespace itr::report

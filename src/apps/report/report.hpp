@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-namespace itr::output {
+namespace itr::report {
 
 struct ReportOptions {
   int every = 1;         ///< of the stored frames, which the page has; the last one it always has
-  double max_mb = 30;    ///< of the file: cells inside of solids are left out first, then frames
+  double max_mb = 30;    ///< of the file: every 2nd, 4th, ... frame is left out until it is smaller
   bool certify = false;  ///< re-checks all stored frames, see certify.hpp, and says so in the page
 };
 
@@ -39,4 +39,4 @@ ReportSummary write_study_report(const std::string& title, const std::string& re
                                  const std::vector<StudyRun>& runs, const std::filesystem::path& file,
                                  const ReportOptions& options = {});
 
-}  // namespace itr::output
+}  // namespace itr::report

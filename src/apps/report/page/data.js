@@ -2,7 +2,6 @@
 // What the file holds: blocks of compressed bytes in base64, see frames.cpp for how they are made.
 'use strict';
 
-const NEVER = 1 << 30;
 const KIND = {
   vertex: 0,
   node: 1,
@@ -21,39 +20,27 @@ async function inflate(id) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
+// Arrays one after the other, each as the lowest bytes of all its values, then the next ones.
 class Reader {
   constructor(bytes) {
     this.bytes = bytes;
     this.at = 0;
   }
-  words(n) {  // of four bytes, the lowest bytes of all words first
-    const out = new Uint32Array(n), b = this.bytes, at = this.at;
-    for (let i = 0; i < n; ++i) out[i] = b[at + i] | b[at + n + i] << 8 | b[at + 2 * n + i] << 16 | b[at + 3 * n + i] << 24;
-    this.at += 4 * n;
-    return out;
+  take(Type, n) {
+    const size = Type.BYTES_PER_ELEMENT, out = new Uint8Array(size * n);
+    for (let k = 0; k < size; ++k)
+      for (let i = 0; i < n; ++i) out[size * i + k] = this.bytes[this.at++];
+    return new Type(out.buffer);
   }
-  floats(n) {
-    return new Float32Array(this.words(n).buffer);
-  }
-  column(n) {
-    const words = this.words(n), out = new Int32Array(n);
-    for (let i = 0, above = 0; i < n; ++i) out[i] = above = (above + ((words[i] >>> 1) ^ -(words[i] & 1))) | 0;
-    return out;
-  }
-  columns(rows, n) {
-    return Array.from({length: n}, () => this.column(rows));
+  columns(Type, rows, n) {
+    return Array.from({length: n}, () => this.take(Type, rows));
   }
   living(rows, n) {
-    return {columns: this.columns(rows, n), birth: this.column(rows), death: this.column(rows)};
-  }
-  codes(n) {
-    const out = new Uint16Array(n), b = this.bytes, at = this.at;
-    for (let i = 0; i < n; ++i) {
-      const z = b[at + i] | b[at + n + i] << 8;
-      out[i] = (z >>> 1) ^ -(z & 1);
-    }
-    this.at += 2 * n;
-    return out;
+    return {
+      columns: this.columns(Int32Array, rows, n),
+      birth: this.take(Int32Array, rows),
+      death: this.take(Int32Array, rows)
+    };
   }
 }
 
@@ -64,31 +51,13 @@ function alive(rows, frame) {
   return Int32Array.from(out);
 }
 
-// Adds what predicts codes, in place: the frames before, along a line if by_line; for what is new the code before it.
-class Predictor {
-  constructor(n, byLine) {
-    this.last = new Uint16Array(n);
-    this.before = new Uint16Array(n);
-    this.byLine = byLine;
-  }
-  restore(ids, birth, first, frame, codes) {
-    const {last, before, byLine} = this;
-    for (let i = 0, neighbour = 0; i < codes.length; ++i) {
-      const id = ids[i], age = frame - Math.max(birth[id], first);
-      const guess = age >= 2 && byLine ? 2 * last[id] - before[id] : age >= 1 ? last[id] : neighbour;
-      before[id] = last[id];
-      last[id] = codes[i] = neighbour = (codes[i] + guess) & 65535;
-    }
-  }
-}
-
 class Run {
   constructor(prefix = '') {
     this.prefix = prefix;
     this.meta = JSON.parse(document.getElementById(prefix + 'meta').textContent);
     this.dim = this.meta.dim;
     this.frames = this.meta.frames;
-    this.chunks = this.meta.chunks.map(c => ({...c, promise: null}));
+    this.decoded = new Map();
     this.meshes = new Map();
     const known = (list, where) => list.map((f, i) => ({...f, where, i}));
     this.stored = [...known(this.meta.vertex_fields, 'vertex'), ...known(this.meta.cell_fields, 'cell')];
@@ -105,8 +74,7 @@ class Run {
     const [topology, steps, forces] =
         await Promise.all(['topology', 'steps', 'forces'].map(id => inflate(this.prefix + id)));
     const r = new Reader(topology);
-    const rest = r.floats(dim * n.vertices);
-    this.rest = Array.from({length: dim}, (_, k) => rest.subarray(k * n.vertices, (k + 1) * n.vertices));
+    this.rest = r.columns(Float32Array, n.vertices, dim);
     this.vertices = r.living(n.vertices, 1);
     this.kind = this.vertices.columns[0];
     this.cells = r.living(n.cells, dim + 2);
@@ -114,8 +82,8 @@ class Run {
     this.facets = r.living(n.facets, dim + 1);
     this.curved = r.living(n.curved, 3);
     const ids = this.obstacleIds = alive(this.vertices, 0).filter(v => this.kind[v] === KIND.obstacle);
-    this.obstacleEdges = r.columns(n.obstacle_edges, 2).map(column => column.map(i => ids[i]));
-    this.obstacleFaces = r.columns(n.obstacle_faces, 3).map(column => column.map(i => ids[i]));
+    this.obstacleEdges = r.columns(Int32Array, n.obstacle_edges, 2).map(column => column.map(i => ids[i]));
+    this.obstacleFaces = r.columns(Int32Array, n.obstacle_faces, 3).map(column => column.map(i => ids[i]));
     const linesOf = bytes => new TextDecoder().decode(bytes).split('\n').filter(Boolean);
     this.steps = linesOf(steps).map(line => JSON.parse(line));
     this.curves = curvesOf(linesOf(forces));
@@ -147,62 +115,36 @@ class Run {
     return a < b ? a * this.meta.counts.vertices + b : b * this.meta.counts.vertices + a;
   }
 
-  chunkOf(frame) {
-    return this.chunks.findIndex(c => frame < c.first + c.count);
+  // Codes of a frame's displacements and fields, in the order of its mesh's ids.
+  decode(index) {
+    if (!this.decoded.has(index))
+      this.decoded.set(index, inflate(`${this.prefix}frame${index}`).then(bytes => {
+        const r = new Reader(bytes), mesh = this.mesh(index), {vertex_fields, cell_fields} = this.meta;
+        const take = (ids, n) => r.columns(Uint16Array, ids.length, n);
+        return {
+          u: take(mesh.vertices, this.dim),
+          vertex: take(mesh.vertices, vertex_fields.length),
+          cell: take(mesh.cells, cell_fields.length)
+        };
+      }));
+    return this.decoded.get(index);
   }
 
-  decode(k) {
-    const chunk = this.chunks[k];
-    if (!chunk.promise) chunk.promise = inflate(`${this.prefix}chunk${k}`).then(bytes => this.unpack(chunk, bytes));
-    return chunk.promise;
-  }
-
-  // In parts between which the page can draw, unless a frame of the chunk is waited for.
-  async unpack(chunk, bytes) {
-    const r = new Reader(bytes), {vertex_fields: ofVertices, cell_fields: ofCells, counts} = this.meta;
-    const make = (n, size, byLine) => Array.from({length: n}, () => new Predictor(size, byLine));
-    const u = make(this.dim, counts.vertices, true), v = make(ofVertices.length, counts.vertices, false);
-    const c = make(ofCells.length, counts.cells, false);
-    const frames = [];
-    let start = performance.now();
-    for (let f = chunk.first; f < chunk.first + chunk.count; ++f) {
-      if (!chunk.isAwaited && performance.now() - start > 3) {
-        await new Promise(resolve => setTimeout(resolve));
-        start = performance.now();
-      }
-      const mesh = this.mesh(f);
-      const restore = (ids, rows) => predictor => {
-        const codes = r.codes(ids.length);
-        predictor.restore(ids, rows.birth, chunk.first, f, codes);
-        return codes;
-      };
-      frames.push({
-        u: u.map(restore(mesh.vertices, this.vertices)),
-        vertex: v.map(restore(mesh.vertices, this.vertices)),
-        cell: c.map(restore(mesh.cells, this.cells))
-      });
-    }
-    return frames;
-  }
-
-  // A frame's mesh, displacements by id of vertex [m], and values of fields.
   async frame(index) {
-    const k = this.chunkOf(index), chunk = this.chunks[k];
-    chunk.isAwaited = true;
-    const frames = await this.decode(k);
-    if (k + 1 < this.chunks.length) this.decode(k + 1);
-    return new Frame(this, index, frames[index - chunk.first], chunk);
+    const codes = await this.decode(index);
+    if (index + 1 < this.frames.length) this.decode(index + 1);
+    return new Frame(this, index, codes);
   }
 }
 
+// A frame's mesh, displacements by id of vertex [m], and values of fields.
 class Frame {
-  constructor(run, index, codes, chunk) {
-    Object.assign(this, {run, index, codes, mesh: run.mesh(index), ...run.frames[index]});
-    this.mesh = run.mesh(index);
+  constructor(run, index, codes) {
+    Object.assign(this, {run, index, codes, ...run.frames[index], mesh: run.mesh(index)});
     const n = run.meta.counts.vertices, ids = this.mesh.vertices;
     this.u = codes.u.map((column, k) => {
-      const out = new Float32Array(n), scale = (chunk.high[k] - chunk.low[k]) / 65535;
-      for (let i = 0; i < ids.length; ++i) out[ids[i]] = chunk.low[k] + scale * column[i];
+      const out = new Float32Array(n), low = this.low[k], scale = (this.high[k] - low) / 65535;
+      for (let i = 0; i < ids.length; ++i) out[ids[i]] = low + scale * column[i];
       return out;
     });
   }

@@ -276,13 +276,13 @@ function isSoftware() {
 
 class Painter {
   // Throws where there is no WebGL2.
-  constructor(canvas, colours) {
+  constructor(canvas) {
     const gl = this.gl = canvas.getContext('webgl2', {antialias: !isSoftware(), alpha: false, stencil: true});
     if (!gl) throw new Error('no WebGL2');
     this.programs = new Map();
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     const pixels = new Uint8Array(1024 * 4);
-    for (let i = 0; i < 1024; ++i) pixels.set([...colourAt(colours, i / 1023), 255], 4 * i);
+    for (let i = 0; i < 1024; ++i) pixels.set([...colourAt(i / 1023), 255], 4 * i);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 1024, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
     for (const [name, value] of [
              [gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE],
@@ -371,16 +371,21 @@ class Painter {
   }
 }
 
-function colourAt(colours, share) {
-  const at = Math.min(Math.max(share, 0), 1) * (colours.length - 1), k = Math.min(Math.floor(at), colours.length - 2);
-  return colours[k].map((c, i) => Math.round(c + (at - k) * (colours[k + 1][i] - c)));
+// From dark blue to yellow, as red, green, blue at equal distances (matplotlib's viridis, 9 of its colours).
+const COLOURS = [
+  [68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50],
+  [253, 231, 37]
+];
+
+function colourAt(share) {
+  const at = Math.min(Math.max(share, 0), 1) * (COLOURS.length - 1), k = Math.min(Math.floor(at), COLOURS.length - 2);
+  return COLOURS[k].map((c, i) => Math.round(c + (at - k) * (COLOURS[k + 1][i] - c)));
 }
 
 // Parallel projection: the eye at angles [degree] about y from z and above the plane; pixels a metre; what is at the middle.
 class Camera {
-  constructor(dim, azimuth, elevation) {
-    Object.assign(
-        this, {dim, azimuth: dim === 2 ? 0 : azimuth, elevation: dim === 2 ? 0 : elevation, zoom: 1, target: [0, 0, 0]});
+  constructor(dim) {
+    Object.assign(this, {dim, azimuth: dim === 2 ? 0 : 35, elevation: dim === 2 ? 0 : 20, zoom: 1, target: [0, 0, 0]});
   }
   axes() {
     const a = this.azimuth * Math.PI / 180, e = this.elevation * Math.PI / 180;

@@ -2,7 +2,7 @@
 # usage: cmake -D FOLDER=src/apps/report/page -D OUTPUT=FILE.cpp -P embed.cmake: the page's files as constants of C++.
 cmake_policy(VERSION 3.25)
 set(SCRIPTS data.js draw.js plots.js view.js study.js page.js)
-set(text "#include \"apps/report/assets.hpp\"\nnamespace itr::output::assets {\n")
+set(text "#include \"apps/report/assets.hpp\"\nnamespace itr::report::assets {\n")
 
 function(add_constant name)
   set(literals "")
@@ -23,4 +23,4 @@ endfunction()
 add_constant(page page.html)
 add_constant(style style.css)
 add_constant(script ${SCRIPTS})
-file(WRITE "${OUTPUT}" "${text}}  // namespace itr::output::assets\n")
+file(WRITE "${OUTPUT}" "${text}}  // namespace itr::report::assets\n")

@@ -54,10 +54,18 @@ function showPlots(run, onTime) {
   return plots;
 }
 
-// Says on the page that something failed; pictures stay.
-function stayWithPictures(error) {
+// Says on the page that something failed; plots stay.
+function stayWithPlots(error) {
   document.body.classList.remove('with-view');
-  document.getElementById('why').textContent = `Pictures only, as there is no 3D drawing here (${error.message}).`;
+  document.getElementById('why').textContent = `Plots only, as there is no 3D drawing here (${error.message}).`;
+}
+
+// Bounds of the rounding: displacements are 16-bit shares of their box, other values 16-bit logarithms.
+function errorOf(run) {
+  const size =
+      Math.max(...run.frames[0].low.map((_, k) => run.frames.reduce((m, f) => Math.max(m, f.high[k] - f.low[k]), 0)));
+  const u = shortNumber(size / 65535 / 2);
+  return `as stored within ${u} ${run.unit('m')} of displacements and 0.1 % of other values`;
 }
 
 async function openPage() {
@@ -65,7 +73,7 @@ async function openPage() {
   document.getElementById('said').textContent = describe(run);
   showCertificate(run.meta);
   document.getElementById('foot').textContent = [
-    ...run.meta.notes, `ITR ${run.meta.version}`, 'drag: turn, with shift: move; wheel: zoom',
+    ...run.meta.notes, errorOf(run), `ITR ${run.meta.version}`, 'drag: turn, with shift: move; wheel: zoom',
     'keys: space plays, comma and dot step, arrows turn, + and − zoom, f fits, e edits, l logarithmic'
   ].join(' · ');
   let view = null, pending = 0, shown = 0;
@@ -79,7 +87,7 @@ async function openPage() {
   showWarnings(run, onTime);
   report.plots = showPlots(run, onTime);
   try {
-    if (new URLSearchParams(location.search).has('pictures')) throw new Error('pictures asked for');
+    if (new URLSearchParams(location.search).has('plots')) throw new Error('plots asked for');
     const remember = () => {
       pending = 0;
       try {
@@ -102,11 +110,11 @@ async function openPage() {
   } catch (error) {
     view = report.view = null;
     document.getElementById('main').replaceChildren();
-    stayWithPictures(error);
+    stayWithPlots(error);
   }
   showTime();
   return report;
 }
 
 window.itrReport =
-    (document.getElementById('study') ? openStudy() : openPage()).catch(error => (stayWithPictures(error), {failed: error}));
+    (document.getElementById('study') ? openStudy() : openPage()).catch(error => (stayWithPlots(error), {failed: error}));

@@ -171,7 +171,7 @@ function commandOf(study, run) {
 
 async function openStudy() {
   const parse = id => JSON.parse(document.getElementById(id).textContent), study = parse('study'),
-        {runs: names, notes, colours} = parse('study-runs');
+        {runs: names, notes} = parse('study-runs');
   const said = document.getElementById('said'), main = document.getElementById('main'),
         plots = document.getElementById('plots'), foot = document.getElementById('foot');
   said.append(...withCode(`Speed against error: ${study.scene} · errors against ${study.reference}`));
@@ -239,7 +239,7 @@ async function openStudy() {
   }
 
   try {
-    if (new URLSearchParams(location.search).has('pictures')) throw new Error('pictures asked for');
+    if (new URLSearchParams(location.search).has('plots')) throw new Error('plots asked for');
     const loaded = new Map(), metas = names.map(name => parse(`run-${name}-meta`)), origin = metas[0].origin;
     const least = (key, pick) => origin.map((_, k) => pick(...metas.map(m => m[key][k]))), low = least('low', Math.min),
           high = least('high', Math.max);
@@ -253,8 +253,7 @@ async function openStudy() {
       Object.assign(run.meta, {origin, low, high});
       return run;
     };
-    const camera = new Camera(origin.length, metas[0].azimuth, metas[0].elevation),
-          slots = [0, 1].map(() => html('div', {className: 'slot'}));
+    const camera = new Camera(origin.length), slots = [0, 1].map(() => html('div', {className: 'slot'}));
     const selects = [0, 1].map(
         i => html(
             'select', {onchange: () => report.show(i, selects[i].value)},
@@ -311,7 +310,7 @@ async function openStudy() {
   } catch (error) {
     main.replaceChildren();
     document.body.classList.remove('with-study');
-    stayWithPictures(error);
+    stayWithPlots(error);
   }
   return report;
 }

@@ -36,7 +36,7 @@ class View {
       sharpness: 1,
       ready: Promise.resolve()
     });
-    this.camera = camera ?? new Camera(run.dim, run.meta.azimuth, run.meta.elevation);
+    this.camera = camera ?? new Camera(run.dim);
     this.state = {
       frame: run.frames.length - 1,
       field: 'elastic_density',
@@ -57,13 +57,13 @@ class View {
     this.low = relative(run.meta.low);
     this.high = relative(run.meta.high);
     this.home = {
-      ...new Camera(run.dim, run.meta.azimuth, run.meta.elevation),
+      ...new Camera(run.dim),
       target: this.low.map((l, k) => (l + this.high[k]) / 2)
     };
     if (!camera || !camera.isPlaced) Object.assign(this.camera, this.home, {isPlaced: true});
     this.found = {};  // ranges of what is computed here, by field
     this.build();
-    this.painter = new Painter(this.canvas, run.meta.colours);
+    this.painter = new Painter(this.canvas);
     this.bodies = new Triangles();
     this.buffer = this.painter.buffers();
     this.obstacles = new Triangles();
@@ -330,7 +330,7 @@ class View {
 
   // Pixels a metre: all of the bodies' way fits in.
   scale() {
-    const {right, up} = new Camera(this.dim, this.meta.azimuth, this.meta.elevation).axes(),
+    const {right, up} = new Camera(this.dim).axes(),
                   size = this.high.map((h, k) => h - this.low[k]);
     const extent = axis =>
         Math.max(size.reduce((sum, s, k) => sum + s * Math.abs(axis[k]), 0), 1e-12 * Math.hypot(...size), 1e-300);
@@ -433,7 +433,7 @@ class View {
           isExceeded = state.most === null && stored && high < stored.largest, shares = [1, 0.75, 0.5, 0.25, 0];
     const marks = marksOf(shares.map(at));
     if (isExceeded) marks[0] = '≥ ' + marks[0];
-    const stops = meta.colours.map(c => `rgb(${c})`).join(',');
+    const stops = COLOURS.map(c => `rgb(${c})`).join(',');
     this.legend.replaceChildren(
         html('b', {}, unit ? `${name} [${unit}]` : name),
         html('div', {className: 'bar', style: `background:linear-gradient(to top,${stops})`}),
@@ -518,7 +518,7 @@ class View {
       lines.push(`  vertices  ${run.cells.columns.slice(0, this.dim + 1).map(c => c[pick.cell]).join(' ')}`);
       show('cell', pick.cell);
       lines.push(`  there from step ${run.frames[birth[pick.cell]].step}${
-          death[pick.cell] < NEVER ? ` to ${run.frames[death[pick.cell] - 1].step}` : ''}`);
+          death[pick.cell] < run.frames.length ? ` to ${run.frames[death[pick.cell] - 1].step}` : ''}`);
     }
     this.pickText.textContent = lines.join('\n');
   }
