@@ -54,11 +54,11 @@ TEST(WarningList, CountsKinds) {
   list.add("step 2: off by 3.5 m");
   list.add("odd");
   EXPECT_EQ(list.count(), 3);
-  const Json summary = Json::parse("{" + list.summary_members() + "}");
+  const Json summary = Json(list.summary_members());
   EXPECT_EQ(summary["warning_count"], 3);
   EXPECT_EQ(summary["warnings"][0], (Json{{"text", "step 1: off by 2 m"}, {"count", 2}}));
-  EXPECT_EQ(Json::parse(list.take_new()).size(), 3u);
-  EXPECT_EQ(list.take_new(), "");
+  EXPECT_EQ(list.take_new().size(), 3u);
+  EXPECT_TRUE(list.take_new().empty());
 }
 
 TEST_F(WarningsTest, AreSaidCountedAndStored) {

@@ -7,6 +7,7 @@
 
 #include "frame_file.hpp"
 #include "itr/core/error.hpp"
+#include "report_json.hpp"
 
 namespace itr::output {
 
@@ -14,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 8;
+constexpr std::int64_t kFormat = 9;
+constexpr std::int64_t kFormatOfLists = 8;  ///< totals without names
 /// In SI units, where the frame is in others: of the vertices, and of the state.
 constexpr const char* kRest = "/checkpoint/rest";
 constexpr const char* kTime = "/checkpoint/t";
@@ -299,7 +301,7 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   write_memory(file, state.remesh_memory);
   write_strata(file, state.strata);
   write_factor(file, state.factor);
-  file.write("/checkpoint/totals", progress.totals, 0);
+  file.write_text("/checkpoint/totals", std::string(progress.totals));
   file.write_text("/checkpoint/scene", std::string(progress.scene));
   file.write_text("/checkpoint/backend", std::string(progress.backend));
   file.write_attribute("checkpoint_format", kFormat);
@@ -316,7 +318,8 @@ std::optional<SavedState> find_saved_state(const fs::path& directory, int before
       const hdf5::Session session;
       const hdf5::File file = hdf5::File::open(path);
       if (!file.contains("/checkpoint")) continue;
-      if (file.read_integer_attribute("checkpoint_format") != kFormat) continue;
+      const std::int64_t format = file.read_integer_attribute("checkpoint_format");
+      if (format != kFormat && format != kFormatOfLists) continue;
       return SavedState{path,
                         file.read_text("/checkpoint/scene"),
                         file.read_text("/checkpoint/backend"),
@@ -379,7 +382,9 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   } else {
     throw InputError({saved.file.string(), kTime, std::to_string(t.size()) + " numbers", "1"});
   }
-  checkpoint.totals = file.read_doubles("/checkpoint/totals").values;
+  checkpoint.totals = file.read_integer_attribute("checkpoint_format") == kFormatOfLists
+                          ? totals_of_list(file.read_doubles("/checkpoint/totals").values)
+                          : file.read_text("/checkpoint/totals");
   const std::int64_t log_bytes = file.read_integer_attribute("checkpoint_log_bytes");
   if (log_bytes < 0)
     throw InputError({saved.file.string(), "attribute checkpoint_log_bytes", std::to_string(log_bytes), "0 or more"});

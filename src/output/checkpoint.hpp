@@ -3,8 +3,7 @@
 // /mesh.
 #pragma once
 
-#include <span>
-#include <string>
+#include <string_view>
 
 #include "core/hdf5.hpp"
 #include "itr/core/units.hpp"
@@ -15,8 +14,8 @@ namespace itr::output {
 /// Counts and texts of a run when it saves a state.
 struct Progress {
   std::string_view scene, backend;  ///< what a resumed run has to have in common with the saved one
-  std::span<const double> totals;
-  std::size_t log_bytes;  ///< length of steps.jsonl, the line of this step included
+  std::string_view totals;          ///< of Totals::save
+  std::size_t log_bytes;            ///< length of steps.jsonl, the line of this step included
 };
 
 /// Adds to a frame that has /mesh of `state` already. All is in SI units, so where `units` are others rest positions and

@@ -3,187 +3,229 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
-#include <type_traits>
 
 #include "core/hdf5.hpp"
 #include "itr/core/error.hpp"
+#include "simulation/report_fields.hpp"
 #include "units.hpp"
 
 namespace itr::output {
 
-std::string json_string(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + '"';
-}
+std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 namespace {
 
-std::string number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
+constexpr const char* kGain = "energy_decrease_by_remeshing";
 
-std::string energy_json(const EnergyReport& e) {
-  const auto where_there = [](const char* name, double energy) {
-    return energy == 0 ? "" : fmt::format(R"("{}":{},)", name, number(energy));
-  };
-  return fmt::format(R"({{"inertia":{},"elastic":{},"body":{},"contact":{},"friction":{},{}{}"total":{}}})",
-                     number(e.inertia), number(e.elastic), number(e.body), number(e.contact), number(e.friction),
-                     where_there("damping", e.damping), where_there("host", e.host), number(e.total));
+Json to_json(int value) { return value; }
+
+/// Whole numbers have no point: readers may compare texts with those of earlier versions.
+Json to_json(double value) {
+  constexpr double kMostDigits = 1e16;
+  if (!std::isfinite(value)) return nullptr;
+  if (value == std::trunc(value) && std::abs(value) < kMostDigits) return static_cast<std::int64_t>(value);
+  return value;
 }
 
-std::string count_json(const OperationCount& count) {
-  std::string refused;
+Json to_json(const EnergyReport& energy) {
+  Json json;
+  for_each_field(kEnergyFields, [&](const auto& field) {
+    const double value = energy.*field.member;
+    const bool is_optional = field.member == &EnergyReport::damping || field.member == &EnergyReport::host;
+    if (value != 0 || !is_optional) json[field.name] = to_json(value);
+  });
+  return json;
+}
+
+Json to_json(const OperationCount& count) {
+  Json refused = Json::object();
   for (int i = 0; i < kRefusals; ++i)
-    if (count.refused[i] > 0)
-      refused += fmt::format(R"({}"{}":{})", refused.empty() ? "" : ",", name(static_cast<Refusal>(i)), count.refused[i]);
-  return fmt::format(R"({{"tried":{},"relaxed":{},"accepted":{},"refused":{{{}}}}})", count.tried, count.relaxed,
-                     count.accepted, refused);
+    if (count.refused[i] > 0) refused[std::string(name(static_cast<Refusal>(i)))] = count.refused[i];
+  return {{"tried", count.tried}, {"relaxed", count.relaxed}, {"accepted", count.accepted}, {"refused", refused}};
 }
 
-std::string seconds_json(const StepSeconds& s) {
-  const double parts = s.assembly + s.linear_solve + s.line_search + s.ccd + s.remesh + s.projection + s.output;
-  return fmt::format(
-      R"({{"assembly":{},"linear_solve":{},"line_search":{},"ccd":{},"remesh":{},"projection":{},"output":{},"rest":{},"total":{}}})",
-      number(s.assembly), number(s.linear_solve), number(s.line_search), number(s.ccd), number(s.remesh),
-      number(s.projection), number(s.output), number(s.total - parts), number(s.total));
+Json to_json(const StepSeconds& seconds) {
+  Json json;
+  double parts = 0;
+  for_each_field(kSecondsFields, [&](const auto& field) {
+    const double value = seconds.*field.member;
+    if (field.member == &StepSeconds::total) json["rest"] = to_json(value - parts);
+    json[field.name] = to_json(value);
+    parts += value;
+  });
+  return json;
 }
 
-std::string norms_json(const DisplacementNorms& n) {
-  return fmt::format(R"({{"l2":{},"h1":{},"h1_semi":{},"linf":{},"linf_grad":{},"lp":{}}})", number(n.l2), number(n.h1),
-                     number(n.h1_semi), number(n.linf), number(n.linf_grad), number(n.lp));
+/// The momentum that edits changed, of all bodies.
+Json to_json(const std::vector<MomentumChange>& changes) {
+  std::vector<double> sum(changes.front().linear.size());
+  for (const MomentumChange& change : changes)
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += change.linear[i];
+  Json json;
+  for (const double value : sum) json.push_back(to_json(value));
+  return json;
 }
 
-std::string versions_json() {
+template <typename Value>
+bool is_there(const Value&) {
+  return true;
+}
+bool is_there(const std::vector<MomentumChange>& changes) { return !changes.empty(); }
+
+/// Adds the fields of `report` that are shown there.
+void add_fields(const StepReport& report, unsigned shown, Json& json) {
+  for_each_field(kStepFields, [&](const auto& field) {
+    const auto& value = report.*field.member;
+    if ((field.shown & shown) && is_there(value)) json[field.name] = to_json(value);
+  });
+}
+
+Json to_json(const DisplacementNorms& n) {
+  return {{"l2", to_json(n.l2)},
+          {"h1", to_json(n.h1)},
+          {"h1_semi", to_json(n.h1_semi)},
+          {"linf", to_json(n.linf)},
+          {"linf_grad", to_json(n.linf_grad)},
+          {"lp", to_json(n.lp)}};
+}
+
+Json versions_json() {
   unsigned major = 0, minor = 0, release = 0;
   H5get_libversion(&major, &minor, &release);
-  return fmt::format(R"({{"itr":{},"compiler":{},"eigen":"{}.{}.{}","hdf5":"{}.{}.{}"}})", json_string(ITR_VERSION),
-                     json_string(__VERSION__), EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, major, minor,
-                     release);
-}
-
-/// The momentum that edits changed, of all bodies; empty where none did.
-std::string remeshing_json(const StepReport& r) {
-  if (r.remeshing.empty()) return "";
-  std::vector<double> sum(r.remeshing.front().linear.size());
-  for (const MomentumChange& change : r.remeshing)
-    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += change.linear[i];
-  std::string numbers;
-  for (const double value : sum) numbers += (numbers.empty() ? "" : ",") + number(value);
-  return fmt::format(R"("remeshing_momentum":[{}],)", numbers);
-}
-
-/// Members that a step's line and the summary share.
-std::string common_members(const StepReport& r) {
-  return fmt::format(
-      R"("vertices":{},"elements":{},"unknowns":{},"newton_iterations":{},"factorizations":{},"linear_solves":{},)"
-      R"("reused_factors":{},"linear_iterations":{},"energy":{},"energy_before_remesh":{},)"
-      R"("splits":{},"curves":{},"straightens":{},"collapses":{},"swaps":{},"smooths":{},"bound_by_dhat":{},"reverted_remeshes":{},)"
-      R"("min_distance":{},"min_volume_ratio":{},"history_loss":{},)"
-      R"("indefinite":{},"damped_steps":{},"refined_quadrature":{},"seconds":{},"processor_seconds":{},"peak_rss_mb":{})",
-      r.vertices, r.elements, r.unknowns, r.newton_iterations, r.factorizations, r.linear_solves, r.reused_factors,
-      r.linear_iterations, energy_json(r.energy), number(r.energy_before_remesh), count_json(r.splits), count_json(r.curves),
-      count_json(r.straightens), count_json(r.collapses), count_json(r.swaps), count_json(r.smooths), r.bound_by_dhat,
-      r.reverted_remeshes, number(r.min_distance), number(r.min_volume_ratio), number(r.history_loss), r.indefinite,
-      r.damped_steps, r.refined_quadrature, seconds_json(r.seconds), number(r.processor_seconds), number(r.peak_rss_mb));
+  return {{"itr", ITR_VERSION},
+          {"compiler", __VERSION__},
+          {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+          {"hdf5", fmt::format("{}.{}.{}", major, minor, release)}};
 }
 
 }  // namespace
 
-std::string step_json(const StepReport& report) {
-  return fmt::format(
-      R"({{"step":{},"t":{},"order":{},"cut_steps":{},{},{}"residual_worth":{},"split_tolerance":{},"best_refused_split":{},"trial_seconds":{}}})",
-      report.step, number(report.t), report.order, report.cut_steps, common_members(report), remeshing_json(report),
-      number(report.residual_worth), number(report.split_tolerance), number(report.best_refused_split),
-      number(report.trial_seconds));
+Json step_json(const StepReport& report) {
+  Json json;
+  add_fields(report, in_step, json);
+  return json;
 }
 
 void Totals::add(const StepReport& report) {
   const StepReport before = total_;
-  const bool is_first = before.vertices == 0;
   total_ = report;
-  total_.add_effort(before);
+  if (before.vertices > 0) add_up(total_, before);
   if (report.step > 0) gain_ += report.energy_before_remesh - report.energy.total - report.history_loss;
-  if (is_first) return;
-  total_.min_distance = std::min(before.min_distance, report.min_distance);
-  total_.min_volume_ratio = std::min(before.min_volume_ratio, report.min_volume_ratio);
-  total_.peak_rss_mb = std::max(before.peak_rss_mb, report.peak_rss_mb);
 }
 
 namespace {
 
-/// Calls `visit` with every number of a report, in a fixed order.
-template <typename Report, typename Visit>
-void for_each_number(Report& r, Visit&& visit) {
-  for (auto* n : {&r.step, &r.vertices, &r.elements, &r.unknowns, &r.newton_iterations, &r.factorizations, &r.linear_solves,
-                  &r.reused_factors, &r.linear_iterations, &r.indefinite, &r.bound_by_dhat, &r.reverted_remeshes,
-                  &r.damped_steps, &r.refined_quadrature, &r.cut_steps})
-    visit(*n);
-  for (auto* count : {&r.splits, &r.collapses, &r.swaps, &r.smooths}) {
-    visit(count->tried);
-    visit(count->relaxed);
-    visit(count->accepted);
-  }
-  auto& e = r.energy;
-  for (auto* x : {&e.inertia, &e.elastic, &e.body, &e.contact, &e.friction, &e.damping, &e.total}) visit(*x);
-  auto& s = r.seconds;
-  for (auto* x : {&s.assembly, &s.linear_solve, &s.line_search, &s.ccd, &s.remesh, &s.projection, &s.output, &s.total})
-    visit(*x);
-  for (auto* x : {&r.t, &r.energy_before_remesh, &r.history_loss, &r.min_distance, &r.min_volume_ratio, &r.processor_seconds,
-                  &r.peak_rss_mb})
-    visit(*x);
-  // Last: states that were saved before there were any do not have them.
-  for (auto* count : {&r.curves, &r.straightens}) {
-    visit(count->tried);
-    visit(count->relaxed);
-    visit(count->accepted);
-  }
-  for (auto* count : {&r.splits, &r.curves, &r.straightens, &r.collapses, &r.swaps, &r.smooths})
-    for (auto& refused : count->refused) visit(refused);
+void from_json(const Json& json, int& value) { value = json.get<int>(); }
+/// Only distances where nothing is near are not finite.
+void from_json(const Json& json, double& value) {
+  value = json.is_null() ? std::numeric_limits<double>::infinity() : json.get<double>();
+}
+void from_json(const Json& json, OperationCount& count) {
+  count.tried = json.at("tried").get<int>();
+  count.relaxed = json.at("relaxed").get<int>();
+  count.accepted = json.at("accepted").get<int>();
+  for (int i = 0; i < kRefusals; ++i)
+    count.refused[i] = json.at("refused").value(std::string(name(static_cast<Refusal>(i))), 0);
+}
+/// Members that `json` lacks keep their values.
+template <typename Fields, typename Whole>
+void read_fields(const Fields& fields, const Json& json, Whole& whole);
+void from_json(const Json& json, EnergyReport& energy) { read_fields(kEnergyFields, json, energy); }
+void from_json(const Json& json, StepSeconds& seconds) { read_fields(kSecondsFields, json, seconds); }
+/// Reads nothing: momentum by body is in no total.
+void from_json(const Json&, std::vector<MomentumChange>&) {}
+
+template <typename Fields, typename Whole>
+void read_fields(const Fields& fields, const Json& json, Whole& whole) {
+  for_each_field(fields, [&](const auto& field) {
+    if (const auto found = json.find(field.name); found != json.end()) from_json(*found, whole.*field.member);
+  });
 }
 
 }  // namespace
 
-std::vector<double> Totals::save() const {
-  std::vector<double> values = {gain_};
-  for_each_number(total_, [&](auto number) { values.push_back(static_cast<double>(number)); });
-  return values;
+std::string Totals::save() const {
+  Json json;
+  json[kGain] = to_json(gain_);
+  add_fields(total_, everywhere, json);
+  return text_of(json);
 }
 
-void Totals::restore(const std::vector<double>& values) {
-  const std::size_t expected = save().size();
-  const bool is_of_first_version = values.size() == expected - 6 - 6 * kRefusals;
-  if (values.size() != expected && !is_of_first_version)
-    throw InputError({"", "saved totals", std::to_string(values.size()) + " numbers", std::to_string(expected)});
-  gain_ = values[0];
-  std::size_t next = 1;
-  for_each_number(total_, [&](auto& number) {
-    if (next < values.size()) number = static_cast<std::remove_reference_t<decltype(number)>>(values[next++]);
-  });
+void Totals::restore(const std::string& saved) {
+  try {
+    const Json json = Json::parse(saved);
+    from_json(json.at(kGain), gain_);
+    read_fields(kStepFields, json, total_);
+  } catch (const Json::exception& error) {
+    throw InputError({"", "saved totals", error.what(), "fields of a report by name"});
+  }
+}
+
+std::string totals_of_list(std::span<const double> numbers) {
+  static constexpr const char* kScalars[] = {"energy_decrease_by_remeshing",
+                                             "step",
+                                             "vertices",
+                                             "elements",
+                                             "unknowns",
+                                             "newton_iterations",
+                                             "factorizations",
+                                             "linear_solves",
+                                             "reused_factors",
+                                             "linear_iterations",
+                                             "indefinite",
+                                             "bound_by_dhat",
+                                             "reverted_remeshes",
+                                             "damped_steps",
+                                             "refined_quadrature",
+                                             "cut_steps"};
+  static constexpr const char* kEnergies[] = {"inertia", "elastic", "body", "contact", "friction", "damping", "total"};
+  static constexpr const char* kSeconds[] = {"assembly", "linear_solve", "line_search", "ccd",
+                                             "remesh",   "projection",   "output",      "total"};
+  static constexpr const char* kLast[] = {
+      "t", "energy_before_remesh", "history_loss", "min_distance", "min_volume_ratio", "processor_seconds", "peak_rss_mb"};
+  static constexpr const char* kCounts[] = {"tried", "relaxed", "accepted"};
+  constexpr std::size_t kFirstLength = 16 + 4 * 3 + 7 + 8 + 7, kLength = kFirstLength + 6 + 6 * kRefusals;
+  if (numbers.size() != kFirstLength && numbers.size() != kLength)
+    throw InputError({"", "saved totals", std::to_string(numbers.size()) + " numbers", std::to_string(kLength)});
+  Json json;
+  std::size_t next = 0;
+  const auto take = [&] { return next < numbers.size() ? to_json(numbers[next++]) : Json(0); };
+  const auto take_counts = [&](std::initializer_list<const char*> operations) {
+    for (const char* operation : operations)
+      for (const char* count : kCounts) json[operation][count] = take();
+  };
+  for (const char* scalar : kScalars) json[scalar] = take();
+  take_counts({"splits", "collapses", "swaps", "smooths"});
+  for (const char* energy : kEnergies) json["energy"][energy] = take();
+  for (const char* part : kSeconds) json["seconds"][part] = take();
+  for (const char* scalar : kLast) json[scalar] = take();
+  take_counts({"curves", "straightens"});
+  for (const char* operation : {"splits", "curves", "straightens", "collapses", "swaps", "smooths"})
+    for (int i = 0; i < kRefusals; ++i) json[operation]["refused"][std::string(name(static_cast<Refusal>(i)))] = take();
+  return text_of(json);
 }
 
 std::string Totals::summary_json(const RunInfo& info, const Units& units, const std::string& outcome,
-                                 const std::string& solver, const DisplacementNorms& norms,
-                                 const std::string& members) const {
+                                 const std::string& solver, const DisplacementNorms& norms, const Json& members) const {
   const StepReport total = in_units(total_, units);
-  return fmt::format(
-      R"({{"scene":{},"outcome":{},"backend":{},"solver":{},"threads":{},"versions":{},"units":{{"length":{},"mass":{},"time":{}}},)"
-      R"("steps":{},"cut_steps":{},"t":{},{},"energy_decrease_by_remeshing":{},{},"norms":{}}})"
-      "\n",
-      json_string(info.scene), json_string(outcome), json_string(info.backend), json_string(solver), info.threads,
-      versions_json(), json_string(units.length()), json_string(units.mass()), json_string(units.time()), total.step,
-      total.cut_steps, number(total.t), common_members(total), number(units.from_si(gain_, "J")), members,
-      norms_json(in_units(norms, units)));
+  Json json{{"scene", info.scene},
+            {"outcome", outcome},
+            {"backend", info.backend},
+            {"solver", solver},
+            {"threads", info.threads},
+            {"versions", versions_json()},
+            {"units", {{"length", units.length()}, {"mass", units.mass()}, {"time", units.time()}}},
+            {"steps", total.step},
+            {"cut_steps", total.cut_steps},
+            {"t", to_json(total.t)}};
+  add_fields(total, in_summary, json);
+  json[kGain] = to_json(units.from_si(gain_, "J"));
+  json.update(members);
+  json["norms"] = to_json(in_units(norms, units));
+  return text_of(json) + "\n";
 }
 
 }  // namespace itr::output

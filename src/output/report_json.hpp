@@ -1,37 +1,44 @@
 // SPDX-License-Identifier: MIT
-// Reports as JSON text with the names that docs/theory.md, "Output" promises.
+// Reports as JSON with the names that docs/theory.md, "Output" promises.
 #pragma once
 
+#include <nlohmann/json.hpp>
+#include <span>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "itr/output/writer.hpp"
 
 namespace itr::output {
 
-std::string json_string(std::string_view text);
-/// One line of steps.jsonl, without the line end. Numbers read back with the same bits; what JSON cannot say is null.
-std::string step_json(const StepReport& report);
+using Json = nlohmann::ordered_json;
+/// The text of `json` in one line, without the line end. Bytes that are no UTF-8 become U+FFFD.
+std::string text_of(const Json& json);
+/// One line of steps.jsonl. Numbers read back with the same value; infinity and NaN, which JSON lacks, are null.
+Json step_json(const StepReport& report);
 
-/// Sums over a run; where a sum says nothing (energy, sizes), the last value; of minima, the least.
+/// Values over a run, by the rules of kStepFields.
 class Totals {
  public:
   void add(const StepReport& report);
   /// Sets the seconds of the whole run.
   void set_seconds(double total) { total_.seconds.total = total; }
   void add_output(double seconds) { total_.seconds.output += seconds; }
-  /// All of it as numbers, for a checkpoint, and back. Throws InputError for a wrong length.
-  std::vector<double> save() const;
-  void restore(const std::vector<double>& values);
+  /// Returns all of it by name as JSON text, for a checkpoint.
+  std::string save() const;
+  /// Takes back such a text. Throws InputError where it is not one.
+  void restore(const std::string& saved);
   const StepReport& report() const { return total_; }
-  /// The text of summary.json, in `units`; `members` are more of them.
+  /// Returns the text of summary.json, in `units`; `members` come before the norms.
   std::string summary_json(const RunInfo& info, const Units& units, const std::string& outcome, const std::string& solver,
-                           const DisplacementNorms& norms, const std::string& members) const;
+                           const DisplacementNorms& norms, const Json& members) const;
 
  private:
   StepReport total_;
   double gain_ = 0;  ///< by remeshing: sum of energy_before_remesh - total - history_loss [J]
 };
+
+/// Returns what Totals::save gives from the list of numbers of checkpoints of format 8. Throws InputError for a length that
+/// no version wrote.
+std::string totals_of_list(std::span<const double> numbers);
 
 }  // namespace itr::output

@@ -2,6 +2,9 @@
 #include "units.hpp"
 
 #include <cmath>
+#include <type_traits>
+
+#include "simulation/report_fields.hpp"
 
 namespace itr::output {
 
@@ -22,19 +25,17 @@ std::vector<ForceCurvePoint> in_units(std::vector<ForceCurvePoint> curves, const
 
 StepReport in_units(StepReport report, const Units& units) {
   if (units.is_si()) return report;
-  EnergyReport& e = report.energy;
-  const double energy = units.factor("J");
-  for (double* value : {&e.inertia, &e.elastic, &e.body, &e.contact, &e.friction, &e.damping, &e.total, &e.host,
-                        &report.energy_before_remesh, &report.history_loss, &report.split_tolerance,
-                        &report.best_refused_split, &report.residual_worth})
-    *value /= energy;
+  const auto convert = [&](auto& whole, const auto& field) {
+    auto& value = whole.*field.member;
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) value = units.from_si(value, field.unit);
+  };
+  for_each_field(kStepFields, [&](const auto& field) { convert(report, field); });
+  for_each_field(kEnergyFields, [&](const auto& field) { convert(report.energy, field); });
   const double momentum = units.factor("kg m/s"), angular = units.factor("kg m^2/s");
   for (MomentumChange& change : report.remeshing) {
     for (double& value : change.linear) value /= momentum;
     for (double& value : change.angular) value /= angular;
   }
-  report.t /= units.factor("s");
-  report.min_distance /= units.factor("m");
   return report;
 }
 

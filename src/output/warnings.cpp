@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "warnings.hpp"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <cctype>
 #include <fstream>
-#include <nlohmann/json.hpp>
-
-#include "report_json.hpp"
+#include <utility>
 
 namespace itr::output {
 
@@ -63,18 +58,12 @@ void WarningList::restore(const std::filesystem::path& log) {
   }
 }
 
-std::string WarningList::take_new() {
-  std::vector<std::string> strings;
-  for (const std::string& text : new_) strings.push_back(json_string(text));
-  new_.clear();
-  return strings.empty() ? std::string() : fmt::format("[{}]", fmt::join(strings, ","));
-}
+nlohmann::ordered_json WarningList::take_new() { return std::exchange(new_, {}); }
 
-std::string WarningList::summary_members() const {
-  std::string list;
-  for (const Kind& kind : kinds_)
-    list += fmt::format(R"({}{{"text":{},"count":{}}})", list.empty() ? "" : ",", json_string(kind.text), kind.count);
-  return fmt::format(R"("warning_count":{},"warnings":[{}])", count_, list);
+nlohmann::ordered_json WarningList::summary_members() const {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Kind& kind : kinds_) list.push_back({{"text", kind.text}, {"count", kind.count}});
+  return {{"warning_count", count_}, {"warnings", list}};
 }
 
 }  // namespace itr::output

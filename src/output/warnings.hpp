@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <string_view>
@@ -21,10 +22,10 @@ class WarningList {
   /// Restores the warnings in the lines of a steps.jsonl, into an empty list.
   void restore(const std::filesystem::path& log);
   int count() const { return count_; }
-  /// Takes the warnings since the last call, as a JSON list; empty: none.
-  std::string take_new();
-  /// `"warning_count":3,"warnings":[{"text":"the first of its kind","count":3}]`
-  std::string summary_members() const;
+  /// Takes the list of warnings that have come since the last call.
+  nlohmann::ordered_json take_new();
+  /// Returns `{"warning_count":3,"warnings":[{"text":"the first of its kind","count":3}]}`.
+  nlohmann::ordered_json summary_members() const;
 
  private:
   struct Kind {

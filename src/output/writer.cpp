@@ -111,7 +111,7 @@ struct Writer::Impl {
     if (checkpoint) {
       sync_frames();
       count_wall_time();
-      const std::vector<double> saved_totals = totals.save();
+      const std::string saved_totals = totals.save();
       const Progress progress{info.scene_identity, info.backend, saved_totals, steps.size()};
       const auto add = [&](hdf5::File& file) { write_checkpoint(file, *checkpoint, progress, options.units); };
       write_frame(directory / name, frame, step, t, Durability::power, add, options.units);
@@ -205,10 +205,9 @@ template <int Dim>
 void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const State<Dim>* checkpoint) {
   const std::size_t length = impl_->steps.size();
   const Units& units = impl_->options.units;
-  std::string line = step_json(in_units(report, units));
-  if (const std::string warnings = impl_->warnings.take_new(); !warnings.empty())
-    line.insert(line.size() - 1, ",\"warnings\":" + warnings);
-  impl_->steps.append(std::move(line));
+  Json line = step_json(in_units(report, units));
+  if (Json warnings = impl_->warnings.take_new(); !warnings.empty()) line["warnings"] = std::move(warnings);
+  impl_->steps.append(text_of(line));
   if (frame.asked && !frame.asked->curves.empty()) impl_->folder.claim(kForceFile);
   if (frame.asked) impl_->forces.add(report.step, units.from_si(report.t, "s"), in_units(frame.asked->curves, units));
   impl_->totals.add(report);

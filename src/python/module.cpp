@@ -15,6 +15,7 @@
 #include "itr/core/parallel.hpp"
 #include "itr/itr.hpp"
 #include "itr/output/writer.hpp"
+#include "simulation/report_fields.hpp"
 
 namespace py = pybind11;
 
@@ -90,22 +91,24 @@ void with_values(const Doubles& values, int nodal_axes, const char* name, int co
 
 std::string json(const py::handle& value) { return py::module_::import("json").attr("dumps")(value).cast<std::string>(); }
 
-py::dict energies(const itr::EnergyReport& e) {
-  using namespace py::literals;
-  return py::dict("inertia"_a = e.inertia, "elastic"_a = e.elastic, "body"_a = e.body, "contact"_a = e.contact,
-                  "friction"_a = e.friction, "damping"_a = e.damping, "host"_a = e.host, "total"_a = e.total);
+py::object to_python(int value) { return py::int_(value); }
+py::object to_python(double value) { return py::float_(value); }
+py::object to_python(const itr::OperationCount& count) { return py::int_(count.accepted); }
+py::object to_python(const itr::StepSeconds& seconds) { return py::float_(seconds.total); }
+py::object to_python(const itr::EnergyReport& energy) {
+  py::dict result;
+  itr::for_each_field(itr::kEnergyFields, [&](const auto& field) { result[field.name] = to_python(energy.*field.member); });
+  return result;
 }
+/// No program is shown these.
+py::object to_python(const std::vector<itr::MomentumChange>&) { return py::none(); }
 
-py::dict describe(const itr::StepReport& r) {
-  using namespace py::literals;
-  return py::dict("step"_a = r.step, "t"_a = r.t, "vertices"_a = r.vertices, "elements"_a = r.elements,
-                  "unknowns"_a = r.unknowns, "newton_iterations"_a = r.newton_iterations,
-                  "linear_solves"_a = r.linear_solves, "factorizations"_a = r.factorizations, "splits"_a = r.splits.accepted,
-                  "curves"_a = r.curves.accepted, "straightens"_a = r.straightens.accepted,
-                  "collapses"_a = r.collapses.accepted, "swaps"_a = r.swaps.accepted, "smooths"_a = r.smooths.accepted,
-                  "order"_a = r.order, "cut_steps"_a = r.cut_steps, "history_loss"_a = r.history_loss,
-                  "min_distance"_a = r.min_distance, "min_volume_ratio"_a = r.min_volume_ratio,
-                  "seconds"_a = r.seconds.total, "energy"_a = energies(r.energy));
+py::dict describe(const itr::StepReport& report) {
+  py::dict result;
+  itr::for_each_field(itr::kStepFields, [&](const auto& field) {
+    if (field.shown & itr::in_program) result[field.name] = to_python(report.*field.member);
+  });
+  return result;
 }
 
 /// Listeners of Python's are called under its lock, which a step does not hold.

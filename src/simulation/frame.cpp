@@ -2,6 +2,9 @@
 #include "itr/simulation/frame.hpp"
 
 #include <algorithm>
+#include <type_traits>
+
+#include "report_fields.hpp"
 
 namespace itr {
 
@@ -18,38 +21,37 @@ void add_changes(const std::vector<MomentumChange>& changes, double factor, std:
 }
 
 StepSeconds& StepSeconds::operator+=(const StepSeconds& other) {
-  assembly += other.assembly;
-  linear_solve += other.linear_solve;
-  line_search += other.line_search;
-  ccd += other.ccd;
-  remesh += other.remesh;
-  projection += other.projection;
-  output += other.output;
-  total += other.total;
+  for_each_field(kSecondsFields, [&](const auto& field) { this->*field.member += other.*field.member; });
   return *this;
 }
 
+namespace {
+
+template <typename Value>
+void add(const Value& before, Value& sum) {
+  sum += before;
+}
+void add(const std::vector<MomentumChange>& before, std::vector<MomentumChange>& sum) { add_changes(before, 1, sum); }
+
+}  // namespace
+
 void StepReport::add_effort(const StepReport& before) {
-  newton_iterations += before.newton_iterations;
-  linear_solves += before.linear_solves;
-  factorizations += before.factorizations;
-  reused_factors += before.reused_factors;
-  linear_iterations += before.linear_iterations;
-  indefinite += before.indefinite;
-  splits += before.splits;
-  curves += before.curves;
-  straightens += before.straightens;
-  collapses += before.collapses;
-  swaps += before.swaps;
-  smooths += before.smooths;
-  history_loss += before.history_loss;
-  add_changes(before.remeshing, 1, remeshing);
-  bound_by_dhat += before.bound_by_dhat;
-  reverted_remeshes += before.reverted_remeshes;
-  cut_steps += before.cut_steps;
-  damped_steps += before.damped_steps;
-  seconds += before.seconds;
-  processor_seconds += before.processor_seconds;
+  for_each_field(kStepFields, [&](const auto& field) {
+    if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(this->*field.member)>, EnergyReport>)
+      if (field.add_up == AddUp::sum) add(before.*field.member, this->*field.member);
+  });
+}
+
+void add_up(StepReport& report, const StepReport& before) {
+  report.add_effort(before);
+  for_each_field(kStepFields, [&](const auto& field) {
+    const auto& old = before.*field.member;
+    auto& value = report.*field.member;
+    if constexpr (std::is_arithmetic_v<std::remove_cvref_t<decltype(old)>>) {
+      if (field.add_up == AddUp::least) value = std::min(old, value);
+      if (field.add_up == AddUp::most) value = std::max(old, value);
+    }
+  });
 }
 
 void StepReport::forget_operations() {

@@ -32,8 +32,8 @@ std::optional<SavedState> find_saved_state(const std::filesystem::path& director
 template <int Dim>
 struct Checkpoint {
   State<Dim> state;
-  std::vector<double> totals;  ///< of the output so far, see Totals
-  std::size_t log_bytes = 0;   ///< length of steps.jsonl then
+  std::string totals;         ///< of the output so far, JSON text
+  std::size_t log_bytes = 0;  ///< length of steps.jsonl then
 };
 
 /// Throws InputError where the file is unreadable, inconsistent, or not as it was written.

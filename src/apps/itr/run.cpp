@@ -108,8 +108,7 @@ std::string describe_refusals(const OperationCount& count, const char* name) {
 }
 
 /// Says how much remeshing did, and where it did nothing why.
-std::string describe_remeshing(const StepReport& totals, const Units& units, int vertices_before, double split_tolerance,
-                               double best_refused) {
+std::string describe_remeshing(const StepReport& totals, const Units& units, int vertices_before) {
   const auto count = [](const OperationCount& c, const char* name) {
     return c.tried > 0 ? fmt::format(", {} of {} {}", c.accepted, c.tried, name) : std::string();
   };
@@ -132,13 +131,13 @@ std::string describe_remeshing(const StepReport& totals, const Units& units, int
   };
   if (!was_refused(totals.splits) && was_refused(totals.curves))  // splits are not enabled
     return done + "; accepted nothing; a smaller /space/remesh/curve/acceptance_tolerance curves more edges";
-  if (totals.splits.tried == 0 && best_refused == 0)
+  if (totals.splits.tried == 0 && totals.best_refused_split == 0)
     return done + fmt::format("; accepted nothing, because no body ever stored the {} that a split has to gain{}",
-                              units.text(split_tolerance, "J", 2), bound);
+                              units.text(totals.split_tolerance, "J", 2), bound);
   return done + fmt::format(
                     "; accepted nothing, because no split promised more than {} and it has to gain {}{}; "
                     "a smaller /space/remesh/split/acceptance_tolerance refines more",
-                    units.text(best_refused, "J", 2), units.text(split_tolerance, "J", 2), bound);
+                    units.text(totals.best_refused_split, "J", 2), units.text(totals.split_tolerance, "J", 2), bound);
 }
 
 std::string describe_solves(const StepReport& totals) {
@@ -288,8 +287,7 @@ class Run {
   void tell_remeshing() const {
     const Setup<Dim>& setup = simulation_.setup();
     if (setup.remesh.enabled)
-      fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.units, setup.mesh.num_vertices(), split_tolerance_,
-                                            best_refused_));
+      fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.units, setup.mesh.num_vertices()));
   }
   void count_warnings() const {
     if (const int count = writer_->warnings(); count > 0)
@@ -392,8 +390,6 @@ class Run {
                            units.text(simulation_.state().t + simulation_.setup().time.dt, "s", 6), result.reason);
       }
       write(result.report);
-      best_refused_ = std::max(best_refused_, result.report.best_refused_split);
-      split_tolerance_ = result.report.split_tolerance;
       ++steps_done_;
       show_progress(result.report, units, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
@@ -430,10 +426,9 @@ class Run {
   double output_seconds_ = 0;
   double start_ = seconds_now();
   int steps_done_ = 0;
-  double best_refused_ = 0, split_tolerance_ = 0;  ///< over the steps since start or --resume; of the last step [J]
-  bool is_saved_ = false;                          ///< whether the present state is
-  std::mutex output_;                              ///< of the writer and of what is below
-  Snapshot<Dim> before_;                           ///< the state that the step begins with
+  bool is_saved_ = false;  ///< whether the present state is
+  std::mutex output_;      ///< of the writer and of what is below
+  Snapshot<Dim> before_;   ///< the state that the step begins with
 };
 
 }  // namespace
