@@ -163,11 +163,9 @@ struct Simulation<Dim>::Impl {
       auto larger = with_room(*start, {end.history.x[0]}, kAtEnd);
       if (!larger) break;
       start = std::move(larger);
-      StepReport effort = result.report;
-      effort.forget_operations();  // of a mesh that is dropped
-      effort.damped_steps = 0;
+      StepReport dropped = std::move(result.report);
       result = take(*start);
-      result.report.add_effort(effort);
+      add_dropped(std::move(dropped), result.report);
     }
     return result;
   }
@@ -302,8 +300,8 @@ StepResult Simulation<Dim>::adapt(double dt) {
     State<Dim> end;
     const auto start = std::make_shared<State<Dim>>();
     const typename Impl::FlatsOfState flats(*impl_);
-    StepResult adapted = impl_->step_with_room(
-        end, [&](const State<Dim>& now) { return take_step(impl_->tools(), now, end, false, start.get()); });
+    StepResult adapted =
+        impl_->step_with_room(end, [&](const State<Dim>& now) { return take_step(impl_->tools(), now, end, start.get()); });
     if (!adapted.ok || adapted.renumbering.empty()) return adapted;
     before = impl_->change_to(start);
     ++impl_->mesh_revision;
@@ -329,8 +327,7 @@ StepResult Simulation<Dim>::advance() {
     const typename Impl::Inside inside(*impl_, Phase::in_step);
     auto end = std::make_shared<State<Dim>>();
     const typename Impl::FlatsOfState flats(*impl_);
-    result =
-        impl_->step_with_room(*end, [&](const State<Dim>& now) { return take_step_in_parts(impl_->tools(), now, *end); });
+    result = impl_->step_with_room(*end, [&](const State<Dim>& now) { return take_step(impl_->tools(), now, *end); });
     if (!result.ok) return result;
     before = impl_->change_to(std::move(end));
   }

@@ -109,57 +109,140 @@ class EffortClock {
   double start_ = seconds_now(), processor_start_ = processor_seconds_now();
 };
 
-/// A step by one integrator: that of the setup or, `damped`, implicit Euler.
+/// A step by one integrator from one state.
 template <int Dim>
-class StepAttempt {
+class StepSolver {
  public:
-  StepAttempt(const StepTools<Dim>& tools, const State<Dim>& before, bool damped)
-      : tools_(tools), setup_(tools.setup), before_(before), next_(before), guard_(tools.setup, before) {
+  /// The first solve starts at `x_start`; empty: at the positions before.
+  StepSolver(const StepTools<Dim>& tools, const State<Dim>& before, StepMethod method, const VectorX& x_start)
+      : tools_(tools), setup_(tools.setup), before_(before), next_(before), x_(x_start), guard_(tools.setup, before) {
     next_.step = before.step + 1;
     next_.t = setup_.time.time_after(next_.step);
-    next_.history.damp_next = damped;
+    next_.history.damp_next = method == StepMethod::implicit_euler;
     report_.step = next_.step;
     report_.t = next_.t;
     report_.order = TimeIntegrator(setup_.time).accuracy(next_.history);
   }
 
-  /// On success `after` is the state after the step, and `start` (unless null) that before it, on its mesh. The first solve
-  /// starts at `x_start`; empty: at the positions before.
-  StepResult run(State<Dim>& after, State<Dim>* start, const VectorX& x_start) {
-    x_ = x_start.size() > 0 ? x_start : next_.history.x[0];
-    {
-      const ScopedTimer timer(report_.seconds.linear_solve);
-      tools_.solver.restore(before_.factor);
-    }
-    if (x_start.size() > 0) settle_chords();
-    NewtonSummary summary = solve_between_chords(expected());
-    if (!summary.converged()) {
-      // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
-      const bool is_stuck = summary.termination == Termination::no_descent ||
-                            summary.termination == Termination::iterations || summary.termination == Termination::infeasible;
-      if (is_stuck && setup_.remesh.enabled) nearly_inverted_ = find_nearly_inverted(next_, x_);
-      return failed(summary);
-    }
-    if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
+  /// Solves, remeshes and solves again. If it has failed by its mesh, another call goes on from the first solve.
+  std::optional<StepFailure> solve(Remeshing remeshing) {
+    if (first_)
+      go_back_to_first_solve();
+    else if (auto failure = solve_first())
+      return failure;
     if (setup_.remesh.enabled) {
-      if (const auto cancelled = remesh()) return failed(*cancelled);
+      if (auto failure = remesh(remeshing)) return failure;
+      first_.reset();
       if (const auto cancelled = let_buckle()) return failed(*cancelled);
       if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();  // as it ends
     }
     if (setup_.newton.is_cancelled()) {
-      summary.termination = Termination::cancelled;
-      return failed(summary);
+      first_summary_.termination = Termination::cancelled;
+      return failed(first_summary_);
     }
     ITR_AUDIT(find_violation(setup_, next_, x_).empty(), find_violation(setup_, next_, x_));
-    return finish(after, start);
+    return std::nullopt;
   }
 
-  /// Whether EnergyGuard was the one that ended it.
-  bool creates_energy() const { return creates_energy_; }
-  /// If the first solve found no step: cells whose curved edges may be why, by the numbers of the state before.
-  const std::vector<CellId>& nearly_inverted_cells() const { return nearly_inverted_; }
+  /// Once solve() has led to a step, `after` is the state after it, and `start` (unless null) that before it, on its mesh.
+  StepResult finish(State<Dim>& after, State<Dim>* start) {
+    StepResult result;
+    next_.created_energy = guard_.created_energy();
+    {
+      const ScopedTimer timer(report_.seconds.assembly);
+      if (!setup_.remesh.enabled || !renumbering_.empty()) report_.energy = problem_->report(x_);
+      if (!setup_.remesh.enabled) report_.energy_before_remesh = report_.energy.total;
+      report_.vertices = next_.mesh.num_vertices();
+      report_.elements = next_.mesh.num_cells();
+      report_.unknowns = problem_->dofs().num_unknowns;
+      report_.min_distance = problem_->min_distance(x_);
+      report_.min_volume_ratio = min_volume_ratio(problem_->cells(), x_);
+      if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
+    }
+    next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
+    next_.factor = tools_.solver.record();
+    next_.stiffness = problem_->stiffness();
+    next_.quadrature = problem_->quadrature_levels();
+    report_.refined_quadrature = static_cast<int>(
+        std::count_if(next_.quadrature.begin(), next_.quadrature.end(), [](int level) { return level > 0; }));
+    if (start) {
+      *start = next_;
+      start->step = before_.step;
+      start->t = before_.t;
+      start->stiffness = before_.stiffness;
+      if (renumbering_.empty()) start->quadrature = before_.quadrature;  // else that of the new cells
+      start->created_energy = before_.created_energy;
+      start->stored_energy = before_.stored_energy;
+      start->history.damp_next = before_.history.damp_next;
+      if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
+    }
+    if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
+    const VectorX increment = problem_->increment_of(x_);
+    TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
+    next_.chords = lowered_chords<Dim>(setup_, next_.mesh, next_.space, next_.chords, next_.history.x);
+    after = std::move(next_);  // before_ may be the same, and is not needed any more
+    clock_.tell(report_);
+    report_.peak_rss_mb = peak_rss_mb();
+    result.report = report_;
+    result.renumbering = std::move(renumbering_);
+    return result;
+  }
+
+  /// Ends a step that has failed.
+  StepResult drop(const StepFailure& failure) {
+    clock_.tell(report_);
+    StepResult result{.ok = false, .reason = failure.reason, .report = report_, .forces = {}, .renumbering = {}};
+    result.cancelled = failure.kind == StepFailure::Kind::cancelled;
+    return result;
+  }
 
  private:
+  /// The solution on the mesh before the step.
+  struct Solution {
+    State<Dim> state;
+    VectorX x;
+    std::unique_ptr<StepProblem<Dim>> problem;
+  };
+
+  std::optional<StepFailure> solve_first() {
+    {
+      const ScopedTimer timer(report_.seconds.linear_solve);
+      tools_.solver.restore(before_.factor);
+    }
+    if (x_.size() > 0)
+      settle_chords();
+    else
+      x_ = next_.history.x[0];
+    first_summary_ = solve_between_chords(expected());
+    if (!first_summary_.converged()) {
+      // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
+      const bool is_stuck = first_summary_.termination == Termination::no_descent ||
+                            first_summary_.termination == Termination::iterations ||
+                            first_summary_.termination == Termination::infeasible;
+      StepFailure failure = failed(first_summary_);
+      if (is_stuck && setup_.remesh.enabled) failure.nearly_inverted = find_nearly_inverted(next_, x_);
+      return failure;
+    }
+    if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
+    if (!setup_.remesh.enabled) return std::nullopt;
+    {
+      const ScopedTimer timer(report_.seconds.assembly);
+      report_.energy = problem_->report(x_);
+      report_.energy_before_remesh = report_.energy.total;
+    }
+    next_.stiffness = problem_->stiffness();
+    next_.quadrature = problem_->quadrature_levels();
+    first_.emplace(next_, x_, std::move(problem_));
+    return std::nullopt;
+  }
+
+  void go_back_to_first_solve() {
+    next_ = first_->state;
+    x_ = first_->x;
+    report_.forget_operations();
+    renumbering_ = {};
+  }
+
   void make_problem() {
     const ScopedTimer timer(report_.seconds.assembly);
     problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.space, next_.history, next_.t, tools_.cache,
@@ -259,46 +342,28 @@ class StepAttempt {
     return summary;
   }
 
-  /// Remeshes, carries the history over and solves again; where that fails, without new curved edges; where that fails too,
-  /// the mesh stays as it was. The second solve, if it was cancelled.
-  std::optional<NewtonSummary> remesh() {
-    {
-      const ScopedTimer timer(report_.seconds.assembly);
-      report_.energy = problem_->report(x_);
-      report_.energy_before_remesh = report_.energy.total;
-    }
-    next_.stiffness = problem_->stiffness();
-    next_.quadrature = problem_->quadrature_levels();
-    const State<Dim> unchanged = next_;
-    const VectorX solution = x_;
-    auto problem_before = std::move(problem_);
-    const auto undo = [&] {
-      next_ = unchanged;
-      x_ = solution;
-      report_.forget_operations();
-      renumbering_ = {};
-    };
-    for (bool may_curve = setup_.remesh.curve.enabled;; may_curve = false) {
-      auto renumbering = remesh_and_project(tools_, *problem_before, unchanged, next_, x_, report_, may_curve);
-      if (!renumbering) break;
-      renumbering_ = std::move(*renumbering);
-      settle_chords();
-      const NewtonSummary summary = solve_between_chords();
-      if (summary.termination == Termination::cancelled) return summary;
-      const std::string failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
-      if (failure.empty()) return std::nullopt;
-      const bool was_curved = report_.curves.accepted > 0;
-      undo();
-      if (was_curved) {
-        warn("remeshed again without curving edges, the remeshed step failed: " + failure);
-        continue;
-      }
-      warn("keeping the mesh as it was, the remeshed step failed: " + failure);
+  /// Remeshes after the first solve, carries the history over and solves again.
+  std::optional<StepFailure> remesh(Remeshing remeshing) {
+    std::optional<MeshRenumbering> renumbering;
+    if (remeshing == Remeshing::none)
       ++report_.reverted_remeshes;
-      break;
+    else
+      renumbering = remesh_and_project(tools_, *first_->problem, first_->state, next_, x_, report_,
+                                       remeshing == Remeshing::with_new_curves);
+    if (!renumbering) {
+      problem_ = std::move(first_->problem);
+      return std::nullopt;
     }
-    problem_ = std::move(problem_before);
-    return std::nullopt;
+    renumbering_ = std::move(*renumbering);
+    settle_chords();
+    const NewtonSummary summary = solve_between_chords();
+    if (summary.termination == Termination::cancelled) return failed(summary);
+    std::string reason = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
+    if (reason.empty()) return std::nullopt;
+    return StepFailure{.kind = StepFailure::Kind::remeshed_unsolved,
+                       .reason = std::move(reason),
+                       .nearly_inverted = {},
+                       .has_new_curves = report_.curves.accepted > 0};
   }
 
   /// Whether edges become curved where straight ones keep up what would buckle.
@@ -344,61 +409,14 @@ class StepAttempt {
     return std::nullopt;
   }
 
-  StepResult finish(State<Dim>& after, State<Dim>* start) {
-    StepResult result;
-    next_.created_energy = guard_.created_energy();
-    {
-      const ScopedTimer timer(report_.seconds.assembly);
-      if (!setup_.remesh.enabled || !renumbering_.empty()) report_.energy = problem_->report(x_);
-      if (!setup_.remesh.enabled) report_.energy_before_remesh = report_.energy.total;
-      report_.vertices = next_.mesh.num_vertices();
-      report_.elements = next_.mesh.num_cells();
-      report_.unknowns = problem_->dofs().num_unknowns;
-      report_.min_distance = problem_->min_distance(x_);
-      report_.min_volume_ratio = min_volume_ratio(problem_->cells(), x_);
-      if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
-    }
-    next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
-    next_.factor = tools_.solver.record();
-    next_.stiffness = problem_->stiffness();
-    next_.quadrature = problem_->quadrature_levels();
-    report_.refined_quadrature = static_cast<int>(
-        std::count_if(next_.quadrature.begin(), next_.quadrature.end(), [](int level) { return level > 0; }));
-    if (start) {
-      *start = next_;
-      start->step = before_.step;
-      start->t = before_.t;
-      start->stiffness = before_.stiffness;
-      if (renumbering_.empty()) start->quadrature = before_.quadrature;  // else that of the new cells
-      start->created_energy = before_.created_energy;
-      start->stored_energy = before_.stored_energy;
-      start->history.damp_next = before_.history.damp_next;
-      if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
-    }
-    if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
-    const VectorX increment = problem_->increment_of(x_);
-    TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
-    next_.chords = lowered_chords<Dim>(setup_, next_.mesh, next_.space, next_.chords, next_.history.x);
-    after = std::move(next_);  // before_ may be the same, and is not needed any more
-    clock_.tell(report_);
-    report_.peak_rss_mb = peak_rss_mb();
-    result.report = report_;
-    result.renumbering = std::move(renumbering_);
-    return result;
+  static StepFailure failed(const NewtonSummary& summary) {
+    const bool is_cancelled = summary.termination == Termination::cancelled;
+    return {.kind = is_cancelled ? StepFailure::Kind::cancelled : StepFailure::Kind::unsolved,
+            .reason = reason_of(summary),
+            .nearly_inverted = {}};
   }
-
-  StepResult failed(const NewtonSummary& summary) {
-    StepResult result = failed(reason_of(summary));
-    result.cancelled = summary.termination == Termination::cancelled;
-    return result;
-  }
-  StepResult failed(std::string reason) {
-    clock_.tell(report_);
-    return {.ok = false, .reason = std::move(reason), .report = report_, .forces = {}, .renumbering = {}};
-  }
-  StepResult forbidden() {
-    creates_energy_ = true;
-    return failed("it would create energy");
+  static StepFailure forbidden() {
+    return {.kind = StepFailure::Kind::creates_energy, .reason = "it would create energy", .nearly_inverted = {}};
   }
 
   void warn(const std::string& what) const { tools_.logger.warning(fmt::format("step {}: {}", next_.step, what)); }
@@ -407,79 +425,115 @@ class StepAttempt {
   const StepSetup<Dim>& setup_;
   const State<Dim>& before_;
   State<Dim> next_;
-  VectorX x_;  ///< the solution, on next_.mesh
+  VectorX x_;  ///< the solution, on next_.mesh; before the first solve its start
   std::unique_ptr<StepProblem<Dim>> problem_;
   EnergyGuard<Dim> guard_;
   MeshRenumbering renumbering_;
   StepReport report_;
-  bool creates_energy_ = false;
-  std::vector<CellId> nearly_inverted_;
+  NewtonSummary first_summary_;
+  std::optional<Solution> first_;  ///< while remeshing may still be taken back
   EffortClock clock_{tools_.solver};
 };
 
-/// By the setup's integrator, or by implicit Euler where that would create energy. `nearly_inverted`: if the first solve
-/// found no step, cells whose curved edges may be why.
+/// The state that attempts start from, where that is not the one before the step.
 template <int Dim>
-StepResult take_step_on_mesh(const StepTools<Dim>& tools, const State<Dim>& before, const VectorX& x_start,
-                             State<Dim>& after, bool damped, State<Dim>* start, std::vector<CellId>& nearly_inverted) {
-  StepAttempt<Dim> attempt(tools, before, damped);
-  StepResult result = attempt.run(after, start, x_start);
-  nearly_inverted = attempt.nearly_inverted_cells();
-  if (!attempt.creates_energy()) return result;
-  tools.logger.warning(
-      fmt::format("step {}: Newmark would create energy here, implicit Euler takes this step", result.report.step));
-  StepReport effort = result.report;
-  effort.forget_operations();
-  StepAttempt<Dim> with_euler(tools, before, true);
-  result = with_euler.run(after, start, x_start);
-  nearly_inverted = with_euler.nearly_inverted_cells();
-  result.report.add_effort(effort);
-  result.report.damped_steps = 1;
-  return result;
+struct StartOfStep {
+  Straightening straightening = Straightening::none;
+  State<Dim> state;
+  VectorX x;
+  StepReport effort;
+  std::optional<MeshRenumbering> renumbering;  ///< empty: no edge could become straight
+};
+
+/// Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
+template <int Dim>
+StartOfStep<Dim> straighten(const StepTools<Dim>& tools, Straightening where, const StepFailure& failure,
+                            const State<Dim>& before) {
+  constexpr double kLeastVolume = 0.2;  // see straighten_cells
+  std::vector<CellId> cells = failure.nearly_inverted;
+  if (where != Straightening::around_failure) {
+    cells.resize(before.mesh.cell_slots());
+    std::iota(cells.begin(), cells.end(), 0);
+  }
+  StartOfStep<Dim> from;
+  from.straightening = where;
+  const EffortClock clock(tools.solver);
+  from.renumbering = straighten_and_project<Dim>(tools, cells, where == Straightening::at_any_volume ? 0 : kLeastVolume,
+                                                 before, from.state, from.x, from.effort);
+  clock.tell(from.effort);
+  if (from.renumbering)
+    tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", before.step + 1,
+                                     before.space.num_curved() - from.state.space.num_curved(), failure.reason));
+  return from;
+}
+
+/// Says that the step is taken by `next`. Straightening and cuts say so themselves: they tell more.
+void tell(const Attempt& next, const StepFailure& failure, int step, const Logger& logger) {
+  std::string what = "Newmark would create energy here, implicit Euler takes this step";
+  if (failure.kind == StepFailure::Kind::remeshed_unsolved)
+    what = (next.remeshing == Remeshing::none ? "keeping the mesh as it was" : "remeshed again without curving edges") +
+           (", the remeshed step failed: " + failure.reason);
+  else if (failure.kind != StepFailure::Kind::creates_energy)
+    return;
+  logger.warning(fmt::format("step {}: {}", step, what));
 }
 
 }  // namespace
 
+void add_dropped(StepReport dropped, StepReport& report) {
+  dropped.forget_operations();
+  dropped.damped_steps = 0;
+  report.add_effort(dropped);
+}
+
 template <int Dim>
-StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped,
-                     State<Dim>* start) {
-  constexpr int kMostRetries = 3;
-  constexpr double kLeastVolume = 0.2;  ///< see straighten_cells; the last retry takes what it gets
-  std::vector<CellId> nearly_inverted;
-  StepResult result = take_step_on_mesh(tools, before, VectorX(), after, damped, start, nearly_inverted);
-  // Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
-  std::optional<MeshRenumbering> renumbering;
-  for (int retry = 0; retry < kMostRetries && !result.ok && !nearly_inverted.empty(); ++retry) {
-    result.report.forget_operations();  // the state that they led to is gone
-    if (retry > 0) {                    // what is around those cells has not helped
-      nearly_inverted.resize(before.mesh.cell_slots());
-      std::iota(nearly_inverted.begin(), nearly_inverted.end(), 0);
+StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start,
+                     Attempt attempt) {
+  const StepLadder ladder{.most_halvings = start ? 0 : tools.setup.time.step_cuts};
+  StartOfStep<Dim> from;
+  std::optional<StepSolver<Dim>> solver;
+  StepFailure failure;
+  StepResult failed;  // of the last attempt, with the effort of all before it
+  for (;;) {
+    if (attempt.straightening != from.straightening) {
+      add_dropped(from.effort, failed.report);
+      from = straighten(tools, attempt.straightening, failure, before);
     }
-    State<Dim> straightened;
-    VectorX x;
-    StepReport effort;
-    const EffortClock clock(tools.solver);
-    const double least_volume = retry + 1 < kMostRetries ? kLeastVolume : 0;
-    renumbering = straighten_and_project<Dim>(tools, nearly_inverted, least_volume, before, straightened, x, effort);
-    clock.tell(effort);
-    result.report.add_effort(effort);
-    if (!renumbering) continue;  // nothing could become straight: the next retry asks for less
-    tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", result.report.step,
-                                     before.space.num_curved() - straightened.space.num_curved(), result.reason));
-    effort = result.report;
-    result = take_step_on_mesh(tools, straightened, x, after, damped, start, nearly_inverted);
-    result.report.add_effort(effort);
+    if (from.straightening != Straightening::none && !from.renumbering) {
+      failure.kind = StepFailure::Kind::nothing_straightened;
+    } else {
+      if (!solver) solver.emplace(tools, from.renumbering ? from.state : before, attempt.method, from.x);
+      auto now = solver->solve(attempt.remeshing);
+      if (!now) break;
+      failure = std::move(*now);
+    }
+    const std::optional<Attempt> next = ladder.next(attempt, failure);
+    if (next) tell(*next, failure, before.step + 1, tools.logger);
+    if (solver && failure.kind != StepFailure::Kind::remeshed_unsolved) {
+      StepResult dropped = solver->drop(failure);
+      add_dropped(std::move(failed.report), dropped.report);
+      failed = std::move(dropped);
+      solver.reset();
+    }
+    if (!next || next->halvings > attempt.halvings) {
+      add_dropped(std::move(from.effort), failed.report);
+      failed.report.forget_operations();
+      return next ? take_step_in_halves(tools, before, after, *next, std::move(failed)) : failed;
+    }
+    attempt = *next;
   }
-  if (!result.ok)
-    result.report.forget_operations();  // the state that they led to is gone
-  else if (renumbering)
-    result.renumbering = result.renumbering.empty() ? std::move(*renumbering) : compose(*renumbering, result.renumbering);
+  StepResult result = solver->finish(after, start);
+  result.report.add_effort(from.effort);
+  add_dropped(std::move(failed.report), result.report);
+  if (attempt.method == StepMethod::implicit_euler && attempt.halvings == 0) result.report.damped_steps = 1;
+  if (auto& first = from.renumbering)
+    result.renumbering = result.renumbering.empty() ? std::move(*first) : compose(*first, result.renumbering);
   return result;
 }
 
 #define ITR_INSTANTIATE(Dim)                                \
   template EdgeLengths edge_lengths<Dim>(const Mesh<Dim>&); \
-  template StepResult take_step<Dim>(const StepTools<Dim>&, const State<Dim>&, State<Dim>&, bool, State<Dim>*);
+  template StepResult take_step<Dim>(const StepTools<Dim>&, const State<Dim>&, State<Dim>&, State<Dim>*, Attempt);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -3,6 +3,7 @@
 
 #include "itr/core/log.hpp"
 #include "itr/simulation/simulation.hpp"
+#include "simulation/step_ladder.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -24,15 +25,20 @@ struct StepTools {
   const Logger& logger;
 };
 
-/// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again.
-/// From `before` to `after`, which may be the same and on failure is left as it was. `damped`: Newmark leaves the step to
-/// implicit Euler. `start`, if there is one, gets the state before the step as it is on the mesh at the end of it.
+/// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again. If
+/// that fails, StepLadder says how the step is taken next, from `attempt` down. From `before` to `after`, which may be the
+/// same and on failure is left as it was. `start`, if there is one, gets the state before the step as it is on the mesh at
+/// the end of it; such a step is not cut.
 template <int Dim>
-StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped = false,
-                     State<Dim>* start = nullptr);
+StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start = nullptr,
+                     Attempt attempt = {});
 
-/// Takes a step; one whose solve fails is cut into smaller ones, as TimeOptions::step_cuts allows and the logger is told.
+/// Takes the step whose attempts have ended with `failed` as two of half the length; `attempt` is the first for each of them.
 template <int Dim>
-StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped = false);
+StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after,
+                               const Attempt& attempt, StepResult failed);
+
+/// Adds the effort of an attempt whose state is dropped: its operations led nowhere.
+void add_dropped(StepReport dropped, StepReport& report);
 
 }  // namespace itr

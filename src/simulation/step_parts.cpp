@@ -20,7 +20,6 @@ StepSetup<Dim> halved(const StepSetup<Dim>& setup, const State<Dim>& state) {
   half.time.first_step = 0;
   half.time.dt = setup.time.dt / 2;
   half.time.steps = 2;
-  --half.time.step_cuts;
   if (half.time.integrator == Integrator::bdf) half.time.integrator = Integrator::implicit_euler;
   if (half.newton.norm == NewtonNorm::euclidean && !half.time.is_static) {  // tolerances go with the step
     half.newton.step_tolerance /= 2;
@@ -86,24 +85,23 @@ NodalForces mean_forces(const StepSetup<Dim>& setup, const NodalForces& first, c
 }  // namespace
 
 template <int Dim>
-StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, bool damped) {
+StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after,
+                               const Attempt& attempt, StepResult failed) {
   const StepSetup<Dim>& setup = tools.setup;
-  StepResult whole = take_step(tools, before, after, damped);
-  if (whole.ok || whole.cancelled || setup.time.step_cuts == 0) return whole;
   const StepSetup<Dim> half = halved(setup, before);
   const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.cache, tools.solver, tools.logger};
-  tools.logger.warning("the step to t = " + setup.units.text(whole.report.t, "s", 6) + " failed (" + whole.reason +
+  tools.logger.warning("the step to t = " + setup.units.text(failed.report.t, "s", 6) + " failed (" + failed.reason +
                        "), cutting it into two of " + setup.units.text(half.time.dt, "s", 6));
   State<Dim> part = before;
   part.step = 0;
   if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);
-  StepReport effort = whole.report;
+  StepReport effort = std::move(failed.report);
   NodalForces forces;
   State<Dim> middle;
   MeshRenumbering renumbering;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
-    StepResult result = take_step_in_parts(tools_of_half, part, part, true);
+    StepResult result = take_step<Dim>(tools_of_half, part, part, nullptr, attempt);
     parts += std::max(1, result.report.cut_steps);
     result.report.add_effort(effort);
     if (!result.ok) return result;
@@ -113,7 +111,7 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& bef
     if (!result.renumbering.empty())
       renumbering = renumbering.empty() ? std::move(result.renumbering) : compose(renumbering, result.renumbering);
   }
-  whole = {.reason = {}, .report = effort, .forces = std::move(forces), .renumbering = std::move(renumbering)};
+  StepResult whole{.reason = {}, .report = effort, .forces = std::move(forces), .renumbering = std::move(renumbering)};
   whole.report.cut_steps = parts;
   whole.report.step = part.step = before.step + 1;
   whole.report.t = part.t = setup.time.time_after(part.step);
@@ -121,7 +119,7 @@ StepResult take_step_in_parts(const StepTools<Dim>& tools, const State<Dim>& bef
   return whole;
 }
 
-template StepResult take_step_in_parts<2>(const StepTools<2>&, const State<2>&, State<2>&, bool);
-template StepResult take_step_in_parts<3>(const StepTools<3>&, const State<3>&, State<3>&, bool);
+template StepResult take_step_in_halves<2>(const StepTools<2>&, const State<2>&, State<2>&, const Attempt&, StepResult);
+template StepResult take_step_in_halves<3>(const StepTools<3>&, const State<3>&, State<3>&, const Attempt&, StepResult);
 
 }  // namespace itr
