@@ -53,7 +53,7 @@ TEST(WarningList, CountsKinds) {
   list.add("step 2: off by 3.5 m");
   list.add("odd");
   EXPECT_EQ(list.count(), 3);
-  const Json summary = Json::parse("{" + list.summary_members() + "}");
+  const Json summary = Json::parse(std::string("{").append(list.summary_members()).append("}"));
   EXPECT_EQ(summary["warning_count"], 3);
   EXPECT_EQ(summary["warnings"][0], (Json{{"text", "step 1: off by 2 m"}, {"count", 2}}));
   EXPECT_EQ(Json::parse(list.take_new()).size(), 3u);
@@ -81,8 +81,9 @@ TEST_F(WarningsTest, SmallerTolerancesGiveNoLargerErrors) {
     ASSERT_EQ(said.status, 0) << said.text;
     const double error = std::abs(force() / reference - 1);
     EXPECT_LE(error, larger + 2e-3) << tolerance;
+    // Each run warns once that only contact holds the bodies.
     if (error > 0.02) {
-      EXPECT_GT(summary()["warning_count"], 0) << tolerance << said.text;
+      EXPECT_GT(summary()["warning_count"], 1) << tolerance << said.text;
     }
     // Where remeshing starves, about 5 % are the mesh's whatever the tolerance, and errors do not compare.
     larger = error > kStarved ? 1e300 : error;
