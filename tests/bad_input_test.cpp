@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a program hands in wrongly gets the same error through C++ and C as through Python: tests/bad_input.txt.
+// What a program hands in wrongly gets the same error through C++ and C as through Python: the cases "api" of
+// texts.txt.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -137,7 +138,7 @@ void bad_stiffness(size_t, const double*, const double*, double, itr_block_recei
   add(to, 1, &vertex, block);
 }
 
-/// One a line of tests/bad_input.txt.
+/// One for each case "api" of texts.txt.
 std::map<std::string, Says> all_cases() {
   const std::vector<double> nans = with_nan(32), pressures = with_nan(16), wall = with_nan(4);
   const std::array facet{0, 16}, inner{0, 5}, edge{0, 2};
@@ -238,11 +239,12 @@ std::map<std::string, Says> all_cases() {
 
 TEST(BadInput, GetsTheErrorOfTheTableInCppAndC) {
   auto cases = all_cases();
-  std::ifstream table(std::string(ITR_SOURCE_DIR) + "/tests/bad_input.txt");
-  for (std::string line; std::getline(table, line);) {
-    if (line.starts_with('#')) continue;
-    const auto colon = line.find(": ");
-    const std::string key = line.substr(0, colon), expected = line.substr(colon + 2);
+  std::ifstream table(std::string(ITR_SOURCE_DIR) + "/tests/texts.txt");
+  const std::string head = "== api: ";
+  for (std::string line, expected; std::getline(table, line);) {
+    if (!line.starts_with(head)) continue;
+    const std::string key = line.substr(head.size());
+    std::getline(table, expected);
     ASSERT_TRUE(cases.contains(key)) << key;
     EXPECT_EQ(cases[key].cpp, expected) << key;
     EXPECT_EQ(cases[key].c, expected) << key;

@@ -59,7 +59,7 @@ TEST(StepLadder, ChoosesTheNextAttemptByTheFailure) {
       {{0, of_setup, kAll, with_new_curves}, kInverted, Attempt{0, of_setup, kLast, with_new_curves}},
       {{0, of_setup, kLast, with_new_curves}, kNotStraight, half},
       {{0, of_setup, kLast, with_new_curves}, kInverted, half},
-      // Of a part: by implicit Euler from the top, and straightening stays with it.
+      // A part begins with implicit Euler from the top, and keeps its straightening.
       {half, kCancelled, fails},
       {half, kUnsolved, quarter},
       {half, kInverted, Attempt{1, implicit_euler, kAround, with_new_curves}},

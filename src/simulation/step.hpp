@@ -33,7 +33,8 @@ template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start = nullptr,
                      Attempt attempt = {});
 
-/// Takes the step whose attempts have ended with `failed` as two of half the length; `attempt` is the first for each of them.
+/// Takes the step whose attempts have ended with `failed` as two of half the length; `attempt` is the first for each of
+/// them.
 template <int Dim>
 StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after,
                                const Attempt& attempt, StepResult failed);

@@ -178,7 +178,8 @@ int dispatch(int argc, char** argv) {
   report_command->add_option("--every", report_options.every, "takes each so many-th of the stored frames")
       ->check(CLI::PositiveNumber);
   report_command
-      ->add_option("--max-mb", report_options.max_mb, "of the file (default: 30): takes every 2nd, 4th, ... frame if it were larger")
+      ->add_option("--max-mb", report_options.max_mb,
+                   "of the file (default: 30): takes every 2nd, 4th, ... frame if it were larger")
       ->check(CLI::PositiveNumber);
   auto* curves = app.add_subcommand("forces", "completes forces.csv from the frames of a run with /output/forces");
   curves->add_option("directory", directory, "result folder")->required();
