@@ -249,7 +249,7 @@ TEST_F(CertifyTest, FindsACurvedEdgeInAFacetThatNeighboursBothOfItsOwn) {
   const Space space({{0, 1}});
   Solid solid;
   solid.mesh =
-      Mesh<3>({{-1, 0, 1}, {1, 0, 1}, {0, 1, 0}, {0, -1, 0}, {-1, 0, -1}, {1, 0, -1}}, {{0, 1, 2, 3}, {4, 5, 3, 2}}, {1, 1});
+      Mesh<3>({{-1, 0, 1}, {1, 0, 1}, {0, 1, 0}, {0, -1, 0}, {-1, 0, -1}, {1, 0, -1}}, {{1, 0, 2, 3}, {4, 5, 2, 3}}, {1, 1});
   solid.obstacle_x.clear();
   solid.obstacle_edges.clear();
   solid.obstacle_triangles.clear();
