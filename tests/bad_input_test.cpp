@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a program hands in wrongly gets the same error through C++ and C as through Python: the cases "api" of
+// Wrong input of a program gets the same error through C++ and C as through Python: the cases "api" of
 // texts.txt.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What libraries behind the solvers do by themselves: threads that nobody asked for, kernels for another CPU.
+// Libraries behind the solvers act by themselves: threads that nobody asked for, kernels for another CPU.
 #include <gtest/gtest.h>
 
 #include <unistd.h>

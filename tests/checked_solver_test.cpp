@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What every solver gets around its engine: analyses that are not repeated, refinement and its count of iterations.
+// Checks around every solver's engine: analyses that are not repeated, refinement and its count of iterations.
 #include <gtest/gtest.h>
 
 #include "itr/linear/engine.hpp"

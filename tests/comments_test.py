@@ -11,6 +11,7 @@ FOLDERS = ("src", "include", "backends", "tests", "verification", "examples")
 ENDINGS = {".hpp", ".cpp", ".h", ".c", ".js", ".py"}
 POINTING = re.compile(r"(What|Whoever|That|Those|The same|One of|It|Of)\b")
 WHOLE_LINE = re.compile(r"\s*(?:///|//|#)\s?(.*)")
+LICENCE = re.compile(r"!|SPDX-")  # lines above a file's own comment
 AFTER_CODE = re.compile(r".*[;,{)}]\s+///?<?\s+(.*)")
 
 
@@ -20,13 +21,14 @@ def pointing_comments(text):
     for number, line in enumerate(text.splitlines(), start=1):
         whole = WHOLE_LINE.fullmatch(line)
         begins = whole if whole and not in_comment else AFTER_CODE.fullmatch(line) if not whole else None
-        in_comment = whole is not None
+        in_comment = whole is not None and not LICENCE.match(whole[1])
         if begins and POINTING.match(begins[1]):
             yield number, begins[1]
 
 
 def check_rule():
-    bad = ["/// Of the mesh.\nint a;", "int a;  ///< Of the mesh", "# What is left\n", "  // The same in place.\n"]
+    bad = ["/// Of the mesh.\nint a;", "int a;  ///< Of the mesh", "# What is left\n", "  // The same in place.\n",
+           "// SPDX-License-Identifier: MIT\n// What a file has.\n"]
     good = ["/// Size of the mesh.\n/// Of all, the first.\nint a;", "int a;  ///< of the mesh", "#include <Of>\n", "x = 1  # Often\n",
             "/// Itself a node.\n"]
     for text in bad:

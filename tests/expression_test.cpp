@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What scenes write instead of numbers: expressions, and interpolations in time.
+// Values that scenes write instead of numbers: expressions, and interpolations in time.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -582,5 +582,21 @@ TEST(Predicates, AreExact) {
   EXPECT_FALSE(segment_intersects_triangle({0.2, 0.2, 0.1}, {0.2, 0.2, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
 }
 
+/// Damaged frames have degenerate triangles and edges.
+TEST(Predicates, TakeTrianglesForSegmentsAndSegmentsForPoints) {
+  const Vec<3> a(0, 0, 0), b(2, 0, 0), middle(1, 0, 0), above(1, 0, 1), below(1, 0, -1), beside(3, 0, 1), out(3, 0, -1);
+  for (const auto& corners : {std::array{a, b, middle}, std::array{a, b, b}, std::array{b, a, a}}) {
+    const auto& [p, q, r] = corners;
+    EXPECT_TRUE(segment_intersects_triangle(above, below, p, q, r));
+    EXPECT_FALSE(segment_intersects_triangle(beside, out, p, q, r));
+    EXPECT_TRUE(segment_intersects_triangle(middle, middle, p, q, r));
+    EXPECT_FALSE(segment_intersects_triangle(above, above, p, q, r));
+  }
+  EXPECT_TRUE(segment_intersects_triangle(above, below, middle, middle, middle));
+  EXPECT_FALSE(segment_intersects_triangle(beside, out, middle, middle, middle));
+  EXPECT_TRUE(segment_intersects_triangle(middle, middle, a, b, {1, 2, 0}));
+  EXPECT_FALSE(segment_intersects_triangle(above, above, a, b, {1, 2, 0}));
+}
+
 }  // namespace
 }  // namespace itr

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What becomes of a history when the mesh is coarsened: momentum, prescribed components, and bodies far away stay.
+// History on a mesh that is coarsened: momentum, prescribed components, and bodies far away stay.
 #include <gtest/gtest.h>
 
 #include <random>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a program is told of a changed mesh, over 10^4 edits of random meshes in batches.
+// Changes of the mesh as a program is told of them, over 10^4 edits of random meshes in batches.
 #include <gtest/gtest.h>
 
 #include <set>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `itr run` leaves in a folder (docs/theory.md, "Output").
+// Files that `itr run` leaves in a folder (docs/theory.md, "Output").
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <malloc.h>

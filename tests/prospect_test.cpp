@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What splits can gain at most.
+// Bounds of the gains of splits.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the table of keys says of a scene is true: pages are current, every key has a type, defaults are those of the reader.
+// The table of keys is true: pages are current, every key has a type, defaults are those of the reader.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What decides about an edit uses its memory again: a warm bound or trial asks for none. Counted in malloc itself, which
+// Decisions about edits use their memory again: a warm bound or trial asks for none. Counted in malloc itself, which
 // operator new and Eigen come down to.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What decides about edits: bounds, the memory of refusals, the gate, and where it finds the surface.
+// Decisions about edits: bounds, the memory of refusals, the gate, and where it finds the surface.
 #include <gtest/gtest.h>
 
 #include <numeric>

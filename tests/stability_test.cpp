@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What remeshing does where nothing is to be gained: it leaves homogeneous states alone, unless they are stable only because
+// Remeshing where nothing is to be gained: it leaves homogeneous states alone, unless they are stable only because
 // elements are too stiff.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a study says of its runs, of rows made up for it: when it has to say nothing, and that its table and sentences agree.
+// Answers of a study to rows made up for it: when it has to say nothing, and that its table and sentences agree.
 #include "apps/study/answers.hpp"
 
 #include <gtest/gtest.h>

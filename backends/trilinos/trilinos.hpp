@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the engines over Kokkos share: its start, its one lock, its way to say that memory is out. And the module's rows.
+// Common part of the engines over Kokkos: its start, its one lock, its way to say that memory is out. And the module's rows.
 #pragma once
 
 #include <cstring>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What this process has used.
+// Resources that this process has used.
 #pragma once
 
 namespace itr {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is inside of closed surfaces, decided exactly: rays along the last axis, whose start is moved by an infinitesimal so
+// Points inside of closed surfaces, decided exactly: rays along the last axis, whose start is moved by an infinitesimal so
 // that they meet no edge and no vertex.
 #pragma once
 

@@ -10,6 +10,12 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 Kernel::Point_2 point(const Vec<2>& p) { return {p[0], p[1]}; }
 Kernel::Point_3 point(const Vec<3>& p) { return {p[0], p[1], p[2]}; }
+
+/// Decides for points, too, which CGAL's test of segments does not take.
+bool meet(const Kernel::Segment_3& s, const Kernel::Segment_3& t) {
+  if (s.is_degenerate()) return t.is_degenerate() ? s.source() == t.source() : t.has_on(s.source());
+  return t.is_degenerate() ? s.has_on(t.source()) : CGAL::do_intersect(s, t);
+}
 }  // namespace
 
 int orientation(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c) {
@@ -38,7 +44,12 @@ bool triangle_contains(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c, const 
 }
 
 bool segment_intersects_triangle(const Vec<3>& p, const Vec<3>& q, const Vec<3>& a, const Vec<3>& b, const Vec<3>& c) {
-  return CGAL::do_intersect(Kernel::Segment_3(point(p), point(q)), Kernel::Triangle_3(point(a), point(b), point(c)));
+  const Kernel::Segment_3 segment(point(p), point(q));
+  const Kernel::Triangle_3 triangle(point(a), point(b), point(c));
+  if (triangle.is_degenerate())
+    return meet(segment, {triangle[0], triangle[1]}) || meet(segment, {triangle[1], triangle[2]}) ||
+           meet(segment, {triangle[2], triangle[0]});
+  return segment.is_degenerate() ? triangle.has_on(segment.source()) : CGAL::do_intersect(segment, triangle);
 }
 
 }  // namespace itr

@@ -36,8 +36,8 @@ Kind kind_of(const fs::path& folder) {
   if (!saved) throw InputError({(folder / "frames").string(), "", "no frame", "frames of a run"});
   const Json scene = Json::parse(saved->scene, nullptr, false);
   if (!scene.is_object()) throw InputError({saved->file.string(), "/checkpoint/scene", "no JSON object", "a scene"});
-  if (!scene.contains("time")) return {true, false};
-  const Json& time = scene["time"];
+  const Json time = scene.value("time", Json());
+  if (time.is_null()) return {true, false};
   return {false, !(time.is_object() && time.value("quasistatic", false))};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is written, in the units of a scene.
+// Reports and forces in the units of a scene, as they are written.
 #pragma once
 
 #include <span>

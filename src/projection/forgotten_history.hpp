@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an edit of the mesh forgets of the predictor, for the trial that decides about the edit (docs/theory.md, "The rules",
+// History that an edit of the mesh forgets, for the trial that decides about the edit (docs/theory.md, "The rules",
 // rule b).
 #pragma once
 

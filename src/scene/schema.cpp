@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the table of keys says to others: a JSON Schema, and the page docs/scenes.md.
+// Writes the table of keys for readers outside: a JSON Schema, and the page docs/scenes.md.
 #include <algorithm>
 #include <cctype>
 

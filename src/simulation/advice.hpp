@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is legal in a setup but looks like a mistake, and what will happen, in words.
+// Advice on setups that are legal but look like mistakes, and on their effects, in words.
 #pragma once
 
 #include <string>

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What happens when a step fails. The ladder has these rungs, from the first attempt down:
+// Ladder of attempts of a step that fails. Its rungs, from the first attempt down:
 //
-// 1. By the setup's integrator, from the state as it is, remeshed with new curved edges if the scene allows them.
-// 2. If the remeshed step fails, the first solve stays, and the step is remeshed again without new curved edges (only if
-// there
-//    were some), then not at all.
+// 1. The setup's integrator takes the step from the state as it is, remeshed with new curved edges if the scene allows them.
+// 2. If the remeshed step fails, the first solve stays. The step is remeshed again without new curved edges, if it had some,
+//    then not at all.
 // 3. If Newmark's method would create energy, implicit Euler takes the step, remeshed as in 1.
 // 4. If cells with curved edges may have stopped the first solve, edges are made straight in the state before the step, and
 //    the step begins again at 1: around these cells, then everywhere, then everywhere at any volume of the new cells.

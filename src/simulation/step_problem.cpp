@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/step_problem.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -11,26 +9,17 @@
 #include <optional>
 #include <utility>
 
-#include "core/timer.hpp"
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
-#include "flight_guard.hpp"
-#include "held_turn.hpp"
 #include "itr/core/error.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
-#include "lagging_rounds.hpp"
-#include "newton/corrected_system.hpp"
+#include "lagged_solve.hpp"
 #include "newton/curvature.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr std::size_t kLongestCycle = 16;       ///< rounds that are remembered
-constexpr int kPressureRounds = 50;             ///< most, where pressure has no potential
-constexpr double kLoadsWorthSaying = 1e-2;      ///< of what loads may be off: less is not said
-constexpr double kFrictionWorthSaying = 1e-2;   ///< of friction's forces: less is not said
-constexpr int kPatience = 30;                   ///< rounds without a smaller residual after which lagging will not converge
 constexpr double kEnergyResolution = 1e-14;     ///< of moduli times volume
 constexpr double kVolumeRatioTolerance = 1e-3;  ///< relative, of the bound that is reported
 
@@ -116,26 +105,9 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   potential_.contact()->set_stiffness(stiffness_.value);
 }
 
-/// x with held dofs at their targets, where the straight way there is free.
 template <int Dim>
-VectorX StepProblem<Dim>::start_of_solve(const VectorX& x) {
-  const VectorX start = with_held_at_targets(x);
-  const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
-                    (cells_.curved_elements.empty() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
-                    potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
-  return free ? start : x;
-}
-
-/// `summary` with the reason of a failure.
-template <int Dim>
-NewtonSummary StepProblem<Dim>::explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
-  if (summary.converged()) return summary;
-  const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
-  if (const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target); !turn.empty())
-    summary.message = turn + "; " + summary.message;
-  summary.message += diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
-                                    sum, x, workspace_);
-  return summary;
+NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
+  return LaggedSolve<Dim>(*this).solve(x, lagged_x, expected);
 }
 
 template <int Dim>
@@ -145,316 +117,10 @@ std::string StepProblem<Dim>::describe_effort(const NewtonSummary& summary) {
                                    rounds_, workspace_);
 }
 
-/// One solve with `lagged_`, which `ends_at(x)`, if given, ends at an iterate. Adaptive stiffness balances the terms before
-/// held dofs move: so it is in the regression values of peers' scenes.
-template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start,
-                                                const std::function<bool(const VectorX& x)>& ends_at) {
-  const EnergySum sum = potential_.sum(lagged_);
-  if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
-  NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
-                      .on_iteration = setup_.on_iteration,
-                      .must_be_minimum = !terms_.has_inertia};
-  if (way_to_start.size() > 0) {
-    extras.gradient_of_way = VectorX::Zero(x.size());
-    potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
-    extras.way_to_start = std::move(way_to_start);
-  }
-  if (!cells_.curved_elements.empty()) {
-    potential_.elastic()->refine_quadrature(x);
-    extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
-  }
-  if (!adaptive_) return minimize_from(x, sum, std::move(extras), ends_at);
-  initialize_stiffness(x);
-  x = start_of_solve(x);
-  bool is_first = true;
-  extras.after_step = [&](const VectorX& d) {
-    const VectorX iterate = base_ + d;
-    const bool refined = potential_.elastic()->refine_quadrature(iterate);
-    if (std::exchange(is_first, false) || setup_.time.is_static) return refined;
-    const bool changed = adaptive_->update(surface_.positions(iterate), stiffness_, workspace_);
-    if (changed) potential_.contact()->set_stiffness(stiffness_.value);
-    return changed || refined;
-  };
-  return minimize_from(x, sum, std::move(extras), ends_at);
-}
-
-/// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will hold
-/// them, and slide off before the next round unless friction is lagged where contact forces are new: here it is lagged
-/// again as often as those on a body double or halve on the way.
-template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_first(VectorX& x, VectorX way_to_start) {
-  constexpr int kMostLags = 200;
-  constexpr double kChange = 2;
-  NewtonSummary all;
-  const auto is_near = [](double a, double b) { return a <= kChange * b && b <= kChange * a; };
-  for (int lags = least_motion_ && potential_.has_friction() ? kMostLags : 0;; --lags) {
-    bool is_outdated = false;
-    std::function<bool(const VectorX&)> ends_at;
-    if (lags > 0)
-      ends_at = [&, lagged = contact_forces_on_loose_parts(x)](const VectorX& iterate) {
-        const std::vector<double> now = contact_forces_on_loose_parts(iterate);
-        return is_outdated = !std::equal(now.begin(), now.end(), lagged.begin(), is_near);
-      };
-    NewtonSummary summary = minimize_lagged(x, std::exchange(way_to_start, {}), ends_at);
-    summary.add_effort(all);
-    all = std::move(summary);
-    if (!is_outdated) return all;
-    lagged_.friction = potential_.lag_friction(x, workspace_);
-  }
-}
-
-/// Norms of the contact forces, scaled.
-template <int Dim>
-std::vector<double> StepProblem<Dim>::contact_forces_on_loose_parts(const VectorX& x) {
-  VectorX gradient = VectorX::Zero(x.size());
-  EnergySum sum;
-  potential_.add_to(sum, lagged_, [](const Traits& term) { return term.kind == TermKind::contact; });
-  sum.add_gradient(x, gradient, workspace_);
-  std::vector<double> forces;
-  for (const auto& part : least_motion_->parts()) {
-    double squared = 0;
-    for (const int node : part.nodes) squared += gradient.template segment<Dim>(Dim * node).squaredNorm();
-    forces.push_back(std::sqrt(squared));
-  }
-  return forces;
-}
-
-/// Minimises over the increment from the positions at the start of the step.
-template <int Dim>
-NewtonSummary StepProblem<Dim>::minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras,
-                                              const std::function<bool(const VectorX& x)>& ends_at) {
-  VectorX d = increment_of(x);
-  const VectorX target = held_.target - base_;
-  EnergySum all = sum;
-  if (least_motion_) {
-    all.add(least_motion_);
-    follow_least_motion(sum, d);
-    extras.after_step = [&, before = extras.after_step](const VectorX& iterate) {
-      const bool changed = before && before(iterate);
-      follow_least_motion(sum, iterate);
-      return changed;
-    };
-  }
-  enum class EndedBy { solver, flight, caller } ended_by = EndedBy::solver;
-  std::optional<FlightGuard<Dim>> guard;
-  if (!terms_.has_inertia && !setup_.time.allow_jumps)
-    guard.emplace(base_, dofs_, held_.target,
-                  least_motion_ ? std::span(least_motion_->parts()) : std::span<const LoosePart<Dim>>());
-  extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
-    if (guard && guard->has_flown(d))
-      ended_by = EndedBy::flight;
-    else if (ends_at && ends_at(base_ + d))
-      ended_by = EndedBy::caller;
-    return ended_by == EndedBy::solver && (!before || before(progress));
-  };
-  constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
-  const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
-  CorrectedSystem corrected(system(), [&](ConstVectorView iterate, const DofMap& dofs) {
-    return least_motion_->rigid_motions(base_ + iterate, dofs);
-  });
-  NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : system();
-  NewtonSummary summary =
-      minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, setup_.newton, workspace_, extras);
-  x = base_ + d;
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
-  if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
-  solution_ = {x, std::move(d)};
-  if (ended_by == EndedBy::caller) return summary;
-  if (ended_by == EndedBy::flight) {
-    summary.termination = Termination::no_descent;
-    const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target);
-    summary.message = turn.empty() ? guard->describe(setup_.units) : turn;
-    return summary;
-  }
-  return explained(std::move(summary), sum, x);
-}
-
-template <int Dim>
-void StepProblem<Dim>::follow_least_motion(const EnergySum& sum, const VectorX& d) {
-  VectorX gradient = VectorX::Zero(d.size()), sizes = gradient;
-  EnergyOfIncrement(sum, base_).add_gradient_and_sizes(d, gradient, sizes, workspace_);
-  least_motion_->follow(gradient, sizes, dofs_);
-}
-
 /// x minus the positions at the start of the step; of the last solution without the round-off of x.
 template <int Dim>
 VectorX StepProblem<Dim>::increment_of(const VectorX& x) const {
   return solution_.x.size() == x.size() && solution_.x == x ? solution_.increment : VectorX(x - base_);
-}
-
-/// How often the step may be solved, each time with what is lagged at the solution before.
-template <int Dim>
-int StepProblem<Dim>::most_rounds() const {
-  int rounds = 1;
-  if (potential_.has_friction())
-    rounds = setup_.contact.friction_iterations < 0 ? std::numeric_limits<int>::max() : setup_.contact.friction_iterations;
-  if (!lagged_.damping.empty() || !lagged_.contact_damping.empty())
-    for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
-  if (has_lagged_loads()) rounds = std::max(rounds, kPressureRounds);
-  return rounds;
-}
-
-/// Loads that depend on the positions and have no potential.
-template <int Dim>
-bool StepProblem<Dim>::has_lagged_loads() const {
-  return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_));
-}
-
-/// By which share of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in
-/// their forces on unknowns at x.
-template <int Dim>
-template <typename F>
-double StepProblem<Dim>::change_of(const VectorX& x, const Lagged& now, const F& is_asked) {
-  const auto gradient_of = [&](const Lagged& lagged) {
-    EnergySum sum;
-    potential_.add_to(sum, lagged, is_asked);
-    VectorX gradient = VectorX::Zero(x.size());
-    sum.add_gradient(x, gradient, workspace_);
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] == kNone) gradient[i] = 0;
-    return gradient;
-  };
-  const VectorX after = gradient_of(now), before = gradient_of(lagged_);
-  const double size = std::max(after.norm(), before.norm()), change = (after - before).norm();
-  if (!std::isfinite(change)) return std::numeric_limits<double>::infinity();
-  return size > 0 ? change / size : 0;
-}
-
-/// Warns or fails where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or nothing.
-template <int Dim>
-void StepProblem<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds,
-                                     NewtonSummary& summary) {
-  if (!now) now = potential_.lag(x, workspace_);
-  if (has_lagged_loads()) {
-    const double off = change_of(x, *now, [](const Traits& term) { return term.has_no_potential; });
-    if (off > setup_.lagged_load_tolerance) {
-      summary.termination = Termination::lagging;
-      summary.message = fmt::format(
-          "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves; "
-          "expected "
-          "at most {:g} (/solver/advanced/lagged_load_tolerance): a smaller time step, or a stiffness with the forces, may "
-          "settle "
-          "them",
-          off, how, rounds, setup_.lagged_load_tolerance);
-      return;
-    }
-    if (off > kLoadsWorthSaying * setup_.lagged_load_tolerance)
-      summary.message = fmt::format(
-          "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves", off,
-          how, rounds);
-  }
-  if (!lagged_.friction || !now->friction) return;
-  const double off = change_of(x, *now, [](const Traits& term) { return term.kind == TermKind::friction; });
-  if (off > kFrictionWorthSaying)
-    summary.message += fmt::format(
-        "{}friction is {:.2g} of itself off that of the contact forces reached, {} after {} solves "
-        "(/solver/contact/friction_iterations)",
-        summary.message.empty() ? "" : "; ", off, how, rounds);
-}
-
-/// x with held dofs at their targets.
-template <int Dim>
-VectorX StepProblem<Dim>::with_held_at_targets(VectorX x) const {
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] == kNone) x[i] = held_.target[i];
-  return x;
-}
-
-/// Whether a solve from x had better begin at `start`: the way there is free, and the energy lower than where only what is
-/// held moves.
-template <int Dim>
-bool StepProblem<Dim>::is_better_start(const VectorX& start, const VectorX& x) {
-  const EnergySum sum = potential_.sum(lagged_);
-  return sum.max_step(x, start - x, workspace_) == 1 &&
-         sum.value(start, workspace_) < sum.value(with_held_at_targets(x), workspace_);
-}
-
-template <int Dim>
-NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
-  double lagging_seconds = 0;
-  VectorX way_to_start;
-  {
-    const ScopedTimer timer(lagging_seconds);
-    const VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
-    if (potential_.contact()) potential_.contact()->foresee(surface_.positions(x), surface_.motion(start - x), workspace_);
-    const bool is_first_step = std::isinf(stiffness_.largest);
-    if (adaptive_ && !is_first_step) initialize_stiffness(x);  // what the friction of the first round is lagged with
-    lagged_ = potential_.lag(lagged_x, workspace_);
-    // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
-    const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
-    if (expected.size() > 0 && may_move && is_better_start(start, x)) {
-      if (terms_.has_inertia) way_to_start = start - x;
-      x = start;
-    }
-  }
-  NewtonSummary summary = minimize_first(x, std::move(way_to_start));
-  rounds_ = 1;
-  summary.assembly_seconds += lagging_seconds;
-  const int rounds = most_rounds();
-  const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
-  std::vector<VectorX> previous = {lagged_x};  // newest last
-  VectorX best = x;
-  Lagged best_lagged = lagged_;
-  BarrierStiffness best_stiffness = stiffness_;
-  double least = std::numeric_limits<double>::infinity();
-  int best_round = 0, round = 1;
-  RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
-  std::optional<Lagged> now;  // what is lagged at x, where the last round made it
-  for (; summary.converged() && round < rounds; ++round) {
-    Lagged next_lagged;
-    VectorX gradient = VectorX::Zero(x.size());
-    {
-      const ScopedTimer timer(summary.assembly_seconds);
-      next_lagged = potential_.lag(x, workspace_);
-      EnergyOfIncrement(potential_.sum(next_lagged), base_).add_gradient(increment_of(x), gradient, workspace_);
-    }
-    double norm = 0;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
-    norm = std::sqrt(norm);
-    if (potential_.has_friction() && norm <= tolerance) {
-      end = RoundsEnd::asked;
-      break;
-    }
-    if (norm < least) {
-      least = norm;
-      best = x;
-      best_lagged = lagged_;
-      best_stiffness = stiffness_;
-      best_round = round;
-    } else if (round - best_round >= kPatience) {
-      x = best;
-      lagged_ = best_lagged;
-      if (adaptive_) {
-        stiffness_ = best_stiffness;
-        potential_.contact()->set_stiffness(stiffness_.value);
-      }
-      end = RoundsEnd::stalled;
-      break;
-    }
-    if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, scope_->diagonal)) {
-      end = *recurred;
-      now = std::move(next_lagged);
-      break;
-    }
-    if (previous.size() == kLongestCycle) previous.erase(previous.begin());
-    previous.push_back(x);
-    lagged_ = std::move(next_lagged);
-    NewtonSummary next = minimize_lagged(x);
-    ++rounds_;
-    const bool is_fixed_point = next.converged() && next.iterations == 0;
-    next.add_effort(summary);
-    summary = next;
-    if (is_fixed_point) {
-      end = RoundsEnd::settled;
-      break;
-    }
-  }
-  const bool is_open = end == RoundsEnd::most || end == RoundsEnd::cycle || end == RoundsEnd::stalled;
-  if (summary.converged() && is_open) judge_lagging(x, std::move(now), to_string(end), round, summary);
-  return summary;
 }
 
 template <int Dim>

@@ -15,6 +15,9 @@
 namespace itr {
 
 template <int Dim>
+class LaggedSolve;
+
+template <int Dim>
 class StepProblem {
  public:
   /// `history` has the state that the step starts from; `t` is the time at its end. All arguments must outlive this but
@@ -63,27 +66,12 @@ class StepProblem {
   double scaling() const { return terms_.scaling; }
 
  private:
+  friend class LaggedSolve<Dim>;
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
-  NewtonSummary minimize_first(VectorX& x, VectorX way_to_start);
-  NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {},
-                                const std::function<bool(const VectorX& x)>& ends_at = {});
-  std::vector<double> contact_forces_on_loose_parts(const VectorX& x);
-  NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras,
-                              const std::function<bool(const VectorX& x)>& ends_at);
-  void follow_least_motion(const EnergySum& sum, const VectorX& d);
-  NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x);
   void initialize_stiffness(const VectorX& x);
   void reset_system();
   SparseSystem& system();
-  VectorX with_held_at_targets(VectorX x) const;
-  bool is_better_start(const VectorX& start, const VectorX& x);
-  VectorX start_of_solve(const VectorX& x);
-  int most_rounds() const;
-  bool has_lagged_loads() const;
-  template <typename F>
-  double change_of(const VectorX& x, const Lagged& now, const F& is_asked);
-  void judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds, NewtonSummary& summary);
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;
 
@@ -104,7 +92,6 @@ class StepProblem {
   Solution solution_;                                 ///< of the last solve
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
-  VectorX norm_weights_;  ///< of NewtonNorm, once needed
   Lagged lagged_;         ///< of the last solve
   ProblemCache<Dim>& cache_;
   unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this

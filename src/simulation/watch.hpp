@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the end of a step says against the model or its tolerances. Each is said once.
+// Warnings about the end of a step against the model or its tolerances. Each is said once.
 #pragma once
 
 #include "itr/simulation/simulation.hpp"

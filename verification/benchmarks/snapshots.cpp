@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What it takes to save a simulation and to go back, at about 10^4 vertices: the two calls, and the copy of the state, mesh
+// Times to save a simulation and to go back, at about 10^4 vertices: the two calls, and the copy of the state, mesh
 // included, that the first step after them makes.
 #include <benchmark/benchmark.h>
 

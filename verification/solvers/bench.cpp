@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What one solver costs on one dumped system (itr run --dump-systems):
+// Costs of one solver on one dumped system (itr run --dump-systems):
 //   [mpirun -n N] itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [KEY=VALUE]...
 // Prints one line of JSON: seconds of the analysis, of a factorisation and a solve (medians), of both through the engine
 // alone where it is a module, what checks, residuals and refinement add to that (the median of the ratios of runs that

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What CHOLMOD's low-rank updates of a factor are worth between two systems of a run (itr run --dump-systems):
+// Worth of CHOLMOD's low-rank updates of a factor between two systems of a run (itr run --dump-systems):
 //   OPENBLAS_CORETYPE=... itr_updown_bench FIRST SECOND
 // Prints one line of JSON: the unknowns in which the matrices differ, the rank of the difference, and seconds to solve the
 // second system by a factor of its own, by conjugate gradients over the factor of the first (as Newton does), and by that

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What stops a motion, as linear bounds that a corrected motion has to keep.
+// Pairs that stop a motion, as linear bounds that a corrected motion has to keep.
 #pragma once
 
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What of a mesh's shape each vertex, edge and facet belongs to: the inside, a flat patch of the surface or of an interface
-// between bodies, a straight feature, a corner. Found once a simulation and carried by edits from then on, over steps and
-// saved states, so that what an edit may do does not hang on the round-off of earlier ones.
+// Strata: the part of a mesh's shape that each vertex, edge and facet belongs to: the inside, a flat patch of the surface or
+// of an interface between bodies, a straight feature, a corner. Found once a simulation and carried by edits from then on,
+// over steps and saved states, so that what an edit may do does not hang on the round-off of earlier ones.
 #pragma once
 
 #include <array>

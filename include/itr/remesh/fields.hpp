@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a remesher works on beside the mesh: nodal fields that follow its edits, and what defines the step's energy.
+// Inputs of a remesher beside the mesh: nodal fields that follow its edits, and the definition of the step's energy.
 #pragma once
 
 #include <limits>

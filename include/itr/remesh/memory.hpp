@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What was refused before, in this step or an earlier one: most trials would only repeat it.
+// Refusals of this step or an earlier one: most trials would only repeat them.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a simulation shows of itself after a step: values that observers (output, a host program) read.
+// Values of a simulation after a step, for observers (output, a host program).
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is wrong, or not known, with a study's reference and runs: said before anything is made of them.
+// Finds mistakes and gaps in a study's reference and runs: said before anything is made of them.
 #pragma once
 
 #include <string>

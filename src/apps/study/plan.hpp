@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a study runs: a table of series, and the runs that it makes of a scene.
+// Plans a study: a table of series, and the runs that it makes of a scene.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a study says: its rows as CSV and JSON, orders, and answers in words.
+// Writes the results of a study: its rows as CSV and JSON, orders, and answers in words.
 #pragma once
 
 #include <optional>

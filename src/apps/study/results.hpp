@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the runs of a study left in their folders, and how far each is from its reference.
+// Reads the folders of a study's runs, and how far each run is from its reference.
 #pragma once
 
 #include <filesystem>

@@ -293,8 +293,12 @@ void LocalProblem<Dim>::hold_vertices() {
     const bool is_node = edge[0] != kNone;
     const bool is_free = is_node ? edge[1] == kNewVertex || std::ranges::all_of(mesh_.cells_of_edge(edge), is_of_patch)
                                  : v.kind == Kind::created || std::ranges::all_of(mesh_.cells_of(v.id), is_of_patch);
+    if (!is_free) {
+      std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(Dim * i), Dim, 1);
+      continue;
+    }
     const auto tags = is_node ? tags_at(edge) : tags_at(std::array{v.id});
-    for (int c = 0; c < Dim; ++c) held[Dim * i + c] = !is_free || tags[c] != kNoTag;
+    for (int c = 0; c < Dim; ++c) held[Dim * i + c] = tags[c] != kNoTag;
   }
   dofs_.hold(held);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What operations ask about the mesh, the fields and the energy of the step, as they are now. Nothing here changes anything:
-// several threads may ask, each with a scratch of its own.
+// Queries of operations about the mesh, the fields and the energy of the step, as they are now. Nothing here changes
+// anything: several threads may ask, each with a scratch of its own.
 #pragma once
 
 #include <algorithm>

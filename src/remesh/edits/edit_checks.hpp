@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the operations' files share.
+// Checks that the files of edits share.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What all operations of one call of the remesher share: what they ask, what they remember, what they commit.
+// State that all operations of one call of the remesher share: queries, memory, committer.
 #pragma once
 
 #include <atomic>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What operations remember while one call of the remesher lasts; refusals also from step to step.
+// Memory of operations during one call of the remesher; refusals also from step to step.
 #pragma once
 
 #include <array>

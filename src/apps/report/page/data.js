@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the file holds: blocks of compressed bytes in base64, see frames.cpp for how they are made.
+// Reads the file's data: blocks of compressed bytes in base64, see frames.cpp for how they are made.
 'use strict';
 
 const KIND = {

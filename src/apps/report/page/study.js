@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a study found: diagrams of error against cost, answers, commands, and two runs side by side.
+// Shows the results of a study: diagrams of error against cost, answers, commands, and two runs side by side.
 'use strict';
 
 const MEASURES = [
