@@ -92,7 +92,7 @@ class StepProblem {
   Solution solution_;                                 ///< of the last solve
   std::unique_ptr<AdaptiveStiffness<Dim>> adaptive_;  ///< null where the stiffness is a number
   BarrierStiffness stiffness_;
-  Lagged lagged_;         ///< of the last solve
+  Lagged lagged_;  ///< of the last solve
   ProblemCache<Dim>& cache_;
   unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this
   int rounds_ = 0;          ///< of the last solve
