@@ -17,7 +17,7 @@ optional=(
   libtrilinos-{amesos2,tpetra,shylu,teuchos,kokkos,kokkos-kernels,epetra,epetraext,triutils,zoltan,trilinosss}-dev
   libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
-  gfortran doxygen pkg-config python3-dev pybind11-dev python3-pip
+  gfortran doxygen pkg-config python3-dev pybind11-dev python3-pip patchelf
   chromium chromium-driver firefox-esr strace
   python3-vtk9 xvfb xauth libgl1-mesa-dri
   python3-pil python3-dolfinx python3-meshio python3-scipy python3-sympy
