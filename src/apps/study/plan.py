@@ -145,8 +145,8 @@ class Plan:
 
     def shared_settings(self):
         """Values that the scene leaves open and all runs have to agree on, and those of their output."""
-        stiffness = "/solver/contact/barrier_stiffness"
-        shared = {stiffness: text_of(self.facts["settings"][stiffness])} if stiffness in self.facts["settings"] else {}
+        settings = self.facts["settings"].items()
+        shared = {pointer: text_of(value) for pointer, value in settings if not pointer.startswith("/space/remesh")}
         self.notes = ""  # further settings that all runs share, in words
         if self.facts["friction"]:
             shared |= {pointer: value for pointer, value in FRICTION_ROUNDS.items() if pointer not in self.options.sets}
