@@ -156,9 +156,14 @@ struct AnySimulation::Impl {
         of(model.dimension_ == 2 ? Either(make<2>(model, *registry, logger, warnings))
                                  : Either(make<3>(model, *registry, logger, warnings))),
         max_threads(model.max_threads()) {
-    std::map<std::string, int> boundaries;
-    for (const auto& part : model.boundaries_) boundaries[part.name] = part.id;
+    std::map<std::string, std::vector<int>> boundaries;
+    visit([&](auto& d) {
+      const auto& tags = d.simulation.setup().names.surfaces;
+      for (const auto& part : model.boundaries_)
+        boundaries[part.name] = tags.contains(part.name) ? tags.at(part.name) : std::vector{part.id};
+    });
     scene::PartNames named = model.scene_ ? model.scene_->parts : scene::PartNames();
+    if (!model.scene_) named.bodies = model.body_names_;
     int first = 0;
     for (const auto& part : model.obstacles_) {
       const int count = static_cast<int>(part.vertices.size()) / model.dimension_;
@@ -248,50 +253,55 @@ void hold(Setup<Dim>& setup, int tag, std::span<const int> mask, SpaceTimeFuncti
 }  // namespace
 
 void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    hold<Dim>(d.simulation.conditions(), tag, mask, as_vector<Dim>(of("displacement", boundary), std::move(displacement)));
+    const SpaceTimeFunction<Dim> function = as_vector<Dim>(of("displacement", boundary), std::move(displacement));
+    for (const int tag : tags) hold<Dim>(d.simulation.conditions(), tag, mask, function);
   });
 }
 
 void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, std::span<const double> displacements) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    hold<Dim>(d.simulation.conditions(), tag, mask, d.nodal("displacements", displacements));
+    const SpaceTimeFunction<Dim> function = d.nodal("displacements", displacements);
+    for (const int tag : tags) hold<Dim>(d.simulation.conditions(), tag, mask, function);
   });
 }
 
 void AnySimulation::set_traction(const std::string& boundary, HostFunction traction) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    NeumannCondition<Dim> condition{tag, as_vector<Dim>(of("traction", boundary), std::move(traction))};
-    const bool is_null = !condition.traction;
-    replace(d.simulation.conditions().neumann, std::move(condition), is_null);
+    const SpaceTimeFunction<Dim> function = as_vector<Dim>(of("traction", boundary), std::move(traction));
+    for (const int tag : tags) replace(d.simulation.conditions().neumann, {tag, function}, !function);
   });
 }
 
 void AnySimulation::set_traction(const std::string& boundary, std::span<const double> tractions) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    replace(d.simulation.conditions().neumann, {tag, d.nodal("tractions", tractions)}, false);
+    const SpaceTimeFunction<Dim> function = d.nodal("tractions", tractions);
+    for (const int tag : tags) replace(d.simulation.conditions().neumann, {tag, function}, false);
   });
 }
 
 void AnySimulation::set_pressure(const std::string& boundary, HostFunction pressure) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const bool is_null = !pressure;
     const auto value = as_function<Dim, 1>(of("pressure", boundary), std::move(pressure));
-    replace(d.simulation.conditions().pressure, {tag, [=](const Vec<Dim>& X, double t) { return value(X, t)[0]; }}, is_null);
+    for (const int tag : tags)
+      replace(d.simulation.conditions().pressure, {tag, [=](const Vec<Dim>& X, double t) { return value(X, t)[0]; }},
+              is_null);
   });
 }
 
 void AnySimulation::set_pressure(const std::string& boundary, std::span<const double> pressures) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const auto value = d.template nodal<1>("pressures", pressures);
-    replace(d.simulation.conditions().pressure, {tag, [=](const RestPoint<Dim>& X, double t) { return value(X, t)[0]; }},
-            false);
+    for (const int tag : tags)
+      replace(d.simulation.conditions().pressure, {tag, [=](const RestPoint<Dim>& X, double t) { return value(X, t)[0]; }},
+              false);
   });
 }
 

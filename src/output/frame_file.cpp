@@ -10,6 +10,7 @@
 #include "file_list.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
+#include "set_members.hpp"
 #include "units.hpp"
 
 namespace itr::output {
@@ -104,6 +105,17 @@ void write_space(const Target& target, const FrameView<Dim>& frame, const Space&
   write_forces("/drawn/reaction_force", frame.asked->forces.reaction);
 }
 
+/// Cells, rows of /mesh/surface and vertices by name.
+template <int Dim>
+void write_sets(hdf5::File& file, const FrameView<Dim>& frame) {
+  for (const SetMembers& set : set_members(frame)) {
+    const std::string name = plain_name(set.name);
+    if (!set.cells.empty()) file.write("/sets/cells/" + name, set.cells, 0);
+    if (!set.facets.empty()) file.write("/sets/facets/" + name, set.facets, 0);
+    if (!set.vertices.empty()) file.write("/sets/vertices/" + name, set.vertices, 0);
+  }
+}
+
 template <int Dim>
 void write_surface(const Target& target, const std::string& group, const std::vector<Vec<Dim>>& positions,
                    const std::vector<std::array<int, 2>>& edges, const std::vector<std::array<int, 3>>& triangles) {
@@ -183,6 +195,7 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, con
   if (!units.is_si() && !file.contains(kUnits))
     file.write_text(kUnits, units.length() + " " + units.mass() + " " + units.time());
   write_mesh(target, mesh, rest);
+  write_sets(file, frame);
   write_space<Dim>(target, frame, space, u);
   target.write("/fields/x", as_span(frame.x), Dim, "m");
   target.write("/fields/u", as_span(u), Dim, "m");
@@ -224,6 +237,8 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
   shape.push_back(static_cast<std::size_t>(drawn_nodes(frame)));
   if (frame.proxy.x)
     shape.insert(shape.end(), {size(*frame.proxy.x), size(*frame.proxy.edges), size(*frame.proxy.triangles)});
+  for (const SetMembers& set : set_members(frame))
+    shape.insert(shape.end(), {size(set.cells), size(set.facets), size(set.vertices)});
   if (frame.asked) {
     const AskedFields& asked = *frame.asked;
     shape.insert(shape.end(), {size(asked.forces.contact), size(asked.forces.friction), size(asked.forces.reaction),

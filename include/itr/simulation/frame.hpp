@@ -13,6 +13,8 @@
 
 namespace itr {
 
+struct SetNames;
+
 /// Terms of the incremental potential divided by alpha h^2 [J], after the last solve of the step.
 struct EnergyReport {
   double inertia = 0, elastic = 0, body = 0, contact = 0, friction = 0, damping = 0, total = 0;
@@ -128,7 +130,8 @@ struct FrameView {
   const std::vector<std::array<int, 3>>& obstacle_triangles;
   const AskedFields* asked = nullptr;  ///< null: nothing was asked for
   ProxyView<Dim> proxy{};
-  const Space* space = nullptr;  ///< null: all edges are straight
+  const Space* space = nullptr;     ///< null: all edges are straight
+  const SetNames* names = nullptr;  ///< of body ids and tags of the mesh; null: there are none
 };
 
 }  // namespace itr
