@@ -2,6 +2,7 @@
 // The barrier that keeps det F above zero in curved cells: its derivatives, what it proves, where it is zero, and when a
 // cell gets one.
 #include "energy/elastic/jacobian_barrier.hpp"
+#include "curved_mesh.hpp"
 
 #include <gtest/gtest.h>
 
@@ -31,7 +32,7 @@ CellSet<Dim> one_cell() {
     cell[k] = k;
   }
   const Mesh<Dim> mesh(rest, {cell}, {1});
-  return whole_mesh(mesh, {}, space_of_orders(mesh, {{1, 2}}));
+  return whole_mesh(of_orders(mesh, {{1, 2}}), {});
 }
 
 template <int Dim>

@@ -26,9 +26,9 @@ itr::Setup<2> square_of(int cells, double moved) {
 
 History at_rest(const Mesh<2>& mesh) {
   History history;
-  history.x = {VectorX(2 * mesh.vertex_slots())};
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) history.x[0].segment<2>(2 * v) = mesh.rest(v);
-  history.v = {VectorX::Zero(2 * mesh.vertex_slots())};
+  history.x = {VectorX(2 * mesh.node_slots())};
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) history.x[0].segment<2>(2 * v) = mesh.rest(v);
+  history.v = {VectorX::Zero(2 * mesh.node_slots())};
   return history;
 }
 

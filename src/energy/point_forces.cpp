@@ -114,22 +114,21 @@ bool has_cells_of(const CellSet<Dim>& mesh, const CellSet<Dim>& cells) {
 }  // namespace
 
 template <int Dim>
-TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces, const Space& space) {
-  const int n = num_nodes(mesh, space);
+TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces) {
+  const int n = mesh.num_nodes();
   if (forces.size() != Eigen::Index{Dim} * n)
     throw InputError({"", "forces", std::to_string(forces.size()) + " numbers",
                       std::to_string(Dim * n) + ", " + std::to_string(Dim) + " a node"});
   const auto loaded = std::make_shared<Points<Dim>>();
   loaded->all = forces;
-  loaded->cells = whole_mesh(mesh, {}, space);
+  loaded->cells = whole_mesh(mesh, {});
   std::vector<Box<Dim>> boxes;
   for (int v = 0; v < n; ++v) {
     const Vec<Dim> f = forces.segment<Dim>(Dim * v);
     if (!f.allFinite())
       throw InputError({"", "forces[" + std::to_string(v) + "]", "a number that is not finite", "numbers"});
     if (f.isZero(0)) continue;
-    const int edge = v - mesh.vertex_slots();
-    loaded->X.push_back(edge < 0 ? mesh.point(v) : mesh.middle(space.curved_edges()[edge]));
+    loaded->X.push_back(mesh.point_of_node(v));
     loaded->force.push_back(f);
     boxes.push_back({loaded->X.back(), loaded->X.back()});
   }
@@ -149,7 +148,7 @@ TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces, con
   };
 }
 
-template TermFactory<2> point_forces<2>(const Mesh<2>&, ConstVectorView, const Space&);
-template TermFactory<3> point_forces<3>(const Mesh<3>&, ConstVectorView, const Space&);
+template TermFactory<2> point_forces<2>(const Mesh<2>&, ConstVectorView);
+template TermFactory<3> point_forces<3>(const Mesh<3>&, ConstVectorView);
 
 }  // namespace itr

@@ -12,7 +12,7 @@
 namespace itr::output {
 
 template <int Dim>
-DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space) {
+DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
   constexpr int kExponent = 8;  // the p of `lp`
   double l2_squared = 0, h1_semi_squared = 0, lp_power = 0;
   DisplacementNorms norms;
@@ -23,7 +23,7 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, c
     norms.linf = std::max(norms.linf, size);
     norms.linf_grad = std::max(norms.linf_grad, gradient);
   };
-  const CellSet<Dim> cells = space.is_linear() ? CellSet<Dim>() : whole_mesh(mesh, {}, space);
+  const CellSet<Dim> cells = mesh.has_nodes() ? whole_mesh(mesh, {}) : CellSet<Dim>();
   std::vector<char> is_curved(mesh.cell_slots(), 0);
   for (const auto& element : cells.curved_elements) {
     is_curved[element.cell] = 1;
@@ -53,7 +53,7 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, c
   return norms;
 }
 
-template DisplacementNorms displacement_norms<2>(const Mesh<2>&, ConstVectorView, const Space&);
-template DisplacementNorms displacement_norms<3>(const Mesh<3>&, ConstVectorView, const Space&);
+template DisplacementNorms displacement_norms<2>(const Mesh<2>&, ConstVectorView);
+template DisplacementNorms displacement_norms<3>(const Mesh<3>&, ConstVectorView);
 
 }  // namespace itr::output

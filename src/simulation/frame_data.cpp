@@ -53,11 +53,11 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
 
 template <int Dim>
 typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>& state, const NodalForces& forces) const {
-  const int bodies = num_nodes(state.mesh, state.space);
+  const int bodies = state.mesh.num_nodes();
   FrameData data;
   data.x = state.history.x[0].head(Dim * bodies);
   data.v = state.history.v[0].head(Dim * bodies);
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
   using Curved = const typename CellSet<Dim>::CurvedElement*;
   const auto add_density = [&](const Material& material, auto points, Curved curved) {
     double mean = 0;
@@ -73,7 +73,7 @@ typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   if (setup().proxy) {
-    const VectorX y = proxy_map(setup(), state.mesh, state.space)->positions(all);
+    const VectorX y = proxy_map(setup(), state.mesh)->positions(all);
     for (std::size_t v = 0; v < setup().proxy->rest.size(); ++v)
       data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
   }
@@ -138,8 +138,8 @@ CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Quadratu
 template <int Dim>
 CellStress cell_stress(const Simulation<Dim>& simulation) {
   const State<Dim>& state = simulation.state();
-  const VectorX x = state.history.x[0].head(Dim * num_nodes(state.mesh, state.space));
-  return stress_of<Dim>(whole_mesh(state.mesh, {}, state.space), x, state.quadrature, simulation.setup());
+  const VectorX x = state.history.x[0].head(Dim * state.mesh.num_nodes());
+  return stress_of<Dim>(whole_mesh(state.mesh, {}), x, state.quadrature, simulation.setup());
 }
 
 template CellStress cell_stress(const Simulation<2>&);

@@ -32,16 +32,16 @@ double& entry_of(EnergyReport& report, EnergyEntry entry) {
 }  // namespace
 
 template <int Dim>
-StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history,
-                              double t, ProblemCache<Dim>& cache, const BarrierStiffness& stiffness,
-                              const QuadratureLevels& levels, const ChordLevels& chords)
+StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
+                              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness, const QuadratureLevels& levels,
+                              const ChordLevels& chords)
     : setup_(setup),
       terms_(potential_terms(setup, history, t)),
-      scope_(cache.scope_of(setup, mesh, space, chords)),
+      scope_(cache.scope_of(setup, mesh, chords)),
       cells_(scope_->cells),
       surface_(scope_->surface),
       workspace_(scope_->workspace),
-      held_(held_dofs(setup, mesh, t, space)),
+      held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
       potential_(terms_, cells_,
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "itr/fem/quadratic.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
@@ -50,19 +49,19 @@ struct CellSet {
   std::vector<CurvedFacet> curved_facets;
 };
 
-/// Calls f(node) for the vertices of a simplex of a mesh with so many vertices, then for the nodes of its curved edges.
-template <std::size_t N, typename F>
-void for_each_node(const std::array<VertexId, N>& simplex, const Space& space, int num_vertices, const F& f) {
+/// Calls f(node) for the vertices of a simplex of the mesh, then for the nodes of its curved edges.
+template <int Dim, std::size_t N, typename F>
+void for_each_node(const Mesh<Dim>& mesh, const std::array<VertexId, N>& simplex, const F& f) {
   for (const VertexId v : simplex) f(v);
   for_each_edge<static_cast<int>(N) - 1>([&](int, int i, int j) {
-    if (const int node = space.node_of(simplex[i], simplex[j], num_vertices); node != kNone) f(node);
+    if (const int node = mesh.node_of(simplex[i], simplex[j]); node != kNone) f(node);
   });
 }
 
 /// The whole of a compact mesh with its own numbering: vertices, the nodes of curved edges, then `extra` vertices without
 /// cells.
 template <int Dim>
-CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra, const Space& space = {});
+CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra);
 
 /// Nodes of the elements of one kind, `size` each.
 struct Stencils {

@@ -100,9 +100,9 @@ LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const C
       is_after_(is_after),
       scratch_(scratch),
       storage_(scratch.take_storage()) {
-  scratch_.known.clear(mesh_.vertex_slots());
+  scratch_.known.clear(mesh_.node_slots());
   scratch_.known_obstacles.clear(static_cast<int>(state.context.obstacles.x.size()));
-  if (static_cast<int>(scratch_.local_of.size()) < mesh_.vertex_slots()) scratch_.local_of.resize(2 * mesh_.vertex_slots());
+  if (static_cast<int>(scratch_.local_of.size()) < mesh_.node_slots()) scratch_.local_of.resize(2 * mesh_.node_slots());
   scratch_.local_of_obstacle.resize(state.context.obstacles.x.size());
   add_cells(patch);
   if (needs_facets(state.context)) add_loaded_facets();

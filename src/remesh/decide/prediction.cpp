@@ -37,7 +37,7 @@ double predict_gain_at_curves(const RemeshState<Dim>& state, const Edit<Dim>& ed
   if (!std::isfinite(after.energy()) || before.has_barrier()) return kUnknown;  // inverted there, or nearly so now
   double gain = before.energy() - after.energy();
   for (const auto& model : after.models()) {
-    const bool is_set = (edit.value && model.id == edit.value->vertex) || model.id >= state.mesh.vertex_slots();
+    const bool is_set = (edit.value && model.id == edit.value->vertex) || model.id >= state.mesh.node_slots();
     const auto* old = is_set ? nullptr : before.find(model.id);
     const Vec<Dim> force = old ? Vec<Dim>(model.gradient - old->gradient) : model.gradient;
     const Eigen::LLT<Mat<Dim>> llt(model.hessian);

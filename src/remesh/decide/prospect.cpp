@@ -21,7 +21,7 @@ template <int Dim>
 std::optional<Vec<Dim>> uniform_acceleration(const Mesh<Dim>& mesh, const Loads<Dim>& loads) {
   std::optional<Vec<Dim>> all;
   if (!loads.acceleration) return Vec<Dim>::Zero();
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) {
     if (!mesh.is_vertex_alive(v)) continue;
     const Vec<Dim> own = loads.acceleration(mesh.point(v));
     if (all && *all != own) return std::nullopt;
@@ -37,7 +37,7 @@ std::vector<int> parts_of(const Mesh<Dim>& mesh) {
   cells.reserve(mesh.cell_slots());
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
     if (mesh.is_cell_alive(c)) cells.push_back(mesh.cell(c));
-  return connected_parts<Dim + 1>(mesh.vertex_slots(), cells);
+  return connected_parts<Dim + 1>(mesh.node_slots(), cells);
 }
 
 /// Elastic energy and inertia of a cell with curved edges, by the rules of quadrature that the step has.
@@ -77,7 +77,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;
   const std::vector<int> parts = parts_of(mesh);
-  std::vector<double> energy(mesh.vertex_slots(), context.coupling);
+  std::vector<double> energy(mesh.node_slots(), context.coupling);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
     if (const CurvedCell<Dim> cell = cell_before(mesh, c); cell.edges) {

@@ -178,7 +178,7 @@ class ShapeBetterer : Mover<Dim> {
 template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session) {
   std::vector<Place> vertices;
-  for (VertexId v = 0; v < session.ask().mesh().vertex_slots(); ++v) vertices.push_back(Place::at_vertex(v));
+  for (VertexId v = 0; v < session.ask().mesh().node_slots(); ++v) vertices.push_back(Place::at_vertex(v));
   for (int round = 0; round < session.ask().options().smooth.max_iterations; ++round) {
     ForceFollower<Dim> follower(session);
     run_waves(session, follower, vertices);

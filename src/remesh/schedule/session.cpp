@@ -23,7 +23,7 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   if (strata.empty()) strata = Strata<Dim>(mesh);
   ITR_AUDIT(strata.find_defect(mesh).empty(), strata.find_defect(mesh));
   log_.add_follower([&](const Change<Dim>& change) {
-    fields.make_room(mesh.vertex_slots());
+    fields.make_room(mesh.node_slots());
     fields.follow(change.edit, change.created, change.first_node);
     for (const auto& [v, x] : change.positions) fields.x.template segment<Dim>(Dim * v) = x;
   });
