@@ -224,12 +224,12 @@ VectorX unproven(const Setup<2>& setup, const std::vector<int>& nodes, std::mt19
   const Mesh<2> mesh = of_orders(setup.mesh, setup.order);
   const CellSet<2> cells = whole_mesh(mesh, {});
   const auto is_positive = [&](const VectorX& x) {
-    return std::all_of(cells.curved_elements.begin(), cells.curved_elements.end(),
-                       [&](const auto& element) { return is_positive_everywhere_exact<2>(at_all_nodes<2>(element, x)); });
+    return std::ranges::all_of(
+        cells.curved(), [&](const auto& element) { return is_positive_everywhere_exact<2>(at_all_nodes<2>(element, x)); });
   };
   const auto is_proven = [&](const VectorX& x) {
-    return std::all_of(cells.curved_elements.begin(), cells.curved_elements.end(), [&](const auto& element) {
-      return std::isfinite(JacobianBarrier<2>(element, at_nodes<2>(element.nodes, x)).value());
+    return std::ranges::all_of(cells.curved(), [&](const auto& element) {
+      return std::isfinite(JacobianBarrier<2>(element, at_nodes<2>(element.nodes(), x)).value());
     });
   };
   const auto& places = mesh.rest();
@@ -310,8 +310,9 @@ TEST(CurvedHost, DensitiesOfDistortedCellsSumUpToTheElasticEnergy) {
     const StepResult result = simulation.advance();
     ASSERT_TRUE(result.ok) << result.reason;
     const State<2>& state = simulation.state();
-    for (const auto& element : whole_mesh(state.mesh, {}).curved_elements)
-      acting += JacobianBarrier<2>(element, at_nodes<2>(element.nodes, state.history.x[0])).is_active();
+    const CellSet<2> cells = whole_mesh(state.mesh, {});
+    for (const auto& element : cells.curved())
+      acting += JacobianBarrier<2>(element, at_nodes<2>(element.nodes(), state.history.x[0])).is_active();
     double sum = 0;
     simulation.observe([&](const FrameView<2>& frame) {
       for (CellId c = 0; c < state.mesh.cell_slots(); ++c) sum += state.mesh.volume(c) * frame.elastic_density[c];

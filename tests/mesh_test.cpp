@@ -7,12 +7,12 @@
 #include <random>
 #include <set>
 
+#include "fem/inverted.hpp"
 #include "geometry/measures.hpp"
 #include "geometry/predicates.hpp"
 #include "itr/core/error.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "mesh/refine.hpp"
-#include "mesh/validate.hpp"
 #include "remesh/edits.hpp"
 
 namespace itr {

@@ -6,10 +6,10 @@
 #include <memory>
 #include <random>
 
+#include "fem/inverted.hpp"
 #include "geometry/intersection.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/trial.hpp"

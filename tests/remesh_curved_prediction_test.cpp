@@ -249,8 +249,8 @@ TYPED_TEST(CurvedPrediction, BarriersArePartOfEnergies) {
     const double whole =
         ElasticEnergy<Dim>(cells, context.materials, context.scaling, context.quadrature_degree).value(x, workspace);
     const auto is_active = [&](const auto& e) { return JacobianBarrier<Dim>(e, at_nodes<Dim>(e.nodes, x)).is_active(); };
-    const auto active = std::find_if(cells.curved_elements.begin(), cells.curved_elements.end(), is_active);
-    if (active == cells.curved_elements.end() || !std::isfinite(whole)) continue;
+    const auto active = std::ranges::find_if(cells.curved(), is_active);
+    if (active == cells.curved().end() || !std::isfinite(whole)) continue;
     const View<Dim> view(scene, context);
     const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
     double sum = 0;

@@ -6,11 +6,11 @@
 
 #include <cstring>
 
+#include "fem/inverted.hpp"
 #include "geometry/measures.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/projection/transfer.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
 #include "remesh/decide/patch.hpp"

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "fem/inverted.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_terms.hpp"
 #include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"

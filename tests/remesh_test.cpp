@@ -5,9 +5,9 @@
 #include <map>
 #include <random>
 
+#include "fem/inverted.hpp"
 #include "geometry/intersection.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/prediction.hpp"

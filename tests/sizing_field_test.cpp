@@ -5,8 +5,8 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "fem/inverted.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_cube.hpp"
 #include "remesh_options.hpp"
 #include "square_mesh.hpp"

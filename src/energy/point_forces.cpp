@@ -58,45 +58,30 @@ template <int Dim>
 void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& forces) {
   struct Best {
     Fit<Dim> fit;
-    bool is_curved;
-    std::size_t element;
+    const typename CellSet<Dim>::Element* element;
     std::array<double, Dim + 1> weights;
   };
   std::map<int, Best> best;
   std::vector<int> hits;
-  const auto look_in = [&](bool is_curved, std::size_t e, const int* vertices, int part, const Mat<Dim>& inverse_edges) {
+  for (const auto& element : cells.elements) {
     Box<Dim> box;
-    for (int k = 0; k <= Dim; ++k) box.include(cells.rest[vertices[k]]);
+    for (const int v : element.vertices) box.include(cells.rest[v]);
     hits.clear();
     points.tree.query(box.inflated(1e-9 * (box.max - box.min).norm()), hits);
     for (const int i : hits) {
-      if (points.X[i].part != part) continue;
-      auto weights = barycentric_weights<Dim>(cells.rest[vertices[0]], inverse_edges, points.X[i]);
-      const Fit<Dim> fit = fit_of<Dim>(points.X[i], weights, inverse_edges);
+      if (points.X[i].part != element.part) continue;
+      auto weights = barycentric_weights<Dim>(cells.rest[element.vertices[0]], element.inverse_edges, points.X[i]);
+      const Fit<Dim> fit = fit_of<Dim>(points.X[i], weights, element.inverse_edges);
       if (!fit.has || fit.facing < kFaces) continue;
       tidy(weights);
-      const auto [it, is_new] = best.try_emplace(i, Best{fit, is_curved, e, weights});
-      if (!is_new && fit.is_better_than(it->second.fit)) it->second = {fit, is_curved, e, weights};
+      const auto [it, is_new] = best.try_emplace(i, Best{fit, &element, weights});
+      if (!is_new && fit.is_better_than(it->second.fit)) it->second = {fit, &element, weights};
     }
-  };
-  for (std::size_t e = 0; e < cells.elements.size(); ++e) {
-    const auto& element = cells.elements[e];
-    look_in(false, e, element.vertices.data(), element.part, element.inverse_edges);
-  }
-  for (std::size_t e = 0; e < cells.curved_elements.size(); ++e) {
-    const auto& element = cells.curved_elements[e];
-    look_in(true, e, element.nodes.data(), element.part, element.inverse_edges);
   }
   for (const auto& [i, place] : best) {
-    if (!place.is_curved) {
-      for (int k = 0; k <= Dim; ++k)
-        forces.segment<Dim>(Dim * cells.elements[place.element].vertices[k]) += place.weights[k] * points.force[i];
-      continue;
-    }
-    const auto& element = cells.curved_elements[place.element];
-    const auto shapes = quadratic_shapes<Dim>(element.curved, place.weights);
-    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-      forces.segment<Dim>(Dim * element.nodes[k]) += shapes[k] * points.force[i];
+    const auto nodes = place.element->nodes();
+    const auto shapes = quadratic_shapes<Dim>(place.element->curved, place.weights);
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k) forces.segment<Dim>(Dim * nodes[k]) += shapes[k] * points.force[i];
   }
 }
 
@@ -104,10 +89,8 @@ void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& 
 template <int Dim>
 bool has_cells_of(const CellSet<Dim>& mesh, const CellSet<Dim>& cells) {
   return mesh.rest.size() <= cells.rest.size() &&
-         std::ranges::equal(mesh.elements, cells.elements, {}, &CellSet<Dim>::Element::vertices,
-                            &CellSet<Dim>::Element::vertices) &&
-         std::ranges::equal(mesh.curved_elements, cells.curved_elements, {}, &CellSet<Dim>::CurvedElement::nodes,
-                            &CellSet<Dim>::CurvedElement::nodes) &&
+         std::ranges::equal(mesh.elements, cells.elements, {}, &CellSet<Dim>::Element::nodes,
+                            &CellSet<Dim>::Element::nodes) &&
          std::equal(mesh.rest.begin(), mesh.rest.end(), cells.rest.begin());
 }
 

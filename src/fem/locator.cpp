@@ -40,10 +40,9 @@ struct Locator<Dim>::Impl {
       for (const int v : mesh.cell(c)) box.include(mesh.rest(v));
       all.include(box);
       boxes.push_back(box);
-      Cell& cell = cells.emplace_back();
-      cell = {c, mesh.body(c), mesh.part(c), {}, 0, mesh.rest(mesh.cell(c)[0]), mesh.inverse_rest_edges(c)};
-      cell.curved = find_nodes<Dim>(
-          mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); }, cell.nodes);
+      const auto element = element_of(mesh, c);
+      cells.push_back({c, element.body, element.part, element.nodes(), element.curved, mesh.rest(element.vertices[0]),
+                       element.inverse_edges});
     }
     if (!ids.empty()) extent = (all.max - all.min).norm();
     tree.build(boxes);

@@ -27,7 +27,7 @@ struct RefinedChords {
 /// Adds a boundary facet's part of the surface that can touch: simplices through all of its nodes (for_each_chord).
 template <int Dim>
 void add_chord_facets(const Mesh<Dim>& mesh, FacetId f, std::vector<typename MeshTypes<Dim>::Facet>& chords) {
-  const auto node_of = [&](VertexId a, VertexId b) { return mesh.node_of(a, b); };
+  const auto node_of = nodes_of_edges(mesh);
   for_each_chord<Dim>(mesh.facet(f), node_of, [&](const auto& ids) { chords.push_back(ids); });
 }
 

@@ -23,14 +23,16 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
     norms.linf = std::max(norms.linf, size);
     norms.linf_grad = std::max(norms.linf_grad, gradient);
   };
-  const CellSet<Dim> cells = mesh.has_nodes() ? whole_mesh(mesh, {}) : CellSet<Dim>();
   std::vector<char> is_curved(mesh.cell_slots(), 0);
-  for (const auto& element : cells.curved_elements) {
-    is_curved[element.cell] = 1;
-    const auto positions = at_nodes<Dim>(element.nodes, x);
+  for (CellId c = 0; mesh.has_nodes() && c < mesh.cell_slots(); ++c) {
+    const auto element = element_of(mesh, c);
+    if (!element.curved) continue;
+    is_curved[c] = 1;
+    const auto positions = at_nodes<Dim>(element.nodes(), x);
     for (const auto& point : quadrature<Dim>(kElasticDegree)) {
-      const Vec<Dim> u = positions * quadratic_shapes<Dim>(element.curved, point.weights) -
-                         rest_position<Dim>(cells, element, point.weights);
+      Vec<Dim> X = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) X += point.weights[k] * mesh.rest(element.vertices[k]);
+      const Vec<Dim> u = positions * quadratic_shapes<Dim>(element.curved, point.weights) - X;
       const Mat<Dim> F = positions * shape_gradients<Dim>(element, point.weights).transpose();
       add(point.share * element.volume, u.norm(), (F - Mat<Dim>::Identity()).norm());
     }

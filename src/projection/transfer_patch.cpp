@@ -20,10 +20,9 @@ class Numbering {
       : mesh_(mesh), materials_(materials), out_(out) {}
 
   void add(CellId c) {
-    std::array<int, kQuadraticNodes<Dim>> nodes{};
-    const CurvedEdges curved = find_nodes<Dim>(
-        mesh_.cell(c), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); }, nodes);
-    out_.add(mesh_.cell(c), nodes, curved, materials_.at(mesh_.body(c)).density, [&](int id) { return local(id); });
+    const auto element = element_of(mesh_, c);
+    out_.add(element.vertices, element.nodes(), element.curved, materials_.at(element.body).density,
+             [&](int id) { return local(id); });
   }
 
  private:
@@ -85,13 +84,14 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
   patch.cells.num_vertices = static_cast<int>(patch.new_cells.vertices.size());
   patch.cells.rest = patch.new_cells.rest;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    const CellId c = ids[i];
-    const CurvedEdges curved = patch.new_cells.view().curved_edges(i);
-    if (curved)
-      patch.cells.curved_elements.push_back(
-          {patch.new_cells.nodes[i], curved, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), c});
-    else
-      patch.cells.elements.push_back({patch.new_cells.cells[i], mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)});
+    auto element = element_of(mesh, ids[i]);
+    element.vertices = patch.new_cells.cells[i];
+    element.part = kNone;
+    if (element.curved) {
+      const auto& nodes = patch.new_cells.nodes[i];
+      std::copy(nodes.begin() + Dim + 1, nodes.end(), element.edge_nodes.begin());
+    }
+    patch.cells.add(element);
   }
   return patch;
 }

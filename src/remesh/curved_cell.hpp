@@ -64,7 +64,7 @@ CurvedCell<Dim> curved_cell(const std::array<VertexId, Dim + 1>& vertices, const
 template <int Dim>
 CurvedCell<Dim> cell_before(const Mesh<Dim>& mesh, CellId c) {
   if (!mesh.has_nodes()) return {};
-  return curved_cell<Dim>(mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
+  return curved_cell<Dim>(mesh.cell(c), nodes_of_edges(mesh));
 }
 
 /// Calls f(gradient, share of the volume) at the points of a rule that integrates squares of the gradient of a field on a

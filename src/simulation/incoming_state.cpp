@@ -182,7 +182,7 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
       refuse_state("body of a saved cell", std::to_string(mesh.body(c)), "one that has a material");
   check_history(setup, state);
   if (!state.quadrature.empty())
-    require_size("saved levels of quadrature", state.quadrature.size(), whole_mesh(mesh, {}).curved_elements.size());
+    require_size("saved levels of quadrature", state.quadrature.size(), whole_mesh(mesh, {}).curved().size());
   if (!state.chords.empty())
     require_size("saved levels of chords", state.chords.size(), static_cast<std::size_t>(mesh.num_curved()));
   if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");

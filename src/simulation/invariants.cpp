@@ -8,8 +8,7 @@ namespace itr {
 
 template <int Dim>
 std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords) {
-  const auto node_of = [&](VertexId a, VertexId b) { return mesh.node_of(a, b); };
-  if (const CellId c = find_inverted(mesh, x, node_of); c != kNone) return "cell " + std::to_string(c) + " is inverted";
+  if (const CellId c = find_inverted(mesh, x); c != kNone) return "cell " + std::to_string(c) + " is inverted";
   if (!setup.contact.enabled) return {};
   const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords);
   if (has_intersection<Dim>(contact.surface, contact.positions(x))) return "surfaces intersect";

@@ -75,15 +75,15 @@ std::vector<CellId> find_nearly_inverted(const State<Dim>& state, const VectorX&
   constexpr double kSmall = 0.1, kTolerance = 0.1;
   const CellSet<Dim> cells = whole_mesh(state.mesh, {});
   std::vector<CellId> found;
-  for (const auto& element : cells.curved_elements) {
+  for (const auto& element : cells.curved()) {
     const double least = min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kTolerance);
     if (least * element.inverse_edges.determinant() >= kSmall) continue;
-    for (int k = 0; k <= Dim; ++k) {
-      const auto around = state.mesh.cells_of(element.nodes[k]);
+    for (const VertexId v : element.vertices) {
+      const auto around = state.mesh.cells_of(v);
       found.insert(found.end(), around.begin(), around.end());
     }
   }
-  if (found.empty() && !cells.curved_elements.empty()) {
+  if (found.empty() && cells.has_curved()) {
     found.resize(state.mesh.cell_slots());
     std::iota(found.begin(), found.end(), 0);
   }

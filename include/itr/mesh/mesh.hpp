@@ -303,6 +303,12 @@ class Mesh {
 template <int Dim>
 std::vector<EdgeKey> edges_of_order_2(const Mesh<Dim>& mesh, const std::map<int, int>& order);
 
+/// Mesh::node_of of a mesh that stays, as a function.
+template <int Dim>
+auto nodes_of_edges(const Mesh<Dim>& mesh) {
+  return [&mesh](VertexId a, VertexId b) { return mesh.node_of(a, b); };
+}
+
 extern template class Mesh<2>;
 extern template class Mesh<3>;
 

@@ -174,13 +174,12 @@ class Explanation {
   /// Pairs of nodes that share a cell.
   static std::set<std::array<int, 2>> coupled_nodes(const CellSet<Dim>& cells) {
     std::set<std::array<int, 2>> pairs;
-    const auto add = [&](const auto& nodes) {
-      for (const int a : nodes)
-        for (const int b : nodes)
+    for (const auto& element : cells.elements)
+      for_each_node(element, [&](int a) {
+        for_each_node(element, [&](int b) {
           if (a < b) pairs.insert({a, b});
-    };
-    for (const auto& element : cells.elements) add(element.vertices);
-    for (const auto& element : cells.curved_elements) add(element.nodes);
+        });
+      });
     return pairs;
   }
 

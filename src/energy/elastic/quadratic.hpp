@@ -37,7 +37,7 @@ class QuadraticElasticity {
   void limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const;
 
  private:
-  using Element = typename CellSet<Dim>::CurvedElement;
+  using Element = typename CellSet<Dim>::Element;
   static constexpr int kNodes = kQuadraticNodes<Dim>;
 
   const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {

@@ -42,9 +42,7 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   std::vector<typename MeshTypes<Dim>::Facet> chords;
   for (int f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
-    for_each_chord<Dim>(
-        mesh.facet(f), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); },
-        [&](const auto& chord) { chords.push_back(chord); });
+    for_each_chord<Dim>(mesh.facet(f), nodes_of_edges(mesh), [&](const auto& chord) { chords.push_back(chord); });
   }
   VectorX x(Dim * total);
   x.head(Dim * bodies) = fields.x.head(Dim * bodies);

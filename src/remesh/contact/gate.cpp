@@ -181,8 +181,7 @@ bool Gate<Dim>::is_any_removed_curved(const Edit<Dim>& edit) const {
   bool is_any = false;
   if (mesh_.has_nodes())
     for (const FacetId f : edit.removed_facets)
-      for_each_node_on<Dim>(
-          mesh_.facet(f), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); }, [&](VertexId) { is_any = true; });
+      for_each_node_on<Dim>(mesh_.facet(f), nodes_of_edges(mesh_), [&](VertexId) { is_any = true; });
   return is_any;
 }
 

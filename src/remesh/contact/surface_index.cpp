@@ -55,9 +55,7 @@ Box<Dim> SurfaceIndex<Dim>::box_of(FacetId f) const {
   Box<Dim> box;
   for (const int v : mesh_->facet(f)) box.include(at(v));
   if (mesh_->has_nodes())
-    for_each_node_on<Dim>(
-        mesh_->facet(f), [&](VertexId a, VertexId b) { return mesh_->node_of(a, b); },
-        [&](VertexId node) { box.include(at(node)); });
+    for_each_node_on<Dim>(mesh_->facet(f), nodes_of_edges(mesh_), [&](VertexId node) { box.include(at(node)); });
   return box;
 }
 
@@ -75,12 +73,10 @@ SurfacePieces<Dim> SurfaceIndex<Dim>::pieces(FacetId f) const {
     result.push_back(piece(f));
     return result;
   }
-  for_each_chord<Dim>(
-      mesh_->facet(f), [&](VertexId a, VertexId b) { return mesh_->node_of(a, b); },
-      [&](const auto& ids) {
-        SurfacePiece<Dim>& piece = result.emplace_back();
-        for (const int v : ids) piece.add(at(v), v);
-      });
+  for_each_chord<Dim>(mesh_->facet(f), nodes_of_edges(mesh_), [&](const auto& ids) {
+    SurfacePiece<Dim>& piece = result.emplace_back();
+    for (const int v : ids) piece.add(at(v), v);
+  });
   return result;
 }
 

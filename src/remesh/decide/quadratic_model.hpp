@@ -126,7 +126,7 @@ class QuadraticModel {
   /// Adds a cell other edges of which are curved, by the rules of quadrature that energy and mass have.
   void add_mixed_cell(const RemeshState<Dim>& state, CellId c, const EdgeKey& edge) {
     const Mesh<Dim>& mesh = state.mesh;
-    const auto cell = curved_cell<Dim>(mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
+    const auto cell = curved_cell<Dim>(mesh.cell(c), nodes_of_edges(mesh));
     const Material& material = context_.materials.at(mesh.body(c));
     const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
     const ElasticModuli moduli = elastic_moduli<Dim>(material, mesh.rest(mesh.cell(c)[0]));

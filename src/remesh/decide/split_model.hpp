@@ -59,7 +59,7 @@ class SplitModel {
   void find_nodes(CellId c) {
     Cell& cell = cells_.emplace_back();
     cell.id = c;
-    cell.nodes = curved_cell<Dim>(mesh_.cell(c), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); });
+    cell.nodes = curved_cell<Dim>(mesh_.cell(c), nodes_of_edges(mesh_));
     for (int k = 0; k <= Dim; ++k) {
       const VertexId v = cell.nodes.nodes[k];
       cell.added[k] = kNone;
