@@ -21,12 +21,9 @@ std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>
     const Material& material = context.materials.at(mesh.body(c));
     const auto moduli = elastic_moduli<Dim>(material, mesh.barycenter(c));
     const auto element = element_of(mesh, c);
-    if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
-      for_each_gradient<Dim>(curved, element.inverse_edges, fields.x, [&](const Mat<Dim>& F, double share) {
-        energies[c] += context.scaling * element.volume * share * elastic_density<Dim>(F, moduli);
-      });
-    else
-      energies[c] = context.scaling * elastic_energy<Dim>(element, fields.x, moduli);
+    for_each_gradient<Dim>(element, fields.x, [&](const Mat<Dim>& F, double share) {
+      energies[c] += context.scaling * (element.volume * (share * elastic_density<Dim>(F, moduli)));
+    });
   }
   return energies;
 }

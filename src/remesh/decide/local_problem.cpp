@@ -292,7 +292,7 @@ void LocalProblem<Dim>::set_quadrature(ConstVectorView x) {
     QuadratureLevels levels;
     std::size_t next = 0;  // of the edit's cells, of which the curved ones are here
     const auto level_of_next = [&] {
-      while (curved_cell_after<Dim>(mesh_, edit_, edit_.inserted_cells[next].vertices).edges == 0) ++next;
+      while (cell_after<Dim>(mesh_, edit_, edit_.inserted_cells[next].vertices).edges == 0) ++next;
       return state_.fields.level_of_new_cell(edit_, next++);
     };
     for (const auto& element : cells_.curved())
@@ -350,7 +350,7 @@ void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
   };
   double loss = 0;
   for (const CellId c : edit_.removed_cells) {
-    const auto cell = curved_cell<Dim>(mesh_.cell(c), nodes_of_edges(mesh_));
+    const auto cell = cell_before(mesh_, c);
     const double mass = state_.context.materials.at(mesh_.body(c)).density * mesh_.volume(c);
     const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
     const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
@@ -372,7 +372,7 @@ void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) c
   for (const CellId c : edit_.removed_cells)
     add_to_side<Dim>(mesh_.cell(c), cell_before(mesh_, c), density(mesh_.body(c)), old_side);
   for (const auto& cell : edit_.inserted_cells)
-    add_to_side<Dim>(cell.vertices, curved_cell_after(mesh_, edit_, cell.vertices), density(cell.body), new_side);
+    add_to_side<Dim>(cell.vertices, cell_after(mesh_, edit_, cell.vertices), density(cell.body), new_side);
   const auto local_vertex = [&](VertexId v) { return LocalVertex{is_created(v) ? Kind::created : Kind::of_mesh, v}; };
   for (const VertexId v : old_side.vertices) old_side.rest.push_back(mesh_.rest(v));
   for (const VertexId v : new_side.vertices) new_side.rest.push_back(rest_position(local_vertex(v)));

@@ -217,15 +217,10 @@ double RemeshQueries<Dim>::roughness(const Place& place) const {
     for (const CellId c : around) {
       const auto element = element_of(mesh_, c);
       const double w = weight(c);
-      const auto add = [&](const Mat<Dim>& gradient, double share) {
-        sum += share * gradient;
-        squares += share * gradient.squaredNorm();
-      };
-      if (const CurvedCell<Dim> cell = cell_before(mesh_, c); cell.edges)
-        for_each_gradient<Dim>(cell, element.inverse_edges, field,
-                               [&](const Mat<Dim>& gradient, double share) { add(gradient, share * w); });
-      else
-        add(deformation_gradient<Dim>(element, field), w);
+      for_each_gradient<Dim>(element, field, [&](const Mat<Dim>& gradient, double share) {
+        sum += share * w * gradient;
+        squares += share * w * gradient.squaredNorm();
+      });
       total += w;
     }
     return std::max(0.0, squares - sum.squaredNorm() / total);
