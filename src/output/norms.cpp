@@ -23,11 +23,19 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
     norms.linf = std::max(norms.linf, size);
     norms.linf_grad = std::max(norms.linf_grad, gradient);
   };
-  std::vector<char> is_curved(mesh.cell_slots(), 0);
-  for (CellId c = 0; mesh.has_nodes() && c < mesh.cell_slots(); ++c) {
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
     const auto element = element_of(mesh, c);
-    if (!element.curved) continue;
-    is_curved[c] = 1;
+    if (!element.curved) {
+      std::array<Vec<Dim>, Dim + 1> u;
+      Vec<Dim> mean = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) {
+        u[k] = vertex_of<Dim>(x, element.vertices[k]) - mesh.rest(element.vertices[k]);
+        mean += u[k] / (Dim + 1);
+      }
+      add(element.volume, mean.norm(), (edge_matrix<Dim>(u) * element.inverse_edges).norm());
+      continue;
+    }
     const auto positions = at_nodes<Dim>(element.nodes(), x);
     for (const auto& point : quadrature<Dim>(kElasticDegree)) {
       Vec<Dim> X = Vec<Dim>::Zero();
@@ -36,17 +44,6 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
       const Mat<Dim> F = positions * shape_gradients<Dim>(element, point.weights).transpose();
       add(point.share * element.volume, u.norm(), (F - Mat<Dim>::Identity()).norm());
     }
-  }
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || is_curved[c]) continue;
-    std::array<Vec<Dim>, Dim + 1> u;
-    Vec<Dim> mean = Vec<Dim>::Zero();
-    for (int k = 0; k <= Dim; ++k) {
-      const VertexId v = mesh.cell(c)[k];
-      u[k] = vertex_of<Dim>(x, v) - mesh.rest(v);
-      mean += u[k] / (Dim + 1);
-    }
-    add(mesh.volume(c), mean.norm(), (edge_matrix<Dim>(u) * mesh.inverse_rest_edges(c)).norm());
   }
   norms.l2 = std::sqrt(l2_squared);
   norms.h1_semi = std::sqrt(h1_semi_squared);

@@ -61,10 +61,16 @@ CurvedCell<Dim> curved_cell(const std::array<VertexId, Dim + 1>& vertices, const
   return cell;
 }
 
+/// Whether any edge is curved before an edit, or by it.
+template <int Dim>
+bool has_curves(const Mesh<Dim>& mesh, const Edit<Dim>& edit) {
+  return mesh.has_nodes() || !edit.inserted_nodes.empty();
+}
+
 /// The cell on these vertices as it is after an edit.
 template <int Dim>
 CurvedCell<Dim> cell_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const std::array<VertexId, Dim + 1>& vertices) {
-  if (mesh.has_nodes() || !edit.inserted_nodes.empty())
+  if (has_curves(mesh, edit))
     return curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); });
   CurvedCell<Dim> cell;
   std::copy(vertices.begin(), vertices.end(), cell.nodes.begin());

@@ -292,7 +292,6 @@ class StepSolver {
   /// Gives the curves of another mesh the chords that they ask for. Remeshing lets chords touch, not curves: where more
   /// chords would meet something, the solve begins where the step does, or is left with those that remeshing saw.
   void settle_chords() {
-    if (!setup_.contact.enabled || !next_.mesh.has_nodes()) return;
     const auto settled = [&](const ChordLevels& levels, std::span<const VectorX> positions) {
       return settled_chords<Dim>(setup_, next_.mesh, levels, positions);
     };

@@ -179,9 +179,8 @@ bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const
 template <int Dim>
 bool Gate<Dim>::is_any_removed_curved(const Edit<Dim>& edit) const {
   bool is_any = false;
-  if (mesh_.has_nodes())
-    for (const FacetId f : edit.removed_facets)
-      for_each_node_on<Dim>(mesh_.facet(f), nodes_of_edges(mesh_), [&](VertexId) { is_any = true; });
+  for (const FacetId f : edit.removed_facets)
+    for_each_node_on<Dim>(mesh_.facet(f), nodes_of_edges(mesh_), [&](VertexId) { is_any = true; });
   return is_any;
 }
 

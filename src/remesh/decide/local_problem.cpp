@@ -221,7 +221,7 @@ void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
 template <int Dim>
 template <typename Simplex>
 void LocalProblem<Dim>::localize(Simplex& simplex) {
-  if (mesh_.has_nodes() || (is_after_ && !edit_.inserted_nodes.empty()))
+  if (has_curves(mesh_, edit_))
     simplex.curved = find_edge_nodes<static_cast<int>(simplex.vertices.size()) - 1>(
         simplex.vertices, [&](VertexId a, VertexId b) { return node_of(a, b); }, simplex.edge_nodes);
   for (VertexId& v : simplex.vertices) v = local(v);

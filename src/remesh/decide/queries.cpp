@@ -258,8 +258,7 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
     options.patch_over_vertex = is_refined && !trial.in_contact
                                     ? patch_over_refinement(edit.removed_cells)
                                     : patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
-  const bool has_nodes = mesh_.has_nodes() || !edit.inserted_nodes.empty();
-  if (has_nodes && !trial.in_contact) options.predicted = trial.predicted;
+  if (has_curves(mesh_, edit) && !trial.in_contact) options.predicted = trial.predicted;
   trial.is_asked = trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);

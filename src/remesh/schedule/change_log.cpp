@@ -23,7 +23,7 @@ void ChangeLog<Dim>::write_surface(VertexId v) {
   const auto include = [&](VertexId w) { surfaces_.back().include(x_.template segment<Dim>(Dim * w)); };
   for_each_facet_at(mesh_, v, [&](FacetId f) {
     for (const VertexId w : mesh_.facet(f)) include(w);
-    if (mesh_.has_nodes()) for_each_node_on<Dim>(mesh_.facet(f), nodes_of_edges(mesh_), include);
+    for_each_node_on<Dim>(mesh_.facet(f), nodes_of_edges(mesh_), include);
   });
 }
 
