@@ -192,7 +192,7 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
   } else {
     surface.x = points<Dim>(frame.x);
     const auto boundary = boundary_facets<Dim>(frame.simplices);
-    surface.own_facets = chords<Dim>(boundary, space_of(frame), num_vertices(frame));
+    surface.own_facets = chords<Dim>(boundary, CurvedNodes(frame));
     if constexpr (Dim == 3)
       for (const auto& f : boundary)
         for (int k = 0; k < 3; ++k) {
@@ -410,6 +410,7 @@ struct Patches {
 template <int Dim>
 Patches<Dim> true_surface(const StoredFrame& frame, const Surface<Dim>& surface) {
   Patches<Dim> result;
+  const CurvedNodes node_of(frame);
   const auto& x = surface.x;
   const auto add = [&](const std::array<int, Dim>& facet) {
     bool is_curved = false;
@@ -514,7 +515,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   const Surface<Dim> surface = make_surface<Dim>(frame);
   check_surface(surface, name, violations);
   Patches<Dim> curves;
-  if (!surface.curved.empty()) curves = true_surface(frame, surface, space_of(frame));
+  if (!surface.curved.empty()) curves = true_surface(frame, surface);
   if (violations.size() == before) check_insides(surface, find_in_hollows(surface, curves), name, violations);
   check_curves(surface, curves, name, violations);
   measure_overhangs(frame, surface, certificate);
