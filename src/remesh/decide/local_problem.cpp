@@ -222,7 +222,7 @@ template <int Dim>
 template <typename Simplex>
 void LocalProblem<Dim>::localize(Simplex& simplex) {
   if (has_curves(mesh_, edit_))
-    simplex.curved = find_edge_nodes<static_cast<int>(simplex.vertices.size()) - 1>(
+    simplex.curved = find_edge_nodes<static_cast<int>(std::tuple_size_v<decltype(simplex.vertices)>) - 1>(
         simplex.vertices, [&](VertexId a, VertexId b) { return node_of(a, b); }, simplex.edge_nodes);
   for (VertexId& v : simplex.vertices) v = local(v);
   if (simplex.curved)
