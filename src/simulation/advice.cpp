@@ -15,6 +15,7 @@
 #include "geometry/measures.hpp"
 #include "mesh/connected_parts.hpp"
 #include "simulation/held_corners.hpp"
+#include "simulation/incoming_state.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
