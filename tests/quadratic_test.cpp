@@ -348,7 +348,7 @@ TEST(CurvedMesh, ChangesGiveNewRevisions) {
   expect_new("tag of a vertex");
   mesh.set_curved_edges({{0, 1}});
   expect_new("curved edge");
-  mesh.apply(*propose_split(mesh, {0, 2}).edit);
+  mesh.apply(make_split(mesh, {0, 2}));
   expect_new("split");
   EXPECT_FALSE(mesh.is_compact());
   mesh.compact();
