@@ -106,7 +106,7 @@ struct Scene {
   }
 
   HistoryTransferReport transfer() {
-    return transfer_history(setup, old_mesh, {}, old_history, mesh, {}, touched, *solver, history);
+    return transfer_history(setup, old_mesh, old_history, mesh, touched, *solver, history);
   }
 
   /// Integral of rho u over all bodies.
@@ -401,7 +401,7 @@ TEST(HistoryTransfer, ForcedBarrierIn3D) {
     };
     const History old_history{.x = {x}, .v = {rates}, .a = {}};
     History history{.x = {carried(x)}, .v = {carried(rates)}, .a = {}};
-    const auto report = transfer_history(setup, old_mesh, {}, old_history, mesh, {}, touched, *solver, history);
+    const auto report = transfer_history(setup, old_mesh, old_history, mesh, touched, *solver, history);
     EXPECT_EQ(report.with_barriers, 1) << seed;
     EXPECT_EQ(report.not_converged, 0) << seed;
     EXPECT_LE((integral(mesh, history.x[0]) - integral(old_mesh, x)).norm(), kRoundOff * kDensity);

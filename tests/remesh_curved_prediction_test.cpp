@@ -163,7 +163,7 @@ TYPED_TEST(CurvedPrediction, EnergiesOfCellsAreThoseOfPatches) {
     double sum = 0;
     for (const auto& cell : edit.inserted_cells) {
       sum += cell_energy<Dim>(view.state, cell.vertices, cell.body, edit);
-      curved += curved_cell_after(scene.mesh, edit, cell.vertices).edges != 0;
+      curved += cell_after(scene.mesh, edit, cell.vertices).edges != 0;
     }
     const double expected = LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, scratch).value();
     EXPECT_NEAR(sum, expected, 1e-9 * std::abs(expected)) << "seed " << seed;
@@ -248,7 +248,7 @@ TYPED_TEST(CurvedPrediction, BarriersArePartOfEnergies) {
     const VectorX x = compact.field(scene.fields.x);
     const double whole =
         ElasticEnergy<Dim>(cells, context.materials, context.scaling, context.quadrature_degree).value(x, workspace);
-    const auto is_active = [&](const auto& e) { return JacobianBarrier<Dim>(e, at_nodes<Dim>(e.nodes, x)).is_active(); };
+    const auto is_active = [&](const auto& e) { return JacobianBarrier<Dim>(e, at_nodes<Dim>(e.nodes(), x)).is_active(); };
     const auto active = std::ranges::find_if(cells.curved(), is_active);
     if (active == cells.curved().end() || !std::isfinite(whole)) continue;
     const View<Dim> view(scene, context);
