@@ -153,7 +153,7 @@ struct Coarsening {
     MatrixX carried(mesh.node_slots(), u.cols());
     for (Eigen::Index v = 0; v < u.rows(); ++v)
       if (map.vertex[v] != kNone) carried.row(map.vertex[v]) = u.row(v);
-    const TransferPatch<3> patch = make_transfer_patch(before, {}, mesh, {}, touched, materials, 2);
+    const TransferPatch<3> patch = make_transfer_patch(before, mesh, touched, materials, 2);
     MatrixX u_old(patch.old_cells.vertices.size(), u.cols()), u_bar(patch.new_cells.vertices.size(), u.cols());
     for (Eigen::Index i = 0; i < u_old.rows(); ++i) u_old.row(i) = u.row(patch.old_cells.vertices[i]);
     for (Eigen::Index i = 0; i < u_bar.rows(); ++i) u_bar.row(i) = carried.row(patch.new_cells.vertices[i]);
@@ -271,7 +271,7 @@ TEST(Transfer, PatchComesNearTheWholeMeshRingByRing) {
   TouchedCells touched{edit->removed_cells, {}};
   for (int c = before.cell_slots(); c < mesh.cell_slots(); ++c) touched.new_cells.push_back(c);
   const auto change = [&](int rings) {
-    const auto patch = make_transfer_patch(before, {}, mesh, {}, touched, {{1, {.density = 1}}, {2, {.density = 5}}}, rings);
+    const auto patch = make_transfer_patch(before, mesh, touched, {{1, {.density = 1}}, {2, {.density = 5}}}, rings);
     std::vector<char> fixed;
     for (const char at_rim : patch.at_rim) fixed.insert(fixed.end(), 2, at_rim);
     TransferReport report;
