@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <vector>
 
 #include "fem/displacement.hpp"
@@ -40,6 +41,7 @@ class QuadraticElasticity {
   using Element = typename CellSet<Dim>::Element;
   static constexpr int kNodes = kQuadraticNodes<Dim>;
 
+  std::span<const Element> elements() const { return cells_.curved(); }
   const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
     return cell_quadrature<Dim>(levels_.empty() ? 0 : levels_[e], degree_);
   }

@@ -318,7 +318,7 @@ void LocalProblem<Dim>::add_terms() {
   else
     storage_->potential.emplace(context, cells_, history);
   IncrementalPotential<Dim>& potential = *storage_->potential;
-  if (cells_.has_curved()) set_quadrature(x);
+  set_quadrature(x);
   // With lumped mass a split changes how inertia is integrated.
   const bool is_nested = !is_after_ || (edit_.is_nested() && context.mass == MassKind::consistent);
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)

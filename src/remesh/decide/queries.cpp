@@ -161,13 +161,10 @@ double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, double tolera
 
 template <int Dim>
 double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read) const {
-  const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
   // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
   if (may_have_curves() && !is_predictable(context_))
     return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read);
-  if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
-  const auto around = mesh_.cells_of_edge(edge);
-  if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
+  if (!mesh_.has_nodes() || !any_is_curved(mesh_.cells_of_edge(edge))) return itr::predict_split<Dim>(state(), edge);
   const double gain = itr::predict_split_at_curves<Dim>(state(), edge);
   return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read) : gain;
 }
