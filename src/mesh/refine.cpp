@@ -70,10 +70,10 @@ std::array<std::array<VertexId, 3>, 4> children_of_facet(const std::array<Vertex
 
 template <int Dim>
 Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
-  ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots(), mesh.num_vertices(), mesh.vertex_slots());
+  ITR_CHECK(mesh.num_vertices() == mesh.node_slots(), mesh.num_vertices(), mesh.node_slots());
   std::vector<Vec<Dim>> rest;
-  rest.reserve(mesh.vertex_slots());
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  rest.reserve(mesh.node_slots());
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) rest.push_back(mesh.rest(v));
   const Midpoints<Dim> mid(mesh, rest);
 
   std::vector<typename Mesh<Dim>::Cell> cells;

@@ -45,7 +45,7 @@ template <int Dim>
 bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit, double least_share) {
   constexpr double kTolerance = 0.1;
   const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
-  const auto node_before = [&](VertexId a, VertexId b) { return mesh.node_of(a, b); };
+  const auto node_before = nodes_of_edges(mesh);
   const auto node_later = [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); };
   const auto keeps = [&](const VectorX& x) {
     double before = std::numeric_limits<double>::infinity();
@@ -96,7 +96,7 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
     if (options.swap.enabled) swap_edges(session);
     if (options.smooth.enabled) smooth_vertices(session);
   }
-  fields.trim(mesh.vertex_slots());
+  fields.trim(mesh.node_slots());
   report.trial_seconds = session.commits().median_trial_seconds();
   memory.refusals = session.memory().remembered(session.ask());
   return report;
@@ -115,7 +115,7 @@ RemeshReport curve_edges(std::span<const EdgeKey> edges, Mesh<Dim>& mesh, Remesh
     else
       count.note(refusal);
   }
-  fields.trim(mesh.vertex_slots());
+  fields.trim(mesh.node_slots());
   memory.refusals = session.memory().remembered(session.ask());
   return session.report();
 }
@@ -149,7 +149,7 @@ RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume
   std::vector<CellId> made;
   for (CellId c = first_new; c < mesh.cell_slots(); ++c) made.push_back(c);
   for (const EdgeKey& edge : curved(edges_of<Dim>(mesh, made))) commit(make_straighten(mesh, edge));
-  fields.trim(mesh.vertex_slots());
+  fields.trim(mesh.node_slots());
   memory.refusals = session.memory().remembered(session.ask());
   return session.report();
 }

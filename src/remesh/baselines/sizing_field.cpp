@@ -36,7 +36,7 @@ class SizingField {
       count.note(refusal);
       if (refusal != Refusal::none) continue;
       ++count.tried;
-      const VertexId created = ask_.mesh().vertex_slots();
+      const VertexId created = ask_.mesh().node_slots();
       if (!session_.commits().commit_unjudged(make_split(ask_.mesh(), edge), session_.scratch().gate, count)) continue;
       for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(created))) push_split(near);
     }
@@ -73,7 +73,7 @@ class SizingField {
   /// No edge is split that is shorter [m].
   double least_length() const {
     Box<Dim> box;
-    for (VertexId v = 0; v < ask_.mesh().vertex_slots(); ++v)
+    for (VertexId v = 0; v < ask_.mesh().node_slots(); ++v)
       if (ask_.mesh().is_vertex_alive(v)) box.include(ask_.mesh().rest(v));
     return ask_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
   }

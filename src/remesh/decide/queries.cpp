@@ -161,13 +161,10 @@ double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, double tolera
 
 template <int Dim>
 double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read) const {
-  const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
   // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
   if (may_have_curves() && !is_predictable(context_))
     return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read);
-  if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
-  const auto around = mesh_.cells_of_edge(edge);
-  if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
+  if (!mesh_.has_nodes() || !any_is_curved(mesh_.cells_of_edge(edge))) return itr::predict_split<Dim>(state(), edge);
   const double gain = itr::predict_split_at_curves<Dim>(state(), edge);
   return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read) : gain;
 }
@@ -217,15 +214,10 @@ double RemeshQueries<Dim>::roughness(const Place& place) const {
     for (const CellId c : around) {
       const auto element = element_of(mesh_, c);
       const double w = weight(c);
-      const auto add = [&](const Mat<Dim>& gradient, double share) {
-        sum += share * gradient;
-        squares += share * gradient.squaredNorm();
-      };
-      if (const CurvedCell<Dim> cell = cell_before(mesh_, c); cell.edges)
-        for_each_gradient<Dim>(cell, element.inverse_edges, field,
-                               [&](const Mat<Dim>& gradient, double share) { add(gradient, share * w); });
-      else
-        add(deformation_gradient<Dim>(element, field), w);
+      for_each_gradient<Dim>(element, field, [&](const Mat<Dim>& gradient, double share) {
+        sum += share * w * gradient;
+        squares += share * w * gradient.squaredNorm();
+      });
       total += w;
     }
     return std::max(0.0, squares - sum.squaredNorm() / total);
@@ -263,8 +255,7 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalR
     options.patch_over_vertex = is_refined && !trial.in_contact
                                     ? patch_over_refinement(edit.removed_cells)
                                     : patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
-  const bool has_nodes = mesh_.has_nodes() || !edit.inserted_nodes.empty();
-  if (has_nodes && !trial.in_contact) options.predicted = trial.predicted;
+  if (has_curves(mesh_, edit) && !trial.in_contact) options.predicted = trial.predicted;
   trial.is_asked = trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);

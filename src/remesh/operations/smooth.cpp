@@ -56,16 +56,11 @@ Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& ask, VertexId vertex
     const auto element = element_of(mesh, c);
     const Vec<Dim> gradient = barycentric_gradient<Dim>(element.inverse_edges, static_cast<int>(k));
     const ElasticModuli moduli = elastic_moduli<Dim>(ask.context().materials.at(element.body), mesh.barycenter(c));
-    const auto add = [&](const Mat<Dim>& F, double weight) {
-      sum += weight *
-             (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
-    };
     const double weight = ask.context().scaling * element.volume;
-    if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
-      for_each_gradient<Dim>(curved, element.inverse_edges, ask.fields().x,
-                             [&](const Mat<Dim>& F, double share) { add(F, share * weight); });
-    else
-      add(deformation_gradient<Dim>(element, ask.fields().x), weight);
+    for_each_gradient<Dim>(element, ask.fields().x, [&](const Mat<Dim>& F, double share) {
+      sum += share * weight *
+             (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
+    });
   }
   return sum;
 }
@@ -178,7 +173,7 @@ class ShapeBetterer : Mover<Dim> {
 template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session) {
   std::vector<Place> vertices;
-  for (VertexId v = 0; v < session.ask().mesh().vertex_slots(); ++v) vertices.push_back(Place::at_vertex(v));
+  for (VertexId v = 0; v < session.ask().mesh().node_slots(); ++v) vertices.push_back(Place::at_vertex(v));
   for (int round = 0; round < session.ask().options().smooth.max_iterations; ++round) {
     ForceFollower<Dim> follower(session);
     run_waves(session, follower, vertices);

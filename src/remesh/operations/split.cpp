@@ -75,7 +75,7 @@ class Refiner {
     }
     auto changed = std::span<const CellId>(trial.verdict.patch).last(trial.edit->inserted_cells.size());
     if (!curves) {
-      const VertexId created = ask_.mesh().vertex_slots() - 1 - static_cast<int>(trial.edit->inserted_nodes.size());
+      const VertexId created = ask_.mesh().node_slots() - 1 - static_cast<int>(trial.edit->inserted_nodes.size());
       inherit(trial.edge(), created);
       changed = ask_.mesh().cells_of(created);
     }
