@@ -93,7 +93,7 @@ Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
 
   Mesh<Dim> refined(std::move(rest), std::move(cells), std::move(body));
   for (const auto& [facet, tag] : tagged) refined.set_facet_tag(refined.find_facet(facet), tag);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) refined.set_vertex_tag(v, mesh.vertex_tag(v));
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v) refined.set_vertex_tag(v, mesh.vertex_tag(v));
   for (const EdgeKey& edge : mesh.edges()) refined.set_vertex_tag(mid(edge[0], edge[1]), mesh.edge_tag(edge));
   return refined;
 }

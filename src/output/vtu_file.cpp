@@ -93,7 +93,7 @@ std::vector<std::uint8_t> points_of(const SetMembers& set, const FrameView<Dim>&
       values[a] = 1;
       for (const VertexId b : frame.mesh.facet(static_cast<FacetId>(f))) edges.insert(edge_key(a, b));
     }
-  std::size_t node = frame.mesh.vertex_slots();
+  std::size_t node = frame.mesh.num_vertices();
   const auto mark = [&](const EdgeKey& edge) { values[node++] = edges.contains(edge); };
   if (frame.space) std::for_each(frame.space->curved_edges().begin(), frame.space->curved_edges().end(), mark);
   std::for_each(drawn.straight_edges.begin(), drawn.straight_edges.end(), mark);

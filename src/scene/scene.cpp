@@ -56,7 +56,7 @@ Sets sets_of(const Geometry<Dim>& geometry) {
   Sets sets;
   std::set<int> surfaces(geometry.id.begin(), geometry.id.end());
   for (FacetId f = 0; f < geometry.mesh.facet_slots(); ++f) surfaces.insert(geometry.mesh.facet_tag(f));
-  for (VertexId v = 0; v < geometry.mesh.vertex_slots(); ++v) surfaces.insert(geometry.mesh.vertex_tag(v));
+  for (VertexId v = 0; v < geometry.mesh.num_vertices(); ++v) surfaces.insert(geometry.mesh.vertex_tag(v));
   surfaces.erase(kNoTag);
   /// Parts of a boundary that are in others, too, have its number.
   const auto fill = [](const std::set<int>& ids, const auto& names, bool have_number, LabelIds& labels) {
