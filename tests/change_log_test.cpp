@@ -58,7 +58,7 @@ TEST(ChangeLog, KnowsEveryVertexAndPartOfTheSurfaceThatACommitChanged) {
         bool has_changed = is_changed[v];
         for (const CellId c : cells_at(mesh, v))
           for (const VertexId w : mesh.cell(c)) has_changed = has_changed || is_changed[w];
-        const Place vertex = Place::at_vertex(v);
+        const Candidate vertex(OperationKind::smooth, v);
         if (has_changed) {
           ASSERT_TRUE(log.has_changed_around(vertex, since)) << "seed " << seed << ", edit " << i << ", vertex " << v;
           EXPECT_TRUE(log.had_changed_around(vertex, log.now()));
@@ -94,7 +94,7 @@ TEST(ChangeLog, TellsGainsByTheFirstCommitThere) {
   log.add_follower([&](const Change<2>& change) { scene.fields.follow(change.edit, change.created); });
   const EdgeKey edge = scene.mesh.edges()[0];
   log.commit(make_split(scene.mesh, edge), {});
-  const Place end = Place::at_vertex(edge[0]);
+  const Candidate end(OperationKind::smooth, edge[0]);
   EXPECT_TRUE(log.had_changed_around(end, 1));
   EXPECT_FALSE(log.had_changed_around(end, 0));
   const EdgeKey half{edge[0], scene.mesh.node_slots() - 1};

@@ -377,19 +377,23 @@ TEST(CurvedHost, RemeshingMayBeSwitchedOnLaterWithAToleranceOfItsOwn) {
 }
 
 TEST(Memory, ForgetsRefusalsByStricterTolerances) {
-  using Memory = RemeshMemory;
-  Memory memory;
-  std::array<double, Memory::kKinds> tolerances{};
-  tolerances[Memory::split] = 10;
-  tolerances[Memory::collapse] = -1;
+  constexpr int kSplit = static_cast<int>(OperationKind::split), kCollapse = static_cast<int>(OperationKind::collapse);
+  RemeshMemory memory;
+  std::array<double, kOperationKinds> tolerances{};
+  tolerances[kSplit] = 10;
+  tolerances[kCollapse] = -1;
   memory.begin(tolerances);
-  memory.refusals[Memory::split] = memory.refusals[Memory::collapse] = {{Place(EdgeKey{0, 1}), {1, 2, false}}};
+  for (const OperationKind kind : {OperationKind::split, OperationKind::collapse})
+    memory.refusals.push_back({Candidate(kind, EdgeKey{0, 1}), {1, 2, false}});
   const auto remembers = [&](double split, double collapse) {
-    Memory copy = memory;
-    tolerances[Memory::split] = split;
-    tolerances[Memory::collapse] = collapse;
+    RemeshMemory copy = memory;
+    tolerances[kSplit] = split;
+    tolerances[kCollapse] = collapse;
     copy.begin(tolerances);
-    return std::array{!copy.refusals[Memory::split].empty(), !copy.refusals[Memory::collapse].empty()};
+    const auto holds = [&](OperationKind kind) {
+      return std::ranges::any_of(copy.refusals, [&](const auto& entry) { return entry.candidate.kind() == kind; });
+    };
+    return std::array{holds(OperationKind::split), holds(OperationKind::collapse)};
   };
   EXPECT_EQ(remembers(9, -1.1), (std::array{true, true}));
   EXPECT_EQ(remembers(20, -0.5), (std::array{true, true}));

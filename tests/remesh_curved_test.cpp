@@ -241,11 +241,11 @@ TYPED_TEST(Curved, RefusalsDoNotKeepCellsDistorted) {
     options.split.min_edge_length = 0;
     options.collapse.acceptance_tolerance = options.straighten.acceptance_tolerance = -1e-12;
     const Gate<Dim> gate(scene.mesh, scene.fields, context);
-    const RemeshQueries<Dim> ask(scene.mesh, scene.fields, context, options, scene.strata, gate, nullptr);
-    if (!ask.is_distorted(scene.mesh.cells_of_edge(edge))) continue;
+    const RemeshQueries<Dim> queries(scene.mesh, scene.fields, context, options, scene.strata, gate, nullptr);
+    if (!queries.is_distorted(scene.mesh.cells_of_edge(edge))) continue;
     ++distorted;
     RemeshMemory memory;
-    memory.refusals[RemeshMemory::straighten] = {{edge, {0, 1e9, false}}};
+    memory.refusals = {{Candidate(OperationKind::straighten, edge), {0, 1e9, false}}};
     straightened += remesh<Dim>(scene.mesh, scene.fields, context, options, memory, scene.strata).straightens.accepted;
   }
   EXPECT_GT(distorted, 5);

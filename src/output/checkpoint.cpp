@@ -111,25 +111,26 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
   return mesh;
 }
 
-constexpr const char* kOperations[RemeshMemory::kKinds] = {"split",   "collapse", "swap",      "smooth",
-                                                           "reshape", "curve",    "straighten"};
-constexpr int kRefusalColumns = 5;  ///< two vertices (one and kNone), least and most signal, whether in contact
+/// Two vertices (one and kNone) or those of a facet, then least and most refusal key, and whether in contact.
+int refusal_columns(OperationKind kind) { return kind == OperationKind::remove_facet ? 6 : 5; }
 
 constexpr const char* kRefusalTolerances = "/checkpoint/refusal_tolerances";  ///< [J], by operation
 
-std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }
+std::string refusals_name(OperationKind kind) {
+  return std::string("/checkpoint/refusals/") + kOperationNames[static_cast<int>(kind)];
+}
 
 void write_memory(hdf5::File& file, const RemeshMemory& memory) {
-  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
-    std::vector<double> rows;
-    rows.reserve(kRefusalColumns * memory.refusals[kind].size());
-    for (const auto& [place, range] : memory.refusals[kind]) {
-      const auto vertices = place.vertices();
-      rows.insert(rows.end(), {double(vertices.front()), place.is_vertex() ? kNone : double(vertices.back()), range.least,
-                               range.most, range.in_contact ? 1.0 : 0.0});
-    }
-    if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
+  std::array<std::vector<double>, kOperationKinds> tables;
+  for (const auto& [candidate, range] : memory.refusals) {
+    auto& rows = tables[static_cast<int>(candidate.kind())];
+    const auto& ids = candidate.facet();
+    rows.insert(rows.end(), ids.begin(), ids.begin() + refusal_columns(candidate.kind()) - 3);
+    rows.insert(rows.end(), {range.least, range.most, range.in_contact ? 1.0 : 0.0});
   }
+  for (int i = 0; i < kOperationKinds; ++i)
+    if (const auto kind = static_cast<OperationKind>(i); !tables[i].empty())
+      file.write(refusals_name(kind), tables[i], refusal_columns(kind));
   std::vector<double> tolerances;
   for (const auto& tolerance : memory.tolerances)
     tolerances.push_back(tolerance.value_or(std::numeric_limits<double>::quiet_NaN()));
@@ -140,29 +141,36 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
   RemeshMemory memory;
   if (file.contains(kRefusalTolerances)) {
     const auto table = file.read_doubles(kRefusalTolerances);
-    if (table.values.size() != RemeshMemory::kKinds)
+    if (table.values.size() > kOperationKinds)
       throw InputError({path.string(), kRefusalTolerances, std::to_string(table.values.size()) + " numbers",
-                        std::to_string(RemeshMemory::kKinds)});
+                        "at most " + std::to_string(kOperationKinds)});
     std::copy(table.values.begin(), table.values.end(), memory.tolerances.begin());
   }
   if (!file.contains("/checkpoint/refusals")) return memory;
-  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
-    if (!file.contains(refusals_name(kind))) continue;
-    const auto table = file.read_doubles(refusals_name(kind));
-    if (table.columns != kRefusalColumns)
-      throw InputError(
-          {path.string(), refusals_name(kind), std::to_string(table.columns) + " columns", std::to_string(kRefusalColumns)});
-    for (std::size_t i = 0; i < table.values.size(); i += kRefusalColumns) {
-      const double* row = &table.values[i];
-      const EdgeKey edge{as_int(path, refusals_name(kind), row[0]), as_int(path, refusals_name(kind), row[1])};
-      if (edge[0] < 0 || edge[0] >= num_vertices || edge[1] < kNone || edge[1] >= num_vertices)
-        throw InputError({path.string(), refusals_name(kind),
-                          "vertices " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]),
-                          "numbers below " + std::to_string(num_vertices)});
-      const Place place = edge[1] == kNone ? Place::at_vertex(edge[0]) : Place(edge);
-      memory.refusals[kind].push_back({place, {row[2], row[3], row[4] != 0}});
+  for (int i = 0; i < kOperationKinds; ++i) {
+    const auto kind = static_cast<OperationKind>(i);
+    const std::string name = refusals_name(kind);
+    if (!file.contains(name)) continue;
+    const auto table = file.read_doubles(name);
+    const int columns = refusal_columns(kind), vertices = columns - 3;
+    if (table.columns != columns)
+      throw InputError({path.string(), name, std::to_string(table.columns) + " columns", std::to_string(columns)});
+    for (std::size_t first = 0; first < table.values.size(); first += columns) {
+      const double* row = &table.values[first];
+      MeshTypes<3>::Facet ids{kNone, kNone, kNone};
+      for (int k = 0; k < vertices; ++k) {
+        ids[k] = as_int(path, name, row[k]);
+        if (ids[k] < (k == 0 ? 0 : kNone) || ids[k] >= num_vertices)
+          throw InputError(
+              {path.string(), name, "a vertex " + std::to_string(ids[k]), "numbers below " + std::to_string(num_vertices)});
+      }
+      const Candidate candidate = vertices == 3     ? Candidate(kind, ids)
+                                  : ids[1] == kNone ? Candidate(kind, ids[0])
+                                                    : Candidate(kind, EdgeKey{ids[0], ids[1]});
+      memory.refusals.push_back({candidate, {row[vertices], row[vertices + 1], row[vertices + 2] != 0}});
     }
   }
+  std::ranges::sort(memory.refusals, {}, &RemeshMemory::Entry::candidate);
   return memory;
 }
 

@@ -21,14 +21,14 @@ std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>
     const Material& material = context.materials.at(mesh.body(c));
     const auto moduli = elastic_moduli<Dim>(material, mesh.barycenter(c));
     const auto element = element_of(mesh, c);
-    for_each_gradient<Dim>(element, fields.x, [&](const Mat<Dim>& F, double share) {
-      energies[c] += context.scaling * (element.volume * (share * elastic_density<Dim>(F, moduli)));
+    for_each_gradient<Dim>(element, fields.x, [&](const Mat<Dim>& F, double fraction) {
+      energies[c] += context.scaling * (element.volume * (fraction * elastic_density<Dim>(F, moduli)));
     });
   }
   return energies;
 }
 
-/// Contact energy (stiffness left out) of each vertex: its share of the pairs that it is part of.
+/// Contact energy (stiffness left out) of each vertex: its part of the pairs that it is part of.
 template <int Dim>
 std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields,
                                             const StepContext<Dim>& context) {
@@ -48,8 +48,8 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {
-    const double share = context.scaling * contact.pair_energy(s, x) / s.size();
-    for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += share;
+    const double part = context.scaling * contact.pair_energy(s, x) / s.size();
+    for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += part;
   }
   for (const EdgeKey& edge : mesh.curved_edges())
     for (const VertexId end : edge) energies[end] += energies[mesh.node_of(edge)] / 2;
@@ -86,12 +86,12 @@ std::unique_ptr<Baseline<Dim>> Baseline<Dim>::chosen_by(const RemeshOptions& opt
 }
 
 template <int Dim>
-void Baseline<Dim>::rank(const RemeshQueries<Dim>& ask) {
+void Baseline<Dim>::rank(const RemeshQueries<Dim>& queries) {
   if (!culls()) return;
-  const Mesh<Dim>& mesh = ask.mesh();
+  const Mesh<Dim>& mesh = queries.mesh();
   const auto edges = mesh.edges();
-  const auto of_cells = cell_energies(mesh, ask.fields(), ask.context());
-  const auto of_vertices = vertex_contact_energies(mesh, ask.fields(), ask.context());
+  const auto of_cells = cell_energies(mesh, queries.fields(), queries.context());
+  const auto of_vertices = vertex_contact_energies(mesh, queries.fields(), queries.context());
   std::vector<double> elastic, contact;
   for (const EdgeKey& edge : edges) {
     double sum = 0;
@@ -102,10 +102,10 @@ void Baseline<Dim>::rank(const RemeshQueries<Dim>& ask) {
         ++count;
       }
     elastic.push_back(sum / count);
-    contact.push_back(ask.is_surface(edge) ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
+    contact.push_back(queries.is_surface(edge) ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
   }
   const bool touching = std::any_of(contact.begin(), contact.end(), [](double e) { return e > 0; });
-  const Thresholds by_elastic(elastic, ask.options()), by_contact(contact, ask.options());
+  const Thresholds by_elastic(elastic, queries.options()), by_contact(contact, queries.options());
   ranks_.clear();
   ranks_.reserve(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
