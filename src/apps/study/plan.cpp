@@ -75,6 +75,7 @@ class Source {
       for (CellId c = 0; c < setup.mesh.cell_slots(); ++c) has_one_body &= setup.mesh.body(c) == body;
       const bool is_open = setup.contact.enabled && !has("/solver/contact/barrier_stiffness");
       if (is_open) setup.contact.adaptive_stiffness = false, setup.contact.barrier_stiffness = 0;
+      const bool has_open_dhat = setup.contact.enabled && setup.contact.activation_distance == 0;
       setup.remesh.enabled = true;
       setup.choose_defaults();
       remesh = setup.remesh;
@@ -82,6 +83,8 @@ class Source {
       const double unit = setup.contact.convergent ? units.factor("Pa") : units.factor("J") / std::pow(units.factor("m"), 4);
       if (is_open)
         pinned = {{"/solver/contact/barrier_stiffness", fmt::format("{}", setup.contact.barrier_stiffness / unit)}};
+      if (has_open_dhat)
+        pinned.push_back({"/contact/dhat", fmt::format("{}", setup.contact.activation_distance / units.factor("m"))});
       const auto& contact = setup.contact;
       has_friction = contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0;
       if (has_friction) pin_friction(options.overrides);
@@ -140,6 +143,7 @@ class Source {
     };
     pin("/solver/contact/friction_iterations", std::to_string(kFrictionRounds));
     pin("/solver/contact/friction_convergence_tol", "0");
+    pin("/solver/lagging_tolerance", "0");
     notes += "friction lagged until it does not change, at most " + json_friction_rounds() + " rounds a solve";
   }
 
