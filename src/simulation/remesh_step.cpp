@@ -96,6 +96,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
     context.host.push_back(point_forces<Dim>(state.mesh, forces));
   }
   context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
+  context.contact.friction_velocity = problem.friction_velocity();
   context.held_components = held_components(setup);
   context.newton = setup.newton;
   context.shortest_edge = tools.initial_edges.shortest;

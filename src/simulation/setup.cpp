@@ -49,7 +49,7 @@ void check_contact(const ContactOptions& contact) {
   require_not_negative("/contact/dhat", contact.activation_distance);
   require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
   require_not_negative("/contact/friction_coefficient", contact.friction_coefficient);
-  require_positive("/contact/epsv", contact.friction_velocity);
+  require_not_negative("/contact/epsv", contact.friction_velocity);
   require_not_negative("/solver/contact/friction_convergence_tol", contact.friction_tolerance);
 }
 
@@ -177,6 +177,7 @@ void StepSetup<Dim>::validate() const {
   check_functions("neumann", neumann, &NeumannCondition<Dim>::traction);
   check_functions("pressure", pressure, &PressureCondition<Dim>::pressure);
   require_positive("/solver/advanced/lagged_load_tolerance", lagged_load_tolerance);
+  require_not_negative("/solver/lagging_tolerance", lagging_tolerance);
   for (std::size_t i = 0; i < damping.size(); ++i) {
     require_not_negative(element("damping", i) + ".coefficient", damping[i].coefficient);
     require_at_least(element("damping", i) + ".lagging_rounds", damping[i].lagging_rounds, 1);

@@ -113,9 +113,16 @@ class EffortClock {
 template <int Dim>
 class StepSolver {
  public:
-  /// The first solve starts at `x_start`; empty: at the positions before.
-  StepSolver(const StepTools<Dim>& tools, const State<Dim>& before, StepMethod method, const VectorX& x_start)
-      : tools_(tools), setup_(tools.setup), before_(before), next_(before), x_(x_start), guard_(tools.setup, before) {
+  /// The first solve starts at `x_start`; empty: at the positions before. It must settle what is lagged if the step may be
+  /// cut.
+  StepSolver(const StepTools<Dim>& tools, const State<Dim>& before, StepMethod method, const VectorX& x_start, bool may_cut)
+      : tools_(tools),
+        setup_(tools.setup),
+        before_(before),
+        next_(before),
+        x_(x_start),
+        guard_(tools.setup, before),
+        must_settle_(may_cut && tools.setup.lagging_tolerance > 0) {
     next_.step = before.step + 1;
     next_.t = setup_.time.time_after(next_.step);
     next_.history.damp_next = method == StepMethod::implicit_euler;
@@ -214,6 +221,7 @@ class StepSolver {
     else
       x_ = next_.history.x[0];
     first_summary_ = solve_between_chords(expected());
+    must_settle_ = false;  // a cut would not help what remeshing does
     if (!first_summary_.converged()) {
       // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
       const bool is_stuck = first_summary_.termination == Termination::no_descent ||
@@ -319,7 +327,7 @@ class StepSolver {
 
   /// From x, where what is lagged is lagged first.
   NewtonSummary solve(const VectorX& expected = {}) {
-    NewtonSummary summary = problem_->solve(x_, VectorX(x_), expected);
+    NewtonSummary summary = problem_->solve(x_, VectorX(x_), expected, must_settle_);
     add_seconds(summary, report_.seconds);
     report_.newton_iterations += summary.iterations;
     report_.residual_worth = std::max(report_.residual_worth, summary.decrement / problem_->scaling());
@@ -427,6 +435,7 @@ class StepSolver {
   VectorX x_;  ///< the solution, on next_.mesh; before the first solve its start
   std::unique_ptr<StepProblem<Dim>> problem_;
   EnergyGuard<Dim> guard_;
+  bool must_settle_;  ///< rounds of lagging, or the step is cut
   MeshRenumbering renumbering_;
   StepReport report_;
   NewtonSummary first_summary_;
@@ -501,7 +510,8 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     if (from.straightening != Straightening::none && !from.renumbering) {
       failure.kind = StepFailure::Kind::nothing_straightened;
     } else {
-      if (!solver) solver.emplace(tools, from.renumbering ? from.state : before, attempt.method, from.x);
+      const bool may_cut = attempt.halvings < ladder.most_halvings;
+      if (!solver) solver.emplace(tools, from.renumbering ? from.state : before, attempt.method, from.x, may_cut);
       auto now = solver->solve(attempt.remeshing);
       if (!now) break;
       failure = std::move(*now);

@@ -46,10 +46,12 @@ template <int Dim>
 class Explanation {
  public:
   /// Throws InputError for what `run` would refuse.
-  Explanation(const Setup<Dim>& setup, linear::Registry& registry, std::vector<std::string> warnings)
+  Explanation(const Setup<Dim>& setup, linear::Registry& registry, const scene::ChosenDefaults& defaults,
+              std::vector<std::string> warnings)
       : registry_(registry),
         simulation_(setup, registry_, Logger([this](LogLevel, std::string_view text) { chosen_.emplace_back(text); })),
         setup_(simulation_.setup()),
+        defaults_(defaults),
         warnings_(std::move(warnings)) {
     for (std::string& found : find_suspicious(simulation_)) warnings_.push_back(std::move(found));
   }
@@ -69,6 +71,7 @@ class Explanation {
     const linear::MatrixTraits matrix = unknowns();
     fmt::print("linear solver\n  {}\n", solver(matrix));
     if (setup_.contact.enabled) contact();
+    defaults();
     fmt::print("warnings\n");
     if (warnings_.empty()) fmt::print("  none\n");
     for (const auto& warning : warnings_) fmt::print("  warning: {}\n", warning);
@@ -78,6 +81,15 @@ class Explanation {
   bool is_dynamic() const { return !setup_.time.is_static && !setup_.time.quasistatic; }
   bool has_friction() const {
     return setup_.contact.enabled && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
+  }
+
+  /// Prints the set of defaults and what it gives for keys that the scene leaves out.
+  void defaults() const {
+    fmt::print("defaults\n  {}{}\n", defaults_.name,
+               defaults_.unlike_polyfem.empty() ? "" : ": those of PolyFEM, which docs/scenes.md lists, but for these:");
+    for (const auto& row : defaults_.values) fmt::print("  {} = {}: {}\n", row.pointer, row.value, row.reason);
+    for (const auto& difference : defaults_.unlike_polyfem) fmt::print("  {}\n", difference);
+    if (!defaults_.information.empty()) fmt::print("  {}\n", defaults_.information);
   }
 
   void bodies() {
@@ -235,6 +247,7 @@ class Explanation {
   std::vector<std::string> chosen_;  ///< what the simulation says of what the scene leaves open
   const Simulation<Dim> simulation_;
   const Setup<Dim>& setup_;
+  const scene::ChosenDefaults& defaults_;
   std::vector<std::string> warnings_;
 };
 
@@ -328,7 +341,7 @@ int explain(const RunOptions& options) {
       [&](auto& setup) {
         const SolverChoice choice = choose_solver(setup.linear, options, registry);
         for (const auto& warning : choice.warnings) scene.warnings.push_back(warning);
-        Explanation(setup, registry, scene.warnings).print(scene.output.units);
+        Explanation(setup, registry, scene.defaults, scene.warnings).print(scene.output.units);
       },
       scene.setup);
   return done;
