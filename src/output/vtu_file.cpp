@@ -95,7 +95,7 @@ std::vector<std::uint8_t> points_of(const SetMembers& set, const FrameView<Dim>&
     }
   std::size_t node = frame.mesh.num_vertices();
   const auto mark = [&](const EdgeKey& edge) { values[node++] = edges.contains(edge); };
-  if (frame.space) std::for_each(frame.space->curved_edges().begin(), frame.space->curved_edges().end(), mark);
+  for (const EdgeKey& edge : frame.mesh.curved_edges()) mark(edge);
   std::for_each(drawn.straight_edges.begin(), drawn.straight_edges.end(), mark);
   return values;
 }
