@@ -184,8 +184,8 @@ struct Simulation<Dim>::Impl {
     made.vertices = state->mesh.num_vertices();
     made.elements = state->mesh.num_cells();
     const VectorX& x = state->history.x[0];
-    StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
-                             state->quadrature, state->chords);
+    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *cache, state->stiffness, state->quadrature,
+                             state->chords);
     made.unknowns = problem.dofs().num_unknowns;
     made.energy = problem.report(x);
     made.energy_before_remesh = made.energy.total;
@@ -238,8 +238,8 @@ struct Simulation<Dim>::Impl {
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
     const Inside inside(*this, Phase::in_step);
-    StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
-                             state->quadrature, state->chords);
+    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *cache, state->stiffness, state->quadrature,
+                             state->chords);
     forces = problem.forces_at_start(state->history.x[0]);
   }
 
