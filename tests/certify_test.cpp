@@ -33,7 +33,12 @@ class CertifyTest : public testing::Test {
     if (space) view.space = space;
     writer.write(view, StepReport());
     writer.finish("finished");
-    return certify(folder).violations;
+    return texts_of(certify(folder));
+  }
+  static std::vector<std::string> texts_of(const Certificate& certificate) {
+    std::vector<std::string> texts;
+    for (const Violation& violation : certificate.violations) texts.push_back(violation.text);
+    return texts;
   }
 
   fs::path folder;
@@ -219,11 +224,25 @@ TEST_F(CertifyTest, FindsCellsOfNoVolumeAtRest) {
   rest[6] = 1.5;  // vertex 3 across the diagonal
   std::memcpy(bytes.data() + at, rest.data(), 8 * rest.size());
   std::ofstream(frame, std::ios::binary) << bytes;
-  EXPECT_EQ(certify(folder).violations,
+  Certificate certificate = certify(folder);
+  EXPECT_EQ(texts_of(certificate),
             std::vector<std::string>{"frames/000000.h5: /mesh/rest is damaged: not what was written"});
+  EXPECT_EQ(certificate.violations[0].of, Violation::Of::file);
   for (std::size_t name; (name = bytes.find("digests")) != std::string::npos;) bytes[name] = 'D';  // as of before these
   std::ofstream(frame, std::ios::binary) << bytes;
-  EXPECT_EQ(certify(folder).violations, std::vector<std::string>{"frames/000000.h5: at rest cell 1 is inverted"});
+  certificate = certify(folder);
+  EXPECT_EQ(texts_of(certificate), std::vector<std::string>{"frames/000000.h5: at rest cell 1 is inverted"});
+  EXPECT_EQ(certificate.violations[0].of, Violation::Of::cells);
+}
+
+TEST_F(CertifyTest, MeasuresFlightByTheSizeOfTheScene) {
+  Plane plane;
+  EXPECT_TRUE(violations_of(plane).empty());
+  EXPECT_EQ(certify(folder).flight, 0);
+  // Body 2 is 7 m up; bodies and obstacle fill 3 m x 3.5 m.
+  for (int i = 4; i < 8; ++i) vertex_of<2>(plane.x, i)[1] += 7;
+  EXPECT_TRUE(violations_of(plane).empty());
+  EXPECT_NEAR(certify(folder).flight, 7 / std::hypot(3, 3.5), 1e-14);
 }
 
 TEST_F(CertifyTest, FindsCurvesInObstaclesThatTheirChordsDoNotReach) {

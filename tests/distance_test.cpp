@@ -137,11 +137,6 @@ TEST_F(DistanceTest, In3DQuadraticFieldsAreIntegratedExactly) {
   EXPECT_NEAR(distance.h1_semi * distance.h1_semi, 2.0 / 60, 1e-14);  // of Y^2 + Z^2
 }
 
-TEST_F(DistanceTest, FlightIsByTheSizeOfTheScene) {
-  EXPECT_NEAR(flight(store<2>(1, square(false), [](const Vec<2>&) { return Vec<2>(0, 4 * std::sqrt(2.0)); })), 4, 1e-14);
-  EXPECT_EQ(flight(store<2>(2, square(false), [](const Vec<2>&) { return Vec<2>(0, 0); })), 0);
-}
-
 TEST_F(DistanceTest, BodiesAreComparedWithTheirOwn) {
   const Motion<2> rest = [](const Vec<2>&) { return Vec<2>(0, 0); };
   const FrameDistance distance = frame_distance(store<2>(1, square(false, 1), rest), store<2>(2, square(false, 2), rest));

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Installs Debian 12 packages: with --minimal those of the command with its built-in solvers and of the pictures, else all
-# that solver modules, tests and the verification suite need too. Asks apt for what is missing only, so a machine that has
+# Installs Debian packages: with --minimal those of the command with CHOLMOD and of the pictures, else all that other solver
+# modules, tests and the verification suite need too. Asks apt for what is missing only, so a machine that has
 # all of them needs neither root nor a network.
 set -euo pipefail
 
@@ -9,16 +9,15 @@ set -euo pipefail
 packages=(
   g++ cmake ninja-build ccache
   libeigen3-dev libtbb-dev libhdf5-dev zlib1g-dev nlohmann-json3-dev libcli11-dev libfmt-dev libspdlog-dev
-  libcgal-dev libgmp-dev libmpfr-dev
+  libcgal-dev libgmp-dev libmpfr-dev libsuitesparse-dev libopenblas-dev
   python3 python3-h5py python3-matplotlib python3-numpy
 )
 optional=(
-  libsuitesparse-dev libopenblas-dev
   libmumps-dev libmumps-ptscotch-dev libptscotch-dev libopenmpi-dev openmpi-bin
   libtrilinos-{amesos2,tpetra,shylu,teuchos,kokkos,kokkos-kernels,epetra,epetraext,triutils,zoltan,trilinosss}-dev
   libtrilinos-{belos,muelu,xpetra,ifpack2,thyra,rtop}-dev
   libgtest-dev librapidcheck-dev libbenchmark-dev
-  gfortran doxygen pkg-config python3-dev pybind11-dev python3-pip
+  gfortran doxygen pkg-config python3-dev pybind11-dev python3-pip patchelf
   chromium chromium-driver firefox-esr strace
   python3-vtk9 xvfb xauth libgl1-mesa-dri
   python3-pil python3-dolfinx python3-meshio python3-scipy python3-sympy

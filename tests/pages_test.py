@@ -201,10 +201,10 @@ class Study(unittest.TestCase):
         """docs/user-guide.md has the default series above those on request."""
         text = (SOURCE / "docs/user-guide.md").read_text()
         default, _, on_request = text.partition("### The runs of a study")[2].partition("\n### ")[0].partition("**More series**")
-        series = re.findall(r'\{"([\w-]+)", Kind::\w+, (true|false)', (SOURCE / "src/apps/study/plan.cpp").read_text())
+        series = re.findall(r'^ +\("([\w-]+)", "\w+", (True|False)', (SOURCE / "src/apps/study/plan.py").read_text(), re.MULTILINE)
         self.assertTrue(series)
         for name, is_default in series:
-            self.assertIn(f"`{name}`", default if is_default == "true" else on_request)
+            self.assertIn(f"`{name}`", default if is_default == "True" else on_request)
 
 
 class Refusals(unittest.TestCase):

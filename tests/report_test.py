@@ -28,6 +28,11 @@ from PIL import Image
 
 EXAMPLES = pathlib.Path(sys.argv.pop())
 ITR = sys.argv.pop()
+sys.path.insert(0, str(EXAMPLES.parent / "src/apps/study"))
+sys.dont_write_bytecode = True
+from plan import ALL_SERIES, Run  # noqa: E402
+from plot import make_svg  # noqa: E402
+from results import COSTS, MEASURES, Results, Row  # noqa: E402
 CHROMIUM = shutil.which("chromium")
 DRIVER = shutil.which("chromedriver")
 FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
@@ -226,7 +231,7 @@ def write_steps(folder, times):
         for step, t in enumerate(times):
             row = {"step": step, "t": t, "vertices": 4 + step, "newton_iterations": 3, "min_distance": None, "min_volume_ratio": 1,
                    "energy": {"elastic": 1.0 + step, "total": 2.0 + step}, "energy_before_remesh": 2.5 + step, "history_loss": 0.25,
-                   "splits": {**none, "accepted": step}, "collapses": none, "swaps": none, "smooths": none, "seconds": {"total": 0.5}}
+                   "splits": {**none, "accepted": step}, "curves": {**none, "accepted": 2 * step}, "collapses": none, "swaps": none, "smooths": none, "seconds": {"total": 0.5}}
             file.write(json.dumps(row) + "\n")
         file.write('{"step":3,"t"')  # what a run is writing just now
 
@@ -524,7 +529,7 @@ class Report(Cases):
         self.report(self.plane)
         self.open(self.plane / "report.html", "#t=0")
         titles = self.browser.run("return [...document.querySelectorAll('#plots figcaption')].map(e => e.textContent)")
-        for title in ("Energy of the step by term [J]elastic –total –", "Vertices4", "Operations of remeshing that were acceptedsplits 0"):
+        for title in ("Energy of the step by term [J]elastic –total –", "Vertices4", "Operations of remeshing that were acceptedsplits 0curves 0"):
             self.assertIn(title, titles)
         self.browser.run("const d = document.querySelector('#plots svg'); d.scrollIntoView(); const b = d.getBoundingClientRect();"
                          "d.dispatchEvent(new PointerEvent('pointermove', {clientX: b.left + 0.4 * b.width, clientY: b.top + 9}))")
@@ -714,7 +719,12 @@ class Report(Cases):
                  "answers": ["Refining pays by <b>4</b>."], "runs": [run("coarse", 0), run("fine", 1), small, time, failed],
                  "worth": {"l2": 0.01, "h1": 0.02}, "doubts": ["`small` is not told."]}
         (folder / "study.json").write_text(json.dumps(study))
-        (folder / "study.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg" id="stored" width="50" height="50"></svg>')
+        measured = (one for one in study["runs"] if "errors" in one)
+        rows = [Row(Run(one["run"], ALL_SERIES[one["series"]], one["label"], {}, reference=one["against"]), certified=True,
+                    errors=dict.fromkeys(measure.name for measure in MEASURES) | one["errors"],
+                    **{cost: one[cost] for cost in COSTS}) for one in measured]
+        worth = dict.fromkeys(measure.name for measure in MEASURES) | study["worth"]
+        (folder / "study.svg").write_text(make_svg(Results("", worth=worth, rows=rows)))
 
     def test_a_study_is_shown_with_two_runs_side_by_side(self):
         folder = self.folder / "study"
@@ -722,13 +732,16 @@ class Report(Cases):
         self.assertIn("2 runs", self.report(folder).stdout)
         self.open(folder / "report.html")
         browser = self.browser
-        self.assertEqual(browser.run("await Promise.all(r.views.map(v => v.ready)); return [r.shown, r.diagrams.length, r.views.map(v => v.state.field)]"),
-                         [["fine", "coarse"], 6, ["difference", "difference"]])
+        self.assertEqual(browser.run("await Promise.all(r.views.map(v => v.ready)); return [r.shown, r.points.length, r.views.map(v => v.state.field)]"),
+                         [["fine", "coarse"], 15, ["difference", "difference"]])  # 2 and 3 points by 3 costs
         self.assertIn("small is not told.", browser.run("return document.querySelector('.doubts').textContent"))
         rows = browser.run("return [...document.querySelectorAll('.words tr')].map(row => [...row.children].slice(-2).map(e => e.textContent))")
         self.assertEqual(rows[1:], [["10 %", "30 %"], ["2.5 %", "15 %"], ["< 1 %", "5 %"], ["10 %", "30 %"], ["", ""]])
-        self.assertEqual(browser.run("return [...r.diagrams[0].figure.querySelectorAll('circle')].map(dot => dot.dataset.run)"), ["coarse", "fine"])
-        self.assertIn("what the reference is worth", browser.run("return r.diagrams[0].figure.textContent"))
+        self.assertEqual(browser.run("return r.points.slice(6, 9).map(p => [p.run.run, p.mark.closest('g[id]').id])"),
+                         [[name, "uniform-h1-processor_seconds"] for name in ("coarse", "fine", "small")])
+        across = browser.run("return r.points.slice(6, 9).map(p => p.mark.getBoundingClientRect()).map(box => [box.x, box.y])")
+        self.assertEqual((across, sorted(across, key=lambda at: at[0])), (sorted(across, key=lambda at: at[1]), across))  # errors fall
+        self.assertIn("what the reference is worth", browser.run("return document.querySelector('#plots svg').textContent"))
         self.assertIn("Refining pays by <b>4</b>.", browser.run("return document.querySelector('.words:not(.point)').textContent"))
         # The difference is 0.1 x, from 0 on the left to 0.1 m on the right, in both.
         browser.run("await r.show(1, 'fine'); await r.show(1, 'coarse'); r.views.forEach(v => v.set({edges: false})); await Promise.all(r.views.map(v => v.ready))")
@@ -741,7 +754,8 @@ class Report(Cases):
         browser.run("r.views[0].zoomAt(2); await r.views[0].set({field: 'elastic_density'}); await r.views[1].ready")
         self.assertEqual(browser.run("return r.views.map(v => [v.camera.zoom, v.state.field, v.range[1]])"), [[2, "elastic_density", 4]] * 2)
         # A point tells its run and the command; a click shows it.
-        browser.run("document.querySelector('circle[data-run=coarse]').dispatchEvent(new MouseEvent('click')); await r.show(1, 'fine')")
+        browser.run("r.points.find(p => p.run.run === 'coarse').mark.dispatchEvent(new MouseEvent('click')); await r.show(1, 'fine')")
+        self.assertEqual(browser.run("return [...new Set([...document.querySelectorAll('.chosen')].map(m => m.textContent))].length"), 1)
         self.assertEqual(browser.run("return r.shown"), ["coarse", "fine"])
         self.assertEqual(browser.run("return document.querySelector('.words p > code').textContent"),
                          "itr run 'my scene.json' -o coarse --set /geometry/0/n_refs=0 --set '/a=\"b c\"'")
@@ -750,7 +764,7 @@ class Report(Cases):
         self.assertEqual(browser.errors(), [])
         self.assertIn("the mesh of fine is left out", self.report(folder, "--max-mb", "0.0001").stdout)
         self.open(folder / "report.html", "?plots")
-        self.assertEqual(browser.run("return [document.getElementById('stored').getBoundingClientRect().width, r.diagrams.length]"), [0, 6])
+        self.assertEqual(browser.run("return [document.querySelector('#plots svg').getBoundingClientRect().width > 300, r.points.length]"), [True, 15])
         self.assertEqual(browser.errors(), [])
 
     def test_a_run_that_stops_is_shown_as_far_as_it_came(self):

@@ -4,6 +4,7 @@
 import csv
 import itertools
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -112,8 +113,12 @@ class Study(unittest.TestCase):
         self.assertIn("For this error, run this", page)
         self.assertIn(page, first.stdout)
         svg = ElementTree.parse(self.folder / "study.svg").getroot()
-        lines = svg.findall("{http://www.w3.org/2000/svg}polyline")
-        self.assertEqual(len(lines), 2 * 3 * 4)  # series, costs, measures (no momentum: quasistatic)
+        lines = {f"{series}-{measure}-{cost}" for series in ("uniform", "itr") for cost in ("processor_seconds", "unknowns", "memory_mb")
+                 for measure in ("l2", "h1", "surface", "energy")}  # no momentum: quasistatic
+        drawn = {group.get("id", ""): group for group in svg.iter("{http://www.w3.org/2000/svg}g")}
+        self.assertEqual({name for name in drawn if re.match("(uniform|itr|swaps)-", name)}, lines)
+        for name, points in (("uniform-h1-unknowns", 3), ("itr-l2-memory_mb", 2)):
+            self.assertEqual(len(drawn[name].findall(".//{http://www.w3.org/2000/svg}use")), points, name)
 
         frames = {path: path.stat().st_mtime_ns for path in self.folder.rglob("frames/*.h5")}
         before = (self.folder / "study.csv").read_text()
@@ -253,7 +258,7 @@ class Study(unittest.TestCase):
         content = json.loads((self.folder / "study.json").read_text())
         verdict = next(v for v in content["verdicts"] if (v["series"], v["measure"]) == ("uniform-p2", "h1"))
         self.assertTrue(all(point["unknowns_ratio"] is None or point["unknowns_ratio"] < 1 for point in verdict["points"]))
-        self.assertIn("uniform-p2: uniform refinement, quadratic elements (P2)", (self.folder / "study.svg").read_text())
+        self.assertIn('id="uniform-p2-h1-unknowns"', (self.folder / "study.svg").read_text())
 
     def test_a_given_reference(self):
         reference = self.folder / "given"
@@ -342,7 +347,8 @@ class Study(unittest.TestCase):
     def test_its_program_may_be_replaced_meanwhile(self):
         prefix = self.folder / "prefix"
         (prefix / "bin").mkdir(parents=True)
-        (prefix / "lib").symlink_to(pathlib.Path(ITR).resolve().parent.parent / "lib")
+        for name in ("lib", "share"):
+            (prefix / name).symlink_to(pathlib.Path(ITR).resolve().parent.parent / name)
         copied = prefix / "bin/itr"
         shutil.copy(ITR, copied)
         solvers = subprocess.run([copied, "solvers"], capture_output=True, text=True).stdout
@@ -363,6 +369,26 @@ class Study(unittest.TestCase):
         done = study(self.folder, "--series", "uniform,nothing", status=2)
         self.assertIn('--series: found "nothing"', done.stderr)
         self.assertIn("sizing-field", done.stderr)
+
+    def test_wrong_input_is_named_before_anything_runs(self):
+        for words in (["--levels", "0"], ["--tolerances", "1,-1"], ["--time-limit", "-1"], ["--starts", "x"], ["--nothing"],
+                      ["--set", "n_refs=1"], ["--set", "/geometry/0/n_ref=1"]):
+            done = study(self.folder, "--series", "uniform", *words, status=2)
+            self.assertIn(words[1].partition("=")[0] if words[0] == "--set" else words[0], done.stderr, words)
+            self.assertFalse((self.folder / "runs").exists(), words)
+
+    def test_what_is_missing_is_said_in_one_line(self):
+        python = self.folder / "python"
+        python.write_text('#!/bin/sh\nexec /usr/bin/python3 -S "$@"\n')  # without the packages of the system
+        python.chmod(0o755)
+        for path, package in ((python, "python3-matplotlib"), (self.folder / "nothing", "python3 python3-matplotlib")):
+            done = subprocess.run(command(self.folder / "study"), capture_output=True, text=True, env=os.environ | {"ITR_PYTHON": path})
+            self.assertEqual(done.returncode, 2)
+            self.assertTrue(done.stderr.endswith(f"apt install {package}\n"), done.stderr)
+            self.assertEqual(done.stderr.count("\n"), 1)
+            self.assertFalse((self.folder / "study").exists())
+        said = subprocess.run([ITR, "study", "--help"], capture_output=True, text=True, check=True, env=os.environ | {"ITR_PYTHON": python})
+        self.assertIn("sizing-field (not by default)", said.stdout)
 
 
 if __name__ == "__main__":

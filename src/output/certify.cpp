@@ -31,6 +31,7 @@ namespace itr::output {
 namespace {
 
 namespace fs = std::filesystem;
+using Of = Violation::Of;
 
 template <std::size_t N, std::size_t M>
 int num_shared(const std::array<int, N>& a, const std::array<int, M>& b) {
@@ -228,7 +229,7 @@ std::optional<QuadraticCell<Dim>> curved_cell(const StoredFrame& frame, std::siz
 /// `what`: of the cells, where `coordinates` say that their vertices are.
 template <int Dim>
 void check_cells(const StoredFrame& frame, const std::vector<double>& coordinates, const char* what, const std::string& name,
-                 std::vector<std::string>& violations) {
+                 std::vector<Violation>& violations) {
   const std::vector<Vec<Dim>> x = points<Dim>(coordinates);
   const Space space = space_of(frame);
   for (std::size_t c = 0; c < frame.simplices.size() / (Dim + 1); ++c) {
@@ -236,12 +237,13 @@ void check_cells(const StoredFrame& frame, const std::vector<double>& coordinate
     for (int k = 0; k <= Dim; ++k) p[k] = x[frame.simplices[(Dim + 1) * c + k]];
     if (const auto nodes = curved_cell<Dim>(frame, c, x, space)) {
       if (!is_positive_everywhere_exact<Dim>(*nodes))
-        violations.push_back(fmt::format("{}: {}cell {} is not positive everywhere", name, what, c));
+        violations.push_back({Of::cells, fmt::format("{}: {}cell {} is not positive everywhere", name, what, c)});
       continue;
     }
     const int sign = orientation_of(p);
     if (sign <= 0)
-      violations.push_back(fmt::format("{}: {}cell {} is {}", name, what, c, sign < 0 ? "inverted" : "degenerate"));
+      violations.push_back(
+          {Of::cells, fmt::format("{}: {}cell {} is {}", name, what, c, sign < 0 ? "inverted" : "degenerate")});
   }
 }
 
@@ -283,7 +285,7 @@ bool is_folded(const Surface<2>& surface, const std::array<int, 2>& a, const std
   return (p[axis] < origin[axis]) == (q[axis] < origin[axis]);
 }
 
-void check_surface(const Surface<2>& surface, const std::string& name, std::vector<std::string>& violations) {
+void check_surface(const Surface<2>& surface, const std::string& name, std::vector<Violation>& violations) {
   const auto& edges = surface.edges;
   const std::vector<Box<2>> boxes = boxes_of<2>(surface.x, edges);
   const Bvh<2> tree(boxes);
@@ -299,12 +301,14 @@ void check_surface(const Surface<2>& surface, const std::string& name, std::vect
       const bool meet = num_shared(a, b) > 0
                             ? is_folded(surface, a, b)
                             : segments_intersect(surface.x[a[0]], surface.x[a[1]], surface.x[b[0]], surface.x[b[1]]);
-      if (meet) violations.push_back(fmt::format("{}: edges {} and {} intersect", name, surface.name(a), surface.name(b)));
+      if (meet)
+        violations.push_back(
+            {Of::surfaces, fmt::format("{}: edges {} and {} intersect", name, surface.name(a), surface.name(b))});
     }
   }
 }
 
-void check_surface(const Surface<3>& surface, const std::string& name, std::vector<std::string>& violations) {
+void check_surface(const Surface<3>& surface, const std::string& name, std::vector<Violation>& violations) {
   const Bvh<3> tree(boxes_of<3>(surface.x, surface.triangles));
   const std::vector<Box<3>> boxes = boxes_of<3>(surface.x, surface.edges);
   std::vector<int> hits;
@@ -321,7 +325,8 @@ void check_surface(const Surface<3>& surface, const std::string& name, std::vect
       const bool meet =
           shared == 1 ? is_folded(surface, e, t) : segment_intersects_triangle(x[e[0]], x[e[1]], x[t[0]], x[t[1]], x[t[2]]);
       if (!meet) continue;
-      violations.push_back(fmt::format("{}: edge {} and triangle {} intersect", name, surface.name(e), surface.name(t)));
+      violations.push_back(
+          {Of::surfaces, fmt::format("{}: edge {} and triangle {} intersect", name, surface.name(e), surface.name(t))});
     }
   }
 }
@@ -330,7 +335,7 @@ void check_surface(const Surface<3>& surface, const std::string& name, std::vect
 /// `in_hollows`: vertices that chords have inside and curves have not.
 template <int Dim>
 void check_insides(const Surface<Dim>& surface, const std::set<int>& in_hollows, const std::string& name,
-                   std::vector<std::string>& violations) {
+                   std::vector<Violation>& violations) {
   const ClosedSurface<Dim> closed(surface.x, surface.own_facets);
   const std::string what = surface.has_proxy ? "the proxy" : "a body";
   const int first = surface.has_proxy ? 0 : surface.num_body_vertices;
@@ -338,13 +343,13 @@ void check_insides(const Surface<Dim>& surface, const std::set<int>& in_hollows,
     if (closed.is_vertex(v)) continue;
     const bool touches = closed.touches(surface.x[v]);
     if (touches || (closed.winding(surface.x[v]) + static_cast<int>(in_hollows.count(v))) % 2 != 0)
-      violations.push_back(
-          fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v), touches ? "on" : "inside of", what));
+      violations.push_back({Of::surfaces, fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v),
+                                                      touches ? "on" : "inside of", what)});
   }
   if (surface.has_proxy) return;  // need not have an orientation that tells a solid from a cavity
   for (const int v : closed.nested())
     violations.push_back(
-        fmt::format("{}: the part of the boundary at vertex {} is inside of a body", name, surface.name(v)));
+        {Of::surfaces, fmt::format("{}: the part of the boundary at vertex {} is inside of a body", name, surface.name(v))});
 }
 
 bool is_nearer(const Vec<2>& a, const Vec<2>& b, const Surface<2>& surface, int primitive, double distance) {
@@ -470,7 +475,7 @@ std::set<int> find_in_hollows(const Surface<3>&, const Patches<3>&) { return {};
 /// Proves by Bernstein bounds that true curves meet nothing. Neighbours in the surface are left to the cells.
 template <int Dim>
 void check_curves(const Surface<Dim>& surface, const Patches<Dim>& all, const std::string& name,
-                  std::vector<std::string>& violations) {
+                  std::vector<Violation>& violations) {
   std::vector<Box<Dim>> boxes(all.patches.size());
   for (std::size_t i = 0; i < boxes.size(); ++i)
     for (const auto& row : all.patches[i].at)
@@ -484,26 +489,50 @@ void check_curves(const Surface<Dim>& surface, const Patches<Dim>& all, const st
     for (const int j : hits) {
       if ((all.is_curved[j] && j <= i) || num_shared(all.facets[i], all.facets[j]) > 0) continue;
       if (!are_apart(all.patches[i], all.patches[j]))
-        violations.push_back(fmt::format("{}: curve {} is not proven to be apart from {}", name, surface.name(all.facets[i]),
-                                         surface.name(all.facets[j])));
+        violations.push_back({Of::surfaces, fmt::format("{}: curve {} is not proven to be apart from {}", name,
+                                                        surface.name(all.facets[i]), surface.name(all.facets[j]))});
     }
   }
   if constexpr (Dim == 2)
     for_each_beyond_chord(surface, all, [&](int vertex, std::size_t curve, bool is_hollow) {
       if (!is_hollow)
-        violations.push_back(fmt::format("{}: vertex ({}) is between curve {} and its chords", name, surface.name(vertex),
-                                         surface.name(all.facets[curve])));
+        violations.push_back({Of::surfaces, fmt::format("{}: vertex ({}) is between curve {} and its chords", name,
+                                                        surface.name(vertex), surface.name(all.facets[curve]))});
     });
 }
 
 template <int Dim>
+double flight(const StoredFrame& frame) {
+  struct Sum {
+    Vec<Dim> u = Vec<Dim>::Zero();
+    int corners = 0;
+  };
+  const auto rest = points<Dim>(frame.rest), x = points<Dim>(frame.x);
+  std::map<std::int64_t, Sum> bodies;
+  Box<Dim> box;
+  for (std::size_t c = 0; c < frame.body.size(); ++c) {
+    Sum& sum = bodies[frame.body[c]];
+    for (int k = 0; k <= Dim; ++k) {
+      const std::int64_t v = frame.simplices[(Dim + 1) * c + k];
+      sum.u += x[v] - rest[v];
+      box.include(rest[v]);
+      ++sum.corners;
+    }
+  }
+  for (const Vec<Dim>& p : points<Dim>(frame.obstacles.x)) box.include(p);
+  double longest = 0;
+  for (const auto& [id, sum] : bodies) longest = std::max(longest, sum.u.norm() / sum.corners);
+  return bodies.empty() ? 0 : longest / (box.max - box.min).norm();
+}
+
+template <int Dim>
 void check_frame(const StoredFrame& frame, const std::string& name, Certificate& certificate) {
-  std::vector<std::string>& violations = certificate.violations;
+  std::vector<Violation>& violations = certificate.violations;
   // NaN compares false with everything, and every predicate after it would pass.
   const auto is_finite = [](double value) { return std::isfinite(value); };
   for (const auto* x : {&frame.rest, &frame.x, &frame.obstacles.x, &frame.proxy.x}) {
     if (std::all_of(x->begin(), x->end(), is_finite)) continue;
-    violations.push_back(name + ": a position is not finite");
+    violations.push_back({Of::file, name + ": a position is not finite"});
     return;
   }
   const std::size_t before = violations.size();
@@ -516,6 +545,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   if (violations.size() == before) check_insides(surface, find_in_hollows(surface, curves), name, violations);
   check_curves(surface, curves, name, violations);
   measure_overhangs(frame, surface, certificate);
+  certificate.flight = std::max(certificate.flight, flight<Dim>(frame));
 }
 
 std::vector<fs::path> frame_files(const fs::path& directory) {
@@ -533,7 +563,7 @@ Certificate certify(const fs::path& directory) {
     ++certificate.frames;
     if (const auto damaged = find_damage(file); !damaged.empty()) {
       for (const std::string& what : damaged)
-        certificate.violations.push_back(fmt::format("{}: {} is damaged: not what was written", name, what));
+        certificate.violations.push_back({Of::file, fmt::format("{}: {} is damaged: not what was written", name, what)});
       continue;
     }
     const StoredFrame frame = read_frame(file);

@@ -12,9 +12,16 @@
 
 namespace itr::output {
 
+struct Violation {
+  enum class Of { file, cells, surfaces } of;
+  std::string text;  ///< one line: frame, what, which ids
+};
+
 struct Certificate {
   int frames = 0;
-  std::vector<std::string> violations;  ///< one line each: frame, what, which ids; also of arrays that are damaged
+  std::vector<Violation> violations;
+  /// Largest mean displacement of a body (by id), over the diagonal of the box of the bodies at rest and the obstacles.
+  double flight = 0;
   /// How far curved edges of the surface leave the chords through their nodes, and how far where something else is nearer to
   /// these chords than that, in the frames' units. The curves themselves are checked.
   double overhang = 0, blocked_overhang = 0;

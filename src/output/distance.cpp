@@ -345,30 +345,6 @@ FrameDistance distance_of(const StoredFrame& frame, const StoredFrame& reference
   return distance;
 }
 
-template <int Dim>
-double flight_of(const StoredFrame& frame) {
-  struct Sum {
-    Vec<Dim> u = Vec<Dim>::Zero();
-    int corners = 0;
-  };
-  std::map<std::int64_t, Sum> bodies;
-  Box<Dim> box;
-  for (std::size_t c = 0; c < frame.body.size(); ++c) {
-    Sum& sum = bodies[frame.body[c]];
-    for (int k = 0; k <= Dim; ++k) {
-      const std::int64_t v = frame.simplices[(Dim + 1) * c + k];
-      sum.u += point<Dim>(frame.x, v) - point<Dim>(frame.rest, v);
-      box.include(point<Dim>(frame.rest, v));
-      ++sum.corners;
-    }
-  }
-  for (std::size_t o = 0; Dim * o < frame.obstacles.x.size(); ++o)
-    box.include(point<Dim>(frame.obstacles.x, static_cast<std::int64_t>(o)));
-  double longest = 0;
-  for (const auto& [id, sum] : bodies) longest = std::max(longest, sum.u.norm() / sum.corners);
-  return bodies.empty() ? 0 : longest / (box.max - box.min).norm();
-}
-
 StoredFrame in_metres(StoredFrame frame) {
   if (frame.units.is_si()) return frame;
   const double metre = frame.units.factor("m");
@@ -379,11 +355,6 @@ StoredFrame in_metres(StoredFrame frame) {
 }
 
 }  // namespace
-
-double flight(const std::filesystem::path& frame) {
-  const StoredFrame stored = read_frame(frame);
-  return stored.dim == 2 ? flight_of<2>(stored) : flight_of<3>(stored);
-}
 
 FrameDistance frame_distance(const std::filesystem::path& frame, const std::filesystem::path& reference) {
   const StoredFrame a = in_metres(read_frame(frame)), b = in_metres(read_frame(reference));

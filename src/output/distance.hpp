@@ -27,10 +27,6 @@ struct FrameDistance {
 /// file is unreadable or the two have different dimensions.
 FrameDistance frame_distance(const std::filesystem::path& frame, const std::filesystem::path& reference);
 
-/// Largest mean displacement of a body (by id), over the diagonal of the box of the bodies at rest and the obstacles. Throws
-/// InputError where the file is unreadable.
-double flight(const std::filesystem::path& frame);
-
 /// Totals over all bodies in a frame, where its scene asked for them (FieldOptions).
 struct FrameTotals {
   int step = 0;

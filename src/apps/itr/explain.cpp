@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include "explain.hpp"
+#include "commands.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "geometry/measures.hpp"
@@ -14,31 +16,18 @@
 #include "itr/simulation/simulation.hpp"
 #include "linear/choice.hpp"
 #include "mesh/connected_parts.hpp"
+#include "mesh/rest_box.hpp"
 #include "simulation/advice.hpp"
+#include "simulation/barrier_stiffness.hpp"
 #include "simulation/step_problem.hpp"
-#include "solver_choice.hpp"
 
 namespace itr::cli {
 
 namespace {
 
-const char* name_of(MaterialLaw law) {
-  switch (law) {
-    case MaterialLaw::neo_hookean:
-      return "neo-Hookean";
-    case MaterialLaw::linear:
-      return "linear elastic";
-    case MaterialLaw::saint_venant_kirchhoff:
-      return "St. Venant-Kirchhoff";
-    case MaterialLaw::fixed_corotated:
-      return "fixed corotated";
-    case MaterialLaw::mooney_rivlin:
-      return "Mooney-Rivlin";
-    case MaterialLaw::own:
-      return "own";
-  }
-  return "";
-}
+constexpr const char* kLaws[] = {"neo-Hookean",     "linear elastic", "St. Venant-Kirchhoff",
+                                 "fixed corotated", "Mooney-Rivlin",  "own"};  ///< by MaterialLaw
+static_assert(std::size(kLaws) == static_cast<std::size_t>(MaterialLaw::own) + 1);
 
 void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
@@ -131,7 +120,7 @@ class Explanation {
       const auto order = setup_.order.find(id);
       fmt::print("  id {}: {} {} elements, {} {}, {}, E {}, nu {:.4g}, rho {:.4g} {}, mass {}\n", id, sum.cells,
                  order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", Dim == 2 ? "area" : "volume",
-                 units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"), name_of(material.law),
+                 units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"), kLaws[static_cast<std::size_t>(material.law)],
                  units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,
                  units.from_si(material.density, "kg/m^3"), units.name("kg/m^3"),
                  units.text(material.density * sum.volume, "kg"));
@@ -264,6 +253,86 @@ class Explanation {
   std::vector<std::string> warnings_;
 };
 
+using Json = nlohmann::ordered_json;
+
+constexpr double kSameVolume = 1e-9;  ///< relative
+
+/// Lowest and highest corner of the box that the bodies fill together; null if they fill none.
+template <int Dim>
+Json filled_box(const Mesh<Dim>& mesh, const Units& units) {
+  const auto box = rest_box(mesh);
+  double volume = 0;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) volume += mesh.volume(c);
+  if (box.isEmpty() || std::abs(volume - box.volume()) > kSameVolume * box.volume()) return nullptr;
+  Json corners = Json::array();
+  for (const Vec<Dim>& corner : {Vec<Dim>(box.min()), Vec<Dim>(box.max())}) {
+    Json& place = corners.emplace_back();
+    for (int k = 0; k < Dim; ++k) place.push_back(units.from_si(corner[k], "m"));
+  }
+  return corners;
+}
+
+/// Values of keys that the scene has or leaves to Setup::choose_defaults, by pointer, with remeshing enabled.
+template <int Dim>
+Json chosen_settings(Setup<Dim> setup, const Json& scene) {
+  const std::string stiffness = "/solver/contact/barrier_stiffness";
+  const bool is_open = setup.contact.enabled && !scene.contains(Json::json_pointer(stiffness));
+  const bool has_open_dhat = setup.contact.enabled && setup.contact.activation_distance == 0;
+  if (is_open) setup.contact.adaptive_stiffness = false, setup.contact.barrier_stiffness = 0;
+  setup.remesh.enabled = true;
+  setup.choose_defaults();
+  Json settings = Json::object();
+  if (is_open) settings[stiffness] = setup.contact.barrier_stiffness / barrier_unit(setup.units, setup.contact);
+  if (has_open_dhat) settings["/contact/dhat"] = setup.units.from_si(setup.contact.activation_distance, "m");
+  const auto add = [&](const char* operation, const std::optional<double>& tolerance) {
+    if (tolerance)
+      settings[fmt::format("/space/remesh/{}/acceptance_tolerance", operation)] = setup.units.from_si(*tolerance, "J");
+  };
+  add("split", setup.remesh.split.acceptance_tolerance);
+  add("collapse", setup.remesh.collapse.acceptance_tolerance);
+  add("swap", setup.remesh.swap.acceptance_tolerance);
+  add("smooth", setup.remesh.smooth.acceptance_tolerance);
+  add("curve", setup.remesh.curve.acceptance_tolerance);
+  add("straighten", setup.remesh.straighten.acceptance_tolerance);
+  return settings;
+}
+
+Json available_solvers() {
+  Json names = Json::array();
+  linear::Registry registry;
+  for (const auto& row : registry.list())
+    if (row.available) names.push_back(row.name);
+  return names;
+}
+
+template <int Dim>
+Json facts(const Setup<Dim>& setup, const Json& scene) {
+  const Units& units = setup.units;
+  const auto& contact = setup.contact;
+  std::set<int> bodies;
+  for (CellId c = 0; c < setup.mesh.cell_slots(); ++c) bodies.insert(setup.mesh.body(c));
+  return {{"version", ITR_VERSION},
+          {"scene", scene},
+          {"dim", Dim},
+          {"units",
+           {{"length", units.length()},
+            {"mass", units.mass()},
+            {"time", units.time()},
+            {"in_si", {{"m", units.factor("m")}, {"s", units.factor("s")}, {"J", units.factor("J")}}}}},
+          {"time",
+           {{"static", setup.time.is_static},
+            {"quasistatic", setup.time.quasistatic},
+            {"dt", units.from_si(setup.time.dt, "s")},
+            {"steps", setup.time.steps}}},
+          {"cells", setup.mesh.num_cells()},
+          {"bodies", bodies},
+          {"box", filled_box(setup.mesh, units)},
+          {"contact", contact.enabled},
+          {"friction", contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0},
+          {"settings", chosen_settings(setup, scene)},
+          {"solvers", available_solvers()}};
+}
+
 }  // namespace
 
 int explain(const RunOptions& options) {
@@ -277,6 +346,14 @@ int explain(const RunOptions& options) {
         Explanation(setup, registry, scene.defaults, scene.warnings).print(scene.output.units);
       },
       scene.setup);
+  return done;
+}
+
+int print_facts(const RunOptions& options) {
+  const scene::Scene scene = scene::read(options.scene, options.overrides);
+  const Json merged = Json::parse(scene.identity);
+  const Json found = std::visit([&](const auto& setup) { return facts(setup, merged); }, scene.setup);
+  fmt::print("{}\n", found.dump(1));
   return done;
 }
 

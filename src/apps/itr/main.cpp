@@ -1,32 +1,33 @@
 // SPDX-License-Identifier: MIT
+#include <fcntl.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "apps/study/study.hpp"
-#include "explain.hpp"
+#include "commands.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr_commit.hpp"
+#include "linear/modules.hpp"
 #include "output/certify.hpp"
 #include "output/force_file.hpp"
 #include "output/run_distance.hpp"
 #include "ranks.hpp"
-#include "report.hpp"
-#include "run.hpp"
 #include "scene/node.hpp"
 
 namespace {
 
 using namespace itr;
-namespace study = cli::study;
 
 scene::Override parse_override(const std::string& text) {
   const auto equals = text.find('=');
@@ -62,9 +63,26 @@ int list_solvers() {
   return cli::done;
 }
 
-int certify(const std::string& directory) {
+int print_json(const output::Certificate& certificate) {
+  nlohmann::ordered_json violations = nlohmann::ordered_json::array();
+  constexpr const char* kNames[] = {"file", "cells", "surfaces"};
+  for (const auto& [of, text] : certificate.violations)
+    violations.push_back({{"of", kNames[static_cast<int>(of)]}, {"text", text}});
+  const nlohmann::ordered_json found = {{"frames", certificate.frames},
+                                        {"passed", certificate.passed()},
+                                        {"violations", violations},
+                                        {"flight", certificate.flight},
+                                        {"overhang", certificate.overhang},
+                                        {"blocked_overhang", certificate.blocked_overhang},
+                                        {"length", certificate.units.length()}};
+  fmt::print("{}\n", found.dump(1));
+  return certificate.passed() ? cli::done : cli::certificate_failed;
+}
+
+int certify(const std::string& directory, bool as_json) {
   const auto certificate = output::certify(directory);
-  for (const auto& violation : certificate.violations) fmt::print("{}\n", violation);
+  if (as_json) return print_json(certificate);
+  for (const auto& violation : certificate.violations) fmt::print("{}\n", violation.text);
   fmt::print("{} frames, each by itself: {}\n", certificate.frames,
              certificate.passed() ? "no intersection, nothing inside of a body, no inversion" : "failed");
   if (certificate.overhang > 0)
@@ -126,34 +144,30 @@ void check_command(const CLI::App& app, int argc, char** argv) {
                     fmt::format("{}one of {}", near.empty() ? "" : near + " perhaps; ", fmt::join(names, ", "))});
 }
 
-void add_study_options(CLI::App& app, study::Options& options, std::vector<std::string>& sets) {
-  std::string series;
-  for (const auto& row : study::all_series())
-    series += fmt::format("\n  {}{}: {}", row.name, row.is_default ? "" : " (not by default)", row.what);
-  app.add_option("scene", options.scene, "scene file (JSON)")->required();
-  app.add_option("-o,--output", options.directory, "folder (default: study/<scene>); what is done in it is not done again");
-  app.add_option("--series", options.series, "some of these, or `all`:" + series)->delimiter(',');
-  app.add_option("--levels", options.levels, "uniform refinements of the scene's mesh (default: 3 in 2D, 2 in 3D)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--tolerances", options.tolerances, "of splits [J] (default: 4, 1, 1/4 and 1/16 times the scene's)")
-      ->delimiter(',')
-      ->check(CLI::PositiveNumber);
-  app.add_option("--starts", options.starts, "uniform refinements of the mesh that remeshing begins with (default: 0)")
-      ->delimiter(',')
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--reference", options.reference,
-                 "folder of a run to compare with (default: the finest level, split on and never coarsened)");
-  app.add_option("--second-reference", options.second_reference,
-                 "folder of another that tells what the first is worth (default: unknown with --reference, else a run)");
-  app.add_option("--reference-tolerance", options.reference_tolerance,
-                 "of its splits [J] (default: a sixteenth of the smallest tolerance)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--frames", options.frames, "times at which runs are compared (default: 10)")->check(CLI::PositiveNumber);
-  app.add_option("--time-limit", options.time_limit, "of a run [s]")->check(CLI::NonNegativeNumber);
-  app.add_option("--solver", options.solver, "linear solver, see `itr solvers`");
-  app.add_option("--threads", options.threads, "of each run (default: 1)")->check(CLI::PositiveNumber);
-  app.add_option("--set", sets, "/json/pointer=VALUE, for all runs")->allow_extra_args(false);
-  add_defaults_option(app, sets);
+/// Becomes the Python program of `itr study` (src/apps/study), which gets these arguments, the last of them null.
+[[noreturn]] void become_study(char** arguments) {
+  namespace fs = std::filesystem;
+  const fs::path program = fs::canonical("/proc/self/exe");
+  std::string folder = (program.parent_path() / ITR_STUDY_FOLDER).lexically_normal().string();
+  if (!fs::exists(folder))
+    throw InputError({folder, "", "no such folder", "the Python program of `itr study`, installed beside the command"});
+  // Runs of a study find the program and its modules even if files are replaced while the study runs.
+  const int file = open("/proc/self/exe", O_RDONLY);
+  std::string self = file < 0 ? program.string() : fmt::format("/proc/{}/fd/{}", getpid(), file), modules;
+  for (const fs::path& one : linear::module_folders()) modules += (modules.empty() ? "" : ":") + one.string();
+  setenv("ITR_BACKEND_PATH", modules.c_str(), 1);
+
+  const char* asked = std::getenv("ITR_PYTHON");
+  std::string python = asked ? asked : fs::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3", option = "-B";
+  std::vector<char*> words = {python.data(), option.data(), folder.data(), self.data()};
+  for (; *arguments; ++arguments) words.push_back(*arguments);
+  words.push_back(nullptr);
+  execvp(python.c_str(), words.data());
+  throw InputError({"", "study", "no program " + python, "Python: apt install python3 python3-matplotlib"});
+}
+
+void check_single_rank() {
+  if (cli::this_launch().ranks > 1) throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
 }
 
 int dispatch(int argc, char** argv) {
@@ -164,17 +178,19 @@ int dispatch(int argc, char** argv) {
   cli::RunOptions options;
   std::vector<std::string> sets;
   std::string directory;
-  bool as_page = false;
+  bool as_page = false, as_json = false;
   auto* run = app.add_subcommand("run", "simulate a scene");
   add_scene_options(*run, options, sets);
   run->add_flag("--report", options.report, "at the end, write report.html into the folder: see `itr report`");
   auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing; takes options of run");
   add_scene_options(*explain, options, sets);
+  explain->add_flag("--json", as_json, "what is known of the scene before it runs, as one JSON object, in its units");
   auto* schema = app.add_subcommand("schema", "JSON Schema of scenes");
   schema->add_flag("--markdown", as_page, "the same as a page to read: docs/scenes.md");
   auto* solvers = app.add_subcommand("solvers", "list linear solvers, present and absent");
   auto* check = app.add_subcommand("certify", "re-check every stored frame with exact predicates");
   check->add_option("directory", directory, "result folder")->required();
+  check->add_flag("--json", as_json, "as one JSON object");
   auto* report_command =
       app.add_subcommand("report", "one HTML file that shows a run, or a study: opens in a browser, from the disk");
   std::string report_file;
@@ -197,10 +213,12 @@ int dispatch(int argc, char** argv) {
   apart->add_option("directory", directory, "result folder")->required();
   apart->add_option("reference", reference, "result folder of the run to compare with")->required();
   apart->add_flag("--last", last_only, "at the last time that both have stored alone (default: at all of them)");
-  auto* study = app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
-  study::Options study_options;
-  add_study_options(*study, study_options, sets);
+  app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   check_command(app, argc, argv);
+  if (argc > 1 && std::string_view(argv[1]) == "study") {
+    check_single_rank();
+    become_study(argv + 2);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
@@ -209,10 +227,9 @@ int dispatch(int argc, char** argv) {
     app.exit(error);
     return cli::bad_input;
   }
-  if (!*run && cli::this_launch().ranks > 1)
-    throw InputError({"", "itr", "several MPI ranks", "one rank: only `itr run` uses more"});
+  if (!*run) check_single_rank();
   if (*solvers) return list_solvers();
-  if (*check) return certify(directory);
+  if (*check) return certify(directory, as_json);
   if (*report_command) return cli::report(directory, report_file, report_options);
   if (*curves) return forces(directory);
   if (*apart) return distance(directory, reference, last_only);
@@ -221,13 +238,9 @@ int dispatch(int argc, char** argv) {
     return cli::done;
   }
   for (const auto& text : sets) options.overrides.push_back(parse_override(text));
-  if (*study) {
-    options.scene = study_options.scene;
-    study_options.overrides = options.overrides;
-  }
   try {
-    if (*study) return cli::run_study(study_options);
-    return *explain ? cli::explain(options) : cli::run(options);
+    if (*explain) return as_json ? cli::print_facts(options) : cli::explain(options);
+    return cli::run(options);
   } catch (const InputError& error) {  // what the library finds wrong with a setup is wrong with its scene
     if (!error.parts().file.empty()) throw;
     InputError::Parts parts = error.parts();

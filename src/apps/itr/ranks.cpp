@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "run.hpp"
+#include "commands.hpp"
 
 namespace itr::cli {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "run.hpp"
+#include "commands.hpp"
 
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -11,6 +11,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -23,11 +24,9 @@
 #include "itr/core/parallel.hpp"
 #include "itr/output/writer.hpp"
 #include "output/force_file.hpp"
+#include "output/warnings.hpp"
 #include "ranks.hpp"
-#include "report.hpp"
 #include "simulation/advice.hpp"
-#include "solver_choice.hpp"
-#include "warnings.hpp"
 
 namespace itr::cli {
 
@@ -61,19 +60,37 @@ void on_interrupt(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+/// Says warnings, and gives them to the results' files too.
+class Warnings {
+ public:
+  /// Says it after "warning:", the first times that there is one of its kind, and passes it on to the writer.
+  void add(std::string_view text) {
+    constexpr int kMostOfAKind = 3;
+    const int times = ++said_[output::kind_of_warning(text)];
+    if (times <= kMostOfAKind)
+      spdlog::warn("warning: {}{}", text, times == kMostOfAKind ? " (more of this kind are counted, not said)" : "");
+    if (writer_)
+      writer_->warn(std::string(text));
+    else
+      early_.emplace_back(text);
+  }
+  /// Passes warnings on to the writer, also those from before it was there.
+  void set_writer(output::Writer* writer) {
+    writer_ = writer;
+    for (const std::string& text : early_) writer_->warn(text);
+    early_.clear();
+  }
+
+ private:
+  std::vector<std::string> early_;
+  std::map<std::string, int> said_;  ///< how often, by kind
+  output::Writer* writer_ = nullptr;
+};
+
 Logger make_logger(Warnings& warnings) {
   return Logger([&warnings](LogLevel level, std::string_view message) {
-    switch (level) {
-      case LogLevel::debug:
-        spdlog::debug("{}", message);
-        break;
-      case LogLevel::info:
-        spdlog::info("{}", message);
-        break;
-      case LogLevel::warning:
-        warnings.add(message);
-        break;
-    }
+    if (level == LogLevel::warning) return warnings.add(message);
+    spdlog::log(level == LogLevel::debug ? spdlog::level::debug : spdlog::level::info, "{}", message);
   });
 }
 
@@ -109,19 +126,20 @@ std::string describe_refusals(const OperationCount& count, const char* name) {
 
 /// Says how much remeshing did, and where it did nothing why.
 std::string describe_remeshing(const StepReport& totals, const Units& units, int vertices_before) {
-  const auto count = [](const OperationCount& c, const char* name) {
-    return c.tried > 0 ? fmt::format(", {} of {} {}", c.accepted, c.tried, name) : std::string();
-  };
-  const std::string done =
-      fmt::format("remeshing: {} vertices at the start, {} at the end; {} of {} splits{}{}{}{}{}{}{}{}{}{}{}",
-                  vertices_before, totals.vertices, totals.splits.accepted, totals.splits.tried,
-                  count(totals.curves, "curved edges"), count(totals.straightens, "straightened"),
-                  count(totals.collapses, "collapses"), count(totals.swaps, "swaps"), count(totals.smooths, "moves"),
-                  describe_refusals(totals.splits, "splits"), describe_refusals(totals.curves, "curved edges"),
-                  describe_refusals(totals.straightens, "straightened"), describe_refusals(totals.collapses, "collapses"),
-                  describe_refusals(totals.swaps, "swaps"), describe_refusals(totals.smooths, "moves"));
-  const int accepted = totals.splits.accepted + totals.curves.accepted + totals.straightens.accepted +
-                       totals.collapses.accepted + totals.swaps.accepted + totals.smooths.accepted;
+  const std::pair<const OperationCount&, const char*> operations[] = {
+      {totals.splits, "splits"},       {totals.curves, "curved edges"}, {totals.straightens, "straightened"},
+      {totals.collapses, "collapses"}, {totals.swaps, "swaps"},         {totals.smooths, "moves"}};
+  std::string done = fmt::format("remeshing: {} vertices at the start, {} at the end", vertices_before, totals.vertices),
+              refusals;
+  int accepted = 0;
+  for (const auto& [count, name] : operations) {
+    const bool is_split = &count == &totals.splits;
+    if (count.tried > 0 || is_split)
+      done += fmt::format("{} {} of {} {}", is_split ? ";" : ",", count.accepted, count.tried, name);
+    refusals += describe_refusals(count, name);
+    accepted += count.accepted;
+  }
+  done += refusals;
   if (accepted > 0) return done;
   const std::string bound = totals.bound_by_dhat > 0
                                 ? fmt::format("; d-hat kept {} surface edges from being split", totals.bound_by_dhat)

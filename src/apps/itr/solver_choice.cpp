@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "solver_choice.hpp"
+#include "commands.hpp"
 
 #include <fmt/format.h>
 

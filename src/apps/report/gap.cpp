@@ -6,35 +6,29 @@
 
 #include "geometry/bvh.hpp"
 #include "itr/geometry/distance.hpp"
+#include "mesh/connected_parts.hpp"
 
 namespace itr::report {
 
 namespace {
 
-/// For each vertex the lowest one that cells connect it with.
-std::vector<int> components(const StoredFrame& frame, int nodes) {
-  std::vector<int> parent(nodes);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  const int corners = frame.dim + 1;
-  for (std::size_t i = 0; i < frame.simplices.size(); ++i) {
-    const int a = root(static_cast<int>(frame.simplices[i])), b = root(static_cast<int>(frame.simplices[i - i % corners]));
-    parent[std::max(a, b)] = std::min(a, b);
-  }
+/// Numbers of the connected parts that nodes are in.
+template <int Dim>
+std::vector<int> parts_of(const StoredFrame& frame, int nodes) {
+  std::vector<std::array<int, Dim + 1>> cells(frame.simplices.size() / (Dim + 1));
+  for (std::size_t i = 0; i < frame.simplices.size(); ++i)
+    cells[i / (Dim + 1)][i % (Dim + 1)] = static_cast<int>(frame.simplices[i]);
+  std::vector<int> part = connected_parts<Dim + 1>(nodes, cells);
   const int num_curved = static_cast<int>(frame.curved_edges.size()) / 2;
-  for (int e = 0; e < num_curved; ++e) parent[nodes - num_curved + e] = root(static_cast<int>(frame.curved_edges[2 * e]));
-  for (int i = 0; i < nodes; ++i) parent[i] = root(i);
-  return parent;
+  for (int e = 0; e < num_curved; ++e) part[nodes - num_curved + e] = part[frame.curved_edges[2 * e]];
+  return part;
 }
 
 template <int Dim>
 struct Primitive {
   std::array<Vec<Dim>, 3> corners;
   int count = 0;
-  int component = -1;  ///< -1: of an obstacle
+  int part = -1;  ///< -1: of an obstacle
 };
 
 template <int Dim>
@@ -54,13 +48,13 @@ Vec<Dim> point(const std::vector<double>& x, std::int64_t i) {
 template <int Dim>
 std::vector<double> gaps_in(const StoredFrame& frame, double most) {
   const int nodes = static_cast<int>(frame.x.size()) / Dim;
-  const std::vector<int> component = components(frame, nodes);
+  const std::vector<int> part = parts_of<Dim>(frame, nodes);
   std::vector<Primitive<Dim>> primitives;
   const auto add = [&](const std::vector<double>& x, const std::vector<std::int64_t>& ids, int count, bool is_obstacle) {
     for (std::size_t i = 0; i + count <= ids.size(); i += count) {
       Primitive<Dim>& one = primitives.emplace_back();
       one.count = count;
-      if (!is_obstacle) one.component = component[ids[i]];
+      if (!is_obstacle) one.part = part[ids[i]];
       for (int k = 0; k < count; ++k) one.corners[k] = point<Dim>(x, ids[i + k]);
     }
   };
@@ -71,9 +65,8 @@ std::vector<double> gaps_in(const StoredFrame& frame, double most) {
   std::vector<std::int64_t> points(obstacles.x.size() / Dim);
   std::iota(points.begin(), points.end(), 0);
   if (obstacles.faces.empty() && obstacles.edges.empty()) add(obstacles.x, points, 1, true);
-  const bool is_alone = std::all_of(primitives.begin(), primitives.end(), [&](const auto& one) {
-    return one.component >= 0 && one.component == primitives.front().component;
-  });
+  const bool is_alone = std::all_of(primitives.begin(), primitives.end(),
+                                    [&](const auto& one) { return one.part >= 0 && one.part == primitives.front().part; });
   if (is_alone) return {};
 
   std::vector<Box<Dim>> boxes(primitives.size());
@@ -97,7 +90,7 @@ std::vector<double> gaps_in(const StoredFrame& frame, double most) {
     double least = most * most;
     for (const int hit : hits) {
       const Primitive<Dim>& one = primitives[hit];
-      if (one.component != component[i]) least = std::min(least, squared_distance<Dim>(p, one));
+      if (one.part != part[i]) least = std::min(least, squared_distance<Dim>(p, one));
     }
     found[i] = std::sqrt(least);
   }

@@ -103,7 +103,8 @@ std::string fill(std::string_view page, const std::vector<std::pair<std::string,
 Json describe(const output::Certificate& certificate) {
   constexpr std::size_t kShown = 20;  // a run that went wrong may have as many as it has cells
   const auto& all = certificate.violations;
-  const std::vector<std::string> shown(all.begin(), all.begin() + static_cast<int>(std::min(all.size(), kShown)));
+  Json shown = Json::array();
+  for (std::size_t i = 0; i < std::min(all.size(), kShown); ++i) shown.push_back(all[i].text);
   return {{"frames", certificate.frames}, {"count", all.size()}, {"violations", shown}};
 }
 
@@ -206,38 +207,40 @@ ReportSummary write_report(const fs::path& directory, const fs::path& file, cons
   return summary;
 }
 
-ReportSummary write_study_report(const std::string& title, const std::string& results, const std::string& diagram,
-                                 const std::vector<StudyRun>& runs, const fs::path& file, const ReportOptions& options) {
-  struct Shown {
-    std::string name, blocks;
-  };
+ReportSummary write_study_report(const fs::path& directory, const fs::path& file, const ReportOptions& options) {
+  const fs::path source = directory / "study.json";
+  const Json results = Json::parse(read_text(source), nullptr, false);
+  if (!results.is_object() || !results.contains("runs") || !results["runs"].is_array())
+    throw InputError({source.string(), "", "no results of a study", "what `itr study` writes"});
+  const std::string diagram = read_text(directory / "study.svg");
   ReportSummary summary;
-  std::vector<Shown> shown;
-  std::size_t size = assets::script.size() + results.size() + diagram.size();
-  for (const StudyRun& run : runs) {
-    const std::vector<fs::path> frames = output::stored_frames(run.directory);
+  std::vector<std::pair<std::string, std::string>> shown;  // run, its blocks
+  std::string data = json_block("study", results);
+  std::size_t size = assets::script.size() + data.size() + diagram.size();
+  for (const Json& run : results["runs"]) {
+    const std::string name = run.value("run", "");
+    const fs::path folder = directory / "runs" / name;
+    const auto frames = run.value("status", "") == "failed" ? std::vector<fs::path>() : output::stored_frames(folder);
     if (frames.empty()) continue;
     ++summary.stored;
     FrameEncoder encoder;
     encoder.add(frames.back());
-    shown.push_back({run.name, run_blocks("run-" + run.name + "-", {run.name, run.directory, encoder}, {0})});
-    size += shown.back().blocks.size();
+    shown.push_back({name, run_blocks("run-" + name + "-", {name, folder, encoder}, {0})});
+    size += shown.back().second.size();
   }
   while (static_cast<double>(size) > 1e6 * options.max_mb && !shown.empty()) {
-    const auto largest = std::max_element(shown.begin(), shown.end(),
-                                          [](const Shown& a, const Shown& b) { return a.blocks.size() < b.blocks.size(); });
-    summary.notes.push_back(fmt::format("the mesh of {} is left out, for at most {:g} MB", largest->name, options.max_mb));
-    size -= largest->blocks.size();
+    const auto largest = std::ranges::max_element(shown, {}, [](const auto& one) { return one.second.size(); });
+    summary.notes.push_back(fmt::format("the mesh of {} is left out, for at most {:g} MB", largest->first, options.max_mb));
+    size -= largest->second.size();
     shown.erase(largest);
   }
   Json names = Json::array();
-  std::string data = json_block("study", Json::parse(results));
-  for (const Shown& run : shown) {
-    names.push_back(run.name);
-    data += run.blocks;
+  for (const auto& [name, blocks] : shown) {
+    names.push_back(name);
+    data += blocks;
   }
   data += json_block("study-runs", {{"runs", names}, {"notes", summary.notes}});
-  const std::string html = page(title, diagram, data);
+  const std::string html = page(fs::canonical(directory).filename().string(), diagram, data);
   output::write_file(file, html);
   summary.frames = static_cast<int>(shown.size());
   summary.mb = megabytes(html);

@@ -26,17 +26,9 @@ struct ReportSummary {
 ReportSummary write_report(const std::filesystem::path& directory, const std::filesystem::path& file,
                            const ReportOptions& options = {});
 
-/// A run of a study.
-struct StudyRun {
-  std::string name;
-  std::filesystem::path directory;
-};
-
-/// Shows what a study found: its work-precision diagram and the last frames of its runs, two side by side. `results` is the
-/// text of study.json, `diagram` that of study.svg, for where the page cannot draw. Frames are left out for the size, those
-/// of the largest runs first. Throws InputError as write_report.
-ReportSummary write_study_report(const std::string& title, const std::string& results, const std::string& diagram,
-                                 const std::vector<StudyRun>& runs, const std::filesystem::path& file,
+/// Shows what the study in `directory` found: its diagrams and the last frames of its runs, two side by side. Frames are
+/// left out for the size, those of the largest runs first. Throws InputError as write_report.
+ReportSummary write_study_report(const std::filesystem::path& directory, const std::filesystem::path& file,
                                  const ReportOptions& options = {});
 
 }  // namespace itr::report

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, Optional, Se
 
 import numpy as np
 
+from . import _load  # isort: skip
 from . import _itr
 from ._itr import InputError, Saved, __version__
 from ._study import study

@@ -83,7 +83,7 @@ function plotsOf(run) {
   ].map(name => ({name: name.replace('_', ' '), values: take(s => s.seconds?.[name])})));
   add('Newton iterations a step', '', [{name: '', values: take(s => s.newton_iterations)}]);
   add('Operations of remeshing that were accepted', '', [
-    'splits', 'collapses', 'swaps', 'smooths', 'raises', 'lowers'
+    'splits', 'curves', 'straightens', 'collapses', 'swaps', 'smooths'
   ].map(name => ({name, values: take(s => s[name]?.accepted)})));
   add('Energy that remeshing gained', 'J', [{name: '', values: take(gainOf)}]);
   add('Least distance in contact', 'm', [{name: '', values: take(s => s.min_distance)}], true);

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Shows the results of a study: diagrams of error against cost, answers, commands, and two runs side by side.
+// Shows the results of a study: its diagrams of error against cost, answers, commands, and two runs side by side.
 'use strict';
 
 const MEASURES = [
   ['l2', 'L2 error of the displacement, relative'], ['h1', 'H1 error of the displacement, relative'],
   ['surface', 'distance of the surfaces [m]'], ['energy', 'error of the energy [J]'],
   ['momentum', 'error of the momentum [kg m/s]']
-];
-const COSTS = [
-  ['processor_seconds', 'processor seconds'], ['unknowns', 'unknowns, mean over the steps'], ['memory_mb', 'memory [MB]']
 ];
 
 // null: smaller than what the reference is worth, so not told; empty: not compared.
@@ -19,70 +16,21 @@ function errorText(study, run, measure) {
   return value === null ? `< ${write(study.worth?.[measure] ?? 0)}` : write(value);
 }
 
-// Runs that diagrams compare: those on other meshes, not with other solvers or time steps; without what tells the worth.
-const shownIn = study =>
-    study.runs.filter(r => !['solvers', 'time', ...(study.worth ? ['reference'] : [])].includes(r.series));
-
 // Text with `names` as code.
 const withCode = text => text.split('`').map((part, i) => i % 2 ? html('code', {}, part) : part);
 
-// Logarithmic in both directions, a line for each series; points tell of their run and choose it.
-class Diagram {
-  constructor(study, [measure, label], [cost, costLabel], {onPoint, colourOf}) {
-    const {width, left, right, top} = PLOT, height = 250, bottom = 38;
-    const worth = study.worth?.[measure] ?? 0, isPoint = r => r.errors?.[measure] > 0 && r[cost] > 0;
-    this.points = shownIn(study).filter(isPoint).map(run => ({run, x: run[cost], y: run.errors[measure]}));
-    if (!this.points.length) return;
-    const range = values => {
-      const [low, high] = [Math.min(...values), Math.max(...values)];
-      return [low / 1.25, high * 1.25];
-    };
-    const [x0, x1] = range(this.points.map(p => p.x)),
-               [y0, y1] = range([...this.points.map(p => p.y), ...(worth > 0 ? [worth] : [])]),
-               log = (v, a, b) => Math.log(v / a) / Math.log(b / a);
-    const x = v => left + log(v, x0, x1) * (width - left - right),
-          y = v => height - bottom - log(v, y0, y1) * (height - top - bottom);
-    const drawing =
-        svg('svg', {viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `${label} against ${costLabel}`});
-    for (const tick of ticksOf(x0, x1, true))
-      drawing.append(
-          svg('line', {x1: x(tick), x2: x(tick), y1: top, y2: height - bottom, stroke: '#e3e5e9'}),
-          svg('text', {x: x(tick), y: height - bottom + 14, 'text-anchor': 'middle'}, shortNumber(tick)));
-    for (const tick of ticksOf(y0, y1, true))
-      drawing.append(
-          svg('line', {x1: left, x2: width - right, y1: y(tick), y2: y(tick), stroke: '#e3e5e9'}),
-          svg('text', {x: left - 5, y: y(tick) + 3.5, 'text-anchor': 'end'}, shortNumber(tick)));
-    if (worth > 0)
-      drawing.append(
-          svg('line',
-              {x1: left, x2: width - right, y1: y(worth), y2: y(worth), stroke: '#8a4b00', 'stroke-dasharray': '4 3'}),
-          svg('text', {x: left + 4, y: y(worth) - 4}, 'what the reference is worth'));
-    drawing.append(svg('text', {x: (left + width - right) / 2, y: height - 6, 'text-anchor': 'middle'}, costLabel));
-    for (const series of new Set(this.points.map(p => p.run.series))) {
-      const own = this.points.filter(p => p.run.series === series).sort((a, b) => b.y - a.y);
-      drawing.append(svg('polyline', {
-        points: own.map(p => `${x(p.x).toFixed(1)},${y(p.y).toFixed(1)}`).join(' '),
-        fill: 'none',
-        stroke: colourOf(series),
-        'stroke-width': 1.3
-      }));
-      for (const p of own) {
-        const dot =
-            svg('circle', {cx: x(p.x), cy: y(p.y), r: 4.5, fill: colourOf(series), tabindex: 0, 'data-run': p.run.run},
-                svg('title', {},
-                    `${p.run.run}: ${p.run.label}\n${label} ${shortNumber(p.y)}\n${costLabel} ${shortNumber(p.x)}\n${
-                        p.run.vertices} vertices at the end`));
-        dot.addEventListener('pointerenter', () => onPoint(p.run, false));
-        dot.addEventListener('click', () => onPoint(p.run, true));
-        drawing.append(dot);
+// Points of the stored diagram with their runs: those of a line SERIES-MEASURE-COST are in the order of their errors.
+function pointsOf(diagram, study) {
+  const points = [];
+  for (const series of new Set(study.runs.map(r => r.series)))
+    for (const [measure] of MEASURES)
+      for (const cost of ['processor_seconds', 'unknowns', 'memory_mb']) {
+        const runs = study.runs.filter(r => r.series === series && r.errors?.[measure] > 0 && r[cost] > 0)
+                         .sort((a, b) => b.errors[measure] - a.errors[measure]);
+        const marks = diagram?.querySelectorAll(`[id="${series}-${measure}-${cost}"] use`) ?? [];
+        marks.forEach((mark, k) => points.push({mark, run: runs[k]}));
       }
-    }
-    this.figure = html('figure', {className: 'plot'}, html('figcaption', {}, label), drawing);
-  }
-  mark(name) {
-    for (const dot of this.figure?.querySelectorAll('circle') ?? [])
-      dot.setAttribute('stroke', dot.dataset.run === name ? '#1d2530' : 'none');
-  }
+  return points;
 }
 
 // Cells of a rest mesh by place.
@@ -176,9 +124,8 @@ async function openStudy() {
         plots = document.getElementById('plots'), foot = document.getElementById('foot');
   said.append(...withCode(`Speed against error: ${study.scene} · errors against ${study.reference}`));
   foot.textContent = [...notes, `ITR ${study.version}`].join(' · ');
-  const series = [...new Set(shownIn(study).map(r => r.series))],
-        colourOf = name => LINE_COLOURS[series.indexOf(name) % LINE_COLOURS.length];
-  const report = {study, diagrams: [], views: [null, null], shown: ['', '']};
+  const diagram = document.querySelector('#fallback svg'),
+        report = {study, points: pointsOf(diagram, study), views: [null, null], shown: ['', '']};
 
   const about = html('pre', {className: 'pick'}), command = html('code'),
         copy = html(
@@ -201,20 +148,18 @@ async function openStudy() {
                                     ])
     ].join('\n');
     command.textContent = commandOf(study, run);
-    report.diagrams.forEach(d => d.mark(run.run));
+    report.points.forEach(p => p.mark.classList.toggle('chosen', p.run === run));
   };
   const onPoint = (run, isChosen) => {
     tell(run);
     if (isChosen && names.includes(run.run)) report.show(0, run.run);
   };
-  for (const measure of MEASURES)
-    for (const cost of COSTS) {
-      const diagram = new Diagram(study, measure, cost, {onPoint, colourOf});
-      if (diagram.figure) report.diagrams.push(diagram), plots.append(diagram.figure);
-    }
-  const legend = html(
-      'p', {className: 'series'},
-      ...series.map(name => html('span', {}, html('i', {style: `background:${colourOf(name)}`}), name)));
+  for (const {mark, run} of report.points) {
+    mark.append(svg('title', {}, `${run.run}: ${run.label}\n${run.vertices} vertices at the end`));
+    mark.addEventListener('pointerenter', () => onPoint(run, false));
+    mark.addEventListener('click', () => onPoint(run, true));
+  }
+  if (diagram) plots.append(diagram);
   const table = html(
       'table', {},
       html('tr', {}, ...['run', '', 'status', 'vertices', 'processor s', 'L2', 'H1'].map(t => html('th', {}, t))),
@@ -225,13 +170,12 @@ async function openStudy() {
                   run.processor_seconds === undefined ? '' : shortNumber(run.processor_seconds), errorText(study, run, 'l2'),
                   errorText(study, run, 'h1')]
                   .map(t => html('td', {}, String(t))))));
-  const point = html('section', {className: 'words point'}, legend, about, html('p', {}, command, ' ', copy));
+  const point = html('section', {className: 'words point'}, about, html('p', {}, command, ' ', copy));
   const answers = html(
       'section', {className: 'words'}, html('ul', {}, ...study.answers.map(a => html('li', {}, ...withCode(a)))),
       html('ul', {className: 'doubts'}, ...(study.doubts ?? []).map(d => html('li', {}, ...withCode(d)))), table);
   plots.before(point);
   plots.after(answers);
-  if (report.diagrams.length) document.body.classList.add('with-diagrams');  // then the stored one is not needed
   if (study.runs.length) tell(study.runs.find(r => r.status === 'finished') ?? study.runs[0]);
   if (!names.length) {
     document.getElementById('why').textContent = 'No run of this study has stored frames: no meshes are shown.';
