@@ -44,10 +44,11 @@ def read_options(words):
     add("--time-limit", type=float, default=0, help="of a run [s]")
     add("--solver", default="", help="linear solver, see `itr solvers`")
     add("--threads", type=int, default=1, help="of each run (default: 1)")
-    add("--defaults", choices=("itr", "polyfem"), help="what keys that the scene leaves out stand for (default: the scene's)")
     add("--set", action="append", default=[], help="/json/pointer=VALUE, for all runs")
+    add("--defaults", help="what keys that the scene leaves out stand for: itr (default) or polyfem, see docs/scenes.md")
     options = parser.parse_args(words)
-    options.set += [f'/defaults="{options.defaults}"'] if options.defaults else []
+    if options.defaults:
+        options.set.append(f'/defaults="{options.defaults}"')
     for name, least in (("levels", 1), ("frames", 1), ("threads", 1), ("starts", 0), ("time_limit", 0), ("tolerances", 1e-300),
                         ("reference_tolerance", 1e-300)):
         values = getattr(options, name)
