@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "simulation/closed_faces.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -23,7 +24,8 @@ bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
       static_cast<int>(cells.facets.size() + cells.curved_facets.size()) != mesh.facet_slots())
     return false;
   for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    if (cells.rest[v] != mesh.rest(v)) return false;
+    if (cells.rest[v] != mesh.rest(v) || surface.surface.closed.has_any(std::array{v}) != is_closed(mesh, space, v))
+      return false;
   if (!std::equal(obstacles.begin(), obstacles.end(), cells.rest.begin() + bodies)) return false;
   if (!space.is_linear()) return has_cells_of(mesh);
   for (CellId c = 0; c < mesh.cell_slots(); ++c)

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
@@ -24,6 +25,9 @@ namespace itr {
 
 /// Tag of a boundary facet or vertex that no selection named: carries no boundary condition.
 inline constexpr int kNoTag = std::numeric_limits<int>::max();
+
+/// Mesh::steps_apart of a vertex that coincides with nothing at rest, or has been apart from that for so many steps.
+inline constexpr std::uint8_t kApart = 255;
 
 /// Stands in an Edit for the vertex that the edit creates.
 inline constexpr VertexId kNewVertex = std::numeric_limits<int>::max();
@@ -179,6 +183,10 @@ class Mesh {
   /// give the tag to a new one on a boundary edge between two that share it.
   int vertex_tag(VertexId v) const { return vertex_tag_[v]; }
   void set_vertex_tag(VertexId v, int tag) { vertex_tag_[v] = tag; }
+  /// For how many steps the vertex has been apart from the faces that coincide with it at rest: 0 as long as these are
+  /// closed (ClosedFaces). Edits give it the least of the parents of its values. Only scenes with contact set it.
+  std::uint8_t steps_apart(VertexId v) const { return steps_apart_[v]; }
+  void set_steps_apart(VertexId v, std::uint8_t steps) { steps_apart_[v] = steps; }
   /// The tag of both ends of an edge of the surface, all of which conditions with that tag hold; else kNoTag.
   int edge_tag(const EdgeKey& edge) const {
     const int tag = vertex_tag_[edge[0]];
@@ -256,6 +264,7 @@ class Mesh {
   std::vector<Vec<Dim>> rest_;
   std::vector<char> vertex_alive_;
   std::vector<int> vertex_tag_;
+  std::vector<std::uint8_t> steps_apart_;
   std::vector<Cell> cells_;
   std::vector<int> body_, part_;
   std::vector<double> volume_, quality_;

@@ -129,6 +129,7 @@ struct FrameView {
   const AskedFields* asked = nullptr;  ///< null: nothing was asked for
   ProxyView<Dim> proxy{};
   const Space* space = nullptr;  ///< null: all edges are straight
+  double dhat = 0;               ///< of contact [m]
 };
 
 }  // namespace itr

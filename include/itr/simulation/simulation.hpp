@@ -131,6 +131,7 @@ class Simulation {
                          setup().obstacles.triangles,
                          &data.asked};
     frame.space = &state.space;
+    frame.dhat = setup().contact.activation_distance;
     if (setup().proxy) frame.proxy = {&data.proxy_x, &setup().proxy->edges, &setup().proxy->triangles};
     observer(frame);
   }

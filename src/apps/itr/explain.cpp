@@ -223,7 +223,7 @@ class Explanation {
   /// Surfaces and which of them can meet; what is near at the start.
   void contact() {
     const ContactSurface<Dim> contact =
-        contact_surface(setup_, setup_.mesh, simulation_.state().space, simulation_.state().chords);
+        contact_surface(setup_, simulation_.state().mesh, simulation_.state().space, simulation_.state().chords);
     const CollisionSurface& surface = contact.surface;
     const VectorX x = contact.positions(simulation_.state().history.x[0]);
     const auto component = connected_parts<2>(surface.counts.size(), surface.edges);
