@@ -99,13 +99,14 @@ TEST(CInterface, AnswersAnErrorWithoutASimulation) {
 
 /// Two triangles that touch along an edge, with vertices of their own: values, tractions and forces by vertex of one are not
 /// those of the other.
-TEST(CInterface, KeepsVerticesThatCoincideApart) {
+void check_vertices_that_coincide(const char* options) {
   itr_model* model = itr_model_create(2);
   const double vertices[] = {0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 1, 1};
   const int cells[] = {0, 1, 2, 3, 5, 4}, touching[] = {1, 2, 4, 3};
   EXPECT_EQ(itr_model_set_mesh(model, 6, vertices, 2, cells, nullptr), ITR_SUCCESS);
   EXPECT_EQ(itr_model_add_boundary(model, "touching", 2, touching, nullptr), ITR_SUCCESS) << itr_model_message(model);
   EXPECT_EQ(itr_model_set_options(model, kOptions), ITR_SUCCESS);
+  EXPECT_EQ(itr_model_set_options(model, options), ITR_SUCCESS) << itr_model_message(model);
   itr_simulation* s = nullptr;
   EXPECT_EQ(itr_simulation_create(model, nullptr, nullptr, &s), ITR_SUCCESS) << itr_model_message(model);
   std::vector<double> values(12, 0);
@@ -122,6 +123,10 @@ TEST(CInterface, KeepsVerticesThatCoincideApart) {
     EXPECT_NEAR(itr_forces(s, ITR_APPLIED)[2 * v], values[2 * v] / std::sqrt(2.0), 1e-12) << v;
   itr_simulation_destroy(s);
   itr_model_destroy(model);
+}
+TEST(CInterface, KeepsVerticesThatCoincideApart) {
+  check_vertices_that_coincide("{}");
+  check_vertices_that_coincide(R"({"contact": {"enabled": true, "dhat": 0.001}})");
 }
 
 TEST(CInterface, ChecksTheLengthsOfArrays) {

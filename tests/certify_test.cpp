@@ -31,7 +31,8 @@ class CertifyTest : public testing::Test {
     Writer writer(folder, {1}, {"scene.json", "eigen:ldlt", 1});
     writer.write(scene.view(), StepReport());
     writer.finish("finished");
-    return texts_of(certify(folder));
+    certificate = certify(folder);
+    return texts_of(certificate);
   }
   static std::vector<std::string> texts_of(const Certificate& certificate) {
     std::vector<std::string> texts;
@@ -40,6 +41,7 @@ class CertifyTest : public testing::Test {
   }
 
   fs::path folder;
+  Certificate certificate;  ///< of the last one
 };
 
 TEST_F(CertifyTest, CertifiesAValidPlaneFrame) { EXPECT_TRUE(violations_of(Plane()).empty()); }
@@ -100,6 +102,40 @@ TEST_F(CertifyTest, AProxyTouchesInPlaceOfTheBoundary) {
   EXPECT_EQ(violations[0], "frames/000000.h5: edges (proxy 0, proxy 1) and (obstacle 0, obstacle 1) intersect");
   plane.proxy_x[1][0] = std::nan("");
   EXPECT_EQ(violations_of(plane).size(), 1u);
+}
+
+/// Two squares with faces that coincide at rest.
+struct TouchingPlane : Plane {
+  TouchingPlane() {
+    mesh = Mesh<2>({{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 1}, {1, 1}, {1, 2}, {0, 2}},
+                   {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}}, {1, 1, 2, 2});
+    for (int i = 0; i < 8; ++i) vertex_of<2>(x, i) = mesh.rest(i);
+  }
+  FrameView<2> view() const {
+    FrameView<2> frame = Plane::view();
+    frame.dhat = 0.01;
+    return frame;
+  }
+};
+
+TEST_F(CertifyTest, LetsClosedFacesOverlapByDhat) {
+  TouchingPlane plane;
+  EXPECT_FALSE(violations_of(plane).empty());
+  for (int v = 0; v < 8; ++v) plane.mesh.set_steps_apart(v, 0);
+  EXPECT_TRUE(violations_of(plane).empty());
+  for (int v = 4; v < 8; ++v) plane.x[2 * v + 1] -= 0.008;
+  for (const double shift : {0.0, 0.003, -0.3}) {
+    for (int v = 4; v < 8; ++v) plane.x[2 * v] = plane.mesh.rest(v)[0] + shift;
+    EXPECT_TRUE(violations_of(plane).empty()) << shift;
+    EXPECT_NEAR(certificate.overlap, 0.008, 1e-5);
+  }
+  for (int v = 4; v < 8; ++v) plane.x[2 * v + 1] -= 0.003;
+  ASSERT_EQ(violations_of(plane).size(), 3u);  // two are of edges that cross by more than d-hat
+  EXPECT_NE(certificate.violations.back().find("bodies overlap at"), std::string::npos);
+  for (int v = 4; v < 8; ++v) plane.x[2 * v + 1] += 0.003;
+  plane.mesh.set_steps_apart(4, 1);
+  plane.mesh.set_steps_apart(5, 1);
+  EXPECT_FALSE(violations_of(plane).empty());
 }
 
 TEST_F(CertifyTest, FindsAnEdgeFoldedOntoItsNeighbour) {

@@ -376,6 +376,8 @@ class CompiledFunctions(unittest.TestCase):
 class Cracks(unittest.TestCase):
     """The faces of a crack coincide at rest: what is asked of one is not asked of the other."""
 
+    contact = {"enabled": False}
+
     def crack(self, remesh=None, size=8):
         """A unit square with a crack along y = 1/2 from the left side to the middle."""
         vertices = [(i / size, j / size) for j in range(size + 1) for i in range(size + 1)]
@@ -395,7 +397,8 @@ class Cracks(unittest.TestCase):
         model.add_boundary("right", box=([1, 0], [1, 1]))
         faces = [face + [tip] for face in (self.lower, self.upper)]
         model.add_boundary("faces", facets=np.array([pair for face in faces for pair in zip(face, face[1:])]))
-        model.set_options({**OPTIONS, "time": {"dt": 1, "time_steps": 5, "quasistatic": True}})
+        model.set_options({**OPTIONS, "time": {"dt": 1, "time_steps": 5, "quasistatic": True},
+                           "contact": self.contact})
         if remesh:
             model.set_options({"space": {"remesh": {"enabled": True, **remesh}}})
         simulation = itr.Simulation(model)
@@ -479,6 +482,12 @@ class Cracks(unittest.TestCase):
         for _ in range(2):
             simulation.step()
         self.assertGreater(seen[0], 0)
+
+
+class CracksWithContact(Cracks):
+    """Such faces are no contact until they have come apart."""
+
+    contact = {"enabled": True, "dhat": 1e-3}
 
 
 class Remeshing(unittest.TestCase):

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "geometry/measures.hpp"
 #include "geometry/predicates.hpp"
 
 namespace itr {
@@ -135,6 +136,36 @@ std::vector<int> ClosedSurface<Dim>::nested() const {
     if (around * volume[part] > 0) found.push_back(first_[part]);
   }
   return found;
+}
+
+/// Looks behind points of each facet: where the surface winds around these twice, another body is there, too. How far that
+/// goes on is the depth.
+template <int Dim>
+Overlap<Dim> ClosedSurface<Dim>::find_overlap(const ClosedFaces& closed) const {
+  constexpr int kMostDoublings = 64, kHalvings = 12;
+  constexpr double kToCenter = 0.25;
+  Overlap<Dim> deepest;
+  for (const Facet& f : facets_) {
+    std::array<Vec<Dim>, Dim> corners;
+    Vec<Dim> center = Vec<Dim>::Zero();
+    for (int k = 0; k < Dim; ++k) center += (corners[k] = x_[f[k]]) / Dim;
+    const Vec<Dim> inward = inward_normal(corners).normalized();
+    for (const Vec<Dim>& corner : corners) {
+      const Vec<Dim> place = corner + kToCenter * (center - corner);
+      const auto is_inside = [&](double depth) { return winding(place + depth * inward) > 1; };
+      double inside = 1e3 * closed.coincident;
+      if (!is_inside(inside)) continue;
+      if (!closed.has_any(f)) return {std::numeric_limits<double>::infinity(), place};
+      double outside = 2 * inside;
+      for (int k = 0; k < kMostDoublings && is_inside(outside); ++k) outside *= 2;
+      for (int k = 0; k < kHalvings; ++k) {
+        const double middle = (std::max(inside, outside / 2) + outside) / 2;
+        (is_inside(middle) ? inside : outside) = middle;
+      }
+      if (outside > deepest.depth) deepest = {outside, place};
+    }
+  }
+  return deepest;
 }
 
 template class ClosedSurface<2>;

@@ -8,8 +8,16 @@
 #include <vector>
 
 #include "geometry/bvh.hpp"
+#include "itr/geometry/closed_faces.hpp"
 
 namespace itr {
+
+/// How deep a body is inside of a body.
+template <int Dim>
+struct Overlap {
+  double depth = 0;  ///< 0: nowhere [m]
+  Vec<Dim> place;
+};
 
 /// Polygons of oriented edges (2D) or polyhedra of oriented triangles (3D), cavities among them.
 template <int Dim>
@@ -30,6 +38,9 @@ class ClosedSurface {
   /// One vertex of each part whose inside is the inside of another part, too: of solids in solids, not of cavities. For
   /// facets with an orientation that do not cross each other.
   std::vector<int> nested() const;
+  /// The deepest overlap of bodies, at points of each facet: infinite where the facet has no closed vertex. Less than 1e3
+  /// `closed.coincident` is none. For facets that are oriented outward.
+  Overlap<Dim> find_overlap(const ClosedFaces& closed) const;
 
  private:
   std::vector<Vec<Dim>> x_;

@@ -49,6 +49,7 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
   ITR_CHECK(cells.size() == body.size(), cells.size(), body.size());
   vertex_alive_.assign(rest_.size(), 1);
   vertex_tag_.assign(rest_.size(), kNoTag);
+  steps_apart_.assign(rest_.size(), kApart);
   cells_of_.resize(rest_.size());
   facets_of_.resize(rest_.size());
   std::map<Facet, std::pair<int, Facet>> facets;  // sorted vertices -> number of cells, outward facet of the first
@@ -267,6 +268,7 @@ VertexId Mesh<Dim>::add_node(const EdgeKey& edge) {
   rest_.push_back((rest_[edge[0]] + rest_[edge[1]]) / 2);
   vertex_alive_.push_back(0);
   vertex_tag_.push_back(kNoTag);
+  steps_apart_.push_back(std::min(steps_apart_[edge[0]], steps_apart_[edge[1]]));
   cells_of_.emplace_back();
   facets_of_.emplace_back();
   renew_revision();
@@ -282,6 +284,7 @@ void Mesh<Dim>::remove_nodes() {
   rest_.resize(num_vertices_);
   vertex_alive_.assign(num_vertices_, 1);
   vertex_tag_.resize(num_vertices_);
+  steps_apart_.resize(num_vertices_);
   cells_of_.resize(num_vertices_);
   facets_of_.resize(num_vertices_);
 }
@@ -312,16 +315,22 @@ std::vector<EdgeKey> Mesh<Dim>::curved_edges() const {
 template <int Dim>
 VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
   VertexId created = kNone;
+  std::uint8_t steps_apart = kApart;
+  if (edit.value)
+    for (int k = 0; k < edit.value->num_parents; ++k)
+      steps_apart = std::min(steps_apart, steps_apart_[edit.value->parents[k]]);
   if (edit.value && edit.value->vertex == kNewVertex) {
     created = node_slots();
     rest_.push_back(edit.value->rest);
     vertex_alive_.push_back(1);
     vertex_tag_.push_back(edit.value->tag);
+    steps_apart_.push_back(steps_apart);
     cells_of_.emplace_back();
     facets_of_.emplace_back();
     ++num_vertices_;
   } else if (edit.value) {
     rest_[edit.value->vertex] = edit.value->rest;
+    steps_apart_[edit.value->vertex] = steps_apart;
   }
   const auto resolve = [&](auto ids) {
     for (int& v : ids)
@@ -366,6 +375,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
     if (!vertex_alive_[v]) continue;
     map.vertex[v] = vertices;
     vertex_tag_[vertices] = vertex_tag_[v];
+    steps_apart_[vertices] = steps_apart_[v];
     rest_[vertices++] = rest_[v];
   }
   const std::vector<EdgeKey> curved = curved_edges();

@@ -21,7 +21,8 @@ int cell_orientation(const std::array<int, 4>& c, ConstVectorView x) {
 }  // namespace
 
 std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<const std::array<int, 2>> edges,
-                                                   std::span<const char> counts, std::size_t most) {
+                                                   std::span<const char> counts, std::size_t most,
+                                                   const ClosedFaces& closed) {
   std::vector<std::array<int, 2>> pairs;
   std::vector<Box<2>> boxes(edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e)
@@ -38,7 +39,8 @@ std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<
       const auto [c, d] = edges[f];
       if (a == c || a == d || b == c || b == d) continue;
       if (!counts[a] && !counts[b] && !counts[c] && !counts[d]) continue;
-      if (segments_intersect(x.segment<2>(2 * a), x.segment<2>(2 * b), x.segment<2>(2 * c), x.segment<2>(2 * d)))
+      if (segments_intersect(x.segment<2>(2 * a), x.segment<2>(2 * b), x.segment<2>(2 * c), x.segment<2>(2 * d)) &&
+          !closed.excuse<2>(edges[e], edges[f], x))
         pairs.push_back({static_cast<int>(e), f});
       if (pairs.size() >= most) return pairs;
     }
@@ -48,7 +50,8 @@ std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<
 
 std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<const std::array<int, 2>> edges,
                                                    std::span<const std::array<int, 3>> triangles,
-                                                   std::span<const char> counts, std::size_t most) {
+                                                   std::span<const char> counts, std::size_t most,
+                                                   const ClosedFaces& closed) {
   std::vector<std::array<int, 2>> pairs;
   const auto at = [&](int v) { return Vec<3>(x.segment<3>(3 * v)); };
   std::vector<Box<3>> boxes(edges.size());
@@ -67,7 +70,8 @@ std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<
       const auto [p, q] = edges[e];
       if (p == a || p == b || p == c || q == a || q == b || q == c) continue;
       if (!counts[a] && !counts[b] && !counts[c] && !counts[p] && !counts[q]) continue;
-      if (segment_intersects_triangle(at(p), at(q), at(a), at(b), at(c))) pairs.push_back({e, static_cast<int>(t)});
+      if (segment_intersects_triangle(at(p), at(q), at(a), at(b), at(c)) && !closed.excuse<3>(edges[e], triangles[t], x))
+        pairs.push_back({e, static_cast<int>(t)});
       if (pairs.size() >= most) return pairs;
     }
   }

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,7 +23,6 @@
 #include "geometry/quadratic_patch.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
-#include "itr/geometry/distance.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 
 namespace itr::output {
@@ -50,7 +50,13 @@ struct Surface {
   const char* own = "";  ///< before the number of a vertex that is no obstacle's
   std::vector<std::array<int, 2>> edges;
   std::vector<std::array<int, 3>> triangles;  ///< 3D only
+  ClosedFaces closed;
 
+  /// Whether the two may lie on each other or overlap.
+  template <std::size_t N, std::size_t M>
+  bool excuses(const std::array<int, N>& a, const std::array<int, M>& b) const {
+    return closed.excuse<Dim>(a, b, Eigen::Map<const VectorX>(x[0].data(), Dim * static_cast<Eigen::Index>(x.size())));
+  }
   template <std::size_t N>
   bool is_obstacle(const std::array<int, N>& simplex) const {
     return simplex[0] >= num_body_vertices;
@@ -75,7 +81,7 @@ struct Surface {
     const auto has_node = [&](const auto& simplex) {
       return std::any_of(simplex.begin(), simplex.end(), [&](int v) { return is_node(v); });
     };
-    if (!has_node(a) && !has_node(b)) return false;
+    if ((!has_node(a) && !has_node(b)) || closed.exclude<Dim>(a, b)) return false;
     const std::vector<int> of_a = corners_of(a), of_b = corners_of(b);
     const auto is_of_b = [&](int v) { return std::find(of_b.begin(), of_b.end(), v) != of_b.end(); };
     if (std::any_of(of_a.begin(), of_a.end(), is_of_b)) return false;
@@ -207,6 +213,17 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
   surface.num_body_vertices = static_cast<int>(surface.x.size());
   if (!frame.has_proxy) surface.curved = CurvedNodes(frame).edges;
   add_surface(frame.obstacles, surface);
+  if (frame.steps_apart.empty()) return surface;
+  std::vector<Vec<Dim>> rest = points<Dim>(frame.rest);
+  Eigen::AlignedBox<double, Dim> box;
+  for (const Vec<Dim>& X : rest) box.extend(X);
+  rest.insert(rest.end(), surface.x.begin() + surface.num_body_vertices, surface.x.end());
+  const int vertices = static_cast<int>(frame.steps_apart.size());
+  const auto is_closed = [&](int v) { return v < vertices && frame.steps_apart[v] == 0; };
+  surface.closed = closed_faces<Dim>(rest, frame.dhat, coincidence<Dim>(box.min(), box.max()), [&](int v) {
+    return surface.is_node(v) ? is_closed(surface.curved[v - vertices][0]) || is_closed(surface.curved[v - vertices][1])
+                              : is_closed(v);
+  });
   return surface;
 }
 
@@ -304,7 +321,7 @@ void check_surface(const Surface<2>& surface, const std::string& name, std::vect
       const bool meet = num_shared(a, b) > 0
                             ? is_folded(surface, a, b)
                             : segments_intersect(surface.x[a[0]], surface.x[a[1]], surface.x[b[0]], surface.x[b[1]]);
-      if (meet)
+      if (meet && !surface.excuses(a, b))
         violations.push_back(
             {Of::surfaces, fmt::format("{}: edges {} and {} intersect", name, surface.name(a), surface.name(b))});
     }
@@ -327,7 +344,7 @@ void check_surface(const Surface<3>& surface, const std::string& name, std::vect
       const auto& x = surface.x;
       const bool meet =
           shared == 1 ? is_folded(surface, e, t) : segment_intersects_triangle(x[e[0]], x[e[1]], x[t[0]], x[t[1]], x[t[2]]);
-      if (!meet) continue;
+      if (!meet || surface.excuses(e, t)) continue;
       violations.push_back(
           {Of::surfaces, fmt::format("{}: edge {} and triangle {} intersect", name, surface.name(e), surface.name(t))});
     }
@@ -350,23 +367,30 @@ void check_insides(const Surface<Dim>& surface, const std::set<int>& in_hollows,
                                                       touches ? "on" : "inside of", what)});
   }
   if (surface.has_proxy) return;  // need not have an orientation that tells a solid from a cavity
+  if (!surface.closed.empty()) return;
   for (const int v : closed.nested())
     violations.push_back(
         {Of::surfaces, fmt::format("{}: the part of the boundary at vertex {} is inside of a body", name, surface.name(v))});
 }
 
-bool is_nearer(const Vec<2>& a, const Vec<2>& b, const Surface<2>& surface, int primitive, double distance) {
-  const auto [p, q] = surface.edges[primitive];
-  const Vec<2>&c = surface.x[p], &d = surface.x[q];
-  return std::min({point_edge_distance_squared<2>(a, c, d), point_edge_distance_squared<2>(b, c, d),
-                   point_edge_distance_squared<2>(c, a, b), point_edge_distance_squared<2>(d, a, b)}) < distance * distance;
+/// Finds bodies in bodies, and how far closed faces overlap, where there are any.
+template <int Dim>
+void check_overlap(const StoredFrame& frame, const Surface<Dim>& surface, const std::string& name,
+                   Certificate& certificate) {
+  if (surface.closed.empty()) return;
+  const auto overlap = ClosedSurface<Dim>(surface.x, surface.own_facets).find_overlap(surface.closed);
+  certificate.overlap = std::max(certificate.overlap, overlap.depth);
+  if (overlap.depth <= frame.dhat) return;
+  std::string place;
+  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.6g}", c ? ", " : "", overlap.place[c]);
+  certificate.violations.push_back({Of::surfaces, fmt::format("{}: bodies overlap at ({})", name, place)});
 }
-bool is_nearer(const Vec<3>& a, const Vec<3>& b, const Surface<3>& surface, int primitive, double distance) {
-  const auto [p, q, r] = surface.triangles[primitive];
-  const Vec<3>&c = surface.x[p], &d = surface.x[q], &e = surface.x[r];
-  return std::min({point_triangle_distance_squared(a, c, d, e), point_triangle_distance_squared(b, c, d, e),
-                   edge_edge_distance_squared(a, b, c, d), edge_edge_distance_squared(a, b, d, e),
-                   edge_edge_distance_squared(a, b, e, c)}) < distance * distance;
+
+template <int Dim>
+bool is_nearer(const Vec<Dim>& a, const Vec<Dim>& b, const Surface<Dim>& surface, int primitive, double distance) {
+  std::array<Vec<Dim>, Dim> corners;
+  for (int k = 0; k < Dim; ++k) corners[k] = surface.x[facets_of(surface)[primitive][k]];
+  return simplex_distance_squared<Dim>(std::array{a, b}, corners) < distance * distance;
 }
 
 /// Fills in what curved edges do beyond their chords. Pieces of the surface around an edge do not count as something else.
@@ -456,7 +480,7 @@ void for_each_beyond_chord(const Surface<2>& surface, const Patches<2>& all, con
     for (std::size_t j = 0; j < all.facets.size(); ++j) {
       const auto& other = all.facets[j];
       const bool has_points = surface.is_obstacle(other) && other[0] != other[1];  // ends are tested as points
-      if (has_points || num_shared(all.facets[i], other) > 0) continue;
+      if (has_points || num_shared(all.facets[i], other) > 0 || surface.closed.exclude<2>(all.facets[i], other)) continue;
       const Vec<2>& p = surface.x[other[0]];
       if ((p.array() < box.min.array()).any() || (p.array() > box.max.array()).any()) continue;
       for (const auto& half : halves)
@@ -491,6 +515,7 @@ void check_curves(const Surface<Dim>& surface, const Patches<Dim>& all, const st
     tree.query(boxes[i], hits);
     for (const int j : hits) {
       if ((all.is_curved[j] && j <= i) || num_shared(all.facets[i], all.facets[j]) > 0) continue;
+      if (surface.closed.template exclude<Dim>(all.facets[i], all.facets[j])) continue;  // their chords are checked
       if (!are_apart(all.patches[i], all.patches[j]))
         violations.push_back({Of::surfaces, fmt::format("{}: curve {} is not proven to be apart from {}", name,
                                                         surface.name(all.facets[i]), surface.name(all.facets[j]))});
@@ -546,6 +571,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   Patches<Dim> curves;
   if (!surface.curved.empty()) curves = true_surface(frame, surface);
   if (violations.size() == before) check_insides(surface, find_in_hollows(surface, curves), name, violations);
+  check_overlap(frame, surface, name, certificate);
   check_curves(surface, curves, name, violations);
   measure_overhangs(frame, surface, certificate);
   certificate.flight = std::max(certificate.flight, flight<Dim>(frame));

@@ -100,6 +100,16 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
   Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
   mesh.set_facets(facets, tags);
   mesh.set_curved_edges(curved_edges);
+  if (file.contains(kStepsApart)) {
+    const auto steps = read_ints(path, file, kStepsApart);
+    if (static_cast<int>(steps.size()) != mesh.num_vertices())
+      throw InputError({path.string(), kStepsApart, std::to_string(steps.size()) + " numbers", "one for every vertex"});
+    for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
+      if (steps[v] < 0 || steps[v] > kApart)
+        throw InputError({path.string(), kStepsApart, std::to_string(steps[v]), "0 to " + std::to_string(kApart)});
+      mesh.set_steps_apart(v, static_cast<std::uint8_t>(steps[v]));
+    }
+  }
   if (!file.contains("/checkpoint/vertex_tag")) return mesh;
   const auto vertex_tags = read_rows<2>(path, file, "/checkpoint/vertex_tag");
   for (const auto& [v, tag] : vertex_tags) {

@@ -23,6 +23,7 @@ using Integers = std::vector<std::int64_t>;
 const std::string kForceSums = "/totals/forces";
 /// Names of length, mass and time; absent: SI units.
 const std::string kUnits = "/units";
+const std::string kDhat = "/mesh/dhat";
 
 std::span<const double> as_span(ConstVectorView v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 
@@ -51,6 +52,13 @@ struct Target {
 };
 
 template <int Dim>
+bool has_steps_apart(const Mesh<Dim>& mesh) {
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v)
+    if (mesh.steps_apart(v) != kApart) return true;
+  return false;
+}
+
+template <int Dim>
 void write_mesh(const Target& target, const Mesh<Dim>& mesh, ConstVectorView rest) {
   hdf5::File& file = target.file;
   Integers simplices, body, surface;
@@ -65,6 +73,16 @@ void write_mesh(const Target& target, const Mesh<Dim>& mesh, ConstVectorView res
   file.write("/mesh/simplices", simplices, Dim + 1);
   file.write("/mesh/body", body, 0);
   file.write("/mesh/surface", surface, Dim);
+}
+
+/// For how many steps vertices have been apart from what coincides with them at rest; nothing where none does.
+template <int Dim>
+void write_steps_apart(const Target& target, const FrameView<Dim>& frame) {
+  if (!has_steps_apart(frame.mesh)) return;
+  Integers steps;
+  for (VertexId v = 0; v < frame.mesh.num_vertices(); ++v) steps.push_back(frame.mesh.steps_apart(v));
+  target.file.write(kStepsApart, steps, 0);
+  target.write(kDhat, std::array{frame.dhat}, 0, "m");
 }
 
 template <std::size_t N>
@@ -194,6 +212,7 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, con
     file.write_text(kUnits, units.length() + " " + units.mass() + " " + units.time());
   write_mesh(target, mesh, rest);
   write_sets(file, frame);
+  write_steps_apart(target, frame);
   write_curves<Dim>(target, frame, u);
   target.write("/fields/x", as_span(frame.x), Dim, "m");
   target.write("/fields/u", as_span(u), Dim, "m");
@@ -230,6 +249,7 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
                                     size(frame.obstacle_x),
                                     size(frame.obstacle_edges),
                                     size(frame.obstacle_triangles),
+                                    has_steps_apart(mesh),
                                     frame.proxy.x != nullptr,
                                     frame.asked != nullptr};
   shape.push_back(static_cast<std::size_t>(drawn_nodes(frame)));
@@ -399,6 +419,16 @@ StoredFrame read_frame(const std::filesystem::path& path) {
     if (const std::int64_t* edge = &frame.curved_edges[i];
         std::lexicographical_compare(edge, edge + 2, edge - 2, edge) || std::equal(edge, edge + 2, edge - 2))
       throw InputError({path.string(), "/mesh/curved_edges", "rows in another order", "ascending rows"});
+  if (file.contains(kStepsApart)) {
+    frame.steps_apart = file.read_integers(kStepsApart).values;
+    const std::vector<double> dhat = file.read_doubles(kDhat).values;
+    if (frame.steps_apart.size() != vertices || dhat.size() != 1)
+      throw InputError(
+          {path.string(), kStepsApart,
+           std::to_string(frame.steps_apart.size()) + " numbers, and " + std::to_string(dhat.size()) + " of d-hat",
+           std::to_string(vertices) + ", and one"});
+    frame.dhat = dhat[0];
+  }
   frame.rest = std::move(rest.values);
   frame.x = std::move(x.values);
   frame.obstacles = read_surface(path, file, "/obstacles", frame.dim);

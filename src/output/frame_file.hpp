@@ -44,6 +44,9 @@ class FrameFiles {
 std::vector<std::filesystem::path> stored_frames(const std::filesystem::path& directory);
 int step_of_frame(const std::filesystem::path& path);
 
+/// Mesh::steps_apart by vertex; only where faces coincide at rest.
+constexpr const char* kStepsApart = "/mesh/steps_apart";
+
 /// Datasets of /fields that only a scene which asks for them has.
 constexpr const char* kAskedFields[] = {"contact_force", "friction_force", "reaction_force", "von_mises", "stress"};
 
@@ -87,8 +90,10 @@ struct StoredFrame {
   std::vector<std::int64_t> simplices;  ///< m x (dim + 1)
   /// e x 2, ascending: the last e nodes are theirs, in this order; empty: all edges are straight.
   std::vector<std::int64_t> curved_edges;
-  std::vector<std::int64_t> body;     ///< m, ids
-  std::vector<std::int64_t> surface;  ///< k x dim, facets of the boundary
+  std::vector<std::int64_t> body;         ///< m, ids
+  std::vector<std::int64_t> steps_apart;  ///< by vertex, 0: of closed faces; empty: there are none
+  double dhat = 0;                        ///< of contact, where there are [m]
+  std::vector<std::int64_t> surface;      ///< k x dim, facets of the boundary
   StoredSurface obstacles;
   bool has_proxy = false;
   StoredSurface proxy;  ///< what touches in place of the boundary

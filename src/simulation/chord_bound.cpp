@@ -9,7 +9,7 @@
 #include "fem/chords.hpp"
 #include "fem/refined_chords.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/geometry/distance.hpp"
+#include "simulation/closed_faces.hpp"
 #include "simulation/contact_surface.hpp"
 
 namespace itr {
@@ -26,21 +26,6 @@ constexpr double kGainOfHalving = 4;  ///< a curve leaves chords of half the len
 
 template <int Dim>
 using Corners = std::array<Vec<Dim>, Dim>;
-
-double distance_squared(const Corners<2>& a, const Corners<2>& b) {
-  return std::min({point_edge_distance_squared<2>(a[0], b[0], b[1]), point_edge_distance_squared<2>(a[1], b[0], b[1]),
-                   point_edge_distance_squared<2>(b[0], a[0], a[1]), point_edge_distance_squared<2>(b[1], a[0], a[1])});
-}
-double distance_squared(const Corners<3>& a, const Corners<3>& b) {
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3; ++i) {
-    least = std::min({least, point_triangle_distance_squared(a[i], b[0], b[1], b[2]),
-                      point_triangle_distance_squared(b[i], a[0], a[1], a[2])});
-    for (int j = 0; j < 3; ++j)
-      least = std::min(least, edge_edge_distance_squared(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]));
-  }
-  return least;
-}
 
 /// A bound on how far a quadratic patch leaves the flat simplex of its corners [m]. `bulges`: by how much the middles of its
 /// edges leave those of the simplex. Along the simplex nothing is left unless the patch turns back on itself.
@@ -66,9 +51,12 @@ template <int Dim>
 class ChordBound {
  public:
   ChordBound(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels, const RefinedChords<Dim>& chords,
-             const VectorX& x)
+             const VectorX& x, int age)
       : setup_(setup), mesh_(mesh), levels_(levels), x_(x), chords_(chords), own_(static_cast<int>(chords_.facets.size())) {
     const int nodes = mesh.num_nodes();
+    if (has_closed_faces(mesh, age))
+      closed_ = closed_faces<Dim>(mesh.rest(), setup.contact.activation_distance, coincidence(mesh),
+                                  [&](int v) { return is_closed<Dim>(mesh, v, age); });
     points_.reserve(chords_.points.size());
     for (const auto& weights : chords_.points) points_.push_back(combined<Dim>(weights, [&](int node) { return at(node); }));
     for (const auto& facet : chords_.facets) {
@@ -96,7 +84,7 @@ class ChordBound {
       tree_.query(box.inflated(2 * height / kOfGap), hits);  // a gap that is larger allows that height
       double& worst = result[chords_.parents[i]];
       for (const int j : hits)
-        if (!are_neighbours(i, j)) worst = std::max(worst, height / allowed(i, j));
+        if (!are_neighbours(i, j) && !are_closed(i, j)) worst = std::max(worst, height / allowed(i, j));
     }
     return result;
   }
@@ -177,8 +165,14 @@ class ChordBound {
     return std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end();
   }
 
+  /// Whether the two are no contact.
+  bool are_closed(int i, int j) const {
+    return j < own_ && closed_.exclude<Dim>(mesh_.facet(chords_.parents[i]), mesh_.facet(chords_.parents[j]));
+  }
+
   double allowed(int i, int j) const {
-    const double gap = std::sqrt(distance_squared(corners_[i], corners_[j])), dhat = setup_.contact.activation_distance;
+    const double gap = std::sqrt(simplex_distance_squared<Dim>(corners_[i], corners_[j])),
+                 dhat = setup_.contact.activation_distance;
     const double of_gap = heights_[j] > 0 ? kOfGap / 2 * gap : kOfGap * gap;
     return gap < dhat ? std::min(kOfActivation * dhat, of_gap) : of_gap;
   }
@@ -207,7 +201,8 @@ class ChordBound {
   const ChordLevels& levels_;
   const VectorX& x_;
   const RefinedChords<Dim>& chords_;
-  int own_;  ///< simplices of bodies
+  int own_;             ///< simplices of bodies
+  ClosedFaces closed_;  ///< by vertices
   std::vector<Vec<Dim>> points_;
   std::vector<Corners<Dim>> corners_;  ///< of simplices, then of obstacles
   std::vector<double> heights_;        ///< by simplex: how far the curve leaves it [m]
@@ -229,9 +224,9 @@ ChordLevels normalized(ChordLevels levels) {
 
 template <int Dim>
 ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
-                              const VectorX& x) {
+                              const VectorX& x, int age) {
   if (!has_chords(setup, mesh)) return {levels, 0};
-  ChordDemand demand = ChordBound<Dim>(setup, mesh, levels, refine_chords(mesh, levels), x).demand();
+  ChordDemand demand = ChordBound<Dim>(setup, mesh, levels, refine_chords(mesh, levels), x, age).demand();
   demand.levels = normalized(std::move(demand.levels));
   return demand;
 }
@@ -239,9 +234,9 @@ ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
 template <int Dim>
 ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ChordLevels levels,
                            std::span<const VectorX> positions) {
-  for (const VectorX& x : positions)
+  for (int age = 0; age < static_cast<int>(positions.size()); ++age)
     for (int round = 0; round < kMostRounds; ++round) {
-      ChordLevels more = find_chord_demand(setup, mesh, levels, x).levels;
+      ChordLevels more = find_chord_demand(setup, mesh, levels, positions[age], age).levels;
       if (more == levels) break;
       levels = std::move(more);
     }
@@ -254,8 +249,8 @@ ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   if (levels.empty() || !has_chords(setup, mesh)) return levels;
   std::vector<char> lowerable(levels.size(), 1);
   const RefinedChords<Dim> chords = refine_chords(mesh, levels);
-  for (const VectorX& x : positions) {
-    const std::vector<char> here = ChordBound<Dim>(setup, mesh, levels, chords, x).find_lowerable();
+  for (int age = 0; age < static_cast<int>(positions.size()); ++age) {
+    const std::vector<char> here = ChordBound<Dim>(setup, mesh, levels, chords, positions[age], age).find_lowerable();
     for (std::size_t edge = 0; edge < levels.size(); ++edge) lowerable[edge] &= here[edge];
     if (std::none_of(lowerable.begin(), lowerable.end(), [](char is) { return is; })) return levels;
   }
@@ -264,16 +259,16 @@ ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
     if (lowerable[edge]) --fewer[edge];
   fewer = normalized(std::move(fewer));
   if (fewer == levels) return levels;
-  const ContactSurface<Dim> contact = contact_surface(setup, mesh, fewer);
+  const ContactSurface<Dim> contact = contact_surface(setup, mesh, fewer, static_cast<int>(positions.size()));
   const bool is_free = std::none_of(positions.begin(), positions.end(), [&](const VectorX& x) {
     return has_intersection<Dim>(contact.surface, contact.positions(x));
   });
   return is_free ? fewer : levels;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                           \
-  template ChordDemand find_chord_demand(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, const VectorX&); \
-  template ChordLevels settled_chords(const StepSetup<Dim>&, const Mesh<Dim>&, ChordLevels, std::span<const VectorX>); \
+#define ITR_INSTANTIATE(Dim)                                                                                                \
+  template ChordDemand find_chord_demand(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, const VectorX&, int); \
+  template ChordLevels settled_chords(const StepSetup<Dim>&, const Mesh<Dim>&, ChordLevels, std::span<const VectorX>);      \
   template ChordLevels lowered_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, std::span<const VectorX>);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -15,18 +15,19 @@ struct ChordDemand {
   double excess = 0;   ///< largest ratio of how far a curve leaves its chords to how far it may: the bound holds up to 1
 };
 
-/// Finds the levels that curves at positions x ask for, from chords of these levels on. No chord is made longer.
+/// Finds the levels that curves at positions x of `age` steps ago ask for, from chords of these levels on. No chord is made
+/// longer.
 template <int Dim>
 ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
-                              const VectorX& x);
+                              const VectorX& x, int age = 0);
 
-/// Adds as many halvings to `levels` as curves at all of these positions ask for.
+/// Adds as many halvings to `levels` as curves at all of these positions, newest first, ask for.
 template <int Dim>
 ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ChordLevels levels,
                            std::span<const VectorX> positions);
 
-/// Takes one halving from `levels` where curves stay far within the bound at all of these positions, and surfaces
-/// do not meet.
+/// Takes one halving from `levels` where curves stay far within the bound at all of these positions, newest first, and
+/// surfaces do not meet.
 template <int Dim>
 ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
                            std::span<const VectorX> positions);

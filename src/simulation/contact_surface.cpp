@@ -6,6 +6,7 @@
 
 #include "energy/contact/surface_builder.hpp"
 #include "fem/refined_chords.hpp"
+#include "simulation/closed_faces.hpp"
 
 namespace itr {
 
@@ -74,10 +75,37 @@ std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, con
   return std::make_shared<VertexMap<Dim>>(weights, std::move(offset));
 }
 
+/// Closed faces of a surface without a proxy.
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels) {
-  if (!setup.proxy && has_refined(levels)) return refined_surface(mesh, setup.obstacles, levels);
-  if (!setup.proxy) return {collision_surface(mesh, setup.obstacles), nullptr};
+ClosedFaces closed_faces_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, int age,
+                            const ContactSurface<Dim>& contact) {
+  if (!has_closed_faces(mesh, age)) return {};
+  std::vector<Vec<Dim>> rest = mesh.rest();
+  const int bodies = static_cast<int>(rest.size());
+  rest.insert(rest.end(), setup.obstacles.rest.begin(), setup.obstacles.rest.end());
+  const auto is_node_closed = [&](int node) { return node < bodies && is_closed(mesh, node, age); };
+  ClosedFaces faces = closed_faces<Dim>(rest, setup.contact.activation_distance, coincidence(mesh), is_node_closed);
+  if (!contact.map) return faces;
+  faces.rest = contact.positions(faces.rest);
+  faces.is_closed.resize(contact.surface.area.size());
+  for (std::size_t i = 0; i < faces.is_closed.size(); ++i) {
+    const auto sources = contact.map->sources(static_cast<int>(i));
+    faces.is_closed[i] = std::any_of(sources.begin(), sources.end(), is_node_closed);
+  }
+  return faces;
+}
+
+template <int Dim>
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels, int age) {
+  if (!setup.proxy) {
+    ContactSurface<Dim> contact{};
+    if (has_refined(levels))
+      contact = refined_surface(mesh, setup.obstacles, levels);
+    else
+      contact.surface = collision_surface(mesh, setup.obstacles);
+    contact.surface.closed = closed_faces_of(setup, mesh, age, contact);
+    return contact;
+  }
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   SurfaceBuilder<Dim> builder;
   for_each_simplex(proxy, 0, [&](const auto& ids) { builder.add(ids); });
@@ -88,7 +116,7 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
   template ClosedSurface<Dim> body_boundary(const Mesh<Dim>&, ConstVectorView, const ChordLevels&);  \
   template CollisionSurface collision_surface(const Mesh<Dim>&, const Obstacles<Dim>&);              \
   template std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>&, const Mesh<Dim>&); \
-  template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&);
+  template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, int);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

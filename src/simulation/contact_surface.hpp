@@ -39,7 +39,9 @@ template <int Dim>
 std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 
 /// The proxy's surface where the setup has one, else the boundary of the compact mesh with its chords; with the obstacles.
+/// `age`: how many steps ago positions were that it is for, of the faces that were closed then.
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels = {});
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels = {},
+                                    int age = 0);
 
 }  // namespace itr

@@ -11,6 +11,7 @@
 #include "itr/core/error.hpp"
 #include "itr/simulation/setup.hpp"
 #include "mesh/rest_box.hpp"
+#include "simulation/closed_faces.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
@@ -153,7 +154,6 @@ template <int Dim>
 std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& contact) {
   double thinnest = std::numeric_limits<double>::infinity(), shortest = thinnest;
   for (const auto& [body, size] : body_sizes(setup.mesh)) thinnest = std::min(thinnest, size.thickness);
-  const ContactSurface<Dim> surface = contact_surface(setup, setup.mesh);
   VectorX start = held_dofs(setup, setup.mesh, setup.time.t0).target;
   for (VertexId v = 0; v < setup.mesh.node_slots(); ++v) start.template segment<Dim>(Dim * v) = setup.mesh.rest(v);
   for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f)
@@ -169,6 +169,10 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
   double gap = std::numeric_limits<double>::infinity();
   if (!setup.proxy) {
     Workspace workspace;
+    Mesh<Dim> mesh = setup.mesh;
+    close_coincident_faces(setup, mesh);
+    ContactSurface<Dim> surface = contact_surface(setup, mesh);
+    surface.surface.closed.dhat = dhat;
     gap = ContactEnergy<Dim>(surface.surface, contact, 1, 1).min_distance(start, workspace);
     if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
   }

@@ -61,7 +61,8 @@ class HistoryTransfer {
       VectorX goal = interleaved<Dim>(projected);
       if (i < num_positions) {
         Vec<Dim> lost = transfer.lost.segment<Dim>(static_cast<Eigen::Index>(Dim * i));
-        goal = positions(*fields[i], interleaved<Dim>(new_values_[i]), std::move(goal), solver, lost, report);
+        goal = positions(*fields[i], interleaved<Dim>(new_values_[i]), std::move(goal), static_cast<int>(i), solver, lost,
+                         report);
         report.lost_positions = std::max(report.lost_positions, lost.cwiseAbs().maxCoeff());
       }
       for (std::size_t v = 0; v < patch_.new_cells.vertices.size(); ++v)
@@ -87,8 +88,8 @@ class HistoryTransfer {
     return all;
   }
 
-  /// The safe way from the interpolant to `goal`; `field` has what is around the patch.
-  VectorX positions(const VectorX& field, VectorX interpolant, VectorX goal, linear::Solver& solver, Vec<Dim>& lost,
+  /// The safe way from the interpolant to `goal`, of positions of `age` steps ago; `field` has what is around the patch.
+  VectorX positions(const VectorX& field, VectorX interpolant, VectorX goal, int age, linear::Solver& solver, Vec<Dim>& lost,
                     HistoryTransferReport& report) const {
     const auto n = static_cast<Eigen::Index>(patch_.new_cells.vertices.size());
     std::vector<char> moving(n), held(prescribed_);
@@ -99,7 +100,7 @@ class HistoryTransfer {
     PatchSurface<Dim> surface;
     CellSet<Dim> cells = patch_.cells;
     if (setup_.contact.enabled) {
-      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance);
+      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance, age);
       cells.num_vertices += static_cast<int>(surface.others.size());
       interpolant.conservativeResize(Dim * cells.num_vertices);
       for (std::size_t i = 0; i < surface.others.size(); ++i)

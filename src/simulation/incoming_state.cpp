@@ -13,6 +13,7 @@
 #include "itr/core/error.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
+#include "simulation/closed_faces.hpp"
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/invariants.hpp"
 
@@ -38,7 +39,12 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   };
   const VectorX& x = state.history.x[0];
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
-  for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
+  if (!has_closed_faces(state.mesh)) {
+    for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
+  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords);
+             overlap.depth > setup.contact.activation_distance) {
+    refuse("a body", overlap.place);
+  }
   for (Eigen::Index i = Dim * state.mesh.num_nodes(); i < x.size(); i += Dim)
     if (const Vec<Dim> p = x.segment<Dim>(i); boundary.touches(p) || boundary.winding(p) != 0) refuse("an obstacle", p);
 }
@@ -104,21 +110,6 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
 
 }  // namespace
 
-namespace {
-
-template <int Dim>
-bool has_coincident_vertices(const CollisionSurface& surface, const VectorX& x) {
-  std::set<std::array<double, Dim>> places;
-  for (const int v : surface.vertices) {
-    std::array<double, Dim> place;
-    for (int c = 0; c < Dim; ++c) place[c] = x[Dim * v + c];
-    if (!places.insert(place).second) return true;
-  }
-  return false;
-}
-
-}  // namespace
-
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!setup.contact.enabled) return;
@@ -142,9 +133,7 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   }
   if (pairs.size() > kMostNamed) found += "; and more";
   throw InputError({"", "initial state", "surfaces that intersect (in " + setup.units.length() + "): " + found,
-                    has_coincident_vertices<Dim>(surface, x)
-                        ? "a gap between the faces of a crack, and between bodies that touch, or no contact"
-                        : "surfaces that do not touch"});
+                    "surfaces that do not touch, but for faces of bodies that coincide at rest"});
 }
 
 template <int Dim>
@@ -159,6 +148,7 @@ template <int Dim>
 State<Dim> initial_state(const Setup<Dim>& setup) {
   State<Dim> state;
   state.mesh = initial_mesh(setup);
+  close_coincident_faces(setup, state.mesh);
   state.t = setup.time.t0;
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
   const std::vector<Vec<Dim>>& rest = state.mesh.rest();
@@ -168,6 +158,7 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);
   state.history.x = {std::move(x)};
   state.chords = settled_chords(setup, state.mesh, {}, state.history.x);
+  open_faces(setup, state.chords, state.history.x[0], state.mesh);
   state.history.v = {sampled(setup.initial_velocity)};
   if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
   return state;
@@ -190,7 +181,8 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
                                     std::pair("barrier stiffness", state.stiffness.value)})
     if (!std::isfinite(value)) refuse_state(std::string("saved ") + name, fmt::format("{}", value), "a number");
   for (std::size_t age = 0; age < state.history.x.size(); ++age)
-    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.chords); !violation.empty())
+    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.chords, static_cast<int>(age));
+        !violation.empty())
       refuse_state(age == 0 ? "saved positions" : fmt::format("saved positions of {} steps before", age), violation,
                    "positions without inversions and intersections");
 }

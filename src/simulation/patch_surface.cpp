@@ -8,6 +8,7 @@
 #include "energy/contact/surface_builder.hpp"
 #include "fem/refined_chords.hpp"
 #include "geometry/bvh.hpp"
+#include "simulation/closed_faces.hpp"
 
 namespace itr {
 
@@ -56,7 +57,8 @@ std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const std::vector<Fac
 
 template <int Dim>
 PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const TransferPatch<Dim>& patch,
-                                const std::vector<char>& moving, const VectorX& x, const VectorX& goal, double reach) {
+                                const std::vector<char>& moving, const VectorX& x, const VectorX& goal, double reach,
+                                int age) {
   PatchSurface<Dim> result;
   const auto& vertices = patch.new_cells.vertices;
   const std::vector<FacetId> own = facets_of_moving<Dim>(mesh, vertices, moving);
@@ -96,12 +98,16 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obs
   std::vector<char> counts(rest.size(), 0);
   std::copy(moving.begin(), moving.end(), counts.begin());
   result.surface = builder.build(rest, std::move(counts));
+  result.surface.closed = closed_faces<Dim>(rest, reach, 0, [&](int i) {
+    const int own_ones = static_cast<int>(vertices.size()), v = i < own_ones ? vertices[i] : result.others[i - own_ones];
+    return v < bodies && is_closed(mesh, v, age);
+  });
   return result;
 }
 
 template PatchSurface<2> patch_surface<2>(const Mesh<2>&, const Obstacles<2>&, const TransferPatch<2>&,
-                                          const std::vector<char>&, const VectorX&, const VectorX&, double);
+                                          const std::vector<char>&, const VectorX&, const VectorX&, double, int);
 template PatchSurface<3> patch_surface<3>(const Mesh<3>&, const Obstacles<3>&, const TransferPatch<3>&,
-                                          const std::vector<char>&, const VectorX&, const VectorX&, double);
+                                          const std::vector<char>&, const VectorX&, const VectorX&, double, int);
 
 }  // namespace itr

@@ -18,6 +18,7 @@
 #include "core/timer.hpp"
 #include "newton/round_off.hpp"
 #include "simulation/chord_bound.hpp"
+#include "simulation/closed_faces.hpp"
 #include "simulation/energy_guard.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
@@ -63,8 +64,8 @@ std::string reason_of(const NewtonSummary& summary) {
 template <int Dim>
 std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
   std::string violation = find_violation(setup, state.mesh, x, state.chords);
-  for (const VectorX& past : state.history.x)
-    if (violation.empty()) violation = find_violation(setup, state.mesh, past, state.chords);
+  for (int age = 0; age < static_cast<int>(state.history.x.size()) && violation.empty(); ++age)
+    violation = find_violation(setup, state.mesh, state.history.x[age], state.chords, age);
   return violation;
 }
 
@@ -183,9 +184,11 @@ class StepSolver {
       start->history.damp_next = before_.history.damp_next;
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
+    if (setup_.contact.enabled) tell_of_closed_faces();
     if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
     TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
+    if (setup_.contact.enabled) open_faces(setup_, next_.chords, next_.history.x[0], next_.mesh);
     next_.chords = lowered_chords<Dim>(setup_, next_.mesh, next_.chords, next_.history.x);
     after = std::move(next_);  // before_ may be the same, and is not needed any more
     clock_.tell(report_);
@@ -231,6 +234,9 @@ class StepSolver {
       if (is_stuck && setup_.remesh.enabled) failure.nearly_inverted = find_nearly_inverted(next_, x_);
       return failure;
     }
+    if (has_closed_faces(next_.mesh))
+      if (std::string reason = find_violation(setup_, next_, x_); !reason.empty())
+        return StepFailure{.kind = StepFailure::Kind::unsolved, .reason = std::move(reason), .nearly_inverted = {}};
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
     if (!setup_.remesh.enabled) return std::nullopt;
     {
@@ -292,7 +298,8 @@ class StepSolver {
 
   /// Whether surfaces with these levels of chords are apart at x, and at past positions.
   bool may_have(const ChordLevels& levels, const VectorX& x) const {
-    const ContactSurface<Dim> contact = contact_surface(setup_, next_.mesh, levels);
+    const int oldest = static_cast<int>(next_.history.x.size());
+    const ContactSurface<Dim> contact = contact_surface(setup_, next_.mesh, levels, oldest);
     const auto is_free = [&](const VectorX& at) { return !has_intersection<Dim>(contact.surface, contact.positions(at)); };
     return is_free(x) && std::all_of(next_.history.x.begin(), next_.history.x.end(), is_free);
   }
@@ -313,6 +320,21 @@ class StepSolver {
     } else {
       next_.chords.clear();
     }
+  }
+
+  /// Warns where faces that are no contact begin to be pressed into each other.
+  void tell_of_closed_faces() const {
+    if (!has_closed_faces(next_.mesh)) return;
+    const auto depth_of = [&](const State<Dim>& state, const VectorX& x) {
+      return find_overlap(setup_, state.mesh, x, state.chords).depth;
+    };
+    const double depth = depth_of(next_, x_);
+    if (depth == 0 || depth_of(before_, before_.history.x[0]) > 0) return;
+    warn(fmt::format(
+        "faces that coincide at rest begin to be pressed into each other, by {}: they pass through each other as "
+        "if there were no contact, up to d-hat, until they have been apart by d-hat once; a gap between them at "
+        "rest makes them contact",
+        setup_.units.text(depth, "m", 3)));
   }
 
   bool has_inertia() const { return !setup_.time.quasistatic && !setup_.time.is_static; }

@@ -30,6 +30,9 @@ namespace itr {
 /// Tag of a boundary facet or vertex that no selection named: carries no boundary condition.
 inline constexpr int kNoTag = std::numeric_limits<int>::max();
 
+/// Mesh::steps_apart of a vertex that coincides with nothing at rest, or has been apart from that for so many steps.
+inline constexpr std::uint8_t kApart = 255;
+
 /// Stands in an Edit for the vertex that the edit creates.
 inline constexpr VertexId kNewVertex = std::numeric_limits<int>::max();
 /// Stands for the i-th of the nodes that an edit creates.
@@ -197,6 +200,13 @@ class Mesh {
     vertex_tag_[v] = tag;
     renew_revision();
   }
+  /// For how many steps the vertex has been apart from the faces that coincide with it at rest: 0 as long as these are
+  /// closed (ClosedFaces). Edits give it the least of the parents of its values. Only scenes with contact set it.
+  std::uint8_t steps_apart(VertexId v) const { return steps_apart_[v]; }
+  void set_steps_apart(VertexId v, std::uint8_t steps) {
+    if ((steps == 0) != (steps_apart_[v] == 0)) renew_revision();
+    steps_apart_[v] = steps;
+  }
   /// The tag of both ends of an edge of the surface, all of which conditions with that tag hold; else kNoTag.
   int edge_tag(const EdgeKey& edge) const {
     const int tag = vertex_tag_[edge[0]];
@@ -285,6 +295,7 @@ class Mesh {
   std::vector<Vec<Dim>> rest_;
   std::vector<char> vertex_alive_;
   std::vector<int> vertex_tag_;
+  std::vector<std::uint8_t> steps_apart_;
   std::vector<Cell> cells_;
   std::vector<int> body_, part_;
   std::vector<double> volume_, quality_;

@@ -90,6 +90,11 @@ int certify(const std::string& directory, bool as_json) {
         "curved edges, which are checked as curves, leave the chords through their nodes by at most {:.2g} {}, and by "
         "{:.2g} {} where something else is nearer than that\n",
         certificate.overhang, certificate.units.length(), certificate.blocked_overhang, certificate.units.length());
+  if (certificate.overlap > 0)
+    fmt::print(
+        "faces that coincide at rest are no contact before they have been apart by d-hat: they overlap by at most {:.2g} "
+        "{}\n",
+        certificate.overlap, certificate.units.length());
   return certificate.passed() ? cli::done : cli::certificate_failed;
 }
 

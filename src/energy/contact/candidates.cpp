@@ -74,13 +74,15 @@ bool contains(const std::array<int, N>& primitive, int v) {
   return std::find(primitive.begin(), primitive.end(), v) != primitive.end();
 }
 
-/// Whether the pair of a vertex and a primitive, or of two edges, can act.
+/// Whether the pair of a vertex and a primitive (an edge in 2D, a triangle in 3D), or of two edges, can act.
 template <std::size_t N>
 bool matters(const CollisionSurface& surface, int v, const std::array<int, N>& primitive) {
-  return !contains(primitive, v) && (counts(surface, v) || counts(surface, primitive));
+  return !contains(primitive, v) && (counts(surface, v) || counts(surface, primitive)) &&
+         !surface.closed.exclude<static_cast<int>(N)>(std::array{v}, primitive);
 }
 bool matters(const CollisionSurface& surface, const std::array<int, 2>& e, const std::array<int, 2>& f) {
-  return !contains(e, f[0]) && !contains(e, f[1]) && (counts(surface, e) || counts(surface, f));
+  return !contains(e, f[0]) && !contains(e, f[1]) && (counts(surface, e) || counts(surface, f)) &&
+         !surface.closed.exclude<3>(e, f);
 }
 
 /// How many of these count.

@@ -127,11 +127,11 @@ CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, s
 
 template <>
 std::vector<std::array<int, 2>> find_intersections<2>(const CollisionSurface& surface, ConstVectorView x, std::size_t most) {
-  return find_intersections(x, surface.edges, surface.counts, most);
+  return find_intersections(x, surface.edges, surface.counts, most, surface.closed);
 }
 template <>
 std::vector<std::array<int, 2>> find_intersections<3>(const CollisionSurface& surface, ConstVectorView x, std::size_t most) {
-  return find_intersections(x, surface.edges, surface.triangles, surface.counts, most);
+  return find_intersections(x, surface.edges, surface.triangles, surface.counts, most, surface.closed);
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                              \

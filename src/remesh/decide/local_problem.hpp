@@ -121,6 +121,7 @@ class LocalProblem {
   /// The node of an edge on the side of the comparison that this is, or kNone.
   VertexId node_of(VertexId a, VertexId b) const;
   bool is_on_surface(const LocalVertex& v) const;
+  bool is_closed(const LocalVertex& v) const;
   void add_cells(std::span<const CellId> patch);
   void add_loaded_facets();
   void hold_vertices();

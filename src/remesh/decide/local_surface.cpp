@@ -85,6 +85,19 @@ void LocalProblem<Dim>::find_stars_of_touching() {
   std::sort(primitives.begin(), primitives.end());
 }
 
+/// Whether the vertex or node is of closed faces: of what the edit creates, if a parent is.
+template <int Dim>
+bool LocalProblem<Dim>::is_closed(const LocalVertex& v) const {
+  if (v.kind == Kind::of_obstacle) return false;
+  const auto has_closed = [&](const auto& created) {
+    return std::any_of(created.parents.begin(), created.parents.begin() + created.num_parents,
+                       [&](VertexId parent) { return mesh_.steps_apart(parent) == 0; });
+  };
+  if (is_after_ && edit_.sets(v.id)) return has_closed(*edit_.value);
+  const auto* node = edit_.created_node(v.id);
+  return node ? has_closed(*node) : mesh_.steps_apart(v.id) == 0;
+}
+
 /// The part of the surface that can touch what changes, with the stars of its vertices: contact is weighted by them.
 template <int Dim>
 void LocalProblem<Dim>::add_surface() {
@@ -138,6 +151,8 @@ void LocalProblem<Dim>::add_surface() {
   dofs_.unknown.resize(Dim * vertices_.size(), kNone);
   changes_.resize(vertices_.size(), 0);
   surface.counts = changes_;
+  surface.closed = closed_faces<Dim>(cells_.rest, state_.context.contact.activation_distance, 0,
+                                     [&](int i) { return is_closed(vertices_[i]); });
   complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 
@@ -145,9 +160,11 @@ template void LocalProblem<2>::find_what_changes();
 template void LocalProblem<2>::find_contacts();
 template void LocalProblem<2>::find_stars_of_touching();
 template void LocalProblem<2>::add_surface();
+template bool LocalProblem<2>::is_closed(const LocalVertex&) const;
 template void LocalProblem<3>::find_what_changes();
 template void LocalProblem<3>::find_contacts();
 template void LocalProblem<3>::find_stars_of_touching();
 template void LocalProblem<3>::add_surface();
+template bool LocalProblem<3>::is_closed(const LocalVertex&) const;
 
 }  // namespace itr

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "itr/core/types.hpp"
+#include "itr/geometry/closed_faces.hpp"
 
 namespace itr {
 
@@ -31,6 +32,7 @@ struct CollisionSurface {
   /// By problem vertex: whether pairs with it count. False for obstacles, and around a patch for vertices whose contacts
   /// the patch cannot change.
   std::vector<char> counts;
+  ClosedFaces closed;  ///< pairs that are no contact yet
 
   // 3D only.
   std::vector<std::array<int, 3>> triangle_edges;  ///< of corners (0 1), (1 2), (2 0)
@@ -53,7 +55,7 @@ template <int Dim>
 void complete_collision_surface(CollisionSurface& surface, std::span<const int> points, std::span<const Vec<Dim>> rest);
 
 /// The first `most` pairs of two edges (2D), or of an edge and a triangle (3D), that share a point without sharing a vertex
-/// and of which one counts: indices, decided exactly.
+/// and of which one counts: indices, decided exactly. Pairs that `closed` excuses are left out.
 template <int Dim>
 std::vector<std::array<int, 2>> find_intersections(const CollisionSurface& surface, ConstVectorView x, std::size_t most);
 template <int Dim>

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#include "simulation/closed_faces.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "energy/contact/candidates.hpp"
+#include "energy/contact/pairs.hpp"
+#include "mesh/rest_box.hpp"
+#include "simulation/contact_surface.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr std::uint8_t kMostSteps = 16;  ///< more than any history has
+
+/// Calls visit(kind, vertices) for the pairs of primitives of bodies that coincide at rest, of which one `counts`.
+template <int Dim, typename Visit>
+void for_each_coincident_pair(const Mesh<Dim>& mesh, std::vector<char> counts, const Visit& visit) {
+  CollisionSurface surface = collision_surface<Dim>(mesh, {});
+  counts.resize(surface.counts.size());
+  for (std::size_t v = 0; v < counts.size(); ++v) surface.counts[v] &= counts[v];
+  const std::vector<Vec<Dim>> nodes = mesh.rest();
+  const Eigen::Map<const VectorX> rest(nodes[0].data(), Dim * static_cast<Eigen::Index>(nodes.size()));
+  const double near = coincidence(mesh);
+  ContactCandidates<Dim> candidates;
+  candidates.update(surface, rest, near);
+  for (const auto& [kind, pairs] : candidates.all())
+    for (const auto& pair : *pairs) {
+      const auto vertices = vertices_of(surface, kind, pair);
+      if (pair_distance_squared<Dim>(kind, gather<Dim>(vertices, pair_size(kind), rest).data()) <= near * near)
+        visit(kind, vertices);
+    }
+}
+
+/// Calls visit(vertex) for the vertex, or the ends of the curved edge, that a node belongs to.
+template <int Dim, typename Visit>
+void for_each_vertex_of_node(const Mesh<Dim>& mesh, int node, const Visit& visit) {
+  if (node < mesh.num_vertices()) return visit(node);
+  for (const VertexId end : mesh.edge_of_node(node)) visit(end);
+}
+
+template <int Dim>
+std::vector<char> closed_nodes(const Mesh<Dim>& mesh) {
+  std::vector<char> closed(mesh.num_nodes());
+  for (std::size_t node = 0; node < closed.size(); ++node) closed[node] = is_closed(mesh, static_cast<int>(node));
+  return closed;
+}
+
+}  // namespace
+
+template <int Dim>
+bool is_closed(const Mesh<Dim>& mesh, int node, int age) {
+  bool closed = false;
+  for_each_vertex_of_node(mesh, node, [&](VertexId v) { closed = closed || mesh.steps_apart(v) <= age; });
+  return closed;
+}
+
+template <int Dim>
+bool has_closed_faces(const Mesh<Dim>& mesh, int age) {
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v)
+    if (mesh.steps_apart(v) <= age) return true;
+  return false;
+}
+
+template <int Dim>
+double coincidence(const Mesh<Dim>& mesh) {
+  const auto box = rest_box(mesh);
+  return coincidence<Dim>(box.min(), box.max());
+}
+
+template <int Dim>
+void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
+  if (!setup.contact.enabled || setup.proxy) return;
+  const std::vector<char> all(mesh.num_vertices(), 1);
+  std::vector<VertexId> closed;
+  for_each_coincident_pair(mesh, all, [&](PairKind kind, const std::array<int, 4>& vertices) {
+    for (int k = 0; k < pair_size(kind); ++k)
+      for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { closed.push_back(v); });
+  });
+  for (const VertexId v : closed) mesh.set_steps_apart(v, 0);
+}
+
+template <int Dim>
+void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const VectorX& x, Mesh<Dim>& mesh) {
+  const bool has_closed = has_closed_faces(mesh);
+  std::vector<char> stay(mesh.num_vertices(), 0);
+  if (has_closed) {
+    const double dhat = setup.contact.activation_distance;
+    const auto visit = [&](PairKind kind, const std::array<int, 4>& vertices) {
+      if (pair_distance_squared<Dim>(kind, gather<Dim>(vertices, pair_size(kind), x).data()) >= dhat * dhat) return;
+      for (int k = 0; k < pair_size(kind); ++k) for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { stay[v] = 1; });
+    };
+    for_each_coincident_pair(mesh, closed_nodes(mesh), visit);
+  }
+  std::vector<VertexId> opened;
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
+    const std::uint8_t steps = mesh.steps_apart(v);
+    if (steps == kApart || (steps == 0 && stay[v])) continue;
+    if (steps == 0) opened.push_back(v);
+    mesh.set_steps_apart(v, steps < kMostSteps ? static_cast<std::uint8_t>(steps + 1) : kApart);
+  }
+  if (opened.empty()) return;
+  const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords);
+  if (has_intersection<Dim>(contact.surface, contact.positions(x)))  // of others that are near at rest
+    for (const VertexId v : opened) mesh.set_steps_apart(v, 0);
+}
+
+template <int Dim>
+Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords,
+                          int age) {
+  const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords, age);
+  return body_boundary(mesh, x, chords).find_overlap(contact.surface.closed);
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                       \
+  template bool is_closed(const Mesh<Dim>&, int, int);                                             \
+  template bool has_closed_faces(const Mesh<Dim>&, int);                                           \
+  template double coincidence(const Mesh<Dim>&);                                                   \
+  template void close_coincident_faces(const StepSetup<Dim>&, Mesh<Dim>&);                         \
+  template void open_faces(const StepSetup<Dim>&, const ChordLevels&, const VectorX&, Mesh<Dim>&); \
+  template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const VectorX&, const ChordLevels&, int);
+ITR_INSTANTIATE(2)
+ITR_INSTANTIATE(3)
+#undef ITR_INSTANTIATE
+
+}  // namespace itr

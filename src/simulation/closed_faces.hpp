@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// Which faces are closed, by the steps that Mesh::steps_apart counts.
+#pragma once
+
+#include "geometry/closed_surface.hpp"
+#include "itr/fem/chord_levels.hpp"
+#include "itr/simulation/setup.hpp"
+
+namespace itr {
+
+/// Whether a node (a vertex, or that of a curved edge) was closed `age` steps ago.
+template <int Dim>
+bool is_closed(const Mesh<Dim>& mesh, int node, int age = 0);
+template <int Dim>
+bool has_closed_faces(const Mesh<Dim>& mesh, int age = 0);
+
+/// ClosedFaces::coincident of a mesh [m].
+template <int Dim>
+double coincidence(const Mesh<Dim>& mesh);
+
+/// Closes the faces of bodies that coincide at rest; does nothing where a proxy touches in their place, or without contact.
+template <int Dim>
+void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh);
+
+/// At the end of a step, with bodies at x: opens faces that are apart by d-hat, and counts a step for those that were open.
+template <int Dim>
+void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const VectorX& x, Mesh<Dim>& mesh);
+
+/// How bodies overlap at x.
+template <int Dim>
+Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords,
+                          int age = 0);
+
+}  // namespace itr
