@@ -131,7 +131,7 @@ TEST_F(CertifyTest, LetsClosedFacesOverlapByDhat) {
   }
   for (int v = 4; v < 8; ++v) plane.x[2 * v + 1] -= 0.003;
   ASSERT_EQ(violations_of(plane).size(), 3u);  // two are of edges that cross by more than d-hat
-  EXPECT_NE(certificate.violations.back().find("bodies overlap at"), std::string::npos);
+  EXPECT_NE(certificate.violations.back().text.find("bodies overlap at"), std::string::npos);
   for (int v = 4; v < 8; ++v) plane.x[2 * v + 1] += 0.003;
   plane.mesh.set_steps_apart(4, 1);
   plane.mesh.set_steps_apart(5, 1);

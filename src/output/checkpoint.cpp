@@ -99,7 +99,6 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
     throw InputError({path.string(), "/mesh", "lists of different lengths", "one entry for every cell and facet"});
   Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
   mesh.set_facets(facets, tags);
-  mesh.set_curved_edges(curved_edges);
   if (file.contains(kStepsApart)) {
     const auto steps = read_ints(path, file, kStepsApart);
     if (static_cast<int>(steps.size()) != mesh.num_vertices())
@@ -110,6 +109,7 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
       mesh.set_steps_apart(v, static_cast<std::uint8_t>(steps[v]));
     }
   }
+  mesh.set_curved_edges(curved_edges);
   if (!file.contains("/checkpoint/vertex_tag")) return mesh;
   const auto vertex_tags = read_rows<2>(path, file, "/checkpoint/vertex_tag");
   for (const auto& [v, tag] : vertex_tags) {

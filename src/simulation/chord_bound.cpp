@@ -56,7 +56,7 @@ class ChordBound {
     const int nodes = mesh.num_nodes();
     if (has_closed_faces(mesh, age))
       closed_ = closed_faces<Dim>(mesh.rest(), setup.contact.activation_distance, coincidence(mesh),
-                                  [&](int v) { return is_closed<Dim>(mesh, v, age); });
+                                  [&](int node) { return is_closed(mesh, node, age); });
     points_.reserve(chords_.points.size());
     for (const auto& weights : chords_.points) points_.push_back(combined<Dim>(weights, [&](int node) { return at(node); }));
     for (const auto& facet : chords_.facets) {

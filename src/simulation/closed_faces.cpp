@@ -21,7 +21,7 @@ void for_each_coincident_pair(const Mesh<Dim>& mesh, std::vector<char> counts, c
   CollisionSurface surface = collision_surface<Dim>(mesh, {});
   counts.resize(surface.counts.size());
   for (std::size_t v = 0; v < counts.size(); ++v) surface.counts[v] &= counts[v];
-  const std::vector<Vec<Dim>> nodes = mesh.rest();
+  const std::vector<Vec<Dim>>& nodes = mesh.rest();
   const Eigen::Map<const VectorX> rest(nodes[0].data(), Dim * static_cast<Eigen::Index>(nodes.size()));
   const double near = coincidence(mesh);
   ContactCandidates<Dim> candidates;
@@ -37,8 +37,9 @@ void for_each_coincident_pair(const Mesh<Dim>& mesh, std::vector<char> counts, c
 /// Calls visit(vertex) for the vertex, or the ends of the curved edge, that a node belongs to.
 template <int Dim, typename Visit>
 void for_each_vertex_of_node(const Mesh<Dim>& mesh, int node, const Visit& visit) {
-  if (node < mesh.num_vertices()) return visit(node);
-  for (const VertexId end : mesh.edge_of_node(node)) visit(end);
+  const EdgeKey edge = mesh.edge_of_node(node);
+  if (edge[0] == kNone) return visit(node);
+  for (const VertexId end : edge) visit(end);
 }
 
 template <int Dim>
@@ -73,13 +74,11 @@ double coincidence(const Mesh<Dim>& mesh) {
 template <int Dim>
 void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
   if (!setup.contact.enabled || setup.proxy) return;
-  const std::vector<char> all(mesh.num_vertices(), 1);
-  std::vector<VertexId> closed;
-  for_each_coincident_pair(mesh, all, [&](PairKind kind, const std::array<int, 4>& vertices) {
+  const std::vector<char> all(mesh.num_nodes(), 1);
+  for_each_coincident_pair<Dim>(mesh, all, [&](PairKind kind, const std::array<int, 4>& vertices) {
     for (int k = 0; k < pair_size(kind); ++k)
-      for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { closed.push_back(v); });
+      for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { mesh.set_steps_apart(v, 0); });
   });
-  for (const VertexId v : closed) mesh.set_steps_apart(v, 0);
 }
 
 template <int Dim>

@@ -81,9 +81,8 @@ ClosedFaces closed_faces_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, 
                             const ContactSurface<Dim>& contact) {
   if (!has_closed_faces(mesh, age)) return {};
   std::vector<Vec<Dim>> rest = mesh.rest();
-  const int bodies = static_cast<int>(rest.size());
   rest.insert(rest.end(), setup.obstacles.rest.begin(), setup.obstacles.rest.end());
-  const auto is_node_closed = [&](int node) { return node < bodies && is_closed(mesh, node, age); };
+  const auto is_node_closed = [&](int node) { return node < mesh.num_nodes() && is_closed(mesh, node, age); };
   ClosedFaces faces = closed_faces<Dim>(rest, setup.contact.activation_distance, coincidence(mesh), is_node_closed);
   if (!contact.map) return faces;
   faces.rest = contact.positions(faces.rest);

@@ -298,8 +298,8 @@ class StepSolver {
 
   /// Whether surfaces with these levels of chords are apart at x, and at past positions.
   bool may_have(const ChordLevels& levels, const VectorX& x) const {
-    const int oldest = static_cast<int>(next_.history.x.size());
-    const ContactSurface<Dim> contact = contact_surface(setup_, next_.mesh, levels, oldest);
+    const ContactSurface<Dim> contact =
+        contact_surface(setup_, next_.mesh, levels, static_cast<int>(next_.history.x.size()));
     const auto is_free = [&](const VectorX& at) { return !has_intersection<Dim>(contact.surface, contact.positions(at)); };
     return is_free(x) && std::all_of(next_.history.x.begin(), next_.history.x.end(), is_free);
   }
