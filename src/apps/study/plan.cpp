@@ -372,8 +372,6 @@ const std::vector<Series>& all_series() {
       {"p", Kind::tolerances, false, "curved edges alone",
        remeshed({kCurve, kStraighten, {"/space/remesh/split/enabled", "false"}})},
       {"splits-p2", Kind::tolerances, false, "splits of quadratic elements", remeshed({kQuadratic})},
-      {"no-screening", Kind::tolerances, false, "`smoothing`, a patch relaxed for every edge",
-       remeshed({kSwap, kSmooth, {"/space/remesh/screening", "\"none\""}})},
       {"culling", Kind::tolerances, false, "`smoothing`, the paper's culling by energy",
        remeshed({kSwap, kSmooth, {"/space/remesh/screening", "\"energy-percentile\""}})},
       {"sizing-field", Kind::levels, false, "the sizing-field baseline, from each uniform level",

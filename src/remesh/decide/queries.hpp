@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "prediction.hpp"
-#include "remesh/baselines/baseline.hpp"
+#include "remesh/paper/baseline.hpp"
 #include "trial.hpp"
 
 namespace itr {
@@ -32,8 +32,7 @@ class RemeshQueries {
         options_(options),
         strata_(strata),
         gate_(gate),
-        baseline_(baseline),
-        total_volume_(mesh.total_volume()) {}
+        baseline_(baseline) {}
 
   const Mesh<Dim>& mesh() const { return mesh_; }
   const RemeshFields<Dim>& fields() const { return fields_; }
@@ -75,10 +74,8 @@ class RemeshQueries {
   /// loses energy where both are linear. [J, times the scaling, up to a factor]
   double roughness(const Place& place) const;
 
-  /// Whether predictions may leave out trials.
-  bool screens() const { return !baseline_ || baseline_->predicts(); }
   /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
-  double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance.value() : 0; }
+  double least_worthwhile() const { return 0.05 * options_.split.acceptance_tolerance.value(); }
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
   /// `surface_read`, unless null, grows by what was read of the surface: what was looked at beside edits that move it there
@@ -99,15 +96,14 @@ class RemeshQueries {
   }
   /// Whether the prediction of an edit of these cells tells that its patch cannot gain the tolerance [J] either.
   bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance) const {
-    return screens() &&
-           at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
+    return at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
   }
   /// Tells whether an edit promises too little for a trial. A split or a curve that may be in contact is not judged by its
   /// prediction, which knows nothing of contact, unless far too little is promised where edges are curved.
   bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance, bool in_contact) const {
     if (in_contact && !may_have_curves()) return false;
     const double factor = in_contact ? kPatchOverPredictionInContact<Dim> : patch_over_refinement(cells);
-    return screens() && at_most(predicted, factor) < context_.scaling * tolerance;
+    return at_most(predicted, factor) < context_.scaling * tolerance;
   }
   /// Decides about the edit of a trial that has to gain `tolerance` [J].
   void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
@@ -131,8 +127,9 @@ class RemeshQueries {
   /// Tells whether the chords that the split of an edge would bring to the surface beside those halves are shorter than
   /// dhat.
   bool makes_short_chords(const EdgeKey& e) const;
-  RemeshState<Dim> state() const { return state(baseline_ ? baseline_->history() : HistoryRule::function); }
-  RemeshState<Dim> state(HistoryRule history) const { return {mesh_, fields_, context_, gate_.present(), history}; }
+  RemeshState<Dim> state(HistoryRule history = HistoryRule::function) const {
+    return {mesh_, fields_, context_, gate_.present(), history};
+  }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
   bool may_have_curves() const { return options_.curve.enabled || mesh_.has_nodes(); }
   /// See prediction.hpp; of a split or a curve of these cells.
@@ -148,7 +145,6 @@ class RemeshQueries {
   const Strata<Dim>& strata_;
   const Gate<Dim>& gate_;
   const Baseline<Dim>* baseline_;  ///< or null
-  double total_volume_;
 };
 
 }  // namespace itr

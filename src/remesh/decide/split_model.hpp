@@ -42,7 +42,6 @@ class SplitModel {
 
  private:
   static constexpr int kNodes = kQuadraticNodes<Dim>;
-  using Gradients = QuadraticCell<Dim>;  ///< of shape functions, or of barycentric coordinates in the first columns
 
   struct Cell {
     CellId id;

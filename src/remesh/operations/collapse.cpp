@@ -60,7 +60,7 @@ class Coarsener {
     const EdgeKey edge = trial.edge();
     if (trial.candidate.place.is_node()) return look_at_straighten(trial, scratch);
     if (const Refusal refusal = ask_.refuse_collapse(edge); refusal != Refusal::none) return trial.refuse(refusal);
-    if (session_.memory().depth(edge) >= options_.max_depth) return trial.refuse(Refusal::depth);
+    if (session_.memory().depth(edge) >= kMostGenerations) return trial.refuse(Refusal::depth);
     trial.signal = ask_.roughness(edge);
     ask_.find_contact(trial, scratch);
     if (session_.memory().was_refused(RemeshMemory::collapse, edge, trial.signal, trial.in_contact)) return;

@@ -113,7 +113,7 @@ class ForceFollower : Mover<Dim> {
   explicit ForceFollower(RemeshSession<Dim>& session)
       : Mover<Dim>(session),
         worthwhile_(std::max(this->tolerance_, this->ask_.least_worthwhile())),
-        least_promise_(this->ask_.screens() ? this->ask_.context().scaling * worthwhile_ : 0) {}
+        least_promise_(this->ask_.context().scaling * worthwhile_) {}
 
   std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
     const VertexId v = place.vertex();
@@ -179,12 +179,10 @@ template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session) {
   std::vector<Place> vertices;
   for (VertexId v = 0; v < session.ask().mesh().vertex_slots(); ++v) vertices.push_back(Place::at_vertex(v));
-  for (int round = 0; round < session.ask().options().smooth.max_iterations; ++round) {
-    ForceFollower<Dim> follower(session);
-    run_waves(session, follower, vertices);
-    ShapeBetterer<Dim> betterer(session);
-    run_waves(session, betterer, vertices);
-  }
+  ForceFollower<Dim> follower(session);
+  run_waves(session, follower, vertices);
+  ShapeBetterer<Dim> betterer(session);
+  run_waves(session, betterer, vertices);
 }
 
 template void smooth_vertices(RemeshSession<2>&);

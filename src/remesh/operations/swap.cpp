@@ -54,7 +54,7 @@ double with_nodes(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double l
 /// Whether the prediction from bulk terms reaches `least` [J].
 template <int Dim>
 bool is_promising(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
-  return !ask.screens() || ask.predict(edit) >= ask.context().scaling * least;
+  return ask.predict(edit) >= ask.context().scaling * least;
 }
 
 /// The differences between the dimensions: the order of edges, and what replaces an edge. Only a swap that improves the
@@ -100,7 +100,7 @@ class Swapper {
 
   void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
     const EdgeKey edge = trial.edge();
-    if (const auto it = tries_.find(edge); it != tries_.end() && it->second >= options_.max_depth)
+    if (const auto it = tries_.find(edge); it != tries_.end() && it->second >= kMostGenerations)
       return trial.refuse(Refusal::depth);
     if (!ask_.exists(edge)) return trial.refuse(Refusal::gone);
     trial.signal = ask_.roughness(edge);

@@ -46,8 +46,7 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
 
 template <int Dim>
 bool RemeshSession<Dim>::shape_matters(const Place& place, double roughness) const {
-  if (!ask_.screens() || roughness >= ask_.context().scaling * ask_.least_worthwhile() || memory_.was_gain(place))
-    return true;
+  if (roughness >= ask_.context().scaling * ask_.least_worthwhile() || memory_.was_gain(place)) return true;
   const Mesh<Dim>& mesh = ask_.mesh();
   const auto around = mesh.cells_of(place.vertices().front());
   return std::any_of(around.begin(), around.end(), [&](CellId c) {

@@ -11,7 +11,7 @@
 #include "itr/core/parallel.hpp"
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "remesh/baselines/baseline.hpp"
+#include "remesh/paper/baseline.hpp"
 #include "remesh/decide/queries.hpp"
 #include "session_memory.hpp"
 

@@ -11,6 +11,9 @@
 
 namespace itr {
 
+/// Collapses or swaps of one edge a step.
+inline constexpr int kMostGenerations = 3;
+
 /// Change of a signal by which a refusal no longer holds.
 inline constexpr double kSameSignal = 1.2;
 
