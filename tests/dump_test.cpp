@@ -9,8 +9,8 @@
 #include <fstream>
 
 #include "itr/core/error.hpp"
-#include "linear/dump.hpp"
 #include "linear_systems.hpp"
+#include "verification/solvers/dump.hpp"
 
 namespace itr::linear {
 namespace {

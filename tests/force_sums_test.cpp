@@ -172,7 +172,6 @@ struct RandomScene {
       remesh.collapse.acceptance_tolerance = Dim == 2 ? -1e-3 : -1e-2;
       remesh.collapse.rel_max_edge_length = 1.5;
       remesh.swap.enabled = remesh.smooth.enabled = with("swaps and smoothing");
-      if (with("history interpolated", 0.3)) remesh.history = HistoryRule::interpolated;
       remesh.curve.enabled = remesh.straighten.enabled = is_curved || with("curving", 0.3);
       is_curved |= remesh.curve.enabled;
     } else if (with("density varies", 0.3)) {
@@ -316,8 +315,7 @@ void expect_sums(const Setup<Dim>& setup, const State<Dim>& before, const State<
   Vec<Dim> by_edits = Vec<Dim>::Zero();
   for (const MomentumChange& change : forces.remeshing) by_edits += Vec<Dim>(change.linear.data());
   expected += by_edits;
-  if (rate.size > 0 && setup.remesh.history == HistoryRule::function)
-    tally.kept = std::max(tally.kept, by_edits.norm() / rate.size);
+  if (rate.size > 0) tally.kept = std::max(tally.kept, by_edits.norm() / rate.size);
   EXPECT_LE((rate.total - expected).norm(), kTolerance * (sum.size + residual.size) + 1e-13 * rate.size)
       << "rate " << rate.total.transpose() << ", forces " << sum.total.transpose() << ", sizes " << sum.size << " and "
       << rate.size << ", residual " << residual.total.transpose();

@@ -128,7 +128,7 @@ TEST(Impact, KeepsTheMeshWhereARemeshedStateIsNotValid) {
       EXPECT_THROW(simulation.restore(State<2>(state)), InputError);
     }
     const auto direct = linear::choose_solver(setup.linear, false, registry, logger);
-    linear::ReusingSolver solver(*direct, true);
+    linear::ReusingSolver solver(*direct);
     ProblemCache<2> cache(solver);
     const auto result = take_step<2>({simulation.setup(), edge_lengths(state.mesh), cache, solver, logger}, state, state);
     EXPECT_TRUE(result.ok) << result.reason;

@@ -383,29 +383,23 @@ TEST(Search, StopsBeforeWhatIsInTheWay) {
 
 TEST(Search, StaysWhereNothingLowersTheEnergy) {
   const DoubleWell energy(1);
-  for (const LineSearch rule : {LineSearch::backtracking, LineSearch::armijo, LineSearch::robust_armijo}) {
-    NewtonOptions options;
-    options.line_search = rule;
-    Parts parts(energy, Vec<2>(2, 2), options);
-    parts.direction->step().way = parts.at->gradient();
-    EXPECT_FALSE(parts.search->along(parts.direction->step()));
-    EXPECT_EQ(parts.x, VectorX(Vec<2>(2, 2)));
-    parts.direction->step().way = -0.1 * parts.at->gradient();
-    EXPECT_TRUE(parts.search->along(parts.direction->step()));
-    EXPECT_LT(parts.x[0], 2);
-  }
+  Parts parts(energy, Vec<2>(2, 2));
+  parts.direction->step().way = parts.at->gradient();
+  EXPECT_FALSE(parts.search->along(parts.direction->step()));
+  EXPECT_EQ(parts.x, VectorX(Vec<2>(2, 2)));
+  parts.direction->step().way = -0.1 * parts.at->gradient();
+  EXPECT_TRUE(parts.search->along(parts.direction->step()));
+  EXPECT_LT(parts.x[0], 2);
 }
 
 TEST(Search, GoesOnWhereTheEnergyFallsInAStraightLine) {
   const DoubleWell energy(1);
-  for (const bool extends : {false, true}) {
-    NewtonOptions options;
-    options.extend_steps = extends;
-    Parts parts(energy, Vec<2>(1e-3, 1e-3), options);
-    ASSERT_TRUE(parts.direction->find());
-    ASSERT_TRUE(parts.search->along(parts.direction->step()));
-    EXPECT_EQ(parts.x[0] > 0.1, extends) << parts.x[0];
-  }
+  Parts parts(energy, Vec<2>(1e-3, 1e-3));
+  ASSERT_TRUE(parts.direction->find());
+  const double one_step = 1e-3 + parts.direction->step().way[0];
+  ASSERT_TRUE(parts.search->along(parts.direction->step()));
+  EXPECT_LT(one_step, 0.1);
+  EXPECT_GT(parts.x[0], 0.1);
 }
 
 TEST(Search, PutsHeldDofsExactlyAtTheirTargets) {

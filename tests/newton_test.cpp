@@ -224,7 +224,6 @@ TEST(Newton, LeavesASaddleWithinRoundOffToOneSide) {
       NewtonOptions options;
       options.gradient_tolerance = options.first_gradient_tolerance = 0;
       options.step_tolerance = 1e-16;
-      options.extend_steps = false;  // they would leave the saddle without asking what it is
       Workspace workspace;
       const NewtonSummary summary = minimize(DoubleWell(c, 1), x, dofs, VectorX(), system, options, workspace);
       EXPECT_TRUE(summary.converged()) << name << ": " << summary.message;
@@ -479,7 +478,6 @@ class StiffPair final : public Energy {
 TEST(Newton, WhatIsStiffHoldsNothingElse) {
   NewtonOptions options;
   options.step_tolerance = 1e-6;
-  options.extend_steps = false;
   VectorX x = VectorX::Zero(4);
   x[0] = x[1] = 1;
   DenseSystem system;
@@ -494,7 +492,6 @@ TEST(Newton, WhatIsStiffHoldsNothingElse) {
 TEST(Newton, StepsThatAShiftMakesShortAreNoEnd) {
   NewtonOptions options;
   options.step_tolerance = 1e-6;
-  options.extend_steps = false;
   options.max_iterations = 30;
   VectorX x = VectorX::Zero(4);
   DenseSystem system;

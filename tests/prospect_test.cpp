@@ -73,7 +73,7 @@ TEST(Prospect, NoSplitGainsMoreThanIsThere) {
     Marks marks;
     for (const EdgeKey& edge : scene.mesh.edges()) {
       const auto split = make_split(scene.mesh, edge);
-      const auto patch = select_patch<3>(scene.mesh, split, {}, 0, marks);
+      const auto patch = select_patch<3>(scene.mesh, split, {}, marks);
       LocalProblem<3> before(state, patch, split, false, scratch), after(state, patch, split, true, scratch);
       if (!after.has_unknowns()) continue;
       EXPECT_LE(before.value() - after.relax(20).energy, available) << "seed " << seed;
@@ -101,7 +101,6 @@ TEST(Prospect, NothingIsAskedInFreeFlightUntilThereIsSomethingToGain) {
   options.split.acceptance_tolerance = 1e-3 * all;
   EXPECT_GT(tried(noisy), 0);
   options.split.acceptance_tolerance = 2 * all;
-  options.screening = Screening::none;
   EXPECT_EQ(tried(noisy), 0);
   TetScene pressed = noisy;
   pressed.context.coupling = std::numeric_limits<double>::infinity();  // as where a term's sign is not known

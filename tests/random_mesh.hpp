@@ -74,11 +74,8 @@ inline std::ostream& operator<<(std::ostream& out, Edit<2>::Kind kind) {
   constexpr const char* kNames[] = {"split", "collapse", "swap", "smooth", "curve", "straighten"};
   return out << kNames[static_cast<int>(kind)];
 }
-inline std::ostream& operator<<(std::ostream& out, HistoryRule rule) {
-  return out << (rule == HistoryRule::function ? "function" : "interpolated");
-}
 inline std::ostream& operator<<(std::ostream& out, Screening screening) {
-  constexpr const char* kNames[] = {"energy-percentile", "bounds", "none"};
+  constexpr const char* kNames[] = {"energy-percentile", "bounds"};
   return out << kNames[static_cast<int>(screening)];
 }
 

@@ -64,7 +64,7 @@ void for_random_edits(int count, int edits_a_scene, double friction, const Compa
     for (int i = 0; i < edits_a_scene; ++i) {
       const auto edit = random_edit(scene, strata, scene.random);
       if (!edit || !gate.passes(*edit, scratch.gate)) continue;
-      const auto patch = select_patch<3>(scene.mesh, *edit, {}, 0, marks);
+      const auto patch = select_patch<3>(scene.mesh, *edit, {}, marks);
       LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
       Mesh<3> changed = scene.mesh;
       RemeshFields<3> fields = scene.fields;
@@ -188,7 +188,7 @@ TEST(Bounds3d, OfOneVertexNeverExceedWhatAPatchGains) {
       const auto edit = random_edit(scene, strata, scene.random);
       if (!edit || !gate.passes(*edit, scratch.gate)) continue;
       const double bound = gain_of_vertex<3>(state, *edit, scratch);
-      const auto patch = select_patch<3>(scene.mesh, *edit, {}, 0, marks);
+      const auto patch = select_patch<3>(scene.mesh, *edit, {}, marks);
       LocalProblem<3> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
       const double energy = before.value();
       const double gain = energy - (after.has_unknowns() ? after.relax(100).energy : after.value());

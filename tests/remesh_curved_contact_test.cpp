@@ -138,7 +138,7 @@ TYPED_TEST(CurvedContact, PatchesSeeWhatTheWholeMeshSees) {
       const double before = whole_energy(scene);
       if (!std::isfinite(before)) break;
       Marks marks;
-      const auto patch = select_patch<Dim>(scene.mesh, edit, {.rings = 1 + i % 3}, 1, marks);
+      const auto patch = select_patch<Dim>(scene.mesh, edit, {.rings = 1 + i % 3}, marks);
       LocalProblem<Dim> old_side(view.state, patch, edit, false, view.scratch),
           new_side(view.state, patch, edit, true, view.scratch);
       const double start = old_side.value(), unrelaxed = new_side.value();

@@ -178,7 +178,7 @@ TYPED_TEST(CurvedLong, TheRemesherKeepsEverythingValid) {
     RemeshOptions options = remesh_options();
     options.curve.enabled = options.straighten.enabled = options.swap.enabled = options.smooth.enabled = true;
     options.collapse.rel_max_edge_length = 100;
-    options.split.max_depth = options.collapse.max_depth = 1;
+    options.split.max_depth = 1;
     scene.context.has_inertia = seed % 4 < 2;
     long left = num_operations<Dim>() / kScenes / 10;
     for (int round = 0; left > 0 && round < 100000; ++round) {

@@ -8,10 +8,10 @@
 #include "curved_scene.hpp"
 #include "curved_trial.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
-#include "remesh/baselines/baseline.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/prospect.hpp"
 #include "remesh/decide/queries.hpp"
+#include "remesh/paper/baseline.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

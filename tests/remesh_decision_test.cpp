@@ -65,7 +65,7 @@ TEST(Bounds, OfOneVertexNeverExceedWhatAPatchGains) {
       const auto edit = random_edit(scene.mesh, scene.random);
       if (!edit || !view.gate.passes(*edit, view.scratch.gate)) continue;
       const double bound = gain_of_vertex<2>(view.state, *edit, view.scratch);
-      const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
+      const auto patch = select_patch<2>(scene.mesh, *edit, {}, marks);
       const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
       const double energy = before->value();
       const double gain = energy - (after->has_unknowns() ? after->relax(100).energy : after->value());

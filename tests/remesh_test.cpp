@@ -81,7 +81,7 @@ TEST(LocalProblem, EnergyDifferenceOfAnEditEqualsTheGlobalOne) {
     const auto edit = random_edit(scene.mesh, scene.random);
     if (!edit) continue;
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, marks);
     LocalView view(scene, HistoryRule::interpolated);
     const auto before = view.problem(patch, *edit, false), after = view.problem(patch, *edit, true);
     const double local = after->value() - before->value();
@@ -105,7 +105,7 @@ TEST(LocalProblem, RelaxationLowersTheGlobalEnergyByWhatItReports) {
     const auto edges = scene.mesh.edges();
     const auto edit = make_split(scene.mesh, edges[scene.random() % edges.size()]);
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, edit, {}, 0, marks);
+    const auto patch = select_patch<2>(scene.mesh, edit, {}, marks);
     LocalView view(scene);
     const auto after = view.problem(patch, edit, true);
     const double start = after->value(), end = after->relax(5).energy;
@@ -131,7 +131,7 @@ TEST(LocalProblem, HistoryAsAFunctionChargesTheIntegralOfWhatIsForgotten) {
     const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), edges[scene.random() % edges.size()]).edit;
     if (!edit) continue;
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, marks);
     const auto inertia = [&](HistoryRule rule) { return LocalView(scene, rule).problem(patch, *edit, true)->value(); };
     const double kept = inertia(HistoryRule::function), forgotten = inertia(HistoryRule::interpolated);
     if (!std::isfinite(kept)) continue;  // inverted by the random state
@@ -162,7 +162,7 @@ TEST(LocalProblem, PredictionsChargeLessThanWhatIsForgotten) {
                           .edit;
     if (!edit) continue;
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, marks);
     const auto inertia = [&](HistoryRule rule) { return LocalView(scene, rule).problem(patch, *edit, true)->value(); };
     const double forgotten = inertia(HistoryRule::function) - inertia(HistoryRule::interpolated);
     if (!std::isfinite(forgotten)) continue;  // inverted by the random state
@@ -188,7 +188,7 @@ TEST(LocalProblem, SplitsAloneChangeNoEnergyWithLumpedMassEither) {
       const auto edges = scene.mesh.edges();
       const auto edit = make_split(scene.mesh, edges[scene.random() % edges.size()]);
       Marks marks;
-      const auto patch = select_patch<2>(scene.mesh, edit, {}, 0, marks);
+      const auto patch = select_patch<2>(scene.mesh, edit, {}, marks);
       LocalView view(scene);
       const double before = view.problem(patch, edit, false)->value();
       EXPECT_NEAR(view.problem(patch, edit, true)->value(), before, 1e-12 * std::abs(before)) << "seed " << seed;
@@ -210,7 +210,7 @@ TEST(LocalProblem, ForgottenHistoryUsesTheLumpedMass) {
     const auto edit = propose_collapse(scene.mesh, Strata<2>(scene.mesh), edges[scene.random() % edges.size()]).edit;
     if (!edit || edit->value->num_parents != 1) continue;  // onto one of its ends: one vertex disappears
     Marks marks;
-    const auto patch = select_patch<2>(scene.mesh, *edit, {}, 0, marks);
+    const auto patch = select_patch<2>(scene.mesh, *edit, {}, marks);
     const double kept = LocalView(scene).problem(patch, *edit, true)->value();
     if (!std::isfinite(kept)) continue;  // inverted by the random state
     const VertexId gone = edit->removed_vertex;
@@ -306,7 +306,7 @@ TEST(Prediction, CountsAShareOfTheHistoryThatACollapseForgets) {
 TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
   std::map<Screening, int> tried;
   for (unsigned seed = 0; seed < 5; ++seed)
-    for (const auto screening : {Screening::energy_percentile, Screening::bounds, Screening::none}) {
+    for (const auto screening : {Screening::energy_percentile, Screening::bounds}) {
       TrialScene scene(seed);
       RemeshOptions options = remesh_options();
       options.collapse.enabled = false;
@@ -317,7 +317,6 @@ TEST(Remesh, BoundsFindEdgesThatCullingByEnergyLeavesOut) {
     }
   EXPECT_GT(tried[Screening::energy_percentile], 0);
   EXPECT_GT(tried[Screening::bounds], 2 * tried[Screening::energy_percentile]);
-  EXPECT_GT(tried[Screening::none], tried[Screening::bounds]);
 }
 
 /// Where no prediction knows what a split depends on, a refusal of one step says nothing of the next.

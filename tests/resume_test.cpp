@@ -131,15 +131,15 @@ TEST_F(InterruptTest, ResultsAreNotErasedUnasked) {
   EXPECT_EQ(results_of(run).size(), 3u);
 }
 
-/// A step that remeshes for many seconds: patches of thousands of cells.
+/// A step that remeshes for many seconds: splits of splits, each of which gains something.
 Case slow_remeshing() {
-  return {"slow",
-          "masticator.json",
-          5,
-          R"("dt":0.05)",
-          {"/geometry/0/n_refs=2", "/space/remesh/screening=\"none\"",
-           R"(/space/remesh/local_relaxation={"local_mesh_n_ring":9,"local_mesh_max_cells":2000})",
-           R"j(/initial_conditions/velocity=[{"id":0,"value":["sin(7*x)",0]}])j"}};
+  return {
+      "slow",
+      "masticator.json",
+      5,
+      R"("dt":0.05)",
+      {"/geometry/0/n_refs=3", R"(/space/remesh/split={"acceptance_tolerance":1e-30,"max_depth":30,"min_edge_length":0})",
+       R"j(/initial_conditions/velocity=[{"id":0,"value":["sin(7*x)",0]}])j"}};
 }
 
 TEST_F(InterruptTest, TheSecondSignalIsHeardWithinRemeshing) {

@@ -63,7 +63,7 @@ std::vector<std::string> direct_solvers() {
 }
 
 TEST_P(Engines, AnUnchangedMatrixIsFactorisedOnce) {
-  ReusingSolver solver(*direct, false);
+  ReusingSolver solver(*direct);
   const auto b = load(block().pattern.order);
   std::vector<double> x(b.size()), y(b.size());
   for (auto* solution : {&x, &y}) {
@@ -78,7 +78,7 @@ TEST_P(Engines, AnUnchangedMatrixIsFactorisedOnce) {
 }
 
 TEST_P(Engines, AFactorSolvesWhatIsLikeIt) {
-  ReusingSolver solver(*direct, true);
+  ReusingSolver solver(*direct);
   const auto b = load(block().pattern.order);
   std::vector<double> x(b.size());
   ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
@@ -99,9 +99,9 @@ TEST_P(Engines, AFactorSolvesWhatIsLikeIt) {
 }
 
 TEST_P(Engines, ALooseSolveGoesOnToAllDigits) {
-  ReusingSolver at_once(*direct, true);
+  ReusingSolver at_once(*direct);
   const auto other = registry.create(GetParam());
-  ReusingSolver in_two(*other, true);
+  ReusingSolver in_two(*other);
   const auto b = load(block().pattern.order);
   std::vector<double> x(b.size());
   const auto solve = [&](ReusingSolver& solver, double change, const Asked& asked) {
@@ -124,7 +124,7 @@ TEST_P(Engines, ALooseSolveGoesOnToAllDigits) {
 }
 
 TEST_P(Engines, AGrownPatternDoesNotMatter) {
-  ReusingSolver solver(*direct, true);
+  ReusingSolver solver(*direct);
   const int n = block().pattern.order;
   // A spring between the first and the last unknown, as a contact would be.
   Elastic touched = block();
@@ -146,7 +146,7 @@ TEST_P(Engines, AGrownPatternDoesNotMatter) {
 
 /// The matrix has a negative eigenvalue in a direction that neither the right-hand side nor the rest of it knows of.
 TEST_P(Engines, IndefinitenessIsSeenInEveryDirection) {
-  ReusingSolver solver(*direct, true);
+  ReusingSolver solver(*direct);
   Elastic system = block();
   auto& [order, starts, rows] = system.pattern;
   ++order;  // one more unknown, on its own
@@ -178,7 +178,7 @@ TEST_P(Engines, IndefinitenessIsSeenInEveryDirection) {
 
 /// A system that was solved by iterations has no factor of its own, and a question alone does not count as a solve.
 TEST_P(Engines, WhatAMatrixIsCanBeAskedAlone) {
-  ReusingSolver solver(*direct, true);
+  ReusingSolver solver(*direct);
   const auto b = load(block().pattern.order);
   std::vector<double> x(b.size());
   ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
@@ -200,7 +200,7 @@ TEST_P(Engines, WhatAMatrixIsCanBeAskedAlone) {
 /// Iterations over the factor of an indefinite matrix prove nothing.
 TEST_P(Engines, NoFactorOfAnIndefiniteMatrixIsKept) {
   if (!direct->capabilities().tells_definiteness || !direct->capabilities().indefinite) return;
-  ReusingSolver solver(*direct, true);
+  ReusingSolver solver(*direct);
   Elastic system = block();
   for (int j = 0; j < 6; ++j) system.values[system.pattern.column_starts[j]] *= -1;
   const auto b = load(system.pattern.order);
@@ -212,7 +212,7 @@ TEST_P(Engines, NoFactorOfAnIndefiniteMatrixIsKept) {
 }
 
 TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
-  ReusingSolver solver(*direct, true);
+  ReusingSolver solver(*direct);
   const auto b = load(block().pattern.order);
   std::vector<double> x(b.size());
   ASSERT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
@@ -228,7 +228,7 @@ TEST_P(Engines, AMatrixThatIsNotLikeItIsFactorised) {
 TEST_P(Engines, ARecordIsAllThatMatters) {
   const auto b = load(block().pattern.order);
   const auto other = registry.create(GetParam());
-  ReusingSolver through(*direct, true), resumed(*other, true);
+  ReusingSolver through(*direct), resumed(*other);
   const auto solve = [&](ReusingSolver& solver, double change) {
     std::vector<double> x(b.size());
     EXPECT_EQ(solver.analyze(block().pattern, block().hints()), Outcome::ok);
@@ -255,7 +255,7 @@ TEST(Record, IsEmptyWhereAnOrderCameFromAnEarlierPattern) {
   if (!registry.is_ready("cholmod"))
     GTEST_SKIP() << "a machine without CHOLMOD does without: " << registry.find("cholmod").reason;
   const auto direct = registry.create("cholmod");
-  ReusingSolver solver(*direct, true);
+  ReusingSolver solver(*direct);
   for (const bool may_keep_order : {false, true}) {
     AnalyzeHints hints = block().hints();
     hints.may_keep_order = may_keep_order;

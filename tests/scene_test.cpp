@@ -93,13 +93,11 @@ TEST_F(SceneTest, OutputAndSpeedOfOthersDoNotStopAScene) {
   const Scene scene = read_scene(square(json::parse(R"({
     "output": {"json": "sim.json", "directory": "out", "paraview": {"skip_frame": 4, "volume": true}},
     "tests": {"err_l2": 1}, "solver": {"max_threads": 2, "contact": {"CCD": {"broad_phase": "HG"}},
-    "linear": {"solver": ["Eigen::PardisoLLT", "mumps"], "reuse_factors": false}}})")));
+    "nonlinear": {"line_search": {"method": "Backtracking"}}, "linear": {"solver": ["Eigen::PardisoLLT", "mumps"]}}})")));
 
   EXPECT_EQ(scene.directory, "out");
   EXPECT_EQ(scene.output.skip_frames, 4);
   EXPECT_EQ(scene.max_threads, 2);
-  EXPECT_FALSE(std::get<itr::Setup<2>>(scene.setup).linear.reuse_factors);
-  EXPECT_TRUE(std::get<itr::Setup<2>>(read_scene(square(json::object())).setup).linear.reuse_factors);
   EXPECT_EQ(std::get<itr::Setup<2>>(scene.setup).linear.solvers, (std::vector<std::string>{"Eigen::PardisoLLT", "mumps"}));
 }
 
@@ -273,27 +271,22 @@ TEST_F(SceneTest, WaysToProjectTheHessian) {
     return read2(square({{"solver", {{"nonlinear", {{"Newton", options}}}}}})).newton;
   };
   EXPECT_FALSE(newton({{"use_psd_projection", false}}).project_to_psd);
-  EXPECT_EQ(newton({{"projected_iterations", 0}}).projected_iterations, 0);
   EXPECT_EQ(newton({{"force_psd_projection", true}}).projected_iterations, 0);
   EXPECT_GT(newton({{"force_psd_projection", false}}).projected_iterations, 0);
   EXPECT_THROW(newton({{"force_psd_projection", true}, {"use_psd_projection", false}}), itr::InputError);
   EXPECT_EQ(read2(square({{"solver", {{"nonlinear", {{"iterations_per_strategy", 1}}}}}})).newton.projected_iterations, 2);
-  EXPECT_FALSE(newton({{"extend_steps", false}}).extend_steps);
-  EXPECT_EQ(newton({{"indefinite", "accept"}}).indefinite, IndefiniteHessian::accept);
   EXPECT_EQ(newton(json::object()).indefinite, IndefiniteHessian::project);
 }
 
 /// The known norms of peers' scenes are those of an L D L^T, which takes indefinite directions.
 TEST_F(SceneTest, WayThroughIndefiniteHessiansIsThatOfAnLdltThatTheSceneNamesFirst) {
-  const auto way = [&](const json& solvers, const json& newton = json::object()) {
-    return read2(square({{"solver", {{"linear", {{"solver", solvers}}}, {"nonlinear", {{"Newton", newton}}}}}}))
-        .newton.indefinite;
+  const auto way = [&](const json& solvers) {
+    return read2(square({{"solver", {{"linear", {{"solver", solvers}}}}}})).newton.indefinite;
   };
   for (const char* name : {"Eigen::SimplicialLDLT", "Eigen::PardisoLDLT", "Eigen::AccelerateLDLT"}) {
     EXPECT_EQ(way(name), IndefiniteHessian::accept);
     EXPECT_EQ(way({name, "Eigen::CholmodSupernodalLLT"}), IndefiniteHessian::accept);
     EXPECT_EQ(way({"Eigen::CholmodSupernodalLLT", name}), IndefiniteHessian::project);
-    EXPECT_EQ(way(name, {{"indefinite", "project"}}), IndefiniteHessian::project);
   }
   for (const char* name : {"eigen:ldlt", "mumps", "cholmod", "Eigen::PardisoLLT"})
     EXPECT_EQ(way({name, "eigen"}), IndefiniteHessian::project) << name;
@@ -522,19 +515,15 @@ TEST_F(SceneTest, ValuesThatAreNotDefinedAreRefused) {
 
 TEST_F(SceneTest, RemeshOptions) {
   const RemeshOptions options = read2(square({{"space", {{"remesh", json::parse(R"({
-      "enabled": true, "type": "sizing_field", "screening": "none", "history": "interpolated",
+      "enabled": true, "type": "sizing_field", "screening": "energy-percentile",
       "split": {"acceptance_tolerance": 0.4}, "collapse": {"rel_max_edge_length": 3}, "swap": {"enabled": true},
-      "smooth": {"max_iters": 4}, "local_relaxation": {"local_mesh_n_ring": 3},
       "sizing_field": {"rel_min_edge_length": 0.02}})")}}}}))
                                     .remesh;
 
   EXPECT_TRUE(options.enabled && options.sizing_field.enabled && options.swap.enabled);
-  EXPECT_EQ(options.screening, Screening::none);
-  EXPECT_EQ(options.history, HistoryRule::interpolated);
+  EXPECT_EQ(options.screening, Screening::energy_percentile);
   EXPECT_EQ(options.split.acceptance_tolerance, 0.4);
   EXPECT_EQ(options.collapse.rel_max_edge_length, 3);
-  EXPECT_EQ(options.smooth.max_iterations, 4);
-  EXPECT_EQ(options.local.rings, 3);
   EXPECT_EQ(options.sizing_field.rel_min_edge_length, 0.02);
 }
 

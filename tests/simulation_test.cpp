@@ -8,6 +8,7 @@
 #include "itr/core/parallel.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/linear/registry.hpp"
+#include "linear/forwarding.hpp"
 #include "simulation/problem_cache.hpp"
 #include "simulation_scenes.hpp"
 
@@ -234,6 +235,25 @@ TEST(Simulation, HasTheSameBitsForOneAndTwoThreads) {
   EXPECT_TRUE(same(one.v[0], two.v[0]));
 }
 
+/// Factorises each matrix: no factor of a solver that calls itself iterative serves another one.
+class Forgetful final : public linear::Forwarding {
+ public:
+  explicit Forgetful(std::unique_ptr<linear::Solver> solver) : solver_(std::move(solver)) {}
+  std::string_view name() const override { return "forgetful"; }
+  linear::Capabilities capabilities() const override { return {.iterative = true}; }
+  linear::Outcome analyze(const linear::SparsityPattern& pattern, const linear::AnalyzeHints& hints) override {
+    return solver_->analyze(pattern, hints);
+  }
+  linear::Outcome factorize(std::span<const double> values) override { return solver_->factorize(values); }
+  linear::SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double) override {
+    return solver_->solve(B, X, columns, 1e-12);
+  }
+
+ private:
+  const linear::Solver& current() const override { return *solver_; }
+  std::unique_ptr<linear::Solver> solver_;
+};
+
 /// A square that turns and swings in free flight: its matrix changes little from step to step.
 struct Flight {
   VectorX x;
@@ -243,8 +263,12 @@ struct Flight {
 Flight fly(bool reuse_factors, int resume_after = 0) {
   auto setup = free_square(32);
   setup.initial_velocity = {{1, [](const Vec<2>& X, double) { return Vec<2>(X[1], 0.3 * X[0] - 0.1); }}};
-  setup.linear.reuse_factors = reuse_factors;
   linear::Registry registry;
+  if (!reuse_factors) {
+    registry.add({.name = "forgetful", .available = true},
+                 [&](const linear::SolverOptions&) { return std::make_unique<Forgetful>(registry.create("eigen:ldlt")); });
+    setup.linear.solvers = {"forgetful"};
+  }
   auto simulation = std::make_unique<Simulation<2>>(setup, registry);
   Flight flight;
   while (!simulation->finished()) {

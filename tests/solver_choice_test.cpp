@@ -287,11 +287,6 @@ TEST(Auto, FailsWithTheReasonWhereItsPickCannotBeCreated) {
   EXPECT_EQ(solve(*solver, residual), Outcome::ok);  // a small one: another pick
 }
 
-TEST(Choice, RefusesToDumpEveryZerothSystem) {
-  Registry registry(kNoModules);
-  EXPECT_THROW(choose_solver({.dump_folder = "x", .dump_every = 0}, false, registry, {}), InputError);
-}
-
 TEST(Choice, CreatesNoSolverThatWillNotRun) {
   Registry registry(kNoModules);
   add_large(registry, nullptr);

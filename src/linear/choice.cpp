@@ -11,15 +11,8 @@
 
 #include "forwarding.hpp"
 #include "itr/core/error.hpp"
-#include "linear/dump.hpp"
 
-namespace itr {
-
-void LinearOptions::validate() const {
-  if (dump_every < 1) throw InputError({"", "dump_every", std::to_string(dump_every), "at least 1"});
-}
-
-namespace linear {
+namespace itr::linear {
 
 namespace {
 
@@ -267,7 +260,6 @@ std::string choose_name(const LinearOptions& options, Registry& registry) {
 
 std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_indefinite, Registry& registry,
                                       const Logger& logger) {
-  options.validate();
   std::map<std::string, SolverOptions> options_of;
   for (const auto& [name, values] : options.options) options_of[registry.find(name).name] = values;
   const auto make = [&registry, options_of, may_be_indefinite, logger](const std::string& name) {
@@ -301,9 +293,7 @@ std::unique_ptr<Solver> choose_solver(const LinearOptions& options, bool may_be_
 
   auto solver = may_be_indefinite ? with_indefinite(make(first), registry) : make(first);
   if (!others.empty()) solver = std::make_unique<FallbackSolver>(std::move(solver), std::move(others), make, logger);
-  if (!options.dump_folder.empty()) solver = make_dumping_solver(std::move(solver), options.dump_folder, options.dump_every);
   return solver;
 }
 
-}  // namespace linear
-}  // namespace itr
+}  // namespace itr::linear

@@ -8,7 +8,6 @@
 
 #include "conjugate_gradients.hpp"
 #include "linear/choice.hpp"
-#include "linear/dump.hpp"
 
 namespace itr::linear {
 
@@ -34,6 +33,17 @@ struct ReusingSolver::Costs {
   int most_iterations() const { return static_cast<int>(std::min(1e6, kWorthTrying * factorization / iteration)); }
 };
 
+bool is_lower_triangle(const SparsityPattern& pattern) {
+  const auto& [order, starts, rows] = pattern;
+  if (order < 0 || starts.front() != 0 || starts.back() != static_cast<int>(rows.size())) return false;
+  for (int j = 0; j < order; ++j) {
+    if (starts[j] < 0 || starts[j] >= starts[j + 1] || starts[j + 1] > starts.back() || rows[starts[j]] != j) return false;
+    for (int p = starts[j] + 1; p < starts[j + 1]; ++p)
+      if (rows[p] <= rows[p - 1] || rows[p] >= order) return false;
+  }
+  return true;
+}
+
 std::shared_ptr<const FactoredMatrix> make_factored_matrix(SparsityPattern pattern, std::vector<double> values,
                                                            int block_size) {
   if (!is_lower_triangle(pattern) || values.size() != pattern.nonzeros()) return nullptr;
@@ -41,8 +51,7 @@ std::shared_ptr<const FactoredMatrix> make_factored_matrix(SparsityPattern patte
   return std::make_shared<const FactoredMatrix>(std::move(shared), std::move(values), block_size);
 }
 
-ReusingSolver::ReusingSolver(Solver& solver, bool reuses)
-    : solver_(solver), reuses_(reuses), iteration_(std::make_unique<Iteration>()) {}
+ReusingSolver::ReusingSolver(Solver& solver) : solver_(solver), iteration_(std::make_unique<Iteration>()) {}
 
 ReusingSolver::~ReusingSolver() = default;
 
@@ -55,7 +64,7 @@ Outcome ReusingSolver::analyze(const SparsityPattern& pattern, const AnalyzeHint
   may_keep_order_ = may_keep_order_ && hints.may_keep_order;
   is_analyzed_ = is_analyzed_ && is_same && (has_own_order_ || hints.may_keep_order) && !capabilities().iterative;
   // If the old factor may serve the new pattern, the analysis waits, because it would discard that factor.
-  if (is_analyzed_ || (factor_.matrix && (reuses_ || is_same))) return Outcome::ok;
+  if (is_analyzed_ || factor_.matrix) return Outcome::ok;
   return analyze_now();
 }
 
@@ -146,7 +155,7 @@ Statistics ReusingSolver::statistics() const {
 /// would cost more than the mean of the systems since the last factorisation, its cost included: the mean is least then.
 bool ReusingSolver::may_iterate(std::span<const double> values, std::span<const double> b) {
   if (values.size() != pattern_->nonzeros() || b.size() != static_cast<std::size_t>(pattern_->order)) return false;
-  if (!reuses_ || !factor_.matrix || factor_.matrix->pattern->order != pattern_->order) return false;
+  if (!factor_.matrix || factor_.matrix->pattern->order != pattern_->order) return false;
   if (factor_.pause > 0) {
     --factor_.pause;
     return false;
@@ -206,7 +215,7 @@ void ReusingSolver::pause() {
 
 FactorRecord ReusingSolver::record() const {
   FactorRecord record = factor_;
-  if (!has_own_order_ || !reuses_) record.matrix.reset();
+  if (!has_own_order_) record.matrix.reset();
   return record;
 }
 

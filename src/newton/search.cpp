@@ -14,7 +14,7 @@ constexpr double kArmijo = 1e-4;
 constexpr double kResolved = 8;  ///< times its round-off: changes of energy below which slopes tell more
 constexpr double kLeastShare = 1e-14;
 constexpr double kStraightFall = 0.8;  ///< of the slope: an energy that falls by more over a full step hardly curves
-constexpr int kMostDoublings = 12;
+constexpr int kMostHalvings = 40, kMostDoublings = 12;
 constexpr double kSingleWaysBelow = 0.25, kMuchMore = 2;  ///< see try_single_ways
 constexpr double kBlockedBelow = 0.5;                     ///< share of a step below which what is in the way is looked at
 constexpr int kLong = 20;                                 ///< iterations from which on what blocks steps is kept
@@ -36,9 +36,8 @@ bool Search::along(Step& step) {
   if (advancing && way.share < kWaitBelow) held_.wait();
   if (way.share < kBlockedBelow) note_blocked(step);
   held_.raise_penalty(step, way.slope);
-  const int limit = task_.options.line_search == LineSearch::backtracking ? 30 : 40;
   double share = way.share;
-  for (int i = 0; i < limit && share > kLeastShare; ++i, share /= 2) {
+  for (int i = 0; i < kMostHalvings && share > kLeastShare; ++i, share /= 2) {
     candidate_ = at_.x() + share * step.way;
     if (advancing && share == 1) held_.move_to_targets(candidate_);
     double value = at_.value_at(candidate_);
@@ -82,12 +81,10 @@ void Search::note_blocked(const Step& step) {
 }
 
 bool Search::is_acceptable(double value, double share, const Way& way, const Step& step) {
-  const LineSearch rule = task_.options.line_search;
   const bool advancing = held_.is_advancing();
   const double change = held_.merit_change(value - at_.value(), share), slope = held_.merit_slope(way.slope);
-  if (rule == LineSearch::backtracking && !advancing) return change < 0;
   if (change <= kArmijo * share * slope) return true;
-  if (advancing || rule == LineSearch::armijo) return false;
+  if (advancing) return false;
   // PolyFEM's "RobustArmijo" (docs/theory.md, "Tolerances"; Hager & Zhang): if the energy changes little, in either
   // direction, a slope that still falls at the end suffices. This rule refuses full steps to the minimum of a quadratic.
   // So, where the energy changes by round-off alone, a slope that shrinks to half suffices, too: if the end is no higher, or
@@ -103,8 +100,8 @@ bool Search::is_acceptable(double value, double share, const Way& way, const Ste
 /// Whether the energy hardly curves over the full step. The slope at the end has to confirm it: values alone are unreliable
 /// near round-off.
 bool Search::falls_straight(double value, double share, const Way& way, const Step& step) {
-  return task_.options.extend_steps && !held_.is_advancing() && share == 1 &&
-         value - at_.value() < kStraightFall * way.slope && slope_at_candidate(step) < kStraightFall / 2 * way.slope;
+  return !held_.is_advancing() && share == 1 && value - at_.value() < kStraightFall * way.slope &&
+         slope_at_candidate(step) < kStraightFall / 2 * way.slope;
 }
 
 double Search::slope_at_candidate(const Step& step) {

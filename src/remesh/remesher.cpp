@@ -71,15 +71,15 @@ template <int Dim>
 RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata) {
   auto baseline = Baseline<Dim>::chosen_by(options);
-  const bool by_size = baseline && baseline->decides_by_size(), predicts = !baseline || baseline->predicts();
+  const bool by_size = baseline && baseline->decides_by_size();
   const bool may_stir = options.swap.enabled || options.smooth.enabled;
   const bool refines = options.split.enabled || options.curve.enabled;
-  const bool asks_what_is_available = (refines && !by_size) || (may_stir && predicts);
+  const bool asks_what_is_available = (refines && !by_size) || may_stir;
   // If the available energy is less than the least gain of one split, shapes do not matter either: a body in flight.
   const bool is_enough_there = !asks_what_is_available ||
                                available_energy(mesh, fields, context) >= context.scaling * least_gain_of_refining(options);
   const bool may_refine = refines && !by_size && is_enough_there;
-  const bool has_to_stir = may_stir && (is_enough_there || !predicts);
+  const bool has_to_stir = may_stir && is_enough_there;
   const bool may_collapse = options.collapse.enabled && any_may_collapse(mesh, options.collapse, context);
   const bool may_straighten = options.straighten.enabled && !by_size;
   if (!may_refine && !(may_straighten && mesh.has_nodes()) && !may_collapse && !has_to_stir && !by_size) return {};

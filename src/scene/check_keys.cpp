@@ -34,8 +34,7 @@ std::string longer_name(const std::string& key, const std::vector<std::string>& 
   return found;
 }
 
-[[noreturn]] void refuse_unknown(const Node& parent, const std::string& key, const std::set<std::string>& known) {
-  std::vector<std::string> names(known.begin(), known.end());
+[[noreturn]] void refuse_unknown(const Node& parent, const std::string& key, const std::vector<std::string>& names) {
   std::string expected;
   const auto other =
       std::find_if(std::begin(kOtherNames), std::end(kOtherNames), [&](const auto& o) { return o.first == key; });
@@ -64,7 +63,7 @@ class Checker {
     if (entry && (!children || (*entry->key->kind && !node.json().is_object()))) return check_value(node, *entry);
     if (!node.json().is_object()) node.fail("an object");
     for (const auto& [key, value] : node.json().items()) {
-      if (!children->contains(key)) refuse_unknown(node, key, *children);
+      if (!children->contains(key)) refuse_unknown(node, key, key_table().names_below(pattern));
       check(node[key], std::string(pattern).append("/").append(key));
     }
   }
@@ -86,9 +85,11 @@ class Checker {
         node.fail(abbreviate(node.json()), "no such key: it is not supported yet");
       case Role::only:
         if (node.json() != entry.fallback)
-          node.fail(fmt::format("{}: others are not supported yet{}", abbreviate(entry.fallback),
+          node.fail(fmt::format("{}: others are not supported{}", abbreviate(entry.fallback),
                                 *entry.key->meaning ? fmt::format(" ({})", entry.key->meaning) : ""));
         return;
+      case Role::removed:
+        node.fail("a key that was removed in version 0.2", entry.key->meaning);
       case Role::unwritten:
         if (node.json() != entry.fallback) warnings_.push_back(node.pointer() + ": is not written");
         return;

@@ -146,9 +146,18 @@ const std::set<std::string>* KeyTable::children(const std::string& pattern) cons
   return found == children_.end() ? nullptr : &found->second;
 }
 
+std::vector<std::string> KeyTable::names_below(const std::string& pattern) const {
+  std::vector<std::string> names;
+  for (const std::string& name : children_.at(pattern)) {
+    const Entry* entry = find(std::string(pattern).append("/").append(name));
+    if (!entry || entry->key->role != Role::removed) names.push_back(name);
+  }
+  return names;
+}
+
 std::string KeyTable::place_of(const std::string& key) const {
   for (const auto& [pattern, entry] : entries_)
-    if (pattern.ends_with("/" + key)) return pattern;
+    if (entry.key->role != Role::removed && pattern.ends_with("/" + key)) return pattern;
   return "";
 }
 

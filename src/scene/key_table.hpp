@@ -17,7 +17,8 @@ enum class Role {
   ignored,    ///< speed, or how PolyFEM gets to a result that does not depend on it; with all that is below
   unwritten,  ///< output that PolyFEM has and we do not: a warning where it is asked for
   only,       ///< supported with one value, its default
-  refused     ///< changes results, not built
+  refused,    ///< changes results, not built
+  removed     ///< was read before; its meaning is what to set instead
 };
 
 /// Who needs a key.
@@ -37,6 +38,9 @@ struct Key {
   Level level = Level::expert;
 };
 std::span<const Key> keys();
+
+/// JSON of the rows that nothing reads (unread_keys.json): role, keys, reason, and the value where there is one.
+extern const char* const kUnreadKeys;
 
 /// Values of keys that are read, known and refused.
 struct RefusedValue {
@@ -69,8 +73,10 @@ class KeyTable {
   /// Finds the entry of the value that a pointer of a scene names, or of the list that it is in; null where there is no such
   /// key.
   const Entry* find_place(const std::string& pointer) const;
-  /// Keys that may stand below a pattern, or null if none may.
+  /// Keys that may stand below a pattern, removed ones too, or null if none may.
   const std::set<std::string>* children(const std::string& pattern) const;
+  /// Lists the keys that may stand below a pattern and are not removed.
+  std::vector<std::string> names_below(const std::string& pattern) const;
   /// A pointer elsewhere in the scene with this key, or nothing.
   std::string place_of(const std::string& key) const;
 

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The rows of the table of keys.
+#include <iterator>
+#include <list>
+
 #include "key_table.hpp"
 
 namespace itr::scene {
@@ -8,10 +11,6 @@ namespace {
 
 using enum Role;
 using enum Level;
-
-constexpr const char* kPolyfem = "an option of PolyFEM that changes no result here";
-constexpr const char* kScheme = "an option of PolyFEM's solvers that changes no converged result";
-constexpr const char* kUnwritten = "output of PolyFEM that is not written here";
 
 // Pointers that stand in several places.
 #define SELECTION "/geometry/*/{volume,surface,point}_selection/*"
@@ -22,7 +21,6 @@ constexpr Key kKeys[] = {
     {"/defaults", read, "itr|polyfem|itr-1|polyfem-1", "\"itr\"", "",
      "what keys that the scene leaves out stand for: ITR's values, or those of PolyFEM; with a version, or the newest",
      basic},
-    {"/tests", ignored, "", "", "", "PolyFEM's own regression values"},
     {"/units/length", read, "nm|um|mm|cm|dm|m|km|in|ft", "\"m\"", "",
      "of all numbers of the scene, its meshes and results; defaults stay what they are in SI units", basic},
     {"/units/mass", read, "ug|mg|g|kg|t|lb", "\"kg\"", "",
@@ -30,8 +28,6 @@ constexpr Key kKeys[] = {
     {"/units/time", read, "ns|us|ms|s|min|h", "\"s\"", "", "see mass", basic},
     {"/units/characteristic_length", read, "positive", "1", "",
      "multiplies the tolerances x_delta, grad_norm, f_delta and friction_convergence_tol"},
-    {"/input/data/state", only, "", "\"\"", "", "`itr run --resume` goes on from a folder's saved state"},
-    {"/input/data/{reorder,u_path}", ignored, "", "", "", kPolyfem},
 
     {"/geometry", read, "list", "", "", "bodies and obstacles, in this order; required", basic},
     {"/geometry/*", read, "", "", "", "one mesh file and what is made of it"},
@@ -55,7 +51,6 @@ constexpr Key kKeys[] = {
     {"/geometry/*/height", read, "number", "0", "m", "of a ground: y in 2D and 3D"},
     {"/geometry/*/point", read, "numbers", "(the origin)", "m", "of a plane"},
     {"/geometry/*/normal", read, "numbers", "", "", "of a plane, either way; required there"},
-    {"/geometry/*/{curve_selection,fps,mesh_sequence}", refused, "", "", "", "not supported yet"},
     {"/geometry/*/array/offset", read, "number", "", "m", "distance between copies; required with mesh_array"},
     {"/geometry/*/array/size", read, "counts", "", "", "copies along each axis; required with mesh_array"},
     {"/geometry/*/array/relative", read, "boolean", "false", "", "offset is in extents of the mesh"},
@@ -74,7 +69,6 @@ constexpr Key kKeys[] = {
      "where n_refs cuts an obstacle's edges, in (0, 1)"},
     {"/geometry/*/advanced/force_linear_geometry", read, "boolean", "false", "",
      "takes the corners of a second-order mesh whose edges are curved at rest by more than 1 % of their length"},
-    {"/geometry/*/advanced/min_component", only, "", "-1", "", "all components are kept"},
     {"/geometry/*/{volume,surface,point}_selection", read, "list", "", "",
      "ids of cells (which material), of boundary facets (which condition; for an obstacle one id), of boundary vertices "
      "(held by conditions): an id for all, or rules, of which the first that matches wins; names of the mesh file stay, its "
@@ -101,8 +95,6 @@ constexpr Key kKeys[] = {
     {SELECTION "/offset", read, "number", "", "m", "point = offset * normal"},
     {SELECTION "/relative", read, "boolean", "false", "",
      "positions are 0 to 1 over the box of this mesh after its transformation; radii are in its diagonals"},
-    {"/geometry/*/{surface,point}_selection/*/boundary_only", only, "", "true", "", "inner facets have no ids"},
-    {SELECTION "/file", refused, "", "", "", "not supported yet"},
 
     {"/materials", read, "list", "", "",
      "of the bodies; an object instead of a list is for everything, whatever its id; required", basic},
@@ -119,13 +111,9 @@ constexpr Key kKeys[] = {
      "density, in 2D too; a warning where it is absent and matters", basic},
     {"/materials/*/plane_strain", read, "boolean", "false", "", "2D: plane strain; false: plane stress"},
     {"/materials/*/{c1,c2,c3,d1,k}", read, "number", "", "Pa", "of the Mooney-Rivlin laws"},
-    {"/materials/*/{phi,psi}", only, "", "0", "", "viscous damping of materials; see /solver/rayleigh_damping"},
-    {"/materials/*/{elasticity_tensor,alphas,mus,Ds,models}", refused, "", "", "", "not supported yet"},
 
     {"/boundary_conditions/rhs", read, "vector", "[]", "m/s^2",
      "pushes in the NEGATIVE direction, as in PolyFEM: gravity that pulls down y is [0, 9.81]", basic},
-    {"/boundary_conditions/{pressure_cavity,normal_aligned_neumann_boundary,normal_aligned_dirichlet_boundary}", only, "",
-     "[]", "", "not supported yet"},
     {"/boundary_conditions/dirichlet_boundary", read, "list", "[]", "", "prescribed displacements", basic},
     {"/boundary_conditions/neumann_boundary", read, "list", "[]", "", "tractions, by rest area", basic},
     {"/boundary_conditions/pressure_boundary", read, "list", "[]", "",
@@ -177,9 +165,6 @@ constexpr Key kKeys[] = {
     {"/time/integrator/energy_growth_limit", read, "positive", "0.05", "",
      "of Newmark: a step that would create more than this part of the energy is taken by implicit Euler"},
     {"/time/quasistatic", read, "boolean", "false", "", "no inertia: each step is an equilibrium", basic},
-    {"/time/allow_jumps", read, "boolean", "false", "",
-     "without inertia: a body that nothing holds may go farther than ten times the scene's extent; else the run stops "
-     "there"},
     {"/time/step_cuts", read, "natural", "0", "",
      "a step whose solve fails is cut in half, so many times over, at most 20; 0: the run stops"},
 
@@ -198,8 +183,6 @@ constexpr Key kKeys[] = {
      basic},
     {"/contact/use_convergent_formulation", read, "boolean", "false", "",
      "weights pairs by area, so that barrier_stiffness is a pressure and results converge with the mesh", basic},
-    {"/contact/{use_area_weighting,use_improved_max_operator,use_physical_barrier}", only, "", "true", "",
-     "parts of the convergent formulation"},
     {"/contact/collision_mesh", read, "", "", "", "another surface touches in place of the boundary; not with remeshing"},
     {"/contact/collision_mesh/enabled", read, "boolean", "true", "", "false: as if it were not there"},
     {"/contact/collision_mesh/mesh", read, "path", "", "",
@@ -208,7 +191,6 @@ constexpr Key kKeys[] = {
      "HDF5 file with weight_triplets/{values,rows,cols}: what a mesh vertex, or a node of quadratic elements, gives to a "
      "surface vertex; "
      "required"},
-    {"/contact/collision_mesh/{max_edge_length,tessellation_type}", refused, "", "", "", "not supported yet"},
 
     {"/solver/max_threads", read, "natural", "0", "", "0: all; results do not depend on it; --threads wins"},
     {"/solver/lagging_tolerance", read, "non_negative", "0", "",
@@ -225,12 +207,8 @@ constexpr Key kKeys[] = {
     {"/solver/linear/solver", read, "names", "\"eigen\"", "",
      "`itr solvers` lists them; of a list the first that is there; PolyFEM's names are understood; --solver wins", basic},
     {"/solver/linear/fallback", read, "names", "[]", "", "solvers that take over where that one fails"},
-    {"/solver/linear/reuse_factors", read, "boolean", "true", "",
-     "the last factor preconditions conjugate gradients on the systems after it, where that is cheaper by count"},
     {"/solver/linear/options", read, "object", "{}", "",
      "by solver, then by option: {\"cholmod\": {\"ordering\": \"metis\"}}"},
-    {"/solver/linear/{precond,enable_overwrite_solver,max_iter,tolerance,Eigen,AMGCL,Hypre,Pardiso,MUMPS}", ignored, "", "",
-     "", "options of PolyFEM's solvers"},
 
     {"/solver/contact/barrier_stiffness", read, "positive, auto or adaptive", "\"adaptive\"", "",
      "kappa: [Pa] with use_convergent_formulation; auto: from the stiffest body and dhat (docs/theory.md; `itr run` and "
@@ -240,11 +218,7 @@ constexpr Key kKeys[] = {
     {"/solver/contact/friction_iterations", read, "integer", "1", "",
      "solves a step, each with friction's normal forces of the one before; negative: until they agree; 0: no friction"},
     {"/solver/contact/friction_convergence_tol", read, "non_negative", "0.01", "N s", "when they agree, times dt"},
-    {"/solver/contact/CCD/{broad_phase,tolerance,max_iterations}", ignored, "", "", "", kScheme},
-    {"/solver/augmented_lagrangian/{initial_weight,scaling,max_weight,eta,error,nonlinear}", ignored, "", "", "", kScheme},
 
-    {"/solver/nonlinear/solver", only, "", "\"Newton\"", "", "the only one"},
-    {"/solver/nonlinear/allow_out_of_iterations", only, "", "false", "", "a step that does not converge is not taken"},
     {"/solver/nonlinear/max_iterations", read, "count", "3000", "",
      "of Newton's method in a solve; more than that: it failed"},
     {"/solver/nonlinear/force_tol", read, "non_negative", "1e-9", "",
@@ -266,42 +240,21 @@ constexpr Key kKeys[] = {
     {"/solver/nonlinear/{first_grad_norm_tol,advanced/first_grad_norm_tol}", read, "non_negative", "", "",
      "nothing is solved where the gradient is below it at the start"},
     {"/solver/nonlinear/iterations_per_strategy", read, "count", "4", "",
-     "PolyFEM's name for Newton/projected_iterations, which is one more"},
-    {"/solver/nonlinear/use_grad_norm", ignored, "", "", "", kScheme},
+     "one less than the iterations with projection before the true Hessian is tried again"},
     {"/solver/nonlinear/advanced/f_delta_tol", read, "non_negative", "0", "J s^2", "as f_delta, not times dt"},
     {"/solver/nonlinear/advanced/f_delta_step_tol", read, "count", "100", "", "see f_delta"},
-    {"/solver/nonlinear/advanced/{derivative_along_delta_x_tol,apply_gradient_fd,gradient_fd_eps}", ignored, "", "", "",
-     kScheme},
-    {"/solver/nonlinear/line_search/method", read, "Backtracking|Armijo|RobustArmijo", "\"RobustArmijo\"", "",
-     "what a step must lower"},
-    {"/solver/nonlinear/line_search/{use_grad_norm_tol,min_step_size,max_step_size_iter,min_step_size_final,"
-     "max_step_size_iter_final,default_init_step_size,step_ratio,Armijo,RobustArmijo}",
-     ignored, "", "", "", kScheme},
     {"/solver/nonlinear/Newton/use_psd_projection", read, "boolean", "true", "",
-     "make Hessians definite where the sum is not"},
+     "make Hessians definite where the sum is not; where it is indefinite, look for a minimum, or take its direction if it "
+     "descends, as PolyFEM does, where the list of solvers begins with Eigen::...LDLT"},
     {"/solver/nonlinear/Newton/force_psd_projection", read, "boolean", "false", "", "in every iteration"},
-    {"/solver/nonlinear/Newton/projected_iterations", read, "natural", "5", "",
-     "iterations with projection before the true Hessian is tried again; 0: it never is"},
-    {"/solver/nonlinear/Newton/indefinite", read, "project|accept",
-     "(\"project\"; \"accept\" where the list of solvers begins with Eigen::...LDLT)", "",
-     "where the Hessian is indefinite: look for a minimum, or take its direction if it descends, as PolyFEM does"},
-    {"/solver/nonlinear/Newton/extend_steps", read, "boolean", "true", "",
-     "go on along a step that the energy fell straight on"},
-    {"/solver/nonlinear/Newton/{residual_tolerance,reg_weight_min,reg_weight_max,reg_weight_inc,"
-     "use_psd_projection_in_regularized}",
-     ignored, "", "", "", kScheme},
 
     {"/solver/advanced/lump_mass_matrix", read, "boolean", "false", "", "mass in the vertices"},
-    {"/solver/advanced/lagged_regularization_weight", only, "", "0", "", "not supported yet"},
-    {"/solver/advanced/lagged_regularization_iterations", only, "", "1", "", "not supported yet"},
     {"/solver/advanced/lagged_load_tolerance", read, "positive", "0.01", "",
      "pressure on a boundary that is not closed may end so much of itself off that of the positions it acts on; a step "
      "fails else"},
-    {"/solver/advanced/check_inversion", only, "", "\"Discrete\"", "", "exact for linear elements"},
     {"/solver/advanced/characteristic_length", read, "number", "-1", "m",
      "scale of tolerances *_tol; not positive: diagonal of the bodies' box"},
     {"/solver/advanced/characteristic_force_density", read, "positive", "1e4", "N/m^3", "scale of grad_norm_tol"},
-    {"/solver/advanced/cache_size", ignored, "", "", "", kScheme},
 
     {"/space/discr_order", read, "order", "1", "",
      "1: linear elements, 2: quadratic ones (curved edges); or a list by body, [{\"id\": 2, \"order\": 2}], bodies that are "
@@ -309,8 +262,6 @@ constexpr Key kKeys[] = {
      basic},
     {"/space/advanced/quadrature_order", read, "integer", "-1", "",
      "degree of elasticity's quadrature on quadratic elements, 1 to 5; -1: 2, and the mass' is exact"},
-    {"/space/advanced/bc_method", only, "", "\"sample\"", "", "conditions hold at the vertices"},
-    {"/space/advanced/{mass_quadrature_order,n_boundary_samples}", only, "", "-1", "", "exact"},
 
     {"/space/remesh/enabled", read, "boolean", "false", "", "in-timestep remeshing", basic},
     {"/space/remesh/type", read, "physics|sizing_field", "\"physics\"", "",
@@ -318,11 +269,9 @@ constexpr Key kKeys[] = {
      "(docs/theory.md)"},
     {"/space/remesh/sizing_field/rel_min_edge_length", read, "non_negative", "0.01", "",
      "shorter edges are not split, in longest sides of the bodies' box: in contact nothing else ends it"},
-    {"/space/remesh/screening", read, "energy-percentile|bounds|none", "\"bounds\"", "",
+    {"/space/remesh/screening", read, "energy-percentile|bounds", "\"bounds\"", "",
      "which edges are tried and what decides: those at the top by energy, by patches that relax (the paper); every edge, by "
-     "what one vertex alone gains and by patches where that does not tell; every edge by patches, which takes longer"},
-    {"/space/remesh/history", read, "function|interpolated", "\"function\"", "",
-     "what an operation is charged for forgetting of the past: what the new mesh cannot represent, or nothing (the paper)"},
+     "what one vertex alone gains and by patches where that does not tell"},
     {"/space/remesh/relative_tolerance", read, "positive", "1e-4", "",
      "chooses split and collapse tolerances where split/acceptance_tolerance is not given: this part of the energy that is "
      "stored so far, or that the scene has (docs/theory.md); `itr run` and `itr explain` print them",
@@ -353,27 +302,15 @@ constexpr Key kKeys[] = {
      "negative: increase of energy that a collapse may cost; nearer to 0, what contact has left behind stays fine"},
     {"/space/remesh/collapse/culling_threshold", read, "share", "0.01", "",
      "with energy-percentile: edges above this share are not collapsed"},
-    {"/space/remesh/collapse/max_depth", read, "natural", "3", "", "generations a step"},
     {"/space/remesh/collapse/rel_max_edge_length", read, "non_negative", "1", "",
      "longest edge collapsed, in shortest edges of the initial mesh: at 1 the input mesh is never coarsened"},
-    {"/space/remesh/collapse/abs_max_edge_length", read, "non_negative", "1e100", "m", "longest edge collapsed"},
     {"/space/remesh/swap/enabled", read, "boolean", "false", "", "edge swaps: better shapes, some more time"},
     {"/space/remesh/swap/acceptance_tolerance", read, "number", "(-1e-6 of the split tolerance)", "J",
      "as for collapses; of swaps that better the shape"},
-    {"/space/remesh/swap/max_depth", read, "natural", "3", "", "generations a step"},
     {"/space/remesh/smooth/enabled", read, "boolean", "false", "",
      "moves of vertices at rest: better shapes, some more time"},
     {"/space/remesh/smooth/acceptance_tolerance", read, "number", "(-1e-6 of the split tolerance)", "J",
      "as for collapses; of moves that better the shape"},
-    {"/space/remesh/smooth/max_iters", read, "count", "1", "", "moves of a vertex a step"},
-    {"/space/remesh/local_relaxation/local_mesh_n_ring", read, "natural", "2", "",
-     "rings of cells that relax around an operation; more: better judged, slower"},
-    {"/space/remesh/local_relaxation/local_mesh_max_cells", read, "count", "100", "",
-     "no further ring beyond so many cells"},
-    {"/space/remesh/local_relaxation/local_mesh_rel_area", read, "share", "0", "",
-     "least share of the volume that relaxes (the paper's is 0.01): slower the finer the mesh, and hardly better"},
-    {"/space/remesh/local_relaxation/max_nl_iterations", read, "count", "1", "",
-     "Newton iterations of a trial before it is judged"},
 
     {"/output/directory", read, "string", "\"\"", "", "result folder; -o wins; default: results/ and the name of the scene",
      basic},
@@ -402,23 +339,6 @@ constexpr Key kKeys[] = {
      "/fields/stress, Cauchy's, a cell, row by row", basic},
     {"/output/paraview/options/kinetic_energy", read, "boolean", "false", "J", "/totals/kinetic_energy"},
     {"/output/paraview/options/momentum", read, "boolean", "false", "kg m/s", "/totals/momentum"},
-    {"/output/paraview/options/{velocity,body_ids}", ignored, "", "", "", "frames always have /fields/v and /mesh/body"},
-    {"/output/paraview/options/{material,acceleration,nodes,discretization_order,forces,jacobian_validity,"
-     "normal_adhesion_forces,tangential_adhesion_forces}",
-     unwritten, "boolean", "false", "", kUnwritten},
-    {"/output/paraview/options/{use_hdf5,force_high_order}", ignored, "", "", "", kPolyfem},
-    {"/output/paraview/{file_name,vismesh_rel_area,high_order_mesh,volume,surface,wireframe,points}", ignored, "", "", "",
-     "sim.xdmf shows the bodies, frames hold the surfaces too"},
-    {"/output/{json,restart_json,stats}", ignored, "", "", "", "see summary.json, steps.jsonl and --resume"},
-    {"/output/log/{level,file_level,path,quiet}", ignored, "", "", "", kPolyfem},
-    {"/output/data/{state,rest_mesh}", ignored, "", "", "", "see --resume"},
-    {"/output/data/{solution,full_mat,stiffness_mat,stress_mat,mises,nodes,u_path,v_path,a_path}", unwritten, "string",
-     "\"\"", "", kUnwritten},
-    {"/output/data/advanced", ignored, "", "", "", kPolyfem},
-    {"/output/advanced/{timestep_prefix,save_solve_sequence_debug,save_ccd_debug_meshes,save_time_sequence,"
-     "save_nl_solve_sequence,spectrum,sol_on_grid,compute_error,sol_at_node,vis_boundary_only,curved_mesh_size}",
-     ignored, "", "", "", kPolyfem},
-    {"/output/reference/{solution,gradient}", ignored, "", "", "", kPolyfem},
 };
 
 constexpr RefusedValue kRefusedValues[] = {
@@ -432,7 +352,22 @@ constexpr RefusedValue kRefusedValues[] = {
 
 }  // namespace
 
-std::span<const Key> keys() { return kKeys; }
+std::span<const Key> keys() {
+  static const Json unread = Json::parse(kUnreadKeys);
+  static std::list<std::string> values;
+  static const std::vector<Key> all = [] {
+    const std::map<std::string, Role> roles = {
+        {"ignored", ignored}, {"unwritten", unwritten}, {"only", only}, {"refused", refused}, {"removed", removed}};
+    std::vector<Key> rows(std::begin(kKeys), std::end(kKeys));
+    for (const Json& row : unread) {
+      const auto text = [&](const char* name) { return row.at(name).get_ref<const std::string&>().c_str(); };
+      values.push_back(row.contains("value") ? row["value"].dump() : "");
+      rows.push_back({text("keys"), roles.at(text("role")), "", values.back().c_str(), "", text("reason")});
+    }
+    return rows;
+  }();
+  return all;
+}
 
 std::span<const RefusedValue> refused_values() { return kRefusedValues; }
 

@@ -108,7 +108,6 @@ TimeOptions read_time(const Node& root, std::vector<std::string>& warnings) {
   }
   options.t0 = time["t0"].number(0);
   options.quasistatic = time["quasistatic"].boolean(false);
-  options.allow_jumps = time["allow_jumps"].boolean(false);
   options.step_cuts = time["step_cuts"].integer_at_least(0, 0);
   if (options.step_cuts > kMostCuts) time["step_cuts"].fail("at most " + std::to_string(kMostCuts));
   read_steps(time, options, warnings);
@@ -263,21 +262,16 @@ NewtonOptions read_newton(const Node& root, double characteristic_length, const 
     read_paper_tolerances(nonlinear, characteristic_length, options);
   else
     read_main_tolerances(root, scale, options);
-  options.line_search = static_cast<LineSearch>(nonlinear["line_search"]["method"].choice(
-      {"Backtracking", "Armijo", "RobustArmijo"}, static_cast<int>(options.line_search)));
   const Node newton = nonlinear["Newton"];
   options.project_to_psd = newton["use_psd_projection"].boolean(true);
   // PolyFEM leaves a fallback strategy after one step more than that.
   options.projected_iterations =
       1 + nonlinear["iterations_per_strategy"].integer_at_least(1, options.projected_iterations - 1);
-  options.projected_iterations = newton["projected_iterations"].integer_at_least(0, options.projected_iterations);
   if (const Node force = newton["force_psd_projection"]; force.boolean(false)) {
     if (!options.project_to_psd) force.fail("true", "false beside use_psd_projection = false");
     options.projected_iterations = 0;
   }
-  options.indefinite = static_cast<IndefiniteHessian>(
-      newton["indefinite"].choice({"project", "accept"}, static_cast<int>(indefinite_by_solver(root))));
-  options.extend_steps = newton["extend_steps"].boolean(options.extend_steps);
+  options.indefinite = indefinite_by_solver(root);
   return options;
 }
 
@@ -289,7 +283,6 @@ LinearOptions read_linear(const Node& root) {
     if (!name.string("").empty()) names.push_back(name.string(""));
   if (!names.empty()) options.solvers = names;
   for (const Node& name : node["fallback"].items()) options.fallback.push_back(name.string(""));
-  options.reuse_factors = node["reuse_factors"].boolean(options.reuse_factors);
   const Node of_solvers = node["options"];
   if (!of_solvers.exists()) return options;
   if (!of_solvers.json().is_object()) of_solvers.fail("an object of solver names");
@@ -310,9 +303,8 @@ RemeshOptions read_remesh(const Node& root) {
   options.sizing_field.enabled = node["type"].choice({"physics", "sizing_field"}, 0) == 1;
   options.sizing_field.rel_min_edge_length =
       node["sizing_field"]["rel_min_edge_length"].non_negative(options.sizing_field.rel_min_edge_length);
-  options.screening = static_cast<Screening>(
-      node["screening"].choice({"energy-percentile", "bounds", "none"}, static_cast<int>(options.screening)));
-  options.history = static_cast<HistoryRule>(node["history"].choice({"function", "interpolated"}, 0));
+  options.screening =
+      static_cast<Screening>(node["screening"].choice({"energy-percentile", "bounds"}, static_cast<int>(options.screening)));
   options.relative_tolerance = node["relative_tolerance"].positive(options.relative_tolerance);
 
   const Node split = node["split"], collapse = node["collapse"], swap = node["swap"], smooth = node["smooth"];
@@ -328,21 +320,10 @@ RemeshOptions read_remesh(const Node& root) {
 
   read_acceptance(collapse, options.collapse.enabled, options.collapse.acceptance_tolerance);
   options.collapse.culling_threshold = read_share(collapse["culling_threshold"], options.collapse.culling_threshold);
-  options.collapse.max_depth = collapse["max_depth"].integer_at_least(0, options.collapse.max_depth);
   options.collapse.rel_max_edge_length = collapse["rel_max_edge_length"].non_negative(options.collapse.rel_max_edge_length);
-  options.collapse.abs_max_edge_length = collapse["abs_max_edge_length"].non_negative(options.collapse.abs_max_edge_length);
 
   read_acceptance(swap, options.swap.enabled, options.swap.acceptance_tolerance);
-  options.swap.max_depth = swap["max_depth"].integer_at_least(0, options.swap.max_depth);
   read_acceptance(smooth, options.smooth.enabled, options.smooth.acceptance_tolerance);
-  options.smooth.max_iterations = smooth["max_iters"].integer_at_least(1, options.smooth.max_iterations);
-
-  const Node local = node["local_relaxation"];
-  options.local.rings = local["local_mesh_n_ring"].integer_at_least(0, options.local.rings);
-  options.local.max_cells = local["local_mesh_max_cells"].integer_at_least(1, options.local.max_cells);
-  options.local.relative_volume = read_share(local["local_mesh_rel_area"], options.local.relative_volume);
-  options.local.max_iterations = local["max_nl_iterations"].integer_at_least(1, options.local.max_iterations);
-  options.local.max_contact_iterations = std::max(options.local.max_contact_iterations, options.local.max_iterations);
   return options;
 }
 

@@ -42,7 +42,7 @@ Json schema_of(const std::string& pattern) {
   Json schema = Json::object();
   if (entry && entry->key->role == Role::only) {
     schema["const"] = entry->fallback;
-  } else if (entry && entry->key->role == Role::refused) {
+  } else if (entry && (entry->key->role == Role::refused || entry->key->role == Role::removed)) {
     schema["not"] = Json::object();
   } else if (entry && entry->key->role == Role::read && !children) {
     schema = entry->kind.schema;
@@ -210,7 +210,8 @@ A file may build on another one. `"common": "base.json"` takes the keys of that 
 objects key by key, lists as a whole, and `null` removes a key. Then `"patch"` is applied, a list of JSON Patch operations. Then
 `--set /json/pointer=VALUE` acts. Paths are relative to `root_path`, by default the folder of the file that is run.
 
-Jump to: [basic keys](#basic-keys), [defaults](#defaults), [not there yet](#not-there-yet), [not written](#not-written), [without effect](#without-effect).
+Jump to: [basic keys](#basic-keys), [defaults](#defaults), [not there yet](#not-there-yet), [not written](#not-written),
+[without effect](#without-effect), [removed](#removed-in-02).
 )";
 
 }  // namespace
@@ -231,7 +232,8 @@ std::string reference_page() {
   return std::string(kIntroduction) + list_of_basic_keys() + section_of_defaults() + tables_of_what_is_read() +
          section_of_refusals() + "\n## Not written\n\nOutput of PolyFEM. A scene that asks for it gets a warning.\n\n" +
          list_of_others(Role::unwritten) + "\n## Without effect\n\nKnown to PolyFEM, and passed over here.\n\n" +
-         list_of_ignored();
+         list_of_ignored() + "\n## Removed in 0.2\n\nTheir presence is an error, which says what to set instead.\n\n" +
+         list_of_others(Role::removed);
 }
 
 }  // namespace itr::scene

@@ -143,7 +143,7 @@ NewtonSummary LaggedSolve<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
   }
   enum class EndedBy { solver, flight, caller } ended_by = EndedBy::solver;
   std::optional<FlightGuard<Dim>> guard;
-  if (!terms_.has_inertia && !setup_.time.allow_jumps)
+  if (!terms_.has_inertia)
     guard.emplace(base_, dofs_, held_.target,
                   least_motion_ ? std::span(least_motion_->parts()) : std::span<const LoosePart<Dim>>());
   extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {

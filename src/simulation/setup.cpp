@@ -81,13 +81,9 @@ void check_remeshing(const RemeshOptions& remesh) {
   require(true, "/space/remesh/smooth/acceptance_tolerance", remesh.smooth.acceptance_tolerance.value_or(0), "a number");
   share("/space/remesh/split/culling_threshold", remesh.split.culling_threshold);
   share("/space/remesh/collapse/culling_threshold", remesh.collapse.culling_threshold);
-  share("/space/remesh/local_relaxation/local_mesh_rel_area", remesh.local.relative_volume);
   require_at_least("/space/remesh/split/max_depth", remesh.split.max_depth, 0);
-  require_at_least("/space/remesh/collapse/max_depth", remesh.collapse.max_depth, 0);
-  require_at_least("/space/remesh/swap/max_depth", remesh.swap.max_depth, 0);
-  require_at_least("/space/remesh/smooth/max_iters", remesh.smooth.max_iterations, 1);
-  require_at_least("/space/remesh/local_relaxation/local_mesh_n_ring", remesh.local.rings, 0);
-  require_at_least("/space/remesh/local_relaxation/max_nl_iterations", remesh.local.max_iterations, 1);
+  require_at_least("remesh.local.rings", remesh.local.rings, 0);
+  require_at_least("remesh.local.max_iterations", remesh.local.max_iterations, 1);
   require_not_negative("/space/remesh/sizing_field/rel_min_edge_length", remesh.sizing_field.rel_min_edge_length);
 }
 
@@ -192,7 +188,6 @@ void Setup<Dim>::validate() const {
   check_proxy(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
     refuse_unknown(this->fields.curves[i], mesh, this->obstacles.rest.size(), element("fields.curves", i));
-  linear.validate();
   for (const auto& [name, list] :
        {std::pair{"initial_displacement", &initial_displacement}, std::pair{"initial_velocity", &initial_velocity},
         std::pair{"initial_acceleration", &initial_acceleration}})

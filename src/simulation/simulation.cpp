@@ -259,8 +259,7 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   const LinearOptions& linear = impl_->setup.linear;
   impl_->direct =
       linear::choose_solver(linear, impl_->setup.newton.indefinite == IndefiniteHessian::accept, registry, impl_->logger);
-  impl_->solver =
-      std::make_unique<linear::ReusingSolver>(*impl_->direct, linear.reuse_factors && linear.dump_folder.empty());
+  impl_->solver = std::make_unique<linear::ReusingSolver>(*impl_->direct);
   impl_->cache = std::make_unique<ProblemCache<Dim>>(*impl_->solver);
   impl_->first_dt = impl_->setup.time.dt;
   impl_->first_newton = impl_->setup.newton;

@@ -26,14 +26,12 @@ SCENES = [
     ("twisting beam", "twisting-beam/twisting-beam-noremesh-nref0.json", []),
 ]
 
-KEY = "/solver/nonlinear/Newton/"
+KEY = "/solver/nonlinear/"
 VARIANTS = [
     ("ours: true Hessian first, 5 clamped after a failure, extended steps", []),
-    ("without extended steps", ["extend_steps=false"]),
-    ("always clamped", ["projected_iterations=0"]),
-    ("always clamped, without extended steps", ["projected_iterations=0", "extend_steps=false"]),
-    ("true Hessian first, 1 clamped after a failure", ["projected_iterations=1"]),
-    ("never projected, shifted by multiples of I", ["use_psd_projection=false"]),
+    ("always clamped", ["Newton/force_psd_projection=true"]),
+    ("true Hessian first, 2 clamped after a failure", ["iterations_per_strategy=1"]),
+    ("never projected, shifted by multiples of I", ["Newton/use_psd_projection=false"]),
 ]
 
 

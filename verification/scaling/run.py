@@ -63,7 +63,7 @@ def elasticity(points, cells):
 
 
 def write_system(folder, dim, cells):
-    """A system as `itr run --dump-systems` leaves it (src/linear/dump.hpp)."""
+    """A system as `itr_dump_systems` leaves it (verification/solvers/dump.hpp)."""
     if (folder / "block_size.npy").exists():
         return
     points, mesh = simplices(dim, cells)

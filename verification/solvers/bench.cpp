@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Costs of one solver on one dumped system (itr run --dump-systems):
+// Costs of one solver on one dumped system (itr_dump_systems):
 //   [mpirun -n N] itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [KEY=VALUE]...
 // Prints one line of JSON: seconds of the analysis, of a factorisation and a solve (medians), of both through the engine
 // alone where it is a module, what checks, residuals and refinement add to that (the median of the ratios of runs that
@@ -17,9 +17,9 @@
 
 #include "apps/itr/ranks.hpp"
 #include "core/timer.hpp"
+#include "dump.hpp"
 #include "itr/core/error.hpp"
 #include "itr/linear/registry.hpp"
-#include "linear/dump.hpp"
 
 namespace {
 

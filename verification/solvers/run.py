@@ -1,14 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """What the choice of a linear solver costs: dumps Newton systems of scenes at several sizes, solves each with every solver
-that is there (a process each, with a limit of time and memory), then runs scenes from end to end with each, factors used
-again and not, and writes results.csv, end_to_end.csv, the tables of README.md and a plot.
+that is there (a process each, with a limit of time and memory), then runs scenes from end to end with each,
+and writes results.csv, end_to_end.csv, the tables of README.md and a plot.
 
 python3 verification/solvers/run.py [--build build/release] [--work DIR] [--seconds 1200] [--gib 16] [--scene NAME]...
 """
 import argparse
 import csv
-import itertools
 import json
 import math
 import os
@@ -48,7 +47,6 @@ SCENES = [
 ENDS = {"masticator 2D": ["/time/tend=3"], "bar-twist 3D": [FIXED, "/time/dt=0.05", "/time/tend=0.5", "/geometry/0/n_refs=1"],
         "ball on spikes 3D": [*BALL, "/time/tend=0.01"], "monkey on rollers 3D": [*MONKEY, "/time/tend=0.03"]}
 DENSE_MOST = 10_000  # unknowns: `dense` is for patches
-ITERATIVE = ("belos:muelu", "eigen:cg")  # have no factors to use again
 END_KEYS = ["scene", "solver", "reuse", "outcome", "steps", "newton_iterations", "linear_solves", "factorizations",
             "linear_iterations", "total_s", "linear_s", "energy", "commit"]
 KEYS = ["scene", "solver", "ranks", "unknowns", "nonzeros", "outcome", "analyze_s", "factorize_s", "solve_s",
@@ -58,13 +56,11 @@ ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROO
                    OMPI_MCA_rmaps_base_oversubscribe="1")
 
 
-def dump(itr, scene, sets, folder, seconds):
+def dump(program, scene, sets, folder, seconds):
     """The folder of the last system that a scene's run solved before its time was over, or None."""
     if not any(folder.glob("*/values.npy")):
-        command = [itr, "run", scene, "-o", folder / "run", "--overwrite", "--dump-systems", folder, "--dump-every", "5",
-                   "--defaults", "polyfem"]
-        for value in ['/solver/linear/solver="auto"', *sets]:
-            command += ["--set", value]
+        solver = "belos:muelu" if MULTIGRID in sets else "auto"
+        command = [program, scene, folder, 5, solver, '/defaults="polyfem"', *(value for value in sets if value != MULTIGRID)]
         folder.mkdir(parents=True, exist_ok=True)
         with open(folder / "log", "w", encoding="utf-8") as log:
             try:
@@ -307,7 +303,7 @@ def main():
         beaten = set()
         for number, size in enumerate(() if arguments.ends else sizes):
             folder = arguments.work / f"{name.replace(' ', '-')}-{number}"
-            system = dump(itr, scene, [*sets, *size], folder, arguments.dump_seconds)
+            system = dump(arguments.build / "bin" / "itr_dump_systems", scene, [*sets, *size], folder, arguments.dump_seconds)
             if system is None:
                 print(f"left out: {name} with {size}: no system (see {folder / 'log'})", flush=True)
                 continue
@@ -333,15 +329,12 @@ def main():
                     row.update(scene=name, solver=solver, ranks=ranks, commit=stored.made("verification/solvers/results.csv"))
                     rows.append(row)
                     print(json.dumps(row), flush=True)
-        for solver, reuse in itertools.product(solvers, (True, False)):
-            if solver in ITERATIVE and not reuse:
-                continue
-            folder = arguments.work / f"{name.replace(' ', '-')}-{solver.replace(':', '-')}{'' if reuse else '-anew'}"
-            sets = [*ENDS[name], f"/solver/linear/reuse_factors={json.dumps(reuse)}"]
+        for solver in solvers:
+            folder = arguments.work / f"{name.replace(' ', '-')}-{solver.replace(':', '-')}"
             end = {"outcome": "left out"} if solver == "dense" and name.endswith("3D") else kept(
                 folder.with_suffix(".json"),
-                lambda: run_scene(itr, scene, sets, solver, folder, arguments.end_seconds, arguments.gib))
-            ends.append({"scene": name, "solver": solver, "reuse": "on" if reuse else "off",
+                lambda: run_scene(itr, scene, ENDS[name], solver, folder, arguments.end_seconds, arguments.gib))
+            ends.append({"scene": name, "solver": solver, "reuse": "on",
                          "commit": stored.made("verification/solvers/end_to_end.csv"), **end})
             print(json.dumps(ends[-1]), flush=True)
         write(rows, ends, arguments.output)

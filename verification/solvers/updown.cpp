@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Worth of CHOLMOD's low-rank updates of a factor between two systems of a run (itr run --dump-systems):
+// Worth of CHOLMOD's low-rank updates of a factor between two systems of a run (itr_dump_systems):
 //   OPENBLAS_CORETYPE=... itr_updown_bench FIRST SECOND
 // Prints one line of JSON: the unknowns in which the matrices differ, the rank of the difference, and seconds to solve the
 // second system by a factor of its own, by conjugate gradients over the factor of the first (as Newton does), and by that
@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "core/timer.hpp"
+#include "dump.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/types.hpp"
 #include "itr/linear/registry.hpp"
 #include "itr/linear/reuse.hpp"
-#include "linear/dump.hpp"
 
 namespace {
 
@@ -153,7 +153,7 @@ void bench(const DumpedSystem& first, const DumpedSystem& second) {
   });
 
   const auto old = make();
-  ReusingSolver reusing(*old, true);
+  ReusingSolver reusing(*old);
   reusing.analyze(first.pattern, first.hints());
   reusing.factorize(first.values);
   reusing.solve(first.rhs, x, 1, kAskedResidual);

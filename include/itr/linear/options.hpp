@@ -14,14 +14,6 @@ struct LinearOptions {
   /// positive definite is an answer, not a failure: Newton projects it.
   std::vector<std::string> fallback = {};
   std::map<std::string, std::map<std::string, std::string>> options = {};  ///< by solver name: {"ordering", "metis"}
-  /// The last factor preconditions conjugate gradients on the next systems, while that is cheaper than to factorise
-  /// (reuse.hpp). Not where systems are written.
-  bool reuse_factors = true;
-  std::string dump_folder = {};  ///< where systems are written as they are solved (dump.hpp); empty: none are
-  int dump_every = 1;            ///< each so many-th
-
-  /// Throws InputError.
-  void validate() const;
 };
 
 }  // namespace itr

@@ -17,6 +17,10 @@ struct FactoredMatrix {
   int block_size = 1;
 };
 
+/// Whether columns follow one another, each with its diagonal first and ascending rows below it: what was read from a file
+/// may be anything.
+bool is_lower_triangle(const SparsityPattern& pattern);
+
 /// Null where the arrays are no lower triangle: for those that were read from a file.
 std::shared_ptr<const FactoredMatrix> make_factored_matrix(SparsityPattern pattern, std::vector<double> values,
                                                            int block_size);
@@ -51,8 +55,8 @@ struct SolveCounts {
 /// Over an iterative solver it only counts.
 class ReusingSolver final : public Solver {
  public:
-  /// `solver` must outlive this. Without `reuses` every matrix that is not the last one is factorised.
-  ReusingSolver(Solver& solver, bool reuses);
+  /// `solver` must outlive this.
+  explicit ReusingSolver(Solver& solver);
   ~ReusingSolver() override;
 
   std::string_view name() const override { return solver_.name(); }
@@ -102,7 +106,6 @@ class ReusingSolver final : public Solver {
   Costs costs() const;
 
   Solver& solver_;
-  bool reuses_;
   FactorRecord factor_;
   bool has_own_order_ = false;  ///< the order of solver_'s analysis came from the pattern analysed, not from an earlier one
   bool is_analyzed_ = false;    ///< the pattern below by solver_

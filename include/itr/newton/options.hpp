@@ -5,8 +5,6 @@
 
 namespace itr {
 
-enum class LineSearch { backtracking, armijo, robust_armijo };
-
 /// How gradients g and steps p are measured, with D the diagonal of the mass matrix of unit density: the last two do not
 /// depend on the mesh.
 enum class NewtonNorm {
@@ -47,11 +45,9 @@ struct NewtonOptions {
   double decrement_tolerance = 0;          ///< stop when the Newton decrement -p.g / 2 is below it [J s^2]
   double energy_tolerance = 0;             ///< stop after `energy_steps` steps in a row that change less [J s^2]
   int energy_steps = 100;
-  LineSearch line_search = LineSearch::robust_armijo;
   IndefiniteHessian indefinite = IndefiniteHessian::project;
   bool project_to_psd = true;    ///< project stencils' Hessians to semi-definite ones where the sum is not definite
   int projected_iterations = 5;  ///< iterations with it before the true Hessian is tried again; 0: it never is
-  bool extend_steps = true;      ///< go on along a step over which the energy fell in a straight line
   /// If it becomes true, the solve ends before its next iteration without convergence and the step is dropped. Another
   /// thread or a signal handler may set it. It must outlive the solves. Null: solves cannot be cancelled.
   const std::atomic<bool>* cancel = nullptr;

@@ -9,14 +9,7 @@ namespace itr {
 /// Which edges are tried, and how an operation is decided.
 enum class Screening {
   energy_percentile,  ///< the paper's culling: splits at the top by energy, collapses at the bottom; patches decide
-  bounds,             ///< asks every edge; the gain of the new vertex alone decides, or else a patch
-  none                ///< every edge; patches decide
-};
-
-/// How x-hat, x_t and v_t are taken on a changed mesh when an operation is judged.
-enum class HistoryRule {
-  function,     ///< as functions on the mesh before; the new mesh pays for motion that it cannot represent
-  interpolated  ///< interpolated onto the new mesh (the paper's rule)
+  bounds              ///< asks every edge; the gain of the new vertex alone decides, or else a patch
 };
 
 // Whatever is left open (std::nullopt) Setup::choose_defaults fills in, and nothing else does: `remesh` needs it filled in.
@@ -45,27 +38,22 @@ struct CollapseOptions {
   bool enabled = true;
   std::optional<double> acceptance_tolerance;  ///< least energy decrease [J]; negative: allowed increase
   double culling_threshold = 0.01;
-  int max_depth = 3;
-  double rel_max_edge_length = 1;      ///< longest edge collapsed, in shortest edges of the initial mesh
-  double abs_max_edge_length = 1e100;  ///< [m]
+  double rel_max_edge_length = 1;  ///< longest edge collapsed, in shortest edges of the initial mesh
 };
 
 struct SwapOptions {
   bool enabled = false;
   std::optional<double> acceptance_tolerance;  ///< [J], of swaps that better the shape
-  int max_depth = 3;
 };
 
 struct SmoothOptions {
   bool enabled = false;
   std::optional<double> acceptance_tolerance;  ///< [J], of moves that better the shape
-  int max_iterations = 1;
 };
 
 struct LocalRelaxationOptions {
   int rings = 2;                   ///< rings of cells around the operation
   int max_cells = 100;             ///< no further ring where there are so many
-  double relative_volume = 0;      ///< least share of the total rest volume (the paper's: 0.01)
   int max_iterations = 1;          ///< Newton iterations before the decision
   int max_contact_iterations = 4;  ///< the same where the patch touches contact
 };
@@ -89,7 +77,6 @@ struct RemeshOptions {
   LocalRelaxationOptions local;
   double relative_tolerance = 1e-4;  ///< share of the scene's energy that choose_defaults takes as tolerance of splits
   Screening screening = Screening::bounds;
-  HistoryRule history = HistoryRule::function;
 
   /// Tolerances of curves and of straightenings [J], filled in.
   double curve_tolerance() const { return curve.acceptance_tolerance.value_or(split.acceptance_tolerance.value()); }

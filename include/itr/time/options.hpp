@@ -17,7 +17,6 @@ struct TimeOptions {
   /// Infinity: never.
   double energy_growth_limit = 0.05;
   bool quasistatic = false;  ///< no inertia
-  bool allow_jumps = false;  ///< quasistatic: a body may move by more than the size of the scene in a step
   bool is_static = false;    ///< one equilibrium at t0 + dt, 1 by default; alpha = 1
   /// A step whose solve fails is cut into two of half its length, and these again, so many times; 0: the simulation stops.
   /// In BDF and Newmark the smaller steps are of implicit Euler, and BDF's order grows again from 1 after them.

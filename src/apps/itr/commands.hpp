@@ -14,11 +14,9 @@ namespace itr::cli {
 
 struct RunOptions {
   std::filesystem::path scene;
-  std::string directory;    ///< empty: output/directory of the scene, or results/<scene name>
-  std::string solver;       ///< empty: the scene's
-  int threads = -1;         ///< -1: the scene's; 0: all
-  std::string dump_folder;  ///< of linear systems; empty: none
-  int dump_every = 1;
+  std::string directory;  ///< empty: output/directory of the scene, or results/<scene name>
+  std::string solver;     ///< empty: the scene's
+  int threads = -1;       ///< -1: the scene's; 0: all
   std::vector<scene::Override> overrides;
   bool resume = false;         ///< go on from the newest saved state of the folder, if there is one
   bool allow_changes = false;  ///< then also with another solver, other tolerances, step cuts

@@ -126,8 +126,6 @@ void add_scene_options(CLI::App& command, cli::RunOptions& options, std::vector<
   command.add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
       ->allow_extra_args(false);
   add_defaults_option(command, sets);
-  command.add_option("--dump-systems", options.dump_folder, "folder for the linear systems, to study solvers with");
-  command.add_option("--dump-every", options.dump_every, "with --dump-systems: each so many-th")->check(CLI::PositiveNumber);
   auto* overwrite = command.add_flag("--overwrite", options.overwrite, "replace the results that the folder has");
   auto* resume = command.add_flag("--resume", options.resume,
                                   "go on from the newest state that the folder has, or from the beginning; tend may change");

@@ -479,8 +479,6 @@ int run(const RunOptions& options) {
   registry.allow_mpi_start();
   return std::visit(
       [&](auto& setup) {
-        setup.linear.dump_folder = options.dump_folder;
-        setup.linear.dump_every = options.dump_every;
         setup.newton.cancel = &stop_now;
         const SolverChoice solver = choose_solver(setup.linear, options, registry);
         if (this_launch().rank > 0) return serve(registry, solver.name);

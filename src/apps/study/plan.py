@@ -87,7 +87,6 @@ ALL_SERIES = {
         ("hp-smoothing", "tolerances", False, "`hp`, swaps and smoothing", remeshed(*CURVES, *SHAPES)),
         ("p", "tolerances", False, "curved edges alone", remeshed(*CURVES, split__enabled="false")),
         ("splits-p2", "tolerances", False, "splits of quadratic elements", remeshed() | P2),
-        ("no-screening", "tolerances", False, "`smoothing`, a patch relaxed for every edge", remeshed(*SHAPES, screening='"none"')),
         ("culling", "tolerances", False, "`smoothing`, the paper's culling by energy", remeshed(*SHAPES, screening='"energy-percentile"')),
         ("sizing-field", "levels", False, "the sizing-field baseline, from each uniform level", remeshed(type='"sizing_field"')),
         ("solvers", "solvers", False, "the linear solvers that are there, without remeshing", FIXED),

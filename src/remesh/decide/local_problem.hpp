@@ -19,6 +19,12 @@
 
 namespace itr {
 
+/// How x-hat is taken on the mesh after an edit.
+enum class HistoryRule {
+  function,     ///< as a function on the mesh before; the new mesh pays for motion that it cannot represent
+  interpolated  ///< interpolated onto the new mesh, which costs less time and no energy
+};
+
 /// Inputs of local problems. None of them changes while a local problem lives, so several may be evaluated at once.
 template <int Dim>
 struct RemeshState {

@@ -3,13 +3,11 @@
 
 #include <algorithm>
 
-#include "remesh/baselines/patch_volume.hpp"
-
 namespace itr {
 
 template <int Dim>
-void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, double least_volume,
-                  Marks& marks, std::vector<CellId>& patch) {
+void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, Marks& marks,
+                  std::vector<CellId>& patch) {
   marks.clear(mesh.cell_slots());
   patch.clear();
   const auto add = [&](CellId c) {
@@ -26,13 +24,10 @@ void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelax
         for (const CellId c : mesh.cells_of(v)) add(c);
     ring_begin = ring_end;
   }
-  if (least_volume > 0) grow_to_volume(mesh, edit, least_volume, marks, patch);
   std::sort(patch.begin(), patch.end());
 }
 
-template void select_patch(const Mesh<2>&, const Edit<2>&, const LocalRelaxationOptions&, double, Marks&,
-                           std::vector<CellId>&);
-template void select_patch(const Mesh<3>&, const Edit<3>&, const LocalRelaxationOptions&, double, Marks&,
-                           std::vector<CellId>&);
+template void select_patch(const Mesh<2>&, const Edit<2>&, const LocalRelaxationOptions&, Marks&, std::vector<CellId>&);
+template void select_patch(const Mesh<3>&, const Edit<3>&, const LocalRelaxationOptions&, Marks&, std::vector<CellId>&);
 
 }  // namespace itr

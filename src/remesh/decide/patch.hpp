@@ -10,16 +10,15 @@
 namespace itr {
 
 /// The support of a trial, ascending: `options.rings` rings around the cells that the edit removes, as many whole rings as
-/// stay below `options.max_cells`; at least of `least_volume` [m^Dim] at rest. Both sides of a
-/// comparison use it.
+/// stay below `options.max_cells`. Both sides of a comparison use it.
 template <int Dim>
-void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, double least_volume,
-                  Marks& marks, std::vector<CellId>& patch);
+void select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options, Marks& marks,
+                  std::vector<CellId>& patch);
 template <int Dim>
 std::vector<CellId> select_patch(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const LocalRelaxationOptions& options,
-                                 double least_volume, Marks& marks) {
+                                 Marks& marks) {
   std::vector<CellId> patch;
-  select_patch(mesh, edit, options, least_volume, marks, patch);
+  select_patch(mesh, edit, options, marks, patch);
   return patch;
 }
 

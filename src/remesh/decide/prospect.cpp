@@ -71,7 +71,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
 template <int Dim>
 double longest_collapse(const CollapseOptions& options, const StepContext<Dim>& context) {
   constexpr double kBelow = 1 - 1e-9;  // edges of a regular mesh are as long as its shortest: round-off is not to choose
-  return std::min(options.abs_max_edge_length, options.rel_max_edge_length * kBelow * context.shortest_edge);
+  return options.rel_max_edge_length * kBelow * context.shortest_edge;
 }
 
 template <int Dim>

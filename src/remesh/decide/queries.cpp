@@ -250,7 +250,6 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const LocalRelaxationOptions& 
   const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
   const bool is_refined = edit.kind == Edit<Dim>::Kind::split || edit.kind == Edit<Dim>::Kind::curve;
   TrialOptions options{.required = context_.scaling * trial.tolerance, .local = local};
-  if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
   // The vertex or nodes that a move or a swap sets do not tell what the vertices around gain.
   if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap)
     options.patch_over_vertex = is_refined && !trial.in_contact ? *patch_over_refinement(trial) : patch_over_vertex(trial);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "prediction.hpp"
-#include "remesh/baselines/baseline.hpp"
+#include "remesh/paper/baseline.hpp"
 #include "trial.hpp"
 
 namespace itr {
@@ -32,8 +32,7 @@ class RemeshQueries {
         options_(options),
         strata_(strata),
         gate_(gate),
-        baseline_(baseline),
-        total_volume_(mesh.total_volume()) {}
+        baseline_(baseline) {}
 
   const Mesh<Dim>& mesh() const { return mesh_; }
   const RemeshFields<Dim>& fields() const { return fields_; }
@@ -77,10 +76,8 @@ class RemeshQueries {
   /// where both are linear. [J, times the scaling, up to a factor]
   double roughness(const Candidate& candidate) const;
 
-  /// Whether predictions may leave out trials.
-  bool screens() const { return !baseline_ || baseline_->predicts(); }
   /// Gain [J] below which a swap or a move only stirs the mesh: a small fraction of what a split has to gain.
-  double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance.value() : 0; }
+  double least_worthwhile() const { return 0.05 * options_.split.acceptance_tolerance.value(); }
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
   /// `surface_read`, unless null, grows by what was read of the surface: what was evaluated beside edits that move it there
@@ -102,7 +99,7 @@ class RemeshQueries {
   /// Whether the prediction of an edit tells that a patch, which gains at most `factor` as much, cannot gain the tolerance
   /// [J] either.
   bool is_hopeless(double predicted, double factor, double tolerance) const {
-    return screens() && at_most(predicted, factor) < context_.scaling * tolerance;
+    return at_most(predicted, factor) < context_.scaling * tolerance;
   }
   /// Factors of prediction.hpp for a trial.
   double patch_over_vertex(const Trial<Dim>& trial) const {
@@ -131,8 +128,9 @@ class RemeshQueries {
   /// Tells whether the chords that the split of an edge would bring to the surface beside those halves are shorter than
   /// dhat.
   bool makes_short_chords(const EdgeKey& e) const;
-  RemeshState<Dim> state() const { return state(baseline_ ? baseline_->history() : HistoryRule::function); }
-  RemeshState<Dim> state(HistoryRule history) const { return {mesh_, fields_, context_, gate_.present(), history}; }
+  RemeshState<Dim> state(HistoryRule history = HistoryRule::function) const {
+    return {mesh_, fields_, context_, gate_.present(), history};
+  }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
   /// Cells that a trial's edit replaces, or that it will.
   std::vector<CellId> cells_of(const Trial<Dim>& trial) const {
@@ -146,7 +144,6 @@ class RemeshQueries {
   const Strata<Dim>& strata_;
   const Gate<Dim>& gate_;
   const Baseline<Dim>* baseline_;  ///< or null
-  double total_volume_;
 };
 
 }  // namespace itr

@@ -124,7 +124,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
       if (at_most(bound.gain, factor) < required + noise) return;  // patches multiply noise less than what they resolve
     }
   }
-  select_patch<Dim>(state.mesh, edit, options.local, options.least_volume, scratch.patch, verdict.patch);
+  select_patch<Dim>(state.mesh, edit, options.local, scratch.patch, verdict.patch);
   if (is_enough) {
     LocalProblem<Dim> after(state, verdict.patch, edit, true, scratch);
     verdict.touches_contact = after.touches_contact();

@@ -67,7 +67,6 @@ struct TrialOptions {
   double required = 0;                ///< least gain [J, times the scaling]
   double patch_over_vertex = 0;       ///< see prediction.hpp; 0: bounds decide nothing
   std::optional<double> predicted{};  ///< gain of the vertex and nodes that the edit sets, where it is as good as the bound
-  double least_volume = 0;            ///< of the patch at rest [m^Dim]
   LocalRelaxationOptions local;
 };
 

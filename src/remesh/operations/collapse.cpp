@@ -63,7 +63,7 @@ void collapse_edges(RemeshSession<Dim>& session) {
     const EdgeKey edge = candidate.edge();
     if (session.baseline() && !session.baseline()->may_collapse(edge)) return Refusal::not_asked;
     if (const Refusal refusal = queries.refuse_collapse(edge); refusal != Refusal::none) return refusal;
-    return session.memory().depth(edge) >= options.max_depth ? Refusal::depth : Refusal::none;
+    return session.memory().depth(edge) >= kMostGenerations ? Refusal::depth : Refusal::none;
   };
   collapse.priority = [&](const Candidate& candidate) { return -queries.rest_length(candidate.edge()); };
   collapse.predict = [&, least](auto& trial, auto& scratch) -> std::optional<double> {

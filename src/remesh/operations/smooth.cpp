@@ -90,7 +90,7 @@ void follow_forces(RemeshSession<Dim>& session) {
   const RemeshQueries<Dim>& queries = session.queries();
   const Mesh<Dim>& mesh = queries.mesh();
   const double least = std::max(queries.options().smooth.acceptance_tolerance.value(), queries.least_worthwhile());
-  const double least_promise = queries.screens() ? queries.context().scaling * least : 0;  // [J, times the scaling]
+  const double least_promise = queries.context().scaling * least;  // [J, times the scaling]
   const auto length = [&](VertexId v) { return kStep * shortest_edge(mesh, v); };
   Operation<Dim> move(session, OperationKind::smooth, &RemeshReport::smooths, least);
   move.priority = [&](const Candidate& candidate) {
@@ -137,10 +137,8 @@ void better_shapes(RemeshSession<Dim>& session) {
 
 template <int Dim>
 void smooth_vertices(RemeshSession<Dim>& session) {
-  for (int round = 0; round < session.queries().options().smooth.max_iterations; ++round) {
-    follow_forces(session);
-    better_shapes(session);
-  }
+  follow_forces(session);
+  better_shapes(session);
 }
 
 template void smooth_vertices(RemeshSession<2>&);

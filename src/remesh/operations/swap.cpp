@@ -52,14 +52,15 @@ void set_tolerance(RemeshSession<Dim>& session, Operation<Dim>& swap, const Bett
   swap.patch_over_prediction = [](const Trial<Dim>& trial) { return trial.in_contact ? std::nullopt : std::optional(1.0); };
 }
 
-/// Runs swaps of edges, each of which is tried up to max_depth times. `priority`(edge, whether an edge was evaluated yet).
+/// Runs swaps of edges, each of which is tried up to kMostGenerations times. `priority`(edge, whether an edge was evaluated
+/// yet).
 template <int Dim, typename Priority>
 void run_edge_swaps(RemeshSession<Dim>& session, Operation<Dim>& swap, const Priority& priority) {
   std::unordered_map<EdgeKey, int, EdgeKeyHash> tries;
   bool has_begun = false;
   swap.refuse = [&](const Candidate& candidate) {
     const auto it = tries.find(candidate.edge());
-    const bool is_over = it != tries.end() && it->second >= session.queries().options().swap.max_depth;
+    const bool is_over = it != tries.end() && it->second >= kMostGenerations;
     return is_over ? Refusal::depth : Refusal::none;
   };
   swap.priority = [&](const Candidate& candidate) { return priority(candidate.edge(), has_begun); };

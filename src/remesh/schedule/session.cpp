@@ -66,9 +66,7 @@ RemeshReport RemeshSession<Dim>::finish() {
 
 template <int Dim>
 bool RemeshSession<Dim>::shape_matters(const Candidate& candidate, double roughness) const {
-  if (!queries_.screens() || roughness >= queries_.context().scaling * queries_.least_worthwhile() ||
-      memory_.was_gain(candidate))
-    return true;
+  if (roughness >= queries_.context().scaling * queries_.least_worthwhile() || memory_.was_gain(candidate)) return true;
   const Mesh<Dim>& mesh = queries_.mesh();
   const auto around = mesh.cells_of(candidate.vertices().front());
   return std::any_of(around.begin(), around.end(), [&](CellId c) {

@@ -13,8 +13,8 @@
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "itr/remesh/report.hpp"
-#include "remesh/baselines/baseline.hpp"
 #include "remesh/decide/queries.hpp"
+#include "remesh/paper/baseline.hpp"
 #include "session_memory.hpp"
 
 namespace itr {

@@ -11,6 +11,9 @@
 
 namespace itr {
 
+/// Collapses or swaps of one edge a step.
+inline constexpr int kMostGenerations = 3;
+
 /// Change of a refusal key by which a refusal no longer holds.
 inline constexpr double kSameKey = 1.2;
 

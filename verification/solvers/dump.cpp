@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "linear/dump.hpp"
+#include "dump.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -7,12 +7,14 @@
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <type_traits>
 #include <utility>
 
-#include "forwarding.hpp"
 #include "itr/core/error.hpp"
+#include "itr/linear/reuse.hpp"
+#include "linear/forwarding.hpp"
 
 namespace itr::linear {
 
@@ -26,8 +28,9 @@ constexpr const char* kType = std::is_same_v<T, double> ? "<f8" : "<i4";
 
 template <typename T>
 void write_array(const std::filesystem::path& file, std::span<const T> values) {
-  std::string text = std::string("{'descr': '") + kType<T> + "', 'fortran_order': False, 'shape': (" +
-                     std::to_string(values.size()) + ",), }";
+  std::ostringstream words;
+  words << "{'descr': '" << kType<T> << "', 'fortran_order': False, 'shape': (" << values.size() << ",), }";
+  std::string text = words.str();
   text.resize(kHeader - 10 - 1, ' ');
   const std::string header = std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(kHeader - 10) + '\0' + text + '\n';
   std::ofstream out(file, std::ios::binary);
@@ -67,6 +70,11 @@ class DumpingSolver final : public Forwarding {
   DumpingSolver(std::unique_ptr<Solver> solver, std::filesystem::path folder, int every)
       : solver_(std::move(solver)), folder_(std::move(folder)), every_(every) {}
   std::string_view name() const override { return solver_->name(); }
+  Capabilities capabilities() const override {
+    Capabilities of_solver = solver_->capabilities();
+    of_solver.iterative = true;
+    return of_solver;
+  }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
     system_.pattern = pattern;
@@ -101,17 +109,6 @@ class DumpingSolver final : public Forwarding {
 
 }  // namespace
 
-bool is_lower_triangle(const SparsityPattern& pattern) {
-  const auto& [order, starts, rows] = pattern;
-  if (order < 0 || starts.front() != 0 || starts.back() != static_cast<int>(rows.size())) return false;
-  for (int j = 0; j < order; ++j) {
-    if (starts[j] < 0 || starts[j] >= starts[j + 1] || starts[j + 1] > starts.back() || rows[starts[j]] != j) return false;
-    for (int p = starts[j] + 1; p < starts[j + 1]; ++p)
-      if (rows[p] <= rows[p - 1] || rows[p] >= order) return false;
-  }
-  return true;
-}
-
 void write_system(const std::filesystem::path& folder, const DumpedSystem& system) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -137,7 +134,7 @@ DumpedSystem read_system(const std::filesystem::path& folder) {
   const auto refuse_unless = [&](bool ok, const char* found) {
     if (!ok) throw InputError({folder.string(), "", found, "a system as write_system leaves it"});
   };
-  refuse_unless(is_lower_triangle(system.pattern), "starts and rows of no lower triangle");
+  refuse_unless(linear::is_lower_triangle(system.pattern), "starts and rows of no lower triangle");
   refuse_unless(block_size.size() == 1 && block_size[0] >= 1, "no block size");
   system.block_size = block_size[0];
   const auto n = static_cast<std::size_t>(system.pattern.order);

@@ -20,15 +20,12 @@ struct DumpedSystem {
   AnalyzeHints hints() const { return {.block_size = block_size, .dofs = dofs, .coordinates = coordinates}; }
 };
 
-/// Columns one after another, each with its diagonal first and ascending rows below it: what was read from a file may be
-/// anything.
-bool is_lower_triangle(const SparsityPattern& pattern);
-
 /// Both throw InputError for what cannot be written or read.
 void write_system(const std::filesystem::path& folder, const DumpedSystem& system);
 DumpedSystem read_system(const std::filesystem::path& folder);
 
-/// Solves with `solver`, and writes every `every`-th system that it is given to a folder "000042" of its own in `folder`.
+/// Solves with `solver`, and writes every `every`-th system that it is given to a folder "000042" of its own in `folder`. It
+/// calls itself iterative, so that no factor serves another system and each system is given.
 std::unique_ptr<Solver> make_dumping_solver(std::unique_ptr<Solver> solver, std::filesystem::path folder, int every);
 
 }  // namespace itr::linear

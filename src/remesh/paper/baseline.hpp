@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The paper's rules in place of ours (docs/theory.md): culling, screening, history, sizing field. A session has a Baseline
+// The paper's rules in place of ours (docs/theory.md): culling, sizing field. A session has a Baseline
 // only if its options choose one of them.
 #pragma once
 
@@ -23,13 +23,8 @@ class Baseline {
 
   /// Whether lengths of edges decide about splits and collapses, instead of energies: then follow_sizing_field makes them.
   bool decides_by_size() const { return options_.sizing_field.enabled; }
-  /// Whether predictions may leave out trials.
-  bool predicts() const { return options_.screening != Screening::none; }
   /// Whether bounds decide where they can, and refusals are remembered.
   bool has_bounds() const { return options_.screening == Screening::bounds; }
-  HistoryRule history() const { return options_.history; }
-  /// Volume at rest [m^Dim] that a patch has at least, of bodies with this one (the paper's §4.3).
-  double least_patch_volume(double total_volume) const { return options_.local.relative_volume * total_volume; }
 
   /// Culling: ranks the edges of the mesh as it is (docs/theory.md, "The rules"): elastic energy of an edge = mean over
   /// incident cells, contact energy = mean over its ends; top if either is among the tops, bottom only if both are at the

@@ -84,8 +84,7 @@ class Baseline<Dim>::Thresholds {
 
 template <int Dim>
 std::unique_ptr<Baseline<Dim>> Baseline<Dim>::chosen_by(const RemeshOptions& options) {
-  const bool chosen = options.sizing_field.enabled || options.screening != Screening::bounds ||
-                      options.history != HistoryRule::function || options.local.relative_volume > 0;
+  const bool chosen = options.sizing_field.enabled || options.screening != Screening::bounds;
   return chosen ? std::make_unique<Baseline>(options) : nullptr;
 }
 
