@@ -66,7 +66,7 @@ def violations(build, scene, folder):
 
 def simulate(build, scene, folder, *more):
     shutil.rmtree(folder, ignore_errors=True)
-    status, words = call(build, "run", scene.folder / "scene.json", "-o", folder, *more)
+    status, words = call(build, "run", scene.folder / "scene.json", "-o", folder, "--defaults", "polyfem", *more)
     return "" if status == 0 else words or f"exit status {status}"
 
 

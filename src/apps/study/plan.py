@@ -17,7 +17,11 @@ REFERENCE_TRIES = 3  # tolerances of references, where none is asked for
 NEXT_TRY = 1 / 16  # tolerance of a reference by that of the one before, which split nothing
 SECOND_FRACTION = 4  # the second reference's tolerance by the first's
 # A remeshed step solves twice, so only friction that has converged is the same on all meshes.
-FRICTION_ROUNDS = {"/solver/contact/friction_iterations": "50", "/solver/contact/friction_convergence_tol": "0"}
+FRICTION_ROUNDS = {
+    "/solver/contact/friction_iterations": "50",
+    "/solver/contact/friction_convergence_tol": "0",
+    "/solver/lagging_tolerance": "0",
+}
 
 ORDER = "/space/discr_order"
 ENABLED, TOLERANCE = "/space/remesh/{}/enabled", "/space/remesh/{}/acceptance_tolerance"
