@@ -79,6 +79,7 @@ TEST_F(CertifyTest, FindsABodyInAnObstacleButLetsObstaclesCross) {
   const auto violations = violations_of(plane);
   ASSERT_EQ(violations.size(), 1u);
   EXPECT_EQ(violations[0], "frames/000000.h5: edges (0, 1) and (obstacle 2, obstacle 3) intersect");
+  EXPECT_EQ(certify(folder).violations[0].of, Violation::Of::surfaces);
 }
 
 struct PlaneWithProxy : Plane {

@@ -277,11 +277,9 @@ Json chosen_settings(Setup<Dim> setup, const Json& scene) {
   const bool is_open = setup.contact.enabled && !scene.contains(Json::json_pointer(stiffness));
   const bool has_open_dhat = setup.contact.enabled && setup.contact.activation_distance == 0;
   if (is_open) setup.contact.adaptive_stiffness = false, setup.contact.barrier_stiffness = 0;
-  const bool is_dhat_open = setup.contact.enabled && setup.contact.activation_distance == 0;
   setup.remesh.enabled = true;
   setup.choose_defaults();
   Json settings = Json::object();
-  if (is_dhat_open) settings["/contact/dhat"] = setup.units.from_si(setup.contact.activation_distance, "m");
   if (is_open) settings[stiffness] = setup.contact.barrier_stiffness / barrier_unit(setup.units, setup.contact);
   if (has_open_dhat) settings["/contact/dhat"] = setup.units.from_si(setup.contact.activation_distance, "m");
   const auto add = [&](const char* operation, const std::optional<double>& tolerance) {
