@@ -35,9 +35,10 @@ class SceneTest : public ::testing::Test {
 
   void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / name, std::ios::binary) << text; }
 
-  /// The least scene, with `changes` merged into it.
+  /// The least scene with the readers' own defaults, PolyFEM's, and `changes` merged into it.
   static json square(const json& changes = json::object()) {
-    json scene = {{"geometry", json::array({{{"mesh", "square.obj"}, {"volume_selection", 1}}})},
+    json scene = {{"defaults", "polyfem"},
+                  {"geometry", json::array({{{"mesh", "square.obj"}, {"volume_selection", 1}}})},
                   {"materials", json::array({{{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}}})},
                   {"time", {{"dt", 0.1}, {"tend", 1}}}};
     scene.merge_patch(changes);

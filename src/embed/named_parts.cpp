@@ -22,7 +22,7 @@ NamedParts::NamedParts(const Mesh<Dim>& mesh, std::map<std::string, std::vector<
   for (CellId c = 0; c < mesh.cell_slots(); ++c) bodies.insert(mesh.body(c));
   if (takes_ids) {
     tags_ = surfaces;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.vertex_tag(v) != kNoTag) tags_.insert(mesh.vertex_tag(v));
   }
   bool are_ids = false;

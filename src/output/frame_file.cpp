@@ -19,7 +19,6 @@ namespace {
 
 using Integers = std::vector<std::int64_t>;
 
-const Space kLinear;
 /// Four rows a curve: contact, friction, reaction, all.
 const std::string kForceSums = "/totals/forces";
 /// Names of length, mass and time; absent: SI units.
@@ -28,8 +27,8 @@ const std::string kUnits = "/units";
 std::span<const double> as_span(ConstVectorView v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 
 template <int Dim>
-VectorX rest_positions(const Mesh<Dim>& mesh, const Space& space) {
-  const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
+VectorX rest_positions(const Mesh<Dim>& mesh) {
+  const std::vector<Vec<Dim>>& nodes = mesh.rest();
   VectorX rest(Dim * static_cast<Eigen::Index>(nodes.size()));
   for (std::size_t i = 0; i < nodes.size(); ++i) vertex_of<Dim>(rest, static_cast<int>(i)) = nodes[i];
   return rest;
@@ -78,11 +77,11 @@ void write_index_rows(hdf5::File& file, const std::string& name, const std::vect
 /// The curved edges, and the cells as XDMF draws them; where only some edges are curved with nodal fields of their own,
 /// since those of /fields have no rows for straight edges.
 template <int Dim>
-void write_space(const Target& target, const FrameView<Dim>& frame, const Space& space, ConstVectorView u) {
+void write_curves(const Target& target, const FrameView<Dim>& frame, ConstVectorView u) {
   hdf5::File& file = target.file;
-  if (space.is_linear()) return;
-  write_index_rows(file, "/mesh/curved_edges", space.curved_edges());
-  const DrawnCells<Dim> drawn = draw_cells(frame.mesh, space);
+  if (!frame.mesh.has_nodes()) return;
+  write_index_rows(file, "/mesh/curved_edges", frame.mesh.curved_edges());
+  const DrawnCells<Dim> drawn = draw_cells(frame.mesh);
   file.write("/mesh/quadratic_cells", drawn.cells, kQuadraticNodes<Dim>);
   if (drawn.straight_edges.empty()) return;
   const auto write = [&](const char* name, ConstVectorView field, const char* unit) {
@@ -185,10 +184,9 @@ template <int Dim>
 void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, const Units& units) {
   const Target target{file, units};
   const Mesh<Dim>& mesh = frame.mesh;
-  ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots() && mesh.num_cells() == mesh.cell_slots(), "mesh is not compact");
-  const Space& space = frame.space ? *frame.space : kLinear;
-  ITR_CHECK(frame.x.size() == Dim * num_nodes(mesh, space), frame.x.size(), mesh.num_vertices(), space.num_curved());
-  const VectorX rest = rest_positions(mesh, space);
+  ITR_CHECK(mesh.is_compact(), "mesh is not compact");
+  ITR_CHECK(frame.x.size() == Dim * mesh.num_nodes(), frame.x.size(), mesh.num_vertices(), mesh.num_curved());
+  const VectorX rest = rest_positions(mesh);
   const VectorX u = frame.x - rest;
   file.write_attribute("step", static_cast<std::int64_t>(step));
   file.write_attribute("t", units.from_si(t, "s"));
@@ -196,7 +194,7 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, con
     file.write_text(kUnits, units.length() + " " + units.mass() + " " + units.time());
   write_mesh(target, mesh, rest);
   write_sets(file, frame);
-  write_space<Dim>(target, frame, space, u);
+  write_curves<Dim>(target, frame, u);
   target.write("/fields/x", as_span(frame.x), Dim, "m");
   target.write("/fields/u", as_span(u), Dim, "m");
   target.write("/fields/v", as_span(frame.v), Dim, "m/s");
@@ -210,9 +208,9 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, con
 
 template <int Dim>
 int drawn_nodes(const FrameView<Dim>& frame) {
-  if (!frame.space || frame.space->is_linear()) return 0;
+  if (!frame.mesh.has_nodes()) return 0;
   const int edges = static_cast<int>(frame.mesh.edges().size());
-  return edges == frame.space->num_curved() ? 0 : frame.mesh.num_vertices() + edges;
+  return edges == frame.mesh.num_curved() ? 0 : frame.mesh.num_vertices() + edges;
 }
 
 namespace {
@@ -226,7 +224,7 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
                                     static_cast<std::size_t>(mesh.num_vertices()),
                                     static_cast<std::size_t>(mesh.num_cells()),
                                     static_cast<std::size_t>(mesh.num_facets()),
-                                    static_cast<std::size_t>(frame.space ? frame.space->num_curved() : 0),
+                                    static_cast<std::size_t>(mesh.num_curved()),
                                     size(frame.v),
                                     size(frame.elastic_density),
                                     size(frame.obstacle_x),

@@ -37,7 +37,7 @@ std::vector<SetMembers> set_members(const FrameView<Dim>& frame) {
     sets.push_back({name,
                     {},
                     list(mesh.facet_slots(), tags, [&](FacetId f) { return mesh.facet_tag(f); }),
-                    list(mesh.vertex_slots(), tags, [&](VertexId v) { return mesh.vertex_tag(v); })});
+                    list(mesh.num_vertices(), tags, [&](VertexId v) { return mesh.vertex_tag(v); })});
   return sets;
 }
 

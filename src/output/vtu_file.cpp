@@ -93,16 +93,16 @@ std::vector<std::uint8_t> points_of(const SetMembers& set, const FrameView<Dim>&
       values[a] = 1;
       for (const VertexId b : frame.mesh.facet(static_cast<FacetId>(f))) edges.insert(edge_key(a, b));
     }
-  std::size_t node = frame.mesh.vertex_slots();
+  std::size_t node = frame.mesh.num_vertices();
   const auto mark = [&](const EdgeKey& edge) { values[node++] = edges.contains(edge); };
-  if (frame.space) std::for_each(frame.space->curved_edges().begin(), frame.space->curved_edges().end(), mark);
+  for (const EdgeKey& edge : frame.mesh.curved_edges()) mark(edge);
   std::for_each(drawn.straight_edges.begin(), drawn.straight_edges.end(), mark);
   return values;
 }
 
 template <int Dim>
 VectorX displacement(const FrameView<Dim>& frame) {
-  const std::vector<Vec<Dim>> rest = node_rest_positions(frame.mesh, frame.space ? *frame.space : Space());
+  const std::vector<Vec<Dim>>& rest = frame.mesh.rest();
   VectorX u = frame.x;
   for (std::size_t v = 0; v < rest.size(); ++v) u.template segment<Dim>(Dim * static_cast<Eigen::Index>(v)) -= rest[v];
   return u;
@@ -116,8 +116,8 @@ template <int Dim>
 void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step, const Units& units) {
   const Mesh<Dim>& mesh = frame.mesh;
   std::string points, cells;
-  const bool is_curved = frame.space && !frame.space->is_linear();
-  const DrawnCells<Dim> drawn = is_curved ? draw_cells(mesh, *frame.space) : DrawnCells<Dim>();
+  const bool is_curved = mesh.has_nodes();
+  const DrawnCells<Dim> drawn = is_curved ? draw_cells(mesh) : DrawnCells<Dim>();
   const double length = units.factor("m");
   const VectorX x = drawn.at_nodes(frame.x) / length;
   const auto vectors = [&](const char* name, ConstVectorView values, double unit) {

@@ -22,7 +22,7 @@ class ConditionReader {
         setup_(setup),
         warnings_(warnings) {
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) point_tags_.insert(setup_.mesh.vertex_tag(v));
+    for (VertexId v = 0; v < setup_.mesh.node_slots(); ++v) point_tags_.insert(setup_.mesh.vertex_tag(v));
     for (auto* tags : {&facet_tags_, &point_tags_}) tags->erase(kNoTag);
   }
 
@@ -329,7 +329,7 @@ class ConditionReader {
     std::set<int> vertices;
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f)
       if (setup_.mesh.facet_tag(f) == tag) vertices.insert(setup_.mesh.facet(f).begin(), setup_.mesh.facet(f).end());
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < setup_.mesh.node_slots(); ++v)
       if (setup_.mesh.vertex_tag(v) == tag) vertices.insert(v);
     return points(vertices);
   }
@@ -343,8 +343,8 @@ class ConditionReader {
 
   std::vector<Vec<Dim>> all_vertices() const {
     std::vector<Vec<Dim>> result;
-    result.reserve(setup_.mesh.vertex_slots());
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) result.push_back(setup_.mesh.rest(v));
+    result.reserve(setup_.mesh.node_slots());
+    for (VertexId v = 0; v < setup_.mesh.node_slots(); ++v) result.push_back(setup_.mesh.rest(v));
     return result;
   }
 

@@ -58,7 +58,7 @@ std::vector<std::string> FileParts<Dim>::tag(Mesh<Dim>& mesh, const std::vector<
       tag_facets(mesh, renumbered, static_cast<int>(g));
       continue;
     }
-    std::vector<char> is_in(mesh.vertex_slots(), 0);
+    std::vector<char> is_in(mesh.num_vertices(), 0);
     for (const int member : group.members) {
       if (group.dim == 0 && renumbered[member] != kNone) is_in[renumbered[member]] = 1;
       if (group.dim == 1)

@@ -22,15 +22,15 @@ void check_names(const Node& node) {
   for (const Node& name : node.items()) name.string("");
 }
 
-void check_stiffness(const Node& node) {
-  if (node.json() == "adaptive") return;
-  if (!node.json().is_number()) node.fail("a number > 0, or \"adaptive\"");
-  node.positive(1);
-}
-
 void check_distance(const Node& node) {
   if (node.json() == "auto") return;
   if (!node.json().is_number()) node.fail("a number > 0, or \"auto\"");
+  node.positive(1);
+}
+
+void check_stiffness(const Node& node) {
+  if (node.json() == "adaptive" || node.json() == "auto") return;
+  if (!node.json().is_number()) node.fail("a number > 0, \"auto\" or \"adaptive\"");
   node.positive(1);
 }
 
@@ -61,8 +61,9 @@ const std::vector<Kind>& kinds() {
       {"id", nullptr, id_schema(), "integer >= 0 or name"},
       {"id or ids", nullptr, any_of(id_schema(), list_of(id_schema())), "integer, name or list of these"},
       {"id or all", nullptr, id_schema(), "integer, name or \"all\""},
-      {"positive or adaptive", check_stiffness,
-       any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "adaptive"}}), "number > 0 or \"adaptive\""},
+      {"positive, auto or adaptive", check_stiffness,
+       any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"enum", {"auto", "adaptive"}}}),
+       "number > 0, \"auto\" or \"adaptive\""},
       {"positive or auto", check_distance, any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "auto"}}),
        "number > 0 or \"auto\""},
       {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }, {{"const", "consistent"}}, "\"consistent\""},

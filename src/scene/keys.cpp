@@ -19,6 +19,9 @@ constexpr const char* kUnwritten = "output of PolyFEM that is not written here";
 #define INTERPOLATION CONDITIONS "/*/interpolation/*"
 
 constexpr Key kKeys[] = {
+    {"/defaults", read, "itr|polyfem|itr-1|polyfem-1", "\"itr\"", "",
+     "what keys that the scene leaves out stand for: ITR's values, or those of PolyFEM; with a version, or the newest",
+     basic},
     {"/tests", ignored, "", "", "", "PolyFEM's own regression values"},
     {"/units/length", read, "nm|um|mm|cm|dm|m|km|in|ft", "\"m\"", "",
      "of all numbers of the scene, its meshes and results; defaults stay what they are in SI units", basic},
@@ -188,7 +191,9 @@ constexpr Key kKeys[] = {
      "`itr explain` says",
      basic},
     {"/contact/dhat_percentage", read, "positive", "0.8", "", "see dhat"},
-    {"/contact/epsv", read, "positive", "0.001", "m/s", "sliding slower than this is smoothed to sticking"},
+    {"/contact/epsv", read, "positive or auto", "0.001", "m/s",
+     "sliding slower than this is smoothed to sticking; auto: a thousandth of the largest relative motion in a step without "
+     "inertia, else by a speed of the scene, as `itr explain` says"},
     {"/contact/friction_coefficient", read, "non_negative", "0", "", "Coulomb's, of all pairs; 0: no friction is computed",
      basic},
     {"/contact/use_convergent_formulation", read, "boolean", "false", "",
@@ -206,6 +211,10 @@ constexpr Key kKeys[] = {
     {"/contact/collision_mesh/{max_edge_length,tessellation_type}", refused, "", "", "", "not supported yet"},
 
     {"/solver/max_threads", read, "natural", "0", "", "0: all; results do not depend on it; --threads wins"},
+    {"/solver/lagging_tolerance", read, "non_negative", "0", "",
+     "rounds of solves for friction, pressure and damping go on until no force at a vertex changes by more than this part "
+     "of "
+     "the largest; a step that does not get there is cut (step_cuts), or else a warning says so; 0: rounds by number"},
     {"/solver/rayleigh_damping", read, "list", "[]", "", "damping in proportion to the Hessian of a term"},
     {"/solver/rayleigh_damping/*/form", read, "elasticity|contact", "", "", "of which term; required"},
     {"/solver/rayleigh_damping/*/stiffness", read, "non_negative", "", "s", "coefficient"},
@@ -223,11 +232,11 @@ constexpr Key kKeys[] = {
     {"/solver/linear/{precond,enable_overwrite_solver,max_iter,tolerance,Eigen,AMGCL,Hypre,Pardiso,MUMPS}", ignored, "", "",
      "", "options of PolyFEM's solvers"},
 
-    {"/solver/contact/barrier_stiffness", read, "positive or adaptive", "(from the stiffest body and dhat)", "",
-     "kappa: [Pa] with use_convergent_formulation; adaptive: follows the forces, as PolyFEM does unless a number is given; "
-     "larger: wider gaps, fewer iterations; docs/theory.md has the default, `itr run` and `itr explain` print it"},
-    {"/solver/contact/initial_barrier_stiffness", read, "positive", "1", "",
-     "where adaptive stiffness begins; given without barrier_stiffness it asks for it"},
+    {"/solver/contact/barrier_stiffness", read, "positive, auto or adaptive", "\"adaptive\"", "",
+     "kappa: [Pa] with use_convergent_formulation; auto: from the stiffest body and dhat (docs/theory.md; `itr run` and "
+     "`itr "
+     "explain` print it); adaptive: follows the forces, as PolyFEM does; larger: wider gaps, fewer iterations"},
+    {"/solver/contact/initial_barrier_stiffness", read, "positive", "1", "", "where adaptive stiffness begins"},
     {"/solver/contact/friction_iterations", read, "integer", "1", "",
      "solves a step, each with friction's normal forces of the one before; negative: until they agree; 0: no friction"},
     {"/solver/contact/friction_convergence_tol", read, "non_negative", "0.01", "N s", "when they agree, times dt"},

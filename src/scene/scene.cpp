@@ -8,6 +8,7 @@
 #include "check_keys.hpp"
 #include "collision_mesh.hpp"
 #include "conditions.hpp"
+#include "defaults.hpp"
 #include "forces.hpp"
 #include "geometry.hpp"
 #include "materials.hpp"
@@ -56,7 +57,7 @@ Sets sets_of(const Geometry<Dim>& geometry) {
   Sets sets;
   std::set<int> surfaces(geometry.id.begin(), geometry.id.end());
   for (FacetId f = 0; f < geometry.mesh.facet_slots(); ++f) surfaces.insert(geometry.mesh.facet_tag(f));
-  for (VertexId v = 0; v < geometry.mesh.vertex_slots(); ++v) surfaces.insert(geometry.mesh.vertex_tag(v));
+  for (VertexId v = 0; v < geometry.mesh.num_vertices(); ++v) surfaces.insert(geometry.mesh.vertex_tag(v));
   surfaces.erase(kNoTag);
   /// Parts of a boundary that are in others, too, have its number.
   const auto fill = [](const std::set<int>& ids, const auto& names, bool have_number, LabelIds& labels) {
@@ -85,6 +86,7 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   setup.fields = read_fields(root);
   setup.lump_mass = read_lump_mass(root);
   setup.lagged_load_tolerance = root["solver"]["advanced"]["lagged_load_tolerance"].positive(setup.lagged_load_tolerance);
+  setup.lagging_tolerance = root["solver"]["lagging_tolerance"].non_negative(0);
   setup.order = read_order(root, sets.bodies, body_ids(setup.mesh));
   setup.quadrature_degree = read_quadrature_degree(root);
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, rest_box(setup.mesh).diagonal().norm()});
@@ -127,8 +129,9 @@ void for_each_file(const Node& root, const Geometries& geometries, const Functio
   f(node["linear_map"], MeshFiles::kWeights);
 }
 
-std::string make_identity(const Node& root, const Geometries& geometries, MeshFiles& files) {
-  Json identity = root.json();
+std::string make_identity(Json identity, const std::string& defaults, const Node& root, const Geometries& geometries,
+                          MeshFiles& files) {
+  identity["defaults"] = defaults;
   identity.erase("output");
   identity.erase("tests");
   if (identity.contains("solver") && identity["solver"].is_object()) identity["solver"].erase("max_threads");
@@ -152,6 +155,11 @@ Change::Of kind_of_change(const std::string& path, bool has_step) {
 }
 
 }  // namespace
+
+std::string defaults_of(const std::string& identity) {
+  const Json scene = Json::parse(identity, nullptr, false);
+  return scene.is_object() ? scene.value("defaults", "") : "";
+}
 
 std::vector<Change> find_changes(const std::string& before, const std::string& now) {
   const Json old_scene = Json::parse(before, nullptr, false), new_scene = Json::parse(now, nullptr, false);
@@ -181,10 +189,12 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   document.units = read_units(root);
   check_keys(document, scene.warnings);
   MeshFiles files;
+  const Json as_written = document.json;
+  scene.defaults = apply_defaults(document);
   const Geometries geometries = list_geometries(root);
+  scene.identity = make_identity(as_written, scene.defaults.name, root, geometries, files);
   scene.max_threads = root["solver"]["max_threads"].integer_at_least(0, 0);
   scene.directory = root["output"]["directory"].string("");
-  scene.identity = make_identity(root, geometries, files);
   scene.warnings.insert(scene.warnings.end(), document.warnings.begin(), document.warnings.end());
   for_each_file(root, geometries, [&](const Node& name, const char*) {
     warn_of_working_folder(name.pointer(), name.string(""), document.root, document.file, scene.warnings);
@@ -201,8 +211,9 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
 template <int Dim>
 Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const std::vector<Override>& overrides,
                       std::vector<std::string>& warnings) {
-  const Document document = parse_document(options, "options", overrides);
+  Document document = parse_document(options, "options", overrides);
   check_keys(document, warnings);
+  apply_defaults(document);
   const Node root(document);
   for (const char* key : {"geometry", "output"})
     if (root.has(key)) root[key].fail("the key", "no such key: the program brings these itself");

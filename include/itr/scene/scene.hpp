@@ -28,6 +28,18 @@ struct PartNames {
   std::map<int, std::vector<int>> obstacles_by_id;    ///< vertices by `surface_selection`
 };
 
+/// The set of defaults of a scene, with its version, and what it gave.
+struct ChosenDefaults {
+  std::string name;           ///< such as "itr-1"
+  bool is_asked_for = false;  ///< by the scene or an override
+  struct Value {
+    std::string pointer, value, reason;  ///< the value as JSON text
+  };
+  std::vector<Value> values;                ///< that the scene leaves out and the set gives
+  std::vector<std::string> unlike_polyfem;  ///< of PolyFEM's set: where results differ from PolyFEM's on purpose
+  std::string information;                  ///< a line on a scene that may expect the other set; or nothing
+};
+
 struct Scene {
   std::variant<Setup<2>, Setup<3>> setup;  ///< the dimension is chosen here, once
   OutputOptions output;
@@ -35,6 +47,7 @@ struct Scene {
   std::string directory;              ///< output/directory, may be empty
   std::vector<std::string> warnings;  ///< on values that are legal and suspicious
   PartNames parts;
+  ChosenDefaults defaults;
   std::string identity;  ///< JSON of all that the results depend on: the merged scene, hashes of its files
 };
 
@@ -47,6 +60,8 @@ struct Change {
     scene     ///< what is simulated
   } of = Of::scene;
 };
+/// The name of the set of defaults in an identity; empty where there is none.
+std::string defaults_of(const std::string& identity);
 std::vector<Change> find_changes(const std::string& before, const std::string& now);
 
 /// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.

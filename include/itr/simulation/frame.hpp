@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "itr/core/types.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/remesh/report.hpp"
 
@@ -130,7 +129,6 @@ struct FrameView {
   const std::vector<std::array<int, 3>>& obstacle_triangles;
   const AskedFields* asked = nullptr;  ///< null: nothing was asked for
   ProxyView<Dim> proxy{};
-  const Space* space = nullptr;     ///< null: all edges are straight
   const SetNames* names = nullptr;  ///< of body ids and tags of the mesh; null: there are none
 };
 
