@@ -138,7 +138,7 @@ int FileParts<Dim>::with(int part, int group) {
   const MeshGroup& added = file_.groups[group];
   FilePart both = part == kNoTag ? FilePart() : parts_[part];
   if (both.number == 0) both.number = added.number, both.name = added.name;
-  if (both.labels.empty()) both.preferred = added.number;
+  if (both.labels.empty()) both.preferred = added.number > 0 ? added.number : kNone;
   const bool is_of_cells = added.dim == Dim;
   for (const Label& label : labels_of(added)) {
     const bool counts = !(is_of_cells && label.name.empty());  // the number of cells is that of their first group

@@ -18,7 +18,7 @@ struct FilePart {
   int number = 0;            ///< that of the first group with one
   std::set<Label> labels{};  ///< that the scene asks for
   std::string name{};        ///< that of the group with the number
-  int preferred = 0;         ///< the number of the first group that it asks for
+  int preferred = kNone;     ///< the number of the first group that it asks for, if it has one
 };
 
 template <int Dim>

@@ -173,7 +173,8 @@ class Keys {
       std::set<Label> labels = stored.labels;
       labels.insert(name_.begin(), name_.end());
       labels.insert(label);
-      found->second = sets_.bodies.key(labels, selected || stored.preferred == 0 ? label.number : stored.preferred);
+      const int number = selected || stored.preferred == kNone ? label.number : stored.preferred;
+      found->second = sets_.bodies.key(labels, number > 0 ? number : kNone);
       sets_.bodies.imply(found->second, selected ? "" : stored.name);
     }
     return found->second;
@@ -198,7 +199,7 @@ class Keys {
         if (!label.name.empty() || !hides(label.number)) labels.insert(label);
     if (selected) labels.insert(*selected);
     if (labels.empty()) return kNoTag;
-    found->second = sets_.surfaces.key(labels, part == kNoTag ? 0 : parts_.part(part).preferred);
+    found->second = sets_.surfaces.key(labels, part == kNoTag ? kNone : parts_.part(part).preferred);
     const bool is_of_file = !selected && labels.size() == 1 && labels.begin()->number == parts_.part(part).number;
     sets_.surfaces.imply(found->second, is_of_file ? parts_.part(part).name : "");
     return found->second;

@@ -67,7 +67,7 @@ void LabelIds::choose() {
     int id = preferred;
     if (is_number(labels)) {
       id = labels.begin()->number;
-    } else if (id <= 0 || !taken.insert(id).second) {
+    } else if (id < 0 || !taken.insert(id).second) {
       while (!taken.insert(next).second) ++next;
       id = next;
     }

@@ -35,8 +35,9 @@ References collect_references(const Node& root);
 /// Ids by label. Parts that are in several sets have an id of their own, which then stands for each of these, too.
 class LabelIds {
  public:
-  /// The key of what is in exactly these sets; `preferred` is the id that it gets unless another has it.
-  int key(const std::set<Label>& labels, int preferred = 0);
+  /// The key of what is in exactly these sets; `preferred` is the id that it gets unless another has it; kNone: any
+  /// above 0.
+  int key(const std::set<Label>& labels, int preferred = kNone);
   /// Notes the name that a file gives the number of a key, which the scene does not ask for: output keeps it where it is the
   /// only one. Empty: there is none.
   void imply(int key, const std::string& name);
