@@ -179,7 +179,7 @@ TEST_F(CollisionMeshTest, BlockRestsOnABumpThatItsMeshDoesNotHave) {
   writer.finish("finished");
   const output::Certificate certificate = output::certify(folder_ / "run");
   EXPECT_EQ(certificate.frames, setup.time.steps + 1);
-  EXPECT_TRUE(certificate.violations.empty()) << certificate.violations[0];
+  EXPECT_TRUE(certificate.violations.empty()) << certificate.violations[0].text;
   const hdf5::Session session;
   const hdf5::File frame = hdf5::File::open(folder_ / "run/frames/000010.h5");
   EXPECT_EQ(frame.read_doubles("/proxy/x").rows(), setup.proxy->rest.size());
