@@ -70,17 +70,13 @@ std::vector<int> read_levels(const fs::path& path, const hdf5::File& file, const
   return levels;
 }
 
-Space read_space(const fs::path& path, const hdf5::File& file) {
+std::vector<EdgeKey> read_curved_edges(const fs::path& path, const hdf5::File& file) {
   if (!file.contains("/mesh/curved_edges")) return {};
-  auto edges = read_rows<2>(path, file, "/mesh/curved_edges");
-  if (std::adjacent_find(edges.begin(), edges.end(), std::greater_equal<>()) != edges.end())
-    throw InputError({path.string(), "/mesh/curved_edges", "rows in another order", "ascending rows"});
-  return Space(std::move(edges));
+  return read_rows<2>(path, file, "/mesh/curved_edges");
 }
 
-/// `space`: its nodes come after the vertices.
 template <int Dim>
-Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& space) {
+Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
   const bool is_apart = file.contains(kRest);
   const std::string name = is_apart ? kRest : "/mesh/rest";
   const auto rest = file.read_doubles(name);
@@ -88,7 +84,8 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
     throw InputError({path.string(), name, std::to_string(rest.columns) + " columns", std::to_string(Dim)});
   for (const double X : rest.values)
     if (!std::isfinite(X)) throw InputError({path.string(), name, std::to_string(X), "finite positions"});
-  const auto curved = static_cast<std::size_t>(is_apart ? 0 : space.num_curved());
+  const std::vector<EdgeKey> curved_edges = read_curved_edges(path, file);
+  const std::size_t curved = is_apart ? 0 : curved_edges.size();  // nodes that come after the vertices
   if (rest.rows() < curved)
     throw InputError(
         {path.string(), name, std::to_string(rest.rows()) + " rows", "more than curved edges, " + std::to_string(curved)});
@@ -102,36 +99,38 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
     throw InputError({path.string(), "/mesh", "lists of different lengths", "one entry for every cell and facet"});
   Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
   mesh.set_facets(facets, tags);
+  mesh.set_curved_edges(curved_edges);
   if (!file.contains("/checkpoint/vertex_tag")) return mesh;
   const auto vertex_tags = read_rows<2>(path, file, "/checkpoint/vertex_tag");
   for (const auto& [v, tag] : vertex_tags) {
-    if (v < 0 || v >= mesh.vertex_slots())
+    if (v < 0 || v >= mesh.num_vertices())
       throw InputError({path.string(), "/checkpoint/vertex_tag", "vertex " + std::to_string(v),
-                        "numbers below " + std::to_string(mesh.vertex_slots())});
+                        "numbers below " + std::to_string(mesh.num_vertices())});
     mesh.set_vertex_tag(v, tag);
   }
   return mesh;
 }
 
-constexpr const char* kOperations[RemeshMemory::kKinds] = {"split",   "collapse", "swap",      "smooth",
-                                                           "reshape", "curve",    "straighten"};
-constexpr int kRefusalColumns = 5;  ///< two vertices (one and kNone), least and most signal, whether in contact
+/// Two vertices (one and kNone) or those of a facet, then least and most refusal key, and whether in contact.
+int refusal_columns(OperationKind kind) { return kind == OperationKind::remove_facet ? 6 : 5; }
 
 constexpr const char* kRefusalTolerances = "/checkpoint/refusal_tolerances";  ///< [J], by operation
 
-std::string refusals_name(int kind) { return std::string("/checkpoint/refusals/") + kOperations[kind]; }
+std::string refusals_name(OperationKind kind) {
+  return std::string("/checkpoint/refusals/") + kOperationNames[static_cast<int>(kind)];
+}
 
 void write_memory(hdf5::File& file, const RemeshMemory& memory) {
-  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
-    std::vector<double> rows;
-    rows.reserve(kRefusalColumns * memory.refusals[kind].size());
-    for (const auto& [place, range] : memory.refusals[kind]) {
-      const auto vertices = place.vertices();
-      rows.insert(rows.end(), {double(vertices.front()), place.is_vertex() ? kNone : double(vertices.back()), range.least,
-                               range.most, range.in_contact ? 1.0 : 0.0});
-    }
-    if (!rows.empty()) file.write(refusals_name(kind), rows, kRefusalColumns);
+  std::array<std::vector<double>, kOperationKinds> tables;
+  for (const auto& [candidate, range] : memory.refusals) {
+    auto& rows = tables[static_cast<int>(candidate.kind())];
+    const auto& ids = candidate.facet();
+    rows.insert(rows.end(), ids.begin(), ids.begin() + refusal_columns(candidate.kind()) - 3);
+    rows.insert(rows.end(), {range.least, range.most, range.in_contact ? 1.0 : 0.0});
   }
+  for (int i = 0; i < kOperationKinds; ++i)
+    if (const auto kind = static_cast<OperationKind>(i); !tables[i].empty())
+      file.write(refusals_name(kind), tables[i], refusal_columns(kind));
   std::vector<double> tolerances;
   for (const auto& tolerance : memory.tolerances)
     tolerances.push_back(tolerance.value_or(std::numeric_limits<double>::quiet_NaN()));
@@ -142,38 +141,45 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
   RemeshMemory memory;
   if (file.contains(kRefusalTolerances)) {
     const auto table = file.read_doubles(kRefusalTolerances);
-    if (table.values.size() != RemeshMemory::kKinds)
+    if (table.values.size() > kOperationKinds)
       throw InputError({path.string(), kRefusalTolerances, std::to_string(table.values.size()) + " numbers",
-                        std::to_string(RemeshMemory::kKinds)});
+                        "at most " + std::to_string(kOperationKinds)});
     std::copy(table.values.begin(), table.values.end(), memory.tolerances.begin());
   }
   if (!file.contains("/checkpoint/refusals")) return memory;
-  for (int kind = 0; kind < RemeshMemory::kKinds; ++kind) {
-    if (!file.contains(refusals_name(kind))) continue;
-    const auto table = file.read_doubles(refusals_name(kind));
-    if (table.columns != kRefusalColumns)
-      throw InputError(
-          {path.string(), refusals_name(kind), std::to_string(table.columns) + " columns", std::to_string(kRefusalColumns)});
-    for (std::size_t i = 0; i < table.values.size(); i += kRefusalColumns) {
-      const double* row = &table.values[i];
-      const EdgeKey edge{as_int(path, refusals_name(kind), row[0]), as_int(path, refusals_name(kind), row[1])};
-      if (edge[0] < 0 || edge[0] >= num_vertices || edge[1] < kNone || edge[1] >= num_vertices)
-        throw InputError({path.string(), refusals_name(kind),
-                          "vertices " + std::to_string(edge[0]) + " and " + std::to_string(edge[1]),
-                          "numbers below " + std::to_string(num_vertices)});
-      const Place place = edge[1] == kNone ? Place::at_vertex(edge[0]) : Place(edge);
-      memory.refusals[kind].push_back({place, {row[2], row[3], row[4] != 0}});
+  for (int i = 0; i < kOperationKinds; ++i) {
+    const auto kind = static_cast<OperationKind>(i);
+    const std::string name = refusals_name(kind);
+    if (!file.contains(name)) continue;
+    const auto table = file.read_doubles(name);
+    const int columns = refusal_columns(kind), vertices = columns - 3;
+    if (table.columns != columns)
+      throw InputError({path.string(), name, std::to_string(table.columns) + " columns", std::to_string(columns)});
+    for (std::size_t first = 0; first < table.values.size(); first += columns) {
+      const double* row = &table.values[first];
+      MeshTypes<3>::Facet ids{kNone, kNone, kNone};
+      for (int k = 0; k < vertices; ++k) {
+        ids[k] = as_int(path, name, row[k]);
+        if (ids[k] < (k == 0 ? 0 : kNone) || ids[k] >= num_vertices)
+          throw InputError(
+              {path.string(), name, "a vertex " + std::to_string(ids[k]), "numbers below " + std::to_string(num_vertices)});
+      }
+      const Candidate candidate = vertices == 3     ? Candidate(kind, ids)
+                                  : ids[1] == kNone ? Candidate(kind, ids[0])
+                                                    : Candidate(kind, EdgeKey{ids[0], ids[1]});
+      memory.refusals.push_back({candidate, {row[vertices], row[vertices + 1], row[vertices + 2] != 0}});
     }
   }
+  std::ranges::sort(memory.refusals, {}, &RemeshMemory::Entry::candidate);
   return memory;
 }
 
 template <int Dim>
-void write_strata(hdf5::File& file, const Strata<Dim>& strata) {
+void write_strata(hdf5::File& file, const Strata<Dim>& strata, int num_vertices) {
   if (strata.empty()) return;
   const auto record = strata.record();
   std::vector<std::int64_t> vertices, interfaces;
-  for (const Stratum stratum : record.vertices) vertices.push_back(static_cast<std::int64_t>(stratum));
+  for (int v = 0; v < num_vertices; ++v) vertices.push_back(static_cast<std::int64_t>(record.vertices[v]));
   for (const auto& row : record.interfaces) interfaces.insert(interfaces.end(), row.begin(), row.end());
   std::vector<double> planes;
   for (const auto& [point, normal] : record.planes) {
@@ -204,8 +210,8 @@ Strata<Dim> read_strata(const fs::path& path, const hdf5::File& file, const Mesh
     record.interfaces = read_rows<Dim + 1>(path, file, "/checkpoint/strata/interfaces");
   for (const auto& row : record.interfaces)
     for (int i = 0; i < Dim; ++i)
-      if (row[i] < 0 || row[i] >= mesh.vertex_slots())
-        refuse("/interfaces", "vertex " + std::to_string(row[i]), "numbers below " + std::to_string(mesh.vertex_slots()));
+      if (row[i] < 0 || row[i] >= mesh.num_vertices())
+        refuse("/interfaces", "vertex " + std::to_string(row[i]), "numbers below " + std::to_string(mesh.num_vertices()));
   const auto planes = file.read_doubles("/checkpoint/strata/planes");
   if (planes.columns != 2 * Dim) refuse("/planes", std::to_string(planes.columns) + " columns", std::to_string(2 * Dim));
   for (std::size_t i = 0; i < planes.values.size(); i += 2 * Dim) {
@@ -217,6 +223,7 @@ Strata<Dim> read_strata(const fs::path& path, const hdf5::File& file, const Mesh
   const auto tolerance = file.read_doubles("/checkpoint/strata/tolerance").values;
   if (tolerance.size() != 1) refuse("/tolerance", std::to_string(tolerance.size()) + " numbers", "1");
   record.tolerance = tolerance[0];
+  record.vertices.insert(record.vertices.end(), mesh.num_curved(), Stratum::volume);
   Strata<Dim> strata(record);
   if (const std::string misfit = strata.find_misfit(mesh); !misfit.empty()) refuse("", misfit, "strata of the frame's mesh");
   return strata;
@@ -269,12 +276,12 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   for (FacetId f = 0; f < state.mesh.facet_slots(); ++f) tags.push_back(state.mesh.facet_tag(f));
   file.write("/checkpoint/facet_tag", tags, 0);
   std::vector<std::int64_t> points;  // rows of a vertex and its tag
-  for (VertexId v = 0; v < state.mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < state.mesh.num_vertices(); ++v)
     if (state.mesh.vertex_tag(v) != kNoTag) points.insert(points.end(), {v, state.mesh.vertex_tag(v)});
   if (!points.empty()) file.write("/checkpoint/vertex_tag", points, 2);
   if (!units.is_si()) {
     std::vector<double> rest;
-    for (VertexId v = 0; v < state.mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < state.mesh.num_vertices(); ++v)
       rest.insert(rest.end(), state.mesh.rest(v).begin(), state.mesh.rest(v).end());
     file.write(kRest, rest, Dim);
     file.write(kTime, std::array{state.t}, 0);
@@ -299,7 +306,7 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   file.write("/checkpoint/energy_guard",
              std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0, state.stored_energy}, 0);
   write_memory(file, state.remesh_memory);
-  write_strata(file, state.strata);
+  write_strata(file, state.strata, state.mesh.num_vertices());
   write_factor(file, state.factor);
   file.write_text("/checkpoint/totals", std::string(progress.totals));
   file.write_text("/checkpoint/scene", std::string(progress.scene));
@@ -346,8 +353,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   Checkpoint<Dim> checkpoint;
   State<Dim>& state = checkpoint.state;
   try {
-    state.space = read_space(saved.file, file);
-    state.mesh = read_mesh<Dim>(saved.file, file, state.space);
+    state.mesh = read_mesh<Dim>(saved.file, file);
   } catch (const InputError& error) {
     throw InputError({saved.file.string(), "/mesh " + error.parts().place, error.parts().found, error.parts().expected});
   }
@@ -371,7 +377,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.created_energy = guard[0];
   state.history.damp_next = guard[1] != 0;
   state.stored_energy = guard[2];
-  state.remesh_memory = read_memory(saved.file, file, state.mesh.vertex_slots());
+  state.remesh_memory = read_memory(saved.file, file, state.mesh.num_vertices());
   state.strata = read_strata<Dim>(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);
   state.step = as_int(saved.file, "attribute step", file.read_integer_attribute("step"));

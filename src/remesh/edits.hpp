@@ -21,6 +21,10 @@ struct Proposal {
 
   explicit operator bool() const { return edit.has_value(); }
 };
+template <int Dim>
+Proposal<Dim> refused(Refusal refusal) {
+  return {.refusal = refusal};
+}
 
 /// Rest position of a vertex of the mesh after an edit.
 template <int Dim>

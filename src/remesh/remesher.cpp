@@ -25,8 +25,8 @@ double least_gain_of_refining(const RemeshOptions& options) {
   return options.split.enabled ? std::min(split, options.curve_tolerance()) : options.curve_tolerance();
 }
 
-/// Tolerances of all operations, by RemeshMemory::Kind [J].
-std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& options) {
+/// Tolerances of all operations, by kind [J].
+std::array<double, kOperationKinds> tolerances_of(const RemeshOptions& options) {
   const double split = options.split.acceptance_tolerance.value_or(0),
                collapse = options.collapse.acceptance_tolerance.value_or(0);
   const double swap = options.swap.acceptance_tolerance.value_or(0),
@@ -37,15 +37,17 @@ std::array<double, RemeshMemory::kKinds> tolerances_of(const RemeshOptions& opti
           smooth,
           smooth,
           options.curve.acceptance_tolerance.value_or(split),
-          options.straighten.acceptance_tolerance.value_or(collapse)};
+          options.straighten.acceptance_tolerance.value_or(collapse),
+          swap};
 }
 
-/// Whether an edit makes no cell that is more compressed somewhere, now or in the past, than that share of what it replaces.
+/// Whether an edit makes no cell that is more compressed somewhere, now or in the past, than that fraction of what it
+/// replaces.
 template <int Dim>
 bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit, double least_share) {
   constexpr double kTolerance = 0.1;
   const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
-  const auto node_before = [&](VertexId a, VertexId b) { return mesh.node_of(a, b); };
+  const auto node_before = nodes_of_edges(mesh);
   const auto node_later = [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); };
   const auto keeps = [&](const VectorX& x) {
     double before = std::numeric_limits<double>::infinity();
@@ -83,23 +85,19 @@ RemeshReport remesh(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContex
   if (!may_refine && !(may_straighten && mesh.has_nodes()) && !may_collapse && !has_to_stir && !by_size) return {};
   memory.begin(tolerances_of(options));
   RemeshSession<Dim> session(mesh, fields, context, options, std::move(baseline), memory, strata);
-  RemeshReport& report = session.report();
-  if (session.baseline()) session.baseline()->rank(session.ask());
+  if (session.baseline()) session.baseline()->rank(session.queries());
   if (by_size) {
     follow_sizing_field(session);
   } else {
     if (may_refine) refine_edges(session);
     if (options.collapse.enabled || (may_straighten && mesh.has_nodes())) coarsen_edges(session);
   }
-  if (may_stir && (has_to_stir || report.accepted() > 0)) {
+  if (may_stir && (has_to_stir || session.report().accepted() > 0)) {
     session.memory().mark_gains();
     if (options.swap.enabled) swap_edges(session);
     if (options.smooth.enabled) smooth_vertices(session);
   }
-  fields.trim(mesh.vertex_slots());
-  report.trial_seconds = session.commits().median_trial_seconds();
-  memory.refusals = session.memory().remembered(session.ask());
-  return report;
+  return session.finish();
 }
 
 template <int Dim>
@@ -109,15 +107,14 @@ RemeshReport curve_edges(std::span<const EdgeKey> edges, Mesh<Dim>& mesh, Remesh
   RemeshSession<Dim> session(mesh, fields, context, options, nullptr, memory, strata);
   OperationCount& count = session.report().curves;
   for (const EdgeKey& edge : edges) {
-    const Refusal refusal = session.ask().refuse_curve(edge, session.scratch());
+    Refusal refusal = session.queries().refuse_curve(edge);
+    if (refusal == Refusal::none && session.queries().may_touch(edge, session.scratch())) refusal = Refusal::overhang;
     if (refusal == Refusal::none)
-      session.commits().commit_unjudged(make_curve(mesh, edge), session.scratch().gate, count);
+      session.commit_unjudged(make_curve(mesh, edge), count);
     else
       count.note(refusal);
   }
-  fields.trim(mesh.vertex_slots());
-  memory.refusals = session.memory().remembered(session.ask());
-  return session.report();
+  return session.finish();
 }
 
 template <int Dim>
@@ -128,12 +125,12 @@ RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume
   // The gate does not ask whether the energy of a new cell is finite.
   const auto is_finite = [&](const Edit<Dim>& edit) {
     return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
-      return std::isfinite(session.ask().energy_of(cell.vertices, cell.body, edit));
+      return std::isfinite(session.queries().energy_of(cell.vertices, cell.body, edit));
     });
   };
   const auto commit = [&](const Edit<Dim>& edit) {
     return is_finite(edit) && (least_volume == 0 || keeps_volumes(mesh, fields, edit, least_volume)) &&
-           session.commits().commit_unjudged(edit, session.scratch().gate, session.report().straightens);
+           session.commit_unjudged(edit, session.report().straightens);
   };
   const CellId first_new = mesh.cell_slots();
   const auto curved = [&mesh](const std::vector<EdgeKey>& edges) {
@@ -144,14 +141,12 @@ RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume
   };
   // Chords keep what the curves are; what lies between them is nearly straight.
   for (const EdgeKey& edge : curved(edges_of<Dim>(mesh, cells)))
-    if (session.ask().refuse_chords(edge) != Refusal::none || !commit(make_chords(mesh, edge)))
+    if (session.queries().refuse_chords(edge) != Refusal::none || !commit(make_chords(mesh, edge)))
       commit(make_straighten(mesh, edge));
   std::vector<CellId> made;
   for (CellId c = first_new; c < mesh.cell_slots(); ++c) made.push_back(c);
   for (const EdgeKey& edge : curved(edges_of<Dim>(mesh, made))) commit(make_straighten(mesh, edge));
-  fields.trim(mesh.vertex_slots());
-  memory.refusals = session.memory().remembered(session.ask());
-  return session.report();
+  return session.finish();
 }
 
 template RemeshReport curve_edges(std::span<const EdgeKey>, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,

@@ -386,7 +386,7 @@ FieldOptions read_fields(const Node& root) {
 
 bool read_lump_mass(const Node& root) { return root["solver"]["advanced"]["lump_mass_matrix"].boolean(false); }
 
-std::map<int, int> read_order(const Node& root, const std::set<int>& bodies) {
+std::map<int, int> read_order(const Node& root, const LabelIds& labels, const std::set<int>& bodies) {
   const auto order_of = [](const Node& node) {
     const int order = node.integer_at_least(1, 1);
     if (order > 2) node.fail("1 or 2: higher orders are not supported");
@@ -398,9 +398,12 @@ std::map<int, int> read_order(const Node& root, const std::set<int>& bodies) {
       for (const int body : bodies) order[body] = order_of(entry);
       continue;
     }
-    const int id = entry["id"].integer(0);
-    if (!bodies.contains(id)) entry["id"].fail("the id of a body");
-    order[id] = order_of(entry["order"]);
+    const Label label = read_label(entry["id"], 0);
+    if (labels.of(label).empty()) {
+      if (!entry.has("id")) entry["id"].fail("the id of a body");
+      labels.refuse(entry["id"], label, "the id of a body: ");
+    }
+    for (const int id : labels.of(label)) order[id] = order_of(entry["order"]);
   }
   return order;
 }

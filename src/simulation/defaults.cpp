@@ -44,7 +44,7 @@ double mean_vertex_area(const Mesh<Dim>& mesh) {
   int vertices = 0;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.is_facet_alive(f)) area += facet_measure(mesh, f);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
   return area / std::max(1, vertices);
 }
 
@@ -156,7 +156,7 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
   for (const auto& [body, size] : body_sizes(setup.mesh)) thinnest = std::min(thinnest, size.thickness);
   const ContactSurface<Dim> surface = contact_surface(setup, setup.mesh);
   VectorX start = held_dofs(setup, setup.mesh, setup.time.t0).target;
-  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v) start.template segment<Dim>(Dim * v) = setup.mesh.rest(v);
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v) start.template segment<Dim>(Dim * v) = setup.mesh.rest(v);
   for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f)
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < i; ++j)

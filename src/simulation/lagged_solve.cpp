@@ -33,7 +33,7 @@ template <int Dim>
 VectorX LaggedSolve<Dim>::start_of_solve(const VectorX& x) {
   const VectorX start = with_held_at_targets(x);
   const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
-                    (cells_.curved_elements.empty() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
+                    (!cells_.has_curved() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
                     potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
   return free ? start : x;
 }
@@ -65,7 +65,7 @@ NewtonSummary LaggedSolve<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
     potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
     extras.way_to_start = std::move(way_to_start);
   }
-  if (!cells_.curved_elements.empty()) {
+  if (cells_.has_curved()) {
     potential_.elastic()->refine_quadrature(x);
     extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
   }

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "itr/core/error.hpp"
-#include "itr/fem/space.hpp"
 #include "simulation/force_target.hpp"
 
 namespace itr {
@@ -156,7 +155,7 @@ void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   const auto rows = static_cast<Eigen::Index>(proxy.rest.size()), vertices = Eigen::Index{setup.mesh.num_vertices()};
-  const Eigen::Index nodes = num_nodes(setup.mesh, space_of_orders(setup.mesh, setup.order));
+  const Eigen::Index nodes = setup.mesh.node_slots() + std::ssize(edges_of_order_2(setup.mesh, setup.order));
   if (proxy.weights.rows() != rows || (proxy.weights.cols() != vertices && proxy.weights.cols() != nodes))
     refuse("weights of the collision mesh", fmt::format("{} x {}", proxy.weights.rows(), proxy.weights.cols()),
            nodes == vertices ? fmt::format("{} x {}", rows, vertices)

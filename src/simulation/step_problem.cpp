@@ -32,16 +32,16 @@ double& entry_of(EnergyReport& report, EnergyEntry entry) {
 }  // namespace
 
 template <int Dim>
-StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history,
-                              double t, ProblemCache<Dim>& cache, const BarrierStiffness& stiffness,
-                              const QuadratureLevels& levels, const ChordLevels& chords)
+StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
+                              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness, const QuadratureLevels& levels,
+                              const ChordLevels& chords)
     : setup_(setup),
       terms_(potential_terms(setup, history, t)),
-      scope_(cache.scope_of(setup, mesh, space, chords)),
+      scope_(cache.scope_of(setup, mesh, chords)),
       cells_(scope_->cells),
       surface_(scope_->surface),
       workspace_(scope_->workspace),
-      held_(held_dofs(setup, mesh, t, space)),
+      held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
       potential_(terms_, cells_,
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
@@ -281,7 +281,7 @@ double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
 template <int Dim>
 double StepProblem<Dim>::energy_resolution() const {
   double stiffness = 0;
-  for_each_cell(cells_, [&](int body, double volume) { stiffness += volume * setup_.materials.at(body).youngs_modulus; });
+  for (const auto& element : cells_.elements) stiffness += element.volume * setup_.materials.at(element.body).youngs_modulus;
   return kEnergyResolution * stiffness;
 }
 
@@ -294,10 +294,10 @@ double StepProblem<Dim>::min_distance(const VectorX& x) {
 template <int Dim>
 double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   double least = std::numeric_limits<double>::infinity();
-  for (const auto& element : cells.elements) least = std::min(least, deformation_gradient<Dim>(element, x).determinant());
-  for (const auto& element : cells.curved_elements)
-    least = std::min(least, min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kVolumeRatioTolerance) *
-                                element.inverse_edges.determinant());
+  for (const auto& element : cells.elements)
+    least = std::min(least, element.curved ? min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kVolumeRatioTolerance) *
+                                                 element.inverse_edges.determinant()
+                                           : deformation_gradient<Dim>(element, x).determinant());
   return least;
 }
 

@@ -24,9 +24,8 @@ class StepProblem {
   /// `stiffness`, which the barrier starts from where it is adaptive, `levels` of quadrature, which the solve may raise, and
   /// those of `chords`.
   /// Problems may share a cache and solve in turn, each as if alone.
-  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history, double t,
-              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {},
-              const ChordLevels& chords = {});
+  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, ProblemCache<Dim>& cache,
+              const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {}, const ChordLevels& chords = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
   /// the first round they are lagged at `lagged_x`. Newton begins where the bodies are `expected` (empty: nowhere), if the

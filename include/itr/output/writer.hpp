@@ -22,7 +22,7 @@ struct DisplacementNorms {
   double l2 = 0, h1 = 0, h1_semi = 0, linf = 0, linf_grad = 0, lp = 0;
 };
 template <int Dim>
-DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space = {});
+DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x);
 
 struct RunInfo {
   std::string scene;    ///< path of the scene file

@@ -20,9 +20,10 @@ struct Override {
   std::string value;  ///< JSON text
 };
 
-/// Names and ids of bodies and obstacles, as /output/forces takes them.
+/// Names and ids of bodies, surfaces and obstacles, as conditions and /output/forces take them.
 struct PartNames {
-  std::map<std::string, int> bodies;                  ///< ids by name
+  std::map<std::string, std::vector<int>> bodies;     ///< ids by name
+  std::map<std::string, std::vector<int>> surfaces;   ///< tags of facets and vertices by name
   std::map<std::string, std::vector<int>> obstacles;  ///< vertices by name
   std::map<int, std::vector<int>> obstacles_by_id;    ///< vertices by `surface_selection`
 };
@@ -69,9 +70,12 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
 /// Geometry that a program brings instead of the files of a scene.
 template <int Dim>
 struct Geometry {
-  Mesh<Dim> mesh;            ///< with the facet tags that conditions refer to as `id`
-  Obstacles<Dim> obstacles;  ///< without motions
-  std::vector<int> id;       ///< by obstacle vertex, as of a `surface_selection`; kNoTag: none
+  Mesh<Dim> mesh;                                    ///< with the facet tags that conditions refer to as `id`
+  Obstacles<Dim> obstacles;                          ///< without motions
+  std::vector<int> id;                               ///< by obstacle vertex, as of a `surface_selection`; kNoTag: none
+  std::map<std::string, std::vector<int>> bodies{};  ///< ids that options may call by these names
+  /// Tags and obstacles' ids, likewise: first the id that options may write, then those of facets that are in others, too.
+  std::map<std::string, std::vector<int>> surfaces{};
 };
 
 /// Makes a setup from a mesh and the other keys of a scene as JSON text: materials, time, contact, conditions, ... Throws

@@ -91,6 +91,11 @@ struct ForceTarget {
   std::array<double, 3> about{};         ///< point of moments [m]
 };
 
+/// Ids that names stand for: of bodies, and of facets and vertices (their tags). An id may stand in several.
+struct SetNames {
+  std::map<std::string, std::vector<int>> bodies, surfaces;
+};
+
 /// Fields that observers get beside positions, velocities and elastic density. Others are not computed.
 struct FieldOptions {
   bool contact_forces = false, friction_forces = false, reaction_forces = false;
@@ -154,6 +159,7 @@ struct StepSetup {
 template <int Dim>
 struct Setup : StepSetup<Dim> {
   Mesh<Dim> mesh;            ///< with body ids and tags of facets and vertices
+  SetNames names;            ///< for output
   std::map<int, int> order;  ///< order of elements by body: 1, or 2 for curved edges; 1 for bodies that are not listed
   std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
   bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead

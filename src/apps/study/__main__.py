@@ -201,7 +201,7 @@ class Study:
         if results.refused:
             results.worth = None
             for row in results.rows:
-                row.errors = None if row.is_against_reference else row.errors
+                row.errors = None if row.run.reference == REFERENCE else row.errors
 
         results.reference = f"the run in `{options.reference}`" if options.reference else "nothing"
         if row := not options.reference and (reference or finest):

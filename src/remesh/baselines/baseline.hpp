@@ -34,7 +34,7 @@ class Baseline {
   /// Culling: ranks the edges of the mesh as it is (docs/theory.md, "The rules"): elastic energy of an edge = mean over
   /// incident cells, contact energy = mean over its ends; top if either is among the tops, bottom only if both are at the
   /// bottom. Leaves out no edge with another screening than `energy_percentile`.
-  void rank(const RemeshQueries<Dim>& ask);
+  void rank(const RemeshQueries<Dim>& queries);
   bool may_split(const EdgeKey& edge) const { return !culls() || rank_of(edge) == Rank::top; }
   bool may_collapse(const EdgeKey& edge) const { return !culls() || rank_of(edge) == Rank::bottom; }
   /// A part of a split edge gets its rank.

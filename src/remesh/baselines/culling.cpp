@@ -21,45 +21,38 @@ std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>
     const Material& material = context.materials.at(mesh.body(c));
     const auto moduli = elastic_moduli<Dim>(material, mesh.barycenter(c));
     const auto element = element_of(mesh, c);
-    if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
-      for_each_gradient<Dim>(curved, element.inverse_edges, fields.x, [&](const Mat<Dim>& F, double share) {
-        energies[c] += context.scaling * element.volume * share * elastic_density<Dim>(F, moduli);
-      });
-    else
-      energies[c] = context.scaling * elastic_energy<Dim>(element, fields.x, moduli);
+    for_each_gradient<Dim>(element, fields.x, [&](const Mat<Dim>& F, double fraction) {
+      energies[c] += context.scaling * (element.volume * (fraction * elastic_density<Dim>(F, moduli)));
+    });
   }
   return energies;
 }
 
-/// Contact energy (stiffness left out) of each vertex: its share of the pairs that it is part of.
+/// Contact energy (stiffness left out) of each vertex: its part of the pairs that it is part of.
 template <int Dim>
 std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields,
                                             const StepContext<Dim>& context) {
   const auto& obstacles = context.obstacles;
-  const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.x.size());
+  const int bodies = mesh.node_slots(), total = bodies + static_cast<int>(obstacles.x.size());
   std::vector<double> energies(total, 0);
   if (!context.contact.enabled) return energies;
   std::vector<typename MeshTypes<Dim>::Facet> chords;
   for (int f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
-    for_each_chord<Dim>(
-        mesh.facet(f), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); },
-        [&](const auto& chord) { chords.push_back(chord); });
+    for_each_chord<Dim>(mesh.facet(f), nodes_of_edges(mesh), [&](const auto& chord) { chords.push_back(chord); });
   }
-  std::vector<Vec<Dim>> rest(bodies);
-  for (int v = 0; v < bodies; ++v) rest[v] = mesh.rest(v);
   VectorX x(Dim * total);
   x.head(Dim * bodies) = fields.x.head(Dim * bodies);
   for (int o = 0; o < total - bodies; ++o) x.segment<Dim>(Dim * (bodies + o)) = obstacles.x[o];
-  const CollisionSurface surface = surface_of_facets<Dim>(chords, std::move(rest), obstacles);
+  const CollisionSurface surface = surface_of_facets<Dim>(chords, mesh.rest(), obstacles);
   const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {
-    const double share = context.scaling * contact.pair_energy(s, x) / s.size();
-    for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += share;
+    const double part = context.scaling * contact.pair_energy(s, x) / s.size();
+    for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += part;
   }
-  for (const auto& [edge, node] : mesh.nodes())
-    for (const VertexId end : edge) energies[end] += energies[node] / 2;
+  for (const EdgeKey& edge : mesh.curved_edges())
+    for (const VertexId end : edge) energies[end] += energies[mesh.node_of(edge)] / 2;
   return energies;
 }
 
@@ -93,12 +86,12 @@ std::unique_ptr<Baseline<Dim>> Baseline<Dim>::chosen_by(const RemeshOptions& opt
 }
 
 template <int Dim>
-void Baseline<Dim>::rank(const RemeshQueries<Dim>& ask) {
+void Baseline<Dim>::rank(const RemeshQueries<Dim>& queries) {
   if (!culls()) return;
-  const Mesh<Dim>& mesh = ask.mesh();
+  const Mesh<Dim>& mesh = queries.mesh();
   const auto edges = mesh.edges();
-  const auto of_cells = cell_energies(mesh, ask.fields(), ask.context());
-  const auto of_vertices = vertex_contact_energies(mesh, ask.fields(), ask.context());
+  const auto of_cells = cell_energies(mesh, queries.fields(), queries.context());
+  const auto of_vertices = vertex_contact_energies(mesh, queries.fields(), queries.context());
   std::vector<double> elastic, contact;
   for (const EdgeKey& edge : edges) {
     double sum = 0;
@@ -109,10 +102,10 @@ void Baseline<Dim>::rank(const RemeshQueries<Dim>& ask) {
         ++count;
       }
     elastic.push_back(sum / count);
-    contact.push_back(ask.is_surface(edge) ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
+    contact.push_back(queries.is_surface(edge) ? (of_vertices[edge[0]] + of_vertices[edge[1]]) / 2 : 0);
   }
   const bool touching = std::any_of(contact.begin(), contact.end(), [](double e) { return e > 0; });
-  const Thresholds by_elastic(elastic, ask.options()), by_contact(contact, ask.options());
+  const Thresholds by_elastic(elastic, queries.options()), by_contact(contact, queries.options());
   ranks_.clear();
   ranks_.reserve(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {

@@ -22,41 +22,43 @@ constexpr double kNearerThanAtRest = 0.1;  ///< squared distances of pairs in co
 template <int Dim>
 class SizingField {
  public:
-  explicit SizingField(RemeshSession<Dim>& session) : session_(session), ask_(session.ask()) {}
+  explicit SizingField(RemeshSession<Dim>& session) : session_(session), queries_(session.queries()) {}
 
   void split() {
     const double least = least_length();
     OperationCount& count = session_.report().splits;
-    for (const EdgeKey& edge : ask_.mesh().edges()) push_split(edge);
+    for (const EdgeKey& edge : queries_.mesh().edges()) push_split(edge);
     while (const auto entry = queue_.pop()) {
-      const EdgeKey edge = entry->place.edge();
-      if (ask_.is_cancelled()) return;
-      Refusal refusal = ask_.refuse_split(edge);
-      if (refusal == Refusal::none && ask_.rest_length(edge) < least) refusal = Refusal::length;
+      const EdgeKey edge = entry->candidate.edge();
+      if (queries_.is_cancelled()) return;
+      if (!queries_.exists(entry->candidate)) continue;
+      Refusal refusal = queries_.refuse_split(edge);
+      if (refusal == Refusal::none && queries_.rest_length(edge) < least) refusal = Refusal::length;
       count.note(refusal);
       if (refusal != Refusal::none) continue;
       ++count.tried;
-      const VertexId created = ask_.mesh().vertex_slots();
-      if (!session_.commits().commit_unjudged(make_split(ask_.mesh(), edge), session_.scratch().gate, count)) continue;
-      for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(created))) push_split(near);
+      const VertexId created = queries_.mesh().node_slots();
+      if (!session_.commit_unjudged(make_split(queries_.mesh(), edge), count)) continue;
+      for (const EdgeKey& near : edges_of<Dim>(queries_.mesh(), queries_.mesh().cells_of(created))) push_split(near);
     }
   }
 
   void collapse() {
     OperationCount& count = session_.report().collapses;
-    for (const EdgeKey& edge : ask_.mesh().edges()) push_collapse(edge);
+    for (const EdgeKey& edge : queries_.mesh().edges()) push_collapse(edge);
     while (const auto entry = queue_.pop()) {
-      const EdgeKey edge = entry->place.edge();
-      if (ask_.is_cancelled()) return;
-      const Refusal refusal = ask_.refuse_collapse(edge);
+      const EdgeKey edge = entry->candidate.edge();
+      if (queries_.is_cancelled()) return;
+      if (!queries_.exists(entry->candidate)) continue;
+      const Refusal refusal = queries_.refuse_collapse(edge);
       count.note(refusal);
       if (refusal != Refusal::none) continue;
       ++count.tried;
-      auto proposal = propose_collapse(ask_.mesh(), ask_.strata(), edge);
+      auto proposal = propose_collapse(queries_.mesh(), queries_.strata(), edge);
       if (proposal && makes_large_edges(*proposal.edit)) proposal = refused<Dim>(Refusal::length);
       count.note(proposal.refusal);
-      if (!proposal || !session_.commits().commit_unjudged(*proposal.edit, session_.scratch().gate, count)) continue;
-      for (const EdgeKey& near : edges_of<Dim>(ask_.mesh(), ask_.mesh().cells_of(proposal.edit->value->vertex)))
+      if (!proposal || !session_.commit_unjudged(*proposal.edit, count)) continue;
+      for (const EdgeKey& near : edges_of<Dim>(queries_.mesh(), queries_.mesh().cells_of(proposal.edit->value->vertex)))
         push_collapse(near);
     }
   }
@@ -64,42 +66,42 @@ class SizingField {
  private:
   void push_split(const EdgeKey& edge) {
     const double size = size_of(edge);
-    if (size > kSplitAbove) queue_.push({edge, size});
+    if (size > kSplitAbove) queue_.push({{OperationKind::split, edge}, size});
   }
   void push_collapse(const EdgeKey& edge) {
-    if (size_of(edge) <= kCollapseBelow) queue_.push({edge, -ask_.rest_length(edge)});
+    if (size_of(edge) <= kCollapseBelow) queue_.push({{OperationKind::collapse, edge}, -queries_.rest_length(edge)});
   }
 
   /// No edge is split that is shorter [m].
   double least_length() const {
     Box<Dim> box;
-    for (VertexId v = 0; v < ask_.mesh().vertex_slots(); ++v)
-      if (ask_.mesh().is_vertex_alive(v)) box.include(ask_.mesh().rest(v));
-    return ask_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
+    for (VertexId v = 0; v < queries_.mesh().node_slots(); ++v)
+      if (queries_.mesh().is_vertex_alive(v)) box.include(queries_.mesh().rest(v));
+    return queries_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
   }
 
-  Vec<Dim> x(VertexId v) const { return ask_.fields().x.template segment<Dim>(Dim * v); }
+  Vec<Dim> x(VertexId v) const { return queries_.fields().x.template segment<Dim>(Dim * v); }
 
   double size_of(const EdgeKey& edge) {
-    const Vec<Dim> way = x(edge[1]) - x(edge[0]);
-    return size_of(way, contact_squared(edge, way));
+    const Vec<Dim> span = x(edge[1]) - x(edge[0]);
+    return size_of(span, contact_squared(edge, span));
   }
-  double size_of(const Vec<Dim>& way, double contact_squared) const {
-    const double longest = ask_.context().longest_edge;
-    return std::sqrt(way.squaredNorm() / (longest * longest) + contact_squared);
+  double size_of(const Vec<Dim>& span, double contact_squared) const {
+    const double longest = queries_.context().longest_edge;
+    return std::sqrt(span.squaredNorm() / (longest * longest) + contact_squared);
   }
 
-  /// Mean over the facets at an edge, and over their vertices, of the squared share that the edge spans of the distance to
-  /// what is in contact there.
-  double contact_squared(const EdgeKey& edge, const Vec<Dim>& way) {
-    if (!ask_.has_contact()) return 0;
+  /// Mean over the facets at an edge, and over their vertices, of the squared fraction that the edge spans of the distance
+  /// to what is in contact there.
+  double contact_squared(const EdgeKey& edge, const Vec<Dim>& span) {
+    if (!queries_.has_contact()) return 0;
     double sum = 0;
     int facets = 0;
-    for (const FacetId f : ask_.mesh().facets_of_edge(edge)) {
+    for (const FacetId f : queries_.mesh().facets_of_edge(edge)) {
       ++facets;
-      for (const VertexId v : ask_.mesh().facet(f)) {
-        const double share = way.dot(contact_at(v));
-        sum += share * share / Dim;
+      for (const VertexId v : queries_.mesh().facet(f)) {
+        const double fraction = span.dot(contact_at(v));
+        sum += fraction * fraction / Dim;
       }
     }
     return facets > 0 ? sum / facets : 0;
@@ -108,7 +110,7 @@ class SizingField {
   /// At a vertex of the surface: the unit direction to what is nearest of all that its facets are in contact with, over the
   /// distance [1/m]; zero without contact.
   Vec<Dim> contact_at(VertexId vertex) {
-    const double dhat = ask_.context().contact.activation_distance;
+    const double dhat = queries_.context().contact.activation_distance;
     double least = dhat * dhat;
     Vec<Dim> direction = Vec<Dim>::Zero();
     const auto look_at = [&](const auto& point, int k, const auto& facet) {
@@ -128,7 +130,7 @@ class SizingField {
       least = squared;
       direction = pair_distance<Dim>(closest.kind, features.data()).separation / squared;
     };
-    for (const FacetId f : ask_.mesh().facets_of(vertex)) {
+    for (const FacetId f : queries_.mesh().facets_of(vertex)) {
       const auto own = piece(f);
       const auto at =
           static_cast<int>(std::find(own.now.id.begin(), own.now.id.end(), SurfaceId(vertex)) - own.now.id.begin());
@@ -145,14 +147,14 @@ class SizingField {
     SurfacePiece<Dim> now, rest;
   };
   Piece piece(FacetId f) const {
-    Piece piece{ask_.surface().piece(f), {}};
-    for (const int v : ask_.mesh().facet(f)) piece.rest.add(ask_.mesh().rest(v), v);
+    Piece piece{queries_.surface().piece(f), {}};
+    for (const int v : queries_.mesh().facet(f)) piece.rest.add(queries_.mesh().rest(v), v);
     return piece;
   }
   /// Finds the pieces that are nearer than dhat to a facet of the surface at present.
   std::vector<Piece> pieces_in_contact(FacetId f) {
-    const SurfaceIndex<Dim>& surface = ask_.surface();
-    const double dhat = ask_.context().contact.activation_distance;
+    const SurfaceIndex<Dim>& surface = queries_.surface();
+    const double dhat = queries_.context().contact.activation_distance;
     LocalScratch<Dim>& scratch = session_.scratch();
     std::vector<Piece> pieces;
     for (const auto& [other, distance] : scratch.neighbourhoods.near(surface, f, dhat, scratch.hits)) {
@@ -164,7 +166,7 @@ class SizingField {
       const int primitive = other.number();
       Piece& obstacle = pieces.emplace_back(Piece{surface.obstacle_piece(primitive), {}});
       for (const int v : surface.primitives().all[primitive].ids())
-        obstacle.rest.add(ask_.context().obstacles.rest[v], SurfaceId::of_obstacle(v));
+        obstacle.rest.add(queries_.context().obstacles.rest[v], SurfaceId::of_obstacle(v));
     }
     return pieces;
   }
@@ -172,22 +174,23 @@ class SizingField {
   /// Whether an edge at the vertex that a collapse keeps would be larger than edges that collapse may be.
   bool makes_large_edges(const Edit<Dim>& edit) {
     const auto& value = *edit.value;
-    const Vec<Dim> target = RemeshFields<Dim>::interpolate(ask_.fields().x, value);
-    const Vec<Dim> contact =
-        ask_.mesh().is_boundary(value.vertex) && ask_.has_contact() ? contact_at(value.vertex) : Vec<Dim>(Vec<Dim>::Zero());
+    const Vec<Dim> target = RemeshFields<Dim>::interpolate(queries_.fields().x, value);
+    const Vec<Dim> contact = queries_.mesh().is_boundary(value.vertex) && queries_.has_contact()
+                                 ? contact_at(value.vertex)
+                                 : Vec<Dim>(Vec<Dim>::Zero());
     return std::any_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
       return std::any_of(cell.vertices.begin(), cell.vertices.end(), [&](VertexId v) {
         if (v == value.vertex) return false;
-        const Vec<Dim> way = x(v) - target;
-        const double share = ask_.mesh().is_boundary(v) ? way.dot(contact) : 0;
-        return size_of(way, share * share) > kCollapseBelow;
+        const Vec<Dim> span = x(v) - target;
+        const double fraction = queries_.mesh().is_boundary(v) ? span.dot(contact) : 0;
+        return size_of(span, fraction * fraction) > kCollapseBelow;
       });
     });
   }
 
   RemeshSession<Dim>& session_;
-  const RemeshQueries<Dim>& ask_;
-  PlaceQueue queue_;
+  const RemeshQueries<Dim>& queries_;
+  CandidateQueue queue_;
 };
 
 }  // namespace
@@ -195,8 +198,8 @@ class SizingField {
 template <int Dim>
 void follow_sizing_field(RemeshSession<Dim>& session) {
   SizingField<Dim> field(session);
-  if (session.ask().options().split.enabled) field.split();
-  if (session.ask().options().collapse.enabled) field.collapse();
+  if (session.queries().options().split.enabled) field.split();
+  if (session.queries().options().collapse.enabled) field.collapse();
 }
 
 template void follow_sizing_field(RemeshSession<2>&);

@@ -29,8 +29,18 @@ std::vector<EdgeKey> edges_of(const Mesh<Dim>& mesh, std::span<const CellId> cel
 }
 
 template <int Dim>
+bool RemeshQueries<Dim>::exists(const Candidate& candidate) const {
+  const auto vertices = candidate.vertices();
+  if (!std::ranges::all_of(vertices, [&](VertexId v) { return mesh_.is_vertex_alive(v); })) return false;
+  if (vertices.size() < 3) return vertices.size() == 1 || mesh_.are_joined(vertices[0], vertices[1]);
+  return std::ranges::any_of(mesh_.cells_of(vertices[0]), [&](CellId c) {
+    const auto& cell = mesh_.cell(c);
+    return std::ranges::all_of(vertices, [&](VertexId v) { return std::ranges::find(cell, v) != cell.end(); });
+  });
+}
+
+template <int Dim>
 Refusal RemeshQueries<Dim>::refuse_split(const EdgeKey& e) const {
-  if (!exists(e)) return Refusal::gone;
   if (rest_length(e) < options_.split.min_edge_length.value()) return Refusal::length;
   if (!has_contact() || !is_surface(e)) return Refusal::none;
   return has_short_halves(e) || makes_short_chords(e) ? Refusal::dhat : Refusal::none;
@@ -66,7 +76,6 @@ bool RemeshQueries<Dim>::makes_short_chords(const EdgeKey& e) const {
 
 template <int Dim>
 Refusal RemeshQueries<Dim>::refuse_collapse(const EdgeKey& e) const {
-  if (!exists(e)) return Refusal::gone;
   const double longest = longest_collapse(options_.collapse, context_);
   if (rest_length(e) > longest) return Refusal::length;
   const auto around = mesh_.cells_of_edge(e);
@@ -75,18 +84,9 @@ Refusal RemeshQueries<Dim>::refuse_collapse(const EdgeKey& e) const {
 }
 
 template <int Dim>
-Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
-  if (!exists(e)) return Refusal::gone;
+Refusal RemeshQueries<Dim>::refuse_curve(const EdgeKey& e) const {
   if (mesh_.node_of(e[0], e[1]) != kNone) return Refusal::not_asked;
-  if (!has_contact() || !is_surface(e)) return Refusal::none;
-  if (has_short_halves(e)) return Refusal::dhat;
-  return touches_within(e, reach(e), scratch) ? Refusal::overhang : Refusal::none;
-}
-
-template <int Dim>
-Refusal RemeshQueries<Dim>::refuse_straighten(const EdgeKey& e) const {
-  if (!exists(e)) return Refusal::gone;
-  return mesh_.node_of(e[0], e[1]) == kNone ? Refusal::not_asked : Refusal::none;
+  return has_contact() && is_surface(e) && has_short_halves(e) ? Refusal::dhat : Refusal::none;
 }
 
 template <int Dim>
@@ -142,8 +142,9 @@ bool RemeshQueries<Dim>::is_distorted(std::span<const CellId> cells) const {
 template <int Dim>
 double RemeshQueries<Dim>::predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch,
                                               Box<Dim>* surface_read) const {
-  const double gain =
-      is_in_contact(edge, scratch) ? std::numeric_limits<double>::quiet_NaN() : itr::predict_straighten<Dim>(state(), edge);
+  const double gain = is_in_contact({OperationKind::straighten, edge}, scratch)
+                          ? std::numeric_limits<double>::quiet_NaN()
+                          : itr::predict_straighten<Dim>(state(), edge);
   return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_straighten(mesh_, edge), scratch, surface_read) : gain;
 }
 
@@ -154,20 +155,18 @@ double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, double tolera
   const RemeshState<Dim> judged = state();
   if (context_.has_inertia && judged.history == HistoryRule::function) {
     const double most = gain_of_vertex<Dim>(state(HistoryRule::interpolated), edit, scratch, surface_read);
-    if (is_hopeless(edit.removed_cells, most, tolerance)) return most;
+    if (is_hopeless(most, itr::patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells)), tolerance)) return most;
   }
   return gain_of_vertex<Dim>(judged, edit, scratch, surface_read);
 }
 
 template <int Dim>
 double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read) const {
-  const auto is_curved = [&](CellId c) { return mesh_.is_curved(c); };
+  const bool is_curved = mesh_.has_nodes() && any_is_curved(mesh_.cells_of_edge(edge));
   // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
-  if (may_have_curves() && !is_predictable(context_))
+  if ((is_curved || options_.curve.enabled) && !is_predictable(context_))
     return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read);
-  if (!mesh_.has_nodes()) return itr::predict_split<Dim>(state(), edge);
-  const auto around = mesh_.cells_of_edge(edge);
-  if (std::none_of(around.begin(), around.end(), is_curved)) return itr::predict_split<Dim>(state(), edge);
+  if (!is_curved) return itr::predict_split<Dim>(state(), edge);
   const double gain = itr::predict_split_at_curves<Dim>(state(), edge);
   return std::isnan(gain) ? gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read) : gain;
 }
@@ -179,8 +178,12 @@ double RemeshQueries<Dim>::predict_curve(const EdgeKey& edge, LocalScratch<Dim>&
 }
 
 template <int Dim>
-bool RemeshQueries<Dim>::is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
-  return has_contact() && touches_within(e, context_.contact.activation_distance, scratch);
+std::optional<double> RemeshQueries<Dim>::patch_over_refinement(const Trial<Dim>& trial) const {
+  const auto cells = cells_of(trial);
+  const bool is_curved = options_.curve.enabled || any_is_curved(cells);
+  if (trial.in_contact) return is_curved ? std::optional(kPatchOverPredictionInContact<Dim>) : std::nullopt;
+  const double nu = largest_poisson_ratio(cells);
+  return is_curved ? patch_over_nodes<Dim>(nu) : itr::patch_over_vertex<Dim>(nu);
 }
 
 template <int Dim>
@@ -192,40 +195,31 @@ bool RemeshQueries<Dim>::touches_within(const EdgeKey& e, double distance, Local
 
 template <int Dim>
 void RemeshQueries<Dim>::find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-  trial.in_contact = is_in_contact(trial.edge(), scratch);
-  if (has_contact() && is_surface(trial.edge())) note_read(trial);
-}
-
-template <int Dim>
-void RemeshQueries<Dim>::note_read(Trial<Dim>& trial) const {
+  trial.in_contact = is_in_contact(trial.candidate(), scratch);
+  if (!has_contact() || !trial.candidate().is_edge() || !is_surface(trial.edge())) return;
   Box<Dim> edge;
   for (const FacetId f : mesh_.facets_of(trial.edge()[0])) edge.include(gate_.present().box_of(f));
   trial.surface_read.include(edge.inflated(reach(trial.edge()) + overhang(trial.edge())));
 }
 
 template <int Dim>
-double RemeshQueries<Dim>::roughness(const Place& place) const {
-  const auto edge = place.vertices();
-  const auto& at_first = mesh_.cells_of(edge[0]);
+double RemeshQueries<Dim>::roughness(const Candidate& candidate) const {
+  const auto vertices = candidate.vertices();
+  const auto& at_first = mesh_.cells_of(vertices[0]);
   boost::container::small_vector<CellId, Dim == 2 ? 16 : 64> around(at_first.begin(), at_first.end());
-  if (!place.is_vertex())
-    for (const CellId c : mesh_.cells_of(edge[1]))
-      if (std::find(mesh_.cell(c).begin(), mesh_.cell(c).end(), edge[0]) == mesh_.cell(c).end()) around.push_back(c);
+  for (std::size_t i = 1; i < vertices.size(); ++i)
+    for (const CellId c : mesh_.cells_of(vertices[i]))
+      if (std::ranges::find_first_of(mesh_.cell(c), vertices.first(i)) == mesh_.cell(c).end()) around.push_back(c);
   const auto variation = [&](const VectorX& field, auto&& weight) {
     Mat<Dim> sum = Mat<Dim>::Zero();
     double total = 0, squares = 0;
     for (const CellId c : around) {
       const auto element = element_of(mesh_, c);
       const double w = weight(c);
-      const auto add = [&](const Mat<Dim>& gradient, double share) {
-        sum += share * gradient;
-        squares += share * gradient.squaredNorm();
-      };
-      if (const CurvedCell<Dim> cell = cell_before(mesh_, c); cell.edges)
-        for_each_gradient<Dim>(cell, element.inverse_edges, field,
-                               [&](const Mat<Dim>& gradient, double share) { add(gradient, share * w); });
-      else
-        add(deformation_gradient<Dim>(element, field), w);
+      for_each_gradient<Dim>(element, field, [&](const Mat<Dim>& gradient, double fraction) {
+        sum += fraction * w * gradient;
+        squares += fraction * w * gradient.squaredNorm();
+      });
       total += w;
     }
     return std::max(0.0, squares - sum.squaredNorm() / total);
@@ -234,7 +228,7 @@ double RemeshQueries<Dim>::roughness(const Place& place) const {
   double result = context_.scaling * variation(fields_.x, stiffness);
   if (context_.has_inertia) {
     const double size =
-        place.is_vertex() ? mesh_.volume(around[0]) : (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).squaredNorm();
+        vertices.size() == 1 ? mesh_.volume(around[0]) : (mesh_.rest(vertices[0]) - mesh_.rest(vertices[1])).squaredNorm();
     const auto mass = [&](CellId c) { return size * mesh_.volume(c) * context_.materials.at(mesh_.body(c)).density; };
     result += variation(fields_.predictor, mass);
   }
@@ -249,23 +243,19 @@ double RemeshQueries<Dim>::largest_poisson_ratio(std::span<const CellId> cells) 
 }
 
 template <int Dim>
-void RemeshQueries<Dim>::judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local,
-                               LocalScratch<Dim>& scratch) const {
+void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const {
   const ScopedTimer timer(trial.seconds);
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
   const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
   const bool is_refined = edit.kind == Edit<Dim>::Kind::split || edit.kind == Edit<Dim>::Kind::curve;
-  TrialOptions options{.required = context_.scaling * tolerance, .local = local};
+  TrialOptions options{.required = context_.scaling * trial.tolerance, .local = local};
   if (baseline_ && !moves) options.least_volume = baseline_->least_patch_volume(total_volume_);
   // The vertex or nodes that a move or a swap sets do not tell what the vertices around gain.
   if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap)
-    options.patch_over_vertex = is_refined && !trial.in_contact
-                                    ? patch_over_refinement(edit.removed_cells)
-                                    : patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells));
-  const bool has_nodes = mesh_.has_nodes() || !edit.inserted_nodes.empty();
-  if (has_nodes && !trial.in_contact) options.predicted = trial.predicted;
-  trial.is_asked = trial.was_previewed = true;
+    options.patch_over_vertex = is_refined && !trial.in_contact ? *patch_over_refinement(trial) : patch_over_vertex(trial);
+  if (has_curves(mesh_, edit) && !trial.in_contact) options.predicted = trial.gain;
+  trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);
 }

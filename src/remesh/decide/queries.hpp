@@ -45,20 +45,19 @@ class RemeshQueries {
   bool is_cancelled() const { return context_.newton.is_cancelled(); }
 
   double rest_length(const EdgeKey& e) const { return (mesh_.rest(e[0]) - mesh_.rest(e[1])).norm(); }
-  bool exists(const Place& place) const {
-    const auto e = place.vertices();
-    if (place.is_vertex()) return mesh_.is_vertex_alive(e[0]);
-    return mesh_.is_vertex_alive(e[0]) && mesh_.is_vertex_alive(e[1]) && mesh_.are_joined(e[0], e[1]);
-  }
+  bool exists(const Candidate& candidate) const;
   bool is_surface(const EdgeKey& e) const {
     return any_facet_at(e, [](FacetId) { return true; });
   }
-  /// Why an edge, by its lengths, cannot be split or may not collapse.
+  /// Returns why an edge, by its lengths, cannot be split or may not collapse.
   Refusal refuse_split(const EdgeKey& e) const;
   Refusal refuse_collapse(const EdgeKey& e) const;
-  /// Why an edge cannot be curved.
-  Refusal refuse_curve(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
-  Refusal refuse_straighten(const EdgeKey& e) const;
+  /// Returns why an edge cannot be curved, as far as its cells and lengths tell.
+  Refusal refuse_curve(const EdgeKey& e) const;
+  /// Whether a curve of a surface edge would be in reach of something else.
+  bool may_touch(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
+    return has_contact() && is_surface(e) && touches_within(e, reach(e), scratch);
+  }
   /// Why a curved edge cannot be replaced by its chords.
   Refusal refuse_chords(const EdgeKey& e) const;
   /// How far a curved edge of the surface leaves its chords [m]; 0 where it is straight or nothing can touch it.
@@ -67,22 +66,25 @@ class RemeshQueries {
   bool overhangs(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
   /// Whether one of these cells is curved and distorted.
   bool is_distorted(std::span<const CellId> cells) const;
-  /// Whether contact acts on the surface at an edge of it, so that the bulk terms alone do not tell what an edit gains.
-  bool is_in_contact(const EdgeKey& e, LocalScratch<Dim>& scratch) const;
-  /// Finds out whether a trial's edge is in contact.
+  /// Whether contact acts on the surface at an edge, so that the bulk terms alone do not tell what an edit gains.
+  bool is_in_contact(const Candidate& candidate, LocalScratch<Dim>& scratch) const {
+    return has_contact() && candidate.is_edge() &&
+           touches_within(candidate.edge(), context_.contact.activation_distance, scratch);
+  }
+  /// Finds out whether a trial is in contact, and notes that the surface around its edge was read.
   void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;
-  /// How much the deformation and the history vary over the cells around an edge or a vertex. No edit gains or
-  /// loses energy where both are linear. [J, times the scaling, up to a factor]
-  double roughness(const Place& place) const;
+  /// Returns how much the deformation and the history vary over the cells around a candidate. No edit gains or loses energy
+  /// where both are linear. [J, times the scaling, up to a factor]
+  double roughness(const Candidate& candidate) const;
 
   /// Whether predictions may leave out trials.
   bool screens() const { return !baseline_ || baseline_->predicts(); }
-  /// Gain [J] below which a swap or a move only stirs the mesh: a small share of what a split has to gain.
+  /// Gain [J] below which a swap or a move only stirs the mesh: a small fraction of what a split has to gain.
   double least_worthwhile() const { return screens() ? 0.05 * options_.split.acceptance_tolerance.value() : 0; }
   /// See prediction.hpp.
   double predict(const Edit<Dim>& edit) const { return predict_gain<Dim>(state(), edit); }
-  /// `surface_read`, unless null, grows by what was read of the surface: what was looked at beside edits that move it there
-  /// is looked at again.
+  /// `surface_read`, unless null, grows by what was read of the surface: what was evaluated beside edits that move it there
+  /// is evaluated again.
   double predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   double predict_curve(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
   double predict_straighten(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read = nullptr) const;
@@ -91,26 +93,26 @@ class RemeshQueries {
   double predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch,
                           Box<Dim>* surface_read = nullptr) const;
   bool any_is_curved(std::span<const CellId> cells) const {
-    return mesh_.has_nodes() && std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh_.is_curved(c); });
+    return std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh_.is_curved(c); });
   }
   /// Energy of a cell, which need not be in the mesh, on the nodes of an edit at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body, const Edit<Dim>& edit) const {
     return cell_energy<Dim>(state(), cell, body, edit);
   }
-  /// Whether the prediction of an edit of these cells tells that its patch cannot gain the tolerance [J] either.
-  bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance) const {
-    return screens() &&
-           at_most(predicted, patch_over_vertex<Dim>(largest_poisson_ratio(cells))) < context_.scaling * tolerance;
-  }
-  /// Tells whether an edit promises too little for a trial. A split or a curve that may be in contact is not judged by its
-  /// prediction, which knows nothing of contact, unless far too little is promised where edges are curved.
-  bool is_hopeless(std::span<const CellId> cells, double predicted, double tolerance, bool in_contact) const {
-    if (in_contact && !may_have_curves()) return false;
-    const double factor = in_contact ? kPatchOverPredictionInContact<Dim> : patch_over_refinement(cells);
+  /// Whether the prediction of an edit tells that a patch, which gains at most `factor` as much, cannot gain the tolerance
+  /// [J] either.
+  bool is_hopeless(double predicted, double factor, double tolerance) const {
     return screens() && at_most(predicted, factor) < context_.scaling * tolerance;
   }
-  /// Decides about the edit of a trial that has to gain `tolerance` [J].
-  void judge(Trial<Dim>& trial, double tolerance, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
+  /// Factors of prediction.hpp for a trial.
+  double patch_over_vertex(const Trial<Dim>& trial) const {
+    return itr::patch_over_vertex<Dim>(largest_poisson_ratio(cells_of(trial)));
+  }
+  /// Factor of a split or a curve. In contact trials tell, since the prediction knows nothing of it; but where edges are
+  /// curved far too little can be promised even there.
+  std::optional<double> patch_over_refinement(const Trial<Dim>& trial) const;
+  /// Decides about the edit of a trial.
+  void judge(Trial<Dim>& trial, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const;
 
  private:
   template <typename Condition>
@@ -120,12 +122,10 @@ class RemeshQueries {
       return std::find(mesh_.facet(f).begin(), mesh_.facet(f).end(), e[1]) != mesh_.facet(f).end() && holds(f);
     });
   }
-  /// Whether the surface at an edge of it is nearer than that to something else.
+  /// Whether the surface at an edge is nearer than this distance to something else.
   bool touches_within(const EdgeKey& e, double distance, LocalScratch<Dim>& scratch) const;
   /// How near the surface at an edge comes within a step to what stands still [m].
   double reach(const EdgeKey& e) const;
-  /// Notes that the surface around a trial's edge was read.
-  void note_read(Trial<Dim>& trial) const;
   /// Whether halves of an edge would be shorter than dhat, at rest or now.
   bool has_short_halves(const EdgeKey& e) const;
   /// Tells whether the chords that the split of an edge would bring to the surface beside those halves are shorter than
@@ -134,11 +134,9 @@ class RemeshQueries {
   RemeshState<Dim> state() const { return state(baseline_ ? baseline_->history() : HistoryRule::function); }
   RemeshState<Dim> state(HistoryRule history) const { return {mesh_, fields_, context_, gate_.present(), history}; }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
-  bool may_have_curves() const { return options_.curve.enabled || mesh_.has_nodes(); }
-  /// See prediction.hpp; of a split or a curve of these cells.
-  double patch_over_refinement(std::span<const CellId> cells) const {
-    const double nu = largest_poisson_ratio(cells);
-    return may_have_curves() ? patch_over_nodes<Dim>(nu) : patch_over_vertex<Dim>(nu);
+  /// Cells that a trial's edit replaces, or that it will.
+  std::vector<CellId> cells_of(const Trial<Dim>& trial) const {
+    return trial.edit ? trial.edit->removed_cells : mesh_.cells_of_edge(trial.edge());
   }
 
   const Mesh<Dim>& mesh_;

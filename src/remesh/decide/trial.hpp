@@ -33,21 +33,22 @@ struct Verdict {
   }
 };
 
-/// Findings about a candidate on the mesh as it was when its wave began.
+/// Findings about a candidate on the mesh as it was when its batch began.
 template <int Dim>
 struct Trial {
-  PlaceQueue::Entry candidate;
+  CandidateQueue::Entry entry;
   std::optional<Edit<Dim>> edit{};
-  double signal = 0;                  ///< see RemeshMemory
-  std::optional<double> predicted{};  ///< gain of the vertex and nodes that the edit sets [J, times the scaling]
+  double key = 0;        ///< of a refusal, see RemeshMemory
+  double gain = 0;       ///< predicted [J, times the scaling]
+  double tolerance = 0;  ///< least gain [J]
   bool in_contact = false;
-  bool is_asked = false;  ///< a refusal is to be remembered
   bool was_previewed = false;
   Box<Dim> surface_read{};  ///< of the present one
   double seconds = 0;       ///< of the preview
   Verdict<Dim> verdict{};
 
-  EdgeKey edge() const { return candidate.place.edge(); }
+  const Candidate& candidate() const { return entry.candidate; }
+  EdgeKey edge() const { return entry.candidate.edge(); }
   void refuse(Refusal reason) { verdict.refusal = reason; }
   /// Takes the edit of a proposal, or the reason why there is none. Returns whether there is one.
   bool take(Proposal<Dim> proposal) {
@@ -55,10 +56,10 @@ struct Trial {
     if (!edit) refuse(proposal.refusal);
     return edit.has_value();
   }
-  /// As before it was looked at; the memory of lists stays.
+  /// As before it was evaluated; the memory of lists stays.
   void clear() {
     verdict.clear();
-    *this = Trial{.candidate = candidate, .verdict = std::move(verdict)};
+    *this = Trial{.entry = entry, .verdict = std::move(verdict)};
   }
 };
 

@@ -62,9 +62,4 @@ double worst_quality(const Mesh<Dim>& mesh, std::span<const CellId> cells) {
   return worst;
 }
 
-template <int Dim>
-Proposal<Dim> refused(Refusal refusal) {
-  return {.refusal = refusal};
-}
-
 }  // namespace itr

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
+// Swaps. Only one that betters the shape may cost a little energy: without that condition, edges swap to and fro.
 #include <algorithm>
 #include <span>
 #include <unordered_map>
 
 #include "remesh/edits/edit_checks.hpp"
-#include "remesh/schedule/wave.hpp"
+#include "remesh/schedule/pipeline.hpp"
 
 namespace itr {
 
@@ -28,7 +29,7 @@ double valence_gain(const Mesh<2>& mesh, const EdgeKey& edge) {
   return gain;
 }
 
-constexpr double kBetter = 1.2;  ///< of the worst quality: by how much a swap betters a shape
+constexpr double kBetter = 1.2;  ///< least factor of the worst quality by which a swap betters a shape
 
 /// Worst quality of the cells that an edit makes over that of those that it removes.
 double shape_gain(const Mesh<3>& mesh, const Edit<3>& edit) {
@@ -38,144 +39,97 @@ double shape_gain(const Mesh<3>& mesh, const Edit<3>& edit) {
   return after / worst_quality<3>(mesh, edit.removed_cells);
 }
 
-/// Least gain of a swap that does not improve the shape [J].
-template <int Dim>
-double least_gain(const RemeshQueries<Dim>& ask) {
-  return std::max(ask.least_worthwhile(), ask.options().swap.acceptance_tolerance.value());
+/// Sets the least gain of a swap: for each node that it adds, that of a curve more.
+template <int Dim, typename Betters>
+void set_tolerance(RemeshSession<Dim>& session, Operation<Dim>& swap, const Betters& betters_shape) {
+  swap.tolerance = [&session, betters_shape](const Trial<Dim>& trial) {
+    const RemeshQueries<Dim>& queries = session.queries();
+    const bool for_shape = betters_shape(*trial.edit) && session.shape_matters(trial.candidate(), trial.key);
+    const double tolerance = queries.options().swap.acceptance_tolerance.value();
+    const double least = for_shape ? tolerance : std::max(queries.least_worthwhile(), tolerance);
+    return least + std::max(trial.edit->added_nodes(), 0) * queries.options().curve_tolerance();
+  };
+  swap.patch_over_prediction = [](const Trial<Dim>& trial) { return trial.in_contact ? std::nullopt : std::optional(1.0); };
 }
 
-/// Least gain of a swap [J]: `least`, and for each node that it adds that of a curve.
-template <int Dim>
-double with_nodes(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
-  const int added = edit.added_nodes();
-  return added <= 0 ? least : least + added * ask.options().curve_tolerance();
+/// Runs swaps of edges, each of which is tried up to max_depth times. `priority`(edge, whether an edge was evaluated yet).
+template <int Dim, typename Priority>
+void run_edge_swaps(RemeshSession<Dim>& session, Operation<Dim>& swap, const Priority& priority) {
+  std::unordered_map<EdgeKey, int, EdgeKeyHash> tries;
+  bool has_begun = false;
+  swap.refuse = [&](const Candidate& candidate) {
+    const auto it = tries.find(candidate.edge());
+    const bool is_over = it != tries.end() && it->second >= session.queries().options().swap.max_depth;
+    return is_over ? Refusal::depth : Refusal::none;
+  };
+  swap.priority = [&](const Candidate& candidate) { return priority(candidate.edge(), has_begun); };
+  swap.after = [&](const Trial<Dim>& trial, bool) {
+    has_begun = true;
+    if (trial.was_previewed) ++tries[trial.edge()];
+  };
+  run_operations<Dim>(session, {&swap});
 }
 
-/// Whether the prediction from bulk terms reaches `least` [J].
-template <int Dim>
-bool is_promising(const RemeshQueries<Dim>& ask, const Edit<Dim>& edit, double least) {
-  return !ask.screens() || ask.predict(edit) >= ask.context().scaling * least;
-}
-
-/// The differences between the dimensions: the order of edges, and what replaces an edge. Only a swap that improves the
-/// shape may cost a little energy: without that condition, edges swap to and fro.
-struct DiagonalSwap {
-  const RemeshQueries<2>& ask;
-  bool may_go(const EdgeKey& edge) const { return !ask.is_surface(edge); }
-  double priority(const EdgeKey& edge) const { return valence_gain(ask.mesh(), edge); }
-  Proposal<2> propose(const EdgeKey& edge) const { return propose_diagonal_swap(ask.mesh(), ask.strata(), edge); }
-  bool betters_shape(const EdgeKey& edge, const Edit<2>&) const { return valence_gain(ask.mesh(), edge) > 0; }
-  /// Edges to be asked again after a swap, from all around or where cells are new.
-  static constexpr bool kAsksAllAround = true;
-  bool is_worth_asking_again(const EdgeKey& edge) const { return valence_gain(ask.mesh(), edge) > 0; }
-};
-
-/// Removes an edge such that the energy of the new tetrahedra is least. At frozen positions this energy is a sum over
-/// tetrahedra.
-struct EdgeRemoval {
-  const RemeshQueries<3>& ask;
-  bool may_go(const EdgeKey&) const { return true; }  // in the volume and within flat patches, as strata say
-  double priority(const EdgeKey& edge) const { return -worst_quality<3>(ask.mesh(), ask.mesh().cells_of_edge(edge)); }
-  Proposal<3> propose(const EdgeKey& edge) const {
-    return propose_edge_removal(ask.mesh(), ask.strata(), edge, [&](const auto& cell, int body, const Edit<3>& edit) {
-      return ask.energy_of(cell, body, edit);
-    });
-  }
-  bool betters_shape(const EdgeKey&, const Edit<3>& edit) const { return shape_gain(ask.mesh(), edit) > kBetter; }
-  static constexpr bool kAsksAllAround = false;
-  bool is_worth_asking_again(const EdgeKey&) const { return true; }
-};
-
-template <int Dim, typename Policy>
-class Swapper {
- public:
-  explicit Swapper(RemeshSession<Dim>& session)
-      : session_(session), ask_(session.ask()), options_(ask_.options().swap), policy_{ask_} {}
-
-  std::optional<PlaceQueue::Entry> rank(const Place& place, LocalScratch<Dim>&) const {
-    const EdgeKey edge = place.edge();
-    if (!policy_.may_go(edge) || (has_begun_ && !policy_.is_worth_asking_again(edge))) return std::nullopt;
-    return PlaceQueue::Entry{.place = place, .priority = policy_.priority(edge)};
-  }
-
-  void look(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const {
-    const EdgeKey edge = trial.edge();
-    if (const auto it = tries_.find(edge); it != tries_.end() && it->second >= options_.max_depth)
-      return trial.refuse(Refusal::depth);
-    if (!ask_.exists(edge)) return trial.refuse(Refusal::gone);
-    trial.signal = ask_.roughness(edge);
-    ask_.find_contact(trial, scratch);
-    if (session_.memory().was_refused(RemeshMemory::swap, edge, trial.signal, trial.in_contact)) return;
-    if (!trial.take(policy_.propose(edge))) return;
-    const bool for_shape = policy_.betters_shape(edge, *trial.edit) && session_.shape_matters(edge, trial.signal);
-    const double least = with_nodes(ask_, *trial.edit, for_shape ? *options_.acceptance_tolerance : least_gain(ask_));
-    trial.is_asked = true;
-    if (!trial.in_contact && !is_promising(ask_, *trial.edit, least))  // there trials tell
-      return trial.refuse(Refusal::prediction);
-    ask_.judge(trial, least, ask_.options().local, scratch);
-  }
-
-  void settle(Trial<Dim>& trial, std::vector<Place>& fresh) {
-    has_begun_ = true;
-    OperationCount& count = session_.report().swaps;
-    count.note(trial.verdict.refusal);
-    if (!trial.is_asked) return;
-    if (trial.was_previewed) ++tries_[trial.edge()];
-    if (!trial.was_previewed || !session_.commits().commit(trial, count)) {
-      session_.memory().remember(RemeshMemory::swap, trial.edge(),
-                                 {trial.signal / kSameSignal, trial.signal * kSameSignal, trial.in_contact});
-      return;
-    }
-    const std::span<const CellId> patch(trial.verdict.patch);
-    const auto near =
-        edges_of<Dim>(ask_.mesh(), Policy::kAsksAllAround ? patch : patch.last(trial.edit->inserted_cells.size()));
-    fresh.insert(fresh.end(), near.begin(), near.end());
-  }
-
- private:
-  RemeshSession<Dim>& session_;
-  const RemeshQueries<Dim>& ask_;
-  const SwapOptions& options_;
-  Policy policy_;
-  bool has_begun_ = false;
-  std::unordered_map<EdgeKey, int, EdgeKeyHash> tries_;
-};
-
-/// Removes facets between present cells, each once, only for a gain of energy. Leaves out facets whose removal an edge
-/// removal would undo to improve the shape.
+/// Removes facets between cells that are there at first, each once, in the order of their vertices and only for a gain of
+/// energy. Leaves out those whose removal an edge removal would undo to improve the shape.
 void remove_facets(RemeshSession<3>& session) {
-  const RemeshQueries<3>& ask = session.ask();
-  const Mesh<3>& mesh = ask.mesh();
-  const double least = least_gain(ask);
-  const CellId end = mesh.cell_slots();
-  for (CellId c = 0; c < end; ++c)
-    for (int k = 0; k < 4 && mesh.is_cell_alive(c); ++k) {
-      if (ask.is_cancelled()) return;
-      const auto facet = opposite_facet<3>(mesh.cell(c), k);
-      auto proposal = propose_facet_removal(mesh, facet);
-      if (!proposal) continue;
-      const auto& cells = proposal.edit->removed_cells;
-      if (std::min(cells[0], cells[1]) != c || shape_gain(mesh, *proposal.edit) < 1 / kBetter) continue;
-      const double required = with_nodes(ask, *proposal.edit, least);
-      if (!is_promising(ask, *proposal.edit, required)) continue;
-      Trial<3> trial{.candidate = {.place = proposal.edit->edge, .priority = 0}, .edit = std::move(proposal.edit)};
-      session.commits().begin_wave();
-      ask.judge(trial, required, ask.options().local, session.scratch());
-      session.report().swaps.note(trial.verdict.refusal);
-      session.commits().commit(trial, session.report().swaps);
-    }
+  const Mesh<3>& mesh = session.queries().mesh();
+  Operation<3> removal(session, OperationKind::remove_facet, &RemeshReport::swaps, 0);
+  set_tolerance(session, removal, [](const Edit<3>&) { return false; });
+  removal.list = [&] {
+    std::vector<Candidate> sides, found;
+    for (CellId c = 0; c < mesh.cell_slots(); ++c)
+      for (int k = 0; k < 4 && mesh.is_cell_alive(c); ++k)
+        sides.emplace_back(OperationKind::remove_facet, opposite_facet<3>(mesh.cell(c), k));
+    std::sort(sides.begin(), sides.end());
+    for (auto side = sides.begin(); (side = std::adjacent_find(side, sides.end())) != sides.end(); ++side)
+      found.push_back(*side);
+    return found;
+  };
+  removal.priority = [](const Candidate&) { return 0.0; };
+  removal.propose = [&](const Candidate& candidate, auto&) {
+    auto proposal = propose_facet_removal(mesh, candidate.facet());
+    if (proposal && shape_gain(mesh, *proposal.edit) < 1 / kBetter) return refused<3>(Refusal::shape);
+    return proposal;
+  };
+  removal.is_candidate = [](const EdgeKey&) { return false; };
+  run_operations<3>(session, {&removal});
 }
 
 }  // namespace
 
+/// Most gain of valence first; after the first swap, edges that gain none are left out.
 void swap_edges(RemeshSession<2>& session) {
-  Swapper<2, DiagonalSwap> swapper(session);
-  run_waves(session, swapper, places(session.ask().mesh().edges()));
+  const RemeshQueries<2>& queries = session.queries();
+  const Mesh<2>& mesh = queries.mesh();
+  Operation<2> swap(session, OperationKind::swap, &RemeshReport::swaps, 0);
+  set_tolerance(session, swap, [&](const Edit<2>& edit) { return valence_gain(mesh, edit.edge) > 0; });
+  swap.propose = [&](const Candidate& candidate, auto&) {
+    return propose_diagonal_swap(mesh, queries.strata(), candidate.edge());
+  };
+  // Valences change all around.
+  swap.edges_to_ask = [&](const Trial<2>& trial) { return edges_of<2>(mesh, trial.verdict.patch); };
+  run_edge_swaps(session, swap, [&](const EdgeKey& edge, bool has_begun) -> std::optional<double> {
+    const double gain = valence_gain(mesh, edge);
+    if (queries.is_surface(edge) || (has_begun && gain <= 0)) return std::nullopt;
+    return gain;
+  });
 }
 
+/// Removes edges, in the volume or within a flat patch, such that the energy of the new tetrahedra is least, worst shape
+/// first. At frozen positions this energy is a sum over tetrahedra.
 void swap_edges(RemeshSession<3>& session) {
-  Swapper<3, EdgeRemoval> swapper(session);
-  run_waves(session, swapper, places(session.ask().mesh().edges()));
+  const RemeshQueries<3>& queries = session.queries();
+  const Mesh<3>& mesh = queries.mesh();
+  Operation<3> removal(session, OperationKind::swap, &RemeshReport::swaps, 0);
+  set_tolerance(session, removal, [&](const Edit<3>& edit) { return shape_gain(mesh, edit) > kBetter; });
+  const auto cost = [&](const auto& cell, int body, const Edit<3>& edit) { return queries.energy_of(cell, body, edit); };
+  removal.propose = [&](const Candidate& candidate, auto&) {
+    return propose_edge_removal(mesh, queries.strata(), candidate.edge(), cost);
+  };
+  run_edge_swaps(session, removal, [&](const EdgeKey& edge, bool) {
+    return std::optional(-worst_quality<3>(mesh, mesh.cells_of_edge(edge)));
+  });
   remove_facets(session);
 }
 

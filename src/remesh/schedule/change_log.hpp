@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "itr/remesh/place.hpp"
+#include "itr/remesh/candidate.hpp"
 #include "remesh/decide/local_problem.hpp"
 
 namespace itr {
@@ -31,7 +31,7 @@ class ChangeLog {
   using Position = typename LocalProblem<Dim>::Position;
   /// `x`: positions [m]. The surface is logged where something can touch it.
   ChangeLog(Mesh<Dim>& mesh, const VectorX& x, bool logs_surface)
-      : mesh_(mesh), x_(x), logs_surface_(logs_surface), touched_(mesh.vertex_slots()) {}
+      : mesh_(mesh), x_(x), logs_surface_(logs_surface), touched_(mesh.node_slots()) {}
   /// Followers are called in the order in which they were added.
   void add_follower(std::function<void(const Change<Dim>&)> follower) { followers_.push_back(std::move(follower)); }
   /// Applies an edit with the positions to which it relaxed.
@@ -39,14 +39,14 @@ class ChangeLog {
 
   /// Number of the last commit.
   unsigned now() const { return static_cast<unsigned>(surfaces_.size()); }
-  /// Whether a commit after `since` replaced cells at an edge or a vertex, or moved a vertex of these.
-  bool has_changed_around(const Place& place, unsigned since) const {
-    return std::ranges::any_of(place.vertices(), [&](VertexId v) { return touched_[v].last_around > since; });
+  /// Whether a commit after `since` replaced cells at a vertex of a candidate, or moved a vertex of these.
+  bool has_changed_around(const Candidate& candidate, unsigned since) const {
+    return std::ranges::any_of(candidate.vertices(), [&](VertexId v) { return touched_[v].last_around > since; });
   }
   /// Whether the first commit that did so was one up to `until`.
-  bool had_changed_around(const Place& place, unsigned until) const {
+  bool had_changed_around(const Candidate& candidate, unsigned until) const {
     const auto had = [&](VertexId v) { return touched_[v].first_around > 0 && touched_[v].first_around <= until; };
-    return std::ranges::any_of(place.vertices(), had);
+    return std::ranges::any_of(candidate.vertices(), had);
   }
   /// Whether one moved a vertex or gave it other cells.
   bool was_written(VertexId v, unsigned since) const { return touched_[v].written > since; }

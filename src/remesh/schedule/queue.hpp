@@ -7,23 +7,25 @@
 #include <unordered_map>
 #include <vector>
 
-#include "itr/remesh/place.hpp"
+#include "itr/remesh/candidate.hpp"
 
 namespace itr {
 
-/// Places in order of descending priority, ties by their own. One that is pushed again moves. Priorities
+/// Candidates in order of descending priority, ties by their own. One that is pushed again moves. Priorities
 /// count to four digits: those of mirror images differ by the round-off of a solve, which is not to decide what is done
 /// first.
-class PlaceQueue {
+class CandidateQueue {
  public:
   struct Entry {
-    Place place;
+    Candidate candidate;
     double priority;
-    unsigned since = 0;        ///< commit after which that was found
-    bool is_hopeless = false;  ///< nothing to gain, then
+    unsigned since = 0;            ///< commit after which it was ranked
+    std::optional<double> gain{};  ///< predicted for the rank [J, times the scaling]; none: not asked for
+    double key = 0;                ///< of a refusal, then
+    bool is_hopeless = false;      ///< too little to gain, then
   };
 
-  /// Several at once, each place once.
+  /// Several at once, each candidate once.
   void push(std::vector<Entry> entries) {
     if (!heap_.empty() || !last_.empty()) {
       for (const Entry& entry : entries) push(entry);
@@ -35,7 +37,7 @@ class PlaceQueue {
   }
   void push(Entry entry) {
     entry.priority = rounded(entry.priority);
-    last_[entry.place] = entry.priority;
+    last_[entry.candidate] = entry.priority;
     heap_.push_back(entry);
     std::push_heap(heap_.begin(), heap_.end(), is_after);
   }
@@ -46,7 +48,7 @@ class PlaceQueue {
       const Entry entry = heap_.back();
       heap_.pop_back();
       if (last_.empty()) return entry;
-      const auto it = last_.find(entry.place);
+      const auto it = last_.find(entry.candidate);
       if (it == last_.end()) return entry;
       if (it->second != entry.priority) continue;  // moved, or popped since
       it->second.reset();
@@ -62,11 +64,11 @@ class PlaceQueue {
     return std::isfinite(priority) ? std::ldexp(std::round(fraction * 16384), exponent - 14) : priority;
   }
   static bool is_after(const Entry& a, const Entry& b) {
-    return a.priority != b.priority ? a.priority < b.priority : a.place > b.place;
+    return a.priority != b.priority ? a.priority < b.priority : a.candidate > b.candidate;
   }
   std::vector<Entry> heap_;
-  /// Priorities of places that did not come first; none: popped.
-  std::unordered_map<Place, std::optional<double>, Place::Hash> last_;
+  /// Priorities of those that did not come first; none: popped.
+  std::unordered_map<Candidate, std::optional<double>, Candidate::Hash> last_;
 };
 
 }  // namespace itr

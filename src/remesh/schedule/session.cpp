@@ -12,18 +12,19 @@ namespace itr {
 template <int Dim>
 RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                                   const RemeshOptions& options, std::unique_ptr<Baseline<Dim>> baseline,
-                                  const RemeshMemory& memory, Strata<Dim>& strata)
+                                  RemeshMemory& memory, Strata<Dim>& strata)
     : baseline_(std::move(baseline)),
+      fields_(fields),
+      stored_(memory),
       gate_(mesh, fields, context),
       log_(mesh, fields.x, context.contact.enabled),
-      ask_(mesh, fields, context, options, strata, gate_, baseline_.get()),
+      queries_(mesh, fields, context, options, strata, gate_, baseline_.get()),
       memory_(memory, !baseline_ || baseline_->has_bounds(), log_),
-      commits_(mesh, gate_, log_),
       lanes_(context.host.empty() ? num_threads() : 1) {  // terms of the program may not be for several threads
   if (strata.empty()) strata = Strata<Dim>(mesh);
   ITR_AUDIT(strata.find_defect(mesh).empty(), strata.find_defect(mesh));
   log_.add_follower([&](const Change<Dim>& change) {
-    fields.make_room(mesh.vertex_slots());
+    fields.make_room(mesh.node_slots());
     fields.follow(change.edit, change.created, change.first_node);
     for (const auto& [v, x] : change.positions) fields.x.template segment<Dim>(Dim * v) = x;
   });
@@ -36,23 +37,43 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   log_.add_follower([&](const Change<Dim>& change) { memory_.follow(mesh, change); });
   log_.add_follower([&](const Change<Dim>&) {
     ITR_AUDIT(mesh.find_defect().empty(), mesh.find_defect());
-    [[maybe_unused]] const auto inverted = [&](const VectorX& x) {
-      return find_inverted(mesh, x, [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
-    };
-    ITR_AUDIT(inverted(fields.x) == kNone, inverted(fields.x));
-    for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(inverted(past) == kNone);
+    ITR_AUDIT(find_inverted(mesh, fields.x) == kNone, find_inverted(mesh, fields.x));
+    for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(find_inverted(mesh, past) == kNone);
   });
 }
 
 template <int Dim>
-bool RemeshSession<Dim>::shape_matters(const Place& place, double roughness) const {
-  if (!ask_.screens() || roughness >= ask_.context().scaling * ask_.least_worthwhile() || memory_.was_gain(place))
+bool RemeshSession<Dim>::commit_unjudged(const Edit<Dim>& edit, OperationCount& count) {
+  if (!gate_.passes(edit, scratch().gate)) {
+    count.note(Refusal::invalid);
+    return false;
+  }
+  log_.commit(edit, {});
+  ++count.accepted;
+  return true;
+}
+
+template <int Dim>
+RemeshReport RemeshSession<Dim>::finish() {
+  fields_.trim(queries_.mesh().node_slots());
+  stored_.refusals = memory_.remembered(queries_);
+  if (trial_seconds_.empty()) return report_;
+  const auto middle = trial_seconds_.begin() + static_cast<std::ptrdiff_t>(trial_seconds_.size() / 2);
+  std::nth_element(trial_seconds_.begin(), middle, trial_seconds_.end());
+  report_.trial_seconds = *middle;
+  return report_;
+}
+
+template <int Dim>
+bool RemeshSession<Dim>::shape_matters(const Candidate& candidate, double roughness) const {
+  if (!queries_.screens() || roughness >= queries_.context().scaling * queries_.least_worthwhile() ||
+      memory_.was_gain(candidate))
     return true;
-  const Mesh<Dim>& mesh = ask_.mesh();
-  const auto around = mesh.cells_of(place.vertices().front());
+  const Mesh<Dim>& mesh = queries_.mesh();
+  const auto around = mesh.cells_of(candidate.vertices().front());
   return std::any_of(around.begin(), around.end(), [&](CellId c) {
     const auto& cell = mesh.cell(c);
-    return std::find(cell.begin(), cell.end(), place.vertices().back()) != cell.end() &&
+    return std::find(cell.begin(), cell.end(), candidate.vertices().back()) != cell.end() &&
            mesh.quality(c) < QualityRule{}.floor;
   });
 }

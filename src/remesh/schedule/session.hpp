@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// State that all operations of one call of the remesher share: queries, memory, committer.
+// State that all operations of one call of the remesher share: queries, memory and the one way in which edits get into the
+// mesh.
 #pragma once
 
 #include <atomic>
@@ -7,10 +8,11 @@
 #include <memory>
 #include <vector>
 
-#include "committer.hpp"
+#include "change_log.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
+#include "itr/remesh/report.hpp"
 #include "remesh/baselines/baseline.hpp"
 #include "remesh/decide/queries.hpp"
 #include "session_memory.hpp"
@@ -21,31 +23,31 @@ template <int Dim>
 class RemeshSession {
  public:
   RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context, const RemeshOptions& options,
-                std::unique_ptr<Baseline<Dim>> baseline, const RemeshMemory& memory, Strata<Dim>& strata);
+                std::unique_ptr<Baseline<Dim>> baseline, RemeshMemory& memory, Strata<Dim>& strata);
   RemeshSession(const RemeshSession&) = delete;
   RemeshSession& operator=(const RemeshSession&) = delete;
 
-  const RemeshQueries<Dim>& ask() const { return ask_; }
+  const RemeshQueries<Dim>& queries() const { return queries_; }
   SessionMemory<Dim>& memory() { return memory_; }
   const SessionMemory<Dim>& memory() const { return memory_; }
-  Committer<Dim>& commits() { return commits_; }
+  ChangeLog<Dim>& log() { return log_; }
+  const ChangeLog<Dim>& log() const { return log_; }
+  const Gate<Dim>& gate() const { return gate_; }
   /// Null where options choose none.
   Baseline<Dim>* baseline() { return baseline_.get(); }
   const Baseline<Dim>* baseline() const { return baseline_.get(); }
   RemeshReport& report() { return report_; }
+  std::vector<double>& trial_seconds() { return trial_seconds_; }
+  /// Commits an edit without relaxing, if the gate lets it pass. Returns whether it did, and counts it.
+  bool commit_unjudged(const Edit<Dim>& edit, OperationCount& count);
+  /// Ends the fields behind the mesh's vertices, stores the refusals and returns the report.
+  RemeshReport finish();
 
   /// Whether badly shaped cells at an edge or a vertex do harm. They do where the fields vary enough, where an
   /// edit nearby gained energy, and where a shape is so bad that rules only allow it to improve. Elsewhere swaps and moves
   /// for better shapes would be wasted work.
-  bool shape_matters(const Place& place, double roughness) const;
-  /// Whether bulk terms at an entry's place are as they were when it was stamped.
-  bool is_unchanged(const PlaceQueue::Entry& entry) const { return !log_.has_changed_around(entry.place, entry.since); }
-  PlaceQueue::Entry stamped(PlaceQueue::Entry entry) const {
-    entry.since = log_.now();
-    return entry;
-  }
-
-  /// Threads that look at candidates at the same time.
+  bool shape_matters(const Candidate& candidate, double roughness) const;
+  /// Threads that evaluate candidates at the same time.
   int num_lanes() const { return static_cast<int>(lanes_.size()); }
   /// Calls f(i, scratch) for all i below n, on all of them.
   template <typename F>
@@ -60,17 +62,18 @@ class RemeshSession {
 
  private:
   std::unique_ptr<Baseline<Dim>> baseline_;
+  RemeshFields<Dim>& fields_;
+  RemeshMemory& stored_;
   Gate<Dim> gate_;
   ChangeLog<Dim> log_;
-  RemeshQueries<Dim> ask_;
+  RemeshQueries<Dim> queries_;
   SessionMemory<Dim> memory_;
-  Committer<Dim> commits_;
   std::deque<LocalScratch<Dim>> lanes_;
   RemeshReport report_;
+  std::vector<double> trial_seconds_;
 };
 
-/// The operations, one file each; splits and curves share one queue, and so do collapses and straightenings. They count what
-/// they do in session.report().
+/// The operations, by their queues. They count what they do in session.report().
 template <int Dim>
 void refine_edges(RemeshSession<Dim>& session);
 template <int Dim>

@@ -2,8 +2,8 @@
 // Memory of operations during one call of the remesher; refusals also from step to step.
 #pragma once
 
-#include <array>
 #include <unordered_map>
+#include <vector>
 
 #include "change_log.hpp"
 #include "itr/remesh/memory.hpp"
@@ -11,27 +11,27 @@
 
 namespace itr {
 
-/// Change of a signal by which a refusal no longer holds.
-inline constexpr double kSameSignal = 1.2;
+/// Change of a refusal key by which a refusal no longer holds.
+inline constexpr double kSameKey = 1.2;
 
 template <int Dim>
 class SessionMemory {
  public:
   /// `remembers`: refusals.
   SessionMemory(const RemeshMemory& memory, bool remembers, const ChangeLog<Dim>& log);
-  /// Forgets refusals of the edges of new cells.
+  /// Forgets refusals at the edges and facets of new cells.
   void follow(const Mesh<Dim>& mesh, const Change<Dim>& change);
-  /// Refusals of edges that are still there.
-  RemeshMemory::Refusals remembered(const RemeshQueries<Dim>& ask) const;
+  /// Refusals of candidates that are still there.
+  std::vector<RemeshMemory::Entry> remembered(const RemeshQueries<Dim>& queries) const;
 
-  /// Whether the same edit was refused before and its signal is still in the refusal's range.
-  bool was_refused(RemeshMemory::Kind kind, const Place& place, double signal, bool in_contact) const {
+  /// Whether the candidate was refused before and its refusal key is still in the refusal's range.
+  bool was_refused(const Candidate& candidate, double key, bool in_contact) const {
     if (!remembers_) return false;
-    const auto it = refused_[kind].find(place);
-    return it != refused_[kind].end() && it->second.holds(signal, in_contact);
+    const auto it = refused_.find(candidate);
+    return it != refused_.end() && it->second.holds(key, in_contact);
   }
-  void remember(RemeshMemory::Kind kind, const Place& place, const RemeshMemory::SignalRange& range) {
-    if (remembers_) refused_[kind][place] = range;
+  void remember(const Candidate& candidate, const RemeshMemory::KeyRange& range) {
+    if (remembers_) refused_[candidate] = range;
   }
 
   /// Generations of an edge in this pass.
@@ -42,14 +42,14 @@ class SessionMemory {
   void set_depth(const EdgeKey& edge, int generation) { depth_[edge] = generation; }
   void forget_depths() { depth_.clear(); }
 
-  /// Marks the places of all commits so far as gains: cells there may be badly shaped.
+  /// Marks the surroundings of all commits so far as gains: cells there may be badly shaped.
   void mark_gains() { gains_until_ = log_.now(); }
-  bool was_gain(const Place& place) const { return log_.had_changed_around(place, gains_until_); }
+  bool was_gain(const Candidate& candidate) const { return log_.had_changed_around(candidate, gains_until_); }
 
  private:
   const ChangeLog<Dim>& log_;
   bool remembers_;
-  std::array<std::unordered_map<Place, RemeshMemory::SignalRange, Place::Hash>, RemeshMemory::kKinds> refused_;
+  std::unordered_map<Candidate, RemeshMemory::KeyRange, Candidate::Hash> refused_;
   std::unordered_map<EdgeKey, int, EdgeKeyHash> depth_;
   unsigned gains_until_ = 0;
 };
