@@ -234,7 +234,7 @@ class Numbers(Case):
         self.assertAlmostEqual(speed / (2 / 3 * 9.81 * math.sin(slope) * steps * dt), 1, delta=0.01)
 
     def test_a_thin_wall_that_touches_nothing_feels_no_contact(self):
-        box(self.folder / "wall.msh", (0.02, 0.02, 0.001), (6, 6, 2))
+        box(self.folder / "wall.msh", (0.004, 0.004, 0.001), (4, 4, 1))
         held = [{"id": 5, "value": [0, 0, 0], "dimension": [False, False, True]},
                 {"id": 6, "value": [0, 0, "-0.0003 * t"], "dimension": [False, False, True]},
                 {"id": 1, "value": [0, 0, 0], "dimension": [True, False, False]},
@@ -248,6 +248,8 @@ class Numbers(Case):
         with_contact = self.forces({**scene, "contact": {"enabled": True}})
         self.assertEqual(with_contact[0]["all_z"], 0)
         self.assertAlmostEqual(with_contact[-1]["all_z"] / alone, 1, delta=1e-6)
+        with_dhat_of_polyfem = self.forces({**scene, "contact": {"enabled": True, "dhat": 1e-3}})[-1]["all_z"]
+        self.assertGreater(abs(with_dhat_of_polyfem / alone - 1), 0.1)
 
     def test_plates_that_stick_hardly_creep(self):
         rectangle(self.folder / "plate.obj", 0.2, 0.02, 10, 1)

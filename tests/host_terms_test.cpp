@@ -159,6 +159,17 @@ TEST(HostForces, ThatHardlySettleAreWarnedOf) {
   EXPECT_NE(warnings.find("off those of the positions reached"), std::string::npos) << warnings;
 }
 
+TEST(HostForces, ThatDoNotSettleToTheToleranceCutTheStep) {
+  auto setup = between_springs(9000);
+  setup.lagging_tolerance = 1e-3;
+  setup.time.step_cuts = 3;
+  std::string warnings;
+  const StepResult result = step_of(setup, &warnings);
+  EXPECT_TRUE(result.ok) << result.reason;
+  EXPECT_GE(result.report.cut_steps, 2);
+  EXPECT_NE(warnings.find("expected at most 0.001 (/solver/lagging_tolerance)"), std::string::npos) << warnings;
+}
+
 TEST(HostForces, InACycleAreNoSolution) {
   // On the whole block, of its mass by the square of the time step: it goes there and back from round to round.
   auto setup = block<2>();

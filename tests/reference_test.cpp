@@ -11,6 +11,7 @@
 
 #include "itr/core/error.hpp"
 #include "itr/scene/scene.hpp"
+#include "scene/defaults.hpp"
 #include "scene/key_table.hpp"
 
 namespace itr::scene {
@@ -82,8 +83,8 @@ std::string options_of(const Scene& scene) {
       r.collapse.acceptance_tolerance.value_or(1e99), r.collapse.culling_threshold, r.collapse.rel_max_edge_length,
       r.swap.enabled, r.swap.acceptance_tolerance.value_or(1e99), r.smooth.enabled,
       r.smooth.acceptance_tolerance.value_or(1e99), r.local.rings, r.local.max_cells, r.local.max_iterations);
-  text += fmt::format("{} {} {} {} {} {}|", s.lump_mass, s.mesh.num_vertices(), fmt::join(s.linear.solvers, ","),
-                      s.linear.fallback.size(), s.linear.options.size(), s.damping.size());
+  text += fmt::format("{} {} {} {} {} {} {}|", s.lagging_tolerance, s.lump_mass, s.mesh.num_vertices(),
+                      fmt::join(s.linear.solvers, ","), s.linear.fallback.size(), s.linear.options.size(), s.damping.size());
   text += fmt::format(
       "{} {} {} {} {}|", scene.output.skip_frames, scene.output.checkpoint_period, scene.max_threads, scene.directory,
       s.fields.any_forces() || s.fields.von_mises || s.fields.stress || s.fields.kinetic_energy || s.fields.momentum);
@@ -109,7 +110,7 @@ class Defaults : public ::testing::Test {
 
 TEST_F(Defaults, OfTheTableAreThoseOfTheReader) {
   const Json base = Json::parse(R"({
-    "geometry": [{"mesh": "square.obj"}], "materials": {"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000},
+    "defaults": "polyfem", "geometry": [{"mesh": "square.obj"}], "materials": {"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000},
     "time": {"dt": 0.1, "tend": 1}})");
   int checked = 0;
   for (const Key& key : keys())
@@ -140,6 +141,24 @@ TEST_F(Defaults, OfTheTableAreThoseOfTheReader) {
       ++checked;
     }
   EXPECT_GT(checked, 70);
+}
+
+/// A scene that leaves out a key of ITR's table has the value there.
+TEST_F(Defaults, OfItrAreThoseOfTheirTable) {
+  const Json base = Json::parse(R"({
+    "geometry": [{"mesh": "square.obj"}], "materials": {"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000},
+    "time": {"dt": 0.1, "tend": 1}, "contact": {"enabled": true, "friction_coefficient": 0.2}})");
+  const std::string absent = options(base);
+  Json peers = base;
+  peers["defaults"] = "polyfem";
+  EXPECT_NE(options(peers), absent);
+  for (const Default& row : itr_defaults()) {
+    Json scene = base;
+    scene[Json::json_pointer(row.pointer)] = Json::parse(row.value);
+    EXPECT_EQ(options(scene), absent) << row.pointer;
+    peers[Json::json_pointer(row.pointer)] = Json::parse(row.value);
+  }
+  EXPECT_EQ(options(peers), absent);
 }
 
 /// Each pointer, and each value, that the page says is refused.
@@ -183,7 +202,7 @@ TEST_F(Defaults, OfSetupsAreThoseOfScenes) {
   for (const bool remeshes : {false, true}) {
     std::ofstream(folder_ / "scene.json") << fmt::format(
         R"({{"geometry": [{{"mesh": "square.obj"}}], "time": {{"dt": 0.1, "tend": 1}}, "contact": {{"enabled": true}},
-        "space": {{"remesh": {{"enabled": {}}}}},
+        "defaults": "polyfem", "solver": {{"contact": {{"barrier_stiffness": "auto"}}}}, "space": {{"remesh": {{"enabled": {}}}}},
         "materials": {{"type": "NeoHookean", "E": 1e4, "nu": 0.4, "rho": 1000}}}})",
         remeshes);
     Scene scene = read(folder_ / "scene.json");

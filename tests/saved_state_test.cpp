@@ -143,7 +143,7 @@ TEST_F(DamageTest, OfInvariantsIsRefused) {
   };
   expect("saved velocities", [](State<2>& s) { s.history.v.clear(); });
   expect("saved velocities", [](State<2>& s) { s.history.v[0].conservativeResize(4); });
-  expect("saved positions: found 2 past states", [](State<2>& s) { s.history.x.push_back(s.history.x[0]); });
+  expect("saved positions: found 3 past states", [](State<2>& s) { s.history.x.push_back(s.history.x[0]); });
   expect("saved accelerations", [](State<2>& s) { s.history.a.push_back(s.history.x[0]); });
   expect("saved velocities[3]: found nan", [](State<2>& s) { s.history.v[0][3] = NAN; });
   expect("saved positions[0]: found inf", [](State<2>& s) { s.history.x[0][0] = HUGE_VAL; });

@@ -26,6 +26,7 @@ constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, litt
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
 constexpr double kLeastDhat = 0.01;     ///< of that without the gap: what nearly touches presses a little at the start
 constexpr double kDhatByMotion = 0.01;  ///< of the way that is prescribed without inertia
+constexpr int kFirstSteps = 20;         ///< that are looked at: choices do not depend on where the run ends
 constexpr double kSlipByMotion = 1e-3;  ///< of the speed that is prescribed: friction is smoothed below that
 /// Part of the speed that gravity gives over the bodies' size: bodies that it holds in place creep by less than 1e-4 of
 /// their size in the time of a hundred falls over it.
@@ -104,15 +105,16 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
       contact.barrier_stiffness / barrier_unit(units, contact), units.text(stiffest, "Pa", 3));
 }
 
-/// The longest relative way that conditions and obstacles prescribe over the run [m]; infinity where they move nothing.
+/// The longest relative way that conditions and obstacles prescribe in the first steps, whatever the end of the run [m];
+/// infinity where they move nothing.
 template <int Dim>
 double prescribed_way(const Setup<Dim>& setup) {
-  constexpr int kSamples = 20;
   double longest = 0;
   try {
     const VectorX first = held_dofs(setup, setup.mesh, setup.time.t0).target;
-    for (int i = 1; i <= kSamples; ++i) {
-      const double t = setup.time.t0 + setup.time.dt * setup.time.steps * i / kSamples;
+    const int steps = setup.time.is_static ? 1 : kFirstSteps;
+    for (int i = 1; i <= steps; ++i) {
+      const double t = setup.time.t0 + setup.time.dt * i;
       const VectorX way = held_dofs(setup, setup.mesh, t).target - first;
       Eigen::AlignedBox<double, Dim> box;
       for (Eigen::Index k = 0; k < way.size(); k += Dim) box.extend(Vec<Dim>(way.template segment<Dim>(k)));
@@ -126,13 +128,12 @@ double prescribed_way(const Setup<Dim>& setup) {
 /// By what is prescribed and by gravity, the smaller; where neither is there, by waves at strains of a thousandth.
 template <int Dim>
 std::string choose_friction_velocity(const Setup<Dim>& setup, ContactOptions& contact) {
-  constexpr int kSteps = 20;  // the first ones, so that it does not depend on where the run ends
   constexpr double kStrain = 1e-3;
   const double size = rest_box(setup.mesh).sizes().maxCoeff();
   const Vec<Dim> center = rest_center(setup.mesh, 0);
   double prescribed = 0, fall = 0;
   try {
-    prescribed = prescribed_speed(setup, center, kSteps);
+    prescribed = prescribed_speed(setup, center, kFirstSteps);
     if (setup.body_acceleration) fall = std::sqrt(2 * size * setup.body_acceleration(center, setup.time.t0).norm());
   } catch (const InputError&) {  // no value at a time or place that no step asks for
   }
