@@ -8,6 +8,7 @@
 #include <array>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 
 #include <boost/container/small_vector.hpp>
@@ -345,7 +346,7 @@ class CellModel {
   bool together_;
   double energy_ = 0, elastic_ = 0;
   bool has_barrier_ = false;
-  boost::container::small_vector<Moving, 4> moving_;
+  boost::container::small_vector<Moving, 4, std::allocator<Moving>> moving_;  ///< Boost's own allocator does not align
   MatrixX between_;  ///< Hessians between different ones, where they move together
 };
 
