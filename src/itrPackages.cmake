@@ -28,7 +28,7 @@ itr_package(development libitr-dev "In-timestep remeshing for contacting elastod
 set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS "itr-backends, python3-h5py, python3-matplotlib")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libitr0 (= ${version}), libeigen3-dev, libtbb-dev, libfmt-dev, libhdf5-dev, libgmp-dev, libmpfr-dev")
+  "libitr0 (= ${version}), libeigen3-dev, libtbb-dev, libfmt-dev, libhdf5-dev, libgmp-dev, libmpfr-dev, zlib1g-dev")
 
 get_property(modules GLOBAL PROPERTY ITR_SOLVER_MODULES)
 if(modules)

@@ -27,7 +27,7 @@ struct Block {
   std::vector<int> cells;
   Block() {
     const Mesh<2> mesh = make_block<2>();
-    for (int v = 0; v < mesh.vertex_slots(); ++v) vertices.insert(vertices.end(), mesh.rest(v).begin(), mesh.rest(v).end());
+    for (int v = 0; v < mesh.node_slots(); ++v) vertices.insert(vertices.end(), mesh.rest(v).begin(), mesh.rest(v).end());
     for (int c = 0; c < mesh.cell_slots(); ++c) cells.insert(cells.end(), mesh.cell(c).begin(), mesh.cell(c).end());
   }
 };

@@ -19,7 +19,7 @@ struct Arrays {
   std::vector<int> cells, bodies;
   Arrays() {
     const Mesh<Dim> mesh = make_block<Dim>();
-    for (int v = 0; v < mesh.vertex_slots(); ++v)
+    for (int v = 0; v < mesh.node_slots(); ++v)
       vertices.insert(vertices.end(), mesh.rest(v).data(), mesh.rest(v).data() + Dim);
     for (int c = 0; c < mesh.cell_slots(); ++c) cells.insert(cells.end(), mesh.cell(c).begin(), mesh.cell(c).end());
     bodies.assign(static_cast<std::size_t>(mesh.cell_slots()), 1);

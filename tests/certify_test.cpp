@@ -26,12 +26,10 @@ class CertifyTest : public testing::Test {
   void TearDown() override { fs::remove_all(folder); }
 
   template <typename Scene>
-  std::vector<std::string> violations_of(const Scene& scene, const Space* space = nullptr) {
+  std::vector<std::string> violations_of(const Scene& scene) {
     fs::remove_all(folder);
     Writer writer(folder, {1}, {"scene.json", "eigen:ldlt", 1});
-    auto view = scene.view();
-    if (space) view.space = space;
-    writer.write(view, StepReport());
+    writer.write(scene.view(), StepReport());
     writer.finish("finished");
     return texts_of(certify(folder));
   }
@@ -246,8 +244,8 @@ TEST_F(CertifyTest, MeasuresFlightByTheSizeOfTheScene) {
 }
 
 TEST_F(CertifyTest, FindsCurvesInObstaclesThatTheirChordsDoNotReach) {
-  const Space space({{0, 1}});
   Plane plane;
+  plane.mesh.set_curved_edges({{0, 1}});
   VectorX x(18);  // and the node of the lowest edge
   x << plane.x, 0.5, -0.4;
   plane.x = x;
@@ -255,7 +253,7 @@ TEST_F(CertifyTest, FindsCurvesInObstaclesThatTheirChordsDoNotReach) {
   plane.density.assign(4, 0);
   const auto violations = [&](double a, double b, double height) {
     plane.obstacle_x = {{a, height}, {b, height}};
-    return violations_of(plane, &space).size();
+    return violations_of(plane).size();
   };
   // At x = 1/4 the parabola is at -0.3, its chord at -0.2.
   EXPECT_EQ(violations(-1, 0.25, -0.300001), 0u);
@@ -265,10 +263,10 @@ TEST_F(CertifyTest, FindsCurvesInObstaclesThatTheirChordsDoNotReach) {
 
 /// The curved edge 0 1 pierces the facet 2 3 4, which shares a vertex with each of the two facets beside that edge.
 TEST_F(CertifyTest, FindsACurvedEdgeInAFacetThatNeighboursBothOfItsOwn) {
-  const Space space({{0, 1}});
   Solid solid;
   solid.mesh =
       Mesh<3>({{-1, 0, 1}, {1, 0, 1}, {0, 1, 0}, {0, -1, 0}, {-1, 0, -1}, {1, 0, -1}}, {{1, 0, 2, 3}, {4, 5, 2, 3}}, {1, 1});
+  solid.mesh.set_curved_edges({{0, 1}});
   solid.obstacle_x.clear();
   solid.obstacle_edges.clear();
   solid.obstacle_triangles.clear();
@@ -277,9 +275,9 @@ TEST_F(CertifyTest, FindsACurvedEdgeInAFacetThatNeighboursBothOfItsOwn) {
   for (int i = 0; i < 6; ++i) vertex_of<3>(solid.x, i) = solid.mesh.rest(i);
   solid.v = VectorX::Zero(21);
   vertex_of<3>(solid.x, 6) = Vec<3>(0, 0, 1);
-  EXPECT_TRUE(violations_of(solid, &space).empty());
+  EXPECT_TRUE(violations_of(solid).empty());
   vertex_of<3>(solid.x, 6) = Vec<3>(-0.5, 0, -0.7);
-  const std::vector<std::string> found = violations_of(solid, &space);
+  const std::vector<std::string> found = violations_of(solid);
   EXPECT_TRUE(std::any_of(found.begin(), found.end(), [](const std::string& text) {
     return text.find("edge (0, 6) and triangle (2, 3, 4) intersect") != std::string::npos;
   })) << ::testing::PrintToString(found);

@@ -10,7 +10,7 @@ namespace itr {
 namespace {
 
 std::vector<CellId> cells_at(const Mesh<2>& mesh, VertexId v) {
-  if (v >= mesh.vertex_slots() || !mesh.is_vertex_alive(v)) return {};
+  if (v >= mesh.node_slots() || !mesh.is_vertex_alive(v)) return {};
   std::vector<CellId> cells(mesh.cells_of(v).begin(), mesh.cells_of(v).end());
   std::sort(cells.begin(), cells.end());
   return cells;
@@ -47,14 +47,14 @@ TEST(ChangeLog, KnowsEveryVertexAndPartOfTheSurfaceThatACommitChanged) {
       EXPECT_EQ(log.now(), since + 1);
       EXPECT_EQ(called, (std::vector<int>{1, 2}));
       EXPECT_EQ(change.created != kNone, edit->kind == Edit<2>::Kind::split);
-      std::vector<char> is_changed(mesh.vertex_slots(), 0);
-      for (int v = 0; v < mesh.vertex_slots(); ++v) {
-        const bool is_new = v >= before.vertex_slots();
+      std::vector<char> is_changed(mesh.node_slots(), 0);
+      for (int v = 0; v < mesh.node_slots(); ++v) {
+        const bool is_new = v >= before.node_slots();
         is_changed[v] =
             is_new || cells_at(before, v) != cells_at(mesh, v) || x.segment<2>(2 * v) != x_before.segment<2>(2 * v);
         ASSERT_TRUE(!is_changed[v] || log.was_written(v, since)) << "seed " << seed << ", edit " << i << ", vertex " << v;
       }
-      for (int v = 0; v < mesh.vertex_slots(); ++v) {
+      for (int v = 0; v < mesh.node_slots(); ++v) {
         bool has_changed = is_changed[v];
         for (const CellId c : cells_at(mesh, v))
           for (const VertexId w : mesh.cell(c)) has_changed = has_changed || is_changed[w];
@@ -97,7 +97,7 @@ TEST(ChangeLog, TellsGainsByTheFirstCommitThere) {
   const Candidate end(OperationKind::smooth, edge[0]);
   EXPECT_TRUE(log.had_changed_around(end, 1));
   EXPECT_FALSE(log.had_changed_around(end, 0));
-  const EdgeKey half{edge[0], scene.mesh.vertex_slots() - 1};
+  const EdgeKey half{edge[0], scene.mesh.node_slots() - 1};
   log.commit(make_split(scene.mesh, half), {});
   EXPECT_TRUE(log.had_changed_around(end, 1)) << "a later commit does not hide the first";
   EXPECT_TRUE(log.has_changed_around(end, 1));

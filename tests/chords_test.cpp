@@ -73,7 +73,7 @@ template <int Dim>
 double depth_in_plates(const State<Dim>& state) {
   constexpr int kSamples = 16;
   const VectorX& x = state.history.x[0];
-  const int nodes = num_nodes(state.mesh, state.space);
+  const int nodes = state.mesh.num_nodes();
   const double low = vertex_of<Dim>(x, nodes)[Dim - 1], high = vertex_of<Dim>(x, nodes + Dim)[Dim - 1];
   double deepest = 0;
   for (FacetId f = 0; f < state.mesh.facet_slots(); ++f) {
@@ -83,8 +83,7 @@ double depth_in_plates(const State<Dim>& state) {
       for (int i = 0; i < Dim; ++i) {
         height += at[i] * (2 * at[i] - 1) * vertex_of<Dim>(x, facet[i])[Dim - 1];
         for (int j = 0; j < i; ++j)
-          height += 4 * at[i] * at[j] *
-                    vertex_of<Dim>(x, state.space.node_of(facet[i], facet[j], state.mesh.vertex_slots()))[Dim - 1];
+          height += 4 * at[i] * at[j] * vertex_of<Dim>(x, state.mesh.node_of(facet[i], facet[j]))[Dim - 1];
       }
       deepest = std::max({deepest, height - high, low - height});
     };
@@ -111,16 +110,16 @@ TYPED_TEST_SUITE(Chords, Dimensions);
 /// points are where the quadratic functions of the facets are.
 TYPED_TEST(Chords, MeetAtPointsOfTheCurves) {
   constexpr int Dim = TypeParam::value;
-  const Mesh<Dim> mesh = make_ball<Dim>(2);
+  Mesh<Dim> mesh = make_ball<Dim>(2);
   std::mt19937 random(5);
   for (int round = 0; round < 20; ++round) {
     std::vector<EdgeKey> curved;
     for (const EdgeKey& edge : mesh.edges())
       if (random() % 4 > 0) curved.push_back(edge);
-    const Space space(curved);
+    mesh.set_curved_edges(curved);
     ChordLevels levels(curved.size());
     for (auto& level : levels) level = static_cast<std::uint8_t>(random() % 4);
-    const RefinedChords<Dim> chords = refine_chords(mesh, space, levels);
+    const RefinedChords<Dim> chords = refine_chords(mesh, levels);
     std::map<std::array<int, Dim - 1>, int> balance, sides;
     for (const auto& facet : chords.facets)
       for (int k = 0; k < Dim; ++k) {
@@ -133,9 +132,9 @@ TYPED_TEST(Chords, MeetAtPointsOfTheCurves) {
       }
     for (const auto& [side, sum] : balance) EXPECT_EQ(sum, 0);
     for (const auto& [side, count] : sides) EXPECT_EQ(count, 2);
-    VectorX x(Dim * num_nodes(mesh, space));
+    VectorX x(Dim * mesh.num_nodes());
     for (double& value : x) value = static_cast<double>(random() % 1000);
-    const int nodes = num_nodes(mesh, space);
+    const int nodes = mesh.num_nodes();
     for (std::size_t i = 0; i < chords.facets.size(); ++i)
       for (int corner = 0; corner < Dim; ++corner) {
         const auto& facet = mesh.facet(chords.parents[i]);
@@ -144,7 +143,7 @@ TYPED_TEST(Chords, MeetAtPointsOfTheCurves) {
         for (int a = 0; a < Dim; ++a) {
           of_facet += at[a] * vertex_of<Dim>(x, facet[a]);
           for (int b = 0; b < a; ++b)
-            if (const int node = space.node_of(facet[a], facet[b], mesh.vertex_slots()); node != kNone)
+            if (const int node = mesh.node_of(facet[a], facet[b]); node != kNone)
               of_facet += 4 * at[a] * at[b] *
                           (vertex_of<Dim>(x, node) - (vertex_of<Dim>(x, facet[a]) + vertex_of<Dim>(x, facet[b])) / 2);
         }
@@ -160,13 +159,12 @@ TYPED_TEST(Chords, MeetAtPointsOfTheCurves) {
 
 TYPED_TEST(Chords, WithoutHalvingsAreThoseThroughTheNodes) {
   constexpr int Dim = TypeParam::value;
-  const Mesh<Dim> mesh = make_ball<Dim>(2);
-  const Space space(mesh.edges());
+  Mesh<Dim> mesh = make_ball<Dim>(2);
+  mesh.set_curved_edges(mesh.edges());
   std::vector<typename Mesh<Dim>::Facet> through_nodes;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), through_nodes);
-  EXPECT_EQ(refine_chords(mesh, space, {}).facets, through_nodes);
-  EXPECT_TRUE(refine_chords(mesh, space, {}).points.empty());
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) add_chord_facets(mesh, f, through_nodes);
+  EXPECT_EQ(refine_chords(mesh, {}).facets, through_nodes);
+  EXPECT_TRUE(refine_chords(mesh, {}).points.empty());
 }
 
 /// Presses, and lets go. A state goes on in another simulation with the same bits.
@@ -186,9 +184,9 @@ TYPED_TEST(Chords, KeepCurvesOutOfWhatTheyTouch) {
     raised += most_halvings(levels) > before;
     joined += most_halvings(levels) < before;
     before = most_halvings(levels);
-    EXPECT_LE(find_chord_demand(setup, state.mesh, state.space, levels, state.history.x[0]).excess, 1) << state.step;
+    EXPECT_LE(find_chord_demand(setup, state.mesh, levels, state.history.x[0]).excess, 1) << state.step;
     EXPECT_EQ(depth_in_plates(state), 0) << state.step;
-    for (const VectorX& x : state.history.x) EXPECT_EQ(find_violation(setup, state.mesh, x, state.space, levels), "");
+    for (const VectorX& x : state.history.x) EXPECT_EQ(find_violation(setup, state.mesh, x, levels), "");
     if (2 * state.step == setup.time.steps) other.restore(State<Dim>(state));
   }
   EXPECT_LT(nearest, setup.contact.activation_distance);
@@ -202,29 +200,28 @@ TYPED_TEST(Chords, KeepCurvesOutOfWhatTheyTouch) {
 /// Lets one edge of a ball at rest come down beside a plate.
 TEST(ChordBound, CountsWhatIsNearACurve) {
   itr::Setup<2> setup = pressed_ball<2>(1, 4);
-  const Mesh<2>& mesh = setup.mesh;
-  const Space space(mesh.edges());
-  VectorX x(2 * (num_nodes(mesh, space) + 4));
-  const std::vector<Vec<2>> rest = node_rest_positions(mesh, space);
+  Mesh<2> mesh = setup.mesh;
+  mesh.set_curved_edges(mesh.edges());
+  VectorX x(2 * (mesh.num_nodes() + 4));
+  const std::vector<Vec<2>> rest = mesh.rest();
   for (std::size_t i = 0; i < rest.size(); ++i) vertex_of<2>(x, static_cast<int>(i)) = rest[i];
-  for (int i = 0; i < 4; ++i) vertex_of<2>(x, num_nodes(mesh, space) + i) = setup.obstacles.rest[i];
-  EXPECT_EQ(find_chord_demand(setup, mesh, space, {}, x).excess, 0);  // straight
+  for (int i = 0; i < 4; ++i) vertex_of<2>(x, mesh.num_nodes() + i) = setup.obstacles.rest[i];
+  EXPECT_EQ(find_chord_demand(setup, mesh, {}, x).excess, 0);  // straight
   int lowest = 0;
   for (int f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.rest(mesh.facet(f)[0])[1] + mesh.rest(mesh.facet(f)[1])[1] <
         mesh.rest(mesh.facet(lowest)[0])[1] + mesh.rest(mesh.facet(lowest)[1])[1])
       lowest = f;
   const auto [a, b] = mesh.facet(lowest);
-  const int edge = space.find(a, b);
-  vertex_of<2>(x, mesh.vertex_slots() + edge)[1] -= 0.02;  // its chords are left by 0.005
-  for (int i = 0; i < 2; ++i) vertex_of<2>(x, num_nodes(mesh, space) + i)[1] = -1.006;
-  ChordDemand demand = find_chord_demand(setup, mesh, space, {}, x);
+  const int edge = mesh.node_of(a, b) - mesh.num_vertices();
+  vertex_of<2>(x, mesh.node_of(a, b))[1] -= 0.02;  // its chords are left by 0.005
+  for (int i = 0; i < 2; ++i) vertex_of<2>(x, mesh.num_nodes() + i)[1] = -1.006;
+  ChordDemand demand = find_chord_demand(setup, mesh, {}, x);
   EXPECT_GT(demand.excess, 1);
   EXPECT_GT(demand.levels[edge], 0);
-  for (int round = 0; round < 4 && demand.excess > 1; ++round)
-    demand = find_chord_demand(setup, mesh, space, demand.levels, x);
+  for (int round = 0; round < 4 && demand.excess > 1; ++round) demand = find_chord_demand(setup, mesh, demand.levels, x);
   EXPECT_LE(demand.excess, 1);
-  EXPECT_EQ(std::count(demand.levels.begin(), demand.levels.end(), 0), space.num_curved() - 1);
+  EXPECT_EQ(std::count(demand.levels.begin(), demand.levels.end(), 0), mesh.num_curved() - 1);
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ CollisionProxy<Dim> boundary_of(const Mesh<Dim>& mesh) {
     else
       proxy.triangles.push_back(facet);
   }
-  proxy.weights.resize(static_cast<Eigen::Index>(proxy.rest.size()), mesh.vertex_slots());
+  proxy.weights.resize(static_cast<Eigen::Index>(proxy.rest.size()), mesh.node_slots());
   proxy.weights.setFromTriplets(weights.begin(), weights.end());
   return proxy;
 }
@@ -82,7 +82,7 @@ CollisionProxy<3> fine_surface(const Mesh<3>& mesh, int n, const std::function<V
         if (i + j + 1 < n) proxy.triangles.push_back({vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)});
       }
   }
-  proxy.weights.resize(static_cast<Eigen::Index>(proxy.rest.size()), mesh.vertex_slots());
+  proxy.weights.resize(static_cast<Eigen::Index>(proxy.rest.size()), mesh.node_slots());
   proxy.weights.setFromTriplets(weights.begin(), weights.end());
   return proxy;
 }
@@ -173,13 +173,13 @@ TEST_F(CollisionMeshTest, BlockRestsOnABumpThatItsMeshDoesNotHave) {
     const Vec<3> force = sum<3>(asked(simulation).forces.contact);
     push += force[1] / weight<3>() / setup.time.steps;
     EXPECT_LT(((momentum() - before) / setup.time.dt - force + weight<3>() * Vec<3>::Unit(1)).norm(), 1e-6 * weight<3>());
-    for (int v = 0; v < setup.mesh.vertex_slots(); ++v) EXPECT_GT(x[3 * v + 1], -0.1 * kBump) << "the bump carries nothing";
+    for (int v = 0; v < setup.mesh.node_slots(); ++v) EXPECT_GT(x[3 * v + 1], -0.1 * kBump) << "the bump carries nothing";
   }
   EXPECT_GT(push, 0.5);
   writer.finish("finished");
   const output::Certificate certificate = output::certify(folder_ / "run");
   EXPECT_EQ(certificate.frames, setup.time.steps + 1);
-  EXPECT_TRUE(certificate.violations.empty()) << certificate.violations[0];
+  EXPECT_TRUE(certificate.violations.empty()) << certificate.violations[0].text;
   const hdf5::Session session;
   const hdf5::File frame = hdf5::File::open(folder_ / "run/frames/000010.h5");
   EXPECT_EQ(frame.read_doubles("/proxy/x").rows(), setup.proxy->rest.size());

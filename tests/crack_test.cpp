@@ -55,8 +55,8 @@ VectorX scattered(Eigen::Index size, std::mt19937& random) {
 }
 
 template <int Dim>
-SpaceTimeFunction<Dim> as_function(const Mesh<Dim>& mesh, const VectorX& values, const Space& space = {}) {
-  return [f = nodal_function<Dim>(std::make_shared<Locator<Dim>>(mesh), values, space)](const RestPoint<Dim>& X, double) {
+SpaceTimeFunction<Dim> as_function(const Mesh<Dim>& mesh, const VectorX& values) {
+  return [f = nodal_function<Dim>(std::make_shared<Locator<Dim>>(mesh), values, Dim)](const RestPoint<Dim>& X, double) {
     return Vec<Dim>(f(X));
   };
 }
@@ -66,19 +66,19 @@ void check_values_at_vertices() {
   int doubled = 0;
   for (unsigned seed = 0; seed < kMeshes; ++seed) {
     std::mt19937 random(seed);
-    const Mesh<Dim> mesh = cracked<Dim>(random);
+    Mesh<Dim> mesh = cracked<Dim>(random);
     doubled += num_doubled(mesh);
-    const Space space(seed % 2 ? mesh.edges() : std::vector<EdgeKey>());
-    const VectorX values = scattered(Dim * num_nodes(mesh, space), random);
+    if (seed % 2) mesh.set_curved_edges(mesh.edges());
+    const VectorX values = scattered(Dim * mesh.num_nodes(), random);
     StepSetup<Dim> setup;
     Mesh<Dim> held = mesh;
     for (FacetId f = 0; f < held.facet_slots(); ++f) held.set_facet_tag(f, 1);
     std::array<bool, Dim> all;
     all.fill(true);
-    setup.dirichlet = {{1, all, as_function<Dim>(mesh, values, space)}};
-    const HeldDofs<Dim> result = held_dofs(setup, held, 0, space);
-    const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
-    for (int n = 0; n < num_nodes(mesh, space); ++n) {
+    setup.dirichlet = {{1, all, as_function<Dim>(mesh, values)}};
+    const HeldDofs<Dim> result = held_dofs(setup, held, 0);
+    const std::vector<Vec<Dim>>& rest = mesh.rest();
+    for (int n = 0; n < mesh.num_nodes(); ++n) {
       if (!result.held[Dim * n]) continue;
       const Vec<Dim> asked = values.segment<Dim>(Dim * n), got = result.target.template segment<Dim>(Dim * n) - rest[n];
       ASSERT_LT((got - asked).norm(), 1e-12) << "seed " << seed << ", node " << n;
@@ -96,7 +96,7 @@ void check_loads() {
     std::mt19937 random(seed);
     Mesh<Dim> mesh = cracked<Dim>(random);
     for (FacetId f = 0; f < mesh.facet_slots(); ++f) mesh.set_facet_tag(f, 1);
-    const VectorX values = scattered(Dim * mesh.vertex_slots(), random);
+    const VectorX values = scattered(Dim * mesh.node_slots(), random);
     StepSetup<Dim> setup;
     setup.neumann = {{1, as_function<Dim>(mesh, values)}};
     setup.body_acceleration = as_function<Dim>(mesh, values);
@@ -161,7 +161,7 @@ void check_interpolation() {
     Mesh<Dim> mesh = before;
     const MeshRenumbering renumbering = changed_at_random(mesh, 60, random);
     const MeshChange<Dim> change = describe_change(before, mesh, renumbering);
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+    for (VertexId v = 0; v < mesh.node_slots(); ++v) {
       if (!mesh.is_boundary(v)) continue;
       std::vector<int> parents;
       for (typename Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(change.interpolation, v); it; ++it)
@@ -199,20 +199,20 @@ void check_forces() {
     const Mesh<Dim> before = cracked<Dim>(random);
     Mesh<Dim> mesh = before;
     const MeshRenumbering renumbering = changed_at_random(mesh, 60, random);
-    for (VertexId v = 0; v < before.vertex_slots(); ++v) {
+    for (VertexId v = 0; v < before.node_slots(); ++v) {
       if (!before.is_boundary(v)) continue;
-      VectorX asked = VectorX::Zero(Dim * before.vertex_slots());
+      VectorX asked = VectorX::Zero(Dim * before.node_slots());
       asked.segment<Dim>(Dim * v) = Vec<Dim>::Ones();
       const CellSet<Dim> cells = whole_mesh<Dim>(mesh, {});
       const auto term = point_forces<Dim>(before, asked)(cells, 0, 1);
       ASSERT_TRUE(term) << "seed " << seed << ", vertex " << v;
-      VectorX gradient = VectorX::Zero(Dim * mesh.vertex_slots());
+      VectorX gradient = VectorX::Zero(Dim * mesh.node_slots());
       Workspace workspace;
       term->add_gradient(gradient, gradient, workspace);
       double sum = 0;
       Vec<Dim> moment = Vec<Dim>::Zero();
       bool has_any = false;
-      for (VertexId w = 0; w < mesh.vertex_slots(); ++w) {
+      for (VertexId w = 0; w < mesh.node_slots(); ++w) {
         const double share = -gradient[Dim * w];
         if (share == 0) continue;
         sum += share;
@@ -257,7 +257,7 @@ TEST(Cracks, PartsThatOverlapAreToldApart) {
   std::vector<Mesh<2>::Cell> cells;
   for (int copy = 0; copy < 2; ++copy) {
     const int first = static_cast<int>(rest.size());
-    for (VertexId v = 0; v < one.vertex_slots(); ++v) rest.push_back(one.rest(v));
+    for (VertexId v = 0; v < one.node_slots(); ++v) rest.push_back(one.rest(v));
     for (CellId c = 0; c < one.cell_slots(); ++c) {
       cells.push_back(one.cell(c));
       for (int& v : cells.back()) v += first;
@@ -265,13 +265,13 @@ TEST(Cracks, PartsThatOverlapAreToldApart) {
   }
   const std::vector<int> bodies(cells.size(), 1);
   const Mesh<2> before(rest, cells, bodies);
-  const VectorX values = scattered(2 * before.vertex_slots(), random);
+  const VectorX values = scattered(2 * before.node_slots(), random);
   const auto f = as_function<2>(before, values);
-  for (VertexId v = 0; v < before.vertex_slots(); ++v) EXPECT_EQ(f(before.point(v), 0), values.segment<2>(2 * v));
+  for (VertexId v = 0; v < before.node_slots(); ++v) EXPECT_EQ(f(before.point(v), 0), values.segment<2>(2 * v));
   Mesh<2> mesh = before;
   const MeshRenumbering renumbering = changed_at_random(mesh, 40, random);
   const MeshChange<2> change = describe_change(before, mesh, renumbering);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < mesh.node_slots(); ++v)
     for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(change.interpolation, v); it; ++it)
       EXPECT_EQ(before.part_of_vertex(static_cast<int>(it.col())), mesh.part_of_vertex(v));
   for (FacetId g = 0; g < mesh.facet_slots(); ++g)

@@ -20,12 +20,12 @@ Mesh<Dim> cut(const Mesh<Dim>& mesh, const std::set<typename MeshTypes<Dim>::Fac
   std::vector<Vec<Dim>> rest;
   std::vector<typename Mesh<Dim>::Cell> cells;
   std::vector<int> bodies;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) rest.push_back(mesh.rest(v));
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     cells.push_back(mesh.cell(c));
     bodies.push_back(mesh.body(c));
   }
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) {
     const auto around = mesh.cells_of(v);
     std::vector<int> group(around.size(), kNone);
     const auto share = [&](CellId a, CellId b) {
@@ -106,8 +106,8 @@ Mesh<Dim> cracked_at_random(const Mesh<Dim>& mesh, int seeds, int size, std::mt1
 template <int Dim>
 int num_doubled(const Mesh<Dim>& mesh) {
   int count = 0;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    for (VertexId w = 0; w < mesh.vertex_slots(); ++w)
+  for (VertexId v = 0; v < mesh.node_slots(); ++v)
+    for (VertexId w = 0; w < mesh.node_slots(); ++w)
       if (w != v && mesh.rest(w) == mesh.rest(v)) {
         ++count;
         break;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "curved_mesh.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "host_block.hpp"
 #include "itr/core/error.hpp"
@@ -30,14 +31,14 @@ Setup<Dim> curving_block() {
 template <int Dim>
 void expect_whole_forces() {
   auto setup = curving_block<Dim>();
-  const int tip = setup.mesh.vertex_slots() - 1;
-  VectorX forces = VectorX::Zero(Dim * setup.mesh.vertex_slots());
+  const int tip = setup.mesh.node_slots() - 1;
+  VectorX forces = VectorX::Zero(Dim * setup.mesh.node_slots());
   forces[Dim * tip + 1] = (Dim == 2 ? 20 : 1) * std::pow(kSize, Dim - 2);  // in 3D, more of it folds the cells at the tip
   setup.fields.applied_forces = true;
   auto simulation = simulate(setup);
   simulation.conditions().terms.push_back(point_forces<Dim>(setup.mesh, forces));
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(simulation.advance().ok);
-  ASSERT_GT(simulation.state().space.num_curved(), 0);
+  ASSERT_GT(simulation.state().mesh.num_curved(), 0);
   EXPECT_LT((sum<Dim>(simulation.forces().applied) - sum<Dim>(forces)).norm(), 1e-12 * forces.norm());
 }
 
@@ -50,7 +51,7 @@ TEST(CurvedHost, ForcesActWhereEdgesAreCurved) {
 template <int Dim>
 Setup<Dim> held_by_points(Setup<Dim> setup) {
   constexpr int kPoints = 77;
-  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v)
     if (setup.mesh.rest(v)[0] < 1e-9) setup.mesh.set_vertex_tag(v, kPoints);
   for (auto& condition : setup.dirichlet)
     if (condition.tag == 1) condition.tag = kPoints;
@@ -62,7 +63,7 @@ void expect_points_to_hold_lines() {
   auto simulation = simulate(held_by_points(curving_block<Dim>()));
   for (int i = 0; i < 6; ++i) ASSERT_TRUE(simulation.advance().ok);
   const State<Dim>& state = simulation.state();
-  const auto rest = node_rest_positions(state.mesh, state.space);
+  const auto rest = state.mesh.rest();
   for (std::size_t v = 0; v < rest.size(); ++v) {
     if (rest[v][0] > 1e-9) continue;
     for (const auto& x : state.history.x)
@@ -167,18 +168,18 @@ TEST(CurvedHost, AStepThatCurvedCellsStopIsTakenAgainWithStraightEdges) {
                            }));
   simulation.on_mesh_change([&](const MeshChange<2>& change, const Mesh<2>& old_mesh) {
     ++changes;
-    EXPECT_EQ(change.vertex.size(), static_cast<std::size_t>(old_mesh.vertex_slots()));
+    EXPECT_EQ(change.vertex.size(), static_cast<std::size_t>(old_mesh.num_vertices()));
   });
   for (int i = 0; i < before; ++i) ASSERT_TRUE(simulation.advance().ok);
-  const int curved = simulation.state().space.num_curved();
+  const int curved = simulation.state().mesh.num_curved();
   EXPECT_EQ(again, 0);
   const StepResult result = simulation.advance();
   ASSERT_TRUE(result.ok) << result.reason;
   EXPECT_EQ(again, 1);
   EXPECT_EQ(changes, 1);
-  EXPECT_LT(simulation.state().space.num_curved(), curved);
+  EXPECT_LT(simulation.state().mesh.num_curved(), curved);
   // Chords bring edges between them that become straight, too.
-  EXPECT_GE(result.report.straightens.accepted, curved - simulation.state().space.num_curved());
+  EXPECT_GE(result.report.straightens.accepted, curved - simulation.state().mesh.num_curved());
   for (int i = before + 1; i < 30; ++i) ASSERT_TRUE(simulation.advance().ok);
 }
 
@@ -197,11 +198,11 @@ void expect_report_of_retries(double speed, double dt, int max_iterations, int s
                            }));
   for (int i = 0; i < steps_before; ++i) ASSERT_TRUE(simulation.advance().ok);
   ASSERT_EQ(retries, 0);
-  const int curved = simulation.state().space.num_curved();
+  const int curved = simulation.state().mesh.num_curved();
   const StepResult result = simulation.advance();
   EXPECT_EQ(result.ok, succeeds) << result.reason;
   EXPECT_EQ(retries, expected);
-  EXPECT_GE(result.report.straightens.accepted, curved - simulation.state().space.num_curved());  // chords are curved inside
+  EXPECT_GE(result.report.straightens.accepted, curved - simulation.state().mesh.num_curved());  // chords are curved inside
   EXPECT_EQ(result.report.straightens.accepted > 0, succeeds);
   const StepSeconds& seconds = result.report.seconds;
   EXPECT_LE(
@@ -220,18 +221,18 @@ TEST(CurvedHost, TheLastRetrySavesImpacts) { expect_report_of_retries(50, 0.005,
 /// Positions of quadratic elements that are positive everywhere, which the parts of the barrier cannot prove, by a random
 /// motion of some nodes.
 VectorX unproven(const Setup<2>& setup, const std::vector<int>& nodes, std::mt19937& random) {
-  const Space space = space_of_orders(setup.mesh, setup.order);
-  const CellSet<2> cells = whole_mesh(setup.mesh, {}, space);
+  const Mesh<2> mesh = of_orders(setup.mesh, setup.order);
+  const CellSet<2> cells = whole_mesh(mesh, {});
   const auto is_positive = [&](const VectorX& x) {
-    return std::all_of(cells.curved_elements.begin(), cells.curved_elements.end(),
-                       [&](const auto& element) { return is_positive_everywhere_exact<2>(at_all_nodes<2>(element, x)); });
+    return std::ranges::all_of(
+        cells.curved(), [&](const auto& element) { return is_positive_everywhere_exact<2>(at_all_nodes<2>(element, x)); });
   };
   const auto is_proven = [&](const VectorX& x) {
-    return std::all_of(cells.curved_elements.begin(), cells.curved_elements.end(), [&](const auto& element) {
-      return std::isfinite(JacobianBarrier<2>(element, at_nodes<2>(element.nodes, x)).value());
+    return std::ranges::all_of(cells.curved(), [&](const auto& element) {
+      return std::isfinite(JacobianBarrier<2>(element, at_nodes<2>(element.nodes(), x)).value());
     });
   };
-  const auto places = node_rest_positions(setup.mesh, space);
+  const auto& places = mesh.rest();
   VectorX rest(2 * places.size()), x = rest;
   for (std::size_t v = 0; v < places.size(); ++v) rest.segment<2>(2 * static_cast<int>(v)) = places[v];
   std::uniform_real_distribution<double> part(-kSize, kSize);
@@ -255,7 +256,7 @@ std::pair<StepResult, int> step_from(const Setup<2>& setup, const VectorX& x) {
   state.history.x[0] = x;
   simulation.restore(std::move(state));
   StepResult result = simulation.advance();
-  return {std::move(result), simulation.state().space.num_curved()};
+  return {std::move(result), simulation.state().mesh.num_curved()};
 }
 
 TEST(CurvedHost, AValidStateOfInfiniteEnergyGoesOnWithStraightEdges) {
@@ -283,17 +284,17 @@ TEST(CurvedHost, TheFirstRetryKeepsCurvesElsewhere) {
   setup.order[1] = 2;
   setup.body_acceleration = nullptr;
   allow_retries(setup);
-  const Space space = space_of_orders(setup.mesh, setup.order);
+  const Mesh<2> mesh = of_orders(setup.mesh, setup.order);
   VertexId corner = 0;
   while (setup.mesh.cells_of(corner).size() != 1) ++corner;
   std::vector<int> nodes;
   for (const VertexId v : setup.mesh.cell(setup.mesh.cells_of(corner)[0]))
-    if (v != corner) nodes.push_back(space.node_of(corner, v, setup.mesh.vertex_slots()));
+    if (v != corner) nodes.push_back(mesh.node_of(corner, v));
   std::mt19937 random(4);
   int kept = 0;
   for (int i = 0; i < 10; ++i) {
     const auto [result, curved] = step_from(setup, unproven(setup, nodes, random));
-    EXPECT_EQ(curved < space.num_curved(), result.ok) << result.reason;
+    EXPECT_EQ(curved < mesh.num_curved(), result.ok) << result.reason;
     kept += result.ok && curved > 0;
   }
   EXPECT_GT(kept, 3);
@@ -309,8 +310,9 @@ TEST(CurvedHost, DensitiesOfDistortedCellsSumUpToTheElasticEnergy) {
     const StepResult result = simulation.advance();
     ASSERT_TRUE(result.ok) << result.reason;
     const State<2>& state = simulation.state();
-    for (const auto& element : whole_mesh(state.mesh, {}, state.space).curved_elements)
-      acting += JacobianBarrier<2>(element, at_nodes<2>(element.nodes, state.history.x[0])).is_active();
+    const CellSet<2> cells = whole_mesh(state.mesh, {});
+    for (const auto& element : cells.curved())
+      acting += JacobianBarrier<2>(element, at_nodes<2>(element.nodes(), state.history.x[0])).is_active();
     double sum = 0;
     simulation.observe([&](const FrameView<2>& frame) {
       for (CellId c = 0; c < state.mesh.cell_slots(); ++c) sum += state.mesh.volume(c) * frame.elastic_density[c];
@@ -335,7 +337,7 @@ TEST(CurvedHost, RemeshingMayBeSwitchedOnLater) {
 
 TEST(CurvedHost, LumpedMassIsRefusedWhereRemeshingFindsCurvedEdges) {
   auto curved = simulate(curving_block<2>());
-  while (curved.state().space.is_linear()) ASSERT_TRUE(curved.advance().ok);
+  while (!curved.state().mesh.has_nodes()) ASSERT_TRUE(curved.advance().ok);
   for (const bool was_enabled : {false, true}) {
     auto setup = curving_block<2>();
     setup.remesh.curve.enabled = false;

@@ -66,8 +66,8 @@ struct CurvedScene {
   }
   VectorX noisy(double noise) {
     std::uniform_real_distribution<double> off(-noise, noise);
-    VectorX field(Dim * mesh.vertex_slots());
-    for (int v = 0; v < mesh.vertex_slots(); ++v)
+    VectorX field(Dim * mesh.node_slots());
+    for (int v = 0; v < mesh.node_slots(); ++v)
       for (int k = 0; k < Dim; ++k) field[Dim * v + k] = mesh.rest(v)[k] + off(random);
     return field;
   }
@@ -97,18 +97,12 @@ struct CurvedScene {
   }
   /// Removes dead slots.
   void compact() {
-    const auto nodes = mesh.nodes();
     const auto map = mesh.compact();
     strata.compact(map);
-    const int vertices = mesh.vertex_slots();
-    for (const auto& [edge, node] : nodes) mesh.add_node({map.vertex[edge[0]], map.vertex[edge[1]]});
-    strata.add_nodes(static_cast<int>(nodes.size()));
     fields.for_each([&](VectorX& field) {
-      VectorX kept(Dim * mesh.vertex_slots());
+      VectorX kept(Dim * mesh.node_slots());
       for (std::size_t v = 0; v < map.vertex.size(); ++v)
         if (map.vertex[v] != kNone) kept.segment<Dim>(Dim * map.vertex[v]) = field.segment<Dim>(Dim * static_cast<int>(v));
-      for (std::size_t i = 0; i < nodes.size(); ++i)
-        kept.segment<Dim>(Dim * (vertices + static_cast<int>(i))) = field.segment<Dim>(Dim * nodes[i].second);
       field = kept;
     });
   }

@@ -4,7 +4,6 @@
 
 #include <vector>
 
-#include "itr/fem/space.hpp"
 #include "remesh/contact/gate.hpp"
 #include "remesh/decide/local_problem.hpp"
 #include "remesh/decide/trial.hpp"
@@ -41,23 +40,17 @@ struct View {
       : gate(scene.mesh, scene.fields, context), state{scene.mesh, scene.fields, context, gate.present(), history} {}
 };
 
-/// A mesh without the slots of its nodes; fields in the numbering of its space.
+/// A mesh without dead slots; fields in its numbering.
 template <int Dim>
 struct Compact {
   Mesh<Dim> mesh;
-  Space space;
-  std::vector<int> slots;  ///< by node of the space
+  std::vector<int> slots;  ///< by node
 
   explicit Compact(const Mesh<Dim>& with_slots) : mesh(with_slots) {
-    const auto nodes = mesh.nodes();
     const auto map = mesh.compact();
-    std::vector<EdgeKey> curved;
-    for (const auto& [edge, node] : nodes) curved.push_back({map.vertex[edge[0]], map.vertex[edge[1]]});
-    space = Space(curved);
-    slots.resize(num_nodes(mesh, space));
+    slots.resize(mesh.num_nodes());
     for (std::size_t v = 0; v < map.vertex.size(); ++v)
       if (map.vertex[v] != kNone) slots[map.vertex[v]] = static_cast<int>(v);
-    for (std::size_t i = 0; i < nodes.size(); ++i) slots[mesh.vertex_slots() + i] = nodes[i].second;
   }
   VectorX field(const VectorX& of_slots, const std::vector<Vec<Dim>>& of_obstacles = {}) const {
     VectorX all(Dim * static_cast<Eigen::Index>(slots.size() + of_obstacles.size()));

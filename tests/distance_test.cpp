@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Distances between stored frames on different meshes, against integrals by hand.
 #include "output/distance.hpp"
+#include "curved_mesh.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -36,8 +37,8 @@ class DistanceTest : public testing::Test {
   void TearDown() override { fs::remove_all(folder); }
 
   template <int Dim>
-  fs::path store(int step, const Mesh<Dim>& mesh, const Motion<Dim>& u, const Space& space = {}) {
-    const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
+  fs::path store(int step, const Mesh<Dim>& mesh, const Motion<Dim>& u) {
+    const std::vector<Vec<Dim>>& nodes = mesh.rest();
     const int count = static_cast<int>(nodes.size());
     VectorX x(Dim * count), v = VectorX::Zero(Dim * count);
     for (int i = 0; i < count; ++i) vertex_of<Dim>(x, i) = nodes[i] + u(nodes[i]);
@@ -49,7 +50,7 @@ class DistanceTest : public testing::Test {
     asked.kinetic_energy = {2.5};
     asked.momentum.assign(Dim, 0.5 * step);
     const fs::path path = folder / fmt::format("frames/{:06}.h5", step);
-    write_frame<Dim>(path, {mesh, x, v, density, obstacles, edges, triangles, &asked, {}, &space}, step, 0.1 * step);
+    write_frame<Dim>(path, {mesh, x, v, density, obstacles, edges, triangles, &asked}, step, 0.1 * step);
     return path;
   }
 
@@ -97,22 +98,21 @@ TEST_F(DistanceTest, OfQuadraticFieldsIsThatOfTheFunctionsWhateverTheMeshes) {
   const Mesh<2> mesh = square(false), other = refine_uniformly(square(true));
   const Motion<2> u = [](const Vec<2>& X) { return Vec<2>(3 + X[0] * X[1], X[0]); };
   const Motion<2> w = [](const Vec<2>& X) { return Vec<2>(3 + 0.5 * X[0] * X[1] + 0.1 * X[1] * X[1], X[0]); };
-  const fs::path a = store<2>(1, mesh, u, space_of_orders(mesh, {{1, 2}}));
-  const fs::path b = store<2>(2, other, w, space_of_orders(other, {{1, 2}}));
+  const fs::path a = store<2>(1, of_orders(mesh, {{1, 2}}), u);
+  const fs::path b = store<2>(2, of_orders(other, {{1, 2}}), w);
   FrameDistance distance = frame_distance(a, b);
   EXPECT_NEAR(distance.l2 * distance.l2, 0.25 / 9 - 0.1 / 8 + 0.01 / 5, 1e-14);
   EXPECT_NEAR(distance.h1_semi * distance.h1_semi, 0.25 / 3 + 0.25 / 3 - 0.2 / 4 + 0.04 / 3, 1e-14);
   EXPECT_NEAR(distance.reference_h1_semi * distance.reference_h1_semi, 0.25 / 3 + 0.25 / 3 + 0.2 / 4 + 0.04 / 3 + 1, 1e-13);
   EXPECT_NEAR(distance.uncovered, 0, 1e-14);
-  EXPECT_LT(frame_distance(store<2>(3, other, u, space_of_orders(other, {{1, 2}})), a).l2, 1e-14);
+  EXPECT_LT(frame_distance(store<2>(3, of_orders(other, {{1, 2}}), u), a).l2, 1e-14);
 }
 
 TEST_F(DistanceTest, OfAQuadraticFieldFromALinearOne) {
   // From its interpolant on the diagonal's two triangles: X^2 - X between the sides.
   const Mesh<2> mesh = square(false);
   const Motion<2> parabola = [](const Vec<2>& X) { return Vec<2>(0, X[0] * X[0]); };
-  const fs::path curved = store<2>(1, mesh, parabola, space_of_orders(mesh, {{1, 2}})),
-                 straight = store<2>(2, mesh, parabola);
+  const fs::path curved = store<2>(1, of_orders(mesh, {{1, 2}}), parabola), straight = store<2>(2, mesh, parabola);
   for (const auto& [a, b] : {std::pair(curved, straight), std::pair(straight, curved)}) {
     const FrameDistance distance = frame_distance(a, b);
     EXPECT_NEAR(distance.l2 * distance.l2, 1.0 / 30, 1e-14);
@@ -126,13 +126,13 @@ TEST_F(DistanceTest, In3DQuadraticFieldsAreIntegratedExactly) {
   const Mesh<3> finer = refine_uniformly(mesh);
   const Motion<3> square = [](const Vec<3>& X) { return Vec<3>(0, 0, X[0] * X[0]); };
   const Motion<3> more = [](const Vec<3>& X) { return Vec<3>(0, 0, X[0] * X[0] + X[1] * X[2]); };
-  const fs::path a = store<3>(1, mesh, square, space_of_orders(mesh, {{1, 2}}));
-  FrameDistance distance = frame_distance(store<3>(2, finer, square, space_of_orders(finer, {{1, 2}})), a);
+  const fs::path a = store<3>(1, of_orders(mesh, {{1, 2}}), square);
+  FrameDistance distance = frame_distance(store<3>(2, of_orders(finer, {{1, 2}}), square), a);
   EXPECT_LT(distance.l2, 1e-14);
   EXPECT_LT(distance.h1_semi, 1e-13);
   EXPECT_LT(distance.surface, 1e-3);
   EXPECT_NEAR(distance.reference_l2 * distance.reference_l2, 24.0 / 5040, 1e-15);  // the integral of X^4
-  distance = frame_distance(store<3>(3, finer, more, space_of_orders(finer, {{1, 2}})), a);
+  distance = frame_distance(store<3>(3, of_orders(finer, {{1, 2}}), more), a);
   EXPECT_NEAR(distance.l2 * distance.l2, 4.0 / 5040, 1e-15);          // of Y^2 Z^2
   EXPECT_NEAR(distance.h1_semi * distance.h1_semi, 2.0 / 60, 1e-14);  // of Y^2 + Z^2
 }

@@ -52,7 +52,7 @@ TEST(Edits3D, KeepBodiesTagsPatchesFeaturesAndTopology) {
     EXPECT_EQ(Invariants(mesh, strata).difference(before, 1e-12), "") << seed;
     const Strata<3> anew(mesh);  // what was carried is what the mesh shows
     EXPECT_EQ(anew.num_patches(), strata.num_patches());
-    for (int v = 0; v < mesh.vertex_slots(); ++v) EXPECT_EQ(anew.vertex(v), strata.vertex(v)) << seed << ", vertex " << v;
+    for (int v = 0; v < mesh.node_slots(); ++v) EXPECT_EQ(anew.vertex(v), strata.vertex(v)) << seed << ", vertex " << v;
   }
   EXPECT_GT(slivers, 5);
   EXPECT_EQ(done.size(), 5u);
@@ -101,7 +101,7 @@ TEST(Edits3D, KeepVerticesWithTagsAndWhatTheyHold) {
     Mesh<3> mesh = random_tets(2 + static_cast<int>(seed) % 3, random, false);
     const Vec<3> middle = mesh.rest(mesh.facet(0)[0]);
     std::map<VertexId, Vec<3>> held;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+    for (VertexId v = 0; v < mesh.node_slots(); ++v) {
       if (!mesh.is_boundary(v) || ((mesh.rest(v) - middle).norm() > 0.5 && random() % 3)) continue;
       mesh.set_vertex_tag(v, 7 + static_cast<int>(random() % 8 == 0));
       held[v] = mesh.rest(v);
@@ -172,7 +172,7 @@ TEST(Edits3D, HaveTheSameRulesInTwoDimensions) {
     strata.compact(mesh.compact());
     const Strata<2> anew(mesh);
     EXPECT_EQ(anew.num_patches(), 7);
-    for (int v = 0; v < mesh.vertex_slots(); ++v) EXPECT_EQ(anew.vertex(v), strata.vertex(v));
+    for (int v = 0; v < mesh.node_slots(); ++v) EXPECT_EQ(anew.vertex(v), strata.vertex(v));
     for (const auto& [key, sum] : totals()) EXPECT_NEAR(sum, before.at(key), 1e-13);
   }
   EXPECT_EQ(done.size(), 4u);
@@ -292,7 +292,7 @@ TEST(Edits3D, RefusalsHaveNamesAndReasons) {
   const Mesh<3> cube = make_cubes(2, unit_grid(2), [](int i, int, int) { return i + 1; });
   const Strata<3> strata(cube);
   const auto at = [&](const Mesh<3>& mesh, double x, double y, double z) {
-    for (int v = 0; v < mesh.vertex_slots(); ++v)
+    for (int v = 0; v < mesh.node_slots(); ++v)
       if (mesh.rest(v) == Vec<3>(x, y, z)) return v;
     return kNone;
   };
@@ -395,7 +395,7 @@ TEST(Edits3D, LinkConditionOfPatchesSeesSliversOnThem) {
     if (cube.facet_tag(f) != 5 || of_cube.vertex(a) != Stratum::surface) continue;
     std::vector<Vec<3>> rest;
     std::vector<Mesh<3>::Cell> cells;
-    for (int v = 0; v < cube.vertex_slots(); ++v) rest.push_back(cube.rest(v));
+    for (int v = 0; v < cube.node_slots(); ++v) rest.push_back(cube.rest(v));
     for (int c = 0; c < cube.cell_slots(); ++c) cells.push_back(cube.cell(c));
     cells.push_back({a, b, u, static_cast<int>(rest.size())});
     rest.push_back((rest[a] + rest[b] + rest[u]) / 3 + Vec<3>(0, 0, 1e-13));
@@ -466,7 +466,7 @@ TEST(Edits3D, BestShapedPositionIsTheCentreOfARegularStarAndStaysInItsStratum) {
   int surface = 0, feature = 0;
   std::mt19937 random(2);
   std::uniform_real_distribution<double> noise(-0.1, 0.1);
-  for (int v = 0; v < cube.vertex_slots(); ++v) {
+  for (int v = 0; v < cube.node_slots(); ++v) {
     const auto move = propose_move<3>(moved, strata, v, moved.rest(v) + Vec<3>(noise(random), noise(random), noise(random)));
     EXPECT_EQ(move.edit.has_value(), strata.vertex(v) != Stratum::corner);
     if (!move) continue;

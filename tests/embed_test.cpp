@@ -57,9 +57,6 @@ TEST(Facade, ErrorsNameArrayIndexFoundAndExpected) {
   inner.add_boundary("inside", std::array{0, 5});
   EXPECT_EQ(message_of([&] { AnySimulation s(inner); }),
             "boundary 'inside', facet 0: found vertices 0 5; expected a facet of the mesh's boundary");
-  Model twice = block_model<2>();
-  twice.add_boundary("again", std::array{12, 13});
-  EXPECT_NE(message_of([&] { AnySimulation s(twice); }).find("boundary of id 2 already"), std::string::npos);
 
   AnySimulation simulation(block_model<2>());
   const std::array mask{1, 1};

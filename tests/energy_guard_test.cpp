@@ -57,7 +57,7 @@ Energies simulate(const Setup<2>& setup) {
   const auto energy = [&] {
     const State<2>& state = simulation.state();
     ProblemCache<2> cache(*solver);
-    StepProblem<2> problem(setup, state.mesh, state.space, state.history, state.t, cache);
+    StepProblem<2> problem(setup, state.mesh, state.history, state.t, cache);
     return problem.mechanical_energy(state.history.x[0], state.history.v[0]);
   };
   const double start = energy();

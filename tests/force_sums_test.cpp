@@ -61,7 +61,7 @@ Mesh<Dim> stacked_blocks(bool two, std::mt19937& random) {
   std::vector<int> body;
   for (int copy = 0; copy < (two ? 2 : 1); ++copy) {
     const int first = static_cast<int>(rest.size());
-    for (int v = 0; v < one.vertex_slots(); ++v) {
+    for (int v = 0; v < one.node_slots(); ++v) {
       Vec<Dim> X = one.rest(v);
       const bool is_inside = Dim == 2 && X.minCoeff() > 1e-9 && X.maxCoeff() < kSize - 1e-9;
       for (int c = 0; is_inside && c < Dim; ++c) X[c] += noise(random) * kSize / 3;
@@ -198,7 +198,7 @@ struct RandomScene {
       setup.dirichlet.push_back(held);
     }
     if (with("held point", 0.3)) {
-      for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v)
+      for (VertexId v = 0; v < setup.mesh.node_slots(); ++v)
         if ((setup.mesh.rest(v) - kSize * Vec<Dim>::Ones()).norm() < 1e-9) setup.mesh.set_vertex_tag(v, 9);
       DirichletCondition<Dim> point{
           9, {true}, [](const Vec<Dim>&, double t) { return Vec<Dim>(0.01 * t * Vec<Dim>::Ones()); }};
@@ -206,7 +206,7 @@ struct RandomScene {
     }
     if (is_curved) return;
     if (with("point forces")) {
-      VectorX forces = VectorX::Zero(Dim * setup.mesh.vertex_slots());
+      VectorX forces = VectorX::Zero(Dim * setup.mesh.node_slots());
       for (double& force : forces) force = number(-0.5, 0.5);
       setup.terms.push_back(point_forces<Dim>(setup.mesh, forces));
     }
@@ -260,8 +260,8 @@ struct Sum {
 
 template <int Dim>
 VectorX mass_times(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& v) {
-  const Eigen::Index dofs = Eigen::Index{Dim} * num_nodes(state.mesh, state.space);
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+  const Eigen::Index dofs = Eigen::Index{Dim} * state.mesh.num_nodes();
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
   VectorX product = VectorX::Zero(dofs);
   InertiaEnergy<Dim>(cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent, VectorX::Zero(dofs))
       .add_mass_product(v.head(dofs), product);

@@ -59,7 +59,7 @@ void expect_support_carries_weight() {
   const AskedFields fields = after_one_step(setup);
   EXPECT_LT((sum<Dim>(fields.forces.reaction) - weight<Dim>() * Vec<Dim>::Unit(1)).norm(), 1e-8 * weight<Dim>());
   EXPECT_EQ(fields.forces.contact.size(), 0);
-  for (int v = 0; v < setup.mesh.vertex_slots(); ++v)
+  for (int v = 0; v < setup.mesh.node_slots(); ++v)
     if (setup.mesh.rest(v)[1] < kSize - 1e-9) {
       EXPECT_EQ((fields.forces.reaction.segment<Dim>(Dim * v).norm()), 0) << v;
     }
@@ -162,7 +162,7 @@ TEST(Forces, OfASupportBalancePressure) {
   constexpr double p = 3000;
   setup.pressure.push_back({1, [](const Vec<2>&, double) { return p; }});
   int corner = kNone;
-  for (int v = 0; v < setup.mesh.vertex_slots(); ++v)
+  for (int v = 0; v < setup.mesh.node_slots(); ++v)
     if (setup.mesh.rest(v).norm() < 1e-12) corner = v;
   expect_forces_change_momentum<2>(setup, [corner](const VectorX& x) {  // normals of the left side sum to its ends' distance
     const Vec<2> down = x.segment<2>(2 * corner) - Vec<2>(0, kSize);

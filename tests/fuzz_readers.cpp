@@ -23,6 +23,7 @@
 #include "itr/scene/scene.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "mesh/mesh_file.hpp"
+#include "mesh_formats.hpp"
 #include "output/certify.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
@@ -65,7 +66,13 @@ std::string damaged(std::string bytes, Random& random) {
                                        "element face 9\n",
                                        "property list char int vertex_index\n",
                                        "end_header\n",
-                                       "format binary_little_endian 1.0\n"};
+                                       "format binary_little_endian 1.0\n",
+                                       "*ELEMENT, TYPE=C3D4\n",
+                                       "*NSET, NSET=foot, GENERATE\n",
+                                       "vertex ",
+                                       "CELL_DATA 9\n",
+                                       "<DataArray type=\"Int64\" format=\"binary\">",
+                                       "</DataArray>"};
   constexpr std::uint64_t kNumbers[] = {0, 1, 0x7f, 0xff, 0x7fffffff, 0xffffffff, 0x100000002, ~std::uint64_t{0}};
   for (std::size_t n = 1 + below(random, 4); n > 0 && !bytes.empty(); --n) {
     const std::size_t at = below(random, bytes.size()), length = below(random, std::min<std::size_t>(bytes.size() - at, 40));
@@ -333,9 +340,21 @@ class Fuzzer {
     const auto mesh = [](const fs::path& path) { read_mesh_file(path); };
     auto msh = meshes(examples, ".msh");
     for (Original& file : msh_files()) msh.push_back(std::move(file));
+    for (const bool binary : {false, true}) msh.push_back({"damaged.msh", msh41(Bar(), binary, true)});
     readers_.push_back({"msh", std::move(msh), mesh});
     readers_.push_back({"obj", meshes(examples, ".obj"), mesh});
     readers_.push_back({"ply", ply_files(), mesh});
+    const Bar bar;
+    readers_.push_back(
+        {"inp", {{"damaged.inp", inp(bar, false, inp_sets(bar))}, {"damaged.inp", inp(bar, true, inp_sets(bar))}}, mesh});
+    readers_.push_back({"stl", {{"damaged.stl", stl(false, true)}, {"damaged.stl", stl(true, true)}}, mesh});
+    std::vector<Original> vtk_files, vtu_files;
+    for (const bool binary : {false, true})
+      for (const bool has_offsets : {false, true}) vtk_files.push_back({"damaged.vtk", vtk(bar, binary, has_offsets)});
+    for (const Xml form : {Xml::text, Xml::base64, Xml::compressed, Xml::appended, Xml::appended_base64})
+      vtu_files.push_back({"damaged.vtu", vtu(bar, form)});
+    readers_.push_back({"vtk", std::move(vtk_files), mesh});
+    readers_.push_back({"vtu", std::move(vtu_files), mesh});
     std::vector<Original> scenes;
     for (const auto& entry : fs::directory_iterator(examples))
       if (entry.path().extension() == ".json") scenes.push_back({"damaged.json", bytes_of(entry.path())});

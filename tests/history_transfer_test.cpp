@@ -4,10 +4,10 @@
 
 #include <random>
 
+#include "fem/inverted.hpp"
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/inertia.hpp"
 #include "itr/linear/registry.hpp"
-#include "mesh/validate.hpp"
 #include "projection/safe_projection.hpp"
 #include "random_cube.hpp"
 #include "random_mesh.hpp"
@@ -35,10 +35,10 @@ struct Scene {
     std::vector<std::array<int, 3>> cells;
     std::vector<int> body;
     for (int i = 0; i < 2; ++i) {
-      for (int v = 0; v < one.vertex_slots(); ++v) rest.emplace_back(one.rest(v) + Vec<2>(3 * i, 0));
+      for (int v = 0; v < one.node_slots(); ++v) rest.emplace_back(one.rest(v) + Vec<2>(3 * i, 0));
       for (int c = 0; c < one.cell_slots(); ++c) {
         auto cell = one.cell(c);
-        for (int& v : cell) v += i * one.vertex_slots();
+        for (int& v : cell) v += i * one.node_slots();
         cells.push_back(cell);
         body.push_back(one.body(c));
       }
@@ -50,7 +50,7 @@ struct Scene {
     setup.time = {.dt = 0.01};
     setup.obstacles.rest = {{2.5, -5e-3}, {4.5, -5e-3}};
     setup.obstacles.edges = {{0, 1}};
-    const int bodies = old_mesh.vertex_slots();
+    const int bodies = old_mesh.node_slots();
     VectorX x(2 * (bodies + 2)), v = VectorX::Random(x.size());
     for (int i = 0; i < bodies; ++i) x.segment<2>(2 * i) = old_mesh.rest(i);
     for (int o = 0; o < 2; ++o) x.segment<2>(2 * (bodies + o)) = setup.obstacles.rest[o];
@@ -60,7 +60,7 @@ struct Scene {
 
   /// The first body, bent.
   void bend() {
-    for (int v = 0; v < old_mesh.vertex_slots() / 2; ++v) {
+    for (int v = 0; v < old_mesh.node_slots() / 2; ++v) {
       const Vec<2> X = old_mesh.rest(v);
       old_history.x[0].segment<2>(2 * v) += 0.02 * Vec<2>(std::sin(9 * X[0] + X[1]), std::cos(8 * X[1] - X[0]));
     }
@@ -71,7 +71,7 @@ struct Scene {
   void coarsen(int collapses, May&& may) {
     mesh = old_mesh;
     RemeshFields<2> fields;
-    const int dofs = 2 * old_mesh.vertex_slots();
+    const int dofs = 2 * old_mesh.node_slots();
     fields.past_positions = {old_history.x[0].head(dofs)};
     fields.past_rates = {old_history.v[0].head(dofs)};
     const auto edges = old_mesh.edges();
@@ -94,7 +94,7 @@ struct Scene {
     for (int c = old_mesh.cell_slots(); c < static_cast<int>(map.cell.size()); ++c)
       if (map.cell[c] != kNone) touched.new_cells.push_back(map.cell[c]);
     const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
-      VectorX field(2 * mesh.vertex_slots() + 4);
+      VectorX field(2 * mesh.node_slots() + 4);
       for (std::size_t v = 0; v < map.vertex.size(); ++v)
         if (map.vertex[v] != kNone) field.segment<2>(2 * map.vertex[v]) = slots.segment<2>(2 * static_cast<int>(v));
       field.tail<4>() = with_obstacles.tail<4>();
@@ -106,7 +106,7 @@ struct Scene {
   }
 
   HistoryTransferReport transfer() {
-    return transfer_history(setup, old_mesh, {}, old_history, mesh, {}, touched, *solver, history);
+    return transfer_history(setup, old_mesh, old_history, mesh, touched, *solver, history);
   }
 
   /// Integral of rho u over all bodies.
@@ -134,7 +134,7 @@ TEST(HistoryTransfer, BodyThatRestsFarAwayDoesNotMatter) {
   scene.expect_integrals_kept();
   EXPECT_GT((scene.history.x[0] - interpolated.x[0]).norm(), 1e-3);
   EXPECT_GT((scene.history.v[0] - interpolated.v[0]).norm(), 1e-3);
-  for (int v = 0; v < scene.mesh.vertex_slots(); ++v)
+  for (int v = 0; v < scene.mesh.node_slots(); ++v)
     if (scene.mesh.rest(v)[0] > 1.5) {
       EXPECT_EQ(scene.history.x[0].segment<2>(2 * v), interpolated.x[0].segment<2>(2 * v));
       EXPECT_EQ(scene.history.v[0].segment<2>(2 * v), interpolated.v[0].segment<2>(2 * v));
@@ -179,7 +179,7 @@ TEST(HistoryTransfer, ForcedBarrierKeepsIntegralsAndValidity) {
   int forced = 0;
   for (unsigned seed = 0; seed < 20; ++seed) {
     Scene scene(seed);
-    const int n = scene.old_mesh.vertex_slots() / 2;
+    const int n = scene.old_mesh.node_slots() / 2;
     auto& x = scene.old_history.x[0];
     for (int v = 0; v < n; ++v) {  // waves along the bottom that the coarser mesh cannot follow
       const Vec<2> X = scene.old_mesh.rest(v);
@@ -187,7 +187,7 @@ TEST(HistoryTransfer, ForcedBarrierKeepsIntegralsAndValidity) {
     }
     double lowest = 1;
     scene.coarsen(30, [&](const EdgeKey& e) { return scene.old_mesh.rest(e[0])[1] < 0.3; });
-    for (int v = 0; v < scene.mesh.vertex_slots(); ++v)
+    for (int v = 0; v < scene.mesh.node_slots(); ++v)
       if (scene.mesh.rest(v)[0] < 1.5) lowest = std::min(lowest, scene.history.x[0][2 * v + 1]);
     const double y = lowest - 1e-6;  // a table right below the interpolant
     scene.setup.obstacles.rest = {{-0.5, y}, {1.5, y}};
@@ -196,7 +196,7 @@ TEST(HistoryTransfer, ForcedBarrierKeepsIntegralsAndValidity) {
     forced += report.with_barriers;
     EXPECT_EQ(report.not_converged, 0) << seed;
     scene.expect_integrals_kept();
-    EXPECT_EQ(find_inverted<2>(scene.mesh, scene.history.x[0].head(2 * scene.mesh.vertex_slots())), kNone);
+    EXPECT_EQ(find_inverted<2>(scene.mesh, scene.history.x[0].head(2 * scene.mesh.node_slots())), kNone);
     EXPECT_FALSE(has_intersection<2>(collision_surface(scene.mesh, scene.setup.obstacles), scene.history.x[0])) << seed;
   }
   EXPECT_GT(forced, 3);
@@ -206,7 +206,7 @@ TEST(HistoryTransfer, ForcedBarrierKeepsIntegralsAndValidity) {
 TEST(SafeProjection, GoesStraightFarFromWhatStopsIt) {
   std::mt19937 random(5);
   const Mesh<2> mesh = random_mesh(16, random);
-  const int n = mesh.vertex_slots();
+  const int n = mesh.node_slots();
   CellSet<2> cells = whole_mesh<2>(mesh, {{-1, -1e-4}, {2, -1e-4}});
   std::map<int, Material> materials;
   for (const int body : {1, 2}) materials[body].density = 2;
@@ -256,7 +256,7 @@ TEST(HistoryTransfer, BodyOnRollersSlides) {
     const bool bottom = scene.old_mesh.rest(facet[0])[1] == 0 && scene.old_mesh.rest(facet[1])[1] == 0;
     scene.old_mesh.set_facet_tag(f, bottom ? 2 : 1);
   }
-  for (int v = 0; v < scene.old_mesh.vertex_slots() / 2; ++v) {
+  for (int v = 0; v < scene.old_mesh.node_slots() / 2; ++v) {
     const Vec<2> X = scene.old_mesh.rest(v);
     scene.old_history.x[0].segment<2>(2 * v) +=
         0.02 * Vec<2>(std::sin(30 * X[0] + X[1]), std::sin(9 * X[1]) * std::cos(20 * X[0]));
@@ -267,7 +267,7 @@ TEST(HistoryTransfer, BodyOnRollersSlides) {
   EXPECT_EQ(report.with_barriers, 0);
   scene.expect_integrals_kept();
   double slid = 0;
-  for (int v = 0; v < scene.mesh.vertex_slots(); ++v)
+  for (int v = 0; v < scene.mesh.node_slots(); ++v)
     if (scene.mesh.rest(v)[1] == 0) {
       EXPECT_EQ(scene.history.x[0][2 * v + 1], interpolated.x[0][2 * v + 1]);
       slid = std::max(slid, std::abs(scene.history.x[0][2 * v] - interpolated.x[0][2 * v]));
@@ -282,14 +282,14 @@ TEST(HistoryTransfer, PinsHoldVertices) {
   scene.setup.dirichlet = {{.tag = 7, .components = {true, true}, .displacement = {}},
                            {.tag = 8, .components = {false, true}, .displacement = {}}};
   const std::map<int, Vec<2>> places = {{7, {0.5, 0}}, {8, {0, 0.5}}};
-  for (int v = 0; v < scene.old_mesh.vertex_slots() / 2; ++v)
+  for (int v = 0; v < scene.old_mesh.node_slots() / 2; ++v)
     for (const auto& [tag, place] : places)
       if ((scene.old_mesh.rest(v) - place).norm() < 1e-9) scene.old_mesh.set_vertex_tag(v, tag);
   scene.coarsen(60, [](const EdgeKey&) { return true; });
   const History interpolated = scene.history;
   scene.transfer();
   int pins = 0;
-  for (int v = 0; v < scene.mesh.vertex_slots(); ++v) {
+  for (int v = 0; v < scene.mesh.node_slots(); ++v) {
     const int tag = scene.mesh.vertex_tag(v);
     if (tag == kNoTag) continue;
     ++pins;
@@ -314,7 +314,7 @@ TEST(HistoryTransfer, LossIsTheDistanceOfThePredictors) {
     std::vector<double> density;
     std::vector<int> all;
     Arrays(const Mesh<2>& mesh, const std::map<int, Material>& materials) {
-      for (int v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+      for (int v = 0; v < mesh.node_slots(); ++v) rest.push_back(mesh.rest(v));
       for (int c = 0; c < mesh.cell_slots(); ++c) {
         cells.push_back(mesh.cell(c));
         density.push_back(materials.at(mesh.body(c)).density);
@@ -331,8 +331,8 @@ TEST(HistoryTransfer, LossIsTheDistanceOfThePredictors) {
   };
   const VectorX squares =
       touched_difference<2>({from.rest, from.cells, from.density}, {to.rest, to.cells, to.density}, {from.all, to.all},
-                            rows(integrator.predictor(scene.old_history), scene.old_mesh.vertex_slots()),
-                            rows(integrator.predictor(scene.history), scene.mesh.vertex_slots()))
+                            rows(integrator.predictor(scene.old_history), scene.old_mesh.node_slots()),
+                            rows(integrator.predictor(scene.history), scene.mesh.node_slots()))
           .squares;
   EXPECT_GT(report.loss, 1e-6);
   EXPECT_NEAR(report.loss, squares.sum() / 2, 1e-10 * report.loss);
@@ -356,7 +356,7 @@ TEST(HistoryTransfer, ForcedBarrierIn3D) {
     setup.materials[1] = {.youngs_modulus = 1e5, .density = kDensity};
     setup.contact = {.enabled = true, .activation_distance = 1e-2};
     setup.time = {.dt = 0.01};
-    const int n = old_mesh.vertex_slots();
+    const int n = old_mesh.node_slots();
     VectorX x(3 * (n + 3)), rates = VectorX::Random(x.size());
     double lowest = 1;
     for (int v = 0; v < n; ++v) {
@@ -393,7 +393,7 @@ TEST(HistoryTransfer, ForcedBarrierIn3D) {
     for (int c = old_mesh.cell_slots(); c < static_cast<int>(map.cell.size()); ++c)
       if (map.cell[c] != kNone) touched.new_cells.push_back(map.cell[c]);
     const auto carried = [&](const VectorX& field) {
-      VectorX kept(3 * (mesh.vertex_slots() + 3));
+      VectorX kept(3 * (mesh.node_slots() + 3));
       for (int v = 0; v < n; ++v)
         if (map.vertex[v] != kNone) kept.segment<3>(3 * map.vertex[v]) = field.segment<3>(3 * v);
       kept.tail<9>() = field.tail<9>();
@@ -401,12 +401,12 @@ TEST(HistoryTransfer, ForcedBarrierIn3D) {
     };
     const History old_history{.x = {x}, .v = {rates}, .a = {}};
     History history{.x = {carried(x)}, .v = {carried(rates)}, .a = {}};
-    const auto report = transfer_history(setup, old_mesh, {}, old_history, mesh, {}, touched, *solver, history);
+    const auto report = transfer_history(setup, old_mesh, old_history, mesh, touched, *solver, history);
     EXPECT_EQ(report.with_barriers, 1) << seed;
     EXPECT_EQ(report.not_converged, 0) << seed;
     EXPECT_LE((integral(mesh, history.x[0]) - integral(old_mesh, x)).norm(), kRoundOff * kDensity);
     EXPECT_LE((integral(mesh, history.v[0]) - integral(old_mesh, rates)).norm(), kRoundOff * kDensity);
-    EXPECT_EQ(find_inverted<3>(mesh, history.x[0].head(3 * mesh.vertex_slots())), kNone);
+    EXPECT_EQ(find_inverted<3>(mesh, history.x[0].head(3 * mesh.node_slots())), kNone);
     EXPECT_FALSE(has_intersection<3>(collision_surface(mesh, setup.obstacles), history.x[0])) << seed;
   }
 }

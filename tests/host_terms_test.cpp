@@ -20,7 +20,7 @@ namespace {
 
 template <int Dim>
 VectorX some_forces(const Mesh<Dim>& mesh) {
-  VectorX forces(Dim * mesh.vertex_slots());
+  VectorX forces(Dim * mesh.node_slots());
   for (int i = 0; i < forces.size(); ++i) forces[i] = std::sin(1.0 + 3 * i);
   return forces;
 }
@@ -32,11 +32,11 @@ TEST(HostForces, StayWhereTheyActHoweverTheMeshChanges) {
   const auto term = point_forces<2>(mesh, forces);
   const auto totals = [&](const Mesh<2>& other) {
     const CellSet<2> cells = whole_mesh(other, {});
-    VectorX gradient = VectorX::Zero(2 * other.vertex_slots());
+    VectorX gradient = VectorX::Zero(2 * other.node_slots());
     Workspace workspace;
     term(cells, 0, 1)->add_gradient(gradient, gradient, workspace);
     Vec<3> total = Vec<3>::Zero();
-    for (int v = 0; v < other.vertex_slots(); ++v) {
+    for (int v = 0; v < other.node_slots(); ++v) {
       const Vec<2> f = -gradient.segment<2>(2 * v), X = other.rest(v);
       total += Vec<3>(f[0], f[1], X[0] * f[1] - X[1] * f[0]);
     }
@@ -99,7 +99,7 @@ TEST(HostForces, OfPositionsBalanceAsTheirPotentialDoes) {
     if (way == 2)
       setup.follower.stiffness = [](const Mesh<2>& mesh, ConstVectorView, double, const StiffnessReceiver& add) {
         const Mat<2> block = k * Mat<2>::Identity();
-        for (int v = 0; v < mesh.vertex_slots(); ++v) add(std::array{v}, block.data());
+        for (int v = 0; v < mesh.node_slots(); ++v) add(std::array{v}, block.data());
       };
     auto simulation = simulate(setup);
     int count = 0;
@@ -122,7 +122,7 @@ Setup<2> between_springs(double k, bool with_stiffness = false) {
   if (with_stiffness)
     setup.follower.stiffness = [k](const Mesh<2>& mesh, ConstVectorView, double, const StiffnessReceiver& add) {
       const Mat<2> block = k * Mat<2>::Identity();
-      for (int v = 0; v < mesh.vertex_slots(); ++v) add(std::array{v}, block.data());
+      for (int v = 0; v < mesh.node_slots(); ++v) add(std::array{v}, block.data());
     };
   return setup;
 }
@@ -183,9 +183,9 @@ TEST(HostForces, ThatVanishWhereTheyLeadAreNoSolution) {
   auto setup = block<2>();
   setup.follower.forces = [](const Mesh<2>& mesh, ConstVectorView x, double, VectorView f) {
     double fall = 0;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) fall += mesh.rest(v)[1] - x[2 * v + 1];
-    if (fall / mesh.vertex_slots() > 2e-3) return;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) f[2 * v + 1] -= 100;
+    for (VertexId v = 0; v < mesh.node_slots(); ++v) fall += mesh.rest(v)[1] - x[2 * v + 1];
+    if (fall / mesh.node_slots() > 2e-3) return;
+    for (VertexId v = 0; v < mesh.node_slots(); ++v) f[2 * v + 1] -= 100;
   };
   const StepResult result = step_of(setup);
   EXPECT_FALSE(result.ok);
@@ -200,7 +200,7 @@ TEST(HostForces, LinearisedHaveTheirDerivatives) {
     MatrixX block = MatrixX::Random(6, 6);
     add(std::array{2, 0, 5}, block.data());
   };
-  VectorX x = VectorX::Random(2 * mesh.vertex_slots() + 4);  // two more vertices, of obstacles
+  VectorX x = VectorX::Random(2 * mesh.node_slots() + 4);  // two more vertices, of obstacles
   const auto energy = lag_follower<2>(follower, mesh, x, 0, 0.1);
   const VectorX y = x + VectorX::Random(x.size());
   expect_derivatives(*energy, y, 1e-6, 1e-7);

@@ -65,7 +65,7 @@ TEST(HostLoop, ConditionsChangeBetweenSteps) {
   simulation.conditions().dirichlet[0].displacement = [](const Vec<2>&, double) { return Vec<2>(0.01, 0); };
   simulation.conditions().body_acceleration = nullptr;
   ASSERT_TRUE(simulation.advance().ok);
-  for (int v = 0; v < simulation.state().mesh.vertex_slots(); ++v)
+  for (int v = 0; v < simulation.state().mesh.num_vertices(); ++v)
     if (simulation.state().mesh.rest(v)[0] == 0) {
       EXPECT_NEAR(simulation.state().history.x[0][2 * v], 0.01, 1e-15);
     }
@@ -305,7 +305,7 @@ TEST(Events, TheProgramIsToldOfMeshChanges) {
   auto simulation = simulate(pressed_block());
   VectorX own;  // 1 + 2 X - 3 Y at the vertices
   const auto exact = [](const Mesh<2>& mesh) {
-    VectorX values(mesh.vertex_slots());
+    VectorX values(mesh.node_slots());
     for (int v = 0; v < values.size(); ++v) values[v] = 1 + 2 * mesh.rest(v)[0] - 3 * mesh.rest(v)[1];
     return values;
   };
@@ -313,20 +313,20 @@ TEST(Events, TheProgramIsToldOfMeshChanges) {
   int changes = 0;
   simulation.on_mesh_change([&](const MeshChange<2>& change, const Mesh<2>& before) {
     ++changes;
-    EXPECT_EQ(before.vertex_slots(), own.size());
+    EXPECT_EQ(before.node_slots(), own.size());
     EXPECT_LT((project_fields(before, simulation.state().mesh, change, own) - exact(simulation.state().mesh)).norm(), 1e-12);
     own = change.interpolation * own;
   });
   for (int i = 0; i < 6; ++i) ASSERT_TRUE(simulation.advance().ok);
   EXPECT_GT(changes, 0);
-  ASSERT_EQ(own.size(), simulation.state().mesh.vertex_slots());
+  ASSERT_EQ(own.size(), simulation.state().mesh.num_vertices());
   EXPECT_LT((own - exact(simulation.state().mesh)).norm(), 1e-12);
 }
 
 TEST(Locator, FindsPointsAndVertices) {
   const Mesh<3> mesh = make_block<3>();
   const Locator<3> locator(mesh);
-  for (int v = 0; v < mesh.vertex_slots(); ++v) {
+  for (int v = 0; v < mesh.node_slots(); ++v) {
     const auto place = locator.find(mesh.rest(v));
     for (int k = 0; k <= 3; ++k) EXPECT_EQ(place.weights[k], place.vertices[k] == v ? 1 : 0);
   }

@@ -77,7 +77,7 @@ TEST(Impact, FindsWhatIsWrongWithPositions) {
   setup.obstacles.rest.emplace_back(0.1, -0.02);  // a point
   setup.obstacles.motion.push_back(kNone);
   const Mesh<2>& mesh = setup.mesh;
-  const int bodies = mesh.vertex_slots();
+  const int bodies = mesh.node_slots();
   VectorX x(2 * (bodies + 3));
   for (int v = 0; v < bodies; ++v) x.segment<2>(2 * v) = mesh.rest(v);
   for (int o = 0; o < 3; ++o) x.segment<2>(2 * (bodies + o)) = setup.obstacles.rest[o];

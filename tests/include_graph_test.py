@@ -64,7 +64,7 @@ WALLS = {
     r"boost/": {"remesh"},
     r"(oneapi/)?tbb/": {"core"},
     r"hdf5\.h|H5": {"core"},
-    r"zlib\.h": {"apps"},
+    r"zlib\.h": {"apps", "mesh"},
     r"CLI/|spdlog/": {"apps"},
 }
 

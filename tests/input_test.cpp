@@ -120,7 +120,7 @@ TEST(Explain, CountsTheEntriesOfTheMatrix) {
   const auto setup = std::get<itr::Setup<2>>(scene::read(file).setup);
   std::size_t entries = 0, free_vertices = 0;
   const auto is_free = [&](VertexId v) { return setup.mesh.rest(v).x() > 1e-9; };
-  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v) free_vertices += is_free(v);
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v) free_vertices += is_free(v);
   for (const auto& [a, b] : setup.mesh.edges()) entries += is_free(a) && is_free(b) ? 4 : 0;
   ASSERT_EQ(free_vertices, 72u);
   entries += 3 * free_vertices;

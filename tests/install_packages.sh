@@ -20,7 +20,7 @@ optional=(
   gfortran doxygen pkg-config python3-dev pybind11-dev python3-pip patchelf
   chromium chromium-driver firefox-esr strace
   python3-vtk9 xvfb xauth libgl1-mesa-dri
-  python3-pil python3-dolfinx python3-meshio python3-scipy python3-sympy
+  python3-pil python3-dolfinx python3-meshio gmsh python3-scipy python3-sympy
 )
 case "${1:-}" in
   "") packages+=("${optional[@]}") ;;

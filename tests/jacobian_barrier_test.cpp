@@ -2,6 +2,7 @@
 // The barrier that keeps det F above zero in curved cells: its derivatives, what it proves, where it is zero, and when a
 // cell gets one.
 #include "energy/elastic/jacobian_barrier.hpp"
+#include "curved_mesh.hpp"
 
 #include <gtest/gtest.h>
 
@@ -31,7 +32,7 @@ CellSet<Dim> one_cell() {
     cell[k] = k;
   }
   const Mesh<Dim> mesh(rest, {cell}, {1});
-  return whole_mesh(mesh, {}, space_of_orders(mesh, {{1, 2}}));
+  return whole_mesh(of_orders(mesh, {{1, 2}}), {});
 }
 
 template <int Dim>
@@ -48,7 +49,7 @@ VectorX flat(const QuadraticCell<Dim>& x) {
 
 /// Random positions at which the barrier acts and is finite.
 template <int Dim>
-QuadraticCell<Dim> distorted(std::mt19937& random, const typename CellSet<Dim>::CurvedElement& element) {
+QuadraticCell<Dim> distorted(std::mt19937& random, const typename CellSet<Dim>::Element& element) {
   for (;;) {
     const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.15);
     const double value = JacobianBarrier<Dim>(element, x).value();
@@ -63,8 +64,8 @@ TYPED_TEST(JacobianBarriers, DerivativesMatchDifferences) {
   const CellSet<Dim> cells = one_cell<Dim>();
   std::mt19937 random(3);
   for (int i = 0; i < 20; ++i) {
-    const QuadraticCell<Dim> positions = distorted<Dim>(random, cells.curved_elements[0]);
-    const double h = 1e-4 * JacobianBarrier<Dim>(cells.curved_elements[0], positions).least_ratio();
+    const QuadraticCell<Dim> positions = distorted<Dim>(random, cells.curved()[0]);
+    const double h = 1e-4 * JacobianBarrier<Dim>(cells.curved()[0], positions).least_ratio();
     const ElasticEnergy<Dim> elastic(cells, kMaterials, 0.3);
     expect_derivatives(elastic, flat<Dim>(positions), h, 1e-4);
     expect_psd(elastic, flat<Dim>(positions));
@@ -78,7 +79,7 @@ TYPED_TEST(JacobianBarriers, ActWhereDetFIsFarBelowItsMeanAndAreFiniteOnlyWhereI
   int finite = 0, inactive = 0, acting = 0;
   for (int i = 0; i < 20000; ++i) {
     const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.01 * (i % 16));
-    const JacobianBarrier<Dim> barrier(cells.curved_elements[0], x);
+    const JacobianBarrier<Dim> barrier(cells.curved()[0], x);
     if (!std::isfinite(barrier.value())) continue;
     ++finite;
     ASSERT_TRUE(is_positive_everywhere_exact<Dim>(x));
@@ -104,10 +105,10 @@ TYPED_TEST(JacobianBarriers, DoNotFeelTheVolume) {
   const CellSet<Dim> cells = one_cell<Dim>();
   std::mt19937 random(7);
   for (int i = 0; i < 20; ++i) {
-    const QuadraticCell<Dim> x = distorted<Dim>(random, cells.curved_elements[0]);
-    const double value = JacobianBarrier<Dim>(cells.curved_elements[0], x).value();
+    const QuadraticCell<Dim> x = distorted<Dim>(random, cells.curved()[0]);
+    const double value = JacobianBarrier<Dim>(cells.curved()[0], x).value();
     for (const double size : {1e-3, 0.2, 5.0})
-      EXPECT_NEAR(JacobianBarrier<Dim>(cells.curved_elements[0], size * x).value(), value, 1e-9 * value);
+      EXPECT_NEAR(JacobianBarrier<Dim>(cells.curved()[0], size * x).value(), value, 1e-9 * value);
   }
 }
 
@@ -116,7 +117,7 @@ TYPED_TEST(JacobianBarriers, StepsLeaveATenthOfTheLeastCoefficient) {
   constexpr int Dim = TypeParam::value;
   const CellSet<Dim> cells = one_cell<Dim>();
   const ElasticEnergy<Dim> elastic(cells, kMaterials, 1);
-  const auto& element = cells.curved_elements[0];
+  const auto& element = cells.curved()[0];
   std::mt19937 random(9);
   Workspace workspace;
   int shorter = 0;

@@ -172,6 +172,8 @@ class Explain(Runs):
         found = self.explain(touching)
         self.assertTrue(found["contact"] and found["friction"])
         self.assertGreater(found["settings"][stiffness], 0)
+        self.assertNotIn("/contact/dhat", found["settings"])
+        self.assertGreater(self.explain(touching, "--set", '/contact/dhat="auto"')["settings"]["/contact/dhat"], 0)
         self.assertNotIn(stiffness, self.explain(touching | {"solver": {"contact": {"barrier_stiffness": 7}}})["settings"])
 
     def test_numbers_are_in_the_scene_s_units(self):

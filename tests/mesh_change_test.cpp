@@ -32,8 +32,8 @@ double to_facet(const Vec<3>& p, const Mesh<3>& mesh, FacetId f) {
 /// Values of 1, and of each coordinate, at the vertices.
 template <int Dim>
 MatrixX linear_fields(const Mesh<Dim>& mesh) {
-  MatrixX fields(mesh.vertex_slots(), Dim + 1);
-  for (int v = 0; v < mesh.vertex_slots(); ++v) fields.row(v) << 1, mesh.rest(v).transpose();
+  MatrixX fields(mesh.node_slots(), Dim + 1);
+  for (int v = 0; v < mesh.node_slots(); ++v) fields.row(v) << 1, mesh.rest(v).transpose();
   return fields;
 }
 
@@ -47,7 +47,7 @@ VectorX integrals(const Mesh<Dim>& mesh, const MatrixX& fields) {
 
 template <int Dim>
 void check(const Mesh<Dim>& before, const Mesh<Dim>& mesh, const MeshChange<Dim>& change) {
-  ASSERT_EQ(change.vertex.size(), std::size_t(before.vertex_slots()));
+  ASSERT_EQ(change.vertex.size(), std::size_t(before.node_slots()));
   // Ids: kept cells and facets have the same vertices, bodies and tags; no new id is told twice.
   const auto follow = [&](auto ids) {
     for (int& v : ids) v = change.vertex[v];
@@ -75,16 +75,16 @@ void check(const Mesh<Dim>& before, const Mesh<Dim>& mesh, const MeshChange<Dim>
     ASSERT_LT(to_facet(middle, before, parent), 1e-12);
   }
   // Interpolation: convex, exact for linear functions, one by one for what stayed.
-  for (int v = 0; v < mesh.vertex_slots(); ++v)
+  for (int v = 0; v < mesh.node_slots(); ++v)
     for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(change.interpolation, v); it; ++it)
       ASSERT_GT(it.value(), 0);
   EXPECT_LT((change.interpolation * linear_fields(before) - linear_fields(mesh)).cwiseAbs().maxCoeff(), 1e-12);
-  for (int v = 0; v < before.vertex_slots(); ++v)
+  for (int v = 0; v < before.node_slots(); ++v)
     if (const int now = change.vertex[v]; now != kNone && mesh.rest(now) == before.rest(v)) {
       ASSERT_EQ(change.interpolation.coeff(now, v), 1);
     }
   // Projection: keeps integrals of any field.
-  const MatrixX field = MatrixX::Random(before.vertex_slots(), 2);
+  const MatrixX field = MatrixX::Random(before.node_slots(), 2);
   const MatrixX projected = project_fields(before, mesh, change, field);
   EXPECT_LT((integrals(mesh, projected) - integrals(before, field)).norm(), 1e-11);
 }

@@ -7,12 +7,12 @@
 #include <random>
 #include <set>
 
+#include "fem/inverted.hpp"
 #include "geometry/measures.hpp"
 #include "geometry/predicates.hpp"
 #include "itr/core/error.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "mesh/refine.hpp"
-#include "mesh/validate.hpp"
 #include "remesh/edits.hpp"
 
 namespace itr {
@@ -205,7 +205,7 @@ TYPED_TEST(MeshOf, SplitsKeepTheDomainAndItsTags) {
     const EdgeKey edge = edges[random() % edges.size()];
     const auto edit = make_split(mesh, edge);
     EXPECT_EQ(edit.inserted_cells.size(), 2 * edit.removed_cells.size());
-    const VertexId expected = mesh.vertex_slots();
+    const VertexId expected = mesh.node_slots();
     EXPECT_EQ(mesh.apply(edit), expected);
     EXPECT_EQ(mesh.rest(expected), Vec<Dim>(0.5 * (mesh.rest(edge[0]) + mesh.rest(edge[1]))));
     ASSERT_EQ(mesh.find_defect(), "") << i;
@@ -222,7 +222,7 @@ struct Image {
   std::vector<int> body, tags, counts;
   std::vector<double> volumes;
   explicit Image(const Mesh<Dim>& mesh) : counts{mesh.num_vertices(), mesh.num_cells(), mesh.num_facets()} {
-    for (int v = 0; v < mesh.vertex_slots(); ++v) {
+    for (int v = 0; v < mesh.node_slots(); ++v) {
       rest.emplace_back(mesh.rest(v).data(), mesh.rest(v).data() + Dim);
       around.emplace_back(mesh.cells_of(v).begin(), mesh.cells_of(v).end());
       facets_around.emplace_back(mesh.facets_of(v).begin(), mesh.facets_of(v).end());
@@ -299,15 +299,15 @@ TEST(Mesh, CompactionRenumbersAndKeepsOrder) {
         i % 3 == 0 ? std::optional(make_split(mesh, edge)) : propose_collapse(mesh, Strata<2>(mesh), edge).edit;
     if (edit) mesh.apply(*edit);
   }
-  ASSERT_GT(mesh.vertex_slots(), mesh.num_vertices());
+  ASSERT_GT(mesh.node_slots(), mesh.num_vertices());
   const Mesh<2> before = mesh;
   const auto map = mesh.compact();
   EXPECT_EQ(mesh.find_defect(), "");
-  EXPECT_EQ(mesh.vertex_slots(), before.num_vertices());
+  EXPECT_EQ(mesh.node_slots(), before.num_vertices());
   EXPECT_EQ(mesh.cell_slots(), before.num_cells());
   EXPECT_EQ(mesh.facet_slots(), before.num_facets());
   int next = 0;
-  for (int v = 0; v < before.vertex_slots(); ++v) {
+  for (int v = 0; v < before.node_slots(); ++v) {
     EXPECT_EQ(map.vertex[v], before.is_vertex_alive(v) ? next++ : kNone);
     EXPECT_TRUE(map.vertex[v] == kNone || mesh.rest(map.vertex[v]) == before.rest(v));
   }
@@ -395,8 +395,8 @@ TEST(Mesh, RefusesEditsThatInvertOrOrphan) {
 TYPED_TEST(MeshOf, InvertedCellsAreFound) {
   constexpr int Dim = TypeParam::value;
   const Mesh<Dim> mesh = make_box<Dim>(2, 9);
-  VectorX x(Dim * mesh.vertex_slots());
-  for (int v = 0; v < mesh.vertex_slots(); ++v) x.segment<Dim>(Dim * v) = mesh.rest(v);
+  VectorX x(Dim * mesh.node_slots());
+  for (int v = 0; v < mesh.node_slots(); ++v) x.segment<Dim>(Dim * v) = mesh.rest(v);
   EXPECT_EQ(find_inverted<Dim>(mesh, x), kNone);
   const CellId c = mesh.num_cells() / 2;
   const auto& cell = mesh.cell(c);

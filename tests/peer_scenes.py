@@ -4,8 +4,8 @@
 
     python3 tests/peer_scenes.py [--only SUBSTRING]... [--itr PATH] [--timeout SECONDS] [--solver NAME]... [--keep DIR]
 
-Scenes run as they are, with PolyFEM's default of the barrier stiffness where they leave it open. With --solver all of them run with that engine instead, with several with one after the other: an
-engine changes no result.
+Scenes run as they are, with PolyFEM's defaults. With --solver all of them run with that engine instead, with several with one
+after the other: an engine changes no result.
 A scene passes if its five norms of the final displacement (docs/theory.md, "Norms"; linf_grad is wrong in the reference and left out)
 are within the margin; `miss` says which norm is off and by how much; `refused` is what `itr` does not support, with its reason;
 `stopped` is a simulation that could not go on. Exit status 1 if a scene misses or stops, 0 otherwise.
@@ -63,11 +63,6 @@ def time_override(scene):
     return times
 
 
-def leaves_stiffness_open(scene):
-    """Then it is PolyFEM's default, which is not ours, that its norms were made with."""
-    return "barrier_stiffness" not in scene.get("solver", {}).get("contact", {})
-
-
 def compare(reference, norms):
     """Largest deviation over its margin, with the name of the norm."""
     margin = reference.get("margin", DEFAULT_MARGIN)
@@ -85,13 +80,11 @@ def run(scene_file, solver, args):
     reference = json.loads(scene_file.read_text())["tests"]
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(args.keep) / scene_file.stem if args.keep else pathlib.Path(scratch)
-        command = [args.itr, "run", str(scene_file), "-o", str(folder), "--overwrite", "--threads", "1"]
+        command = [args.itr, "run", str(scene_file), "-o", str(folder), "--overwrite", "--threads", "1", "--defaults", "polyfem"]
         command += ["--solver", solver] if solver else []
         command += ["--set", "/output/paraview/skip_frame=1000000"]
         if override:
             command += ["--set", "/time=" + json.dumps(override)]
-        if leaves_stiffness_open(read_merged(scene_file)):
-            command += ["--set", '/solver/contact/barrier_stiffness="adaptive"']
         start = time.monotonic()
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=args.timeout)

@@ -150,10 +150,10 @@ struct Coarsening {
     TouchedCells touched{edit.removed_cells, {}};
     const auto map = mesh.compact();
     for (int c = first; c < static_cast<int>(map.cell.size()); ++c) touched.new_cells.push_back(map.cell[c]);
-    MatrixX carried(mesh.vertex_slots(), u.cols());
+    MatrixX carried(mesh.node_slots(), u.cols());
     for (Eigen::Index v = 0; v < u.rows(); ++v)
       if (map.vertex[v] != kNone) carried.row(map.vertex[v]) = u.row(v);
-    const TransferPatch<3> patch = make_transfer_patch(before, {}, mesh, {}, touched, materials, 2);
+    const TransferPatch<3> patch = make_transfer_patch(before, mesh, touched, materials, 2);
     MatrixX u_old(patch.old_cells.vertices.size(), u.cols()), u_bar(patch.new_cells.vertices.size(), u.cols());
     for (Eigen::Index i = 0; i < u_old.rows(); ++i) u_old.row(i) = u.row(patch.old_cells.vertices[i]);
     for (Eigen::Index i = 0; i < u_bar.rows(); ++i) u_bar.row(i) = carried.row(patch.new_cells.vertices[i]);
@@ -184,9 +184,9 @@ struct Coarsening {
 TEST(Transfer, KeepsMomentumAndLinearFieldsThroughAThousandCoarseningsIn3D) {
   std::mt19937 random(4);
   Coarsening state{make_cube(14, random, 0.15)};
-  MatrixX u(state.mesh.vertex_slots(), 4);  // random, random, smooth, linear
+  MatrixX u(state.mesh.num_vertices(), 4);  // random, random, smooth, linear
   const auto linear = [](const Vec<3>& X) { return 1 + 2 * X[0] - 3 * X[1] + 5 * X[2]; };
-  for (int v = 0; v < state.mesh.vertex_slots(); ++v) {
+  for (int v = 0; v < state.mesh.num_vertices(); ++v) {
     const Vec<3>& X = state.mesh.rest(v);
     u.row(v) << std::uniform_real_distribution<double>(-1, 1)(random), std::uniform_real_distribution<double>(-1, 1)(random),
         std::sin(5 * X[0]) * std::cos(4 * X[1] + X[2]), linear(X);
@@ -195,7 +195,7 @@ TEST(Transfer, KeepsMomentumAndLinearFieldsThroughAThousandCoarseningsIn3D) {
   const double scale = state.moments(u.cwiseAbs()).cwiseAbs().maxCoeff();
   int done = 0;
   for (int i = 0; done < 1000 && i < 100000; ++i) {
-    const VertexId gone = static_cast<int>(random() % state.mesh.vertex_slots());
+    const VertexId gone = static_cast<int>(random() % state.mesh.num_vertices());
     if (state.mesh.is_boundary(gone)) continue;
     const auto around = state.mesh.cells_of(gone);
     const VertexId kept = state.mesh.cell(around[random() % around.size()])[random() % 4];
@@ -208,7 +208,7 @@ TEST(Transfer, KeepsMomentumAndLinearFieldsThroughAThousandCoarseningsIn3D) {
   ASSERT_EQ(done, 1000);
   ASSERT_EQ(state.mesh.find_defect(), "");
   EXPECT_LE((state.moments(u) - before).cwiseAbs().maxCoeff(), 1e-12 * scale);
-  for (int v = 0; v < state.mesh.vertex_slots(); ++v) ASSERT_NEAR(u(v, 3), linear(state.mesh.rest(v)), 1e-11);
+  for (int v = 0; v < state.mesh.num_vertices(); ++v) ASSERT_NEAR(u(v, 3), linear(state.mesh.rest(v)), 1e-11);
 }
 
 /// The visited vertices, and with them the cost, follow the edit and not the mesh.
@@ -220,7 +220,7 @@ TEST(Transfer, PatchDoesNotGrowWithTheMesh) {
     const int middle = (n / 2 * (n + 1) + n / 2) * (n + 1) + n / 2;
     const auto edit = collapse(state.mesh, middle, middle + 1);
     ASSERT_TRUE(edit);
-    MatrixX u = MatrixX::Random(state.mesh.vertex_slots(), 1);
+    MatrixX u = MatrixX::Random(state.mesh.num_vertices(), 1);
     state.apply(*edit, u);
     vertices.push_back(state.patch_vertices);
   }
@@ -265,13 +265,13 @@ TEST(Transfer, PatchComesNearTheWholeMeshRingByRing) {
   ASSERT_TRUE(edit);
   Mesh<2> mesh = before;
   RemeshFields<2> fields;
-  fields.x = VectorX::Random(2 * before.vertex_slots());
+  fields.x = VectorX::Random(2 * before.node_slots());
   const VectorX old_values = fields.x;
   fields.follow(*edit, mesh.apply(*edit));
   TouchedCells touched{edit->removed_cells, {}};
   for (int c = before.cell_slots(); c < mesh.cell_slots(); ++c) touched.new_cells.push_back(c);
   const auto change = [&](int rings) {
-    const auto patch = make_transfer_patch(before, {}, mesh, {}, touched, {{1, {.density = 1}}, {2, {.density = 5}}}, rings);
+    const auto patch = make_transfer_patch(before, mesh, touched, {{1, {.density = 1}}, {2, {.density = 5}}}, rings);
     std::vector<char> fixed;
     for (const char at_rim : patch.at_rim) fixed.insert(fixed.end(), 2, at_rim);
     TransferReport report;

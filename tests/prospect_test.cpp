@@ -26,8 +26,8 @@ TetScene falling_cube(double pull, double noise) {
   const Vec<3> fall = scene.context.scaling * scene.context.loads.acceleration(Vec<3>::Zero());
   std::uniform_real_distribution<double> random(-noise, noise);
   scene.fields = {};
-  scene.fields.x = scene.fields.predictor = VectorX(3 * scene.mesh.vertex_slots());
-  for (int v = 0; v < scene.mesh.vertex_slots(); ++v) {
+  scene.fields.x = scene.fields.predictor = VectorX(3 * scene.mesh.node_slots());
+  for (int v = 0; v < scene.mesh.node_slots(); ++v) {
     scene.fields.x.segment<3>(3 * v) = turn * scene.mesh.rest(v);
     scene.fields.predictor.segment<3>(3 * v) =
         turn * scene.mesh.rest(v) - fall + Vec<3>(random(scene.random), random(scene.random), random(scene.random));
@@ -125,8 +125,8 @@ TEST(Prospect, NothingIsStirredInFreeFlight) {
     scene.mesh = make_cubes(3, place, [](int, int, int) { return 1; });
     const Mat<3> turn = Eigen::AngleAxisd(0.7, Vec<3>(1, 2, 3).normalized()).toRotationMatrix();
     const Vec<3> fall = scene.context.scaling * scene.context.loads.acceleration(Vec<3>::Zero());
-    scene.fields.x = scene.fields.predictor = VectorX(3 * scene.mesh.vertex_slots());
-    for (int v = 0; v < scene.mesh.vertex_slots(); ++v) {
+    scene.fields.x = scene.fields.predictor = VectorX(3 * scene.mesh.node_slots());
+    for (int v = 0; v < scene.mesh.node_slots(); ++v) {
       const Vec<3>& X = scene.mesh.rest(v);
       scene.fields.predictor.segment<3>(3 * v) = turn * X - fall;
       scene.fields.x.segment<3>(3 * v) = turn * (X + (flies ? 0.0 : 0.1) * Vec<3>(X[1] * X[1], 0, 0));

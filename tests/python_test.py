@@ -786,7 +786,47 @@ class Files(unittest.TestCase):
         quads = meshio.Mesh(points, [("triangle", cells + 1), ("quad", [[1, 2, 6, 5]])])
         with self.assertRaises(itr.InputError) as caught:
             itr.Model.from_meshio(quads)
-        self.assertEqual(str(caught.exception), "mesh: found cells quad; expected tetra, triangle, tetra10 or triangle6 only")
+        self.assertEqual(
+            str(caught.exception),
+            "mesh: found cells quad; expected tetra, triangle, tetra10 or triangle6 only: itr.simplices splits others",
+        )
+
+    def test_meshio_with_sets(self):
+        try:
+            import meshio
+        except ImportError:
+            self.skipTest("no meshio")
+        vertices, cells = block()
+        left, lower = np.flatnonzero(vertices[:, 0] == 0), np.flatnonzero(vertices[:, 1] == 0)
+        mesh = meshio.Mesh(
+            vertices,
+            [("triangle", cells)],
+            point_sets={"left": left, "around": np.union1d(left, lower), "one": left[:1]},
+            cell_sets={"soft": [np.arange(9)], "all": [np.arange(18)]},
+        )
+        model = itr.Model.from_meshio(mesh)
+        material = OPTIONS["materials"]
+        options = {**OPTIONS, "materials": [{**material, "id": "all"}]}
+        options["boundary_conditions"] = {"dirichlet_boundary": [
+            {"id": "left", "value": [0, 0], "dimension": [True, False]},
+            {"id": "around", "value": [0, 0], "dimension": [False, True]}]}
+        model.set_options(options)
+        simulation = itr.Simulation(model)
+        self.assertEqual(sorted(set(simulation.bodies.tolist())), [0, 1])
+        self.assertEqual(len(set(simulation.facet_boundaries.tolist()) - {-1}), 2)  # left of both, the rest of around
+        simulation.set_velocities([1, 1])
+        simulation.step()
+        moved = simulation.positions - simulation.rest_positions
+        self.assertEqual(np.abs(moved[left]).max(), 0)
+        self.assertEqual(np.abs(moved[lower, 1]).max(), 0)
+        self.assertGreater(np.abs(moved[lower, 0]).max(), 0)
+        simulation.watch_forces()
+        simulation.step()
+        np.testing.assert_array_equal(simulation.resultant("soft")[0], simulation.resultant("body:1")[0])
+        with self.assertRaises(itr.InputError) as caught:
+            model.set_options({"materials": [{**material, "id": "hard"}]})
+            itr.Simulation(model)
+        self.assertIn('"all", "soft"', str(caught.exception))
 
     def test_dolfinx(self):
         try:

@@ -5,8 +5,11 @@
 
 #include <numeric>
 #include <random>
+#include <set>
 
+#include "curved_mesh.hpp"
 #include "derivatives.hpp"
+#include "fem/chords.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/energy/elastic/elastic.hpp"
@@ -17,6 +20,7 @@
 #include "itr/geometry/quadratic_validity.hpp"
 #include "itr/simulation/simulation.hpp"
 #include "random_quadratic.hpp"
+#include "remesh/edits.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/invariants.hpp"
 
@@ -123,13 +127,13 @@ Mesh<Dim> two_cells() {
     return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}}, {{0, 1, 2, 3}, {1, 4, 2, 3}}, {1, 2}};
 }
 
-/// A space with some of the mesh's edges curved.
+/// The mesh with some of its edges curved.
 template <int Dim>
-Space random_space(const Mesh<Dim>& mesh, std::mt19937& random) {
-  std::vector<EdgeKey> curved;
+Mesh<Dim> randomly_curved(const Mesh<Dim>& mesh, std::mt19937& random) {
+  std::vector<EdgeKey> edges;
   for (const EdgeKey& edge : mesh.edges())
-    if (random() % 3) curved.push_back(edge);
-  return Space(std::move(curved));
+    if (random() % 3) edges.push_back(edge);
+  return curved(mesh, edges);
 }
 
 template <int Dim>
@@ -150,8 +154,7 @@ TYPED_TEST(Quadratic, DerivativesMatchDifferences) {
   const Mesh<Dim> mesh = two_cells<Dim>();
   std::mt19937 random(11);
   for (int i = 0; i < 12; ++i) {
-    const CellSet<Dim> cells =
-        whole_mesh(mesh, {}, i == 0 ? space_of_orders(mesh, {{1, 2}, {2, 2}}) : random_space(mesh, random));
+    const CellSet<Dim> cells = whole_mesh(i == 0 ? of_orders(mesh, {{1, 2}, {2, 2}}) : randomly_curved(mesh, random), {});
     std::map<int, Material> materials = kMaterials;
     materials.at(1).law = static_cast<MaterialLaw>(i % 4);
     materials.at(2).youngs_modulus_at = [](const Vec<3>& X) { return 50 + 20 * X[1]; };
@@ -159,7 +162,7 @@ TYPED_TEST(Quadratic, DerivativesMatchDifferences) {
     ElasticEnergy<Dim> elastic(cells, materials, 0.3);
     expect_derivatives(elastic, x, 1e-6, 1e-6);
     expect_psd(elastic, x);
-    elastic.set_quadrature_levels(QuadratureLevels(cells.curved_elements.size(), 2));
+    elastic.set_quadrature_levels(QuadratureLevels(cells.curved().size(), 2));
     expect_derivatives(elastic, x, 1e-6, 1e-6);
     for (const MassKind kind : {MassKind::consistent, MassKind::lumped})
       expect_derivatives(InertiaEnergy<Dim>(cells, materials, kind, perturbed(cells, random, 0.2)), x, 1e-4, 1e-7);
@@ -174,10 +177,10 @@ TYPED_TEST(Quadratic, DerivativesMatchDifferences) {
 template <int Dim>
 double deformed_volume(const CellSet<Dim>& cells, const VectorX& x) {
   double sum = 0;
-  for (const auto& element : cells.elements) sum += element.volume * deformation_gradient<Dim>(element, x).determinant();
-  for (const auto& element : cells.curved_elements)
+  for (const auto& element : cells.straight()) sum += element.volume * deformation_gradient<Dim>(element, x).determinant();
+  for (const auto& element : cells.curved())
     for (const auto& point : quadrature<Dim>(Dim)) {
-      const Mat<Dim> F = at_nodes<Dim>(element.nodes, x) * shape_gradients<Dim>(element, point.weights).transpose();
+      const Mat<Dim> F = at_nodes<Dim>(element.nodes(), x) * shape_gradients<Dim>(element, point.weights).transpose();
       sum += element.volume * point.share * F.determinant();
     }
   return sum;
@@ -189,8 +192,7 @@ TYPED_TEST(Quadratic, PressureOnAClosedSurfaceIsThatOfTheEnclosedVolume) {
   std::mt19937 random(17);
   Workspace workspace;
   for (int i = 0; i < 8; ++i) {
-    const Space space = i == 0 ? space_of_orders(mesh, {{1, 2}, {2, 2}}) : random_space(mesh, random);
-    CellSet<Dim> cells = whole_mesh(mesh, {}, space);
+    CellSet<Dim> cells = whole_mesh(i == 0 ? of_orders(mesh, {{1, 2}, {2, 2}}) : randomly_curved(mesh, random), {});
     VectorX rest(Dim * cells.num_vertices);
     for (int v = 0; v < cells.num_vertices; ++v) vertex_of<Dim>(rest, v) = cells.rest[v];
     const VectorX lagged = perturbed(cells, random, 0.1), x = perturbed(cells, random, 0.1);
@@ -203,7 +205,7 @@ TYPED_TEST(Quadratic, PressureOnAClosedSurfaceIsThatOfTheEnclosedVolume) {
     EXPECT_NEAR(closed.value(x, workspace), 0.3 * 2.5 * (deformed_volume(cells, x) - deformed_volume(cells, rest)), 1e-12);
     expect_derivatives(closed, x, 1e-5, 1e-8);
     expect_psd(closed, x);
-    (cells.curved_facets.empty() ? cells.facets.back().tag : cells.curved_facets.back().tag) = 6;
+    cells.facets.back().tag = 6;
     expect_derivatives(PressureEnergy<Dim>(cells, loads, lagged, 0.3), x, 1e-5, 1e-8);
   }
 }
@@ -214,14 +216,15 @@ TYPED_TEST(Quadratic, PressureOnOneFacetPushesAlongItsNormals) {
   constexpr int kFine = 400;  // midpoints a direction
   const Mesh<Dim> mesh = two_cells<Dim>();
   std::mt19937 random(19);
-  CellSet<Dim> cells = whole_mesh(mesh, {}, space_of_orders(mesh, {{1, 2}, {2, 2}}));
-  const auto loaded = cells.curved_facets.front();
-  cells.curved_facets = {loaded};
+  CellSet<Dim> cells = whole_mesh(of_orders(mesh, {{1, 2}, {2, 2}}), {});
+  const auto loaded = cells.facets.front();
+  const auto nodes = loaded.nodes();
+  cells.facets = {loaded};
   Loads<Dim> loads;
   loads.pressures.emplace_back(kNoTag, [](const Vec<Dim>&) { return 2.5; });
   const VectorX x = perturbed(cells, random, 0.1);
   const VectorX gradient = gradient_of(PressureEnergy<Dim>(cells, loads, x, 1), x);
-  const auto p = at_nodes<Dim>(loaded.nodes, x);
+  const auto p = at_nodes<Dim>(nodes, x);
   VectorX expected = VectorX::Zero(x.size());
   Eigen::Matrix<double, Dim - 1, Dim> linear;
   linear << Eigen::Matrix<double, Dim - 1, 1>::Constant(-1), Mat<Dim - 1>::Identity();
@@ -244,8 +247,7 @@ TYPED_TEST(Quadratic, PressureOnOneFacetPushesAlongItsNormals) {
         else
           normal = t.col(0).cross(t.col(1)) / (2 * kFine * kFine);
         const auto shapes = quadratic_shapes<Dim - 1>(loaded.curved, l);
-        for (int n = 0; n < kQuadraticNodes<Dim - 1>; ++n)
-          vertex_of<Dim>(expected, loaded.nodes[n]) += 2.5 * shapes[n] * normal;
+        for (int n = 0; n < kQuadraticNodes<Dim - 1>; ++n) vertex_of<Dim>(expected, nodes[n]) += 2.5 * shapes[n] * normal;
       }
   EXPECT_LE((gradient - expected).norm(), 1e-4 * expected.norm());
 }
@@ -259,20 +261,18 @@ TYPED_TEST(Quadratic, LinearFunctionsHaveTheEnergiesOfStraightCells) {
   std::map<int, Material> materials = kMaterials;
   materials.at(2).density_at = nullptr;
   for (int i = 0; i < 8; ++i) {
-    const Space space = i == 0 ? space_of_orders(mesh, {{1, 2}, {2, 2}}) : random_space(mesh, random);
-    const CellSet<Dim> straight = whole_mesh(mesh, {}), curved = whole_mesh(mesh, {}, space);
+    const Mesh<Dim> with_curves = i == 0 ? of_orders(mesh, {{1, 2}, {2, 2}}) : randomly_curved(mesh, random);
+    const CellSet<Dim> straight = whole_mesh(mesh, {}), curved = whole_mesh(with_curves, {});
     const VectorX x = perturbed(straight, random, 0.05);
     VectorX y(Dim * curved.num_vertices);
     y.head(x.size()) = x;
-    for (int k = 0; k < space.num_curved(); ++k) {
-      const auto [a, b] = space.curved_edges()[k];
-      vertex_of<Dim>(y, mesh.vertex_slots() + k) = (vertex_of<Dim>(x, a) + vertex_of<Dim>(x, b)) / 2;
-    }
+    for (const auto& [a, b] : with_curves.curved_edges())
+      vertex_of<Dim>(y, with_curves.node_of(a, b)) = (vertex_of<Dim>(x, a) + vertex_of<Dim>(x, b)) / 2;
     const double W = ElasticEnergy<Dim>(straight, materials, 1).value(x, workspace);
     ElasticEnergy<Dim> elastic(curved, materials, 1);
     EXPECT_NEAR(elastic.value(y, workspace), W, 1e-12 * W);
     for (std::uint8_t level = 1; level <= kMostClosedLevel; ++level) {
-      elastic.set_quadrature_levels(QuadratureLevels(curved.curved_elements.size(), level));
+      elastic.set_quadrature_levels(QuadratureLevels(curved.curved().size(), level));
       EXPECT_NEAR(elastic.value(y, workspace), W, 1e-12 * W);
     }
     const InertiaEnergy<Dim> of_straight(straight, materials, MassKind::consistent, VectorX::Zero(x.size()));
@@ -289,21 +289,24 @@ TYPED_TEST(Quadratic, LinearFunctionsHaveTheEnergiesOfStraightCells) {
 }
 
 /// Neighbours cut a shared facet in the same way whatever its vertices' order is, and the parts cover it.
-TEST(Space, ChordFacetsCoverTheFacet) {
+TEST(CurvedMesh, ChordFacetsCoverTheFacet) {
   const std::vector<Vec<3>> rest = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<EdgeKey> edges = {{0, 1}, {0, 2}, {1, 2}};
   for (int mask = 0; mask < 8; ++mask) {
     std::vector<EdgeKey> curved;
     for (int k = 0; k < 3; ++k)
       if (mask >> k & 1) curved.push_back(edges[k]);
-    const Space space(curved);
+    const auto node_of = [&](int a, int b) {
+      const auto at = std::find(curved.begin(), curved.end(), edge_key(a, b));
+      return at == curved.end() ? kNone : 3 + static_cast<int>(at - curved.begin());
+    };
     std::vector<Vec<3>> nodes = rest;
     for (const auto& [a, b] : curved) nodes.push_back((rest[a] + rest[b]) / 2);
     std::set<std::array<int, 3>> first;
     for (const std::array<int, 3> facet :
          {std::array{0, 1, 2}, std::array{1, 2, 0}, std::array{2, 0, 1}, std::array{0, 2, 1}}) {
       std::vector<std::array<int, 3>> chords;
-      add_chord_facets<3>(facet, space, 3, chords);
+      for_each_chord<3>(facet, node_of, [&](const auto& ids) { chords.push_back(ids); });
       EXPECT_EQ(chords.size(), 1 + curved.size());
       double area = 0;
       std::set<std::array<int, 3>> sorted;
@@ -318,11 +321,41 @@ TEST(Space, ChordFacetsCoverTheFacet) {
   }
 }
 
-TEST(Space, AnEdgeHasTheLeastOrderOfItsCells) {
+TEST(CurvedMesh, AnEdgeHasTheLeastOrderOfItsCells) {
   const Mesh<2> mesh = two_cells<2>();
-  EXPECT_EQ(space_of_orders(mesh, {{1, 2}}).curved_edges(), (std::vector<EdgeKey>{{0, 1}, {1, 2}}));
-  EXPECT_EQ(space_of_orders(mesh, {{1, 2}, {2, 2}}).num_curved(), 5);
-  EXPECT_TRUE(space_of_orders(mesh, {{1, 1}}).is_linear());
+  EXPECT_EQ(of_orders(mesh, {{1, 2}}).curved_edges(), (std::vector<EdgeKey>{{0, 1}, {1, 2}}));
+  EXPECT_EQ(of_orders(mesh, {{1, 2}, {2, 2}}).num_curved(), 5);
+  EXPECT_FALSE(of_orders(mesh, {{1, 1}}).has_nodes());
+}
+
+TEST(CurvedMesh, HasEdgesOfItsOwnOnlyAscendingAndOnce) {
+  const Mesh<2> mesh = two_cells<2>();
+  const std::vector<std::vector<EdgeKey>> wrong = {{{1, 3}},  {{0, 4}},         {{1, 0}},
+                                                   {{-1, 2}}, {{0, 2}, {0, 1}}, {{0, 1}, {0, 1}}};
+  for (const auto& edges : wrong) EXPECT_THROW(curved(mesh, edges), InputError) << edges[0][0] << " " << edges[0][1];
+}
+
+/// A revision stays with copies, and no two contents share one.
+TEST(CurvedMesh, ChangesGiveNewRevisions) {
+  Mesh<2> mesh = two_cells<2>();
+  const Mesh<2> copy = mesh;
+  EXPECT_EQ(copy.revision(), mesh.revision());
+  std::set<std::uint64_t> revisions = {mesh.revision(), two_cells<2>().revision()};
+  const auto expect_new = [&](const char* change) { EXPECT_TRUE(revisions.insert(mesh.revision()).second) << change; };
+  mesh.set_facet_tag(0, 3);
+  expect_new("tag of a facet");
+  mesh.set_vertex_tag(1, 2);
+  expect_new("tag of a vertex");
+  mesh.set_curved_edges({{0, 1}});
+  expect_new("curved edge");
+  mesh.apply(make_split(mesh, {0, 2}));
+  expect_new("split");
+  EXPECT_FALSE(mesh.is_compact());
+  mesh.compact();
+  expect_new("compacted");
+  EXPECT_TRUE(mesh.is_compact());
+  EXPECT_EQ(mesh.edge_of_node(mesh.num_vertices()), (EdgeKey{0, 1}));
+  EXPECT_EQ(revisions.size(), 7u);
 }
 
 /// A square of n x n x 2 triangles with its lower left corner at `origin`.
@@ -372,11 +405,11 @@ TEST(QuadraticRun, BodiesThatCollideStayValidAndKeepMomentum) {
     ASSERT_TRUE(result.ok) << result.reason;
     nearest = std::min(nearest, result.report.min_distance);
     const State<2>& state = simulation.state();
-    EXPECT_EQ(find_violation(simulation.setup(), state.mesh, state.history.x[0], state.space), "");
+    EXPECT_EQ(find_violation(simulation.setup(), state.mesh, state.history.x[0]), "");
   }
   EXPECT_LT(nearest, 0.02);  // they did touch
   const State<2>& state = simulation.state();
-  const CellSet<2> cells = whole_mesh(state.mesh, {}, state.space);
+  const CellSet<2> cells = whole_mesh(state.mesh, {});
   VectorX momentum = VectorX::Zero(state.history.v[0].size());
   InertiaEnergy<2>(cells, simulation.setup().materials, MassKind::consistent, VectorX::Zero(momentum.size()))
       .add_mass_product(state.history.v[0], momentum);

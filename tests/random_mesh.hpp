@@ -98,7 +98,7 @@ inline Mesh<2> with_second_body(const Mesh<2>& first, std::mt19937& random) {
   std::vector<Vec<2>> rest;
   std::vector<std::array<int, 3>> cells;
   std::vector<int> body;
-  for (int v = 0; v < first.vertex_slots(); ++v) rest.push_back(first.rest(v));
+  for (int v = 0; v < first.node_slots(); ++v) rest.push_back(first.rest(v));
   for (int c = 0; c < first.cell_slots(); ++c) cells.push_back(first.cell(c)), body.push_back(first.body(c));
   const Grid second = make_grid(
       3, [](int i, int j) { return Vec<2>(1.02 + 0.15 * i, 0.23 + 0.15 * j); }, [&](int, int) { return random() % 2; });
@@ -133,8 +133,8 @@ struct TrialScene {
     obstacles.edges = {{0, 1}, {1, 2}};
     obstacles.past_x = {obstacles.x};
     std::uniform_real_distribution<double> noise(-0.008, 0.008);
-    fields.x.resize(2 * mesh.vertex_slots());
-    for (int v = 0; v < mesh.vertex_slots(); ++v)
+    fields.x.resize(2 * mesh.node_slots());
+    for (int v = 0; v < mesh.node_slots(); ++v)
       for (int c = 0; c < 2; ++c) fields.x[2 * v + c] = mesh.rest(v)[c] + noise(random);
     fields.predictor = fields.velocity_reference = fields.x;
     for (Eigen::Index i = 0; i < fields.x.size(); ++i) fields.predictor[i] += noise(random);
@@ -189,7 +189,7 @@ inline void write_back(const LocalProblem<2>& problem, VertexId created, VectorX
 inline double global_energy(const Mesh<2>& slots, const RemeshFields<2>& slot_fields, const StepContext<2>& context) {
   Mesh<2> mesh = slots;
   const auto map = mesh.compact();
-  const int bodies = mesh.vertex_slots();
+  const int bodies = mesh.node_slots();
   const auto compacted = [&](const VectorX& field, const std::vector<Vec<2>>& extra) {
     VectorX kept(2 * (bodies + extra.size()));
     for (std::size_t v = 0; v < map.vertex.size(); ++v)

@@ -113,7 +113,7 @@ inline Mesh<3> random_tets(int n, std::mt19937& random, bool slivers) {
   Mesh<3> mesh = make_cubes(n, place, body_at);
   if (!slivers) return mesh;
   Strata<3> strata(mesh);
-  for (int v = 0; v < mesh.vertex_slots(); ++v) {
+  for (int v = 0; v < mesh.node_slots(); ++v) {
     if (random() % 3) continue;
     const auto around = mesh.cells_of(v);
     const CellId c = around[random() % around.size()];

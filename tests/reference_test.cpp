@@ -90,7 +90,7 @@ std::string options_of(const Scene& scene) {
   text += fmt::format(
       "{} {} {} {} {}|", scene.output.skip_frames, scene.output.checkpoint_period, scene.max_threads, scene.directory,
       s.fields.any_forces() || s.fields.von_mises || s.fields.stress || s.fields.kinetic_energy || s.fields.momentum);
-  for (VertexId v = 0; v < s.mesh.vertex_slots(); ++v) text += fmt::format("{} {} ", s.mesh.rest(v)[0], s.mesh.rest(v)[1]);
+  for (VertexId v = 0; v < s.mesh.num_vertices(); ++v) text += fmt::format("{} {} ", s.mesh.rest(v)[0], s.mesh.rest(v)[1]);
   return text;
 }
 

@@ -6,10 +6,10 @@
 #include <memory>
 #include <random>
 
+#include "fem/inverted.hpp"
 #include "geometry/intersection.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/trial.hpp"
@@ -248,8 +248,8 @@ TEST(Gate3d, LetsCollapsesOnFlatSurfacesPass) {
       4, [](int i, int j, int k) { return Vec<3>(Vec<3>(i, j, k) / 4); }, [](int, int, int) { return 1; });
   const Strata<3> strata(mesh);
   RemeshFields<3> fields;
-  fields.x.resize(3 * mesh.vertex_slots());
-  for (int v = 0; v < mesh.vertex_slots(); ++v) fields.x.segment<3>(3 * v) = mesh.rest(v);
+  fields.x.resize(3 * mesh.node_slots());
+  for (int v = 0; v < mesh.node_slots(); ++v) fields.x.segment<3>(3 * v) = mesh.rest(v);
   fields.past_positions = {fields.x};
   StepContext<3> context;
   context.contact = {.enabled = true, .activation_distance = 0.01};
@@ -275,8 +275,8 @@ TEST(Gate3d, LetsNoSwapTakeAnObstacleIn) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> noise(-0.02, 0.02);
   RemeshFields<3> fields;
-  fields.x.resize(3 * mesh.vertex_slots());
-  for (int v = 0; v < mesh.vertex_slots(); ++v)
+  fields.x.resize(3 * mesh.node_slots());
+  for (int v = 0; v < mesh.node_slots(); ++v)
     fields.x.segment<3>(3 * v) = mesh.rest(v) + Vec<3>(noise(random), noise(random), noise(random));
   fields.past_positions = {fields.x};
   const auto at = [&](VertexId v) -> Vec<3> { return fields.x.segment<3>(3 * v); };
@@ -336,8 +336,8 @@ struct Swapped {
   Swapped(Mesh<3> mesh, double noise, std::mt19937& random) : before(mesh), after(std::move(mesh)) {
     std::uniform_real_distribution<double> shift(-noise, noise);
     RemeshFields<3> fields;
-    fields.x.resize(3 * before.vertex_slots());
-    for (int v = 0; v < before.vertex_slots(); ++v)
+    fields.x.resize(3 * before.node_slots());
+    for (int v = 0; v < before.node_slots(); ++v)
       fields.x.segment<3>(3 * v) = before.rest(v) + Vec<3>::NullaryExpr([&] { return shift(random); });
     if (find_inverted<3>(before, fields.x) != kNone) return;
     fields.past_positions = {fields.x};

@@ -67,8 +67,8 @@ struct Body {
     context.loads.acceleration = [](const Vec<Dim>&) { return Vec<Dim>(-5 * Vec<Dim>::Unit(Dim - 1)); };
     context.held_components[1].fill(true);
     std::uniform_real_distribution<double> noise(-0.005, 0.005);
-    fields.x.resize(Dim * mesh.vertex_slots());
-    for (int v = 0; v < mesh.vertex_slots(); ++v)
+    fields.x.resize(Dim * mesh.node_slots());
+    for (int v = 0; v < mesh.node_slots(); ++v)
       for (int c = 0; c < Dim; ++c) fields.x[Dim * v + c] = mesh.rest(v)[c] + noise(random);
     fields.predictor = fields.x;
     for (double& x : fields.predictor) x += noise(random);

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "apply_edit.hpp"
+#include "curved_mesh.hpp"
 #include "curved_run.hpp"
 #include "curved_trial.hpp"
 #include "itr/core/parallel.hpp"
@@ -91,8 +92,8 @@ template <int Dim>
 double whole_energy(const Scene<Dim>& scene) {
   const Compact<Dim> compact(scene.mesh);
   const auto& obstacles = scene.context.obstacles;
-  const CellSet<Dim> cells = whole_mesh(compact.mesh, obstacles.rest, compact.space);
-  const CollisionSurface surface = collision_surface(compact.mesh, obstacles_of(scene), compact.space);
+  const CellSet<Dim> cells = whole_mesh(compact.mesh, obstacles.rest);
+  const CollisionSurface surface = collision_surface(compact.mesh, obstacles_of(scene));
   const VectorX x = compact.field(scene.fields.x, obstacles.x);
   const VectorX predictor = compact.field(scene.fields.predictor, obstacles.x);
   const VectorX reference = compact.field(scene.fields.velocity_reference, obstacles.velocity_reference);
@@ -109,7 +110,7 @@ std::string violation(const Scene<Dim>& scene, const VectorX& x, const std::vect
   StepSetup<Dim> setup;
   setup.contact.enabled = true;
   setup.obstacles = obstacles_of(scene);
-  return find_violation(setup, compact.mesh, compact.field(x, of_obstacles), compact.space);
+  return find_violation(setup, compact.mesh, compact.field(x, of_obstacles));
 }
 
 template <int Dim>
@@ -148,7 +149,7 @@ TYPED_TEST(CurvedContact, PatchesSeeWhatTheWholeMeshSees) {
       in_contact += old_side.touches_contact() && !edit.inserted_facets.empty();
       scene.apply(edit);
       EXPECT_NEAR(before - whole_energy(scene), start - unrelaxed, 1e-11 * std::abs(before) + 1e-13);
-      const VertexId first_node = scene.mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size());
+      const VertexId first_node = scene.mesh.node_slots() - static_cast<int>(edit.inserted_nodes.size());
       for (const auto& [v, x] : positions) {
         const VertexId slot = v == kNewVertex         ? first_node - 1
                               : v > kNewVertex - 1000 ? first_node + (kNewVertex - 1 - v)
@@ -180,7 +181,7 @@ TYPED_TEST(CurvedContact, NothingTouchesInTheRoomThatAReachGivesWayTo) {
     View<Dim> view(scene, scene.context, HistoryRule::interpolated);
     const SurfaceIndex<Dim>& surface = view.state.surface;
     const double dhat = scene.context.contact.activation_distance;
-    for (VertexId v = 0; v < scene.mesh.vertex_slots(); ++v) {
+    for (VertexId v = 0; v < scene.mesh.node_slots(); ++v) {
       if (!scene.mesh.is_vertex_alive(v) || !scene.mesh.is_boundary(v)) continue;
       ContactReach<Dim> usual, yielding;
       for (auto* reach : {&usual, &yielding}) {
@@ -218,8 +219,8 @@ template <int Dim>
 void scatter_points(Scene<Dim>& scene, int count) {
   auto& obstacles = scene.context.obstacles;
   const Compact<Dim> compact(scene.mesh);
-  const auto now = body_boundary(compact.mesh, compact.field(scene.fields.x, {}), compact.space);
-  const auto past = body_boundary(compact.mesh, compact.field(scene.fields.past_positions[0], {}), compact.space);
+  const auto now = body_boundary(compact.mesh, compact.field(scene.fields.x, {}));
+  const auto past = body_boundary(compact.mesh, compact.field(scene.fields.past_positions[0], {}));
   const auto is_outside = [](const ClosedSurface<Dim>& boundary, const Vec<Dim>& point) {
     return !boundary.touches(point) && boundary.winding(point) == 0;
   };
@@ -316,11 +317,11 @@ TYPED_TEST(CurvedContact, ProjectionsSeeTheChordsOfTheWholeSurface) {
   for (unsigned seed = 0; seed < 10; ++seed) {
     const Scene<Dim> scene(seed, 0.5, 0.004);
     const Compact<Dim> compact(scene.mesh);
-    const auto& [mesh, space, slots] = compact;
+    const auto& [mesh, slots] = compact;
     const Obstacles<Dim> obstacles = obstacles_of(scene);
     const VectorX x = compact.field(scene.fields.x, scene.context.obstacles.x);
     const TouchedCells touched{.old_cells = {}, .new_cells = {0, 1, 2, 3}};
-    const auto patch = make_transfer_patch<Dim>(mesh, space, mesh, space, touched, scene.context.materials, 0);
+    const auto patch = make_transfer_patch<Dim>(mesh, mesh, touched, scene.context.materials, 0);
     const auto& ids = patch.new_cells.vertices;
     std::vector<char> moving(ids.size());
     VectorX goal(Dim * static_cast<Eigen::Index>(ids.size()));
@@ -328,9 +329,9 @@ TYPED_TEST(CurvedContact, ProjectionsSeeTheChordsOfTheWholeSurface) {
       moving[i] = !patch.at_rim[i];
       vertex_of<Dim>(goal, static_cast<int>(i)) = vertex_of<Dim>(x, ids[i]);
     }
-    const auto found = patch_surface<Dim>(mesh, space, obstacles, patch, moving, x, goal, 100);
+    const auto found = patch_surface<Dim>(mesh, obstacles, patch, moving, x, goal, 100);
     if (found.empty()) continue;
-    const CollisionSurface whole = collision_surface(mesh, obstacles, space);
+    const CollisionSurface whole = collision_surface(mesh, obstacles);
     const auto id = [&](int v) {
       const auto n = static_cast<int>(ids.size());
       return v < n ? ids[v] : found.others[v - n];
@@ -445,12 +446,11 @@ TYPED_TEST(CurvedContact, RunsStayValidOnAnyNumberOfThreads) {
 double depth_in_tent(const State<2>& state) {
   const VectorX& x = state.history.x[0];
   double deepest = 0;
-  for (int i = 0; i < state.space.num_curved(); ++i) {
-    const EdgeKey& edge = state.space.curved_edges()[i];
+  for (const EdgeKey& edge : state.mesh.curved_edges()) {
     if (state.mesh.facets_of_edge(edge).empty()) continue;
     for (double t = 0; t <= 1; t += 1.0 / 64) {
       const Vec<2> p = (1 - t) * (1 - 2 * t) * vertex_of<2>(x, edge[0]) + t * (2 * t - 1) * vertex_of<2>(x, edge[1]) +
-                       4 * t * (1 - t) * vertex_of<2>(x, state.mesh.vertex_slots() + i);
+                       4 * t * (1 - t) * vertex_of<2>(x, state.mesh.node_of(edge));
       const double roof = p[0] < 2.1 ? -0.4 + 0.74 * (p[0] - 1.6) : -0.4 + 0.74 * (2.6 - p[0]);
       if (p[1] > -0.4) deepest = std::max(deepest, roof - p[1]);
     }
@@ -484,7 +484,7 @@ TYPED_TEST(CurvedContact, RunsOfOrderTwoSplit) {
   const Run<Dim> result = run<Dim>(setup);
   EXPECT_LT(result.nearest, 0.01);
   EXPECT_GT(result.splits, 3);
-  EXPECT_TRUE(is_all_curved(result.state.mesh, result.state.space));
+  EXPECT_TRUE(is_all_curved(result.state.mesh));
 }
 
 }  // namespace

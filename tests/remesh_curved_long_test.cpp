@@ -8,7 +8,6 @@
 #include <span>
 
 #include "curved_scene.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "remesh/contact/gate.hpp"
 #include "remesh_options.hpp"
@@ -85,17 +84,12 @@ struct LongScene : CurvedScene<Dim> {
     if (std::string defect = strata.find_defect(mesh); !defect.empty()) return defect;
     for (const auto& [body, sum] : volumes())
       if (std::abs(sum - volume.at(body)) > 1e-11) return "volume of body " + std::to_string(body);
-    Mesh<Dim> straight = mesh;
-    straight.compact();
-    std::vector<EdgeKey> curved;
-    for (const auto& [edge, node] : mesh.nodes()) curved.push_back(edge);
-    const Space space(curved);
     const auto violation = [&](const VectorX& x, const std::vector<Vec<Dim>>& obstacles) {
-      VectorX all(Dim * (mesh.vertex_slots() + static_cast<int>(obstacles.size())));
-      all.head(Dim * mesh.vertex_slots()) = x.head(Dim * mesh.vertex_slots());
+      VectorX all(Dim * (mesh.node_slots() + static_cast<int>(obstacles.size())));
+      all.head(Dim * mesh.node_slots()) = x.head(Dim * mesh.node_slots());
       for (std::size_t i = 0; i < obstacles.size(); ++i)
-        all.template segment<Dim>(Dim * (mesh.vertex_slots() + static_cast<int>(i))) = obstacles[i];
-      return find_violation(setup, straight, all, space);
+        all.template segment<Dim>(Dim * (mesh.node_slots() + static_cast<int>(i))) = obstacles[i];
+      return find_violation(setup, mesh, all);
     };
     const std::string now = violation(fields.x, context.obstacles.x);
     return now.empty() ? violation(fields.past_positions[0], context.obstacles.past_x[0]) : now;
@@ -161,7 +155,7 @@ TYPED_TEST(CurvedLong, RandomOperationsKeepEverythingValid) {
         }
         const FacetId first_facet = scene.mesh.facet_slots();
         const VertexId created = scene.mesh.apply(edit);
-        scene.fields.follow(edit, created, scene.mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size()));
+        scene.fields.follow(edit, created, scene.mesh.node_slots() - static_cast<int>(edit.inserted_nodes.size()));
         scene.strata.follow(edit, created);
         gate.follow(edit, first_facet);
         scene.stir();

@@ -22,12 +22,12 @@ class CurvedPrediction : public ::testing::Test {};
 using Dimensions = ::testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
 TYPED_TEST_SUITE(CurvedPrediction, Dimensions);
 
-/// All terms on the whole mesh, in the numbering of a space.
+/// All terms on the whole mesh, in the numbering of the compact mesh.
 template <int Dim>
 double whole_energy(const Mesh<Dim>& slots, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                     bool* was_refined = nullptr) {
   const Compact<Dim> compact(slots);
-  const CellSet<Dim> cells = whole_mesh(compact.mesh, {}, compact.space);
+  const CellSet<Dim> cells = whole_mesh(compact.mesh, {});
   const VectorX x = compact.field(fields.x), predictor = compact.field(fields.predictor);
   IncrementalPotential<Dim> potential(context, cells, {.predictor = predictor, .velocity_reference = predictor});
   if (was_refined) *was_refined = potential.elastic()->refine_quadrature(x);
@@ -80,7 +80,7 @@ TYPED_TEST(CurvedPrediction, PatchesSeeWhatTheWholeMeshSees) {
         const double relaxed = after.has_unknowns() ? after.relax(3).energy : after.value();
         after.get_positions(verdict.positions);
         scene.apply(edit);
-        const VertexId first_node = scene.mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size());
+        const VertexId first_node = scene.mesh.node_slots() - static_cast<int>(edit.inserted_nodes.size());
         for (const auto& [v, x] : verdict.positions) {
           const VertexId slot = v == kNewVertex         ? first_node - 1
                                 : v > kNewVertex - 1000 ? first_node + (kNewVertex - 1 - v)
@@ -129,9 +129,10 @@ TYPED_TEST(CurvedPrediction, StraighteningIsChargedForWhatItForgets) {
     const StepContext<Dim> context = context_of<Dim>(seed);
     const View<Dim> view(scene, context);
     LocalScratch<Dim> scratch;
-    const auto nodes = scene.mesh.nodes();
-    if (nodes.empty()) continue;
-    const auto [edge, node] = nodes[scene.random() % nodes.size()];
+    const auto edges = scene.mesh.curved_edges();
+    if (edges.empty()) continue;
+    const EdgeKey edge = edges[scene.random() % edges.size()];
+    const VertexId node = scene.mesh.node_of(edge);
     const Edit<Dim> edit = make_straighten(scene.mesh, edge);
     const double gain = LocalProblem<Dim>(view.state, edit.removed_cells, edit, false, scratch).value() -
                         LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, scratch).value();
@@ -162,7 +163,7 @@ TYPED_TEST(CurvedPrediction, EnergiesOfCellsAreThoseOfPatches) {
     double sum = 0;
     for (const auto& cell : edit.inserted_cells) {
       sum += cell_energy<Dim>(view.state, cell.vertices, cell.body, edit);
-      curved += curved_cell_after(scene.mesh, edit, cell.vertices).edges != 0;
+      curved += cell_after(scene.mesh, edit, cell.vertices).edges != 0;
     }
     const double expected = LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, scratch).value();
     EXPECT_NEAR(sum, expected, 1e-9 * std::abs(expected)) << "seed " << seed;
@@ -242,14 +243,14 @@ TYPED_TEST(CurvedPrediction, BarriersArePartOfEnergies) {
     context.loads = {};
     context.coupling = 0;
     const Compact<Dim> compact(scene.mesh);
-    const CellSet<Dim> cells = whole_mesh(compact.mesh, {}, compact.space);
+    const CellSet<Dim> cells = whole_mesh(compact.mesh, {});
     Workspace workspace;
     const VectorX x = compact.field(scene.fields.x);
     const double whole =
         ElasticEnergy<Dim>(cells, context.materials, context.scaling, context.quadrature_degree).value(x, workspace);
-    const auto is_active = [&](const auto& e) { return JacobianBarrier<Dim>(e, at_nodes<Dim>(e.nodes, x)).is_active(); };
-    const auto active = std::find_if(cells.curved_elements.begin(), cells.curved_elements.end(), is_active);
-    if (active == cells.curved_elements.end() || !std::isfinite(whole)) continue;
+    const auto is_active = [&](const auto& e) { return JacobianBarrier<Dim>(e, at_nodes<Dim>(e.nodes(), x)).is_active(); };
+    const auto active = std::ranges::find_if(cells.curved(), is_active);
+    if (active == cells.curved().end() || !std::isfinite(whole)) continue;
     const View<Dim> view(scene, context);
     const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
     double sum = 0;
@@ -329,14 +330,15 @@ TYPED_TEST(CurvedPrediction, PredictionOfAStraighteningIsWhatItCosts) {
     CurvedScene<Dim> scene(seed, 0.5, seed % 5 ? 0.001 : 0.02);
     const StepContext<Dim> context = context_of<Dim>(seed);
     View<Dim> view(scene, context);
-    for (const auto& [edge, node] : scene.mesh.nodes()) {
+    for (const EdgeKey& edge : scene.mesh.curved_edges()) {
       const Edit<Dim> edit = make_straighten(scene.mesh, edge);
       const double before = LocalProblem<Dim>(view.state, edit.removed_cells, edit, false, view.scratch).value();
       const double after = LocalProblem<Dim>(view.state, edit.removed_cells, edit, true, view.scratch).value();
       const double predicted = predict_straighten<Dim>(view.state, edge);
       left_out += std::isnan(predicted);
       if (std::isnan(predicted) || !std::isfinite(after) || !std::isfinite(before)) continue;
-      EXPECT_NEAR(predicted, before - after, 1e-9 * std::abs(before)) << "seed " << seed << ", node " << node;
+      EXPECT_NEAR(predicted, before - after, 1e-9 * std::abs(before))
+          << "seed " << seed << ", node " << scene.mesh.node_of(edge);
       ++compared;
     }
   }

@@ -2,6 +2,7 @@
 // Whole runs with curved edges: they choose the order, keep momentum in free flight, and do with one of two operations.
 #include <gtest/gtest.h>
 
+#include "curved_mesh.hpp"
 #include "curved_run.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/energy/inertia.hpp"
@@ -35,7 +36,7 @@ TYPED_TEST(CurvedRun, RunsChooseTheOrderToo) {
   const Run<Dim> both = run<Dim>(setup);
   EXPECT_GT(both.curves, 5);
   EXPECT_GT(both.collapses, 0);
-  EXPECT_EQ(both.state.space.num_curved() > 0, true);
+  EXPECT_EQ(both.state.mesh.num_curved() > 0, true);
   for (const int threads : {1, 3}) {
     const ThreadLimit limit(threads);
     expect_same(run<Dim>(setup).state, both.state);
@@ -58,7 +59,7 @@ TYPED_TEST(CurvedRun, RunsInFreeFlightKeepMomentum) {
   setup.remesh.straighten.enabled = true;
   setup.remesh.collapse.rel_max_edge_length = 3;
   const auto momentum = [&](const State<Dim>& state) {
-    const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+    const CellSet<Dim> cells = whole_mesh(state.mesh, {});
     VectorX product = VectorX::Zero(state.history.v[0].size());
     InertiaEnergy<Dim>(cells, setup.materials, MassKind::consistent, VectorX::Zero(product.size()))
         .add_mass_product(state.history.v[0], product);
@@ -101,7 +102,7 @@ TYPED_TEST(CurvedRun, RunsWithOneOfTheTwo) {
   const Run<Dim> split = run<Dim>(setup);
   EXPECT_GT(split.splits, 3);
   EXPECT_EQ(split.curves, 0);
-  EXPECT_TRUE(is_all_curved(split.state.mesh, split.state.space));
+  EXPECT_TRUE(is_all_curved(split.state.mesh));
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ TYPED_TEST(Curved, EveryOperationKeepsTheFunctionsOfBothSpaces) {
     Mat<Dim> slope = Mat<Dim>::Random(),
              curvature = is_quadratic ? Mat<Dim>(Mat<Dim>::Random()) : Mat<Dim>(Mat<Dim>::Zero());
     scene.fields.for_each([&](VectorX& field) {
-      for (int v = 0; v < scene.mesh.vertex_slots(); ++v) {
+      for (int v = 0; v < scene.mesh.node_slots(); ++v) {
         const Vec<Dim>& X = scene.mesh.rest(v);
         field.template segment<Dim>(Dim * v) = slope * X + curvature * (X[0] * X);
       }
@@ -98,8 +98,8 @@ TYPED_TEST(Curved, OperationsInterpolateWhereTheyChangeNodes) {
       scene.apply(edit);
       if (this->HasFatalFailure()) return;
       const VectorX& after = scene.fields.x;
-      const int first_node = scene.mesh.vertex_slots() - static_cast<int>(edit.inserted_nodes.size());
-      for (int v = first_node; v < scene.mesh.vertex_slots(); ++v) {
+      const int first_node = scene.mesh.node_slots() - static_cast<int>(edit.inserted_nodes.size());
+      for (int v = first_node; v < scene.mesh.node_slots(); ++v) {
         double deepest = -1;
         Vec<Dim> value = Vec<Dim>::Zero();
         for (const CellId c : edit.removed_cells) {
@@ -114,13 +114,14 @@ TYPED_TEST(Curved, OperationsInterpolateWhereTheyChangeNodes) {
         EXPECT_LT((after.template segment<Dim>(Dim * v) - value).norm(), 1e-12) << "seed " << seed;
         ++nodes;
       }
-      for (const auto& [edge, node] : old.nodes()) {
+      for (const EdgeKey& edge : old.curved_edges()) {
         if (std::find(set.begin(), set.end(), edge) != set.end()) continue;
-        ASSERT_EQ(scene.mesh.node_of(edge[0], edge[1]), node);
+        const VertexId node = old.node_of(edge);
+        ASSERT_EQ(scene.mesh.node_of(edge), node);
         ASSERT_EQ(scene.mesh.rest(node), (scene.mesh.rest(edge[0]) + scene.mesh.rest(edge[1])) / 2);
         ++kept;
       }
-      for (VertexId v = 0; v < old.vertex_slots(); ++v)
+      for (VertexId v = 0; v < old.node_slots(); ++v)
         if (!edit.value || v != edit.value->vertex) {
           ASSERT_EQ((after.template segment<Dim>(Dim * v)), (before.template segment<Dim>(Dim * v)));
         }
@@ -145,7 +146,7 @@ TYPED_TEST(Curved, CollapsesMergeNodes) {
       if (!proposal || proposal.edit->value->rest == scene.mesh.rest(proposal.edit->value->vertex)) continue;  // onto an end
       const VertexId kept = proposal.edit->value->vertex;
       std::set<VertexId> had;
-      for (const auto& [with_node, node] : scene.mesh.nodes())
+      for (const EdgeKey& with_node : scene.mesh.curved_edges())
         for (const VertexId end : edge)
           if (with_node[0] == end || with_node[1] == end) had.insert(with_node[0] == end ? with_node[1] : with_node[0]);
       scene.apply(*proposal.edit);
@@ -204,10 +205,10 @@ TYPED_TEST(Curved, CellsAreStraightenedWithoutCompressingThem) {
     RemeshMemory memory;
     std::vector<CellId> all(scene.mesh.cell_slots());
     std::iota(all.begin(), all.end(), 0);
-    nodes_before += static_cast<int>(scene.mesh.nodes().size());
+    nodes_before += scene.mesh.num_curved();
     const RemeshReport report =
         straighten_cells<Dim>(all, 0.2, scene.mesh, scene.fields, context_of<Dim>(seed), options, memory, scene.strata);
-    nodes_after += static_cast<int>(scene.mesh.nodes().size());
+    nodes_after += scene.mesh.num_curved();
     EXPECT_GT(least_jacobians<Dim>(scene, scene.fields.x).first, 0.05 * least_mean) << "seed " << seed;
     EXPECT_TRUE(report.coarsened());
     ++compared;

@@ -5,9 +5,9 @@
 #include <random>
 #include <set>
 
+#include "fem/inverted.hpp"
 #include "geometry/dynamic_tree.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh_options.hpp"

@@ -20,7 +20,7 @@ void average_vertices(RemeshSession<2>& session, double least_gain) {
   Operation<2> average(session, OperationKind::smooth, &RemeshReport::smooths, least_gain);
   average.list = [&] {
     std::vector<Candidate> found;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) found.emplace_back(OperationKind::smooth, v);
+    for (VertexId v = 0; v < mesh.node_slots(); ++v) found.emplace_back(OperationKind::smooth, v);
     return found;
   };
   average.is_candidate = [](const EdgeKey&) { return false; };

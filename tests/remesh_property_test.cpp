@@ -6,11 +6,11 @@
 
 #include <cstring>
 
+#include "fem/inverted.hpp"
 #include "geometry/measures.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/projection/transfer.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
 #include "remesh/decide/patch.hpp"
@@ -54,9 +54,9 @@ bool same_fields(RemeshFields<2> a, RemeshFields<2> b) {
 
 /// Slot by slot, dead ones and adjacency included.
 bool same_mesh(const Mesh<2>& a, const Mesh<2>& b) {
-  if (a.vertex_slots() != b.vertex_slots() || a.cell_slots() != b.cell_slots() || a.facet_slots() != b.facet_slots())
+  if (a.node_slots() != b.node_slots() || a.cell_slots() != b.cell_slots() || a.facet_slots() != b.facet_slots())
     return false;
-  for (int v = 0; v < a.vertex_slots(); ++v)
+  for (int v = 0; v < a.node_slots(); ++v)
     if (a.is_vertex_alive(v) != b.is_vertex_alive(v) || a.rest(v) != b.rest(v) ||
         !std::ranges::equal(a.cells_of(v), b.cells_of(v)) || !std::ranges::equal(a.facets_of(v), b.facets_of(v)))
       return false;
@@ -125,8 +125,8 @@ struct Transfer {
 
   Transfer(const Mesh<2>& before, const std::vector<EditChoice>& edits, const std::map<int, double>& density_of) {
     RemeshFields<2> fields;
-    fields.x = VectorX::Random(2 * before.vertex_slots());
-    fields.past_rates = {VectorX::Random(2 * before.vertex_slots())};
+    fields.x = VectorX::Random(2 * before.node_slots());
+    fields.past_rates = {VectorX::Random(2 * before.node_slots())};
     Mesh<2> mesh = before;
     old_values = columns(fields);
     fill(before, density_of, old_rest, old_cells, old_density);
@@ -138,7 +138,7 @@ struct Transfer {
     const auto map = mesh.compact();
     for (int c = before.cell_slots(); c < static_cast<int>(map.cell.size()); ++c)
       if (map.cell[c] != kNone) touched.new_cells.push_back(map.cell[c]);
-    interpolant.resize(mesh.vertex_slots(), 4);
+    interpolant.resize(mesh.node_slots(), 4);
     for (std::size_t v = 0; v < map.vertex.size(); ++v)
       if (map.vertex[v] != kNone) interpolant.row(map.vertex[v]) = slots.row(static_cast<int>(v));
     fill(mesh, density_of, rest, cells, density);
@@ -169,7 +169,7 @@ struct Transfer {
   }
   static void fill(const Mesh<2>& mesh, const std::map<int, double>& density_of, std::vector<Vec<2>>& rest,
                    std::vector<std::array<int, 3>>& cells, std::vector<double>& density) {
-    for (int v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+    for (int v = 0; v < mesh.node_slots(); ++v) rest.push_back(mesh.rest(v));
     for (int c = 0; c < mesh.cell_slots(); ++c) {
       cells.push_back(mesh.cell(c));
       density.push_back(density_of.at(mesh.body(c)));
@@ -182,7 +182,7 @@ RC_GTEST_PROP(TransferProperties, RefinementTransfersFieldsExactly, ()) {
   const Transfer transfer(before, draw_edits(0, 1), {{1, 1}, {2, 7}});
   // The functions before and after agree at every vertex after, wherever the cell around it was split.
   for (std::size_t v = 0; v < transfer.rest.size(); ++v) {
-    if (static_cast<int>(v) < before.vertex_slots()) {
+    if (static_cast<int>(v) < before.node_slots()) {
       RC_ASSERT(transfer.interpolant.row(v) == transfer.old_values.row(v));
       continue;
     }
@@ -268,7 +268,7 @@ std::optional<Edit<2>> find_edit(const Mesh<2>& before, const Mesh<2>& after, Ki
   };
   const Strata<2> strata(before);
   if (kind == Kind::smooth) {
-    for (int v = 0; v < before.vertex_slots(); ++v)
+    for (int v = 0; v < before.node_slots(); ++v)
       if (const auto edit = propose_move(before, strata, v, after.rest(v)).edit;
           after.rest(v) != before.rest(v) && leads_there(edit))
         return edit;

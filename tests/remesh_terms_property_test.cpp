@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "fem/inverted.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_terms.hpp"
 #include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"
@@ -64,8 +64,8 @@ Remeshed remesh_sharply(const TrialScene& scene, RemeshOptions options, double m
 
 /// A field of a mesh at the vertices of another one of the same body, as the function that it is.
 VectorX evaluate(const Mesh<2>& mesh, const VectorX& field, const Mesh<2>& other) {
-  VectorX values = VectorX::Zero(2 * other.vertex_slots());
-  for (int v = 0; v < other.vertex_slots(); ++v) {
+  VectorX values = VectorX::Zero(2 * other.node_slots());
+  for (int v = 0; v < other.node_slots(); ++v) {
     if (!other.is_vertex_alive(v)) continue;
     const int body = other.body(other.cells_of(v)[0]);
     vertex_of<2>(values, v) = value_in(mesh, field, cell_at(mesh, body, other.rest(v)), other.rest(v));
@@ -74,7 +74,7 @@ VectorX evaluate(const Mesh<2>& mesh, const VectorX& field, const Mesh<2>& other
 }
 
 VectorX lumped_masses(const Mesh<2>& mesh, const std::map<int, Material>& materials) {
-  VectorX masses = VectorX::Zero(mesh.vertex_slots());
+  VectorX masses = VectorX::Zero(mesh.node_slots());
   for (int c = 0; c < mesh.cell_slots(); ++c)
     if (mesh.is_cell_alive(c))
       for (const int v : mesh.cell(c)) masses[v] += materials.at(mesh.body(c)).density * mesh.volume(c) / 3;
@@ -99,7 +99,7 @@ double lumped_inertia(const Mesh<2>& old_mesh, const VectorX& old_predictor, con
 }
 
 bool is_near(const Mesh<2>& mesh, const VectorX& a, const VectorX& b) {
-  for (int v = 0; v < mesh.vertex_slots(); ++v)
+  for (int v = 0; v < mesh.node_slots(); ++v)
     if (mesh.is_vertex_alive(v) && (vertex_of<2>(a, v) - vertex_of<2>(b, v)).norm() > 1e-12) return false;
   return true;
 }
@@ -146,7 +146,7 @@ RC_GTEST_PROP(WholeMesh, LosesTheEnergyThatAnAcceptedOperationIsSaidToGain, ()) 
   RC_ASSERT(is_near(after.mesh, after.fields.predictor, evaluate(scene.mesh, scene.fields.predictor, after.mesh)));
   RC_ASSERT(is_near(after.mesh, after.fields.velocity_reference,
                     evaluate(scene.mesh, scene.fields.velocity_reference, after.mesh)));
-  for (int v = 0; v < after.mesh.vertex_slots(); ++v)
+  for (int v = 0; v < after.mesh.node_slots(); ++v)
     for (int c = 0; c < 2; ++c)
       if (after.mesh.is_vertex_alive(v) && !changed.is_free(v, c))
         RC_ASSERT(std::abs(after.fields.x[2 * v + c] - start[2 * v + c]) < 1e-13);

@@ -5,9 +5,9 @@
 #include <map>
 #include <random>
 
+#include "fem/inverted.hpp"
 #include "geometry/intersection.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/prediction.hpp"
@@ -46,7 +46,7 @@ TEST(Edits, KeepVerticesWithTagsAndWhatTheyHold) {
     std::mt19937 random(seed);
     Mesh<2> mesh = random_mesh(4, random);
     std::map<VertexId, Vec<2>> held;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+    for (VertexId v = 0; v < mesh.node_slots(); ++v) {
       if (!mesh.is_boundary(v) || random() % 2) continue;
       mesh.set_vertex_tag(v, 7);
       held[v] = mesh.rest(v);
@@ -348,8 +348,8 @@ TEST(Remesh, BettersShapesWhereTheyDoHarm) {
   context.newton.step_tolerance = 1e-9;
   context.obstacles.past_x.resize(1);
   RemeshFields<2> fields;
-  fields.x.resize(2 * mesh.vertex_slots());
-  for (int v = 0; v < mesh.vertex_slots(); ++v) {
+  fields.x.resize(2 * mesh.node_slots());
+  for (int v = 0; v < mesh.node_slots(); ++v) {
     const Vec<2>& X = mesh.rest(v);
     fields.x.segment<2>(2 * v) = X + (X[0] < 0.4 ? Vec<2>(0, std::pow(0.4 - X[0], 2)) : Vec<2>(0, 0));
   }

@@ -707,13 +707,14 @@ class Report(Cases):
         """Two runs of the square: on two cells, and on four that move on by 0.1 x."""
         more = SQUARE + [[0.25, 0.75]]
         write_frame(folder / "runs/coarse", 4, 1, SQUARE, SQUARE, [[0, 1, 2], [0, 2, 3]], [1, 2])
+        write_frame(folder / "runs/time-1", 4, 1, SQUARE, SQUARE, [[0, 1, 2], [0, 2, 3]], [1, 2])
         moved = numpy.array(more, float) + [[0.1 * x, 0] for x, y in more]
         write_frame(folder / "runs/fine", 4, 1, more, moved, [[0, 1, 2], [0, 2, 4], [2, 3, 4], [3, 0, 4]], [1, 1, 2, 4])
         run = lambda name, k: {"run": name, "series": "uniform", "label": f"n_refs {k}", "set": [f"/geometry/0/n_refs={k}", '/a="b c"'],
                                "solver": "", "status": "finished", "vertices": 4 + k, "unknowns": 10 * 4 ** k, "memory_mb": 20 + k,
                                "processor_seconds": 0.5 * 8 ** k, "against": "reference", "errors": {"l2": 0.1 / 4 ** k, "h1": 0.3 / 2 ** k}}
         small = {**run("small", 2), "errors": {"l2": None, "h1": 0.05}}
-        time = {**run("time-1", 0), "series": "time", "against": "time-4"}
+        time = {**run("time-1", 0), "series": "time", "against": "time-4", "errors": {"l2": 1e-9, "h1": 1e-9}}
         failed = {"run": "worse", "series": "itr", "label": "tolerance 1 J", "set": [], "solver": "", "status": "failed", "reason": "too <long>"}
         study = {"scene": "my scene.json", "settings": "", "version": "0", "reference": "`reference`", "times": 1, "verdicts": [], "orders": [],
                  "answers": ["Refining pays by <b>4</b>."], "runs": [run("coarse", 0), run("fine", 1), small, time, failed],
@@ -729,14 +730,14 @@ class Report(Cases):
     def test_a_study_is_shown_with_two_runs_side_by_side(self):
         folder = self.folder / "study"
         self.write_study(folder)
-        self.assertIn("2 runs", self.report(folder).stdout)
+        self.assertIn("3 runs", self.report(folder).stdout)
         self.open(folder / "report.html")
         browser = self.browser
         self.assertEqual(browser.run("await Promise.all(r.views.map(v => v.ready)); return [r.shown, r.points.length, r.views.map(v => v.state.field)]"),
-                         [["fine", "coarse"], 15, ["difference", "difference"]])  # 2 and 3 points by 3 costs
+                         [["fine", "time-1"], 15, ["difference", "difference"]])  # 2 and 3 points by 3 costs
         self.assertIn("small is not told.", browser.run("return document.querySelector('.doubts').textContent"))
         rows = browser.run("return [...document.querySelectorAll('.words tr')].map(row => [...row.children].slice(-2).map(e => e.textContent))")
-        self.assertEqual(rows[1:], [["10 %", "30 %"], ["2.5 %", "15 %"], ["< 1 %", "5 %"], ["10 %", "30 %"], ["", ""]])
+        self.assertEqual(rows[1:], [["10 %", "30 %"], ["2.5 %", "15 %"], ["< 1 %", "5 %"], ["1e-7 %", "1e-7 %"], ["", ""]])
         self.assertEqual(browser.run("return r.points.slice(6, 9).map(p => [p.run.run, p.mark.closest('g[id]').id])"),
                          [[name, "uniform-h1-processor_seconds"] for name in ("coarse", "fine", "small")])
         across = browser.run("return r.points.slice(6, 9).map(p => p.mark.getBoundingClientRect()).map(box => [box.x, box.y])")

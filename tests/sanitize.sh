@@ -17,7 +17,7 @@ cmake --preset "$preset" && cmake --build --preset "$preset" --target "${tests[@
 
 mkdir -p "$build/examples"
 flags=(-O1 -fno-omit-frame-pointer -fsanitize=$sanitizer -march=x86-64-v3 -DEIGEN_MAX_ALIGN_BYTES=32 -Iinclude -isystem /usr/include/eigen3)
-libraries=("$build/lib/libitr.a" -ltbb -lfmt -lhdf5_serial -lgmp -lmpfr -ldl -lpthread -lm)
+libraries=("$build/lib/libitr.a" -ltbb -lfmt -lhdf5_serial -lgmp -lmpfr -lz -ldl -lpthread -lm)
 for name in "${examples[@]}"; do
   "${CXX:-c++}" -std=c++20 "${flags[@]}" "examples/api/$name.cpp" "${libraries[@]}" -o "$build/examples/$name" || exit 1
 done

@@ -154,14 +154,14 @@ TEST_F(DamageTest, OfInvariantsIsRefused) {
   expect("body of a saved cell", [](State<2>& s) {
     std::vector<Vec<2>> rest;
     std::vector<std::array<int, 3>> cells;
-    for (int v = 0; v < s.mesh.vertex_slots(); ++v) rest.push_back(s.mesh.rest(v));
+    for (int v = 0; v < s.mesh.num_vertices(); ++v) rest.push_back(s.mesh.rest(v));
     for (int c = 0; c < s.mesh.cell_slots(); ++c) cells.push_back(s.mesh.cell(c));
     const std::vector<int> body(cells.size(), 77);
     s.mesh = Mesh<2>(rest, cells, body);
   });
   expect("is inverted", [](State<2>& s) { std::swap(s.history.x[0][0], s.history.x[0][2]); });
   expect("surfaces intersect", [](State<2>& s) {  // through the wall
-    for (int v = 0; v < s.mesh.vertex_slots(); ++v) s.history.x[0][2 * v] += 0.1;
+    for (int v = 0; v < s.mesh.num_vertices(); ++v) s.history.x[0][2 * v] += 0.1;
   });
   EXPECT_EQ(message_of([](State<2>&) {}), "taken");
 }

@@ -92,7 +92,7 @@ Ending simulate(const Setup<Dim>& setup, double unit) {
     ending.splits += step.report.splits.accepted;
   }
   const auto& state = simulation.state();
-  ending.x = state.history.x[0].head(Dim * state.mesh.vertex_slots()) / unit;
+  ending.x = state.history.x[0].head(Dim * state.mesh.num_vertices()) / unit;
   return ending;
 }
 

@@ -29,18 +29,16 @@ class SceneTest : public ::testing::Test {
     write("tet.msh",
           "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
           "$Elements\n1\n1 4 2 3 1 1 2 3 4\n$EndElements\n");
-    write("inverted.msh",
-          "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
-          "$Elements\n1\n1 4 2 3 1 2 1 3 4\n$EndElements\n");
     write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
   }
   ~SceneTest() override { fs::remove_all(folder_); }
 
-  void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / name) << text; }
+  void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / name, std::ios::binary) << text; }
 
-  /// The least scene, with `changes` merged into it.
+  /// The least scene with the readers' own defaults, PolyFEM's, and `changes` merged into it.
   static json square(const json& changes = json::object()) {
-    json scene = {{"geometry", json::array({{{"mesh", "square.obj"}, {"volume_selection", 1}}})},
+    json scene = {{"defaults", "polyfem"},
+                  {"geometry", json::array({{{"mesh", "square.obj"}, {"volume_selection", 1}}})},
                   {"materials", json::array({{{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}}})},
                   {"time", {{"dt", 0.1}, {"tend", 1}}}};
     scene.merge_patch(changes);

@@ -6,8 +6,8 @@
 
 #include <ostream>
 
+#include "fem/inverted.hpp"
 #include "itr/simulation/simulation.hpp"
-#include "mesh/validate.hpp"
 #include "simulation/contact_surface.hpp"
 #include "square_mesh.hpp"
 

@@ -28,7 +28,7 @@ Vec<2> momentum(const Simulation<2>& simulation) {
   InertiaEnergy<2>(cells, simulation.setup().materials, MassKind::consistent, VectorX::Zero(v.size()))
       .add_mass_product(v, product);
   Vec<2> sum = Vec<2>::Zero();
-  for (int i = 0; i < state.mesh.vertex_slots(); ++i) sum += product.segment<2>(2 * i);
+  for (int i = 0; i < state.mesh.num_vertices(); ++i) sum += product.segment<2>(2 * i);
   return sum;
 }
 
@@ -132,7 +132,7 @@ TEST_P(Laws, KeepMomentumThroughRemeshing) {
   std::vector<Vec<2>> rest;
   std::vector<std::array<int, 3>> cells;
   std::vector<int> bodies;
-  for (int v = 0; v < setup.mesh.vertex_slots(); ++v) rest.push_back(setup.mesh.rest(v));
+  for (int v = 0; v < setup.mesh.node_slots(); ++v) rest.push_back(setup.mesh.rest(v));
   for (int c = 0; c < setup.mesh.cell_slots(); ++c) {
     cells.push_back(setup.mesh.cell(c));
     bodies.push_back(c < setup.mesh.cell_slots() / 2 ? 1 : 2);
@@ -182,7 +182,7 @@ TEST(MeshScope, IsSharedWhileTheMeshStays) {
   EXPECT_NE(cache.scope_of(setup, tagged), first);
   std::vector<Vec<2>> rest;
   std::vector<Mesh<2>::Cell> cells;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) rest.push_back(mesh.rest(v));
   for (CellId c = 0; c < mesh.cell_slots(); ++c) cells.push_back(mesh.cell(c));
   rest[0].x() -= 1e-9;
   EXPECT_NE(cache.scope_of(setup, Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1))), first);
@@ -302,7 +302,7 @@ TEST(Simulation, WhatPointsHoldStaysHeldWhereTheMeshChanges) {
   ASSERT_GT(by_points.mesh.num_vertices(), 16);
   EXPECT_EQ(by_points.history.x[0], by_facets.history.x[0]);
   int held = 0;
-  for (VertexId v = 0; v < by_points.mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < by_points.mesh.node_slots(); ++v)
     if (by_points.mesh.rest(v)[0] == 0) held += by_points.mesh.vertex_tag(v) == 9;
   EXPECT_GT(held, 4);
 }

@@ -5,8 +5,8 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "fem/inverted.hpp"
 #include "itr/remesh/remesher.hpp"
-#include "mesh/validate.hpp"
 #include "random_cube.hpp"
 #include "remesh_options.hpp"
 #include "square_mesh.hpp"
@@ -44,8 +44,8 @@ struct SizedBody {
       context.shortest_edge = std::min(context.shortest_edge, length);
       context.longest_edge = std::max(context.longest_edge, length);
     }
-    fields.x.resize(Dim * mesh.vertex_slots());
-    for (int v = 0; v < mesh.vertex_slots(); ++v) fields.x.template segment<Dim>(Dim * v) = motion * mesh.rest(v);
+    fields.x.resize(Dim * mesh.node_slots());
+    for (int v = 0; v < mesh.node_slots(); ++v) fields.x.template segment<Dim>(Dim * v) = motion * mesh.rest(v);
     fields.past_positions = {fields.x};
     fields.predictor = fields.velocity_reference = fields.x;
     options.enabled = options.sizing_field.enabled = true;
@@ -135,7 +135,7 @@ void refine_at_contact() {
   body.context.contact.enabled = true;
   body.context.contact.activation_distance = 0.03;
   // The inner vertices' lengths alone ask for nothing; what is in contact spans some of the way to the spike.
-  for (int v = 0; v < body.mesh.vertex_slots(); ++v) {
+  for (int v = 0; v < body.mesh.node_slots(); ++v) {
     auto x = body.fields.x.template segment<Dim>(Dim * v);
     x[Dim - 1] += 0.3 * (x[0] - 0.4) * (x[0] - 0.4);
   }

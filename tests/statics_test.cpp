@@ -41,7 +41,7 @@ TEST(Statics, PressureReachesTheUniformStretchOfTheClosedForm) {
   }
   EXPECT_LT(low, 0.9);
   const auto& state = simulation.state();
-  for (int v = 0; v < state.mesh.vertex_slots(); ++v)
+  for (int v = 0; v < state.mesh.num_vertices(); ++v)
     EXPECT_LE((state.history.x[0].segment<2>(2 * v) - low * state.mesh.rest(v)).norm(), 1e-9);
 }
 
@@ -90,7 +90,7 @@ TEST(Statics, ContactCarriesTheLoad) {
   VectorX gradient = VectorX::Zero(state.history.x[0].size());
   ContactEnergy<2>(surface, setup.contact, setup.contact.barrier_stiffness, 1)
       .add_gradient(state.history.x[0], gradient, workspace);
-  const int bodies = state.mesh.vertex_slots();
+  const int bodies = state.mesh.num_vertices();
   EXPECT_NEAR(-(gradient[2 * bodies + 1] + gradient[2 * bodies + 3]), -400, 1e-5);
 }
 

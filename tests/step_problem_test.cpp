@@ -26,9 +26,9 @@ itr::Setup<2> square_of(int cells, double moved) {
 
 History at_rest(const Mesh<2>& mesh) {
   History history;
-  history.x = {VectorX(2 * mesh.vertex_slots())};
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) history.x[0].segment<2>(2 * v) = mesh.rest(v);
-  history.v = {VectorX::Zero(2 * mesh.vertex_slots())};
+  history.x = {VectorX(2 * mesh.node_slots())};
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) history.x[0].segment<2>(2 * v) = mesh.rest(v);
+  history.v = {VectorX::Zero(2 * mesh.node_slots())};
   return history;
 }
 
@@ -40,11 +40,11 @@ TEST(StepProblem, SolvesAsIfAloneWhereAnotherHasTheCacheToo) {
   const History of_coarse = at_rest(coarse.mesh), of_fine = at_rest(fine.mesh);
   ProblemCache<2> own(*solver);
   VectorX expected = of_coarse.x[0];
-  ASSERT_TRUE(StepProblem<2>(coarse, coarse.mesh, {}, of_coarse, 0.1, own).solve(expected, expected).converged());
+  ASSERT_TRUE(StepProblem<2>(coarse, coarse.mesh, of_coarse, 0.1, own).solve(expected, expected).converged());
 
   ProblemCache<2> cache(*solver);
-  StepProblem<2> before(coarse, coarse.mesh, {}, of_coarse, 0.1, cache);
-  StepProblem<2> after(fine, fine.mesh, {}, of_fine, 0.1, cache);
+  StepProblem<2> before(coarse, coarse.mesh, of_coarse, 0.1, cache);
+  StepProblem<2> after(fine, fine.mesh, of_fine, 0.1, cache);
   VectorX x = of_fine.x[0];
   ASSERT_TRUE(after.solve(x, x).converged());
   x = of_coarse.x[0];

@@ -11,7 +11,7 @@ namespace {
 
 std::map<Stratum, int> count_strata(const auto& mesh, const auto& strata) {
   std::map<Stratum, int> count;
-  for (int v = 0; v < mesh.vertex_slots(); ++v) ++count[strata.vertex(v)];
+  for (int v = 0; v < mesh.node_slots(); ++v) ++count[strata.vertex(v)];
   return count;
 }
 
@@ -35,7 +35,7 @@ TEST(Strata, OfACubeOfTwoBodiesAreItsPlanesAndLines) {
   EXPECT_EQ(
       count_strata(two, of_two),
       (std::map<Stratum, int>{{Stratum::volume, 4}, {Stratum::surface, 20}, {Stratum::feature, 28}, {Stratum::corner, 12}}));
-  for (int v = 0; v < two.vertex_slots(); ++v) {
+  for (int v = 0; v < two.node_slots(); ++v) {
     const Mat<3> P = of_two.tangent_projector(two, v);
     EXPECT_NEAR((P * P - P).norm(), 0, 1e-14);
     EXPECT_NEAR(P.trace(), std::max(0, 3 - static_cast<int>(of_two.vertex(v))), 1e-14);

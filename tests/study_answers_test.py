@@ -234,12 +234,15 @@ class Plans(unittest.TestCase):
         self.options.sets = {"/contact/friction_coefficient": "0"}
         self.assertEqual(set(self.settings(rounds).values()), {None})
 
-    def test_all_runs_have_one_barrier_stiffness(self):
-        key = "/solver/contact/barrier_stiffness"
-        self.assertEqual(set(self.settings(key).values()), {None})  # the scene has it
+    def test_all_runs_have_one_barrier(self):
+        keys = "/solver/contact/barrier_stiffness", "/contact/dhat"
+        for key in keys:
+            self.assertEqual(set(self.settings(key).values()), {None})  # the scene has it
+        self.options.sets = {keys[1]: '"auto"'}
         made = self.plan("first")
-        [stiffness] = {run.settings[key] for run in made.references + made.runs}
-        self.assertEqual(float(stiffness), made.facts["settings"][key])
+        for key in keys:
+            [value] = {run.settings[key] for run in made.references + made.runs}
+            self.assertEqual(float(value), made.facts["settings"][key])
 
     def test_there_is_a_second_reference_and_there_are_smaller_tolerances_for_the_first(self):
         self.options.tolerances = [1, 0.25]

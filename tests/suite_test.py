@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The verification suite judges: what it must not let pass. Argument: the source folder."""
 import importlib.util
+import json
 import math
 import pathlib
 import re
@@ -134,21 +135,23 @@ class HardCases(unittest.TestCase):
                 (folder / f"run/frames/{step:06}.h5").touch()
             return self.stability.violations(folder, types.SimpleNamespace(contact=contact), folder / "run")
 
+    def printed(self, *violations, of="surfaces"):
+        found = {"frames": 2, "violations": [{"of": of, "text": text} for text in violations]}
+        return f"echo '{json.dumps(found)}'" + ("; exit 4" if violations else "")
+
     def test_a_certificate_has_to_be_made(self):
-        fine = "echo '2 frames, each by itself: no intersection, nothing inside of a body, no inversion'"
+        fine = self.printed()
         self.assertEqual(self.certified(fine), [])
         for broken in ("kill -SEGV $$", "exit 0", "exit 2", "echo 'frame 1: not readable' >&2; exit 2", fine + "; exit 4",
                        fine + "; exit 1"):
             self.assertEqual(len(self.certified(broken)), 1, broken)
         self.assertIn("saw 2 of 3 frames", self.certified(fine, frames=3)[0])
-        self.assertEqual(self.certified("echo 'frame 1: edges 3 and 4 cross'; echo '2 frames, each by itself: failed'; exit 4"),
-                         ["frame 1: edges 3 and 4 cross"])
+        self.assertEqual(self.certified(self.printed("frame 1: edges 3 and 4 cross")), ["frame 1: edges 3 and 4 cross"])
 
     def test_without_contact_only_surfaces_may_meet(self):
-        lines = ["frame 1: edges (1, 2) and (3, 4) intersect", "frame 1: cell 5 is inverted", "frame 2: a position is not finite"]
-        script = "\n".join(f"echo '{line}'" for line in [*lines, "2 frames, each by itself: failed"]) + "\nexit 4"
-        self.assertEqual(self.certified(script, contact=False), lines[1:])
-        self.assertEqual(self.certified(script), lines)
+        for of, kept in (("surfaces", []), ("cells", ["frame 1"]), ("file", ["frame 1"])):
+            self.assertEqual(self.certified(self.printed("frame 1", of=of), contact=False), kept)
+            self.assertEqual(self.certified(self.printed("frame 1", of=of)), ["frame 1"])
 
     def states(self, **last):
         """Two frames of a block that is pulled up by its held top and gains what that puts in."""

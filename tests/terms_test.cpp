@@ -58,7 +58,7 @@ TrialScene scene_of_all_terms() {
 std::multimap<TermKind, double> summed_terms(const TrialScene& scene) {
   const StepContext<2>& context = scene.context;
   const auto& obstacles = context.obstacles;
-  const int bodies = scene.mesh.vertex_slots();
+  const int bodies = scene.mesh.node_slots();
   const auto with_obstacles = [&](const VectorX& field, const std::vector<Vec<2>>& values) {
     VectorX all(field.size() + 2 * static_cast<Eigen::Index>(values.size()));
     all.head(field.size()) = field;
@@ -140,7 +140,7 @@ TrialScene scene_at_rest() {
   scene.context.coupling = 0;
   scene.context.obstacles = {};
   scene.context.obstacles.past_x.resize(1);
-  for (int v = 0; v < scene.mesh.vertex_slots(); ++v) vertex_of<2>(scene.fields.x, v) = scene.mesh.rest(v);
+  for (int v = 0; v < scene.mesh.node_slots(); ++v) vertex_of<2>(scene.fields.x, v) = scene.mesh.rest(v);
   scene.fields.predictor = scene.fields.velocity_reference = scene.fields.past_positions[0] = scene.fields.x;
   return scene;
 }

@@ -25,11 +25,11 @@ struct TetScene {
     context.shortest_edge = 0.1;
     context.loads.acceleration = [](const Vec<3>&) { return Vec<3>(0, 0, -5); };
     std::uniform_real_distribution<double> noise(-0.006, 0.006);
-    fields.x.resize(3 * mesh.vertex_slots());
+    fields.x.resize(3 * mesh.node_slots());
     double lowest = std::numeric_limits<double>::infinity();
-    for (int v = 0; v < mesh.vertex_slots(); ++v)
+    for (int v = 0; v < mesh.node_slots(); ++v)
       for (int c = 0; c < 3; ++c) fields.x[3 * v + c] = mesh.rest(v)[c] + noise(random);
-    for (int v = 0; v < mesh.vertex_slots(); ++v) lowest = std::min(lowest, fields.x[3 * v + 2]);
+    for (int v = 0; v < mesh.node_slots(); ++v) lowest = std::min(lowest, fields.x[3 * v + 2]);
     fields.predictor = fields.velocity_reference = fields.x;
     for (double& x : fields.predictor) x += noise(random);
     fields.past_positions = {fields.x};
@@ -46,7 +46,7 @@ struct TetScene {
 inline double whole_energy(const Mesh<3>& slots, const RemeshFields<3>& slot_fields, const StepContext<3>& context) {
   Mesh<3> mesh = slots;
   const auto map = mesh.compact();
-  const int bodies = mesh.vertex_slots();
+  const int bodies = mesh.node_slots();
   const auto& obstacles = context.obstacles;
   const auto compacted = [&](const VectorX& field, const std::vector<Vec<3>>& extra) {
     VectorX kept(3 * (bodies + extra.size()));

@@ -43,7 +43,7 @@ FILES = {
     "quad.msh": TET + "$Elements\n1\n1 3 2 3 1 1 2 3 4\n$EndElements\n",
     "node.msh": TET + ONE + " 3 7\n$EndElements\n",
     "text.msh": "this is no mesh\n",
-    "mesh.stl": "solid\n",
+    "mesh.step": "solid\n",
     "folder/empty.obj": "",
     "twice.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 3 4 1\n",
     "loose.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n",

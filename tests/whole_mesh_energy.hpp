@@ -96,7 +96,7 @@ inline double squared_distance(const Mesh<2>& mesh_a, const VectorX& a, const Me
 class WholeMeshEnergy {
  public:
   WholeMeshEnergy(const Mesh<2>& mesh, const RemeshFields<2>& fields, const StepContext<2>& context, const VectorX& lagged_x)
-      : bodies_(mesh.vertex_slots()), obstacles_(context.obstacles.x), newton_(context.newton) {
+      : bodies_(mesh.node_slots()), obstacles_(context.obstacles.x), newton_(context.newton) {
     set_cells(mesh, context);
     set_surface(context);
     hold(mesh, context);

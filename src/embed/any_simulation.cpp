@@ -60,8 +60,8 @@ VectorX as_field(std::span<const double> values) {
 }
 
 template <int Dim>
-VectorX rest_of(const Mesh<Dim>& mesh, const Space& space = {}) {
-  const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
+VectorX rest_of(const Mesh<Dim>& mesh) {
+  const std::vector<Vec<Dim>>& nodes = mesh.rest();
   VectorX X(Dim * static_cast<Eigen::Index>(nodes.size()));
   for (std::size_t i = 0; i < nodes.size(); ++i) vertex_of<Dim>(X, static_cast<int>(i)) = nodes[i];
   return X;
@@ -87,10 +87,9 @@ struct AnySimulation::Impl {
     std::map<std::string, std::size_t> term_places;  ///< in Setup::terms
 
     const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
-    const Space& space() const { return simulation.state().space; }
     /// Also what a simulation that `remeshes` may curve later, be its mesh frozen now or not.
     void refuse_curved(const std::string& place, bool remeshes) const {
-      if (!space().is_linear()) refuse(place, "curved edges", "a mesh with straight edges alone (discr_order 1)");
+      if (mesh().has_nodes()) refuse(place, "curved edges", "a mesh with straight edges alone (discr_order 1)");
       if (remeshes && simulation.setup().remesh.curve.enabled)
         refuse(place, "/space/remesh/curve/enabled", "a mesh of which the edges stay straight");
     }
@@ -99,15 +98,16 @@ struct AnySimulation::Impl {
     template <int Components = Dim>
     std::function<Vec<Components>(const RestPoint<Dim>& X, double t)> nodal(const std::string& name,
                                                                             std::span<const double> values) {
-      const auto by_node = static_cast<std::size_t>(Components * itr::num_nodes(mesh(), space()));
+      const auto by_node = static_cast<std::size_t>(Components * mesh().num_nodes());
       const bool is_by_node = values.size() == by_node;
-      check_array(name, values, is_by_node ? by_node : static_cast<std::size_t>(Components * mesh().vertex_slots()));
-      if (!locator || locator_revision != simulation.mesh_revision()) {
+      check_array(name, values, is_by_node ? by_node : static_cast<std::size_t>(Components * mesh().num_vertices()));
+      if (!locator || locator_revision != mesh().revision()) {
         locator = std::make_shared<Locator<Dim>>(mesh());
-        locator_revision = simulation.mesh_revision();
+        locator_revision = mesh().revision();
       }
-      return [f = nodal_function<Dim>(locator, as_field(values), is_by_node ? space() : Space())](
-                 const RestPoint<Dim>& X, double) { return Vec<Components>(f(X)); };
+      return [f = nodal_function<Dim>(locator, as_field(values), Components)](const RestPoint<Dim>& X, double) {
+        return Vec<Components>(f(X));
+      };
     }
     /// Puts a term in the place of the one of its name; a null one goes.
     void set_term(const std::string& name, TermFactory<Dim> term) {
@@ -156,9 +156,14 @@ struct AnySimulation::Impl {
         of(model.dimension_ == 2 ? Either(make<2>(model, *registry, logger, warnings))
                                  : Either(make<3>(model, *registry, logger, warnings))),
         max_threads(model.max_threads()) {
-    std::map<std::string, int> boundaries;
-    for (const auto& part : model.boundaries_) boundaries[part.name] = part.id;
+    std::map<std::string, std::vector<int>> boundaries;
+    visit([&](auto& d) {
+      const auto& tags = d.simulation.setup().names.surfaces;
+      for (const auto& part : model.boundaries_)
+        boundaries[part.name] = tags.contains(part.name) ? tags.at(part.name) : std::vector{part.id};
+    });
     scene::PartNames named = model.scene_ ? model.scene_->parts : scene::PartNames();
+    if (!model.scene_) named.bodies = model.body_names_;
     int first = 0;
     for (const auto& part : model.obstacles_) {
       const int count = static_cast<int>(part.vertices.size()) / model.dimension_;
@@ -248,50 +253,55 @@ void hold(Setup<Dim>& setup, int tag, std::span<const int> mask, SpaceTimeFuncti
 }  // namespace
 
 void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, HostFunction displacement) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    hold<Dim>(d.simulation.conditions(), tag, mask, as_vector<Dim>(of("displacement", boundary), std::move(displacement)));
+    const SpaceTimeFunction<Dim> function = as_vector<Dim>(of("displacement", boundary), std::move(displacement));
+    for (const int tag : tags) hold<Dim>(d.simulation.conditions(), tag, mask, function);
   });
 }
 
 void AnySimulation::fix(const std::string& boundary, std::span<const int> mask, std::span<const double> displacements) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    hold<Dim>(d.simulation.conditions(), tag, mask, d.nodal("displacements", displacements));
+    const SpaceTimeFunction<Dim> function = d.nodal("displacements", displacements);
+    for (const int tag : tags) hold<Dim>(d.simulation.conditions(), tag, mask, function);
   });
 }
 
 void AnySimulation::set_traction(const std::string& boundary, HostFunction traction) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    NeumannCondition<Dim> condition{tag, as_vector<Dim>(of("traction", boundary), std::move(traction))};
-    const bool is_null = !condition.traction;
-    replace(d.simulation.conditions().neumann, std::move(condition), is_null);
+    const SpaceTimeFunction<Dim> function = as_vector<Dim>(of("traction", boundary), std::move(traction));
+    for (const int tag : tags) replace(d.simulation.conditions().neumann, {tag, function}, !function);
   });
 }
 
 void AnySimulation::set_traction(const std::string& boundary, std::span<const double> tractions) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    replace(d.simulation.conditions().neumann, {tag, d.nodal("tractions", tractions)}, false);
+    const SpaceTimeFunction<Dim> function = d.nodal("tractions", tractions);
+    for (const int tag : tags) replace(d.simulation.conditions().neumann, {tag, function}, false);
   });
 }
 
 void AnySimulation::set_pressure(const std::string& boundary, HostFunction pressure) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const bool is_null = !pressure;
     const auto value = as_function<Dim, 1>(of("pressure", boundary), std::move(pressure));
-    replace(d.simulation.conditions().pressure, {tag, [=](const Vec<Dim>& X, double t) { return value(X, t)[0]; }}, is_null);
+    for (const int tag : tags)
+      replace(d.simulation.conditions().pressure, {tag, [=](const Vec<Dim>& X, double t) { return value(X, t)[0]; }},
+              is_null);
   });
 }
 
 void AnySimulation::set_pressure(const std::string& boundary, std::span<const double> pressures) {
-  const int tag = impl_->parts.tag(boundary);
+  const std::vector<int> tags = impl_->parts.tags(boundary);
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     const auto value = d.template nodal<1>("pressures", pressures);
-    replace(d.simulation.conditions().pressure, {tag, [=](const RestPoint<Dim>& X, double t) { return value(X, t)[0]; }},
-            false);
+    for (const int tag : tags)
+      replace(d.simulation.conditions().pressure, {tag, [=](const RestPoint<Dim>& X, double t) { return value(X, t)[0]; }},
+              false);
   });
 }
 
@@ -355,7 +365,7 @@ void AnySimulation::move_obstacle(const std::string& obstacle, std::span<const d
 void AnySimulation::set_forces(std::span<const double> forces) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
     if (!forces.empty()) check_array("forces", forces, static_cast<std::size_t>(Dim * num_nodes()));
-    d.set_term("", forces.empty() ? nullptr : point_forces<Dim>(d.mesh(), as_field(forces), d.space()));
+    d.set_term("", forces.empty() ? nullptr : point_forces<Dim>(d.mesh(), as_field(forces)));
   });
 }
 
@@ -385,7 +395,7 @@ void AnySimulation::set_follower_forces(ForceFunction forces, StiffnessFunction 
                                                       const StiffnessReceiver& add) {
         f(rest_of(mesh), x, t, [&](std::span<const int> vertices, const double* block) {
           const std::size_t side = Dim * vertices.size();
-          check_block("follower stiffness", vertices, {block, side * side}, mesh.vertex_slots());
+          check_block("follower stiffness", vertices, {block, side * side}, mesh.num_nodes());
           add(vertices, block);
         });
       };
@@ -409,12 +419,13 @@ int AnySimulation::num_vertices() const {
   return impl_->visit([](const auto& d) { return d.mesh().num_vertices(); });
 }
 int AnySimulation::num_nodes() const {
-  return impl_->visit([](const auto& d) { return itr::num_nodes(d.mesh(), d.space()); });
+  return impl_->visit([](const auto& d) { return d.mesh().num_nodes(); });
 }
 std::vector<int> AnySimulation::curved_edges() const {
   return impl_->visit([](const auto& d) {
+    const std::vector<EdgeKey> edges = d.mesh().curved_edges();
     return joined(
-        d.space().num_curved(), [&](int i) -> auto& { return d.space().curved_edges()[i]; });
+        static_cast<int>(edges.size()), [&](int i) -> auto& { return edges[i]; });
   });
 }
 int AnySimulation::num_cells() const {
@@ -435,7 +446,7 @@ std::span<const double> AnySimulation::velocities() const {
 }
 std::vector<double> AnySimulation::rest_positions() const {
   return impl_->visit([](const auto& d) {
-    const VectorX X = rest_of(d.mesh(), d.space());
+    const VectorX X = rest_of(d.mesh());
     return std::vector<double>(X.begin(), X.end());
   });
 }
@@ -544,9 +555,9 @@ void AnySimulation::on_mesh_change(std::function<void(const AnyMeshChange&)> lis
                     [&d, &change, &before, call = std::weak_ptr(call)](const MatrixX& fields) {
                       if (call.expired())
                         refuse("project", "a call after that of the listener", "one from inside of the listener");
-                      if (fields.rows() != before.vertex_slots())
+                      if (fields.rows() != before.num_vertices())
                         refuse("fields", fmt::format("{} rows", fields.rows()),
-                               fmt::format("{}, one a vertex of the mesh before", before.vertex_slots()));
+                               fmt::format("{}, one a vertex of the mesh before", before.num_vertices()));
                       return project_fields(before, d.mesh(), change, fields);
                     }});
         });

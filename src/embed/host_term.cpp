@@ -17,8 +17,7 @@ class TermOfHost final : public Energy {
  public:
   TermOfHost(std::shared_ptr<const HostTerm> term, std::string place, const CellSet<Dim>& cells, double t, double scale)
       : term_(std::move(term)), place_(std::move(place)), scale_(scale) {
-    if (!cells.curved_elements.empty() || !cells.curved_facets.empty())
-      throw InputError({"", place_, "curved edges", "a mesh with straight edges alone"});
+    if (cells.has_curved()) throw InputError({"", place_, "curved edges", "a mesh with straight edges alone"});
     part_.dimension = Dim;
     part_.t = t;
     for (const Vec<Dim>& X : cells.rest) X_.insert(X_.end(), X.begin(), X.end());

@@ -208,19 +208,32 @@ scene::Geometry<Dim> Model::geometry() const {
   if (cells_.empty()) refuse("mesh", "no cells", "set_mesh before");
   scene::Geometry<Dim> geometry;
   geometry.mesh = Mesh<Dim>(as_points<Dim>(vertices_), as_rows<Dim + 1>(cells_), bodies_);
-  for (const Part& part : boundaries_) {
+  std::map<FacetId, std::vector<int>> parts_of;
+  for (std::size_t p = 0; p < boundaries_.size(); ++p) {
+    const Part& part = boundaries_[p];
     const auto facets = as_rows<Dim>(part.facets);
     for (std::size_t i = 0; i < facets.size(); ++i) {
       const FacetId f = geometry.mesh.find_facet(facets[i]);
-      const auto fail = [&](const std::string& expected) {
+      if (f == kNone)
         refuse(fmt::format("boundary '{}', facet {}", part.name, i), fmt::format("vertices {}", fmt::join(facets[i], " ")),
-               expected);
-      };
-      if (f == kNone) fail("a facet of the mesh's boundary");
-      if (const int tag = geometry.mesh.facet_tag(f); tag != kNoTag && tag != part.id)
-        fail(fmt::format("one that is not in the boundary of id {} already", tag));
-      geometry.mesh.set_facet_tag(f, part.id);
+               "a facet of the mesh's boundary");
+      auto& parts = parts_of[f];
+      if (parts.empty() || parts.back() != static_cast<int>(p)) parts.push_back(static_cast<int>(p));
     }
+    geometry.surfaces[part.name] = {part.id};
+  }
+  // Facets of several boundaries have a tag of their own.
+  int next = 1;
+  for (const auto* list : {&boundaries_, &obstacles_})
+    for (const Part& part : *list) next = std::max(next, part.id + 1);
+  std::map<std::vector<int>, int> tags;
+  for (const auto& [f, parts] : parts_of) {
+    const auto [tag, is_new] = tags.try_emplace(parts, parts.size() == 1 ? boundaries_[parts[0]].id : next);
+    if (is_new && parts.size() > 1) {
+      for (const int p : parts) geometry.surfaces[boundaries_[p].name].push_back(next);
+      ++next;
+    }
+    geometry.mesh.set_facet_tag(f, tag->second);
   }
   Obstacles<Dim>& obstacles = geometry.obstacles;
   for (const Part& part : obstacles_) {
@@ -230,7 +243,9 @@ scene::Geometry<Dim> Model::geometry() const {
     for (const auto& [a, b, c] : as_rows<3>(part.triangles))
       obstacles.triangles.push_back({first + a, first + b, first + c});
     geometry.id.resize(obstacles.rest.size(), part.id);
+    geometry.surfaces[part.name] = {part.id};
   }
+  geometry.bodies = body_names_;
   return geometry;
 }
 

@@ -12,25 +12,26 @@
 namespace itr {
 
 template <int Dim>
-NamedParts::NamedParts(const Mesh<Dim>& mesh, const std::map<std::string, int>& boundaries, const scene::PartNames& named,
-                       bool takes_ids)
-    : boundaries_(boundaries), takes_ids_(takes_ids) {
+NamedParts::NamedParts(const Mesh<Dim>& mesh, std::map<std::string, std::vector<int>> boundaries,
+                       const scene::PartNames& named, bool takes_ids)
+    : boundaries_(std::move(boundaries)), takes_ids_(takes_ids) {
+  boundaries_.insert(named.surfaces.begin(), named.surfaces.end());
   std::set<int> surfaces, bodies;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
   for (CellId c = 0; c < mesh.cell_slots(); ++c) bodies.insert(mesh.body(c));
   if (takes_ids) {
     tags_ = surfaces;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.vertex_tag(v) != kNoTag) tags_.insert(mesh.vertex_tag(v));
   }
   bool are_ids = false;
   const auto add = [&](const char* kind, const std::string& name, ForceTarget target) {
     parts_.push_back({kind, name, are_ids, std::move(target)});
   };
-  for (const auto& [name, id] : boundaries) add("boundary", name, {.surfaces = {id}});
+  for (const auto& [name, tags] : boundaries_) add("boundary", name, {.surfaces = tags});
   for (const auto& [name, vertices] : named.obstacles) add("obstacle", name, {.obstacle_vertices = vertices});
-  for (const auto& [name, id] : named.bodies) add("body", name, {.bodies = {id}});
+  for (const auto& [name, ids] : named.bodies) add("body", name, {.bodies = ids});
   are_ids = true;
   for (const int id : surfaces) add("boundary", std::to_string(id), {.surfaces = {id}});
   for (const auto& [id, vertices] : named.obstacles_by_id)
@@ -38,12 +39,12 @@ NamedParts::NamedParts(const Mesh<Dim>& mesh, const std::map<std::string, int>& 
   for (const int id : bodies) add("body", std::to_string(id), {.bodies = {id}});
 }
 
-int NamedParts::tag(const std::string& boundary) const {
+std::vector<int> NamedParts::tags(const std::string& boundary) const {
   if (const auto found = boundaries_.find(boundary); found != boundaries_.end()) return found->second;
   int id = 0;
   const auto [end, error] = std::from_chars(boundary.data(), boundary.data() + boundary.size(), id);
   const bool is_id = error == std::errc() && end == boundary.data() + boundary.size();
-  if (is_id && tags_.contains(id)) return id;
+  if (is_id && tags_.contains(id)) return {id};
   std::vector<std::string> known;
   for (const auto& [name, ignored] : boundaries_) known.push_back("'" + name + "'");
   for (const int other : tags_) known.push_back(std::to_string(other));
@@ -97,7 +98,7 @@ void NamedParts::refuse_unknown(const std::string& text) const {
          fmt::format("a name or the id of a surface, obstacle or body: {}", fmt::join(known, ", ")));
 }
 
-template NamedParts::NamedParts(const Mesh<2>&, const std::map<std::string, int>&, const scene::PartNames&, bool);
-template NamedParts::NamedParts(const Mesh<3>&, const std::map<std::string, int>&, const scene::PartNames&, bool);
+template NamedParts::NamedParts(const Mesh<2>&, std::map<std::string, std::vector<int>>, const scene::PartNames&, bool);
+template NamedParts::NamedParts(const Mesh<3>&, std::map<std::string, std::vector<int>>, const scene::PartNames&, bool);
 
 }  // namespace itr

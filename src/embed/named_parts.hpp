@@ -17,13 +17,13 @@ namespace itr {
 class NamedParts {
  public:
   NamedParts() = default;
-  /// `boundaries`: ids by name; `takes_ids`: conditions may name boundaries by id, too.
+  /// `boundaries`: tags by name; `takes_ids`: conditions may name boundaries by id, too.
   template <int Dim>
-  NamedParts(const Mesh<Dim>& mesh, const std::map<std::string, int>& boundaries, const scene::PartNames& named,
+  NamedParts(const Mesh<Dim>& mesh, std::map<std::string, std::vector<int>> boundaries, const scene::PartNames& named,
              bool takes_ids);
 
-  /// The facet or vertex tag of a boundary. Throws InputError where there is none.
-  int tag(const std::string& boundary) const;
+  /// The facet and vertex tags of a boundary. Throws InputError where there is none.
+  std::vector<int> tags(const std::string& boundary) const;
   /// All of these parts together: names, else ids, of boundaries, else of obstacles, else of bodies, or "body:3". Throws
   /// InputError for one that nothing has, and where none is given.
   ForceTarget target(std::span<const std::string> parts) const;
@@ -41,7 +41,7 @@ class NamedParts {
   [[noreturn]] void refuse_unknown(const std::string& text) const;
 
   std::vector<Part> parts_;  ///< names before ids, boundaries before obstacles before bodies
-  std::map<std::string, int> boundaries_;
+  std::map<std::string, std::vector<int>> boundaries_;
   std::set<int> tags_;  ///< of facets and vertices, where conditions may name them
   bool takes_ids_ = false;
 };

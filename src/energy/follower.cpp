@@ -44,7 +44,7 @@ void LinearizedForces<Dim>::add_hessian(ConstVectorView, PsdProjection psd, Hess
 template <int Dim>
 std::shared_ptr<const Energy> lag_follower(const FollowerForces<Dim>& follower, const Mesh<Dim>& mesh, const VectorX& x,
                                            double t, double scale) {
-  const Eigen::Index bodies = Dim * mesh.vertex_slots();
+  const Eigen::Index bodies = Dim * mesh.num_nodes();
   VectorX forces = VectorX::Zero(bodies);
   follower.forces(mesh, x.head(bodies), t, forces);
   auto energy = std::make_shared<LinearizedForces<Dim>>(std::move(forces), x, scale);

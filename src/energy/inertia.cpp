@@ -26,8 +26,8 @@ template <int Dim>
 void InertiaEnergy<Dim>::renew(const std::map<int, Material>& materials, MassKind kind, ConstVectorView predictor) {
   kind_ = kind;
   mass_.clear();
-  mass_.reserve(cells_.elements.size());
-  for (const auto& element : cells_.elements)
+  mass_.reserve(cells_.straight().size());
+  for (const auto& element : cells_.straight())
     mass_.push_back(mass_density<Dim>(materials.at(element.body), rest_barycenter(cells_, element)) * element.volume);
   renew_curved(materials);
   predictor_ = predictor;
@@ -43,7 +43,7 @@ void InertiaEnergy<Dim>::renew_curved(const std::map<int, Material>& materials) 
   constexpr std::size_t kAbsent = kAllCurved<Dim> + 1;
   std::array<std::size_t, kAllCurved<Dim> + 1> matrix_of;
   matrix_of.fill(kAbsent);
-  for (const auto& element : cells_.curved_elements) {
+  for (const auto& element : cells_.curved()) {
     const Material& material = materials.at(element.body);
     if (material.density_at) {
       std::vector<double> density;
@@ -85,7 +85,7 @@ double InertiaEnergy<Dim>::value_of(ConstVectorView distance) const {
     return part;
   });
   for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
-    const auto d = at_nodes<Dim>(cells_.curved_elements[e].nodes, distance);
+    const auto d = at_nodes<Dim>(cells_.curved()[e].nodes(), distance);
     sum += 0.5 * curved_mass_[e].mass * (d * matrices_[curved_mass_[e].matrix]).cwiseProduct(d).sum();
   }
   if (residual_.size() > 0) sum += residual_.view().dot(distance) + loss_;
@@ -128,7 +128,7 @@ void InertiaEnergy<Dim>::add_mass_product(ConstVectorView x, VectorView y) const
   for (std::size_t e = 0; e < mass_.size(); ++e)
     ElementMass<Dim>(kind_, mass_[e]).add_product(cells_.elements[e].vertices, from, to);
   for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
-    const auto& nodes = cells_.curved_elements[e].nodes;
+    const auto nodes = cells_.curved()[e].nodes();
     const auto product = (curved_mass_[e].mass * at_nodes<Dim>(nodes, x) * matrices_[curved_mass_[e].matrix]).eval();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k) y.template segment<Dim>(Dim * nodes[k]) += product.col(k);
   }
@@ -156,13 +156,13 @@ void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink
 template <int Dim>
 void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal) {
   diagonal.setZero();
-  for (const auto& element : cells.elements)
+  for (const auto& element : cells.straight())
     for (const int v : element.vertices)
       diagonal.segment<Dim>(Dim * v).array() += 2 * element.volume / ((Dim + 1) * (Dim + 2));
-  for (const auto& element : cells.curved_elements) {
+  for (const auto& element : cells.curved()) {
     const auto mass = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).diagonal();
-    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-      diagonal.segment<Dim>(Dim * element.nodes[k]).array() += element.volume * mass[k];
+    const auto nodes = element.nodes();
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k) diagonal.segment<Dim>(Dim * nodes[k]).array() += element.volume * mass[k];
   }
   const auto used = (diagonal.array() > 0).count();
   const double mean = used > 0 ? diagonal.sum() / static_cast<double>(used) : 1;

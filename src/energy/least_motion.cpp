@@ -58,15 +58,15 @@ void for_each_mass(const CellSet<Dim>& cells, const LooseParts<Dim>& loose, cons
   const ElementMass<Dim> unit(MassKind::consistent, 1);
   Mat<Dim + 1> linear = Mat<Dim + 1>::Constant(unit.off);
   linear.diagonal().array() += unit.extra;
-  for (std::size_t e = 0; e < cells.elements.size(); ++e)
-    if (const int part = loose.of_element[e]; part != kNone)
-      f(part, cells.elements[e].vertices, (loose.mass[e] * linear).eval());
-  for (std::size_t e = 0; e < cells.curved_elements.size(); ++e)
-    if (const int part = loose.of_curved[e]; part != kNone) {
-      const auto& element = cells.curved_elements[e];
-      f(part, element.nodes,
-        (loose.curved_mass[e] * constant_quadratic_mass<Dim>(MassKind::consistent, element.curved)).eval());
-    }
+  for (std::size_t e = 0; e < cells.elements.size(); ++e) {
+    const auto& element = cells.elements[e];
+    if (const int part = loose.of_element[e]; part == kNone)
+      continue;
+    else if (element.curved)
+      f(part, element.nodes(), (loose.mass[e] * constant_quadratic_mass<Dim>(MassKind::consistent, element.curved)).eval());
+    else
+      f(part, element.vertices, (loose.mass[e] * linear).eval());
+  }
 }
 
 /// The centre of mass of each part at positions x.
@@ -80,45 +80,33 @@ std::vector<Vec<Dim>> centres_of_mass(const CellSet<Dim>& cells, const LoosePart
   return centres;
 }
 
-/// Corners of all cells, elements first.
-template <int Dim>
-std::vector<std::array<int, Dim + 1>> corners_of(const CellSet<Dim>& cells) {
-  std::vector<std::array<int, Dim + 1>> corners;
-  for (const auto& element : cells.elements) corners.push_back(element.vertices);
-  for (const auto& element : cells.curved_elements) {
-    corners.emplace_back();
-    std::copy_n(element.nodes.begin(), Dim + 1, corners.back().begin());
-  }
-  return corners;
-}
-
 /// All connected parts, loose or not.
 template <int Dim>
 LooseParts<Dim> find_parts(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
-  const std::vector<std::array<int, Dim + 1>> corners = corners_of(cells);
+  std::vector<std::array<int, Dim + 1>> corners;
+  for (const auto& element : cells.elements) corners.push_back(element.vertices);
   const std::vector<int> part_of_vertex =
       connected_parts<Dim + 1>(cells.rest.size(), std::span<const std::array<int, Dim + 1>>(corners));
   LooseParts<Dim> all;
   std::map<int, int> numbers;  // parts without cells, such as single vertices, have none
   std::vector<double> total;
   std::vector<char> is_in(cells.rest.size(), 0);
-  const auto add = [&](const auto& of, int body, double volume, std::vector<int>& part_of, std::vector<double>& masses) {
-    const auto [entry, is_new] = numbers.try_emplace(part_of_vertex[of[0]], static_cast<int>(all.parts.size()));
+  for (const auto& element : cells.elements) {
+    const auto [entry, is_new] =
+        numbers.try_emplace(part_of_vertex[element.vertices[0]], static_cast<int>(all.parts.size()));
     if (is_new) all.parts.emplace_back(), total.push_back(0);
     const int part = entry->second;
-    const Material& material = materials.at(body);
-    const double mass = volume * (material.density > 0 ? material.density : 1);
+    const Material& material = materials.at(element.body);
+    const double mass = element.volume * (material.density > 0 ? material.density : 1);
     all.parts[part].modulus = std::max(all.parts[part].modulus, material.youngs_modulus);
     total[part] += mass;
-    for (const int node : of)
+    for_each_node(element, [&](int node) {
       if (!std::exchange(is_in[node], 1)) all.parts[part].nodes.push_back(node);
-    part_of.push_back(part);
-    masses.push_back(mass);
-  };
-  for (const auto& e : cells.elements) add(e.vertices, e.body, e.volume, all.of_element, all.mass);
-  for (const auto& e : cells.curved_elements) add(e.nodes, e.body, e.volume, all.of_curved, all.curved_mass);
+    });
+    all.of_element.push_back(part);
+    all.mass.push_back(mass);
+  }
   for (std::size_t e = 0; e < all.mass.size(); ++e) all.mass[e] /= total[all.of_element[e]];
-  for (std::size_t e = 0; e < all.curved_mass.size(); ++e) all.curved_mass[e] /= total[all.of_curved[e]];
   for (LoosePart<Dim>& part : all.parts) std::sort(part.nodes.begin(), part.nodes.end());
   return all;
 }
@@ -143,8 +131,7 @@ LooseParts<Dim> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x, c
     loose.push_back(std::move(part));
   }
   all.parts = std::move(loose);
-  for (std::vector<int>* of : {&all.of_element, &all.of_curved})
-    for (int& part : *of) part = number[part];
+  for (int& part : all.of_element) part = number[part];
   return all;
 }
 
@@ -165,17 +152,15 @@ void LeastMotion<Dim>::follow(ConstVectorView gradient, ConstVectorView sizes, c
 
 template <int Dim>
 void LeastMotion<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
-  const auto factors = [&](const std::vector<int>& part_of, const std::vector<double>& masses) {
-    std::vector<double> stiffness(masses.size(), 0);
-    for (std::size_t e = 0; e < masses.size(); ++e)
-      if (part_of[e] != kNone) stiffness[e] = loose_.parts[part_of[e]].stiffness * masses[e];
-    return stiffness;
-  };
-  sink.add_multiples<Dim>(cells_, factors(loose_.of_element, loose_.mass), unit_mass_block<Dim>(MassKind::consistent));
-  const std::vector<double> curved = factors(loose_.of_curved, loose_.curved_mass);
+  std::vector<double> stiffness(loose_.mass.size(), 0);
+  for (std::size_t e = 0; e < stiffness.size(); ++e)
+    if (const int part = loose_.of_element[e]; part != kNone) stiffness[e] = loose_.parts[part].stiffness * loose_.mass[e];
+  const auto curved = cells_.curved();
+  const std::size_t num_straight = stiffness.size() - curved.size();
+  sink.add_multiples<Dim>(cells_, std::span(stiffness).first(num_straight), unit_mass_block<Dim>(MassKind::consistent));
   sink.add_curved_multiples<Dim>(
-      cells_, curved, {}, [&](std::size_t e) -> const auto& {
-        return constant_quadratic_mass<Dim>(MassKind::consistent, cells_.curved_elements[e].curved);
+      cells_, std::span(stiffness).subspan(num_straight), {}, [&](std::size_t e) -> const auto& {
+        return constant_quadratic_mass<Dim>(MassKind::consistent, curved[e].curved);
       });
 }
 

@@ -23,8 +23,8 @@ struct LoosePart {
 template <int Dim>
 struct LooseParts {
   std::vector<LoosePart<Dim>> parts;
-  std::vector<int> of_element, of_curved;  ///< index of the part, or kNone
-  std::vector<double> mass, curved_mass;   ///< of the part's mass; their sum over a part is 1
+  std::vector<int> of_element;  ///< index of the part, or kNone
+  std::vector<double> mass;     ///< by element, of the part's mass; their sum over a part is 1
   bool empty() const { return parts.empty(); }
 };
 

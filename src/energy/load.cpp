@@ -19,33 +19,31 @@ std::array<Vec<Dim>, Vertices> rest_of(const std::array<int, Vertices>& vertices
   return rest;
 }
 
-template <int Dim, std::size_t Vertices>
-void add_forces(const std::array<int, Vertices>& vertices, const CellSet<Dim>& cells, int part, double weight,
+/// Adds the forces of a load times a density on a cell or a facet: with curved edges by the rule for products of two
+/// quadratic functions, without them by the points of linear ones, of the density in the middle.
+template <int Dim, int SimplexDim, typename Simplex>
+void add_forces(const Simplex& simplex, const CellSet<Dim>& cells, double measure, const auto& density,
                 const std::function<Vec<Dim>(const RestPoint<Dim>&)>& load, VectorView forces) {
-  using Point = LoadPoint<Vertices>;
-  for_each_load_point<Dim>(rest_of(vertices, cells), part, weight, load, [&](std::size_t q, const Vec<Dim>& f) {
-    for (std::size_t k = 0; k < Vertices; ++k)
-      forces.segment<Dim>(Dim * vertices[k]) += (k == q ? Point::kNear : Point::kFar) * f;
-  });
-}
-
-/// Adds forces on a simplex with curved edges, by the rule for products of two quadratic functions.
-template <int Dim, int SimplexDim>
-void add_curved_forces(const std::array<int, kQuadraticNodes<SimplexDim>>& nodes, CurvedEdges curved,
-                       const CellSet<Dim>& cells, int part, double measure,
-                       const std::function<double(const Vec<Dim>&)>& density,
-                       const std::function<Vec<Dim>(const RestPoint<Dim>&)>& load, VectorView forces) {
-  Vec<Dim> inward = Vec<Dim>::Zero();
-  if constexpr (SimplexDim < Dim) {
-    std::array<int, Dim> corners;
-    std::copy_n(nodes.begin(), Dim, corners.begin());
-    inward = inward_normal(rest_of(corners, cells));
+  const auto rest = rest_of(simplex.vertices, cells);
+  if (!simplex.curved) {
+    using Point = LoadPoint<SimplexDim + 1>;
+    Vec<Dim> sum = Vec<Dim>::Zero();
+    for (const Vec<Dim>& X : rest) sum += X;
+    const double weight = density(Vec<Dim>(sum / (SimplexDim + 1))) * measure;
+    for_each_load_point<Dim>(rest, simplex.part, weight, load, [&](std::size_t q, const Vec<Dim>& f) {
+      for (std::size_t k = 0; k < rest.size(); ++k)
+        forces.segment<Dim>(Dim * simplex.vertices[k]) += (k == q ? Point::kNear : Point::kFar) * f;
+    });
+    return;
   }
+  Vec<Dim> inward = Vec<Dim>::Zero();
+  if constexpr (SimplexDim < Dim) inward = inward_normal(rest);
+  const auto nodes = simplex.nodes();
   for (const auto& point : quadrature<SimplexDim>(kMassDegree)) {
     Vec<Dim> X = Vec<Dim>::Zero();
-    for (int k = 0; k <= SimplexDim; ++k) X += point.weights[k] * cells.rest[nodes[k]];
-    const Vec<Dim> f = point.share * measure * density(X) * load(RestPoint<Dim>(X, inward, part));
-    const auto shapes = quadratic_shapes<SimplexDim>(curved, point.weights);
+    for (int k = 0; k <= SimplexDim; ++k) X += point.weights[k] * rest[k];
+    const Vec<Dim> f = point.share * measure * density(X) * load(RestPoint<Dim>(X, inward, simplex.part));
+    const auto shapes = quadratic_shapes<SimplexDim>(simplex.curved, point.weights);
     for (int k = 0; k < kQuadraticNodes<SimplexDim>; ++k) forces.segment<Dim>(Dim * nodes[k]) += shapes[k] * f;
   }
 }
@@ -66,29 +64,17 @@ void LoadEnergy<Dim>::renew(const std::map<int, Material>& materials, const Load
   VectorView forces = forces_.resize(Dim * cells_.num_vertices);
   forces.setZero();
   if (loads.acceleration)
-    for (const auto& element : cells_.elements) {
-      const double density = mass_density<Dim>(materials.at(element.body), rest_barycenter(cells_, element));
-      add_forces<Dim>(element.vertices, cells_, element.part, density * element.volume, loads.acceleration, forces);
-    }
-  if (loads.acceleration)
-    for (const auto& element : cells_.curved_elements) {
-      const auto density = [&](const Vec<Dim>& X) { return mass_density<Dim>(materials.at(element.body), X); };
-      add_curved_forces<Dim, Dim>(element.nodes, element.curved, cells_, element.part, element.volume, density,
-                                  loads.acceleration, forces);
-    }
-  for (const auto& facet : cells_.curved_facets)
-    for (const auto& [tag, traction] : loads.tractions) {
-      if (tag != facet.tag) continue;
-      std::array<int, Dim> corners;
-      std::copy_n(facet.nodes.begin(), Dim, corners.begin());
-      add_curved_forces<Dim, Dim - 1>(
-          facet.nodes, facet.curved, cells_, facet.part, facet_area(rest_of(corners, cells_)),
-          [](const Vec<Dim>&) { return 1.0; }, traction, forces);
-    }
-  for (const auto& facet : cells_.facets)
-    for (const auto& [tag, traction] : loads.tractions)
-      if (tag == facet.tag)
-        add_forces<Dim>(facet.vertices, cells_, facet.part, facet_area(rest_of(facet.vertices, cells_)), traction, forces);
+    for (const auto& element : cells_.elements)
+      add_forces<Dim, Dim>(
+          element, cells_, element.volume,
+          [&](const Vec<Dim>& X) { return mass_density<Dim>(materials.at(element.body), X); }, loads.acceleration, forces);
+  for (const bool is_curved : {true, false})
+    for (const auto& facet : cells_.facets)
+      for (const auto& [tag, traction] : loads.tractions)
+        if (tag == facet.tag && is_curved == (facet.curved != 0))
+          add_forces<Dim, Dim - 1>(
+              facet, cells_, facet_area(rest_of(facet.vertices, cells_)), [](const Vec<Dim>&) { return 1.0; }, traction,
+              forces);
   for (int v = 0; v < cells_.num_vertices; ++v) rest_work_ += forces.segment<Dim>(Dim * v).dot(cells_.rest[v]);
 }
 

@@ -58,45 +58,30 @@ template <int Dim>
 void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& forces) {
   struct Best {
     Fit<Dim> fit;
-    bool is_curved;
-    std::size_t element;
+    const typename CellSet<Dim>::Element* element;
     std::array<double, Dim + 1> weights;
   };
   std::map<int, Best> best;
   std::vector<int> hits;
-  const auto look_in = [&](bool is_curved, std::size_t e, const int* vertices, int part, const Mat<Dim>& inverse_edges) {
+  for (const auto& element : cells.elements) {
     Box<Dim> box;
-    for (int k = 0; k <= Dim; ++k) box.include(cells.rest[vertices[k]]);
+    for (const int v : element.vertices) box.include(cells.rest[v]);
     hits.clear();
     points.tree.query(box.inflated(1e-9 * (box.max - box.min).norm()), hits);
     for (const int i : hits) {
-      if (points.X[i].part != part) continue;
-      auto weights = barycentric_weights<Dim>(cells.rest[vertices[0]], inverse_edges, points.X[i]);
-      const Fit<Dim> fit = fit_of<Dim>(points.X[i], weights, inverse_edges);
+      if (points.X[i].part != element.part) continue;
+      auto weights = barycentric_weights<Dim>(cells.rest[element.vertices[0]], element.inverse_edges, points.X[i]);
+      const Fit<Dim> fit = fit_of<Dim>(points.X[i], weights, element.inverse_edges);
       if (!fit.has || fit.facing < kFaces) continue;
       tidy(weights);
-      const auto [it, is_new] = best.try_emplace(i, Best{fit, is_curved, e, weights});
-      if (!is_new && fit.is_better_than(it->second.fit)) it->second = {fit, is_curved, e, weights};
+      const auto [it, is_new] = best.try_emplace(i, Best{fit, &element, weights});
+      if (!is_new && fit.is_better_than(it->second.fit)) it->second = {fit, &element, weights};
     }
-  };
-  for (std::size_t e = 0; e < cells.elements.size(); ++e) {
-    const auto& element = cells.elements[e];
-    look_in(false, e, element.vertices.data(), element.part, element.inverse_edges);
-  }
-  for (std::size_t e = 0; e < cells.curved_elements.size(); ++e) {
-    const auto& element = cells.curved_elements[e];
-    look_in(true, e, element.nodes.data(), element.part, element.inverse_edges);
   }
   for (const auto& [i, place] : best) {
-    if (!place.is_curved) {
-      for (int k = 0; k <= Dim; ++k)
-        forces.segment<Dim>(Dim * cells.elements[place.element].vertices[k]) += place.weights[k] * points.force[i];
-      continue;
-    }
-    const auto& element = cells.curved_elements[place.element];
-    const auto shapes = quadratic_shapes<Dim>(element.curved, place.weights);
-    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-      forces.segment<Dim>(Dim * element.nodes[k]) += shapes[k] * points.force[i];
+    const auto nodes = place.element->nodes();
+    const auto shapes = quadratic_shapes<Dim>(place.element->curved, place.weights);
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k) forces.segment<Dim>(Dim * nodes[k]) += shapes[k] * points.force[i];
   }
 }
 
@@ -104,32 +89,29 @@ void add_located(const Points<Dim>& points, const CellSet<Dim>& cells, VectorX& 
 template <int Dim>
 bool has_cells_of(const CellSet<Dim>& mesh, const CellSet<Dim>& cells) {
   return mesh.rest.size() <= cells.rest.size() &&
-         std::ranges::equal(mesh.elements, cells.elements, {}, &CellSet<Dim>::Element::vertices,
-                            &CellSet<Dim>::Element::vertices) &&
-         std::ranges::equal(mesh.curved_elements, cells.curved_elements, {}, &CellSet<Dim>::CurvedElement::nodes,
-                            &CellSet<Dim>::CurvedElement::nodes) &&
+         std::ranges::equal(mesh.elements, cells.elements, {}, &CellSet<Dim>::Element::nodes,
+                            &CellSet<Dim>::Element::nodes) &&
          std::equal(mesh.rest.begin(), mesh.rest.end(), cells.rest.begin());
 }
 
 }  // namespace
 
 template <int Dim>
-TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces, const Space& space) {
-  const int n = num_nodes(mesh, space);
+TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces) {
+  const int n = mesh.num_nodes();
   if (forces.size() != Eigen::Index{Dim} * n)
     throw InputError({"", "forces", std::to_string(forces.size()) + " numbers",
                       std::to_string(Dim * n) + ", " + std::to_string(Dim) + " a node"});
   const auto loaded = std::make_shared<Points<Dim>>();
   loaded->all = forces;
-  loaded->cells = whole_mesh(mesh, {}, space);
+  loaded->cells = whole_mesh(mesh, {});
   std::vector<Box<Dim>> boxes;
   for (int v = 0; v < n; ++v) {
     const Vec<Dim> f = forces.segment<Dim>(Dim * v);
     if (!f.allFinite())
       throw InputError({"", "forces[" + std::to_string(v) + "]", "a number that is not finite", "numbers"});
     if (f.isZero(0)) continue;
-    const int edge = v - mesh.vertex_slots();
-    loaded->X.push_back(edge < 0 ? mesh.point(v) : mesh.middle(space.curved_edges()[edge]));
+    loaded->X.push_back(mesh.point_of_node(v));
     loaded->force.push_back(f);
     boxes.push_back({loaded->X.back(), loaded->X.back()});
   }
@@ -149,7 +131,7 @@ TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces, con
   };
 }
 
-template TermFactory<2> point_forces<2>(const Mesh<2>&, ConstVectorView, const Space&);
-template TermFactory<3> point_forces<3>(const Mesh<3>&, ConstVectorView, const Space&);
+template TermFactory<2> point_forces<2>(const Mesh<2>&, ConstVectorView);
+template TermFactory<3> point_forces<3>(const Mesh<3>&, ConstVectorView);
 
 }  // namespace itr

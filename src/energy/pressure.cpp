@@ -79,9 +79,9 @@ CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, D
   return weights;
 }
 
-/// Barycenter of a facet as a point of its body. Its corners are the first of its `nodes`.
-template <int Dim, std::size_t N>
-RestPoint<Dim> middle_of(const std::array<int, N>& nodes, int part, const CellSet<Dim>& cells) {
+/// Barycenter of a facet as a point of its body.
+template <int Dim>
+RestPoint<Dim> middle_of(const std::array<int, Dim>& nodes, int part, const CellSet<Dim>& cells) {
   std::array<Vec<Dim>, Dim> corners;
   Vec<Dim> middle = Vec<Dim>::Zero();
   for (int k = 0; k < Dim; ++k) {
@@ -97,22 +97,19 @@ template <int Dim>
 PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>& loads, ConstVectorView lagged_x,
                                     double scale)
     : correction_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
-  for (const auto& facet : cells.facets)
-    for (const auto& [tag, pressure] : loads.pressures) {
-      if (tag != facet.tag) continue;
-      const RestPoint<Dim> middle = middle_of(facet.vertices, facet.part, cells);
-      facets_.push_back({facet.vertices, pressure(middle)});
-      origin_ += middle;
-    }
-  for (const auto& facet : cells.curved_facets)
-    for (const auto& [tag, pressure] : loads.pressures) {
-      if (tag != facet.tag) continue;
-      const RestPoint<Dim> middle = middle_of(facet.nodes, facet.part, cells);
-      curved_facets_.push_back({facet.nodes, facet.curved, pressure(middle)});
-      origin_ += middle;
-    }
+  for (const bool is_curved : {false, true})
+    for (const auto& facet : cells.facets)
+      for (const auto& [tag, pressure] : loads.pressures) {
+        if (tag != facet.tag || is_curved != (facet.curved != 0)) continue;
+        const RestPoint<Dim> middle = middle_of<Dim>(facet.vertices, facet.part, cells);
+        if (is_curved)
+          curves_.push_back({facet.nodes(), facet.curved, pressure(middle)});
+        else
+          facets_.push_back({facet.vertices, pressure(middle)});
+        origin_ += middle;
+      }
   if (empty()) return;
-  origin_ /= static_cast<double>(facets_.size() + curved_facets_.size());
+  origin_ /= static_cast<double>(facets_.size() + curves_.size());
   for (const LoadedFacet& facet : facets_) {
     const Corners p = corners(facet, lagged_x);
     const Corners gradient = cone_gradient(p);
@@ -149,7 +146,7 @@ template <int Dim>
 template <typename F>
 void PressureEnergy<Dim>::for_each_cone(ConstVectorView x, const F& f) const {
   constexpr int kDegree = Dim == 2 ? 3 : 4;  // of det(x, t1, t2), and of a shape function times the normal
-  for (const CurvedLoadedFacet& facet : curved_facets_) {
+  for (const CurvedLoadedFacet& facet : curves_) {
     auto nodes = at_nodes<Dim>(facet.nodes, x);
     nodes.colwise() -= origin_;
     for (const auto& point : quadrature<Dim - 1>(kDegree)) {

@@ -29,7 +29,8 @@ double distance_from_chords(const std::array<Vec<Dim>, Dim>& facet, int i, int j
   return largest / 4;
 }
 
-/// Calls add(ids) for the simplices through all nodes of a boundary facet, oriented as the facet (see add_chord_facets).
+/// Calls add(ids) for the simplices through all nodes of a boundary facet, oriented as the facet: of a triangle with 1, 2, 3
+/// curved edges 2, 3, 4; with 2 the diagonal starts at the vertex of lower id.
 /// `node_of(a, b)`: the node of an edge, or kNone where it is straight.
 template <int Dim, typename NodeOf, typename Add>
 void for_each_chord(const typename MeshTypes<Dim>::Facet& facet, const NodeOf& node_of, const Add& add) {

@@ -51,6 +51,10 @@ class HeldRule {
     if (may_own && own == mesh.vertex_tag(ends[N - 1])) hold(own, tags, [](int) { return true; });
     return tags;
   }
+  Tags tags_of_node(const Mesh<Dim>& mesh, VertexId node) const {
+    const EdgeKey edge = mesh.edge_of_node(node);
+    return edge[0] == kNone ? tags_at(mesh, std::array{node}) : tags_at(mesh, edge);
+  }
 
  private:
   template <typename Wins>

@@ -7,16 +7,14 @@
 
 namespace itr {
 
-/// The first cell that is not positively oriented everywhere, decided exactly; kNone: none. `node_of(a, b)`: the node of an
-/// edge or kNone.
-template <int Dim, typename NodeOf>
-CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView x, const NodeOf& node_of) {
+/// The first cell that is not positively oriented everywhere, decided exactly; kNone: none.
+template <int Dim>
+CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView x) {
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
-    typename CellSet<Dim>::CurvedElement element{};
-    element.curved = find_nodes<Dim>(mesh.cell(c), node_of, element.nodes);
+    const auto element = element_of(mesh, c);
     const bool is_positive = element.curved ? is_positive_everywhere_exact<Dim>(at_all_nodes<Dim>(element, x))
-                                            : is_positively_oriented<Dim>(mesh.cell(c), x);
+                                            : is_positively_oriented<Dim>(element.vertices, x);
     if (!is_positive) return c;
   }
   return kNone;

@@ -22,16 +22,17 @@ struct Locator<Dim>::Impl {
   struct Cell {
     CellId id;
     int body, part;
-    std::array<VertexId, Dim + 1> vertices;
+    std::array<VertexId, kQuadraticNodes<Dim>> nodes;
+    CurvedEdges curved;
     Vec<Dim> origin;
     Mat<Dim> inverse_edges;
   };
   std::vector<Cell> cells;
   Bvh<Dim> tree;
-  int num_vertices;
+  int num_nodes;
   double extent = 0;  ///< [m]
 
-  Impl(const Mesh<Dim>& mesh, std::span<const CellId> ids) : num_vertices(mesh.vertex_slots()) {
+  Impl(const Mesh<Dim>& mesh, std::span<const CellId> ids) : num_nodes(mesh.node_slots()) {
     std::vector<Box<Dim>> boxes;
     Box<Dim> all;
     for (const CellId c : ids) {
@@ -39,7 +40,9 @@ struct Locator<Dim>::Impl {
       for (const int v : mesh.cell(c)) box.include(mesh.rest(v));
       all.include(box);
       boxes.push_back(box);
-      cells.push_back({c, mesh.body(c), mesh.part(c), mesh.cell(c), mesh.rest(mesh.cell(c)[0]), mesh.inverse_rest_edges(c)});
+      const auto element = element_of(mesh, c);
+      cells.push_back({c, element.body, element.part, element.nodes(), element.curved, mesh.rest(element.vertices[0]),
+                       element.inverse_edges});
     }
     if (!ids.empty()) extent = (all.max - all.min).norm();
     tree.build(boxes);
@@ -110,7 +113,7 @@ typename Locator<Dim>::Place Locator<Dim>::find(const RestPoint<Dim>& X, int bod
     const Fit<Dim> fit = fit_of<Dim>(X, weights, cell.inverse_edges);
     if (best.cell != kNone && !fit.is_better_than(best_fit)) return;
     best_fit = fit;
-    best = {cell.id, cell.vertices, weights};
+    best = {cell.id, cell.nodes, cell.curved, weights};
   };
   for (; best.cell == kNone && reach < 4 * impl_->extent; reach *= 1000) {
     hits.clear();
@@ -120,21 +123,20 @@ typename Locator<Dim>::Place Locator<Dim>::find(const RestPoint<Dim>& X, int bod
   for (std::size_t i = 0; best.cell == kNone && i < impl_->cells.size(); ++i) look(static_cast<int>(i));
   if (best_fit.has && best_fit.depth < 0) {  // a cell that shares the facet, edge or vertex has the point inside
     const Place at_side = best;
-    const auto shares_all = [&](const auto& vertices) {
+    const auto shares_all = [&](const auto& nodes) {
+      const auto end = nodes.begin() + Dim + 1;
       for (int k = 0; k <= Dim; ++k)
-        if (at_side.weights[k] > kAtFacet &&
-            std::find(vertices.begin(), vertices.end(), at_side.vertices[k]) == vertices.end())
-          return false;
+        if (at_side.weights[k] > kAtFacet && std::find(nodes.begin(), end, at_side.nodes[k]) == end) return false;
       return true;
     };
     for (const int i : hits) {
       const auto& cell = impl_->cells[i];
-      if ((body != kNone && cell.body != body) || !shares_all(cell.vertices)) continue;
+      if ((body != kNone && cell.body != body) || !shares_all(cell.nodes)) continue;
       const auto weights = barycentric_weights<Dim>(cell.origin, cell.inverse_edges, X);
       const double depth = *std::min_element(weights.begin(), weights.end());
       if (depth <= best_fit.depth) continue;
       best_fit.depth = depth;
-      best = {cell.id, cell.vertices, weights};
+      best = {cell.id, cell.nodes, cell.curved, weights};
     }
   }
   if (best.cell == kNone && X.part != kNone) return find(RestPoint<Dim>(X, X.inward, kNone), body);
@@ -143,20 +145,19 @@ typename Locator<Dim>::Place Locator<Dim>::find(const RestPoint<Dim>& X, int bod
 }
 
 template <int Dim>
-int Locator<Dim>::num_vertices() const {
-  return impl_->num_vertices;
+int Locator<Dim>::num_nodes() const {
+  return impl_->num_nodes;
 }
 
 template <int Dim>
 std::function<VectorX(const RestPoint<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
-                                                               Space space) {
-  const int vertices = locator->num_vertices();
-  const int components = static_cast<int>(values.size()) / std::max(1, vertices + space.num_curved());
-  return [locator = std::move(locator), values = std::move(values), space = std::move(space), vertices,
-          components](const RestPoint<Dim>& X) {
-    const auto place = locator->find(X);
+                                                               int components) {
+  const bool is_by_node = values.size() == Eigen::Index{components} * locator->num_nodes();
+  return [locator = std::move(locator), values = std::move(values), components, is_by_node](const RestPoint<Dim>& X) {
+    auto place = locator->find(X);
+    if (!is_by_node) place.curved = 0;
     VectorX sum = VectorX::Zero(components);
-    for_each_weight<Dim>(place, space, vertices,
+    for_each_weight<Dim>(place,
                          [&](int node, double weight) { sum += weight * values.segment(components * node, components); });
     return sum;
   };
@@ -166,7 +167,7 @@ template class Locator<2>;
 template class Locator<3>;
 template Fit<2> fit_of(const RestPoint<2>&, const std::array<double, 3>&, const Mat<2>&);
 template Fit<3> fit_of(const RestPoint<3>&, const std::array<double, 4>&, const Mat<3>&);
-template std::function<VectorX(const RestPoint<2>&)> nodal_function<2>(std::shared_ptr<const Locator<2>>, VectorX, Space);
-template std::function<VectorX(const RestPoint<3>&)> nodal_function<3>(std::shared_ptr<const Locator<3>>, VectorX, Space);
+template std::function<VectorX(const RestPoint<2>&)> nodal_function<2>(std::shared_ptr<const Locator<2>>, VectorX, int);
+template std::function<VectorX(const RestPoint<3>&)> nodal_function<3>(std::shared_ptr<const Locator<3>>, VectorX, int);
 
 }  // namespace itr

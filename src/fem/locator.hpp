@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/fem/space.hpp"
+#include "itr/fem/quadratic.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
@@ -56,43 +56,43 @@ class Locator {
   Locator(Locator&&) noexcept;
 
   struct Place {
-    CellId cell = kNone;                       ///< kNone: there are no cells (of that body)
-    std::array<VertexId, Dim + 1> vertices{};  ///< of the cell
-    std::array<double, Dim + 1> weights{};     ///< barycentric: >= 0, of sum 1; exactly 1 and 0 at a vertex
+    CellId cell = kNone;  ///< kNone: there are no cells (of that body)
+    std::array<VertexId, kQuadraticNodes<Dim>>
+        nodes{};  ///< of the cell, vertices first; at a straight edge its first vertex
+    CurvedEdges curved = 0;
+    std::array<double, Dim + 1> weights{};  ///< barycentric: >= 0, of sum 1; exactly 1 and 0 at a vertex
   };
   /// The cell that has X [m], of those that share it the one at its inward side; outside of all, a nearest one. Only cells
   /// of the point's connected part count if there are any, and of `body` unless this is kNone.
   Place find(const RestPoint<Dim>& X, int body = kNone) const;
-  /// Length of nodal fields: the vertex slots of the mesh.
-  int num_vertices() const;
+  int num_nodes() const;  ///< length of nodal fields: the node slots of the mesh
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-/// Calls visit(node, weight) for the nodes of `space` whose values make up that at a place: weights of shape functions that
-/// are linear on cells or, along curved edges, quadratic. `vertices`: those of the mesh.
+/// Calls visit(node, weight) for the nodes whose values make up that at a place: weights of shape functions that are linear
+/// on cells or, along curved edges, quadratic.
 template <int Dim, typename Visit>
-void for_each_weight(const typename Locator<Dim>::Place& place, const Space& space, int vertices, const Visit& visit) {
+void for_each_weight(const typename Locator<Dim>::Place& place, const Visit& visit) {
   for (int k = 0; k <= Dim; ++k)
-    if (place.weights[k] > 0) visit(place.vertices[k], place.weights[k]);
-  if (space.is_linear()) return;
-  for_each_edge<Dim>([&](int, int i, int j) {
+    if (place.weights[k] > 0) visit(place.nodes[k], place.weights[k]);
+  if (place.curved == 0) return;
+  for_each_edge<Dim>([&](int edge, int i, int j) {
     const double product = place.weights[i] * place.weights[j];
-    const int a = place.vertices[i], b = place.vertices[j], curved = product > 0 ? space.find(a, b) : kNone;
-    if (curved == kNone) return;
-    visit(vertices + curved, 4 * product);
-    visit(a, -2 * product);
-    visit(b, -2 * product);
+    if (!(place.curved >> edge & 1) || !(product > 0)) return;
+    visit(place.nodes[Dim + 1 + edge], 4 * product);
+    visit(place.nodes[i], -2 * product);
+    visit(place.nodes[j], -2 * product);
   });
 }
 
-/// The function of rest position with these values at the nodes of `space`, on cells linear or, along curved edges,
-/// quadratic. `values`: `components` for each node, interleaved. Several threads may call the result at a time.
+/// The function of rest position with these values, of so many components each, interleaved: by node (on cells linear or,
+/// along curved edges, quadratic) or by vertex (linear on cells). Several threads may call the result at a time.
 template <int Dim>
 std::function<VectorX(const RestPoint<Dim>& X)> nodal_function(std::shared_ptr<const Locator<Dim>> locator, VectorX values,
-                                                               Space space = {});
+                                                               int components);
 
 extern template class Locator<2>;
 extern template class Locator<3>;

@@ -19,8 +19,7 @@ class ChordRefiner {
   using Result = RefinedChords<Dim>;
   using Coordinates = typename Result::Coordinates;
 
-  ChordRefiner(const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels)
-      : mesh_(mesh), space_(space), levels_(levels) {}
+  ChordRefiner(const Mesh<Dim>& mesh, const ChordLevels& levels) : mesh_(mesh), levels_(levels) {}
 
   void add(FacetId f) {
     root_ = mesh_.facet(f);
@@ -32,9 +31,9 @@ class ChordRefiner {
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < i; ++j) {
         const EdgeKey edge = edge_key(root_[i], root_[j]);
-        const int at = space_.find(edge[0], edge[1]);
-        halvings_[edge] = at == kNone ? 0 : 1 + (levels_.empty() ? 0 : levels_[at]);
-        if (at != kNone) middles_[edge] = mesh_.vertex_slots() + at;
+        const int node = mesh_.node_of(edge);
+        halvings_[edge] = node == kNone ? 0 : 1 + (levels_.empty() ? 0 : levels_[node - mesh_.num_vertices()]);
+        if (node != kNone) middles_[edge] = node;
       }
     refine(root_, f);
   }
@@ -73,7 +72,7 @@ class ChordRefiner {
     for (int k = 0; k < Dim; ++k) middle[k] = (coordinates_.at(edge[0])[k] + coordinates_.at(edge[1])[k]) / 2;
     const auto [at, is_new] = middles_.try_emplace(edge, 0);
     if (is_new) {
-      at->second = num_nodes(mesh_, space_) + static_cast<int>(result_.points.size());
+      at->second = mesh_.num_nodes() + static_cast<int>(result_.points.size());
       result_.points.push_back(weights_at(middle));
     }
     const int point = at->second;
@@ -89,7 +88,7 @@ class ChordRefiner {
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < i; ++j) {
         const double product = at[i] * at[j];
-        const int node = space_.node_of(root_[i], root_[j], mesh_.vertex_slots());
+        const int node = mesh_.node_of(root_[i], root_[j]);
         if (product == 0) continue;
         if (node != kNone) {
           weights.emplace_back(node, 4 * product);
@@ -104,7 +103,6 @@ class ChordRefiner {
   }
 
   const Mesh<Dim>& mesh_;
-  const Space& space_;
   const ChordLevels& levels_;
   Facet root_{};
   std::unordered_map<int, Coordinates> coordinates_;        ///< in the root
@@ -116,14 +114,14 @@ class ChordRefiner {
 }  // namespace
 
 template <int Dim>
-RefinedChords<Dim> refine_chords(const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels) {
-  ChordRefiner<Dim> refiner(mesh, space, levels);
+RefinedChords<Dim> refine_chords(const Mesh<Dim>& mesh, const ChordLevels& levels) {
+  ChordRefiner<Dim> refiner(mesh, levels);
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.is_facet_alive(f)) refiner.add(f);
   return std::move(refiner).result();
 }
 
-template RefinedChords<2> refine_chords(const Mesh<2>&, const Space&, const ChordLevels&);
-template RefinedChords<3> refine_chords(const Mesh<3>&, const Space&, const ChordLevels&);
+template RefinedChords<2> refine_chords(const Mesh<2>&, const ChordLevels&);
+template RefinedChords<3> refine_chords(const Mesh<3>&, const ChordLevels&);
 
 }  // namespace itr

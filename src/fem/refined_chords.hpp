@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "fem/chords.hpp"
 #include "itr/fem/chord_levels.hpp"
-#include "itr/fem/space.hpp"
 
 namespace itr {
 
@@ -24,12 +24,19 @@ struct RefinedChords {
   std::vector<Weights> points;                            ///< nodes that a point combines, with their weights
 };
 
+/// Adds a boundary facet's part of the surface that can touch: simplices through all of its nodes (for_each_chord).
+template <int Dim>
+void add_chord_facets(const Mesh<Dim>& mesh, FacetId f, std::vector<typename MeshTypes<Dim>::Facet>& chords) {
+  const auto node_of = nodes_of_edges(mesh);
+  for_each_chord<Dim>(mesh.facet(f), node_of, [&](const auto& ids) { chords.push_back(ids); });
+}
+
 /// The chords of all boundary facets (see add_chord_facets), in the order of these.
 template <int Dim>
-std::vector<typename MeshTypes<Dim>::Facet> boundary_chords(const Mesh<Dim>& mesh, const Space& space) {
+std::vector<typename MeshTypes<Dim>::Facet> boundary_chords(const Mesh<Dim>& mesh) {
   std::vector<typename MeshTypes<Dim>::Facet> chords;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
+    if (mesh.is_facet_alive(f)) add_chord_facets(mesh, f, chords);
   return chords;
 }
 
@@ -43,6 +50,6 @@ Vec<Dim> combined(const Weights& weights, const At& at) {
 
 /// Returns the boundary of the mesh in simplices, with the chords of each curved edge halved by its level.
 template <int Dim>
-RefinedChords<Dim> refine_chords(const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels);
+RefinedChords<Dim> refine_chords(const Mesh<Dim>& mesh, const ChordLevels& levels);
 
 }  // namespace itr

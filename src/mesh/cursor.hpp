@@ -29,6 +29,32 @@ class Cursor {
     return bytes_.substr(begin, position_ - begin);
   }
 
+  /// Next text between double quotes.
+  std::string quoted_text() {
+    skip_space();
+    const auto end = position_ < bytes_.size() && bytes_[position_] == '"' ? bytes_.find('"', position_ + 1) : bytes_.npos;
+    if (end == bytes_.npos) fail(quoted(bytes_.substr(position_, 40)), "a name between double quotes");
+    const std::string text(bytes_.substr(position_ + 1, end - position_ - 1));
+    position_ = end + 1;
+    return text;
+  }
+
+  /// The word that comes next.
+  std::string_view peek() {
+    const std::size_t begin = position_;
+    const std::string_view next = word();
+    position_ = begin;
+    return next;
+  }
+
+  /// Goes on behind the next empty line.
+  void skip_paragraph() {
+    const auto end = bytes_.find("\n\n", position_);
+    position_ = end == bytes_.npos ? bytes_.size() : end + 2;
+  }
+
+  bool is_at_end() const { return position_ >= bytes_.size(); }
+
   /// Binary data begins after the end of the line.
   void end_line() {
     while (position_ < bytes_.size() && bytes_[position_] != '\n') ++position_;

@@ -2,7 +2,10 @@
 #include "itr/mesh/mesh.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <string>
@@ -52,8 +55,8 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const auto place = [&] { return "cell " + std::to_string(c); };
     for (const int v : cells[c])
-      if (v < 0 || v >= vertex_slots())
-        throw InputError({"", place(), "vertex index " + std::to_string(v), "0 to " + std::to_string(vertex_slots() - 1)});
+      if (v < 0 || v >= node_slots())
+        throw InputError({"", place(), "vertex index " + std::to_string(v), "0 to " + std::to_string(node_slots() - 1)});
     add_cell(cells[c], body[c], kNone);
     if (!(volume_.back() > 0 && std::isfinite(volume_.back())))
       throw InputError({"", place(), "rest volume " + std::to_string(volume_.back()),
@@ -71,6 +74,13 @@ Mesh<Dim>::Mesh(std::vector<Vec<Dim>> rest, std::vector<Cell> cells, std::vector
     if (entry.first == 1) add_facet(entry.second, kNoTag);
   const std::vector<int> part = connected_parts<Dim + 1>(rest_.size(), cells_);
   for (std::size_t c = 0; c < cells_.size(); ++c) part_[c] = part[cells_[c][0]];
+  renew_revision();
+}
+
+template <int Dim>
+void Mesh<Dim>::renew_revision() {
+  static std::atomic<std::uint64_t> last{0};
+  revision_ = ++last;
 }
 
 template <int Dim>
@@ -78,7 +88,7 @@ void Mesh<Dim>::set_facets(const std::vector<Facet>& facets, const std::vector<i
   ITR_CHECK(facets.size() == tags.size(), facets.size(), tags.size());
   std::vector<Facet> found;
   for (const Facet& facet : facets) {
-    const bool in_range = std::all_of(facet.begin(), facet.end(), [&](int v) { return v >= 0 && v < vertex_slots(); });
+    const bool in_range = std::all_of(facet.begin(), facet.end(), [&](int v) { return v >= 0 && v < node_slots(); });
     const FacetId f = in_range ? find_facet(facet) : kNone;
     if (f == kNone)
       throw InputError({"", "facet " + std::to_string(found.size()), "one that is not on the boundary", "a boundary facet"});
@@ -92,6 +102,13 @@ void Mesh<Dim>::set_facets(const std::vector<Facet>& facets, const std::vector<i
   facet_tag_.clear();
   num_facets_ = 0;
   for (std::size_t f = 0; f < facets.size(); ++f) add_facet(facets[f], tags[f]);
+  renew_revision();
+}
+
+template <int Dim>
+bool Mesh<Dim>::is_compact() const {
+  return num_nodes() == node_slots() && num_cells_ == cell_slots() && num_facets_ == facet_slots() &&
+         std::find(vertex_alive_.begin(), vertex_alive_.begin() + num_vertices_, 0) == vertex_alive_.begin() + num_vertices_;
 }
 
 template <int Dim>
@@ -209,7 +226,7 @@ FacetId Mesh<Dim>::find_facet(const Facet& vertices) const {
 template <int Dim>
 std::vector<EdgeKey> Mesh<Dim>::edges() const {
   std::vector<EdgeKey> all;
-  for (VertexId v = 0; v < vertex_slots(); ++v) {
+  for (VertexId v = 0; v < node_slots(); ++v) {
     const auto first = static_cast<std::ptrdiff_t>(all.size());
     for (const CellId c : cells_of_[v])
       for (const VertexId w : cells_[c])
@@ -240,36 +257,63 @@ bool Mesh<Dim>::is_curved(CellId c) const {
 
 template <int Dim>
 VertexId Mesh<Dim>::add_node(const EdgeKey& edge) {
-  const VertexId node = vertex_slots();
+  const VertexId node = node_slots();
   ITR_CHECK(edge[0] < edge[1] && node_of(edge[0], edge[1]) == kNone, edge[0], edge[1]);
   if (static_cast<int>(nodes_from_.size()) <= edge[0]) nodes_from_.resize(edge[0] + 1);
   nodes_from_[edge[0]].emplace_back(edge[1], node);
   edge_of_node_.resize(node + 1, {kNone, kNone});
   edge_of_node_[node] = edge;
-  ++num_nodes_;
+  ++num_curved_;
   rest_.push_back((rest_[edge[0]] + rest_[edge[1]]) / 2);
   vertex_alive_.push_back(0);
   vertex_tag_.push_back(kNoTag);
   cells_of_.emplace_back();
   facets_of_.emplace_back();
+  renew_revision();
   return node;
 }
 
+/// Removes the slots behind the vertices, of a mesh that has others nowhere.
 template <int Dim>
-std::vector<std::pair<EdgeKey, VertexId>> Mesh<Dim>::nodes() const {
-  std::vector<std::pair<EdgeKey, VertexId>> all;
-  all.reserve(num_nodes_);
-  for (std::size_t a = 0; a < nodes_from_.size(); ++a)
-    for (const auto& [b, node] : nodes_from_[a]) all.push_back({{static_cast<VertexId>(a), b}, node});
-  std::sort(all.begin(), all.end());
-  return all;
+void Mesh<Dim>::remove_nodes() {
+  num_curved_ = 0;
+  nodes_from_.clear();
+  edge_of_node_.clear();
+  rest_.resize(num_vertices_);
+  vertex_alive_.assign(num_vertices_, 1);
+  vertex_tag_.resize(num_vertices_);
+  cells_of_.resize(num_vertices_);
+  facets_of_.resize(num_vertices_);
+}
+
+template <int Dim>
+void Mesh<Dim>::set_curved_edges(const std::vector<EdgeKey>& edges) {
+  ITR_CHECK(is_compact(), node_slots(), num_vertices_);
+  remove_nodes();
+  for (const auto& [a, b] : edges)
+    if (a < 0 || b <= a || b >= num_vertices_ || !are_joined(a, b))
+      throw InputError({"", "curved edges", std::to_string(a) + "-" + std::to_string(b), "edges of the mesh"});
+  if (std::adjacent_find(edges.begin(), edges.end(), std::greater_equal<>()) != edges.end())
+    throw InputError({"", "curved edges", "rows in another order", "ascending rows"});
+  for (const EdgeKey& edge : edges) add_node(edge);
+  renew_revision();
+}
+
+template <int Dim>
+std::vector<EdgeKey> Mesh<Dim>::curved_edges() const {
+  std::vector<EdgeKey> edges;
+  edges.reserve(num_curved_);
+  for (const EdgeKey& edge : edge_of_node_)
+    if (edge[0] != kNone) edges.push_back(edge);
+  std::sort(edges.begin(), edges.end());
+  return edges;
 }
 
 template <int Dim>
 VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
   VertexId created = kNone;
   if (edit.value && edit.value->vertex == kNewVertex) {
-    created = vertex_slots();
+    created = node_slots();
     rest_.push_back(edit.value->rest);
     vertex_alive_.push_back(1);
     vertex_tag_.push_back(edit.value->tag);
@@ -303,26 +347,30 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
     ITR_CHECK(node != kNone, curved[0], curved[1]);
     edge_of_node_[node] = {kNone, kNone};
     std::erase_if(nodes_from_[std::min(curved[0], curved[1])], [&](const auto& entry) { return entry.second == node; });
-    --num_nodes_;
+    --num_curved_;
   }
   for (const auto& node : edit.inserted_nodes) {
     const EdgeKey ends = resolve(node.edge);
     add_node(edge_key(ends[0], ends[1]));
   }
+  renew_revision();
   return created;
 }
 
 template <int Dim>
 typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
-  Renumbering map{std::vector<VertexId>(vertex_slots(), kNone), std::vector<CellId>(cell_slots(), kNone),
+  Renumbering map{std::vector<VertexId>(node_slots(), kNone), std::vector<CellId>(cell_slots(), kNone),
                   std::vector<FacetId>(facet_slots(), kNone)};
   int vertices = 0, cells = 0, facets = 0;
-  for (int v = 0; v < vertex_slots(); ++v) {
+  for (int v = 0; v < node_slots(); ++v) {
     if (!vertex_alive_[v]) continue;
     map.vertex[v] = vertices;
     vertex_tag_[vertices] = vertex_tag_[v];
     rest_[vertices++] = rest_[v];
   }
+  const std::vector<EdgeKey> curved = curved_edges();
+  for (std::size_t i = 0; i < curved.size(); ++i)
+    map.vertex[node_of(curved[i][0], curved[i][1])] = vertices + static_cast<int>(i);
   const auto renumber = [&](auto ids) {
     for (int& v : ids) v = map.vertex[v];
     return ids;
@@ -347,12 +395,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
     facet_tag_[to] = facet_tag_[f];
     for (const int v : facets_[to]) facets_of_[v].push_back(to);
   }
-  num_nodes_ = 0;
-  nodes_from_.clear();
-  edge_of_node_.clear();
-  rest_.resize(vertices);
-  vertex_alive_.assign(vertices, 1);
-  vertex_tag_.resize(vertices);
+  remove_nodes();
   cells_.resize(cells);
   body_.resize(cells);
   part_.resize(cells);
@@ -361,6 +404,8 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
   inverse_edges_.resize(cells);
   facets_.resize(facets);
   facet_tag_.resize(facets);
+  for (const EdgeKey& edge : curved) add_node(renumber(edge));
+  renew_revision();
   return map;
 }
 
@@ -393,18 +438,46 @@ std::string Mesh<Dim>::find_defect() const {
   }
   if (boundary != num_facets_) return "a facet that is not on the boundary";
   const auto is_node = [](const EdgeKey& edge) { return edge[0] != kNone; };
-  if (std::count_if(edge_of_node_.begin(), edge_of_node_.end(), is_node) != num_nodes_) return "wrong number of nodes";
-  const auto all = nodes();
-  if (static_cast<int>(all.size()) != num_nodes_) return "wrong number of curved edges";
-  for (const auto& [edge, node] : all) {
+  if (std::count_if(edge_of_node_.begin(), edge_of_node_.end(), is_node) != num_curved_) return "wrong number of nodes";
+  for (VertexId node = 0; node < static_cast<int>(edge_of_node_.size()); ++node) {
+    const EdgeKey& edge = edge_of_node_[node];
+    if (!is_node(edge)) continue;
     if (!vertex_alive_[edge[0]] || !vertex_alive_[edge[1]] || !are_joined(edge[0], edge[1]))
       return "node " + std::to_string(node) + " of an edge that is gone";
-    if (vertex_alive_[node] || edge_of_node(node) != edge) return "node " + std::to_string(node) + " is of two edges";
+    if (vertex_alive_[node] || node_of(edge[0], edge[1]) != node) return "node " + std::to_string(node) + " is of two edges";
   }
+  std::ptrdiff_t listed = 0;
+  for (const auto& nodes : nodes_from_) listed += std::ssize(nodes);
+  if (listed != num_curved_) return "wrong number of curved edges";
   return {};
+}
+
+template <int Dim>
+std::vector<EdgeKey> edges_of_order_2(const Mesh<Dim>& mesh, const std::map<int, int>& order) {
+  const auto is_quadratic = [&](CellId c) {
+    const auto entry = order.find(mesh.body(c));
+    return entry != order.end() && entry->second == 2;
+  };
+  if (std::none_of(order.begin(), order.end(), [](const auto& entry) { return entry.second == 2; })) return {};
+  std::vector<EdgeKey> curved, straight, result;
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    auto& edges = is_quadratic(c) ? curved : straight;
+    const auto vertices = ascending(mesh.cell(c));
+    for (int i = 0; i <= Dim; ++i)
+      for (int j = i + 1; j <= Dim; ++j) edges.push_back({vertices[i], vertices[j]});
+  }
+  for (auto* edges : {&curved, &straight}) {
+    std::sort(edges->begin(), edges->end());
+    edges->erase(std::unique(edges->begin(), edges->end()), edges->end());
+  }
+  std::set_difference(curved.begin(), curved.end(), straight.begin(), straight.end(), std::back_inserter(result));
+  return result;
 }
 
 template class Mesh<2>;
 template class Mesh<3>;
+template std::vector<EdgeKey> edges_of_order_2<2>(const Mesh<2>&, const std::map<int, int>&);
+template std::vector<EdgeKey> edges_of_order_2<3>(const Mesh<3>&, const std::map<int, int>&);
 
 }  // namespace itr

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
+#include "core/quoted.hpp"
 #include "readers.hpp"
 
 namespace itr {
@@ -45,14 +47,24 @@ void check(const MeshFile& mesh, const fs::path& file) {
 
 }  // namespace
 
+std::string split_advice(const fs::path& file) {
+  return "`python3 -m itr.simplices " + file.filename().string() + " new.msh` splits other cells into these";
+}
+
 MeshFile read_mesh_file(const fs::path& file) {
+  constexpr std::pair<const char*, MeshFile (*)(std::string_view, const fs::path&)> kReaders[] = {
+      {".msh", read_msh}, {".inp", read_inp}, {".obj", read_obj}, {".ply", read_ply},
+      {".stl", read_stl}, {".vtk", read_vtk}, {".vtu", read_vtu}, {".vtp", read_vtu}};
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  const auto read = ending == ".msh" ? read_msh : ending == ".obj" ? read_obj : ending == ".ply" ? read_ply : nullptr;
-  if (!read)
+  const auto reader =
+      std::find_if(std::begin(kReaders), std::end(kReaders), [&](const auto& known) { return ending == known.first; });
+  if (reader == std::end(kReaders))
     throw InputError(
-        {file.string(), "", "a name that ends in '" + ending + "'", ".msh, .obj or .ply (others are not supported yet)"});
-  MeshFile mesh = read(read_bytes(file), file);
+        {file.string(), "", "a name that ends in " + quoted(std::string_view(ending)),
+         ".msh, .inp, .vtu, .vtp, .vtk, .stl, .obj or .ply (geometry of CAD is meshed by Gmsh, other meshes are "
+         "converted by `meshio convert`: docs/user-guide.md, \"Mesh files\")"});
+  MeshFile mesh = reader->second(read_bytes(file), file);
   check(mesh, file);
   return mesh;
 }

@@ -2,44 +2,56 @@
 // Gmsh .msh, versions 2.2 and 4.1, text and binary (https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format).
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <map>
-#include <unordered_map>
+#include <set>
 #include <utility>
 
 #include "cursor.hpp"
+#include "mesh_builder.hpp"
 #include "readers.hpp"
 
 namespace itr {
 
 namespace {
 
-/// " (quadrilateral)" of types that other programs mesh with.
-std::string name_of(int type) {
-  constexpr std::pair<int, const char*> kNames[] = {{3, "quadrilateral"},  {5, "hexahedron"},     {6, "prism"},
-                                                    {7, "pyramid"},        {10, "quadrilateral"}, {12, "hexahedron"},
-                                                    {16, "quadrilateral"}, {17, "hexahedron"}};
+struct ElementType {
+  int type, dim;
+  bool is_second_order;
+};
+constexpr ElementType kTypes[] = {{15, 0, false}, {1, 1, false}, {2, 2, false}, {4, 3, false},
+                                  {8, 1, true},   {9, 2, true},  {11, 3, true}};
+
+/// Names other types.
+std::string name_of(std::int64_t type) {
+  constexpr std::pair<int, const char*> kNames[] = {{3, "quadrilateral"}, {5, "hexahedron"},     {6, "prism"},
+                                                    {7, "pyramid"},       {10, "quadrilateral"}, {12, "hexahedron"},
+                                                    {13, "prism"},        {14, "pyramid"},       {16, "quadrilateral"},
+                                                    {17, "hexahedron"},   {18, "prism"},         {19, "pyramid"}};
   for (const auto& [known, name] : kNames)
-    if (known == type) return std::string(" (") + name + ")";
+    if (known == type) return name;
   return "";
 }
 
 class MshReader {
  public:
-  MshReader(std::string_view bytes, const std::filesystem::path& file) : in_(bytes, file), file_(file) {}
+  MshReader(std::string_view bytes, const std::filesystem::path& file) : in_(bytes, file), mesh_(file), file_(file) {}
 
   MeshFile read() {
     if (in_.word() != "$MeshFormat") in_.fail("another beginning", "$MeshFormat");
     read_format();
     for (std::string_view section = in_.word(); !section.empty(); section = in_.word()) read_section(section);
-    if (tags_.empty()) in_.fail("no nodes", "a $Nodes section");
-    number_nodes();
-    return std::move(mesh_);
+    if (mesh_.num_nodes() == 0) in_.fail("no nodes", "a $Nodes section");
+    mesh_.lists_elements_again = !is_new_;
+    return mesh_.finish();
   }
 
  private:
   void read_format() {
     const std::string version(in_.word());
-    if (version != "2.2" && version != "4.1") in_.fail("version '" + version + "'", "2.2 or 4.1");
+    if (version != "2.2" && version != "4.1")
+      in_.fail("version '" + version + "'",
+               "2.2 or 4.1 (`gmsh " + file_.filename().string() + " -save -format msh41 -o new.msh` writes that)");
     is_new_ = version == "4.1";
     const std::int64_t binary = in_.small(), size = in_.small();
     if (binary < 0 || binary > 1) in_.fail("file type " + std::to_string(binary), "0 (text) or 1 (binary)");
@@ -53,60 +65,107 @@ class MshReader {
   void read_section(std::string_view section) {
     if (section.front() != '$') in_.fail(quoted(section.substr(0, 40)), "a section, such as $Nodes");
     const std::string name(section.substr(1));
-    if (name != "Entities" && name != "Nodes" && name != "Elements") return in_.skip_section(name);
-    if (name == "Entities" && !is_new_) return in_.skip_section(name);
-    if (in_.binary && is_new_) in_.end_line();
-    if (name == "Entities") read_entities();
-    if (name == "Nodes") is_new_ ? read_nodes_4() : read_nodes_2();
-    if (name == "Elements") is_new_ ? read_elements_4() : read_elements_2();
+    const bool is_of_entities = name == "Entities" || name == "PartitionedEntities";
+    const bool is_of_nodes = name == "Nodes" || name == "ParametricNodes";
+    const bool is_read = name == "PhysicalNames" || is_of_nodes || name == "Elements" || (is_of_entities && is_new_);
+    if (!is_read) return in_.skip_section(name);
+    if (name == "PhysicalNames") {
+      read_names();
+    } else {
+      if (in_.binary && is_new_) in_.end_line();
+      if (is_of_entities) read_entities(name == "PartitionedEntities");
+      if (is_of_nodes) is_new_ ? read_nodes_4() : read_nodes_2(name == "ParametricNodes");
+      if (name == "Elements") is_new_ ? read_elements_4() : read_elements_2();
+    }
     in_.expect_end(name);
   }
 
-  void read_entities() {
+  /// Text in binary files, too.
+  void read_names() {
+    const bool binary = std::exchange(in_.binary, false);
+    const std::size_t count = in_.count(in_.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int64_t dim = in_.small(), number = in_.small();
+      if (dim < 0 || dim > 3) in_.fail("dimension " + std::to_string(dim), "0 to 3");
+      names_[{static_cast<int>(dim), number}] = in_.quoted_text();
+    }
+    in_.binary = binary;
+  }
+
+  void read_entities(bool is_partitioned) {
+    if (is_partitioned) {
+      in_.size();
+      const std::size_t num_ghosts = in_.count(in_.size());
+      for (std::size_t i = 0; i < 2 * num_ghosts; ++i) in_.small();
+    }
     std::array<std::size_t, 4> counts;
     for (auto& count : counts) count = in_.count(in_.size());
     for (int dim = 0; dim < 4; ++dim)
-      for (std::size_t i = 0; i < counts[dim]; ++i) read_entity(dim);
+      for (std::size_t i = 0; i < counts[dim]; ++i) read_entity(dim, is_partitioned);
   }
 
-  void read_entity(int dim) {
-    const std::int64_t tag = in_.small();
+  void read_entity(int dim, bool is_partitioned) {
+    const std::pair<int, std::int64_t> entity{dim, in_.small()};
+    bool is_own = true;  // or what partitions of a larger one meet at, which has its groups
+    if (is_partitioned) {
+      const std::int64_t parent_dim = in_.small(), parent = in_.small();
+      const std::size_t num_partitions = in_.count(in_.size());
+      for (std::size_t i = 0; i < num_partitions; ++i) in_.small();
+      if (parent_dim == dim) parent_[entity] = parent;
+      is_own = parent_dim == dim;
+      if (!is_own) is_between_partitions_.insert(entity);
+    }
     for (int i = 0; i < (dim == 0 ? 3 : 6); ++i) in_.real();
     const std::size_t num_groups = in_.count(in_.size());
     for (std::size_t i = 0; i < num_groups; ++i) {
-      const std::int64_t group = in_.small();
-      if (i == 0) group_[{dim, tag}] = static_cast<int>(group);
+      const std::int64_t number = in_.small();
+      if (is_own) groups_[entity].push_back(group(dim, number));
     }
     if (dim == 0) return;
     const std::size_t num_bounding = in_.count(in_.size());
     for (std::size_t i = 0; i < num_bounding; ++i) in_.small();
   }
 
-  void read_point() {
-    for (int c = 0; c < 3; ++c) point_[c] = in_.real();
-    mesh_.vertices.push_back(point_);
+  /// A number below 0 stands for the group, turned round.
+  int group(int dim, std::int64_t number) {
+    if (number < -2147483647 || number > 2147483647) in_.fail("the group " + std::to_string(number), "a smaller number");
+    number = std::abs(number);
+    const auto name = names_.find({dim, number});
+    return mesh_.group(dim, static_cast<int>(number), name == names_.end() ? "" : name->second);
   }
 
-  void read_nodes_2() {
+  Vec<3> read_point() {
+    Vec<3> point;
+    for (int c = 0; c < 3; ++c) point[c] = in_.real();
+    return point;
+  }
+
+  void read_nodes_2(bool is_parametric) {
     const std::size_t num_nodes = read_count_2();
     for (std::size_t i = 0; i < num_nodes; ++i) {
-      tags_.push_back(in_.small());
-      read_point();
+      const std::int64_t tag = in_.small();
+      mesh_.add_node(tag, read_point());
+      if (!is_parametric) continue;
+      const std::int64_t dim = in_.small();
+      in_.small();
+      if (dim < 0 || dim > 3) in_.fail("entity dimension " + std::to_string(dim), "0 to 3");
+      for (int c = 0; c < dim % 3; ++c) in_.real();  // on a curve one parameter, on a surface two
     }
   }
 
   void read_nodes_4() {
     const std::size_t num_blocks = in_.count(in_.size());
     for (int i = 0; i < 3; ++i) in_.size();
+    std::vector<std::int64_t> tags;
     for (std::size_t block = 0; block < num_blocks; ++block) {
       const std::int64_t dim = in_.small();
       in_.small();
       const bool is_parametric = in_.small() != 0;
       if (dim < 0 || dim > 3) in_.fail("entity dimension " + std::to_string(dim), "0 to 3");
-      const std::size_t num_nodes = in_.count(in_.size());
-      for (std::size_t i = 0; i < num_nodes; ++i) tags_.push_back(in_.size());
-      for (std::size_t i = 0; i < num_nodes; ++i) {
-        read_point();
+      tags.resize(in_.count(in_.size()));
+      for (std::int64_t& tag : tags) tag = in_.size();
+      for (const std::int64_t tag : tags) {
+        mesh_.add_node(tag, read_point());
         for (int c = 0; is_parametric && c < dim; ++c) in_.real();
       }
     }
@@ -138,7 +197,10 @@ class MshReader {
           const std::int64_t value = in_.small();
           if (tag == 0) body = value;
         }
-        read_element(type, number, static_cast<int>(body));
+        const ElementType& known = find_type(type, number);
+        here_.clear();
+        if (body != 0) here_.push_back(group(known.dim, body));
+        read_element(known, number);
       }
       done += num_here;
     }
@@ -148,152 +210,63 @@ class MshReader {
     const std::size_t num_blocks = in_.count(in_.size());
     for (int i = 0; i < 3; ++i) in_.size();
     for (std::size_t block = 0; block < num_blocks; ++block) {
-      const std::int64_t dim = in_.small(), entity = in_.small(), type = in_.small();
+      const std::int64_t dim = in_.small(), tag = in_.small(), type = in_.small();
       const std::size_t num_elements = in_.count(in_.size());
-      const auto group = group_.find({static_cast<int>(dim), entity});
-      const int body = group == group_.end() ? 0 : group->second;
+      const std::pair<int, std::int64_t> entity{static_cast<int>(dim), tag};
+      here_ = groups_of(entity);
       for (std::size_t i = 0; i < num_elements; ++i) {
         const std::int64_t number = in_.size();
-        read_element(type, number, body);
+        const ElementType& known = find_type(type, number);
+        if (!here_.empty() && known.dim != dim)
+          in_.fail("element " + std::to_string(number) + " of type " + std::to_string(type) + " in an entity of dimension " +
+                       std::to_string(dim),
+                   "elements of that dimension");
+        read_element(known, number, is_between_partitions_.contains(entity));
       }
     }
   }
 
-  void read_element(std::int64_t type, std::int64_t number, int body) {
-    switch (type) {
-      case 15:
-        read_node_tags<1>();
-        return;
-      case 1:
-        edges_.push_back(read_node_tags<2>());
-        return;
-      case 2:
-        triangles_.push_back(read_node_tags<3>()), mesh_.triangle_body.push_back(body);
-        return;
-      case 4:
-        tetrahedra_.push_back(read_node_tags<4>()), mesh_.tetrahedron_body.push_back(body);
-        return;
-      case 8:
-        edges_.push_back(read_second_order<2, 1>({{{0, 1}}}));
-        return;
-      case 9:
-        triangles_.push_back(read_second_order<3, 3>({{{0, 1}, {1, 2}, {2, 0}}}));
-        mesh_.triangle_body.push_back(body);
-        return;
-      case 11:
-        tetrahedra_.push_back(read_second_order<4, 6>({{{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}}}));
-        mesh_.tetrahedron_body.push_back(body);
-        return;
-      default:
-        in_.fail("element " + std::to_string(number) + " of type " + std::to_string(type) + name_of(type),
-                 "1 (line), 2 (triangle), 4 (tetrahedron), 15 (point), or 8, 9, 11 (the same of second order)");
-    }
+  /// Takes those of the whole for a part of an entity.
+  const std::vector<int>& groups_of(const std::pair<int, std::int64_t>& entity) const {
+    static const std::vector<int> none;
+    auto found = groups_.find(entity);
+    if (const auto whole = parent_.find(entity); found == groups_.end() && whole != parent_.end())
+      found = groups_.find({entity.first, whole->second});
+    return found == groups_.end() ? none : found->second;
   }
 
-  /// The corners of an element of second order; its other nodes are kept aside.
-  template <std::size_t Corners, std::size_t Edges>
-  std::array<std::int64_t, Corners> read_second_order(const std::array<std::array<int, 2>, Edges>& edges) {
-    const auto tags = read_node_tags<Corners>();
-    const auto middles = read_node_tags<Edges>();
-    for (std::size_t e = 0; e < Edges; ++e) middles_.push_back({tags[edges[e][0]], tags[edges[e][1]], middles[e]});
-    return tags;
+  const ElementType& find_type(std::int64_t type, std::int64_t number) const {
+    const auto found =
+        std::find_if(std::begin(kTypes), std::end(kTypes), [&](const ElementType& t) { return t.type == type; });
+    if (found != std::end(kTypes)) return *found;
+    const std::string name = name_of(type);
+    in_.fail(
+        "element " + std::to_string(number) + " of type " + std::to_string(type) + (name.empty() ? "" : " (" + name + ")"),
+        "1 (line), 2 (triangle), 4 (tetrahedron), 15 (point), or 8, 9, 11 (the same of second order)" +
+            (name.empty() ? "" : "; " + split_advice(file_)));
   }
 
-  template <std::size_t N>
-  std::array<std::int64_t, N> read_node_tags() {
-    std::array<std::int64_t, N> tags;
-    for (auto& tag : tags) tag = is_new_ ? in_.size() : in_.small();
-    return tags;
-  }
-
-  /// Node tags 1..n are positions; otherwise nodes are numbered as they come.
-  void number_nodes() {
-    const auto n = static_cast<std::int64_t>(tags_.size());
-    const auto [least, greatest] = std::minmax_element(tags_.begin(), tags_.end());
-    const bool is_dense = *least == 1 && *greatest == n;
-    std::unordered_map<std::int64_t, int> index;
-    index.reserve(tags_.size());
-    for (std::int64_t i = 0; i < n; ++i)
-      if (!index.emplace(tags_[i], static_cast<int>(is_dense ? tags_[i] - 1 : i)).second)
-        throw InputError(
-            {file_.string(), "$Nodes", "node " + std::to_string(tags_[i]) + " twice", "different node numbers"});
-    if (is_dense) sort_vertices();
-    renumber(edges_, mesh_.edges, index);
-    renumber(triangles_, mesh_.triangles, index);
-    renumber(tetrahedra_, mesh_.tetrahedra, index);
-    if (!middles_.empty()) drop_middles(index);
-  }
-
-  /// The library's meshes are straight at rest: of a file of second order the corners say all, or it is refused.
-  void drop_middles(const std::unordered_map<std::int64_t, int>& index) {
-    constexpr double kTolerance = 1e-6;  // of the edge's length: digits of text files
-    std::vector<std::array<int, 3>> middles;
-    renumber(middles_, middles, index);
-    std::vector<char> is_middle(mesh_.vertices.size(), 0);
-    for (std::size_t i = 0; i < middles.size(); ++i) {
-      const auto [a, b, m] = middles[i];
-      const Vec<3>&A = mesh_.vertices[a], &B = mesh_.vertices[b];
-      is_middle[m] = 1;
-      if (const double off = (mesh_.vertices[m] - (A + B) / 2).norm(); !(off <= kTolerance * (B - A).norm()))
-        throw InputError({file_.string(), "node " + std::to_string(middles_[i][2]),
-                          std::to_string(off) + " off the middle of its edge",
-                          "a mesh whose edges are straight at rest (curved ones are not supported)"});
-    }
-    std::vector<int> place(mesh_.vertices.size(), -1);
-    std::size_t kept = 0;
-    for (std::size_t v = 0; v < place.size(); ++v) {
-      if (is_middle[v]) continue;
-      place[v] = static_cast<int>(kept);
-      mesh_.vertices[kept++] = mesh_.vertices[v];
-    }
-    mesh_.vertices.resize(kept);
-    move_ids(mesh_.edges, place);
-    move_ids(mesh_.triangles, place);
-    move_ids(mesh_.tetrahedra, place);
-  }
-
-  template <std::size_t N>
-  void move_ids(std::vector<std::array<int, N>>& rows, const std::vector<int>& place) const {
-    for (auto& row : rows)
-      for (int& v : row) {
-        if (place[v] < 0)
-          throw InputError({file_.string(), "$Elements", "a node that is a corner here and in the middle of an edge there",
-                            "one of both"});
-        v = place[v];
-      }
-  }
-
-  void sort_vertices() {
-    std::vector<Vec<3>> sorted(mesh_.vertices.size());
-    for (std::size_t i = 0; i < sorted.size(); ++i) sorted[static_cast<std::size_t>(tags_[i] - 1)] = mesh_.vertices[i];
-    mesh_.vertices = std::move(sorted);
-  }
-
-  template <std::size_t N>
-  void renumber(const std::vector<std::array<std::int64_t, N>>& from, std::vector<std::array<int, N>>& to,
-                const std::unordered_map<std::int64_t, int>& index) {
-    to.resize(from.size());
-    for (std::size_t i = 0; i < from.size(); ++i)
-      for (std::size_t k = 0; k < N; ++k) {
-        const auto found = index.find(from[i][k]);
-        if (found == index.end())
-          throw InputError(
-              {file_.string(), "$Elements", "node " + std::to_string(from[i][k]), "a node of the $Nodes section"});
-        to[i][k] = found->second;
-      }
+  /// An element belongs to the groups `here_`. What partitions meet at is left out: no entity of the model is there.
+  void read_element(const ElementType& type, std::int64_t number, bool is_left_out = false) {
+    nodes_.resize(MeshBuilder::num_nodes_of(type.dim, type.is_second_order));
+    for (std::int64_t& tag : nodes_) tag = is_new_ ? in_.size() : in_.small();
+    if (is_left_out) return;
+    if (nodes_.size() == 10) std::swap(nodes_[8], nodes_[9]);
+    const std::int64_t member = type.dim == 0 ? nodes_[0] : mesh_.add_element(type.dim, nodes_, number);
+    for (const int group : here_) mesh_.add_member(group, member);
   }
 
   Cursor in_;
+  MeshBuilder mesh_;
   const std::filesystem::path& file_;
   bool is_new_ = false;
-  Vec<3> point_;
-  MeshFile mesh_;
-  std::vector<std::int64_t> tags_;  ///< of the nodes, as they come
-  std::vector<std::array<std::int64_t, 2>> edges_;
-  std::vector<std::array<std::int64_t, 3>> triangles_;
-  std::vector<std::array<std::int64_t, 4>> tetrahedra_;
-  std::vector<std::array<std::int64_t, 3>> middles_;   ///< of elements of second order: ends of an edge, its node
-  std::map<std::pair<int, std::int64_t>, int> group_;  ///< (dimension, entity) -> first physical group
+  std::vector<std::int64_t> nodes_;  ///< of the element that is read
+  std::vector<int> here_;            ///< groups that it belongs to
+  using Entity = std::pair<int, std::int64_t>;
+  std::map<Entity, std::string> names_;        ///< by dimension and number of a group
+  std::map<Entity, std::vector<int>> groups_;  ///< by dimension and tag of an entity
+  std::map<Entity, std::int64_t> parent_;      ///< of the parts of entities
+  std::set<Entity> is_between_partitions_;
 };
 
 }  // namespace

@@ -70,10 +70,10 @@ std::array<std::array<VertexId, 3>, 4> children_of_facet(const std::array<Vertex
 
 template <int Dim>
 Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
-  ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots(), mesh.num_vertices(), mesh.vertex_slots());
+  ITR_CHECK(mesh.num_vertices() == mesh.node_slots(), mesh.num_vertices(), mesh.node_slots());
   std::vector<Vec<Dim>> rest;
-  rest.reserve(mesh.vertex_slots());
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+  rest.reserve(mesh.node_slots());
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) rest.push_back(mesh.rest(v));
   const Midpoints<Dim> mid(mesh, rest);
 
   std::vector<typename Mesh<Dim>::Cell> cells;
@@ -93,6 +93,8 @@ Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
 
   Mesh<Dim> refined(std::move(rest), std::move(cells), std::move(body));
   for (const auto& [facet, tag] : tagged) refined.set_facet_tag(refined.find_facet(facet), tag);
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v) refined.set_vertex_tag(v, mesh.vertex_tag(v));
+  for (const EdgeKey& edge : mesh.edges()) refined.set_vertex_tag(mid(edge[0], edge[1]), mesh.edge_tag(edge));
   return refined;
 }
 

@@ -67,8 +67,8 @@ std::vector<InputSheet<Dim>> find_sheets(const Mesh<Dim>& mesh) {
     });
     add(facet, {0, mesh.body(*cell), mesh.facet_tag(f)}, f);
   }
-  std::vector<char> between(mesh.vertex_slots());
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) between[v] = mesh.is_on_interface(v);
+  std::vector<char> between(mesh.node_slots());
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) between[v] = mesh.is_on_interface(v);
   std::vector<std::pair<typename MeshTypes<Dim>::Facet, std::array<int, 3>>> faces;  // vertices, body, cell, place in it
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
@@ -182,8 +182,9 @@ Strata<Dim>::Strata(const Mesh<Dim>& mesh, double flatness) {
     else
       interfaces_[ascending(sheet.vertices)] = sheet.patch;
   }
-  vertices_.assign(mesh.vertex_slots(), Stratum::corner);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) vertices_[v] = classify(mesh, v);
+  vertices_.assign(mesh.node_slots(), Stratum::corner);
+  for (VertexId v = 0; v < mesh.node_slots(); ++v)
+    vertices_[v] = mesh.is_vertex_alive(v) ? classify(mesh, v) : Stratum::volume;
 }
 
 template <int Dim>
@@ -407,9 +408,10 @@ void Strata<Dim>::follow(const Edit<Dim>& edit, VertexId created) {
 
 template <int Dim>
 void Strata<Dim>::compact(const typename Mesh<Dim>::Renumbering& map) {
-  std::vector<Stratum> vertices;
+  const auto is_kept = [](VertexId v) { return v != kNone; };
+  std::vector<Stratum> vertices(std::count_if(map.vertex.begin(), map.vertex.end(), is_kept));
   for (std::size_t v = 0; v < map.vertex.size(); ++v)
-    if (map.vertex[v] != kNone) vertices.push_back(vertices_[v]);
+    if (is_kept(map.vertex[v])) vertices[map.vertex[v]] = vertices_[v];
   std::vector<int> patches;
   for (std::size_t f = 0; f < map.facet.size(); ++f)
     if (map.facet[f] != kNone) patches.push_back(patches_[f]);
@@ -426,7 +428,7 @@ void Strata<Dim>::compact(const typename Mesh<Dim>::Renumbering& map) {
 
 template <int Dim>
 std::string Strata<Dim>::find_misfit(const Mesh<Dim>& mesh) const {
-  if (static_cast<int>(vertices_.size()) != mesh.vertex_slots()) return "wrong number of vertices";
+  if (static_cast<int>(vertices_.size()) != mesh.node_slots()) return "wrong number of vertices";
   if (static_cast<int>(patches_.size()) != mesh.facet_slots()) return "wrong number of facets";
   std::size_t interfaces = 0;
   for (const auto& sheet : find_sheets(mesh)) {
@@ -435,7 +437,7 @@ std::string Strata<Dim>::find_misfit(const Mesh<Dim>& mesh) const {
     if (patch < 0 || patch >= num_patches()) return "a facet without a patch at vertex " + std::to_string(sheet.vertices[0]);
   }
   if (interfaces != interfaces_.size()) return "interface facets that are not in the mesh";
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) {
     if (!mesh.is_vertex_alive(v)) continue;
     const bool held = mesh.is_boundary(v) || mesh.is_on_interface(v) || mesh.cells_of(v).empty();
     if (held != (vertices_[v] != Stratum::volume)) return "stratum of vertex " + std::to_string(v);

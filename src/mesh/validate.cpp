@@ -75,20 +75,11 @@ std::vector<std::array<int, 2>> find_intersections(ConstVectorView x, std::span<
 }
 
 template <int Dim>
-CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView x) {
-  for (int c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c) && cell_orientation(mesh.cell(c), x) <= 0) return c;
-  return kNone;
-}
-
-template <int Dim>
 bool is_positively_oriented(const typename MeshTypes<Dim>::Cell& cell, ConstVectorView x) {
   return cell_orientation(cell, x) > 0;
 }
 
 template bool is_positively_oriented<2>(const MeshTypes<2>::Cell&, ConstVectorView);
 template bool is_positively_oriented<3>(const MeshTypes<3>::Cell&, ConstVectorView);
-template CellId find_inverted<2>(const Mesh<2>&, ConstVectorView);
-template CellId find_inverted<3>(const Mesh<3>&, ConstVectorView);
 
 }  // namespace itr

@@ -22,8 +22,4 @@ std::vector<std::array<int, 2>> find_intersections(ConstVectorView positions, st
 template <int Dim>
 bool is_positively_oriented(const typename MeshTypes<Dim>::Cell& cell, ConstVectorView positions);
 
-/// The first cell (index among alive ids) that is not positively oriented at these positions, decided exactly; kNone: none.
-template <int Dim>
-CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView positions);
-
 }  // namespace itr

@@ -22,7 +22,6 @@
 #include "geometry/quadratic_patch.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/geometry/distance.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
 
@@ -129,22 +128,28 @@ std::vector<std::array<int, Dim>> boundary_facets(const std::vector<std::int64_t
   return once;
 }
 
-Space space_of(const StoredFrame& frame) {
-  std::vector<EdgeKey> curved;
-  for (std::size_t i = 0; i < frame.curved_edges.size(); i += 2)
-    curved.push_back({static_cast<int>(frame.curved_edges[i]), static_cast<int>(frame.curved_edges[i + 1])});
-  return Space(std::move(curved));
-}
+/// The curved edges of a frame and their nodes.
+struct CurvedNodes {
+  int num_vertices;
+  std::vector<EdgeKey> edges;  ///< ascending
 
-int num_vertices(const StoredFrame& frame) {
-  return static_cast<int>(frame.x.size()) / frame.dim - static_cast<int>(frame.curved_edges.size()) / 2;
-}
+  explicit CurvedNodes(const StoredFrame& frame)
+      : num_vertices(static_cast<int>(frame.x.size()) / frame.dim - static_cast<int>(frame.curved_edges.size()) / 2) {
+    for (std::size_t i = 0; i < frame.curved_edges.size(); i += 2)
+      edges.push_back({static_cast<int>(frame.curved_edges[i]), static_cast<int>(frame.curved_edges[i + 1])});
+  }
+  int operator()(std::int64_t a, std::int64_t b) const {
+    const EdgeKey edge = edge_key(static_cast<int>(a), static_cast<int>(b));
+    const auto at = std::lower_bound(edges.begin(), edges.end(), edge);
+    return at != edges.end() && *at == edge ? num_vertices + static_cast<int>(at - edges.begin()) : kNone;
+  }
+};
 
 /// The surface through all nodes.
 template <int Dim>
-std::vector<std::array<int, Dim>> chords(const std::vector<std::array<int, Dim>>& facets, const Space& space, int vertices) {
+std::vector<std::array<int, Dim>> chords(const std::vector<std::array<int, Dim>>& facets, const CurvedNodes& node_of) {
   std::vector<std::array<int, Dim>> result;
-  for (const auto& facet : facets) add_chord_facets<Dim>(facet, space, vertices, result);
+  for (const auto& facet : facets) for_each_chord<Dim>(facet, node_of, [&](const auto& ids) { result.push_back(ids); });
   return result;
 }
 
@@ -188,7 +193,7 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
   } else {
     surface.x = points<Dim>(frame.x);
     const auto boundary = boundary_facets<Dim>(frame.simplices);
-    surface.own_facets = chords<Dim>(boundary, space_of(frame), num_vertices(frame));
+    surface.own_facets = chords<Dim>(boundary, CurvedNodes(frame));
     if constexpr (Dim == 3)
       for (const auto& f : boundary)
         for (int k = 0; k < 3; ++k) {
@@ -200,7 +205,7 @@ Surface<Dim> make_surface(const StoredFrame& frame) {
     add_facets(facets, surface);
   }
   surface.num_body_vertices = static_cast<int>(surface.x.size());
-  if (!frame.has_proxy) surface.curved = space_of(frame).curved_edges();
+  if (!frame.has_proxy) surface.curved = CurvedNodes(frame).edges;
   add_surface(frame.obstacles, surface);
   return surface;
 }
@@ -211,17 +216,15 @@ int orientation_of(const std::array<Vec<3>, 4>& p) { return orientation(p[0], p[
 /// Positions of all nodes of a cell with a curved edge; nothing where all of its edges are straight.
 template <int Dim>
 std::optional<QuadraticCell<Dim>> curved_cell(const StoredFrame& frame, std::size_t c, const std::vector<Vec<Dim>>& x,
-                                              const Space& space) {
-  if (space.is_linear()) return std::nullopt;
+                                              const CurvedNodes& node_of) {
   const std::int64_t* cell = &frame.simplices[(Dim + 1) * c];
-  const int vertices = num_vertices(frame);
   QuadraticCell<Dim> nodes;
   bool is_curved = false;
   for (int k = 0; k <= Dim; ++k) nodes.col(k) = x[cell[k]];
   for_each_edge<Dim>([&](int edge, int i, int j) {
-    const int at = space.find(static_cast<int>(cell[i]), static_cast<int>(cell[j]));
-    is_curved = is_curved || at != kNone;
-    nodes.col(Dim + 1 + edge) = at != kNone ? x[vertices + at] : Vec<Dim>((x[cell[i]] + x[cell[j]]) / 2);
+    const int node = node_of(cell[i], cell[j]);
+    is_curved = is_curved || node != kNone;
+    nodes.col(Dim + 1 + edge) = node != kNone ? x[node] : Vec<Dim>((x[cell[i]] + x[cell[j]]) / 2);
   });
   return is_curved ? std::optional(nodes) : std::nullopt;
 }
@@ -231,11 +234,11 @@ template <int Dim>
 void check_cells(const StoredFrame& frame, const std::vector<double>& coordinates, const char* what, const std::string& name,
                  std::vector<Violation>& violations) {
   const std::vector<Vec<Dim>> x = points<Dim>(coordinates);
-  const Space space = space_of(frame);
+  const CurvedNodes node_of(frame);
   for (std::size_t c = 0; c < frame.simplices.size() / (Dim + 1); ++c) {
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = x[frame.simplices[(Dim + 1) * c + k]];
-    if (const auto nodes = curved_cell<Dim>(frame, c, x, space)) {
+    if (const auto nodes = curved_cell<Dim>(frame, c, x, node_of)) {
       if (!is_positive_everywhere_exact<Dim>(*nodes))
         violations.push_back({Of::cells, fmt::format("{}: {}cell {} is not positive everywhere", name, what, c)});
       continue;
@@ -369,17 +372,16 @@ bool is_nearer(const Vec<3>& a, const Vec<3>& b, const Surface<3>& surface, int 
 /// Fills in what curved edges do beyond their chords. Pieces of the surface around an edge do not count as something else.
 template <int Dim>
 void measure_overhangs(const StoredFrame& frame, const Surface<Dim>& surface, Certificate& certificate) {
-  const Space space = space_of(frame);
-  if (space.is_linear() || surface.has_proxy) return;
+  const CurvedNodes node_of(frame);
+  if (node_of.edges.empty() || surface.has_proxy) return;
   const auto& primitives = facets_of(surface);
   const Bvh<Dim> tree(boxes_of<Dim>(surface.x, primitives));
   const auto& x = surface.x;
   std::vector<int> hits;
   for (const auto& facet : boundary_facets<Dim>(frame.simplices))
     for (int k = 0; k < (Dim == 2 ? 1 : 3); ++k) {
-      const int a = facet[k], b = facet[(k + 1) % Dim], at = space.find(a, b);
-      if (at == kNone) continue;
-      const int node = num_vertices(frame) + at;
+      const int a = facet[k], b = facet[(k + 1) % Dim], node = node_of(a, b);
+      if (node == kNone) continue;
       std::array<Vec<Dim>, Dim> corners;
       for (int i = 0; i < Dim; ++i) corners[i] = x[facet[i]];
       const double height = distance_from_chords<Dim>(corners, k, (k + 1) % Dim, x[node]);
@@ -411,17 +413,18 @@ struct Patches {
 };
 
 template <int Dim>
-Patches<Dim> true_surface(const StoredFrame& frame, const Surface<Dim>& surface, const Space& space) {
+Patches<Dim> true_surface(const StoredFrame& frame, const Surface<Dim>& surface) {
   Patches<Dim> result;
+  const CurvedNodes node_of(frame);
   const auto& x = surface.x;
   const auto add = [&](const std::array<int, Dim>& facet) {
     bool is_curved = false;
     std::array<Vec<Dim>, Dim> corners;
     for (int k = 0; k < Dim; ++k) corners[k] = x[facet[k]];
     result.patches.push_back(quadratic_patch<Dim>(corners, [&](int i, int j) -> Vec<Dim> {
-      const int at = surface.is_obstacle(facet) ? kNone : space.find(facet[i], facet[j]);
-      is_curved = is_curved || at != kNone;
-      return at != kNone ? x[num_vertices(frame) + at] : Vec<Dim>((corners[i] + corners[j]) / 2);
+      const int node = surface.is_obstacle(facet) ? kNone : node_of(facet[i], facet[j]);
+      is_curved = is_curved || node != kNone;
+      return node != kNone ? x[node] : Vec<Dim>((corners[i] + corners[j]) / 2);
     }));
     result.facets.push_back(facet);
     result.is_curved.push_back(is_curved);
@@ -541,7 +544,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   const Surface<Dim> surface = make_surface<Dim>(frame);
   check_surface(surface, name, violations);
   Patches<Dim> curves;
-  if (!surface.curved.empty()) curves = true_surface(frame, surface, space_of(frame));
+  if (!surface.curved.empty()) curves = true_surface(frame, surface);
   if (violations.size() == before) check_insides(surface, find_in_hollows(surface, curves), name, violations);
   check_curves(surface, curves, name, violations);
   measure_overhangs(frame, surface, certificate);

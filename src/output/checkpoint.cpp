@@ -70,17 +70,13 @@ std::vector<int> read_levels(const fs::path& path, const hdf5::File& file, const
   return levels;
 }
 
-Space read_space(const fs::path& path, const hdf5::File& file) {
+std::vector<EdgeKey> read_curved_edges(const fs::path& path, const hdf5::File& file) {
   if (!file.contains("/mesh/curved_edges")) return {};
-  auto edges = read_rows<2>(path, file, "/mesh/curved_edges");
-  if (std::adjacent_find(edges.begin(), edges.end(), std::greater_equal<>()) != edges.end())
-    throw InputError({path.string(), "/mesh/curved_edges", "rows in another order", "ascending rows"});
-  return Space(std::move(edges));
+  return read_rows<2>(path, file, "/mesh/curved_edges");
 }
 
-/// `space`: its nodes come after the vertices.
 template <int Dim>
-Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& space) {
+Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
   const bool is_apart = file.contains(kRest);
   const std::string name = is_apart ? kRest : "/mesh/rest";
   const auto rest = file.read_doubles(name);
@@ -88,7 +84,8 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
     throw InputError({path.string(), name, std::to_string(rest.columns) + " columns", std::to_string(Dim)});
   for (const double X : rest.values)
     if (!std::isfinite(X)) throw InputError({path.string(), name, std::to_string(X), "finite positions"});
-  const auto curved = static_cast<std::size_t>(is_apart ? 0 : space.num_curved());
+  const std::vector<EdgeKey> curved_edges = read_curved_edges(path, file);
+  const std::size_t curved = is_apart ? 0 : curved_edges.size();  // nodes that come after the vertices
   if (rest.rows() < curved)
     throw InputError(
         {path.string(), name, std::to_string(rest.rows()) + " rows", "more than curved edges, " + std::to_string(curved)});
@@ -102,12 +99,13 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file, const Space& s
     throw InputError({path.string(), "/mesh", "lists of different lengths", "one entry for every cell and facet"});
   Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
   mesh.set_facets(facets, tags);
+  mesh.set_curved_edges(curved_edges);
   if (!file.contains("/checkpoint/vertex_tag")) return mesh;
   const auto vertex_tags = read_rows<2>(path, file, "/checkpoint/vertex_tag");
   for (const auto& [v, tag] : vertex_tags) {
-    if (v < 0 || v >= mesh.vertex_slots())
+    if (v < 0 || v >= mesh.num_vertices())
       throw InputError({path.string(), "/checkpoint/vertex_tag", "vertex " + std::to_string(v),
-                        "numbers below " + std::to_string(mesh.vertex_slots())});
+                        "numbers below " + std::to_string(mesh.num_vertices())});
     mesh.set_vertex_tag(v, tag);
   }
   return mesh;
@@ -177,11 +175,11 @@ RemeshMemory read_memory(const fs::path& path, const hdf5::File& file, int num_v
 }
 
 template <int Dim>
-void write_strata(hdf5::File& file, const Strata<Dim>& strata) {
+void write_strata(hdf5::File& file, const Strata<Dim>& strata, int num_vertices) {
   if (strata.empty()) return;
   const auto record = strata.record();
   std::vector<std::int64_t> vertices, interfaces;
-  for (const Stratum stratum : record.vertices) vertices.push_back(static_cast<std::int64_t>(stratum));
+  for (int v = 0; v < num_vertices; ++v) vertices.push_back(static_cast<std::int64_t>(record.vertices[v]));
   for (const auto& row : record.interfaces) interfaces.insert(interfaces.end(), row.begin(), row.end());
   std::vector<double> planes;
   for (const auto& [point, normal] : record.planes) {
@@ -212,8 +210,8 @@ Strata<Dim> read_strata(const fs::path& path, const hdf5::File& file, const Mesh
     record.interfaces = read_rows<Dim + 1>(path, file, "/checkpoint/strata/interfaces");
   for (const auto& row : record.interfaces)
     for (int i = 0; i < Dim; ++i)
-      if (row[i] < 0 || row[i] >= mesh.vertex_slots())
-        refuse("/interfaces", "vertex " + std::to_string(row[i]), "numbers below " + std::to_string(mesh.vertex_slots()));
+      if (row[i] < 0 || row[i] >= mesh.num_vertices())
+        refuse("/interfaces", "vertex " + std::to_string(row[i]), "numbers below " + std::to_string(mesh.num_vertices()));
   const auto planes = file.read_doubles("/checkpoint/strata/planes");
   if (planes.columns != 2 * Dim) refuse("/planes", std::to_string(planes.columns) + " columns", std::to_string(2 * Dim));
   for (std::size_t i = 0; i < planes.values.size(); i += 2 * Dim) {
@@ -225,6 +223,7 @@ Strata<Dim> read_strata(const fs::path& path, const hdf5::File& file, const Mesh
   const auto tolerance = file.read_doubles("/checkpoint/strata/tolerance").values;
   if (tolerance.size() != 1) refuse("/tolerance", std::to_string(tolerance.size()) + " numbers", "1");
   record.tolerance = tolerance[0];
+  record.vertices.insert(record.vertices.end(), mesh.num_curved(), Stratum::volume);
   Strata<Dim> strata(record);
   if (const std::string misfit = strata.find_misfit(mesh); !misfit.empty()) refuse("", misfit, "strata of the frame's mesh");
   return strata;
@@ -277,12 +276,12 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   for (FacetId f = 0; f < state.mesh.facet_slots(); ++f) tags.push_back(state.mesh.facet_tag(f));
   file.write("/checkpoint/facet_tag", tags, 0);
   std::vector<std::int64_t> points;  // rows of a vertex and its tag
-  for (VertexId v = 0; v < state.mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < state.mesh.num_vertices(); ++v)
     if (state.mesh.vertex_tag(v) != kNoTag) points.insert(points.end(), {v, state.mesh.vertex_tag(v)});
   if (!points.empty()) file.write("/checkpoint/vertex_tag", points, 2);
   if (!units.is_si()) {
     std::vector<double> rest;
-    for (VertexId v = 0; v < state.mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < state.mesh.num_vertices(); ++v)
       rest.insert(rest.end(), state.mesh.rest(v).begin(), state.mesh.rest(v).end());
     file.write(kRest, rest, Dim);
     file.write(kTime, std::array{state.t}, 0);
@@ -307,7 +306,7 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
   file.write("/checkpoint/energy_guard",
              std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0, state.stored_energy}, 0);
   write_memory(file, state.remesh_memory);
-  write_strata(file, state.strata);
+  write_strata(file, state.strata, state.mesh.num_vertices());
   write_factor(file, state.factor);
   file.write_text("/checkpoint/totals", std::string(progress.totals));
   file.write_text("/checkpoint/scene", std::string(progress.scene));
@@ -354,8 +353,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   Checkpoint<Dim> checkpoint;
   State<Dim>& state = checkpoint.state;
   try {
-    state.space = read_space(saved.file, file);
-    state.mesh = read_mesh<Dim>(saved.file, file, state.space);
+    state.mesh = read_mesh<Dim>(saved.file, file);
   } catch (const InputError& error) {
     throw InputError({saved.file.string(), "/mesh " + error.parts().place, error.parts().found, error.parts().expected});
   }
@@ -379,7 +377,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.created_energy = guard[0];
   state.history.damp_next = guard[1] != 0;
   state.stored_energy = guard[2];
-  state.remesh_memory = read_memory(saved.file, file, state.mesh.vertex_slots());
+  state.remesh_memory = read_memory(saved.file, file, state.mesh.num_vertices());
   state.strata = read_strata<Dim>(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);
   state.step = as_int(saved.file, "attribute step", file.read_integer_attribute("step"));

@@ -2,11 +2,11 @@
 // Cells with curved edges as XDMF and VTK draw them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
 
-#include "itr/fem/space.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr::output {
@@ -40,17 +40,20 @@ struct DrawnCells {
 };
 
 template <int Dim>
-DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh, const Space& space) {
+DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh) {
   DrawnCells<Dim> drawn;
   for (const EdgeKey& edge : mesh.edges())
-    if (space.find(edge[0], edge[1]) == kNone) drawn.straight_edges.push_back(edge);
-  const Space straight(drawn.straight_edges);
+    if (mesh.node_of(edge) == kNone) drawn.straight_edges.push_back(edge);
+  const auto number = [&](const EdgeKey& edge) {
+    const auto& all = drawn.straight_edges;
+    return mesh.num_nodes() + static_cast<int>(std::lower_bound(all.begin(), all.end(), edge) - all.begin());
+  };
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     const auto& cell = mesh.cell(c);
     drawn.cells.insert(drawn.cells.end(), cell.begin(), cell.end());
     for (const auto& [i, j] : drawn_edges<Dim>()) {
-      const int curved = space.node_of(cell[i], cell[j], mesh.vertex_slots());
-      drawn.cells.push_back(curved != kNone ? curved : straight.node_of(cell[i], cell[j], num_nodes(mesh, space)));
+      const int curved = mesh.node_of(cell[i], cell[j]);
+      drawn.cells.push_back(curved != kNone ? curved : number(edge_key(cell[i], cell[j])));
     }
   }
   return drawn;

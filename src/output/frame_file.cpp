@@ -10,6 +10,7 @@
 #include "file_list.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
+#include "set_members.hpp"
 #include "units.hpp"
 
 namespace itr::output {
@@ -18,7 +19,6 @@ namespace {
 
 using Integers = std::vector<std::int64_t>;
 
-const Space kLinear;
 /// Four rows a curve: contact, friction, reaction, all.
 const std::string kForceSums = "/totals/forces";
 /// Names of length, mass and time; absent: SI units.
@@ -27,8 +27,8 @@ const std::string kUnits = "/units";
 std::span<const double> as_span(ConstVectorView v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 
 template <int Dim>
-VectorX rest_positions(const Mesh<Dim>& mesh, const Space& space) {
-  const std::vector<Vec<Dim>> nodes = node_rest_positions(mesh, space);
+VectorX rest_positions(const Mesh<Dim>& mesh) {
+  const std::vector<Vec<Dim>>& nodes = mesh.rest();
   VectorX rest(Dim * static_cast<Eigen::Index>(nodes.size()));
   for (std::size_t i = 0; i < nodes.size(); ++i) vertex_of<Dim>(rest, static_cast<int>(i)) = nodes[i];
   return rest;
@@ -77,11 +77,11 @@ void write_index_rows(hdf5::File& file, const std::string& name, const std::vect
 /// The curved edges, and the cells as XDMF draws them; where only some edges are curved with nodal fields of their own,
 /// since those of /fields have no rows for straight edges.
 template <int Dim>
-void write_space(const Target& target, const FrameView<Dim>& frame, const Space& space, ConstVectorView u) {
+void write_curves(const Target& target, const FrameView<Dim>& frame, ConstVectorView u) {
   hdf5::File& file = target.file;
-  if (space.is_linear()) return;
-  write_index_rows(file, "/mesh/curved_edges", space.curved_edges());
-  const DrawnCells<Dim> drawn = draw_cells(frame.mesh, space);
+  if (!frame.mesh.has_nodes()) return;
+  write_index_rows(file, "/mesh/curved_edges", frame.mesh.curved_edges());
+  const DrawnCells<Dim> drawn = draw_cells(frame.mesh);
   file.write("/mesh/quadratic_cells", drawn.cells, kQuadraticNodes<Dim>);
   if (drawn.straight_edges.empty()) return;
   const auto write = [&](const char* name, ConstVectorView field, const char* unit) {
@@ -102,6 +102,17 @@ void write_space(const Target& target, const FrameView<Dim>& frame, const Space&
   write_forces("/drawn/contact_force", frame.asked->forces.contact);
   write_forces("/drawn/friction_force", frame.asked->forces.friction);
   write_forces("/drawn/reaction_force", frame.asked->forces.reaction);
+}
+
+/// Cells, rows of /mesh/surface and vertices by name.
+template <int Dim>
+void write_sets(hdf5::File& file, const FrameView<Dim>& frame) {
+  for (const SetMembers& set : set_members(frame)) {
+    const std::string name = plain_name(set.name);
+    if (!set.cells.empty()) file.write("/sets/cells/" + name, set.cells, 0);
+    if (!set.facets.empty()) file.write("/sets/facets/" + name, set.facets, 0);
+    if (!set.vertices.empty()) file.write("/sets/vertices/" + name, set.vertices, 0);
+  }
 }
 
 template <int Dim>
@@ -173,17 +184,17 @@ template <int Dim>
 void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, const Units& units) {
   const Target target{file, units};
   const Mesh<Dim>& mesh = frame.mesh;
-  ITR_CHECK(mesh.num_vertices() == mesh.vertex_slots() && mesh.num_cells() == mesh.cell_slots(), "mesh is not compact");
-  const Space& space = frame.space ? *frame.space : kLinear;
-  ITR_CHECK(frame.x.size() == Dim * num_nodes(mesh, space), frame.x.size(), mesh.num_vertices(), space.num_curved());
-  const VectorX rest = rest_positions(mesh, space);
+  ITR_CHECK(mesh.is_compact(), "mesh is not compact");
+  ITR_CHECK(frame.x.size() == Dim * mesh.num_nodes(), frame.x.size(), mesh.num_vertices(), mesh.num_curved());
+  const VectorX rest = rest_positions(mesh);
   const VectorX u = frame.x - rest;
   file.write_attribute("step", static_cast<std::int64_t>(step));
   file.write_attribute("t", units.from_si(t, "s"));
   if (!units.is_si() && !file.contains(kUnits))
     file.write_text(kUnits, units.length() + " " + units.mass() + " " + units.time());
   write_mesh(target, mesh, rest);
-  write_space<Dim>(target, frame, space, u);
+  write_sets(file, frame);
+  write_curves<Dim>(target, frame, u);
   target.write("/fields/x", as_span(frame.x), Dim, "m");
   target.write("/fields/u", as_span(u), Dim, "m");
   target.write("/fields/v", as_span(frame.v), Dim, "m/s");
@@ -197,9 +208,9 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, con
 
 template <int Dim>
 int drawn_nodes(const FrameView<Dim>& frame) {
-  if (!frame.space || frame.space->is_linear()) return 0;
+  if (!frame.mesh.has_nodes()) return 0;
   const int edges = static_cast<int>(frame.mesh.edges().size());
-  return edges == frame.space->num_curved() ? 0 : frame.mesh.num_vertices() + edges;
+  return edges == frame.mesh.num_curved() ? 0 : frame.mesh.num_vertices() + edges;
 }
 
 namespace {
@@ -213,7 +224,7 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
                                     static_cast<std::size_t>(mesh.num_vertices()),
                                     static_cast<std::size_t>(mesh.num_cells()),
                                     static_cast<std::size_t>(mesh.num_facets()),
-                                    static_cast<std::size_t>(frame.space ? frame.space->num_curved() : 0),
+                                    static_cast<std::size_t>(mesh.num_curved()),
                                     size(frame.v),
                                     size(frame.elastic_density),
                                     size(frame.obstacle_x),
@@ -224,6 +235,8 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
   shape.push_back(static_cast<std::size_t>(drawn_nodes(frame)));
   if (frame.proxy.x)
     shape.insert(shape.end(), {size(*frame.proxy.x), size(*frame.proxy.edges), size(*frame.proxy.triangles)});
+  for (const SetMembers& set : set_members(frame))
+    shape.insert(shape.end(), {size(set.cells), size(set.facets), size(set.vertices)});
   if (frame.asked) {
     const AskedFields& asked = *frame.asked;
     shape.insert(shape.end(), {size(asked.forces.contact), size(asked.forces.friction), size(asked.forces.reaction),

@@ -12,7 +12,7 @@
 namespace itr::output {
 
 template <int Dim>
-DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space) {
+DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
   constexpr int kExponent = 8;  // the p of `lp`
   double l2_squared = 0, h1_semi_squared = 0, lp_power = 0;
   DisplacementNorms norms;
@@ -23,28 +23,27 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, c
     norms.linf = std::max(norms.linf, size);
     norms.linf_grad = std::max(norms.linf_grad, gradient);
   };
-  const CellSet<Dim> cells = space.is_linear() ? CellSet<Dim>() : whole_mesh(mesh, {}, space);
-  std::vector<char> is_curved(mesh.cell_slots(), 0);
-  for (const auto& element : cells.curved_elements) {
-    is_curved[element.cell] = 1;
-    const auto positions = at_nodes<Dim>(element.nodes, x);
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    if (!mesh.is_cell_alive(c)) continue;
+    const auto element = element_of(mesh, c);
+    if (!element.curved) {
+      std::array<Vec<Dim>, Dim + 1> u;
+      Vec<Dim> mean = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) {
+        u[k] = vertex_of<Dim>(x, element.vertices[k]) - mesh.rest(element.vertices[k]);
+        mean += u[k] / (Dim + 1);
+      }
+      add(element.volume, mean.norm(), (edge_matrix<Dim>(u) * element.inverse_edges).norm());
+      continue;
+    }
+    const auto positions = at_nodes<Dim>(element.nodes(), x);
     for (const auto& point : quadrature<Dim>(kElasticDegree)) {
-      const Vec<Dim> u = positions * quadratic_shapes<Dim>(element.curved, point.weights) -
-                         rest_position<Dim>(cells, element, point.weights);
+      Vec<Dim> X = Vec<Dim>::Zero();
+      for (int k = 0; k <= Dim; ++k) X += point.weights[k] * mesh.rest(element.vertices[k]);
+      const Vec<Dim> u = positions * quadratic_shapes<Dim>(element.curved, point.weights) - X;
       const Mat<Dim> F = positions * shape_gradients<Dim>(element, point.weights).transpose();
       add(point.share * element.volume, u.norm(), (F - Mat<Dim>::Identity()).norm());
     }
-  }
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || is_curved[c]) continue;
-    std::array<Vec<Dim>, Dim + 1> u;
-    Vec<Dim> mean = Vec<Dim>::Zero();
-    for (int k = 0; k <= Dim; ++k) {
-      const VertexId v = mesh.cell(c)[k];
-      u[k] = vertex_of<Dim>(x, v) - mesh.rest(v);
-      mean += u[k] / (Dim + 1);
-    }
-    add(mesh.volume(c), mean.norm(), (edge_matrix<Dim>(u) * mesh.inverse_rest_edges(c)).norm());
   }
   norms.l2 = std::sqrt(l2_squared);
   norms.h1_semi = std::sqrt(h1_semi_squared);
@@ -53,7 +52,7 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, c
   return norms;
 }
 
-template DisplacementNorms displacement_norms<2>(const Mesh<2>&, ConstVectorView, const Space&);
-template DisplacementNorms displacement_norms<3>(const Mesh<3>&, ConstVectorView, const Space&);
+template DisplacementNorms displacement_norms<2>(const Mesh<2>&, ConstVectorView);
+template DisplacementNorms displacement_norms<3>(const Mesh<3>&, ConstVectorView);
 
 }  // namespace itr::output

@@ -211,16 +211,13 @@ std::string totals_of_list(std::span<const double> numbers) {
 std::string Totals::summary_json(const RunInfo& info, const Units& units, const std::string& outcome,
                                  const std::string& solver, const DisplacementNorms& norms, const Json& members) const {
   const StepReport total = in_units(total_, units);
-  Json json{{"scene", info.scene},
-            {"outcome", outcome},
-            {"backend", info.backend},
-            {"solver", solver},
-            {"threads", info.threads},
-            {"versions", versions_json()},
-            {"units", {{"length", units.length()}, {"mass", units.mass()}, {"time", units.time()}}},
-            {"steps", total.step},
-            {"cut_steps", total.cut_steps},
-            {"t", to_json(total.t)}};
+  Json json{
+      {"scene", info.scene},       {"outcome", outcome},
+      {"backend", info.backend},   {"solver", solver},
+      {"threads", info.threads},   {"versions", versions_json()},
+      {"defaults", info.defaults}, {"units", {{"length", units.length()}, {"mass", units.mass()}, {"time", units.time()}}},
+      {"steps", total.step},       {"cut_steps", total.cut_steps},
+      {"t", to_json(total.t)}};
   add_fields(total, in_summary, json);
   json[kGain] = to_json(units.from_si(gain_, "J"));
   json.update(members);

@@ -3,15 +3,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <set>
 #include <span>
 
 #include "drawn_cells.hpp"
 #include "files.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadratic.hpp"
+#include "set_members.hpp"
 #include "units.hpp"
 
 namespace itr::output {
@@ -74,9 +77,32 @@ std::string cells_text(const Mesh<Dim>& mesh, const DrawnCells<Dim>* drawn) {
          array("types", "UInt8", types, 1) + "</Cells>\n";
 }
 
+std::string set_array(const std::string& name, const std::vector<std::uint8_t>& values) {
+  return array(("set:" + plain_name(name)).c_str(), "UInt8", values, 1);
+}
+
+/// By point, whether it is in a set: of its facets all nodes.
+template <int Dim>
+std::vector<std::uint8_t> points_of(const SetMembers& set, const FrameView<Dim>& frame, const DrawnCells<Dim>& drawn,
+                                    Eigen::Index count) {
+  std::vector<std::uint8_t> values(static_cast<std::size_t>(count), 0);
+  for (const std::int64_t v : set.vertices) values[v] = 1;
+  std::set<EdgeKey> edges;
+  for (const std::int64_t f : set.facets)
+    for (const VertexId a : frame.mesh.facet(static_cast<FacetId>(f))) {
+      values[a] = 1;
+      for (const VertexId b : frame.mesh.facet(static_cast<FacetId>(f))) edges.insert(edge_key(a, b));
+    }
+  std::size_t node = frame.mesh.num_vertices();
+  const auto mark = [&](const EdgeKey& edge) { values[node++] = edges.contains(edge); };
+  for (const EdgeKey& edge : frame.mesh.curved_edges()) mark(edge);
+  std::for_each(drawn.straight_edges.begin(), drawn.straight_edges.end(), mark);
+  return values;
+}
+
 template <int Dim>
 VectorX displacement(const FrameView<Dim>& frame) {
-  const std::vector<Vec<Dim>> rest = node_rest_positions(frame.mesh, frame.space ? *frame.space : Space());
+  const std::vector<Vec<Dim>>& rest = frame.mesh.rest();
   VectorX u = frame.x;
   for (std::size_t v = 0; v < rest.size(); ++v) u.template segment<Dim>(Dim * static_cast<Eigen::Index>(v)) -= rest[v];
   return u;
@@ -90,8 +116,8 @@ template <int Dim>
 void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& frame, int step, const Units& units) {
   const Mesh<Dim>& mesh = frame.mesh;
   std::string points, cells;
-  const bool is_curved = frame.space && !frame.space->is_linear();
-  const DrawnCells<Dim> drawn = is_curved ? draw_cells(mesh, *frame.space) : DrawnCells<Dim>();
+  const bool is_curved = mesh.has_nodes();
+  const DrawnCells<Dim> drawn = is_curved ? draw_cells(mesh) : DrawnCells<Dim>();
   const double length = units.factor("m");
   const VectorX x = drawn.at_nodes(frame.x) / length;
   const auto vectors = [&](const char* name, ConstVectorView values, double unit) {
@@ -111,6 +137,14 @@ void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& fra
   std::vector<std::int64_t> body;
   for (CellId c = 0; c < mesh.cell_slots(); ++c) body.push_back(mesh.body(c));
   cells += array("body", "Int64", body, 1) + array("elastic_density", "Float64", pressures(frame.elastic_density), 1);
+  for (const SetMembers& set : set_members(frame)) {
+    if (set.cells.empty() && !(set.facets.empty() && set.vertices.empty()))
+      points += set_array(set.name, points_of(set, frame, drawn, x.size() / Dim));
+    if (set.cells.empty()) continue;
+    std::vector<std::uint8_t> is_in(mesh.cell_slots(), 0);
+    for (const std::int64_t c : set.cells) is_in[c] = 1;
+    cells += set_array(set.name, is_in);
+  }
   if (frame.asked) {
     forces("contact_force", frame.asked->forces.contact);
     forces("friction_force", frame.asked->forces.friction);

@@ -140,7 +140,7 @@ struct Writer::Impl {
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
     if (vtu_series) vtu_series->add(vtu_series_entry(step, options.units.from_si(t, "s")));
-    const bool is_quadratic = frame.space && !frame.space->is_linear();
+    const bool is_quadratic = frame.mesh.has_nodes();
     series.add({frame_name(step), options.units.from_si(t, "s"), Dim, nodes, frame.mesh.num_cells(), is_quadratic,
                 drawn_nodes(frame), std::move(asked)});
   }
@@ -190,7 +190,7 @@ Writer::Writer(Folder folder, OutputOptions options, RunInfo info, const Checkpo
   impl_->totals.restore(checkpoint.totals);
   impl_->seconds_before = impl_->totals.report().seconds.total;
   const State<Dim>& state = checkpoint.state;
-  impl_->norms = displacement_norms(state.mesh, state.history.x[0], state.space);
+  impl_->norms = displacement_norms(state.mesh, state.history.x[0]);
 }
 
 Writer::~Writer() = default;
@@ -211,7 +211,7 @@ void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const 
   if (frame.asked && !frame.asked->curves.empty()) impl_->folder.claim(kForceFile);
   if (frame.asked) impl_->forces.add(report.step, units.from_si(report.t, "s"), in_units(frame.asked->curves, units));
   impl_->totals.add(report);
-  impl_->norms = displacement_norms(frame.mesh, frame.x, frame.space ? *frame.space : Space());
+  impl_->norms = displacement_norms(frame.mesh, frame.x);
   if (!checkpoint && !impl_->is_due(report.step)) return;
   try {
     impl_->store(frame, report.step, report.t, checkpoint);

@@ -113,13 +113,14 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem, co
   const int patch = static_cast<int>(problem.part.size());
   const int parts = patch == 0 ? 0 : *std::max_element(problem.part.begin(), problem.part.end()) + 1;
   VectorX masses = VectorX::Zero(patch);
-  for (const auto& element : problem.cells.elements)
+  for (const auto& element : problem.cells.straight())
     for (const int v : element.vertices)
       masses[v] += problem.materials.at(element.body).density * element.volume / (Dim + 1);
-  for (const auto& element : problem.cells.curved_elements) {
+  for (const auto& element : problem.cells.curved()) {
     const auto shares = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).rowwise().sum().eval();
+    const auto nodes = element.nodes();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // 0 at straight edges
-      masses[element.nodes[k]] += problem.materials.at(element.body).density * element.volume * shares[k];
+      masses[nodes[k]] += problem.materials.at(element.body).density * element.volume * shares[k];
   }
   std::vector<Integral> integrals(parts * Dim);
   for (int v = 0; v < patch; ++v)
@@ -171,16 +172,11 @@ template <int Dim>
 Barriers<Dim> barriers_for(const SafeProjectionProblem<Dim>& problem, const VectorX& interpolant, Workspace& workspace) {
   double least_ratio = kVolumeActivation * 2, mass = 0, volume = 0;
   for (const auto& element : problem.cells.elements) {
-    least_ratio = std::min(least_ratio, deformation_gradient<Dim>(element, interpolant).determinant());
+    if (!element.curved) least_ratio = std::min(least_ratio, deformation_gradient<Dim>(element, interpolant).determinant());
     mass += problem.materials.at(element.body).density * element.volume;
     volume += element.volume;
   }
-  for (const auto& element : problem.cells.curved_elements) {
-    mass += problem.materials.at(element.body).density * element.volume;
-    volume += element.volume;
-  }
-  const std::size_t count = problem.cells.elements.size() + problem.cells.curved_elements.size();
-  const double size = std::pow(volume / count, 1.0 / Dim);
+  const double size = std::pow(volume / problem.cells.elements.size(), 1.0 / Dim);
   Barriers<Dim> barriers{std::make_shared<ElasticEnergy<Dim>>(problem.cells, problem.materials, 1), nullptr, nullptr,
                          least_ratio / 2};
   barriers.volume = std::make_shared<VolumeBarrier<Dim>>(problem.cells, barriers.least_ratio, mass / volume * size * size);
@@ -203,8 +199,9 @@ std::vector<char> near_barriers(const SafeProjectionProblem<Dim>& problem, const
   std::vector<char> is_near(problem.cells.num_vertices, 0);
   const VectorX end = x + way;
   for (const auto& element : problem.cells.elements)
-    if (deformation_gradient<Dim>(element, end).determinant() < barriers.least_ratio)
-      for (const int v : element.vertices) is_near[v] = 1;
+    if (element.curved ? max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, way)) < 1
+                       : deformation_gradient<Dim>(element, end).determinant() < barriers.least_ratio)
+      for_each_node(element, [&](int v) { is_near[v] = 1; });
   if (barriers.distance) {
     VectorX single(way.size());
     barriers.distance->get_single_ways(x, way, single, workspace);
@@ -213,17 +210,13 @@ std::vector<char> near_barriers(const SafeProjectionProblem<Dim>& problem, const
     for (const ContactStencil& pair : barriers.distance->active(end, workspace))
       for (int k = 0; k < pair.size(); ++k) is_near[pair.vertices[k]] = 1;
   }
-  for (const auto& element : problem.cells.curved_elements)
-    if (max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, way)) < 1)
-      for (const int v : element.nodes) is_near[v] = 1;
   for (int ring = 0; ring < problem.rings; ++ring) {
     const std::vector<char> before = is_near;
-    for (const auto& element : problem.cells.elements)
-      if (std::any_of(element.vertices.begin(), element.vertices.end(), [&](int v) { return before[v]; }))
-        for (const int v : element.vertices) is_near[v] = 1;
-    for (const auto& element : problem.cells.curved_elements)
-      if (std::any_of(element.nodes.begin(), element.nodes.end(), [&](int v) { return before[v]; }))
-        for (const int v : element.nodes) is_near[v] = 1;
+    for (const auto& element : problem.cells.elements) {
+      bool is_beside = false;
+      for_each_node(element, [&](int v) { is_beside = is_beside || before[v]; });
+      if (is_beside) for_each_node(element, [&](int v) { is_near[v] = 1; });
+    }
   }
   return is_near;
 }
@@ -274,7 +267,7 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   const double whole = distance->value(interpolant, workspace);
   energy.add(distance);
   energy.add(barriers.volume);
-  if (!problem.cells.curved_elements.empty()) energy.add(std::make_shared<InversionGuard<Dim>>(barriers.inversion));
+  if (problem.cells.has_curved()) energy.add(std::make_shared<InversionGuard<Dim>>(barriers.inversion));
   if (barriers.distance) energy.add(barriers.distance);
   SparseSystem sparse(solver);
   sparse.reset(dofs, Dim, element_stencils(problem.cells));

@@ -16,14 +16,13 @@ namespace {
 template <int Dim>
 class Numbering {
  public:
-  Numbering(const Mesh<Dim>& mesh, const Space& space, const std::map<int, Material>& materials, TransferCells<Dim>& out)
-      : mesh_(mesh), space_(space), materials_(materials), out_(out) {}
+  Numbering(const Mesh<Dim>& mesh, const std::map<int, Material>& materials, TransferCells<Dim>& out)
+      : mesh_(mesh), materials_(materials), out_(out) {}
 
   void add(CellId c) {
-    std::array<int, kQuadraticNodes<Dim>> nodes{};
-    const CurvedEdges curved = find_nodes<Dim>(
-        mesh_.cell(c), [&](VertexId a, VertexId b) { return space_.node_of(a, b, mesh_.vertex_slots()); }, nodes);
-    out_.add(mesh_.cell(c), nodes, curved, materials_.at(mesh_.body(c)).density, [&](int id) { return local(id); });
+    const auto element = element_of(mesh_, c);
+    out_.add(element.vertices, element.nodes(), element.curved, materials_.at(element.body).density,
+             [&](int id) { return local(id); });
   }
 
  private:
@@ -31,18 +30,12 @@ class Numbering {
     const auto [it, is_new] = known_.try_emplace(id, static_cast<int>(out_.vertices.size()));
     if (is_new) {
       out_.vertices.push_back(id);
-      out_.rest.push_back(rest_of(id));
+      out_.rest.push_back(mesh_.rest(id));
     }
     return it->second;
   }
-  Vec<Dim> rest_of(int id) const {
-    if (id < mesh_.vertex_slots()) return mesh_.rest(id);
-    const auto& [a, b] = space_.curved_edges()[id - mesh_.vertex_slots()];
-    return (mesh_.rest(a) + mesh_.rest(b)) / 2;
-  }
 
   const Mesh<Dim>& mesh_;
-  const Space& space_;
   const std::map<int, Material>& materials_;
   TransferCells<Dim>& out_;
   std::unordered_map<VertexId, int> known_;
@@ -59,12 +52,10 @@ MatrixX TransferCells<Dim>::gather(const VectorX& field) const {
 }
 
 template <int Dim>
-TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Space& old_space, const Mesh<Dim>& mesh,
-                                       const Space& space, const TouchedCells& touched,
+TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched,
                                        const std::map<int, Material>& materials, int rings) {
   TransferPatch<Dim> patch;
-  Numbering<Dim> old_numbering(old_mesh, old_space, materials, patch.old_cells),
-      numbering(mesh, space, materials, patch.new_cells);
+  Numbering<Dim> old_numbering(old_mesh, materials, patch.old_cells), numbering(mesh, materials, patch.new_cells);
   for (const CellId c : touched.old_cells) old_numbering.add(c);
   std::vector<CellId> ids = touched.new_cells;
   std::unordered_set<CellId> inside(ids.begin(), ids.end());
@@ -77,9 +68,7 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Space& o
   for (int ring = 0; ring <= rings; ++ring) {  // cells around the vertices of the ring before
     const std::size_t end = patch.new_cells.vertices.size();
     for (std::size_t i = std::exchange(first, end); i < end; ++i) {
-      const int v = patch.new_cells.vertices[i];
-      if (v >= mesh.vertex_slots()) continue;  // a node: its ends are there too
-      for (const CellId c : mesh.cells_of(v))
+      for (const CellId c : mesh.cells_of(patch.new_cells.vertices[i]))  // of a curved edge's node none: its ends are there
         if (inside.insert(c).second) {
           ids.push_back(c);
           numbering.add(c);
@@ -88,28 +77,29 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Space& o
   }
   for (const int v : patch.new_cells.vertices) {
     std::vector<CellId> of_edge;
-    if (v >= mesh.vertex_slots()) of_edge = mesh.cells_of_edge(space.curved_edges()[v - mesh.vertex_slots()]);
-    const std::span<const CellId> around = v < mesh.vertex_slots() ? mesh.cells_of(v) : std::span<const CellId>(of_edge);
+    if (const EdgeKey edge = mesh.edge_of_node(v); edge[0] != kNone) of_edge = mesh.cells_of_edge(edge);
+    const std::span<const CellId> around = of_edge.empty() ? mesh.cells_of(v) : std::span<const CellId>(of_edge);
     patch.at_rim.push_back(!std::all_of(around.begin(), around.end(), [&](CellId c) { return inside.contains(c); }));
   }
   patch.cells.num_vertices = static_cast<int>(patch.new_cells.vertices.size());
   patch.cells.rest = patch.new_cells.rest;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    const CellId c = ids[i];
-    const CurvedEdges curved = patch.new_cells.view().curved_edges(i);
-    if (curved)
-      patch.cells.curved_elements.push_back(
-          {patch.new_cells.nodes[i], curved, mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), c});
-    else
-      patch.cells.elements.push_back({patch.new_cells.cells[i], mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c)});
+    auto element = element_of(mesh, ids[i]);
+    element.vertices = patch.new_cells.cells[i];
+    element.part = kNone;
+    if (element.curved) {
+      const auto& nodes = patch.new_cells.nodes[i];
+      std::copy(nodes.begin() + Dim + 1, nodes.end(), element.edge_nodes.begin());
+    }
+    patch.cells.add(element);
   }
   return patch;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                           \
-  template struct TransferCells<Dim>;                                                                                  \
-  template TransferPatch<Dim> make_transfer_patch<Dim>(const Mesh<Dim>&, const Space&, const Mesh<Dim>&, const Space&, \
-                                                       const TouchedCells&, const std::map<int, Material>&, int);
+#define ITR_INSTANTIATE(Dim)                                                                                    \
+  template struct TransferCells<Dim>;                                                                           \
+  template TransferPatch<Dim> make_transfer_patch<Dim>(const Mesh<Dim>&, const Mesh<Dim>&, const TouchedCells&, \
+                                                       const std::map<int, Material>&, int);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

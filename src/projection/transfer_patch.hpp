@@ -7,7 +7,6 @@
 
 #include "itr/energy/material.hpp"
 #include "itr/fem/cell_set.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/projection/transfer.hpp"
 
 namespace itr {
@@ -60,8 +59,7 @@ struct TransferPatch {
 /// `touched` are cells of the two meshes, which are compact. Free to move are the vertices of touched cells and those up to
 /// `rings` edges away, and the nodes of edges of which all cells are in the patch.
 template <int Dim>
-TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Space& old_space, const Mesh<Dim>& mesh,
-                                       const Space& space, const TouchedCells& touched,
+TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched,
                                        const std::map<int, Material>& materials, int rings);
 
 }  // namespace itr

@@ -24,7 +24,7 @@ Vec<Dim*(Dim + 1)> volume_gradient(const Mat<Dim>& F, double J, const Mat<Dim>& 
 template <int Dim>
 double VolumeBarrier<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = 0;
-  for (const auto& element : cells_.elements) {
+  for (const auto& element : cells_.straight()) {
     const double r = deformation_gradient<Dim>(element, x).determinant() / activation_;
     if (!(r > 0)) return std::numeric_limits<double>::infinity();
     if (r < 1) sum -= element.volume * (r - 1) * (r - 1) * std::log(r);
@@ -34,7 +34,7 @@ double VolumeBarrier<Dim>::value(ConstVectorView x, Workspace&) const {
 
 template <int Dim>
 void VolumeBarrier<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
-  for (const auto& element : cells_.elements) {
+  for (const auto& element : cells_.straight()) {
     const Mat<Dim> F = deformation_gradient<Dim>(element, x);
     const double J = F.determinant(), r = J / activation_;
     if (r >= 1) continue;
@@ -49,7 +49,7 @@ void VolumeBarrier<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 /// The part of the Hessian along dJ/dx; the part with the curvature of J itself is left out: it is not positive.
 template <int Dim>
 void VolumeBarrier<Dim>::add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const {
-  for (const auto& element : cells_.elements) {
+  for (const auto& element : cells_.straight()) {
     const Mat<Dim> F = deformation_gradient<Dim>(element, x);
     const double J = F.determinant(), r = J / activation_;
     if (r >= 1) continue;

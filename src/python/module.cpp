@@ -151,6 +151,7 @@ void add_model(py::module_& m) {
            })
       .def("add_boundary_facets",
            [](Model& model, const std::string& name, const Ints& facets) { return model.add_boundary(name, view(facets)); })
+      .def("name_body", &Model::name_body)
       .def("add_boundary_box", [](Model& model, const std::string& name, const Doubles& low,
                                   const Doubles& high) { return model.add_boundary(name, view(low), view(high)); })
       .def("add_boundary_rule",

@@ -61,27 +61,36 @@ CurvedCell<Dim> curved_cell(const std::array<VertexId, Dim + 1>& vertices, const
   return cell;
 }
 
+/// Whether any edge is curved before an edit, or by it.
+template <int Dim>
+bool has_curves(const Mesh<Dim>& mesh, const Edit<Dim>& edit) {
+  return mesh.has_nodes() || !edit.inserted_nodes.empty();
+}
+
+/// The cell on these vertices as it is after an edit.
+template <int Dim>
+CurvedCell<Dim> cell_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const std::array<VertexId, Dim + 1>& vertices) {
+  if (has_curves(mesh, edit))
+    return curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); });
+  CurvedCell<Dim> cell;
+  std::copy(vertices.begin(), vertices.end(), cell.nodes.begin());
+  return cell;
+}
+
 template <int Dim>
 CurvedCell<Dim> cell_before(const Mesh<Dim>& mesh, CellId c) {
-  if (!mesh.has_nodes()) return {};
-  return curved_cell<Dim>(mesh.cell(c), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
+  const auto element = element_of(mesh, c);
+  return {element.nodes(), element.curved};
 }
 
 /// Calls f(gradient, share of the volume) at the points of a rule that integrates squares of the gradient of a field on a
-/// cell with curved edges.
+/// cell.
 template <int Dim, typename F>
-void for_each_gradient(const CurvedCell<Dim>& cell, const Mat<Dim>& inverse_edges, const VectorX& field, const F& f) {
-  const auto linear = barycentric_gradients<Dim>(inverse_edges);
-  const auto values = at_nodes<Dim>(cell.nodes, field);
+void for_each_gradient(const typename CellSet<Dim>::Element& element, const VectorX& field, const F& f) {
+  if (!element.curved) return f(deformation_gradient<Dim>(element, field), 1.0);
+  const auto values = at_nodes<Dim>(element.nodes(), field);
   for (const auto& point : quadrature<Dim>(Dim))
-    f(Mat<Dim>(values * quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear).transpose()), point.share);
-}
-
-template <int Dim>
-CurvedCell<Dim> curved_cell_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit,
-                                  const std::array<VertexId, Dim + 1>& vertices) {
-  if (!mesh.has_nodes() && edit.inserted_nodes.empty()) return {};
-  return curved_cell<Dim>(vertices, [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); });
+    f(Mat<Dim>(values * shape_gradients<Dim>(element, point.weights).transpose()), point.share);
 }
 
 /// Calls visit(f) for the boundary facets at a vertex, or at the edge of a node.

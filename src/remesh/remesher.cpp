@@ -47,7 +47,7 @@ template <int Dim>
 bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit, double least_share) {
   constexpr double kTolerance = 0.1;
   const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
-  const auto node_before = [&](VertexId a, VertexId b) { return mesh.node_of(a, b); };
+  const auto node_before = nodes_of_edges(mesh);
   const auto node_later = [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); };
   const auto keeps = [&](const VectorX& x) {
     double before = std::numeric_limits<double>::infinity();

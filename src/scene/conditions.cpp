@@ -14,16 +14,16 @@ namespace {
 template <int Dim>
 class ConditionReader {
  public:
-  ConditionReader(const Node& root, Setup<Dim>& setup, std::vector<std::string>& warnings)
-      : boundary_(root["boundary_conditions"]),
+  ConditionReader(const Node& root, const Sets& sets, Setup<Dim>& setup, std::vector<std::string>& warnings)
+      : sets_(sets),
+        boundary_(root["boundary_conditions"]),
         initial_(root["initial_conditions"]),
         geometry_(root["geometry"]),
         setup_(setup),
         warnings_(warnings) {
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) point_tags_.insert(setup_.mesh.vertex_tag(v));
+    for (VertexId v = 0; v < setup_.mesh.node_slots(); ++v) point_tags_.insert(setup_.mesh.vertex_tag(v));
     for (auto* tags : {&facet_tags_, &point_tags_}) tags->erase(kNoTag);
-    for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c) bodies_.insert(setup_.mesh.body(c));
   }
 
   void read(ObstacleGeometry<Dim> geometry) {
@@ -49,6 +49,13 @@ class ConditionReader {
  private:
   using Function = SpaceTimeFunction<Dim>;
 
+  /// Sets that entries of one list before another one act on.
+  struct Seen {
+    std::set<Label> labels;
+    std::set<int> tags;
+    bool has_all = false;
+  };
+
   /// `rhs` stands on the left side of PolyFEM's equation: positive values push in the negative direction.
   void read_body_acceleration() {
     const Node rhs = boundary_["rhs"];
@@ -60,8 +67,33 @@ class ConditionReader {
     setup_.body_acceleration = value.function;
   }
 
+  /// Facets of several sets have conditions of each: in each component that of the first entry counts.
+  void hold(const Node& node, DirichletCondition<Dim> added) {
+    auto& all = setup_.dirichlet;
+    const auto earlier =
+        std::find_if(all.begin(), all.end(), [&](const DirichletCondition<Dim>& other) { return other.tag == added.tag; });
+    if (earlier == all.end()) return all.push_back(std::move(added));
+    bool loses = false;
+    for (int c = 0; c < Dim; ++c) {
+      loses |= added.components[c] && earlier->components[c];
+      added.components[c] = added.components[c] && !earlier->components[c];
+      earlier->components[c] = earlier->components[c] || added.components[c];
+    }
+    if (loses)
+      warnings_.push_back(node.pointer() +
+                          ": an entry before it holds a part of this set in the same directions and wins there");
+    earlier->displacement = [first = earlier->displacement, second = added.displacement, of_second = added.components](
+                                const RestPoint<Dim>& X, double t) {
+      Vec<Dim> value = first(X, t);
+      const Vec<Dim> other = second(X, t);
+      for (int c = 0; c < Dim; ++c)
+        if (of_second[c]) value[c] = other[c];
+      return value;
+    };
+  }
+
   void read_dirichlet() {
-    std::set<int> seen;
+    Seen seen;
     for (const Node& node : boundary_["dirichlet_boundary"].items()) {
       warn_of_components(node["value"], Dim, warnings_);
       const Function function = read_value(node);
@@ -70,26 +102,39 @@ class ConditionReader {
       const bool is_free = std::none_of(components.begin(), components.end(), [](bool b) { return b; });
       for (const int tag : tags_of(node, seen)) {
         check_defined<Dim>(function, vertices_with(tag), times(), node["value"]);
-        if (!is_free) setup_.dirichlet.push_back({tag, components, function});
+        if (!is_free) hold(node, {tag, components, function});
       }
     }
   }
 
+  /// Adds a load, to that which a facet of several sets has already.
+  template <typename Condition, typename Function>
+  static void load(std::vector<Condition>& all, Condition added, Function Condition::*value) {
+    const auto earlier =
+        std::find_if(all.begin(), all.end(), [&](const Condition& other) { return other.tag == added.tag; });
+    if (earlier == all.end()) return all.push_back(std::move(added));
+    using Value = std::invoke_result_t<Function, const RestPoint<Dim>&, double>;
+    Function& sum = (*earlier).*value;
+    sum = [first = sum, second = added.*value](const RestPoint<Dim>& X, double t) {
+      return Value(first(X, t) + second(X, t));
+    };
+  }
+
   void read_neumann() {
-    std::set<int> seen;
+    Seen seen;
     for (const Node& node : boundary_["neumann_boundary"].items()) {
       warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
       for (const int tag : loaded_tags(node, seen)) {
         check_defined<Dim>(value.function, vertices_with(tag), times(), node["value"]);
         if (value.is_zero) continue;
-        setup_.neumann.push_back({tag, value.function});
+        load(setup_.neumann, {tag, value.function}, &NeumannCondition<Dim>::traction);
       }
     }
   }
 
   void read_pressure() {
-    std::set<int> seen;
+    Seen seen;
     for (const Node& node : boundary_["pressure_boundary"].items()) {
       const ScalarFunction<Dim> value = read_scalar_function<Dim>(node["value"], node["interpolation"]);
       const Function as_vector = [f = value.function](const Vec<Dim>& X, double t) {
@@ -98,7 +143,7 @@ class ConditionReader {
       for (const int tag : loaded_tags(node, seen)) {
         check_defined<Dim>(as_vector, vertices_with(tag), times(), node["value"]);
         if (value.is_zero) continue;
-        setup_.pressure.push_back({tag, value.function});
+        load(setup_.pressure, {tag, value.function}, &PressureCondition<Dim>::pressure);
       }
     }
   }
@@ -107,18 +152,18 @@ class ConditionReader {
   /// elsewhere.
   void warn_of_second_motions(const std::vector<Node>& displacements) {
     std::set<int> moved;
-    const auto id_of = [&](const Node& node) { return is_all(node["id"]) ? kNoTag : read_condition_id(node["id"]); };
     const auto warn = [&](const Node& node) {
       warnings_.push_back(node.pointer() +
                           ": an entry before it, in obstacle_displacements, moves the same obstacle and wins");
     };
-    for (const Node& node : displacements)
+    for (const Node& node : displacements) {
       if (is_all(node["id"]))
         moved = obstacle_ids_;
-      else if (obstacle_ids_.contains(id_of(node)) && !moved.insert(id_of(node)).second)
+      else if (const int id = obstacle_of(node["id"]); id != kNoTag && !moved.insert(id).second)
         warn(node);
+    }
     for (const Node& node : boundary_["dirichlet_boundary"].items())
-      if (moved.contains(id_of(node))) warn(node);
+      if (!is_all(node["id"]) && moved.contains(obstacle_of(node["id"]))) warn(node);
   }
 
   /// The first entry with an obstacle's id moves it; obstacle_displacements come before dirichlet_boundary.
@@ -126,12 +171,13 @@ class ConditionReader {
     std::vector<Node> entries = boundary_["obstacle_displacements"].items();
     for (const Node& node : entries) warn_of_components(node["value"], Dim, warnings_);
     for (const Node& node : entries)
-      if (!is_all(node["id"]) && !obstacle_ids_.contains(read_condition_id(node["id"]))) {
-        const int id = read_condition_id(node["id"]);
-        if (!facet_tags_.contains(id) && !point_tags_.contains(id))
-          refuse_unused(node["id"], "an obstacle's id: " + id_list(obstacle_ids_));
-        warnings_.push_back(node["id"].pointer() + ": " + std::to_string(id) +
-                            " is a surface of a body, which this does not move; obstacles: " + id_list(obstacle_ids_));
+      if (!is_all(node["id"]) && obstacle_of(node["id"]) == kNoTag) {
+        if (ids_of(node["id"]).empty())
+          node["id"].fail(abbreviate(node["id"].json()) + ", which nothing has",
+                          "an obstacle's id: " + sets_.surfaces.list(&obstacle_ids_));
+        warnings_.push_back(
+            node["id"].pointer() + ": " + text_of(read_condition_label(node["id"])) +
+            " is a surface of a body, which this does not move; obstacles: " + sets_.surfaces.list(&obstacle_ids_));
       }
     warn_of_second_motions(entries);
     for (const Node& node : boundary_["dirichlet_boundary"].items()) entries.push_back(node);
@@ -139,11 +185,11 @@ class ConditionReader {
     std::vector<char> is_taken(obstacles.rest.size(), false);
     for (const Node& node : entries) {
       const bool matches_all = is_all(node["id"]);
-      const int id = matches_all ? kNoTag : read_condition_id(node["id"]);
+      const int id = matches_all ? kNoTag : obstacle_of(node["id"]);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
       std::vector<Vec<Dim>> moved;
       for (std::size_t v = 0; v < obstacles.rest.size(); ++v) {
-        if (is_taken[v] || (!matches_all && id != geometry.id[v])) continue;
+        if (is_taken[v] || (!matches_all && (id == kNoTag || id != geometry.id[v]))) continue;
         is_taken[v] = true;
         if (value.is_zero) continue;  // fixed
         obstacles.motion[v] = static_cast<int>(obstacles.motions.size());
@@ -157,19 +203,25 @@ class ConditionReader {
 
   std::vector<InitialCondition<Dim>> read_initial(const char* name) {
     std::vector<InitialCondition<Dim>> conditions;
-    std::set<int> seen;
+    std::set<Label> seen;
+    std::set<int> taken;
     for (const Node& node : initial_[name].items()) {
       if (!node.has("id")) node["id"].fail("the id of a body");
-      const int body = read_id(node["id"], 0);
+      const Label label = read_label(node["id"], 0);
       warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"]);
-      if (!bodies_.contains(body)) refuse_unused(node["id"], "the id of a body: " + id_list(bodies_));
-      if (!seen.insert(body).second) {
-        warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
-        continue;
+      const std::vector<int>& bodies = sets_.bodies.of(label);
+      if (bodies.empty()) sets_.bodies.refuse(node["id"], label, "the id of a body: ");
+      bool is_new = seen.insert(label).second;
+      for (const int body : bodies) {
+        if (!taken.insert(body).second) {
+          is_new = false;
+          continue;
+        }
+        check_defined<Dim>(value.function, vertices_of_body(body), {setup_.time.t0}, node["value"]);
+        if (!value.is_zero) conditions.push_back({body, value.function});
       }
-      check_defined<Dim>(value.function, vertices_of_body(body), {setup_.time.t0}, node["value"]);
-      if (!value.is_zero) conditions.push_back({body, value.function});
+      if (!is_new) warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
     }
     return conditions;
   }
@@ -187,55 +239,64 @@ class ConditionReader {
 
   static bool is_all(const Node& id) { return id.exists() && id.json() == "all"; }
 
-  int read_condition_id(const Node& node) const {
-    if (!node.exists() || !node.json().is_number()) node.fail("an id, or \"all\"");
-    return read_id(node, 0);
+  static Label read_condition_label(const Node& node) {
+    if (!node.exists() || !(node.json().is_number() || node.json().is_string())) node.fail("a number, a name, or \"all\"");
+    return read_label(node, 0);
   }
 
-  /// Tags of facets and points that a condition acts on, without those that an entry before it has taken.
-  std::vector<int> tags_of(const Node& node, std::set<int>& seen) {
+  /// Tags of facets and points, and ids of obstacles.
+  const std::vector<int>& ids_of(const Node& id) const { return sets_.surfaces.of(read_condition_label(id)); }
+
+  /// The id of the obstacles with this label; kNoTag: there is none.
+  int obstacle_of(const Node& id) const {
+    for (const int tag : ids_of(id))
+      if (obstacle_ids_.contains(tag)) return tag;
+    return kNoTag;
+  }
+
+  /// Tags of facets and points that a condition acts on, none where an entry before it has the same id.
+  std::vector<int> tags_of(const Node& node, Seen& seen) {
     std::set<int> tags = facet_tags_;
     tags.insert(point_tags_.begin(), point_tags_.end());
     return tags_of(node, tags, seen);
   }
   /// Reads tags of facets, since points and obstacles bear no loads.
-  std::vector<int> loaded_tags(const Node& node, std::set<int>& seen) {
+  std::vector<int> loaded_tags(const Node& node, Seen& seen) {
     const Node id = node["id"];
-    if (!is_all(id) && !facet_tags_.contains(read_condition_id(id))) {
-      const std::string surfaces = "the id of a surface of a body: " + id_list(facet_tags_);
-      const int tag = read_condition_id(id);
-      if (point_tags_.contains(tag)) id.fail(abbreviate(id.json()) + ", an id of points, which have no area", surfaces);
-      if (obstacle_ids_.contains(tag)) id.fail(abbreviate(id.json()) + ", an obstacle, which bears no loads", surfaces);
-      refuse_unused(id, surfaces, why_unused(id));
+    const auto has_any = [](const std::vector<int>& ids, const std::set<int>& tags) {
+      return std::any_of(ids.begin(), ids.end(), [&](int tag) { return tags.contains(tag); });
+    };
+    if (!is_all(id) && !has_any(ids_of(id), facet_tags_)) {
+      const std::string expected = "the id of a surface of a body: ";
+      if (has_any(ids_of(id), point_tags_))
+        id.fail(abbreviate(id.json()) + ", an id of points, which have no area",
+                expected + sets_.surfaces.list(&facet_tags_));
+      if (has_any(ids_of(id), obstacle_ids_))
+        id.fail(abbreviate(id.json()) + ", an obstacle, which bears no loads", expected + sets_.surfaces.list(&facet_tags_));
+      sets_.surfaces.refuse(id, read_condition_label(id), expected, why_unused(id));
     }
     return tags_of(node, facet_tags_, seen);
   }
-  std::vector<int> tags_of(const Node& node, const std::set<int>& tags, std::set<int>& seen) {
+  std::vector<int> tags_of(const Node& node, const std::set<int>& tags, Seen& seen) {
     std::vector<int> taken;
     if (is_all(node["id"])) {
       for (const int tag : tags)
-        if (tag > 0 && seen.insert(tag).second) taken.push_back(tag);
+        if (tag > 0 && seen.tags.insert(tag).second) taken.push_back(tag);
+      seen.has_all = true;
       return taken;
     }
-    const int tag = read_condition_id(node["id"]);
-    const bool is_of_bodies = tag > 0 && tags.contains(tag);
-    if (!is_of_bodies && !obstacle_ids_.contains(tag))
-      refuse_unused(node["id"],
-                    "the id of a surface, above 0: " + id_list(tags) +
-                        (obstacle_ids_.empty() ? "" : "; or of an obstacle: " + id_list(obstacle_ids_)),
-                    why_unused(node["id"]));
-    if (!seen.insert(tag).second)
+    const Label label = read_condition_label(node["id"]);
+    const bool is_zero = label.name.empty() && label.number <= 0;
+    if ((ids_of(node["id"]).empty() || is_zero) && obstacle_of(node["id"]) == kNoTag)
+      sets_.surfaces.refuse(node["id"], label, "the id of a surface or an obstacle, above 0: ", why_unused(node["id"]));
+    if (seen.has_all || !seen.labels.insert(label).second) {
       warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
-    else if (is_of_bodies)
-      taken.push_back(tag);
+      return taken;
+    }
+    for (const int tag : ids_of(node["id"]))
+      if (!is_zero && tags.contains(tag)) taken.push_back(tag);
+    seen.tags.insert(taken.begin(), taken.end());
     return taken;
-  }
-
-  static std::string id_list(const std::set<int>& ids) {
-    return ids.empty() ? "there is none" : list_ids(std::vector<int>(ids.begin(), ids.end()));
-  }
-  [[noreturn]] static void refuse_unused(const Node& id, const std::string& expected, const std::string& why = "") {
-    id.fail(abbreviate(id.json()) + ", which nothing has" + why, expected);
   }
 
   /// The warning that was given of a selection which would have this id if anything were in it.
@@ -268,7 +329,7 @@ class ConditionReader {
     std::set<int> vertices;
     for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f)
       if (setup_.mesh.facet_tag(f) == tag) vertices.insert(setup_.mesh.facet(f).begin(), setup_.mesh.facet(f).end());
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < setup_.mesh.node_slots(); ++v)
       if (setup_.mesh.vertex_tag(v) == tag) vertices.insert(v);
     return points(vertices);
   }
@@ -282,26 +343,27 @@ class ConditionReader {
 
   std::vector<Vec<Dim>> all_vertices() const {
     std::vector<Vec<Dim>> result;
-    result.reserve(setup_.mesh.vertex_slots());
-    for (VertexId v = 0; v < setup_.mesh.vertex_slots(); ++v) result.push_back(setup_.mesh.rest(v));
+    result.reserve(setup_.mesh.node_slots());
+    for (VertexId v = 0; v < setup_.mesh.node_slots(); ++v) result.push_back(setup_.mesh.rest(v));
     return result;
   }
 
+  const Sets& sets_;
   Node boundary_, initial_, geometry_;
   Setup<Dim>& setup_;
   std::vector<std::string>& warnings_;
-  std::set<int> facet_tags_, point_tags_, bodies_, obstacle_ids_;
+  std::set<int> facet_tags_, point_tags_, obstacle_ids_;
 };
 
 }  // namespace
 
 template <int Dim>
-void read_conditions(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
+void read_conditions(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
                      std::vector<std::string>& warnings) {
-  ConditionReader<Dim>(root, setup, warnings).read(std::move(obstacles));
+  ConditionReader<Dim>(root, sets, setup, warnings).read(std::move(obstacles));
 }
 
-template void read_conditions(const Node&, ObstacleGeometry<2>, Setup<2>&, std::vector<std::string>&);
-template void read_conditions(const Node&, ObstacleGeometry<3>, Setup<3>&, std::vector<std::string>&);
+template void read_conditions(const Node&, const Sets&, ObstacleGeometry<2>, Setup<2>&, std::vector<std::string>&);
+template void read_conditions(const Node&, const Sets&, ObstacleGeometry<3>, Setup<3>&, std::vector<std::string>&);
 
 }  // namespace itr::scene

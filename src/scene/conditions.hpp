@@ -9,7 +9,7 @@ namespace itr::scene {
 
 /// Fills the conditions and the obstacles of a setup whose mesh and time are read.
 template <int Dim>
-void read_conditions(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
+void read_conditions(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
                      std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <set>
 
-#include "selection.hpp"
-
 namespace itr::scene {
 
 namespace {
@@ -13,15 +11,17 @@ namespace {
 template <int Dim>
 class ForceReader {
  public:
-  ForceReader(const PartNames& parts, const Mesh<Dim>& mesh) : parts_(parts), mesh_(mesh) {}
+  ForceReader(const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh) : parts_(parts), sets_(sets) {
+    for (FacetId f = 0; f < mesh.facet_slots(); ++f) facet_tags_.insert(mesh.facet_tag(f));
+  }
 
   ForceTarget read(const Node& node) const {
     ForceTarget target;
     target.name = node["name"].string("");
     if (target.name.empty()) node["name"].fail("the name of the curve");
     if (target.name.find_first_of(",\"\n") != std::string::npos) node["name"].fail("a name without commas and quotes");
-    for (const Node& id : node["surfaces"].items()) target.surfaces.push_back(surface(id));
-    for (const Node& id : node["bodies"].items()) target.bodies.push_back(body(id));
+    for (const Node& id : node["surfaces"].items()) add_new(surface(id), target.surfaces);
+    for (const Node& id : node["bodies"].items()) add_new(body(id), target.bodies);
     std::set<int> vertices;
     for (const Node& id : node["obstacles"].items()) {
       const std::vector<int>& of_id = obstacle(id);
@@ -39,62 +39,65 @@ class ForceReader {
   }
 
  private:
-  [[noreturn]] static void refuse(const Node& node, const char* what, const std::set<int>& ids) {
-    node.fail(abbreviate(node.json()) + ", which nothing has",
-              std::string(what) + ": " + list_ids(std::vector<int>(ids.begin(), ids.end())));
+  static void add_new(const std::vector<int>& ids, std::vector<int>& to) {
+    for (const int id : ids)
+      if (std::find(to.begin(), to.end(), id) == to.end()) to.push_back(id);
   }
 
-  int surface(const Node& node) const {
-    std::set<int> ids;
-    for (FacetId f = 0; f < mesh_.facet_slots(); ++f)
-      if (mesh_.facet_tag(f) != kNoTag) ids.insert(mesh_.facet_tag(f));
-    const int id = read_id(node, 0);
-    if (!ids.contains(id)) refuse(node, "the id of a surface_selection", ids);
-    return id;
+  std::vector<int> surface(const Node& node) const {
+    const Label label = read_label(node, 0);
+    std::vector<int> tags = sets_.surfaces.of(label);
+    std::erase_if(tags, [&](int tag) { return !facet_tags_.contains(tag); });
+    if (tags.empty()) sets_.surfaces.refuse(node, label, "the id of a surface: ");
+    return tags;
   }
 
-  int body(const Node& node) const {
-    if (node.json().is_string()) return named(node, parts_.bodies, "of a geometry whose volume_selection is a number");
-    std::set<int> ids;
-    for (CellId c = 0; c < mesh_.cell_slots(); ++c) ids.insert(mesh_.body(c));
-    const int id = read_id(node, 0);
-    if (!ids.contains(id)) refuse(node, "the id of a body", ids);
-    return id;
+  std::vector<int> body(const Node& node) const {
+    const Label label = read_label(node, 0);
+    if (sets_.bodies.of(label).empty()) sets_.bodies.refuse(node, label, "the id of a body: ");
+    return sets_.bodies.of(label);
   }
 
+  /// By the name of a geometry, or by what its `surface_selection` says.
   const std::vector<int>& obstacle(const Node& node) const {
-    if (node.json().is_string()) return named(node, parts_.obstacles, "of an obstacle");
-    const auto found = parts_.obstacles_by_id.find(read_id(node, 0));
-    if (found != parts_.obstacles_by_id.end()) return found->second;
+    const Label label = read_label(node, 0);
+    if (const auto found = parts_.obstacles.find(label.name); !label.name.empty() && found != parts_.obstacles.end())
+      return found->second;
+    for (const int id : sets_.surfaces.of(label))
+      if (const auto found = parts_.obstacles_by_id.find(id); found != parts_.obstacles_by_id.end()) return found->second;
     std::set<int> ids;
     for (const auto& [id, vertices] : parts_.obstacles_by_id) ids.insert(id);
-    refuse(node, "the surface_selection of an obstacle, or its name", ids);
-  }
-
-  template <typename Part>
-  static const Part& named(const Node& node, const std::map<std::string, Part>& parts, const char* of) {
-    const auto found = parts.find(node.string(""));
-    if (found != parts.end()) return found->second;
-    std::string names;
-    for (const auto& [name, part] : parts) names += (names.empty() ? "" : ", ") + name;
-    node.fail(abbreviate(node.json()) + ", which is no /geometry/*/name " + of,
-              names.empty() ? "an id: there are no names" : names);
+    std::string known = sets_.surfaces.list(&ids);
+    for (const auto& [name, vertices] : parts_.obstacles)
+      if (sets_.surfaces.of({0, name}).empty()) known += ", \"" + name + "\"";
+    node.fail(abbreviate(node.json()) + ", which nothing has",
+              "the surface_selection of an obstacle, or its name: " + known);
   }
 
   const PartNames& parts_;
-  const Mesh<Dim>& mesh_;
+  const Sets& sets_;
+  std::set<int> facet_tags_;
 };
+
+/// Ids by names, and by numbers that stand for others than themselves.
+std::map<std::string, std::vector<int>> ids_by_name(const LabelIds& labels) {
+  std::map<std::string, std::vector<int>> names;
+  for (const auto& [label, ids] : labels.all())
+    if (!label.name.empty() || ids != std::vector{label.number}) names.emplace(text_of(label), ids);
+  return names;
+}
 
 }  // namespace
 
 template <int Dim>
-PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles) {
+PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles, const Sets& sets) {
   PartNames parts;
+  parts.bodies = ids_by_name(sets.bodies);
   for (const Node& geometry : geometries.bodies) {
     const Node selection = geometry["volume_selection"];
     const std::string name = geometry["name"].string("");
-    if (!name.empty() && selection.exists() && selection.json().is_number())
-      parts.bodies.emplace(name, read_id(selection, 0));
+    if (!name.empty() && selection.exists() && !selection.json().is_structured())
+      parts.bodies.emplace(name, sets.bodies.of(read_label(selection, 0)));
   }
   std::map<std::string, std::size_t> first;
   for (std::size_t i = 0; i < geometries.obstacles.size(); ++i)
@@ -106,12 +109,18 @@ PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& 
   }
   for (std::size_t v = 0; v < obstacles.id.size(); ++v)
     if (obstacles.id[v] != kNoTag) parts.obstacles_by_id[obstacles.id[v]].push_back(static_cast<int>(v));
+  for (auto& [name, ids] : ids_by_name(sets.surfaces)) {
+    for (const int id : ids)
+      if (const auto found = parts.obstacles_by_id.find(id); found != parts.obstacles_by_id.end())
+        parts.obstacles.emplace(name, found->second);
+    parts.surfaces.emplace(name, ids);
+  }
   return parts;
 }
 
 template <int Dim>
-std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, const Mesh<Dim>& mesh) {
-  const ForceReader<Dim> reader(parts, mesh);
+std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh) {
+  const ForceReader<Dim> reader(parts, sets, mesh);
   std::vector<ForceTarget> targets;
   std::set<std::string> names;
   for (const Node& node : root["output"]["forces"].items()) {
@@ -121,9 +130,9 @@ std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, c
   return targets;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                      \
-  template PartNames name_parts(const Geometries&, const ObstacleGeometry<Dim>&); \
-  template std::vector<ForceTarget> read_forces(const Node&, const PartNames&, const Mesh<Dim>&);
+#define ITR_INSTANTIATE(Dim)                                                                   \
+  template PartNames name_parts(const Geometries&, const ObstacleGeometry<Dim>&, const Sets&); \
+  template std::vector<ForceTarget> read_forces(const Node&, const PartNames&, const Sets&, const Mesh<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

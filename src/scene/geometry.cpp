@@ -8,15 +8,19 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
 
+#include "file_parts.hpp"
 #include "mesh/refine.hpp"
 #include "selection.hpp"
 #include "transformation.hpp"
 
 namespace itr::scene {
+
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -29,9 +33,9 @@ template <int Dim>
 struct Collected {
   std::vector<Vec<Dim>> rest;
   std::vector<typename Mesh<Dim>::Cell> cells;
-  std::vector<int> body;
-  std::vector<std::pair<typename Mesh<Dim>::Facet, int>> tagged;
-  std::vector<int> point_tags;  ///< by vertex, inner ones included
+  std::vector<int> body;                                          ///< keys of Sets::bodies
+  std::vector<std::pair<typename Mesh<Dim>::Facet, int>> tagged;  ///< facets with keys of Sets::surfaces
+  std::vector<int> point_tags;                                    ///< such keys by vertex, inner ones included
 };
 
 template <int Dim>
@@ -43,8 +47,6 @@ std::string corner_text(const Vec<Dim>& p) {
 
 const std::vector<std::array<int, 3>>& cells_of(const MeshFile& file, const Vec<2>&) { return file.triangles; }
 const std::vector<std::array<int, 4>>& cells_of(const MeshFile& file, const Vec<3>&) { return file.tetrahedra; }
-const std::vector<int>& bodies_of(const MeshFile& file, const Vec<2>&) { return file.triangle_body; }
-const std::vector<int>& bodies_of(const MeshFile& file, const Vec<3>&) { return file.tetrahedron_body; }
 
 template <int Dim>
 double signed_volume(const std::vector<Vec<Dim>>& points, const typename Mesh<Dim>::Cell& cell) {
@@ -61,32 +63,27 @@ double longest_edge(const std::vector<Vec<Dim>>& points, const typename Mesh<Dim
   return longest;
 }
 
-/// Triangles are turned to positive area; tetrahedra only if the transformation is a mirror: a file with inverted ones is
-/// wrong.
+/// Cells are turned to positive volume. Triangles have no side that is right, so nothing is said of theirs.
 template <int Dim>
 void orient_cells(const Node& geometry, const std::vector<Vec<Dim>>& points, bool is_mirror,
-                  std::vector<typename Mesh<Dim>::Cell>& cells) {
-  std::vector<int> degenerate, inverted;
+                  std::vector<typename Mesh<Dim>::Cell>& cells, std::vector<std::string>& warnings) {
+  std::vector<int> degenerate;
+  std::size_t turned = 0;
   for (int c = 0; c < static_cast<int>(cells.size()); ++c) {
     auto& cell = cells[c];
     if (is_mirror) std::swap(cell[0], cell[1]);
-    double volume = signed_volume<Dim>(points, cell);
-    if (Dim == 2 && volume < 0) {
-      std::swap(cell[0], cell[1]);
-      volume = -volume;
-    }
-    if (!(std::abs(volume) > kLeastShape * std::pow(longest_edge<Dim>(points, cell), Dim)))
-      degenerate.push_back(c);
-    else if (volume < 0)
-      inverted.push_back(c);
+    const double volume = signed_volume<Dim>(points, cell);
+    if (!(std::abs(volume) > kLeastShape * std::pow(longest_edge<Dim>(points, cell), Dim))) degenerate.push_back(c);
+    if (volume >= 0) continue;
+    std::swap(cell[0], cell[1]);
+    ++turned;
   }
-  const auto refuse = [&](const char* what, const std::vector<int>& ids) {
-    if (!ids.empty())
-      geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + " with " + what + " elements " + list_ids(ids),
-                            "elements of positive volume");
-  };
-  refuse("degenerate", degenerate);
-  refuse("inverted", inverted);
+  if (!degenerate.empty())
+    geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + " with degenerate elements " + list_ids(degenerate),
+                          "elements of positive volume");
+  if (Dim == 3 && turned > 0)
+    warnings.push_back(fmt::format("{}: {} of {} elements list their corners the other way round: turned",
+                                   geometry["mesh"].pointer(), turned, cells.size()));
 }
 
 /// Refuses what formats without indices leave: every cell with vertices of its own, where others have theirs.
@@ -108,9 +105,9 @@ void check_connected(const Node& geometry, const std::vector<Vec<Dim>>& points,
                           "a mesh whose elements share vertices (merge those that coincide)");
 }
 
-/// Removes points that no cell uses; returns how many there were.
+/// Removes points that no cell uses; returns the new ids by the old ones.
 template <int Dim>
-std::size_t drop_unused(std::vector<Vec<Dim>>& points, std::vector<typename Mesh<Dim>::Cell>& cells) {
+std::vector<int> drop_unused(std::vector<Vec<Dim>>& points, std::vector<typename Mesh<Dim>::Cell>& cells) {
   std::vector<int> renumbered(points.size(), kNone);
   for (const auto& cell : cells)
     for (const int v : cell) renumbered[v] = 0;
@@ -120,11 +117,10 @@ std::size_t drop_unused(std::vector<Vec<Dim>>& points, std::vector<typename Mesh
     points[used] = points[v];
     renumbered[v] = used++;
   }
-  const std::size_t unused = points.size() - static_cast<std::size_t>(used);
   points.resize(used);
   for (auto& cell : cells)
     for (int& v : cell) v = renumbered[v];
-  return unused;
+  return renumbered;
 }
 
 template <int Dim>
@@ -147,21 +143,100 @@ Mesh<Dim> refine(Mesh<Dim> mesh, const Node& node) {
   return mesh;
 }
 
-/// Adds the mesh, with ids by the geometry's selections, and its copies.
+template <int Dim, std::size_t N>
+Vec<Dim> barycenter(const Mesh<Dim>& mesh, const std::array<VertexId, N>& vertices) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const int v : vertices) sum += mesh.rest(v);
+  return sum / static_cast<double>(N);
+}
+
+/// Keys of the cells, facets and vertices of one geometry: by its selections, and by the groups of its file.
 template <int Dim>
-void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, Collected<Dim>& all,
+class Keys {
+ public:
+  Keys(const Node& geometry, const Box<Dim>& box, const FileParts<Dim>& parts, const References& references, Sets& sets)
+      : volumes(geometry["volume_selection"], box),
+        surfaces(geometry["surface_selection"], box),
+        points(geometry["point_selection"], box),
+        parts_(parts),
+        sets_(sets) {
+    if (const Label name{0, geometry["name"].string("")}; references.bodies.contains(name)) name_.insert(name);
+  }
+
+  /// A selection decides the number; names of the file, and that of the geometry, stay.
+  int of_cell(const Vec<Dim>& p, int part) {
+    const FilePart& stored = parts_.part(part);
+    const std::optional<Label> selected = volumes(p, stored.number);
+    const Label label = selected.value_or(Label{stored.number});
+    const auto [found, is_new] = cells_.try_emplace({part, label}, 0);
+    if (is_new) {
+      std::set<Label> labels = stored.labels;
+      labels.insert(name_.begin(), name_.end());
+      labels.insert(label);
+      found->second = sets_.bodies.key(labels, selected || stored.preferred == 0 ? label.number : stored.preferred);
+      sets_.bodies.imply(found->second, selected ? "" : stored.name);
+    }
+    return found->second;
+  }
+  int of_facet(const Vec<Dim>& p, int part) { return of_surface(surfaces(p, number_of(part)), part); }
+  int of_vertex(const Vec<Dim>& p, int part) { return of_surface(points(p, number_of(part)), part); }
+
+  /// Whether groups of the file do not count where they have this number, since a selection gives it.
+  bool hides(int number) const { return surfaces.gives(number) || points.gives(number); }
+
+  Selection<Dim> volumes, surfaces, points;
+
+ private:
+  int number_of(int part) const { return part == kNoTag ? 0 : parts_.part(part).number; }
+  int of_surface(const std::optional<Label>& selected, int part) {
+    if (!selected && part == kNoTag) return kNoTag;
+    const auto [found, is_new] = facets_.try_emplace({part, selected}, kNoTag);
+    if (!is_new) return found->second;
+    std::set<Label> labels;
+    if (part != kNoTag)
+      for (const Label& label : parts_.part(part).labels)
+        if (!label.name.empty() || !hides(label.number)) labels.insert(label);
+    if (selected) labels.insert(*selected);
+    if (labels.empty()) return kNoTag;
+    found->second = sets_.surfaces.key(labels, part == kNoTag ? 0 : parts_.part(part).preferred);
+    const bool is_of_file = !selected && labels.size() == 1 && labels.begin()->number == parts_.part(part).number;
+    sets_.surfaces.imply(found->second, is_of_file ? parts_.part(part).name : "");
+    return found->second;
+  }
+
+  const FileParts<Dim>& parts_;
+  Sets& sets_;
+  std::set<Label> name_;  ///< of the geometry, if the scene asks for it
+  std::map<std::pair<int, Label>, int> cells_;
+  std::map<std::pair<int, std::optional<Label>>, int> facets_;
+};
+
+/// Warns of numbers that a selection and a group of the file give to different facets: the selection's counts.
+template <int Dim>
+void warn_of_hidden_groups(const Node& geometry, const Mesh<Dim>& mesh, const FileParts<Dim>& parts, const Keys<Dim>& keys,
+                           const References& references, std::vector<std::string>& warnings) {
+  for (const Label& label : references.surfaces) {
+    if (!label.name.empty() || !keys.hides(label.number)) continue;
+    bool is_there = false, differs = false;
+    for (FacetId f = 0; f < mesh.num_facets(); ++f) {
+      const bool is_of_file = parts.has_number(mesh.facet_tag(f), label.number);
+      is_there |= is_of_file;
+      differs |= is_of_file != (keys.surfaces(barycenter(mesh, mesh.facet(f))) == label);
+    }
+    if (is_there && differs)
+      warnings.push_back(fmt::format("{}: gives the id {}, which a group of the mesh file has too: the selection's counts",
+                                     geometry["surface_selection"].pointer(), label.number));
+  }
+}
+
+/// Adds the mesh, with ids by the geometry's selections and by its file, and its copies.
+template <int Dim>
+void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, Keys<Dim>& keys, Collected<Dim>& all,
              std::vector<std::string>& warnings) {
-  const auto barycenter = [&](const auto& vertices) {
-    Vec<Dim> sum = Vec<Dim>::Zero();
-    for (const int v : vertices) sum += mesh.rest(v);
-    return (sum / static_cast<double>(vertices.size())).eval();
-  };
-  const Selection<Dim> volumes(geometry["volume_selection"], box), surfaces(geometry["surface_selection"], box);
-  const Selection<Dim> points(geometry["point_selection"], box);
-  std::vector<int> body(mesh.num_cells()), tag(mesh.num_facets());
-  for (CellId c = 0; c < mesh.num_cells(); ++c)
-    body[c] = volumes(barycenter(mesh.cell(c)), mesh.body(c)).value_or(mesh.body(c));
-  for (FacetId f = 0; f < mesh.num_facets(); ++f) tag[f] = surfaces(barycenter(mesh.facet(f))).value_or(kNoTag);
+  std::vector<int> body(mesh.num_cells()), tag(mesh.num_facets()), point_tag(mesh.num_vertices());
+  for (CellId c = 0; c < mesh.num_cells(); ++c) body[c] = keys.of_cell(barycenter(mesh, mesh.cell(c)), mesh.body(c));
+  for (FacetId f = 0; f < mesh.num_facets(); ++f) tag[f] = keys.of_facet(barycenter(mesh, mesh.facet(f)), mesh.facet_tag(f));
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v) point_tag[v] = keys.of_vertex(mesh.rest(v), mesh.vertex_tag(v));
 
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) {
     const int first = static_cast<int>(all.rest.size());
@@ -169,10 +244,8 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, C
       for (int& v : vertices) v += first;
       return vertices;
     };
-    for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
-      all.rest.push_back(mesh.rest(v) + shift);
-      all.point_tags.push_back(points(mesh.rest(v)).value_or(kNoTag));
-    }
+    for (VertexId v = 0; v < mesh.num_vertices(); ++v) all.rest.push_back(mesh.rest(v) + shift);
+    all.point_tags.insert(all.point_tags.end(), point_tag.begin(), point_tag.end());
     for (CellId c = 0; c < mesh.num_cells(); ++c) all.cells.push_back(shifted(mesh.cell(c)));
     all.body.insert(all.body.end(), body.begin(), body.end());
     for (FacetId f = 0; f < mesh.num_facets(); ++f)
@@ -186,23 +259,31 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, C
           fmt::format("{}: selects nothing: no {} is in it, or rules before it took them; the mesh spans {} to {} {}",
                       pointer, what, corner_text<Dim>(low), corner_text<Dim>(high), units.name("m")));
   };
-  note_empty(volumes, "barycentre of a cell");
-  note_empty(surfaces, "barycentre of a boundary facet");
-  note_empty(points, "vertex");
+  note_empty(keys.volumes, "barycentre of a cell");
+  note_empty(keys.surfaces, "barycentre of a boundary facet");
+  note_empty(keys.points, "vertex");
 }
 
 template <int Dim>
-void read_body(const Node& geometry, const MeshFile& file, Collected<Dim>& all, std::vector<std::string>& warnings) {
+void read_body(const Node& geometry, const MeshFile& file, const References& references, Sets& sets, Collected<Dim>& all,
+               std::vector<std::string>& warnings) {
   std::vector<Vec<Dim>> points = points_of<Dim>(file);
   std::vector<typename Mesh<Dim>::Cell> cells = cells_of(file, Vec<Dim>());
   const bool is_mirror = transform<Dim>(points, geometry);
   const Box<Dim> box = bounding_box<Dim>(points);
   check_connected<Dim>(geometry, points, cells);
-  orient_cells<Dim>(geometry, points, is_mirror, cells);
-  if (const std::size_t unused = drop_unused<Dim>(points, cells); unused > 0)
-    warnings.push_back(geometry["mesh"].pointer() + ": " + std::to_string(unused) + " vertices in no cell are left out");
-  const Mesh<Dim> mesh = make_mesh<Dim>(geometry, std::move(points), std::move(cells), bodies_of(file, Vec<Dim>()));
-  collect<Dim>(geometry, refine<Dim>(mesh, geometry["n_refs"]), box, all, warnings);
+  orient_cells<Dim>(geometry, points, is_mirror, cells, warnings);
+  const std::vector<int> renumbered = drop_unused<Dim>(points, cells);
+  const std::string pointer = geometry["mesh"].pointer();
+  if (const auto unused = std::count(renumbered.begin(), renumbered.end(), kNone); unused > 0)
+    warnings.push_back(pointer + ": " + std::to_string(unused) + " vertices in no cell are left out");
+  FileParts<Dim> parts(file, references, sets);
+  Mesh<Dim> mesh = make_mesh<Dim>(geometry, std::move(points), std::move(cells), parts.cell_parts());
+  for (const std::string& note : parts.tag(mesh, renumbered)) warnings.push_back(pointer + ": " + note);
+  mesh = refine<Dim>(std::move(mesh), geometry["n_refs"]);
+  Keys<Dim> keys(geometry, box, parts, references, sets);
+  warn_of_hidden_groups<Dim>(geometry, mesh, parts, keys, references, warnings);
+  collect<Dim>(geometry, mesh, box, keys, all, warnings);
 }
 
 int dimension_of(const Node& geometry, const MeshFile& file) {
@@ -234,10 +315,43 @@ std::filesystem::path MeshFiles::find(const Node& name, const char* what) {
   return path;
 }
 
+namespace {
+
+/// Cells are straight at rest: edges that are curved by little are taken as straight, others if the scene says so.
+void straighten(const Node& geometry, const fs::path& path, const MeshFile& file, std::vector<std::string>& notes) {
+  constexpr double kMostSag = 0.01;
+  if (file.sagging_edges == 0) return;
+  const Node mesh = geometry["mesh"];
+  const std::string curved = fmt::format("{} edges that are curved at rest, by up to {:.2g} % of their length ({})",
+                                         file.sagging_edges, 100 * file.sag, file.sag_place);
+  const std::string name = path.filename().string();
+  if (!(file.sag <= kMostSag) && !geometry["advanced"]["force_linear_geometry"].boolean(false))
+    mesh.fail(abbreviate(mesh.json()) + " with " + curved,
+              "at most 1 %: more elements there, or the corners alone, by \"advanced\": {\"force_linear_geometry\": true} "
+              "beside \"mesh\"" +
+                  (path.extension() == ".msh"
+                       ? ", or by `echo 'Merge \"" + name +
+                             "\"; SetOrder 1; Save \"straight.msh\";' > straight.geo && gmsh straight.geo -`"
+                       : ""));
+  notes.push_back(mesh.pointer() + ": " + curved + ": taken as straight");
+}
+
+}  // namespace
+
 const MeshFile& MeshFiles::get(const Node& geometry) {
-  const std::filesystem::path path = find(geometry["mesh"], kMesh);
-  const auto found = files_.find(path.string());
-  return found != files_.end() ? found->second : files_.emplace(path.string(), read_mesh_file(path)).first->second;
+  const fs::path path = find(geometry["mesh"], kMesh);
+  const auto [found, is_new] = files_.try_emplace(path.string());
+  if (!is_new) return found->second;
+  MeshFile& file = found->second;
+  file = read_mesh_file(path);
+  straighten(geometry, path, file, notes_);
+  for (const std::string& note : file.notes) notes_.push_back(geometry["mesh"].pointer() + ": " + note);
+  return file;
+}
+
+void MeshFiles::take_notes(std::vector<std::string>& warnings) {
+  warnings.insert(warnings.end(), notes_.begin(), notes_.end());
+  notes_.clear();
 }
 
 std::string MeshFiles::hash(const Node& name, const char* what) {
@@ -297,13 +411,22 @@ int find_dimension(const Geometries& geometries, MeshFiles& files) {
 }
 
 template <int Dim>
-Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings) {
+Mesh<Dim> read_bodies(const Node& root, const Geometries& geometries, MeshFiles& files, Sets& sets,
+                      std::vector<std::string>& warnings) {
+  const References references = collect_references(root);
   Collected<Dim> all;
-  for (const Node& geometry : geometries.bodies) read_body<Dim>(geometry, files.get(geometry), all, warnings);
+  for (const Node& geometry : geometries.bodies)
+    read_body<Dim>(geometry, files.get(geometry), references, sets, all, warnings);
+  for (const Node& geometry : geometries.obstacles)
+    if (const Node id = geometry["surface_selection"]; id.exists()) sets.surfaces.key({read_obstacle_label(id)});
+  sets.bodies.choose();
+  sets.surfaces.choose();
+  for (int& body : all.body) body = sets.bodies.id(body);
   Mesh<Dim> mesh = make_mesh<Dim>(geometries.bodies.front(), std::move(all.rest), std::move(all.cells), std::move(all.body));
-  for (const auto& [facet, tag] : all.tagged) mesh.set_facet_tag(mesh.find_facet(facet), tag);
+  for (const auto& [facet, key] : all.tagged) mesh.set_facet_tag(mesh.find_facet(facet), sets.surfaces.id(key));
   for (VertexId v = 0; v < mesh.num_vertices(); ++v)
-    if (mesh.is_boundary(v)) mesh.set_vertex_tag(v, all.point_tags[v]);
+    if (mesh.is_boundary(v) && all.point_tags[v] != kNoTag) mesh.set_vertex_tag(v, sets.surfaces.id(all.point_tags[v]));
+  files.take_notes(warnings);
   return mesh;
 }
 
@@ -335,8 +458,8 @@ std::vector<Vec<Dim>> points_of(const MeshFile& file) {
   return points;
 }
 
-template Mesh<2> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
-template Mesh<3> read_bodies(const Geometries&, MeshFiles&, std::vector<std::string>&);
+template Mesh<2> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&);
+template Mesh<3> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&);
 template std::vector<Vec<2>> read_copies(const Node&, const Vec<2>&);
 template std::vector<Vec<3>> read_copies(const Node&, const Vec<3>&);
 template std::vector<Vec<2>> points_of(const MeshFile&);

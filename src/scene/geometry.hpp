@@ -7,6 +7,7 @@
 #include "itr/simulation/setup.hpp"
 #include "mesh/mesh_file.hpp"
 #include "node.hpp"
+#include "sets.hpp"
 
 namespace itr::scene {
 
@@ -15,6 +16,8 @@ class MeshFiles {
  public:
   /// The file that `geometry/mesh` names; InputError there if it is missing.
   const MeshFile& get(const Node& geometry);
+  /// Moves sentences on the files that were read since to the end of `warnings`.
+  void take_notes(std::vector<std::string>& warnings);
   static constexpr const char* kMesh = "the path of a mesh file";
   static constexpr const char* kWeights = "the path of an HDF5 file with weights";
   /// Hashes the bytes of the file that a value names (FNV-1a), in hexadecimal.
@@ -25,6 +28,7 @@ class MeshFiles {
  private:
   std::map<std::string, MeshFile> files_;
   std::map<std::string, std::string> hashes_;
+  std::vector<std::string> notes_;
 };
 
 /// Enabled geometries, in the order of the file. The others are not looked at further.
@@ -41,9 +45,14 @@ bool is_flat(const MeshFile& file);
 /// 2 or 3: what all bodies' meshes agree on.
 int find_dimension(const Geometries& geometries, MeshFiles& files);
 
-/// All bodies in one mesh, transformed, refined, with body ids and tags of facets and vertices.
+/// All bodies in one mesh, transformed, refined, with body ids and tags of facets and vertices, to which `sets` gets the
+/// labels; it gets those of obstacles, too.
 template <int Dim>
-Mesh<Dim> read_bodies(const Geometries& geometries, MeshFiles& files, std::vector<std::string>& warnings);
+Mesh<Dim> read_bodies(const Node& root, const Geometries& geometries, MeshFiles& files, Sets& sets,
+                      std::vector<std::string>& warnings);
+
+/// The label of an obstacle: it has one.
+Label read_obstacle_label(const Node& node);
 
 template <int Dim>
 struct ObstacleGeometry {
@@ -54,7 +63,7 @@ struct ObstacleGeometry {
 
 template <int Dim>
 ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
-                                     std::vector<std::string>& warnings);
+                                     const Sets& sets, std::vector<std::string>& warnings);
 
 /// The surface of the file that `holder` names as `mesh`, moved by the transformation of `geometry`. All points of the file
 /// are its vertices, in their order.

@@ -14,21 +14,23 @@ Json scalar_schema() { return {{"type", {"number", "string"}}}; }
 Json list_of(const Json& item) { return {{"type", "array"}, {"items", item}}; }
 Json any_of(const Json& a, const Json& b) { return {{"anyOf", {a, b}}}; }
 Json number_schema() { return {{"type", "number"}}; }
-Json id_schema() { return {{"type", "integer"}, {"minimum", 0}}; }
+Json natural_schema() { return {{"type", "integer"}, {"minimum", 0}}; }
+/// A number or a name.
+Json id_schema() { return any_of(natural_schema(), {{"type", "string"}}); }
 
 void check_names(const Node& node) {
   for (const Node& name : node.items()) name.string("");
 }
 
-void check_stiffness(const Node& node) {
-  if (node.json() == "adaptive") return;
-  if (!node.json().is_number()) node.fail("a number > 0, or \"adaptive\"");
-  node.positive(1);
-}
-
 void check_distance(const Node& node) {
   if (node.json() == "auto") return;
   if (!node.json().is_number()) node.fail("a number > 0, or \"auto\"");
+  node.positive(1);
+}
+
+void check_stiffness(const Node& node) {
+  if (node.json() == "adaptive" || node.json() == "auto") return;
+  if (!node.json().is_number()) node.fail("a number > 0, \"auto\" or \"adaptive\"");
   node.positive(1);
 }
 
@@ -39,7 +41,7 @@ const std::vector<Kind>& kinds() {
       {"non_negative", [](const Node& node) { node.non_negative(0); }, {{"type", "number"}, {"minimum", 0}}, "number >= 0"},
       {"share", nullptr, {{"type", "number"}, {"minimum", 0}, {"maximum", 1}}, "number of [0, 1]"},
       {"integer", [](const Node& node) { node.integer(0); }, {{"type", "integer"}}, "integer"},
-      {"natural", [](const Node& node) { node.integer_at_least(0, 0); }, id_schema(), "integer >= 0"},
+      {"natural", [](const Node& node) { node.integer_at_least(0, 0); }, natural_schema(), "integer >= 0"},
       {"count",
        [](const Node& node) { node.integer_at_least(1, 1); },
        {{"type", "integer"}, {"minimum", 1}},
@@ -53,16 +55,15 @@ const std::vector<Kind>& kinds() {
       {"number or numbers", nullptr, any_of(number_schema(), list_of(number_schema())), "number or list of numbers"},
       {"numbers", nullptr, list_of(number_schema()), "list of numbers"},
       {"booleans", nullptr, list_of({{"type", "boolean"}}), "list of booleans"},
-      {"counts", nullptr, any_of(id_schema(), list_of(id_schema())), "list of integers >= 1, one an axis"},
+      {"counts", nullptr, any_of(natural_schema(), list_of(natural_schema())), "list of integers >= 1, one an axis"},
       {"points", nullptr, list_of(list_of(number_schema())), "two lists of numbers"},
       {"axis", nullptr, {{"type", {"integer", "string"}}}, "integer or string"},
-      {"id", nullptr, id_schema(), "integer >= 0"},
-      {"id or ids", nullptr, any_of(id_schema(), list_of(id_schema())), "integer or list of integers"},
-      {"ids or names", nullptr, any_of({{"type", {"integer", "string"}}}, list_of({{"type", {"integer", "string"}}})),
-       "integer, name or list of these"},
-      {"id or all", nullptr, any_of(id_schema(), {{"const", "all"}}), "integer or \"all\""},
-      {"positive or adaptive", check_stiffness,
-       any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "adaptive"}}), "number > 0 or \"adaptive\""},
+      {"id", nullptr, id_schema(), "integer >= 0 or name"},
+      {"id or ids", nullptr, any_of(id_schema(), list_of(id_schema())), "integer, name or list of these"},
+      {"id or all", nullptr, id_schema(), "integer, name or \"all\""},
+      {"positive, auto or adaptive", check_stiffness,
+       any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"enum", {"auto", "adaptive"}}}),
+       "number > 0, \"auto\" or \"adaptive\""},
       {"positive or auto", check_distance, any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "auto"}}),
        "number > 0 or \"auto\""},
       {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }, {{"const", "consistent"}}, "\"consistent\""},

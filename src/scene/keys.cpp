@@ -19,6 +19,9 @@ constexpr const char* kUnwritten = "output of PolyFEM that is not written here";
 #define INTERPOLATION CONDITIONS "/*/interpolation/*"
 
 constexpr Key kKeys[] = {
+    {"/defaults", read, "itr|polyfem|itr-1|polyfem-1", "\"itr\"", "",
+     "what keys that the scene leaves out stand for: ITR's values, or those of PolyFEM; with a version, or the newest",
+     basic},
     {"/tests", ignored, "", "", "", "PolyFEM's own regression values"},
     {"/units/length", read, "nm|um|mm|cm|dm|m|km|in|ft", "\"m\"", "",
      "of all numbers of the scene, its meshes and results; defaults stay what they are in SI units", basic},
@@ -33,11 +36,13 @@ constexpr Key kKeys[] = {
     {"/geometry", read, "list", "", "", "bodies and obstacles, in this order; required", basic},
     {"/geometry/*", read, "", "", "", "one mesh file and what is made of it"},
     {"/geometry/*/mesh", read, "path", "", "",
-     "mesh file: .msh (Gmsh 2.2 or 4.1), .obj or .ply; relative to the scene's folder; required", basic},
+     "mesh file: .msh (Gmsh 2.2 or 4.1), .inp (Abaqus, CalculiX), .vtu, .vtp, .vtk, .stl, .obj or .ply; relative to the "
+     "scene's folder; required",
+     basic},
     {"/geometry/*/type", read, "mesh|mesh_array|plane|ground|mesh_sequence", "\"mesh\"", "",
      "mesh_array makes copies; plane and ground are flat obstacles without end, which need no file; "
      "mesh_sequence is not supported yet"},
-    {"/geometry/*/name", read, "string", "", "", "for /output/forces"},
+    {"/geometry/*/name", read, "string", "", "", "an id of all its cells, or of the obstacle in /output/forces"},
     {"/geometry/*/enabled", read, "boolean", "true", "", "false: as if the entry were not there, its file is not opened"},
     {"/geometry/*/is_obstacle", read, "boolean", "false", "",
      "only collides: it has no material and no unknowns, stands still or moves as prescribed", basic},
@@ -67,15 +72,18 @@ constexpr Key kKeys[] = {
      "before all that: moves and scales the mesh into the unit box"},
     {"/geometry/*/advanced/refinement_location", read, "number", "0.5", "",
      "where n_refs cuts an obstacle's edges, in (0, 1)"},
-    {"/geometry/*/advanced/force_linear_geometry", only, "", "false", "", "meshes are linear"},
+    {"/geometry/*/advanced/force_linear_geometry", read, "boolean", "false", "",
+     "takes the corners of a second-order mesh whose edges are curved at rest by more than 1 % of their length"},
     {"/geometry/*/advanced/min_component", only, "", "-1", "", "all components are kept"},
     {"/geometry/*/{volume,surface,point}_selection", read, "list", "", "",
      "ids of cells (which material), of boundary facets (which condition; for an obstacle one id), of boundary vertices "
-     "(held by conditions): a number for all, or rules, of which the first that matches wins",
+     "(held by conditions): an id for all, or rules, of which the first that matches wins; names of the mesh file stay, its "
+     "numbers where no rule gives others",
      basic},
     {"/geometry/*/{volume,surface,point}_selection/*", read, "id", "", "", "id of all, or a rule with an id and a region"},
     {SELECTION "/id", read, "id", "", "",
-     "given to what the region contains: barycentres of cells and facets, positions of vertices; no condition acts on id 0",
+     "number or name, given to what the region contains: barycentres of cells and facets, positions of vertices; no "
+     "condition acts on id 0",
      basic},
     {SELECTION "/id_offset", read, "integer", "0", "",
      "alone: added to ids of the file; with threshold: added to the side's number"},
@@ -102,7 +110,8 @@ constexpr Key kKeys[] = {
     {"/materials/*/type", read,
      "NeoHookean|LinearElasticity|HookeLinearElasticity|SaintVenant|FixedCorotational|MooneyRivlin|MooneyRivlin3Param", "",
      "", "the law, see docs/theory.md; required", basic},
-    {"/materials/*/id", read, "id or ids", "0", "", "of cells, as volume_selection or the mesh file gives them", basic},
+    {"/materials/*/id", read, "id or ids", "0", "", "number or name of cells, as volume_selection or the mesh file gives it",
+     basic},
     {"/materials/*/E", read, "number or expression", "", "Pa", "Young's modulus, > 0", basic},
     {"/materials/*/nu", read, "number or expression", "", "", "Poisson's ratio, in (-1, 0.5)", basic},
     {"/materials/*/{lambda,mu}", read, "number or expression", "", "Pa", "Lame's parameters, both, instead of E and nu"},
@@ -123,7 +132,8 @@ constexpr Key kKeys[] = {
      "pressures on the deformed surface, positive against the outward normal"},
     {"/boundary_conditions/obstacle_displacements", read, "list", "[]", "", "motion of obstacles", basic},
     {CONDITIONS "/*", read, "", "", "", "one condition; of several with one id the first wins"},
-    {CONDITIONS "/*/id", read, "id or all", "", "", "of surface_selection or point_selection, or \"all\"", basic},
+    {CONDITIONS "/*/id", read, "id or all", "", "",
+     "number or name, as surface_selection, point_selection or the mesh file gives it, or \"all\"", basic},
     {"/boundary_conditions/{dirichlet_boundary,obstacle_displacements}/*/value", read, "vector", "", "m",
      "displacement from rest at time t (not an increment)", basic},
     {"/boundary_conditions/neumann_boundary/*/value", read, "vector", "", "N/m^2",
@@ -181,7 +191,9 @@ constexpr Key kKeys[] = {
      "`itr explain` says",
      basic},
     {"/contact/dhat_percentage", read, "positive", "0.8", "", "see dhat"},
-    {"/contact/epsv", read, "positive", "0.001", "m/s", "sliding slower than this is smoothed to sticking"},
+    {"/contact/epsv", read, "positive or auto", "0.001", "m/s",
+     "sliding slower than this is smoothed to sticking; auto: a thousandth of the largest relative motion in a step without "
+     "inertia, else by a speed of the scene, as `itr explain` says"},
     {"/contact/friction_coefficient", read, "non_negative", "0", "", "Coulomb's, of all pairs; 0: no friction is computed",
      basic},
     {"/contact/use_convergent_formulation", read, "boolean", "false", "",
@@ -199,6 +211,10 @@ constexpr Key kKeys[] = {
     {"/contact/collision_mesh/{max_edge_length,tessellation_type}", refused, "", "", "", "not supported yet"},
 
     {"/solver/max_threads", read, "natural", "0", "", "0: all; results do not depend on it; --threads wins"},
+    {"/solver/lagging_tolerance", read, "non_negative", "0", "",
+     "rounds of solves for friction, pressure and damping go on until no force at a vertex changes by more than this part "
+     "of "
+     "the largest; a step that does not get there is cut (step_cuts), or else a warning says so; 0: rounds by number"},
     {"/solver/rayleigh_damping", read, "list", "[]", "", "damping in proportion to the Hessian of a term"},
     {"/solver/rayleigh_damping/*/form", read, "elasticity|contact", "", "", "of which term; required"},
     {"/solver/rayleigh_damping/*/stiffness", read, "non_negative", "", "s", "coefficient"},
@@ -216,11 +232,11 @@ constexpr Key kKeys[] = {
     {"/solver/linear/{precond,enable_overwrite_solver,max_iter,tolerance,Eigen,AMGCL,Hypre,Pardiso,MUMPS}", ignored, "", "",
      "", "options of PolyFEM's solvers"},
 
-    {"/solver/contact/barrier_stiffness", read, "positive or adaptive", "(from the stiffest body and dhat)", "",
-     "kappa: [Pa] with use_convergent_formulation; adaptive: follows the forces, as PolyFEM does unless a number is given; "
-     "larger: wider gaps, fewer iterations; docs/theory.md has the default, `itr run` and `itr explain` print it"},
-    {"/solver/contact/initial_barrier_stiffness", read, "positive", "1", "",
-     "where adaptive stiffness begins; given without barrier_stiffness it asks for it"},
+    {"/solver/contact/barrier_stiffness", read, "positive, auto or adaptive", "\"adaptive\"", "",
+     "kappa: [Pa] with use_convergent_formulation; auto: from the stiffest body and dhat (docs/theory.md; `itr run` and "
+     "`itr "
+     "explain` print it); adaptive: follows the forces, as PolyFEM does; larger: wider gaps, fewer iterations"},
+    {"/solver/contact/initial_barrier_stiffness", read, "positive", "1", "", "where adaptive stiffness begins"},
     {"/solver/contact/friction_iterations", read, "integer", "1", "",
      "solves a step, each with friction's normal forces of the one before; negative: until they agree; 0: no friction"},
     {"/solver/contact/friction_convergence_tol", read, "non_negative", "0.01", "N s", "when they agree, times dt"},
@@ -368,10 +384,11 @@ constexpr Key kKeys[] = {
      "curves of forces: forces.csv gets, by step, force and moment of contact, friction, reactions and all of them"},
     {"/output/forces/*", read, "", "", "", "one curve: of all vertices that it names, each once"},
     {"/output/forces/*/name", read, "string", "", "", "required"},
-    {"/output/forces/*/surfaces", read, "id or ids", "", "", "ids of surface_selection: what acts on these surfaces"},
-    {"/output/forces/*/bodies", read, "ids or names", "", "",
-     "ids of volume_selection, or names: what acts on these bodies"},
-    {"/output/forces/*/obstacles", read, "ids or names", "", "",
+    {"/output/forces/*/surfaces", read, "id or ids", "", "",
+     "as surface_selection or the mesh file gives them: what acts on these surfaces"},
+    {"/output/forces/*/bodies", read, "id or ids", "", "",
+     "as volume_selection or the mesh file gives them, or names of geometries: what acts on these bodies"},
+    {"/output/forces/*/obstacles", read, "id or ids", "", "",
      "ids of surface_selection, or names: what bodies do to these obstacles"},
     {"/output/forces/*/about", read, "numbers", "(the origin)", "m", "what moments are about"},
     {"/output/paraview/skip_frame", read, "count", "1", "", "store every n-th step", basic},

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "function.hpp"
 
@@ -243,10 +244,28 @@ std::vector<int> elements_of(const Mesh<Dim>& mesh, int body) {
   return elements;
 }
 
+/// The bodies of an entry. A number that no cell has is one of a list for several meshes; a name that nothing has is wrong.
+template <typename Bodies>
+std::vector<std::pair<Label, int>> ids_of(const Node& entry, const LabelIds& bodies, const Bodies& of_mesh) {
+  std::vector<std::pair<Label, int>> ids;
+  const auto add = [&](const Label& label) {
+    for (const int id : bodies.of(label)) ids.emplace_back(label, id);
+    if (bodies.of(label).empty() && !of_mesh.contains(label.number)) ids.emplace_back(label, label.number);
+  };
+  for (const Node& id : entry["id"].items()) {
+    const Label label = id.json().is_string() ? read_label(id, 0) : Label{id.integer(0)};
+    if (!label.name.empty() && bodies.of(label).empty()) bodies.refuse(id, label, "the id of a body: ");
+    add(label);
+  }
+  if (!entry.has("id")) add({0});
+  return ids;
+}
+
 }  // namespace
 
 template <int Dim>
-std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, std::vector<std::string>& warnings) {
+std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies, const Mesh<Dim>& mesh,
+                                       std::vector<std::string>& warnings) {
   const Node node = root["materials"];
   if (!node.exists()) node.fail("the materials of the bodies");
   const auto points = barycenters_by_body(mesh);
@@ -260,16 +279,19 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
     for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body, warnings);
     return materials;
   }
+  std::map<int, Label> first_label;
   for (const Node& entry : node.items()) {
     MaterialReader reader(entry, Dim);
-    std::vector<int> ids;
-    for (const Node& id : entry["id"].items()) ids.push_back(id.integer(0));
-    if (!entry.has("id")) ids = {0};
-    for (const int id : ids) {
+    for (const auto& [label, id] : ids_of(entry, bodies, points)) {
       const auto of_body = points.find(id);
       const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second, warnings);
+      const auto [first, is_new] = first_label.emplace(id, label);
+      if (!is_new && first->second != label)
+        entry.fail("a second material, of \"" + text_of(label) + "\", for elements " + list_ids(elements_of(mesh, id)) +
+                       ", which are in \"" + text_of(first->second) + "\" too",
+                   "one for every body");
       if (!materials.insert_or_assign(id, material).second)
-        warnings.push_back(entry.pointer() + ": replaces the material before it of id " + std::to_string(id));
+        warnings.push_back(entry.pointer() + ": replaces the material before it of id " + text_of(label));
     }
   }
   for (const auto& [body, of_body] : points)
@@ -280,7 +302,7 @@ std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, 
   return materials;
 }
 
-template std::map<int, Material> read_materials(const Node&, const Mesh<2>&, std::vector<std::string>&);
-template std::map<int, Material> read_materials(const Node&, const Mesh<3>&, std::vector<std::string>&);
+template std::map<int, Material> read_materials(const Node&, const LabelIds&, const Mesh<2>&, std::vector<std::string>&);
+template std::map<int, Material> read_materials(const Node&, const LabelIds&, const Mesh<3>&, std::vector<std::string>&);
 
 }  // namespace itr::scene

@@ -6,12 +6,14 @@
 
 #include "itr/scene/scene.hpp"
 #include "node.hpp"
+#include "sets.hpp"
 
 namespace itr::scene {
 
 /// By body id. InputError for a body of the mesh without one, and for moduli or densities out of range; those that vary are
 /// looked at in every element.
 template <int Dim>
-std::map<int, Material> read_materials(const Node& root, const Mesh<Dim>& mesh, std::vector<std::string>& warnings);
+std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies, const Mesh<Dim>& mesh,
+                                       std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

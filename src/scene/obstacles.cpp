@@ -141,9 +141,8 @@ void check_lengths(const Node& mesh, const Surface& surface, const std::vector<V
                 "no degenerate surfaces");
 }
 
-int read_obstacle_id(const Node& node) {
-  if (node.exists() && !node.json().is_number()) node.fail("an integer: an obstacle has one id");
-  return node.exists() ? read_id(node, 0) : kNoTag;
+int read_obstacle_id(const Node& node, const Sets& sets) {
+  return node.exists() ? sets.surfaces.of(read_obstacle_label(node)).front() : kNoTag;
 }
 
 template <int Dim>
@@ -163,7 +162,7 @@ void append(const Surface& surface, const std::vector<Vec<Dim>>& points, const V
 }
 
 template <int Dim>
-void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<Dim>& out) {
+void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets, ObstacleGeometry<Dim>& out) {
   if (Dim == 2 && !is_flat(file))
     geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + ", a surface in space, where no body has tetrahedra (2D)",
                           "a line or a flat mesh");
@@ -176,14 +175,14 @@ void read_obstacle(const Node& geometry, const MeshFile& file, ObstacleGeometry<
   if (extract == 2) surface.triangles.clear();
   if (extract == 3) surface.triangles.clear(), surface.edges.clear();
   check_lengths<Dim>(geometry["mesh"], surface, points);
-  const int id = read_obstacle_id(geometry["surface_selection"]);
+  const int id = read_obstacle_id(geometry["surface_selection"], sets);
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
 }
 
 /// One edge or triangle that reaches ten times as far as the bodies do at the start, seen from above their middle: an edge
 /// inside of the plane would add pairs to those of the faces beside it, whose barrier pushes sideways.
 template <int Dim>
-void read_flat(const Node& geometry, const Box<Dim>& bodies, ObstacleGeometry<Dim>& out) {
+void read_flat(const Node& geometry, const Box<Dim>& bodies, const Sets& sets, ObstacleGeometry<Dim>& out) {
   constexpr double kReach = 10;
   Vec<Dim> point = Vec<Dim>::Zero(), normal = Vec<Dim>::Unit(1);
   const auto read_point = [](const Node& node, Vec<Dim>& result) {
@@ -218,31 +217,37 @@ void read_flat(const Node& geometry, const Box<Dim>& bodies, ObstacleGeometry<Di
   }
   surface.is_used.assign(points.size(), true);
   out.obstacles.flats.push_back(static_cast<int>(out.obstacles.rest.size()));
-  append<Dim>(surface, points, Vec<Dim>::Zero(), read_obstacle_id(geometry["surface_selection"]), out);
+  append<Dim>(surface, points, Vec<Dim>::Zero(), read_obstacle_id(geometry["surface_selection"], sets), out);
 }
 
 }  // namespace
 
 template <int Dim>
 ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
-                                     std::vector<std::string>& warnings) {
+                                     const Sets& sets, std::vector<std::string>& warnings) {
   ObstacleGeometry<Dim> all;
-  std::map<int, std::string> pointers;  // of ids
+  std::map<Label, std::string> pointers;
   for (const Node& geometry : geometries.obstacles) {
     const int part = all.part.empty() ? 0 : all.part.back() + 1;
     if (is_flat_obstacle(geometry))
-      read_flat<Dim>(geometry, rest_box(bodies), all);
+      read_flat<Dim>(geometry, rest_box(bodies), sets, all);
     else
-      read_obstacle<Dim>(geometry, files.get(geometry), all);
+      read_obstacle<Dim>(geometry, files.get(geometry), sets, all);
     all.part.resize(all.obstacles.rest.size(), part);
     const Node node = geometry["surface_selection"];
     if (!node.exists()) continue;
-    const auto [first, is_new] = pointers.try_emplace(read_obstacle_id(node), geometry.pointer());
+    const auto [first, is_new] = pointers.try_emplace(read_obstacle_label(node), geometry.pointer());
     if (!is_new)
-      warnings.push_back(node.pointer() + ": " + first->second + " has the id " + std::to_string(first->first) +
+      warnings.push_back(node.pointer() + ": " + first->second + " has the id " + text_of(first->first) +
                          " too: what names it acts on both obstacles");
   }
+  files.take_notes(warnings);
   return all;
+}
+
+Label read_obstacle_label(const Node& node) {
+  if (!node.json().is_number() && !node.json().is_string()) node.fail("a number or a name: an obstacle has one id");
+  return read_label(node, 0);
 }
 
 template <int Dim>
@@ -259,7 +264,9 @@ Obstacles<Dim> read_surface(const Node& holder, const Node& geometry, MeshFiles&
 
 template Obstacles<2> read_surface(const Node&, const Node&, MeshFiles&);
 template Obstacles<3> read_surface(const Node&, const Node&, MeshFiles&);
-template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&, const Mesh<2>&, std::vector<std::string>&);
-template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&, const Mesh<3>&, std::vector<std::string>&);
+template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&, const Mesh<2>&, const Sets&,
+                                            std::vector<std::string>&);
+template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&, const Mesh<3>&, const Sets&,
+                                            std::vector<std::string>&);
 
 }  // namespace itr::scene

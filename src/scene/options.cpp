@@ -45,7 +45,10 @@ void read_integrator(const Node& node, TimeOptions& options) {
 void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>& warnings) {
   const Node tend = time["tend"], dt = time["dt"], steps = time["time_steps"];
   const Units& units = time.document().units;
-  if (tend.exists() + dt.exists() + steps.exists() < 2) time.fail(abbreviate(time.json()), "two of tend, dt and time_steps");
+  Json found = Json::object();
+  for (const char* key : {"dt", "tend", "time_steps"})
+    if (time.has(key)) found[key] = time[key].json();
+  if (found.size() < 2) time.fail(abbreviate(found), "two of tend, dt and time_steps");
   if (tend.exists() && !(tend.number(0) > options.t0))
     tend.fail("a time after t0 = " + std::to_string(units.from_si(options.t0, "s")));
   const double duration = tend.number(0) - options.t0;
@@ -54,7 +57,7 @@ void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>
   if (!tend.exists()) return;
   if (steps.exists()) {
     if (std::abs(options.steps * options.dt - duration) > 1e-12 * std::max(1.0, duration))
-      time.fail(abbreviate(time.json()), "tend = t0 + dt * time_steps, or only two of them");
+      time.fail(abbreviate(found), "tend = t0 + dt * time_steps, or only two of them");
     return;
   }
   const double ratio = duration / options.dt, nearest = std::round(ratio);
@@ -158,15 +161,16 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   }
   options.convergent = contact["use_convergent_formulation"].boolean(false);
   options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
-  options.friction_velocity = contact["epsv"].positive(1e-3);
+  const Node epsv = contact["epsv"];
+  options.friction_velocity = epsv.exists() && epsv.json() == "auto" ? 0 : epsv.positive(1e-3);
   const Node stiffness = solver["barrier_stiffness"];
-  const bool is_adaptive_in_peers = solver.has("initial_barrier_stiffness");  // says where adaptive stiffness begins
-  options.adaptive_stiffness = stiffness.exists() ? stiffness.json() == "adaptive" : is_adaptive_in_peers;
+  const bool is_from_bodies = stiffness.exists() && stiffness.json() == "auto";
+  options.adaptive_stiffness = !stiffness.exists() || stiffness.json() == "adaptive";
   const Node first = solver["initial_barrier_stiffness"];
   // The plain form's barrier is in m^4, its stiffness an energy by that.
   const double unit = options.convergent ? units.factor("Pa") : units.factor("J") / std::pow(units.factor("m"), 4);
   if (options.adaptive_stiffness) options.barrier_stiffness = first.exists() ? unit * first.positive(1) : 1;
-  if (stiffness.exists() && !options.adaptive_stiffness) options.barrier_stiffness = unit * stiffness.positive(1);
+  if (!is_from_bodies && !options.adaptive_stiffness) options.barrier_stiffness = unit * stiffness.positive(1);
   options.friction_iterations = solver["friction_iterations"].integer(1);
   options.friction_tolerance = solver["friction_convergence_tol"].non_negative(1e-2);
   return options;
@@ -382,7 +386,7 @@ FieldOptions read_fields(const Node& root) {
 
 bool read_lump_mass(const Node& root) { return root["solver"]["advanced"]["lump_mass_matrix"].boolean(false); }
 
-std::map<int, int> read_order(const Node& root, const std::set<int>& bodies) {
+std::map<int, int> read_order(const Node& root, const LabelIds& labels, const std::set<int>& bodies) {
   const auto order_of = [](const Node& node) {
     const int order = node.integer_at_least(1, 1);
     if (order > 2) node.fail("1 or 2: higher orders are not supported");
@@ -394,9 +398,12 @@ std::map<int, int> read_order(const Node& root, const std::set<int>& bodies) {
       for (const int body : bodies) order[body] = order_of(entry);
       continue;
     }
-    const int id = entry["id"].integer(0);
-    if (!bodies.contains(id)) entry["id"].fail("the id of a body");
-    order[id] = order_of(entry["order"]);
+    const Label label = read_label(entry["id"], 0);
+    if (labels.of(label).empty()) {
+      if (!entry.has("id")) entry["id"].fail("the id of a body");
+      labels.refuse(entry["id"], label, "the id of a body: ");
+    }
+    for (const int id : labels.of(label)) order[id] = order_of(entry["order"]);
   }
   return order;
 }

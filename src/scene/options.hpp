@@ -6,6 +6,7 @@
 #include <set>
 #include "itr/scene/scene.hpp"
 #include "node.hpp"
+#include "sets.hpp"
 
 namespace itr::scene {
 
@@ -34,7 +35,7 @@ std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& ti
 FieldOptions read_fields(const Node& root);
 bool read_lump_mass(const Node& root);
 /// Orders of elements by body, of those that `bodies` names.
-std::map<int, int> read_order(const Node& root, const std::set<int>& bodies);
+std::map<int, int> read_order(const Node& root, const LabelIds& labels, const std::set<int>& bodies);
 int read_quadrature_degree(const Node& root);
 
 }  // namespace itr::scene

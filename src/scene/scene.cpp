@@ -8,6 +8,7 @@
 #include "check_keys.hpp"
 #include "collision_mesh.hpp"
 #include "conditions.hpp"
+#include "defaults.hpp"
 #include "forces.hpp"
 #include "geometry.hpp"
 #include "materials.hpp"
@@ -50,9 +51,34 @@ std::set<int> body_ids(const Mesh<Dim>& mesh) {
   return ids;
 }
 
+/// Ids and names of a geometry that a program brings: every number stands for itself.
+template <int Dim>
+Sets sets_of(const Geometry<Dim>& geometry) {
+  Sets sets;
+  std::set<int> surfaces(geometry.id.begin(), geometry.id.end());
+  for (FacetId f = 0; f < geometry.mesh.facet_slots(); ++f) surfaces.insert(geometry.mesh.facet_tag(f));
+  for (VertexId v = 0; v < geometry.mesh.num_vertices(); ++v) surfaces.insert(geometry.mesh.vertex_tag(v));
+  surfaces.erase(kNoTag);
+  /// Parts of a boundary that are in others, too, have its number.
+  const auto fill = [](const std::set<int>& ids, const auto& names, bool have_number, LabelIds& labels) {
+    for (const int id : ids) {
+      std::set<Label> of_id;
+      for (const auto& [name, with] : names)
+        if (std::find(with.begin(), with.end(), id) != with.end())
+          of_id.insert({{have_number ? with.front() : id}, {0, name}});
+      labels.key(of_id.empty() ? std::set<Label>{{id}} : of_id, id);
+    }
+    labels.choose();
+  };
+  fill(body_ids(geometry.mesh), geometry.bodies, false, sets.bodies);
+  fill(surfaces, geometry.surfaces, true, sets.surfaces);
+  return sets;
+}
+
 /// All but geometry and the contact that comes with it.
 template <int Dim>
-void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup, std::vector<std::string>& warnings) {
+void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
+                std::vector<std::string>& warnings) {
   setup.time = read_time(root, warnings);
   setup.remesh = read_remesh(root);
   setup.linear = read_linear(root);
@@ -60,11 +86,12 @@ void read_model(const Node& root, ObstacleGeometry<Dim> obstacles, Setup<Dim>& s
   setup.fields = read_fields(root);
   setup.lump_mass = read_lump_mass(root);
   setup.lagged_load_tolerance = root["solver"]["advanced"]["lagged_load_tolerance"].positive(setup.lagged_load_tolerance);
-  setup.order = read_order(root, body_ids(setup.mesh));
+  setup.lagging_tolerance = root["solver"]["lagging_tolerance"].non_negative(0);
+  setup.order = read_order(root, sets.bodies, body_ids(setup.mesh));
   setup.quadrature_degree = read_quadrature_degree(root);
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, rest_box(setup.mesh).diagonal().norm()});
-  setup.materials = read_materials(root, setup.mesh, warnings);
-  read_conditions<Dim>(root, std::move(obstacles), setup, warnings);
+  setup.materials = read_materials(root, sets.bodies, setup.mesh, warnings);
+  read_conditions<Dim>(root, sets, std::move(obstacles), setup, warnings);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }
 
@@ -73,15 +100,17 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
                       std::vector<std::string>& warnings) {
   Setup<Dim> setup;
   setup.units = root.document().units;
-  setup.mesh = read_bodies<Dim>(geometries, files, warnings);
+  Sets sets;
+  setup.mesh = read_bodies<Dim>(root, geometries, files, sets, warnings);
+  setup.names = {sets.bodies.names(), sets.surfaces.names()};
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
     for (const Node& geometry : *list)
       for (const char* key : {"translation", "dimensions", "scale"})
         warn_of_components(geometry["transformation"][key], Dim, warnings, true);
-  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, warnings);
-  parts = name_parts<Dim>(geometries, obstacles);
-  std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, setup.mesh);
-  read_model<Dim>(root, std::move(obstacles), setup, warnings);
+  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, sets, warnings);
+  parts = name_parts<Dim>(geometries, obstacles, sets);
+  std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, sets, setup.mesh);
+  read_model<Dim>(root, sets, std::move(obstacles), setup, warnings);
   setup.fields.curves = std::move(curves);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
@@ -100,8 +129,9 @@ void for_each_file(const Node& root, const Geometries& geometries, const Functio
   f(node["linear_map"], MeshFiles::kWeights);
 }
 
-std::string make_identity(const Node& root, const Geometries& geometries, MeshFiles& files) {
-  Json identity = root.json();
+std::string make_identity(Json identity, const std::string& defaults, const Node& root, const Geometries& geometries,
+                          MeshFiles& files) {
+  identity["defaults"] = defaults;
   identity.erase("output");
   identity.erase("tests");
   if (identity.contains("solver") && identity["solver"].is_object()) identity["solver"].erase("max_threads");
@@ -125,6 +155,11 @@ Change::Of kind_of_change(const std::string& path, bool has_step) {
 }
 
 }  // namespace
+
+std::string defaults_of(const std::string& identity) {
+  const Json scene = Json::parse(identity, nullptr, false);
+  return scene.is_object() ? scene.value("defaults", "") : "";
+}
 
 std::vector<Change> find_changes(const std::string& before, const std::string& now) {
   const Json old_scene = Json::parse(before, nullptr, false), new_scene = Json::parse(now, nullptr, false);
@@ -154,10 +189,12 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   document.units = read_units(root);
   check_keys(document, scene.warnings);
   MeshFiles files;
+  const Json as_written = document.json;
+  scene.defaults = apply_defaults(document);
   const Geometries geometries = list_geometries(root);
+  scene.identity = make_identity(as_written, scene.defaults.name, root, geometries, files);
   scene.max_threads = root["solver"]["max_threads"].integer_at_least(0, 0);
   scene.directory = root["output"]["directory"].string("");
-  scene.identity = make_identity(root, geometries, files);
   scene.warnings.insert(scene.warnings.end(), document.warnings.begin(), document.warnings.end());
   for_each_file(root, geometries, [&](const Node& name, const char*) {
     warn_of_working_folder(name.pointer(), name.string(""), document.root, document.file, scene.warnings);
@@ -174,16 +211,19 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
 template <int Dim>
 Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const std::vector<Override>& overrides,
                       std::vector<std::string>& warnings) {
-  const Document document = parse_document(options, "options", overrides);
+  Document document = parse_document(options, "options", overrides);
   check_keys(document, warnings);
+  apply_defaults(document);
   const Node root(document);
   for (const char* key : {"geometry", "output"})
     if (root.has(key)) root[key].fail("the key", "no such key: the program brings these itself");
   if (!read_units(root).is_si()) root["units"].fail("SI units: a program brings its geometry in metres");
+  const Sets sets = sets_of(geometry);
   Setup<Dim> setup;
+  setup.names = {sets.bodies.names(), sets.surfaces.names()};
   setup.mesh = std::move(geometry.mesh);
   geometry.obstacles.motion.assign(geometry.obstacles.rest.size(), kNone);
-  read_model<Dim>(root, {std::move(geometry.obstacles), std::move(geometry.id)}, setup, warnings);
+  read_model<Dim>(root, sets, {std::move(geometry.obstacles), std::move(geometry.id)}, setup, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;
 }

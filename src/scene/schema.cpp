@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "defaults.hpp"
 #include "itr/scene/scene.hpp"
 #include "key_table.hpp"
 #include "simulation/unsupported.hpp"
@@ -11,11 +12,19 @@ namespace itr::scene {
 
 namespace {
 
+/// ITR's default of a key; null where it is PolyFEM's.
+const Default* find_default(const std::string& pointer) {
+  for (const Default& row : itr_defaults())
+    if (pointer == row.pointer) return &row;
+  return nullptr;
+}
+
 void describe(const Entry& entry, Json& schema) {
   std::string text = entry.key->meaning;
   if (const std::string unit = entry.key->unit; !unit.empty()) text += " [" + unit + "]";
   schema["description"] = text;
   if (!entry.fallback.is_discarded()) schema["default"] = entry.fallback;
+  if (const Default* row = find_default(entry.key->pointer)) schema["default"] = Json::parse(row->value);
 }
 
 Json schema_of(const std::string& pattern);
@@ -75,6 +84,8 @@ std::string row(const Key& key) {
     names += (names.empty() ? "`" : ", `") + name + "`";
   if (key.level == Level::basic) names = "**" + names + "**";
   if (!fallback.empty() && fallback[0] != '(') fallback = "`" + fallback + "`";
+  if (const Default* itr = find_default(pointer))
+    fallback = "`" + std::string(itr->value) + "`; PolyFEM's: " + (fallback.empty() ? "none" : fallback);
   return "| " + names + " | " + in_cell(kind_of(key).words) + " | " + in_cell(fallback) + " | " + key.unit + " | " +
          in_cell(key.meaning) + " |\n";
 }
@@ -153,6 +164,21 @@ std::string list_of_basic_keys() {
   return text + "\n";
 }
 
+/// Lists where ITR's defaults are others than PolyFEM's, and why.
+std::string section_of_defaults() {
+  std::string text =
+      "\n## Defaults\n\nThere are two sets. A scene that says nothing gets ITR's. `\"defaults\": \"polyfem\"`, or "
+      "`itr run --defaults polyfem`, gives those of PolyFEM. `summary.json` and saved states name the set with its version, "
+      "such as `itr-1`, and `--resume` keeps it. `itr explain` prints what a scene gets. These keys have other defaults in "
+      "ITR's set:\n\n| key | ITR | PolyFEM | why |\n|---|---|---|---|\n";
+  for (const Default& row : itr_defaults()) {
+    const Entry* entry = key_table().find(row.pointer);
+    text += "| `" + std::string(row.pointer) + "` | `" + row.value + "` | `" + entry->key->fallback + "` | " + row.reason +
+            " |\n";
+  }
+  return text;
+}
+
 /// Section of refusals: combinations, values, keys.
 std::string section_of_refusals() {
   std::string text =
@@ -184,7 +210,7 @@ A file may build on another one. `"common": "base.json"` takes the keys of that 
 objects key by key, lists as a whole, and `null` removes a key. Then `"patch"` is applied, a list of JSON Patch operations. Then
 `--set /json/pointer=VALUE` acts. Paths are relative to `root_path`, by default the folder of the file that is run.
 
-Jump to: [basic keys](#basic-keys), [not there yet](#not-there-yet), [not written](#not-written), [without effect](#without-effect).
+Jump to: [basic keys](#basic-keys), [defaults](#defaults), [not there yet](#not-there-yet), [not written](#not-written), [without effect](#without-effect).
 )";
 
 }  // namespace
@@ -202,8 +228,8 @@ std::string json_schema() {
 }
 
 std::string reference_page() {
-  return std::string(kIntroduction) + list_of_basic_keys() + tables_of_what_is_read() + section_of_refusals() +
-         "\n## Not written\n\nOutput of PolyFEM. A scene that asks for it gets a warning.\n\n" +
+  return std::string(kIntroduction) + list_of_basic_keys() + section_of_defaults() + tables_of_what_is_read() +
+         section_of_refusals() + "\n## Not written\n\nOutput of PolyFEM. A scene that asks for it gets a warning.\n\n" +
          list_of_others(Role::unwritten) + "\n## Without effect\n\nKnown to PolyFEM, and passed over here.\n\n" +
          list_of_ignored();
 }

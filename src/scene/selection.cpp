@@ -9,13 +9,6 @@ namespace {
 constexpr double kNear = 1e-7;  ///< of the geometry's diagonal: how far from a side a threshold below 0 selects
 }  // namespace
 
-int read_id(const Node& node, int fallback) {
-  if (node.exists() && node.json().is_string()) node.fail("an integer: files of ids are not supported yet");
-  const int id = node.integer(fallback);
-  if (id < 0 || id > 2147483646) node.fail("an id of 0 to 2147483646");
-  return id;
-}
-
 template <int Dim>
 Selection<Dim>::Selection(const Node& node, const Box<Dim>& box) : box_(box) {
   for (const Node& item : node.items()) {
@@ -27,11 +20,11 @@ Selection<Dim>::Selection(const Node& node, const Box<Dim>& box) : box_(box) {
 }
 
 template <int Dim>
-std::optional<int> Selection<Dim>::operator()(const Vec<Dim>& p, int stored) const {
+std::optional<Label> Selection<Dim>::operator()(const Vec<Dim>& p, int stored) const {
   for (std::size_t i = 0; i < rules_.size(); ++i)
-    if (const std::optional<int> id = rules_[i](p, stored)) {
+    if (std::optional<Label> label = rules_[i](p, stored)) {
       matched_[i] = 1;
-      return id;
+      return label;
     }
   return std::nullopt;
 }
@@ -45,14 +38,21 @@ std::vector<std::string> Selection<Dim>::unmatched() const {
 }
 
 template <int Dim>
-typename Selection<Dim>::Rule Selection<Dim>::read_rule(const Node& node) const {
-  if (!node.json().is_object()) return [id = read_id(node, 0)](const Vec<Dim>&, int) { return std::optional(id); };
+typename Selection<Dim>::Rule Selection<Dim>::read_rule(const Node& node) {
+  const auto read = [&](const Node& id) {
+    const Label label = read_label(id, 0);
+    if (label.name.empty()) numbers_.insert(label.number);
+    return label;
+  };
+  if (!node.json().is_object()) return [label = read(node)](const Vec<Dim>&, int) { return std::optional(label); };
   if (!node.has("box") && node.has("threshold")) return read_threshold(node);
   if (!node.has("id")) {
     if (node.json().size() != 1 || !node.has("id_offset")) node["id"].fail("the id of what is selected");
-    return [offset = node["id_offset"].integer(0)](const Vec<Dim>&, int stored) { return std::optional(stored + offset); };
+    return [offset = node["id_offset"].integer(0)](const Vec<Dim>&, int stored) {
+      return std::optional(Label{stored + offset});
+    };
   }
-  const int id = read_id(node["id"], 0);
+  const Label label = read(node["id"]);
   Test test;
   if (node.has("box"))
     test = read_box(node);
@@ -68,15 +68,16 @@ typename Selection<Dim>::Rule Selection<Dim>::read_rule(const Node& node) const 
     test = [](const Vec<Dim>&) { return true; };
   else
     node.fail("box, threshold, center, radius, axis or normal, beside the id");
-  return [test, id](const Vec<Dim>& p, int) { return test(p) ? std::optional(id) : std::nullopt; };
+  return [test, label](const Vec<Dim>& p, int) { return test(p) ? std::optional(label) : std::nullopt; };
 }
 
 /// Sides of the bounding box: left 1, bottom 2, right 3, top 4, back 5, front 6; the rest 7.
 template <int Dim>
-typename Selection<Dim>::Rule Selection<Dim>::read_threshold(const Node& node) const {
+typename Selection<Dim>::Rule Selection<Dim>::read_threshold(const Node& node) {
   const double given = node["threshold"].number(0);
   const double threshold = given < 0 ? kNear * box_.diagonal().norm() : given;
   const int offset = node["id_offset"].integer(0);
+  for (int side = 1; side <= 7; ++side) numbers_.insert(side + offset);
   return [box = box_, threshold, offset](const Vec<Dim>& p, int) {
     const auto is_near = [&](double a, double b) { return std::abs(a - b) < threshold; };
     int side = 7;
@@ -92,7 +93,7 @@ typename Selection<Dim>::Rule Selection<Dim>::read_threshold(const Node& node) c
       side = 5;
     else if (Dim == 3 && is_near(p[Dim - 1], box.max()[Dim - 1]))
       side = 6;
-    return std::optional(side + offset);
+    return std::optional(Label{side + offset});
   };
 }
 

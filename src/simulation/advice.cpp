@@ -15,6 +15,7 @@
 #include "geometry/measures.hpp"
 #include "mesh/connected_parts.hpp"
 #include "simulation/held_corners.hpp"
+#include "simulation/incoming_state.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
@@ -68,7 +69,7 @@ struct MeshFigures {
     size = box.sizes().maxCoeff();
     const Vec<Dim> middle = box.center();  // may lie outside of the bodies, where loads need not be defined
     center = mesh.rest(0);
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.is_vertex_alive(v) && (mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
   }
 };
@@ -152,9 +153,9 @@ void find_odd_stiffness(const Setup<Dim>& setup, std::vector<std::string>& found
 
 template <int Dim>
 void find_held(const Setup<Dim>& setup, std::vector<std::string>& found) {
-  const Space space = space_of_orders(setup.mesh, setup.order);
-  const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0 + setup.time.dt, space).held;
-  if (std::all_of(held.begin(), held.begin() + Dim * num_nodes(setup.mesh, space), [](char h) { return h != 0; }))
+  const Mesh<Dim> mesh = initial_mesh(setup);
+  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
+  if (std::all_of(held.begin(), held.begin() + Dim * mesh.num_nodes(), [](char h) { return h != 0; }))
     found.emplace_back("every vertex is held: there is nothing to solve for");
 }
 
@@ -163,9 +164,9 @@ template <int Dim>
 std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   const Mesh<Dim>& mesh = setup.mesh;
   const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
-  const std::vector<int> part = connected_parts<2>(mesh.vertex_slots(), mesh.edges());
+  const std::vector<int> part = connected_parts<2>(mesh.node_slots(), mesh.edges());
   std::set<int> fixed, loose, bodies;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < mesh.node_slots(); ++v)
     for (int c = 0; c < Dim; ++c)
       if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(part[v]);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
@@ -287,7 +288,7 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
   const State<Dim>& state = simulation.state();
   const double dhat = setup.contact.activation_distance;
   Workspace workspace;
-  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.space, state.chords);
+  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.chords);
   const ContactEnergy<Dim> energy(contact.surface, setup.contact, 1, 1);
   const double gap = energy.min_distance(contact.positions(state.history.x[0]), workspace);
   if (gap < dhat)
@@ -302,8 +303,8 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
           setup.units.text(dhat, "m"), 100 * dhat / size.thickness, body, setup.units.text(size.thickness, "m"),
           dhat > kLarge * size.thickness ? "tens of" : "some"));
   double shortest = kInfinity;
-  const std::vector<Vec<Dim>> rest = setup.proxy ? setup.proxy->rest : node_rest_positions(state.mesh, state.space);
-  const CollisionSurface surface = contact_surface(setup, state.mesh, state.space).surface;  // of nodes alone
+  const std::vector<Vec<Dim>> rest = setup.proxy ? setup.proxy->rest : state.mesh.rest();
+  const CollisionSurface surface = contact_surface(setup, state.mesh).surface;  // of nodes alone
   for (const auto& [a, b] : surface.edges)
     if (surface.counts[a]) shortest = std::min(shortest, (rest[a] - rest[b]).norm());
   if (dhat > shortest)

@@ -65,16 +65,10 @@ double height_over(const Corners<Dim>& corners, const std::array<Vec<Dim>, Dim*(
 template <int Dim>
 class ChordBound {
  public:
-  ChordBound(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels,
-             const RefinedChords<Dim>& chords, const VectorX& x)
-      : setup_(setup),
-        mesh_(mesh),
-        space_(space),
-        levels_(levels),
-        x_(x),
-        chords_(chords),
-        own_(static_cast<int>(chords_.facets.size())) {
-    const int nodes = num_nodes(mesh, space);
+  ChordBound(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels, const RefinedChords<Dim>& chords,
+             const VectorX& x)
+      : setup_(setup), mesh_(mesh), levels_(levels), x_(x), chords_(chords), own_(static_cast<int>(chords_.facets.size())) {
+    const int nodes = mesh.num_nodes();
     points_.reserve(chords_.points.size());
     for (const auto& weights : chords_.points) points_.push_back(combined<Dim>(weights, [&](int node) { return at(node); }));
     for (const auto& facet : chords_.facets) {
@@ -109,7 +103,7 @@ class ChordBound {
 
   ChordDemand demand() const {
     ChordDemand result{levels_, 0};
-    result.levels.resize(space_.num_curved(), 0);
+    result.levels.resize(mesh_.num_curved(), 0);
     const std::vector<double> excess = this->excess();
     for (FacetId f = 0; f < mesh_.facet_slots(); ++f) {
       result.excess = std::max(result.excess, excess[f]);
@@ -130,8 +124,8 @@ class ChordBound {
 
   /// Curves of which a halving can be taken back, for these positions.
   std::vector<char> find_lowerable() const {
-    std::vector<char> result(space_.num_curved(), 0);
-    for (int edge = 0; edge < space_.num_curved(); ++edge) result[edge] = level(edge) > 0;
+    std::vector<char> result(mesh_.num_curved(), 0);
+    for (int edge = 0; edge < mesh_.num_curved(); ++edge) result[edge] = level(edge) > 0;
     const std::vector<double> excess = this->excess(kSlack * kGainOfHalving);
     for (FacetId f = 0; f < mesh_.facet_slots(); ++f)
       if (excess[f] > 1) for_each_curve(f, [&](int edge) { result[edge] = 0; });
@@ -153,7 +147,7 @@ class ChordBound {
         Vec<Dim>& bulge = bulges[edge++] = Vec<Dim>::Zero();
         for (int a = 0; a < Dim; ++a)
           for (int b = 0; b < a; ++b) {
-            const int node = space_.node_of(facet[a], facet[b], mesh_.vertex_slots());
+            const int node = mesh_.node_of(facet[a], facet[b]);
             if (node == kNone) continue;
             is_curved = true;
             const double along_a = coordinates[k][a] - coordinates[l][a], along_b = coordinates[k][b] - coordinates[l][b];
@@ -195,12 +189,13 @@ class ChordBound {
     const auto& facet = mesh_.facet(f);
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < i; ++j)
-        if (const int edge = space_.find(facet[i], facet[j]); edge != kNone) visit(edge);
+        if (const int node = mesh_.node_of(facet[i], facet[j]); node != kNone) visit(node - mesh_.num_vertices());
   }
 
   int most_halvings(int edge) const {
-    const auto& [a, b] = space_.curved_edges()[edge];
-    const Vec<Dim> middle = at(mesh_.vertex_slots() + edge);
+    const int node = mesh_.num_vertices() + edge;
+    const auto [a, b] = mesh_.edge_of_node(node);
+    const Vec<Dim> middle = at(node);
     const double chord =
         std::min({(middle - at(a)).norm(), (at(b) - middle).norm(), (mesh_.rest(a) - mesh_.rest(b)).norm() / 2});
     const double halvings = std::floor(std::log2(chord / (kLeastChord * setup_.contact.activation_distance)));
@@ -209,7 +204,6 @@ class ChordBound {
 
   const StepSetup<Dim>& setup_;
   const Mesh<Dim>& mesh_;
-  const Space& space_;
   const ChordLevels& levels_;
   const VectorX& x_;
   const RefinedChords<Dim>& chords_;
@@ -221,8 +215,8 @@ class ChordBound {
 };
 
 template <int Dim>
-bool has_chords(const StepSetup<Dim>& setup, const Space& space) {
-  return setup.contact.enabled && !setup.proxy && !space.is_linear();
+bool has_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
+  return setup.contact.enabled && !setup.proxy && mesh.has_nodes();
 }
 
 /// The form in which levels are compared: empty where all are 0.
@@ -234,20 +228,20 @@ ChordLevels normalized(ChordLevels levels) {
 }  // namespace
 
 template <int Dim>
-ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space,
-                              const ChordLevels& levels, const VectorX& x) {
-  if (!has_chords(setup, space)) return {levels, 0};
-  ChordDemand demand = ChordBound<Dim>(setup, mesh, space, levels, refine_chords(mesh, space, levels), x).demand();
+ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
+                              const VectorX& x) {
+  if (!has_chords(setup, mesh)) return {levels, 0};
+  ChordDemand demand = ChordBound<Dim>(setup, mesh, levels, refine_chords(mesh, levels), x).demand();
   demand.levels = normalized(std::move(demand.levels));
   return demand;
 }
 
 template <int Dim>
-ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, ChordLevels levels,
+ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ChordLevels levels,
                            std::span<const VectorX> positions) {
   for (const VectorX& x : positions)
     for (int round = 0; round < kMostRounds; ++round) {
-      ChordLevels more = find_chord_demand(setup, mesh, space, levels, x).levels;
+      ChordLevels more = find_chord_demand(setup, mesh, levels, x).levels;
       if (more == levels) break;
       levels = std::move(more);
     }
@@ -255,13 +249,13 @@ ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
 }
 
 template <int Dim>
-ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels,
+ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
                            std::span<const VectorX> positions) {
-  if (levels.empty() || !has_chords(setup, space)) return levels;
+  if (levels.empty() || !has_chords(setup, mesh)) return levels;
   std::vector<char> lowerable(levels.size(), 1);
-  const RefinedChords<Dim> chords = refine_chords(mesh, space, levels);
+  const RefinedChords<Dim> chords = refine_chords(mesh, levels);
   for (const VectorX& x : positions) {
-    const std::vector<char> here = ChordBound<Dim>(setup, mesh, space, levels, chords, x).find_lowerable();
+    const std::vector<char> here = ChordBound<Dim>(setup, mesh, levels, chords, x).find_lowerable();
     for (std::size_t edge = 0; edge < levels.size(); ++edge) lowerable[edge] &= here[edge];
     if (std::none_of(lowerable.begin(), lowerable.end(), [](char is) { return is; })) return levels;
   }
@@ -270,20 +264,17 @@ ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
     if (lowerable[edge]) --fewer[edge];
   fewer = normalized(std::move(fewer));
   if (fewer == levels) return levels;
-  const ContactSurface<Dim> contact = contact_surface(setup, mesh, space, fewer);
+  const ContactSurface<Dim> contact = contact_surface(setup, mesh, fewer);
   const bool is_free = std::none_of(positions.begin(), positions.end(), [&](const VectorX& x) {
     return has_intersection<Dim>(contact.surface, contact.positions(x));
   });
   return is_free ? fewer : levels;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                        \
-  template ChordDemand find_chord_demand(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const ChordLevels&, \
-                                         const VectorX&);                                                           \
-  template ChordLevels settled_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, ChordLevels,           \
-                                      std::span<const VectorX>);                                                    \
-  template ChordLevels lowered_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const ChordLevels&,    \
-                                      std::span<const VectorX>);
+#define ITR_INSTANTIATE(Dim)                                                                                           \
+  template ChordDemand find_chord_demand(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, const VectorX&); \
+  template ChordLevels settled_chords(const StepSetup<Dim>&, const Mesh<Dim>&, ChordLevels, std::span<const VectorX>); \
+  template ChordLevels lowered_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, std::span<const VectorX>);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

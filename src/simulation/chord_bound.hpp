@@ -6,7 +6,6 @@
 #include <span>
 
 #include "itr/fem/chord_levels.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/simulation/setup.hpp"
 
 namespace itr {
@@ -18,18 +17,18 @@ struct ChordDemand {
 
 /// Finds the levels that curves at positions x ask for, from chords of these levels on. No chord is made longer.
 template <int Dim>
-ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space,
-                              const ChordLevels& levels, const VectorX& x);
+ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
+                              const VectorX& x);
 
 /// Adds as many halvings to `levels` as curves at all of these positions ask for.
 template <int Dim>
-ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, ChordLevels levels,
+ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ChordLevels levels,
                            std::span<const VectorX> positions);
 
 /// Takes one halving from `levels` where curves stay far within the bound at all of these positions, and surfaces
 /// do not meet.
 template <int Dim>
-ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& levels,
+ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
                            std::span<const VectorX> positions);
 
 }  // namespace itr

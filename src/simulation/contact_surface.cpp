@@ -12,10 +12,9 @@ namespace itr {
 namespace {
 
 template <int Dim>
-ContactSurface<Dim> refined_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space,
-                                    const ChordLevels& levels) {
-  const RefinedChords<Dim> chords = refine_chords(mesh, space, levels);
-  std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
+ContactSurface<Dim> refined_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const ChordLevels& levels) {
+  const RefinedChords<Dim> chords = refine_chords(mesh, levels);
+  std::vector<Vec<Dim>> rest = mesh.rest();
   const int nodes = static_cast<int>(rest.size()), own = nodes + static_cast<int>(chords.points.size());
   const int others = static_cast<int>(obstacles.rest.size());
   std::vector<Eigen::Triplet<double>> entries;
@@ -39,30 +38,30 @@ bool has_refined(const ChordLevels& levels) {
 }  // namespace
 
 template <int Dim>
-ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space, const ChordLevels& levels) {
-  std::vector<Vec<Dim>> points(num_nodes(mesh, space));
+ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const ChordLevels& levels) {
+  std::vector<Vec<Dim>> points(mesh.num_nodes());
   for (std::size_t i = 0; i < points.size(); ++i) points[i] = vertex_of<Dim>(x, static_cast<int>(i));
-  if (!has_refined(levels)) return {std::move(points), boundary_chords(mesh, space)};
-  const RefinedChords<Dim> chords = refine_chords(mesh, space, levels);
+  if (!has_refined(levels)) return {std::move(points), boundary_chords(mesh)};
+  const RefinedChords<Dim> chords = refine_chords(mesh, levels);
   for (const auto& weights : chords.points)
     points.push_back(combined<Dim>(weights, [&](int node) { return vertex_of<Dim>(x, node); }));
   return {std::move(points), chords.facets};
 }
 
 template <int Dim>
-CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space) {
-  return surface_of_facets<Dim>(boundary_chords(mesh, space), node_rest_positions(mesh, space), obstacles);
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
+  return surface_of_facets<Dim>(boundary_chords(mesh), mesh.rest(), obstacles);
 }
 
 /// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
 template <int Dim>
-std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space) {
+std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
   const CollisionProxy<Dim>& proxy = *setup.proxy;
-  const int vertices = num_nodes(mesh, space), own = static_cast<int>(proxy.rest.size());
+  const int vertices = mesh.num_nodes(), own = static_cast<int>(proxy.rest.size());
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
   std::vector<Eigen::Triplet<double>> entries;
   VectorX offset = VectorX::Zero(Dim * (own + obstacles));
-  const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
+  const std::vector<Vec<Dim>>& rest = mesh.rest();
   for (int i = 0; i < own; ++i) vertex_of<Dim>(offset, i) = proxy.rest[i];
   for (int i = 0; i < own; ++i)
     for (typename Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, i); it; ++it) {
@@ -76,22 +75,20 @@ std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, con
 }
 
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space,
-                                    const ChordLevels& levels) {
-  if (!setup.proxy && has_refined(levels)) return refined_surface(mesh, setup.obstacles, space, levels);
-  if (!setup.proxy) return {collision_surface(mesh, setup.obstacles, space), nullptr};
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels) {
+  if (!setup.proxy && has_refined(levels)) return refined_surface(mesh, setup.obstacles, levels);
+  if (!setup.proxy) return {collision_surface(mesh, setup.obstacles), nullptr};
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   SurfaceBuilder<Dim> builder;
   for_each_simplex(proxy, 0, [&](const auto& ids) { builder.add(ids); });
-  return {builder.build(proxy.rest, std::vector<char>(proxy.rest.size(), 1), setup.obstacles), proxy_map(setup, mesh, space),
-          true};
+  return {builder.build(proxy.rest, std::vector<char>(proxy.rest.size(), 1), setup.obstacles), proxy_map(setup, mesh), true};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                       \
-  template ClosedSurface<Dim> body_boundary(const Mesh<Dim>&, ConstVectorView, const Space&, const ChordLevels&);  \
-  template CollisionSurface collision_surface(const Mesh<Dim>&, const Obstacles<Dim>&, const Space&);              \
-  template std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&); \
-  template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&, const ChordLevels&);
+#define ITR_INSTANTIATE(Dim)                                                                         \
+  template ClosedSurface<Dim> body_boundary(const Mesh<Dim>&, ConstVectorView, const ChordLevels&);  \
+  template CollisionSurface collision_surface(const Mesh<Dim>&, const Obstacles<Dim>&);              \
+  template std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>&, const Mesh<Dim>&); \
+  template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

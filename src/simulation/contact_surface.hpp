@@ -7,21 +7,19 @@
 #include "geometry/closed_surface.hpp"
 #include "itr/energy/contact/surface.hpp"
 #include "itr/fem/chord_levels.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/fem/vertex_map.hpp"
 #include "itr/simulation/setup.hpp"
 
 namespace itr {
 
-/// The surface of a compact mesh through all nodes of its space (add_chord_facets), and of the obstacles, whose vertices
+/// The surface of a compact mesh through all of its nodes (add_chord_facets), and of the obstacles, whose vertices
 /// follow the nodes.
 template <int Dim>
-CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const Space& space = {});
+CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles);
 
 /// The boundary of the bodies through all nodes and the points of refined chords, at positions x of the nodes [m].
 template <int Dim>
-ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space = {},
-                                 const ChordLevels& levels = {});
+ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const ChordLevels& levels = {});
 
 /// Surface that can touch in a simulation, and its positions.
 template <int Dim>
@@ -38,11 +36,10 @@ struct ContactSurface {
 
 /// From the nodes of the bodies and the vertices of obstacles to those of the setup's proxy and obstacles.
 template <int Dim>
-std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {});
+std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 
 /// The proxy's surface where the setup has one, else the boundary of the compact mesh with its chords; with the obstacles.
 template <int Dim>
-ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {},
-                                    const ChordLevels& levels = {});
+ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels = {});
 
 }  // namespace itr

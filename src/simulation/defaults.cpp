@@ -8,9 +8,11 @@
 #include <limits>
 
 #include "barrier_stiffness.hpp"
+#include "itr/core/error.hpp"
 #include "itr/simulation/setup.hpp"
 #include "mesh/rest_box.hpp"
 #include "simulation/remesh_step.hpp"
+#include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
 #include "sizes.hpp"
 
@@ -21,7 +23,12 @@ namespace {
 constexpr double kSoftness = 0.1;          ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
 constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, little beside usual deformations
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
-constexpr double kLeastDhat = 0.01;       ///< of that without the gap: what nearly touches presses a little at the start
+constexpr double kLeastDhat = 0.01;     ///< of that without the gap: what nearly touches presses a little at the start
+constexpr double kDhatByMotion = 0.01;  ///< of the way that is prescribed without inertia
+constexpr double kSlipByMotion = 1e-3;  ///< of the speed that is prescribed: friction is smoothed below that
+/// Part of the speed that gravity gives over the bodies' size: bodies that it holds in place creep by less than 1e-4 of
+/// their size in the time of a hundred falls over it.
+constexpr double kSlipByFall = 5e-7;
 constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest
 /// Cost that operations may have, in split tolerances. Collapses: with less, meshes stay fine where contact was.
 constexpr double kCollapseShare = 0.01;
@@ -36,7 +43,7 @@ double mean_vertex_area(const Mesh<Dim>& mesh) {
   int vertices = 0;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.is_facet_alive(f)) area += facet_measure(mesh, f);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
   return area / std::max(1, vertices);
 }
 
@@ -96,14 +103,59 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
       contact.barrier_stiffness / barrier_unit(units, contact), units.text(stiffest, "Pa", 3));
 }
 
-/// A thousandth of the thinnest body, a tenth of the shortest surface edge, and less than the gap at the start.
+/// The longest relative way that conditions and obstacles prescribe over the run [m]; infinity where they move nothing.
+template <int Dim>
+double prescribed_way(const Setup<Dim>& setup) {
+  constexpr int kSamples = 20;
+  double longest = 0;
+  try {
+    const VectorX first = held_dofs(setup, setup.mesh, setup.time.t0).target;
+    for (int i = 1; i <= kSamples; ++i) {
+      const double t = setup.time.t0 + setup.time.dt * setup.time.steps * i / kSamples;
+      const VectorX way = held_dofs(setup, setup.mesh, t).target - first;
+      Eigen::AlignedBox<double, Dim> box;
+      for (Eigen::Index k = 0; k < way.size(); k += Dim) box.extend(Vec<Dim>(way.template segment<Dim>(k)));
+      longest = std::max(longest, box.diagonal().norm());
+    }
+  } catch (const InputError&) {  // no value at a time that no step asks for
+  }
+  return longest > 0 ? longest : std::numeric_limits<double>::infinity();
+}
+
+/// By what is prescribed and by gravity, the smaller; where neither is there, by waves at strains of a thousandth.
+template <int Dim>
+std::string choose_friction_velocity(const Setup<Dim>& setup, ContactOptions& contact) {
+  constexpr int kSteps = 20;  // the first ones, so that it does not depend on where the run ends
+  constexpr double kStrain = 1e-3;
+  const double size = rest_box(setup.mesh).sizes().maxCoeff();
+  const Vec<Dim> center = rest_center(setup.mesh, 0);
+  double prescribed = 0, fall = 0;
+  try {
+    prescribed = prescribed_speed(setup, center, kSteps);
+    if (setup.body_acceleration) fall = std::sqrt(2 * size * setup.body_acceleration(center, setup.time.t0).norm());
+  } catch (const InputError&) {  // no value at a time or place that no step asks for
+  }
+  if (prescribed == 0 && fall == 0)
+    for (const auto& [body, material] : setup.materials)
+      prescribed = std::max(prescribed, kStrain * std::sqrt(material.youngs_modulus / material.density));
+  const bool is_by_fall = fall > 0 && (prescribed == 0 || kSlipByFall * fall < kSlipByMotion * prescribed);
+  contact.friction_velocity = is_by_fall ? kSlipByFall * fall : kSlipByMotion * prescribed;
+  const Units& units = setup.units;
+  return fmt::format("friction is smoothed below {}: {:g} of {}, {}; /contact/epsv sets another",
+                     units.text(contact.friction_velocity, "m/s", 3), is_by_fall ? kSlipByFall : kSlipByMotion,
+                     is_by_fall ? "the speed of a fall over the bodies' size" : "the fastest motion",
+                     units.text(is_by_fall ? fall : prescribed, "m/s", 3));
+}
+
+/// A thousandth of the thinnest body, a tenth of the shortest surface edge, a hundredth of what is prescribed without
+/// inertia, and less than the gap at the start.
 template <int Dim>
 std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& contact) {
   double thinnest = std::numeric_limits<double>::infinity(), shortest = thinnest;
   for (const auto& [body, size] : body_sizes(setup.mesh)) thinnest = std::min(thinnest, size.thickness);
   const ContactSurface<Dim> surface = contact_surface(setup, setup.mesh);
   VectorX start = held_dofs(setup, setup.mesh, setup.time.t0).target;
-  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v) start.template segment<Dim>(Dim * v) = setup.mesh.rest(v);
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v) start.template segment<Dim>(Dim * v) = setup.mesh.rest(v);
   for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f)
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < i; ++j)
@@ -111,7 +163,9 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
             std::min(shortest, (setup.mesh.rest(setup.mesh.facet(f)[i]) - setup.mesh.rest(setup.mesh.facet(f)[j])).norm());
   const Units& units = setup.units;
   double& dhat = contact.activation_distance;
-  dhat = std::min(kDhatByThickness * thinnest, kDhatByEdge * shortest);
+  const bool has_inertia = !setup.time.quasistatic && !setup.time.is_static;
+  const double way = has_inertia ? std::numeric_limits<double>::infinity() : prescribed_way(setup);
+  dhat = std::min({kDhatByThickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * way});
   double gap = std::numeric_limits<double>::infinity();
   if (!setup.proxy) {
     Workspace workspace;
@@ -119,9 +173,10 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
     if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
   }
   return fmt::format(
-      "d-hat {}: a thousandth of the thinnest body ({}), a tenth of the shortest surface edge ({}){}; /contact/dhat sets "
+      "d-hat {}: a thousandth of the thinnest body ({}), a tenth of the shortest surface edge ({}){}{}; /contact/dhat sets "
       "another",
       units.text(dhat, "m"), units.text(thinnest, "m"), units.text(shortest, "m"),
+      std::isfinite(way) ? ", at most a hundredth of what is prescribed, " + units.text(way, "m") : "",
       std::isfinite(gap) ? ", less than the gap, " + units.text(gap, "m") : "");
 }
 
@@ -178,6 +233,11 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   if (contact.enabled && contact.activation_distance == 0) words.push_back(choose_activation_distance(*this, contact));
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
+  const bool has_inertia = !this->time.quasistatic && !this->time.is_static;
+  if (contact.enabled && contact.friction_velocity == 0 && has_inertia) {
+    std::string chosen = choose_friction_velocity(*this, contact);
+    if (contact.friction_coefficient > 0 && contact.friction_iterations != 0) words.push_back(std::move(chosen));
+  }
   if (!remesh.enabled) return words;
   if (!remesh.split.min_edge_length) remesh.split.min_edge_length = kLeastSplitEdge * rest_diagonal(mesh);
   if (!remesh.split.acceptance_tolerance) words.push_back(choose_split_tolerance(*this, remesh));

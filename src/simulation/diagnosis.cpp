@@ -135,21 +135,22 @@ void Diagnosis<Dim>::name_worst_cell_at(int vertex) {
   double least = std::numeric_limits<double>::infinity();
   std::span<const int> worst;
   for (const auto& element : scope_.cells.elements) {
-    if (!has(element.vertices, vertex)) continue;
-    const double ratio = deformation_gradient<Dim>(element, x_).determinant();
-    if (ratio >= least) continue;
-    least = ratio;
-    worst = element.vertices;
-  }
-  for (const auto& element : scope_.cells.curved_elements) {
-    if (!has(element.nodes, vertex)) continue;
-    const auto nodes = at_nodes<Dim>(element.nodes, x_);
-    for (const auto& point : closed_quadrature<Dim>(1)) {
-      const double ratio = (nodes * shape_gradients<Dim>(element, point.weights).transpose()).determinant();
-      if (ratio >= least) continue;
-      least = ratio;
-      worst = std::span<const int>(element.nodes).first(Dim + 1);
+    const auto look = [&](const Mat<Dim>& F) {
+      if (const double ratio = F.determinant(); ratio < least) {
+        least = ratio;
+        worst = element.vertices;
+      }
+    };
+    bool has_it = false;
+    for_each_node(element, [&](int node) { has_it = has_it || node == vertex; });
+    if (!has_it) continue;
+    if (!element.curved) {
+      look(deformation_gradient<Dim>(element, x_));
+      continue;
     }
+    const auto nodes = at_nodes<Dim>(element.nodes(), x_);
+    for (const auto& point : closed_quadrature<Dim>(1))
+      look(nodes * shape_gradients<Dim>(element, point.weights).transpose());
   }
   if (!worst.empty()) text_ << "; its cell " << named_cell(worst) << " has the volume ratio " << least;
 }

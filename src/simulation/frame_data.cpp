@@ -23,29 +23,23 @@ struct CellPoint {
   double share;
 };
 
-/// f(material, points, curved) for each cell in the mesh's order: one point where F is constant and `curved` is null, those
-/// of the elastic energy's quadrature in cells with curved edges, of which `levels` are those of the state.
+/// f(element, points) for each cell in the mesh's order: one point where F is constant, those of the elastic energy's
+/// quadrature in cells with curved edges, of which `levels` are those of the state.
 template <int Dim, typename Function>
-void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels,
-                            const Setup<Dim>& setup, const Function& f) {
+void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels, int degree,
+                            const Function& f) {
+  std::vector<const typename CellSet<Dim>::Element*> ordered(cells.elements.size());
+  for (const auto& element : cells.elements) ordered[element.cell] = &element;
   std::vector<CellPoint<Dim>> points;
-  auto straight = cells.elements.begin();
-  auto curved = cells.curved_elements.begin();
-  const std::size_t count = cells.elements.size() + cells.curved_elements.size();
-  for (std::size_t c = 0; c < count; ++c) {
+  for (std::size_t e = 0; const auto* element : ordered) {
     points.clear();
-    if (curved == cells.curved_elements.end() || static_cast<std::size_t>(curved->cell) != c) {
-      points.push_back({deformation_gradient<Dim>(*straight, x), rest_barycenter(cells, *straight), 1});
-      f(setup.materials.at(straight->body), std::span<const CellPoint<Dim>>(points), nullptr);
-      ++straight;
-      continue;
-    }
-    const std::size_t e = static_cast<std::size_t>(curved - cells.curved_elements.begin());
-    for (const auto& point : cell_quadrature<Dim>(levels.empty() ? 0 : levels[e], setup.quadrature_degree))
-      points.push_back({at_nodes<Dim>(curved->nodes, x) * shape_gradients<Dim>(*curved, point.weights).transpose(),
-                        rest_position<Dim>(cells, *curved, point.weights), point.share});
-    f(setup.materials.at(curved->body), std::span<const CellPoint<Dim>>(points), &*curved);
-    ++curved;
+    if (element->curved)
+      for (const auto& point : cell_quadrature<Dim>(levels.empty() ? 0 : levels[e++], degree))
+        points.push_back({at_nodes<Dim>(element->nodes(), x) * shape_gradients<Dim>(*element, point.weights).transpose(),
+                          rest_position<Dim>(cells, *element, point.weights), point.share});
+    else
+      points.push_back({deformation_gradient<Dim>(*element, x), rest_barycenter(cells, *element), 1});
+    f(*element, std::span<const CellPoint<Dim>>(points));
   }
 }
 
@@ -53,27 +47,27 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
 
 template <int Dim>
 typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>& state, const NodalForces& forces) const {
-  const int bodies = num_nodes(state.mesh, state.space);
+  const int bodies = state.mesh.num_nodes();
   FrameData data;
   data.x = state.history.x[0].head(Dim * bodies);
   data.v = state.history.v[0].head(Dim * bodies);
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
-  using Curved = const typename CellSet<Dim>::CurvedElement*;
-  const auto add_density = [&](const Material& material, auto points, Curved curved) {
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
+  const auto add_density = [&](const auto& element, auto points) {
+    const Material& material = setup().materials.at(element.body);
     double mean = 0;
     for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
-    if (curved)
-      mean += barrier_density<Dim>(JacobianBarrier<Dim>(*curved, at_nodes<Dim>(curved->nodes, data.x)),
-                                   elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, *curved)));
+    if (element.curved)
+      mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
+                                   elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, element)));
     data.elastic_density.push_back(mean);
   };
-  for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup(), add_density);
+  for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup().quadrature_degree, add_density);
   data.asked.forces = forces;
   add_asked(cells, state, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   if (setup().proxy) {
-    const VectorX y = proxy_map(setup(), state.mesh, state.space)->positions(all);
+    const VectorX y = proxy_map(setup(), state.mesh)->positions(all);
     for (std::size_t v = 0; v < setup().proxy->rest.size(); ++v)
       data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
   }
@@ -118,7 +112,8 @@ double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Ve
 template <int Dim>
 CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels, const Setup<Dim>& setup) {
   CellStress stress;
-  for_each_cell_in_order<Dim>(cells, x, levels, setup, [&](const Material& material, auto points, auto) {
+  for_each_cell_in_order<Dim>(cells, x, levels, setup.quadrature_degree, [&](const auto& element, auto points) {
+    const Material& material = setup.materials.at(element.body);
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
     for (const auto& [F, X, share] : points) {
@@ -138,8 +133,8 @@ CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Quadratu
 template <int Dim>
 CellStress cell_stress(const Simulation<Dim>& simulation) {
   const State<Dim>& state = simulation.state();
-  const VectorX x = state.history.x[0].head(Dim * num_nodes(state.mesh, state.space));
-  return stress_of<Dim>(whole_mesh(state.mesh, {}, state.space), x, state.quadrature, simulation.setup());
+  const VectorX x = state.history.x[0].head(Dim * state.mesh.num_nodes());
+  return stress_of<Dim>(whole_mesh(state.mesh, {}), x, state.quadrature, simulation.setup());
 }
 
 template CellStress cell_stress(const Simulation<2>&);

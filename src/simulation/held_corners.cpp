@@ -25,7 +25,7 @@ template <int Dim>
 std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
   const Mesh<Dim>& mesh = setup.mesh;
   const ConditionsByTag<Dim> all = conditions_by_tag<Dim>(setup);
-  std::vector<Conditions<Dim>> holding(mesh.vertex_slots());
+  std::vector<Conditions<Dim>> holding(mesh.node_slots());
   const auto add = [&](VertexId v, const DirichletCondition<Dim>* condition) {
     std::erase(holding[v], condition);
     holding[v].push_back(condition);
@@ -35,7 +35,7 @@ std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
       if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == tag)
         for (const VertexId v : mesh.facet(f)) add(v, condition);
   for (const auto& [tag, condition] : all)
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.is_vertex_alive(v) && mesh.vertex_tag(v) == tag) add(v, condition);
   return holding;
 }
@@ -73,7 +73,7 @@ void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& foun
   std::map<std::pair<int, int>, Contradiction> all;  // of the id that loses and of the one that wins
   const std::vector<Conditions<Dim>> holding = by_vertex(setup);
   const double resolved = kResolved * rest_diagonal(setup.mesh);
-  for (VertexId v = 0; v < setup.mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v)
     for (std::size_t i = 0; i < holding[v].size(); ++i)
       for (std::size_t j = i + 1; j < holding[v].size(); ++j) {
         const auto &loser = *holding[v][i], &winner = *holding[v][j];

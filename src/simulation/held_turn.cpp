@@ -32,13 +32,11 @@ bool is_held(const DofMap& dofs, int node) {
 template <int Dim>
 std::vector<std::array<int, 2>> held_edges(const CellSet<Dim>& cells, const DofMap& dofs) {
   std::vector<std::array<int, 2>> edges;
-  const auto add = [&](const auto& corners) {
-    for (int i = 0; i <= Dim; ++i)
-      for (int j = i + 1; j <= Dim; ++j)
-        if (is_held<Dim>(dofs, corners[i]) && is_held<Dim>(dofs, corners[j])) edges.push_back({corners[i], corners[j]});
-  };
-  for (const auto& element : cells.elements) add(element.vertices);
-  for (const auto& element : cells.curved_elements) add(element.nodes);
+  for (const auto& element : cells.elements)
+    for_each_edge<Dim>([&](int, int i, int j) {
+      const int a = element.vertices[i], b = element.vertices[j];
+      if (is_held<Dim>(dofs, a) && is_held<Dim>(dofs, b)) edges.push_back({a, b});
+    });
   return edges;
 }
 

@@ -25,19 +25,14 @@ VectorX interleaved(const MatrixX& rows) {
 template <int Dim>
 class HistoryTransfer {
  public:
-  HistoryTransfer(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space, const Mesh<Dim>& mesh,
-                  const Space& space, const TouchedCells& touched)
-      : setup_(setup),
-        mesh_(mesh),
-        space_(space),
-        patch_(make_transfer_patch(old_mesh, old_space, mesh, space, touched, setup.materials, kRings<Dim>)) {
+  HistoryTransfer(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Mesh<Dim>& mesh, const TouchedCells& touched)
+      : setup_(setup), mesh_(mesh), patch_(make_transfer_patch(old_mesh, mesh, touched, setup.materials, kRings<Dim>)) {
     const auto n = patch_.new_cells.vertices.size();
     prescribed_.assign(Dim * n, 0);
     const auto components = held_components(setup);
     const HeldRule<Dim> rule(components);
     for (std::size_t i = 0; i < n; ++i) {
-      const int v = patch_.new_cells.vertices[i], node = v - mesh.vertex_slots();
-      const auto tags = node < 0 ? rule.tags_at(mesh, std::array{v}) : rule.tags_at(mesh, space.curved_edges()[node]);
+      const auto tags = rule.tags_of_node(mesh, patch_.new_cells.vertices[i]);
       for (int c = 0; c < Dim; ++c) prescribed_[Dim * i + c] = tags[c] != kNoTag;
     }
   }
@@ -104,8 +99,7 @@ class HistoryTransfer {
     PatchSurface<Dim> surface;
     CellSet<Dim> cells = patch_.cells;
     if (setup_.contact.enabled) {
-      surface =
-          patch_surface(mesh_, space_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance);
+      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance);
       cells.num_vertices += static_cast<int>(surface.others.size());
       interpolant.conservativeResize(Dim * cells.num_vertices);
       for (std::size_t i = 0; i < surface.others.size(); ++i)
@@ -128,7 +122,6 @@ class HistoryTransfer {
 
   const StepSetup<Dim>& setup_;
   const Mesh<Dim>& mesh_;
-  const Space& space_;
   TransferPatch<Dim> patch_;
   std::vector<char> prescribed_;  ///< by dof of the patch
   std::vector<MatrixX> old_values_, new_values_;
@@ -145,11 +138,11 @@ bool depends_on_past(const StepSetup<Dim>& setup) {
 }
 
 template <int Dim>
-HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space,
-                                       const History& old_history, const Mesh<Dim>& mesh, const Space& space,
-                                       const TouchedCells& touched, linear::Solver& solver, History& history) {
+HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
+                                       const Mesh<Dim>& mesh, const TouchedCells& touched, linear::Solver& solver,
+                                       History& history) {
   if (!depends_on_past(setup)) return {};
-  HistoryTransfer<Dim> transfer(setup, old_mesh, old_space, mesh, space, touched);
+  HistoryTransfer<Dim> transfer(setup, old_mesh, mesh, touched);
   std::vector<VectorX*> fields;
   const auto add = [&](const std::vector<VectorX>& old_fields, std::vector<VectorX>& new_fields) {
     for (std::size_t i = 0; i < new_fields.size(); ++i) {
@@ -168,11 +161,10 @@ HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<D
   return report;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                                \
-  template bool depends_on_past<Dim>(const StepSetup<Dim>&);                                                                \
-  template HistoryTransferReport transfer_history<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const Space&,               \
-                                                       const History&, const Mesh<Dim>&, const Space&, const TouchedCells&, \
-                                                       linear::Solver&, History&);
+#define ITR_INSTANTIATE(Dim)                                                                                    \
+  template bool depends_on_past<Dim>(const StepSetup<Dim>&);                                                    \
+  template HistoryTransferReport transfer_history<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const History&, \
+                                                       const Mesh<Dim>&, const TouchedCells&, linear::Solver&, History&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

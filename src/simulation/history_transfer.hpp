@@ -2,7 +2,6 @@
 #pragma once
 
 #include "itr/core/log.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/linear/solver.hpp"
 #include "itr/projection/transfer.hpp"
 #include "itr/simulation/setup.hpp"
@@ -28,8 +27,8 @@ bool depends_on_past(const StepSetup<Dim>& setup);
 /// of that are kept to round-off. Prescribed components of positions stay what they are. Does nothing where no step depends
 /// on the past.
 template <int Dim>
-HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const Space& old_space,
-                                       const History& old_history, const Mesh<Dim>& mesh, const Space& space,
-                                       const TouchedCells& touched, linear::Solver& solver, History& history);
+HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<Dim>& old_mesh, const History& old_history,
+                                       const Mesh<Dim>& mesh, const TouchedCells& touched, linear::Solver& solver,
+                                       History& history);
 
 }  // namespace itr

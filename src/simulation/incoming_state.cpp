@@ -37,24 +37,23 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
                       "surfaces that do not touch"});
   };
   const VectorX& x = state.history.x[0];
-  const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.space, state.chords);
+  const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
   for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
-  for (Eigen::Index i = Dim * num_nodes(state.mesh, state.space); i < x.size(); i += Dim)
+  for (Eigen::Index i = Dim * state.mesh.num_nodes(); i < x.size(); i += Dim)
     if (const Vec<Dim> p = x.segment<Dim>(i); boundary.touches(p) || boundary.winding(p) != 0) refuse("an obstacle", p);
 }
 
 /// Value of the first condition that names the body of one of the vertex's cells; the last cell's body wins.
 template <int Dim>
-VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<Dim>& mesh, const Space& space,
-               int obstacle_vertices, double t0) {
-  VectorX field = VectorX::Zero(Dim * (num_nodes(mesh, space) + obstacle_vertices));
+VectorX sample(const std::vector<InitialCondition<Dim>>& conditions, const Mesh<Dim>& mesh, int obstacle_vertices,
+               double t0) {
+  VectorX field = VectorX::Zero(Dim * (mesh.num_nodes() + obstacle_vertices));
   if (conditions.empty()) return field;
-  const std::vector<Vec<Dim>> rest = node_rest_positions(mesh, space);
   for (int c = 0; c < mesh.cell_slots(); ++c)
     for (const auto& condition : conditions) {
       if (condition.body != mesh.body(c)) continue;
-      for_each_node(mesh.cell(c), space, mesh.vertex_slots(),
-                    [&](int node) { field.segment<Dim>(Dim * node) = condition.value(rest[node], t0); });
+      for_each_node(mesh, mesh.cell(c),
+                    [&](int node) { field.segment<Dim>(Dim * node) = condition.value(mesh.rest(node), t0); });
       break;
     }
   return field;
@@ -85,8 +84,8 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
   require_size("past states of saved velocities", history.v.size(), history.x.size());
   require_size("past states of saved accelerations", history.a.size(),
                integrator.uses_acceleration() ? history.x.size() : 0);
-  const auto size = static_cast<std::size_t>(Dim) *
-                    (static_cast<std::size_t>(num_nodes(state.mesh, state.space)) + setup.obstacles.rest.size());
+  const auto size =
+      static_cast<std::size_t>(Dim) * (static_cast<std::size_t>(state.mesh.num_nodes()) + setup.obstacles.rest.size());
   const auto check = [&](const std::string& name, const VectorX& field) {
     require_size("length of saved " + name, static_cast<std::size_t>(field.size()), size);
     require_finite("saved " + name, field);
@@ -123,7 +122,7 @@ bool has_coincident_vertices(const CollisionSurface& surface, const VectorX& x) 
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!setup.contact.enabled) return;
-  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.space, state.chords);
+  const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.chords);
   const CollisionSurface& surface = contact.surface;
   const VectorX x = contact.positions(state.history.x[0]);
   const auto corners = [&](const auto& primitive) {
@@ -149,22 +148,26 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
 }
 
 template <int Dim>
+Mesh<Dim> initial_mesh(const Setup<Dim>& setup) {
+  Mesh<Dim> mesh = setup.mesh;
+  mesh.compact();
+  mesh.set_curved_edges(edges_of_order_2(mesh, setup.order));
+  return mesh;
+}
+
+template <int Dim>
 State<Dim> initial_state(const Setup<Dim>& setup) {
   State<Dim> state;
-  state.mesh = setup.mesh;
-  state.mesh.compact();
-  state.space = space_of_orders(state.mesh, setup.order);
+  state.mesh = initial_mesh(setup);
   state.t = setup.time.t0;
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
-  const std::vector<Vec<Dim>> rest = node_rest_positions(state.mesh, state.space);
-  const auto sampled = [&](const auto& conditions) {
-    return sample(conditions, state.mesh, state.space, obstacles, setup.time.t0);
-  };
+  const std::vector<Vec<Dim>>& rest = state.mesh.rest();
+  const auto sampled = [&](const auto& conditions) { return sample(conditions, state.mesh, obstacles, setup.time.t0); };
   VectorX x = sampled(setup.initial_displacement);
   for (std::size_t v = 0; v < rest.size(); ++v) vertex_of<Dim>(x, static_cast<int>(v)) += rest[v];
   x.tail(Dim * obstacles) = held_dofs(setup, state.mesh, state.t).target.tail(Dim * obstacles);
   state.history.x = {std::move(x)};
-  state.chords = settled_chords(setup, state.mesh, state.space, {}, state.history.x);
+  state.chords = settled_chords(setup, state.mesh, {}, state.history.x);
   state.history.v = {sampled(setup.initial_velocity)};
   if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
   return state;
@@ -173,32 +176,27 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
 template <int Dim>
 void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
   const Mesh<Dim>& mesh = state.mesh;
-  if (mesh.num_vertices() != mesh.vertex_slots() || mesh.num_cells() != mesh.cell_slots())
-    refuse_state("saved mesh", "dead slots", "a compact mesh");
-  for (const auto& [a, b] : state.space.curved_edges())
-    if (a < 0 || b <= a || b >= mesh.vertex_slots() || !mesh.are_joined(a, b))
-      refuse_state("curved edges of a saved state", fmt::format("{}-{}", a, b), "an edge of the mesh");
+  if (!mesh.is_compact()) refuse_state("saved mesh", "dead slots", "a compact mesh");
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
     if (!setup.materials.contains(mesh.body(c)))
       refuse_state("body of a saved cell", std::to_string(mesh.body(c)), "one that has a material");
   check_history(setup, state);
   if (!state.quadrature.empty())
-    require_size("saved levels of quadrature", state.quadrature.size(),
-                 whole_mesh(mesh, {}, state.space).curved_elements.size());
+    require_size("saved levels of quadrature", state.quadrature.size(), whole_mesh(mesh, {}).curved().size());
   if (!state.chords.empty())
-    require_size("saved levels of chords", state.chords.size(), static_cast<std::size_t>(state.space.num_curved()));
+    require_size("saved levels of chords", state.chords.size(), static_cast<std::size_t>(mesh.num_curved()));
   if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
   for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
                                     std::pair("barrier stiffness", state.stiffness.value)})
     if (!std::isfinite(value)) refuse_state(std::string("saved ") + name, fmt::format("{}", value), "a number");
   for (std::size_t age = 0; age < state.history.x.size(); ++age)
-    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.space, state.chords);
-        !violation.empty())
+    if (const std::string violation = find_violation(setup, mesh, state.history.x[age], state.chords); !violation.empty())
       refuse_state(age == 0 ? "saved positions" : fmt::format("saved positions of {} steps before", age), violation,
                    "positions without inversions and intersections");
 }
 
 #define ITR_INSTANTIATE(Dim)                                                \
+  template Mesh<Dim> initial_mesh(const Setup<Dim>&);                       \
   template State<Dim> initial_state(const Setup<Dim>&);                     \
   template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
   template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);

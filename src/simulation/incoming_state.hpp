@@ -10,6 +10,9 @@ namespace itr {
 /// The state at the setup's start time, by its initial conditions.
 template <int Dim>
 State<Dim> initial_state(const Setup<Dim>& setup);
+/// The setup's mesh, compact and with the curved edges that its orders ask for.
+template <int Dim>
+Mesh<Dim> initial_mesh(const Setup<Dim>& setup);
 
 /// Throws InputError where surfaces of the state intersect, or a body or obstacle is inside of a body. Checks nothing where
 /// contact is not enabled.

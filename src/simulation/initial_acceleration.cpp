@@ -10,7 +10,7 @@ namespace itr {
 template <int Dim>
 void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, ProblemCache<Dim>& cache) {
   SparseSystem& system = cache.system;
-  StepProblem<Dim> problem(setup, state.mesh, state.space, state.history, state.t, cache, state.stiffness, {}, state.chords);
+  StepProblem<Dim> problem(setup, state.mesh, state.history, state.t, cache, state.stiffness, {}, state.chords);
   VectorX force = problem.total_force(state.history.x[0], state.history.v[0]);
   const DofMap& dofs = problem.dofs();
   VectorX& a = state.history.a[0];

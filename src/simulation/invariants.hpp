@@ -4,7 +4,6 @@
 #include <string>
 
 #include "itr/fem/chord_levels.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/simulation/setup.hpp"
 
 namespace itr {
@@ -12,7 +11,7 @@ namespace itr {
 /// Finds a violation in positions of bodies and obstacles, in words, decided exactly; empty: none. Cells are positively
 /// oriented everywhere; with contact, surfaces do not cross, and no body or obstacle is inside of a body.
 template <int Dim>
-std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const Space& space = {},
+std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x,
                            const ChordLevels& chords = {});
 
 }  // namespace itr

@@ -21,6 +21,7 @@ namespace {
 
 constexpr std::size_t kLongestCycle = 16;      ///< rounds that are remembered
 constexpr int kPressureRounds = 50;            ///< most, where pressure has no potential
+constexpr int kMostRounds = 1000;              ///< where no number limits them
 constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: less is not said
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
@@ -32,7 +33,7 @@ template <int Dim>
 VectorX LaggedSolve<Dim>::start_of_solve(const VectorX& x) {
   const VectorX start = with_held_at_targets(x);
   const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
-                    (cells_.curved_elements.empty() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
+                    (!cells_.has_curved() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
                     potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
   return free ? start : x;
 }
@@ -64,7 +65,7 @@ NewtonSummary LaggedSolve<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
     potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
     extras.way_to_start = std::move(way_to_start);
   }
-  if (!cells_.curved_elements.empty()) {
+  if (cells_.has_curved()) {
     potential_.elastic()->refine_quadrature(x);
     extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
   }
@@ -187,9 +188,10 @@ template <int Dim>
 int LaggedSolve<Dim>::most_rounds() const {
   int rounds = 1;
   if (potential_.has_friction())
-    rounds = setup_.contact.friction_iterations < 0 ? std::numeric_limits<int>::max() : setup_.contact.friction_iterations;
+    rounds = setup_.contact.friction_iterations < 0 ? kMostRounds : setup_.contact.friction_iterations;
   if (!lagged_.damping.empty() || !lagged_.contact_damping.empty())
-    for (const DampingOptions& options : setup_.damping) rounds = std::max(rounds, options.lagging_rounds);
+    for (const DampingOptions& options : setup_.damping)
+      rounds = std::max(rounds, setup_.lagging_tolerance > 0 ? kMostRounds : options.lagging_rounds);
   if (has_lagged_loads()) rounds = std::max(rounds, kPressureRounds);
   return rounds;
 }
@@ -200,21 +202,41 @@ bool LaggedSolve<Dim>::has_lagged_loads() const {
   return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_));
 }
 
+/// Forces on unknowns at x of the terms of which `is_asked(traits)` holds, scaled.
+template <int Dim>
+template <typename F>
+VectorX LaggedSolve<Dim>::forces_of(const VectorX& x, const Lagged& lagged, const F& is_asked) {
+  EnergySum sum;
+  potential_.add_to(sum, lagged, is_asked);
+  VectorX gradient = VectorX::Zero(x.size());
+  sum.add_gradient(x, gradient, workspace_);
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    if (dofs_.unknown[i] == kNone) gradient[i] = 0;
+  return gradient;
+}
+
+/// By which part of the largest force at a vertex lagged terms change there from `lagged_` to `now`, in the worst case.
+/// Where friction is small beside what it may be, that counts.
+template <int Dim>
+double LaggedSolve<Dim>::largest_change(const VectorX& x, const Lagged& now) {
+  const auto is_lagged = [](const Traits& term) { return term.needs_velocities || term.has_no_potential; };
+  const auto largest = [](const VectorX& force) {
+    return std::sqrt(force.reshaped(Dim, force.size() / Dim).colwise().squaredNorm().maxCoeff());
+  };
+  const VectorX before = forces_of(x, lagged_, is_lagged), after = forces_of(x, now, is_lagged);
+  double size = std::max(largest(before), largest(after));
+  if (potential_.has_friction())
+    size = std::max(size, setup_.contact.friction_coefficient *
+                              largest(forces_of(x, now, [](const Traits& term) { return term.kind == TermKind::contact; })));
+  return size > 0 ? largest(after - before) / size : 0;
+}
+
 /// By which share of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in
 /// their forces on unknowns at x.
 template <int Dim>
 template <typename F>
 double LaggedSolve<Dim>::change_of(const VectorX& x, const Lagged& now, const F& is_asked) {
-  const auto gradient_of = [&](const Lagged& lagged) {
-    EnergySum sum;
-    potential_.add_to(sum, lagged, is_asked);
-    VectorX gradient = VectorX::Zero(x.size());
-    sum.add_gradient(x, gradient, workspace_);
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] == kNone) gradient[i] = 0;
-    return gradient;
-  };
-  const VectorX after = gradient_of(now), before = gradient_of(lagged_);
+  const VectorX after = forces_of(x, now, is_asked), before = forces_of(x, lagged_, is_asked);
   const double size = std::max(after.norm(), before.norm()), change = (after - before).norm();
   if (!std::isfinite(change)) return std::numeric_limits<double>::infinity();
   return size > 0 ? change / size : 0;
@@ -225,6 +247,14 @@ template <int Dim>
 void LaggedSolve<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds,
                                      NewtonSummary& summary) {
   if (!now) now = potential_.lag(x, workspace_);
+  if (const double change = must_settle_ ? largest_change(x, *now) : 0; change > setup_.lagging_tolerance) {
+    summary.termination = Termination::lagging;
+    summary.message = fmt::format(
+        "friction, pressure or damping changes by {:.2g} of the largest force, {} after {} solves; expected at most {:g} "
+        "(/solver/lagging_tolerance)",
+        change, how, rounds, setup_.lagging_tolerance);
+    return;
+  }
   if (has_lagged_loads()) {
     const double off = change_of(x, *now, [](const Traits& term) { return term.has_no_potential; });
     if (off > setup_.lagged_load_tolerance) {
@@ -280,6 +310,8 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     const bool is_first_step = std::isinf(stiffness_.largest);
     if (adaptive_ && !is_first_step)
       problem_.initialize_stiffness(x);  // what the friction of the first round is lagged with
+    const double motion = problem_.relative_motion(with_held_at_targets(lagged_x) - base_);
+    problem_.smooth_friction_by(lagged_x == base_ ? std::max(motion, problem_.last_motion_) : motion);
     lagged_ = potential_.lag(lagged_x, workspace_);
     // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
     const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
@@ -306,6 +338,7 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     VectorX gradient = VectorX::Zero(x.size());
     {
       const ScopedTimer timer(summary.assembly_seconds);
+      problem_.smooth_friction_by(problem_.relative_motion(problem_.increment_of(x)));
       next_lagged = potential_.lag(x, workspace_);
       EnergyOfIncrement(potential_.sum(next_lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
     }
@@ -313,7 +346,8 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
     norm = std::sqrt(norm);
-    if (potential_.has_friction() && norm <= tolerance) {
+    if (setup_.lagging_tolerance > 0 ? largest_change(x, next_lagged) <= setup_.lagging_tolerance
+                                     : potential_.has_friction() && norm <= tolerance) {
       end = RoundsEnd::asked;
       break;
     }

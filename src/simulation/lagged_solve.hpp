@@ -14,7 +14,7 @@ namespace itr {
 template <int Dim>
 class LaggedSolve {
  public:
-  explicit LaggedSolve(StepProblem<Dim>& problem) : problem_(problem) {}
+  LaggedSolve(StepProblem<Dim>& problem, bool must_settle) : problem_(problem), must_settle_(must_settle) {}
   /// Solves as StepProblem::solve says.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected);
 
@@ -35,10 +35,14 @@ class LaggedSolve {
   int most_rounds() const;
   bool has_lagged_loads() const;
   template <typename F>
+  VectorX forces_of(const VectorX& x, const Lagged& lagged, const F& is_asked);
+  template <typename F>
   double change_of(const VectorX& x, const Lagged& now, const F& is_asked);
+  double largest_change(const VectorX& x, const Lagged& now);
   void judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds, NewtonSummary& summary);
 
   StepProblem<Dim>& problem_;
+  bool must_settle_;
   const StepSetup<Dim>& setup_ = problem_.setup_;
   const PotentialTerms<Dim>& terms_ = problem_.terms_;
   const CellSet<Dim>& cells_ = problem_.cells_;

@@ -81,7 +81,7 @@ struct TransferArrays {
   std::vector<double> density;
 
   TransferArrays(const Mesh<Dim>& mesh, const std::map<int, double>& by_body) {
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) rest.push_back(mesh.rest(v));
+    for (VertexId v = 0; v < mesh.num_vertices(); ++v) rest.push_back(mesh.rest(v));
     for (CellId c = 0; c < mesh.cell_slots(); ++c) {
       const auto found = by_body.find(mesh.body(c));
       cells.push_back(mesh.cell(c));
@@ -101,7 +101,7 @@ template <int Dim>
 MeshChange<Dim> describe_change(const Mesh<Dim>& before, const Mesh<Dim>& mesh, const MeshRenumbering& renumbering) {
   MeshChange<Dim> change;
   const auto head = [](const std::vector<int>& ids, int n) { return std::vector<int>(ids.begin(), ids.begin() + n); };
-  change.vertex = head(renumbering.vertex, before.vertex_slots());
+  change.vertex = head(renumbering.vertex, before.num_vertices());
   change.cell = head(renumbering.cell, before.cell_slots());
   change.facet = head(renumbering.facet, before.facet_slots());
 
@@ -126,21 +126,21 @@ MeshChange<Dim> describe_change(const Mesh<Dim>& before, const Mesh<Dim>& mesh, 
     change.facet_parent[f] = lost.find(point, mesh.facet_tag(f));
   }
 
-  std::vector<VertexId> stayed(mesh.vertex_slots(), kNone);
-  for (VertexId v = 0; v < before.vertex_slots(); ++v)
+  std::vector<VertexId> stayed(mesh.num_vertices(), kNone);
+  for (VertexId v = 0; v < before.num_vertices(); ++v)
     if (change.vertex[v] != kNone && mesh.rest(change.vertex[v]) == before.rest(v)) stayed[change.vertex[v]] = v;
   const Locator<Dim> locator(before, change.touched.old_cells);
   std::vector<Eigen::Triplet<double>> entries;
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
     if (stayed[v] != kNone) {
       entries.emplace_back(v, stayed[v], 1);
       continue;
     }
     const auto place = locator.find(mesh.point(v), mesh.body(mesh.cells_of(v)[0]));
     for (int k = 0; k <= Dim; ++k)
-      if (place.weights[k] > 0) entries.emplace_back(v, place.vertices[k], place.weights[k]);
+      if (place.weights[k] > 0) entries.emplace_back(v, place.nodes[k], place.weights[k]);
   }
-  change.interpolation.resize(mesh.vertex_slots(), before.vertex_slots());
+  change.interpolation.resize(mesh.num_vertices(), before.num_vertices());
   change.interpolation.setFromTriplets(entries.begin(), entries.end());
   return change;
 }

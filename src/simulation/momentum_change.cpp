@@ -49,10 +49,10 @@ std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const 
   for (const CellId c : touched.new_cells) bodies.insert(after.mesh.body(c));
   // The integrator's acceleration from the history is linear in the end velocity, of which none is left here.
   const auto momenta = [&](const State<Dim>& state) {
-    const Eigen::Index dofs = Eigen::Index{Dim} * num_nodes(state.mesh, state.space);
+    const Eigen::Index dofs = Eigen::Index{Dim} * state.mesh.num_nodes();
     const VectorX& x = state.history.x[0];
     const VectorX free = -setup.time.dt * TimeIntegrator(setup.time).acceleration(VectorX::Zero(x.size()), state.history);
-    return momenta_of<Dim>(setup, whole_mesh(state.mesh, {}, state.space), bodies, x.head(dofs), free.head(dofs));
+    return momenta_of<Dim>(setup, whole_mesh(state.mesh, {}), bodies, x.head(dofs), free.head(dofs));
   };
   const auto were = momenta(before), are = momenta(after);
   std::vector<MomentumChange> changes;

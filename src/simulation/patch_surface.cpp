@@ -15,15 +15,15 @@ namespace {
 
 /// Facets of the mesh at vertices that move, ascending.
 template <int Dim>
-std::vector<FacetId> facets_of_moving(const Mesh<Dim>& mesh, const Space& space, std::span<const int> vertices,
+std::vector<FacetId> facets_of_moving(const Mesh<Dim>& mesh, std::span<const int> vertices,
                                       const std::vector<char>& moving) {
   std::vector<FacetId> facets;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     if (!moving[i]) continue;
     std::vector<FacetId> of_edge;
-    const int node = vertices[i] - mesh.vertex_slots();
-    if (node >= 0) of_edge = mesh.facets_of_edge(space.curved_edges()[node]);
-    const auto at = node < 0 ? mesh.facets_of(vertices[i]) : std::span<const FacetId>(of_edge);
+    const EdgeKey edge = mesh.edge_of_node(vertices[i]);
+    if (edge[0] != kNone) of_edge = mesh.facets_of_edge(edge);
+    const auto at = edge[0] == kNone ? mesh.facets_of(vertices[i]) : std::span<const FacetId>(of_edge);
     facets.insert(facets.end(), at.begin(), at.end());
   }
   std::sort(facets.begin(), facets.end());
@@ -33,7 +33,7 @@ std::vector<FacetId> facets_of_moving(const Mesh<Dim>& mesh, const Space& space,
 
 /// Boxes that hold facets on their way from `x` to `goal`, which is by the numbers that `known` has.
 template <int Dim>
-std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const Space& space, const std::vector<FacetId>& facets,
+std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const std::vector<FacetId>& facets,
                                     const std::unordered_map<int, int>& known, const VectorX& x, const VectorX& goal,
                                     double reach) {
   std::vector<Box<Dim>> boxes;
@@ -41,7 +41,7 @@ std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const Space& space, c
   for (const FacetId f : facets) {
     Box<Dim> box;
     chords.clear();
-    add_chord_facets<Dim>(mesh.facet(f), space, mesh.vertex_slots(), chords);
+    add_chord_facets(mesh, f, chords);
     for (const auto& chord : chords)
       for (const int v : chord) {
         box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
@@ -55,17 +55,16 @@ std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const Space& space, c
 }  // namespace
 
 template <int Dim>
-PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const Obstacles<Dim>& obstacles,
-                                const TransferPatch<Dim>& patch, const std::vector<char>& moving, const VectorX& x,
-                                const VectorX& goal, double reach) {
+PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const TransferPatch<Dim>& patch,
+                                const std::vector<char>& moving, const VectorX& x, const VectorX& goal, double reach) {
   PatchSurface<Dim> result;
   const auto& vertices = patch.new_cells.vertices;
-  const std::vector<FacetId> own = facets_of_moving<Dim>(mesh, space, vertices, moving);
+  const std::vector<FacetId> own = facets_of_moving<Dim>(mesh, vertices, moving);
   if (own.empty()) return result;
 
   std::unordered_map<int, int> known;  // from ids in fields to those in the patch
   for (std::size_t i = 0; i < vertices.size(); ++i) known[vertices[i]] = static_cast<int>(i);
-  const Bvh<Dim> tree(boxes_of_ways<Dim>(mesh, space, own, known, x, goal, reach));
+  const Bvh<Dim> tree(boxes_of_ways<Dim>(mesh, own, known, x, goal, reach));
   std::vector<int> hits;
   const auto is_near = [&](std::span<const int> ids) {
     Box<Dim> box;
@@ -76,17 +75,11 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
   };
 
   std::vector<Vec<Dim>> rest = patch.new_cells.rest;
-  const int bodies = num_nodes(mesh, space);
-  const auto rest_of = [&](int v) -> Vec<Dim> {
-    if (v >= bodies) return obstacles.rest[v - bodies];
-    if (v < mesh.vertex_slots()) return mesh.rest(v);
-    const auto& [a, b] = space.curved_edges()[v - mesh.vertex_slots()];
-    return (mesh.rest(a) + mesh.rest(b)) / 2;
-  };
+  const int bodies = mesh.num_nodes();
   const auto local = [&](int v) {
     const auto [it, is_new] = known.try_emplace(v, static_cast<int>(rest.size()));
     if (is_new) {
-      rest.push_back(rest_of(v));
+      rest.push_back(v < bodies ? mesh.rest(v) : obstacles.rest[v - bodies]);
       result.others.push_back(v);
     }
     return it->second;
@@ -97,7 +90,7 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
     for (int& v : ids) v = local(v);
     builder.add(ids);
   };
-  for (const auto& chord : boundary_chords(mesh, space)) add(chord);  // own ones are near themselves
+  for (const auto& chord : boundary_chords(mesh)) add(chord);  // own ones are near themselves
   for_each_simplex(obstacles, bodies, add);
 
   std::vector<char> counts(rest.size(), 0);
@@ -106,9 +99,9 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const
   return result;
 }
 
-template PatchSurface<2> patch_surface<2>(const Mesh<2>&, const Space&, const Obstacles<2>&, const TransferPatch<2>&,
+template PatchSurface<2> patch_surface<2>(const Mesh<2>&, const Obstacles<2>&, const TransferPatch<2>&,
                                           const std::vector<char>&, const VectorX&, const VectorX&, double);
-template PatchSurface<3> patch_surface<3>(const Mesh<3>&, const Space&, const Obstacles<3>&, const TransferPatch<3>&,
+template PatchSurface<3> patch_surface<3>(const Mesh<3>&, const Obstacles<3>&, const TransferPatch<3>&,
                                           const std::vector<char>&, const VectorX&, const VectorX&, double);
 
 }  // namespace itr

@@ -21,8 +21,7 @@ struct PatchSurface {
 /// `moving` by vertex of the patch; `x` over bodies and obstacles, where they go from there by `goal` (Dim a vertex of the
 /// patch); `reach` is how near something has to come to count [m].
 template <int Dim>
-PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Space& space, const Obstacles<Dim>& obstacles,
-                                const TransferPatch<Dim>& patch, const std::vector<char>& moving, const VectorX& x,
-                                const VectorX& goal, double reach);
+PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles, const TransferPatch<Dim>& patch,
+                                const std::vector<char>& moving, const VectorX& x, const VectorX& goal, double reach);
 
 }  // namespace itr

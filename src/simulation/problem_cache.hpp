@@ -12,20 +12,16 @@ namespace itr {
 template <int Dim>
 struct MeshScope {
   /// The mesh must be compact.
-  MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {}, const ChordLevels& chords = {});
-  /// Whether this is of such a mesh and space, obstacles included: the same vertices, cells, facets, tags, curved edges and
-  /// levels of their chords.
-  bool is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const ChordLevels& chords) const;
+  MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& chords = {});
+  /// Whether this is of such a mesh, obstacles and levels of chords.
+  bool is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& chords) const;
 
-  Space space;
+  std::uint64_t mesh_revision;
   ChordLevels chords;
   CellSet<Dim> cells;
   ContactSurface<Dim> surface;  ///< empty without contact
   double diagonal;              ///< of the bodies at rest [m]
   Workspace workspace;          ///< search trees of the surface
-
- private:
-  bool has_cells_of(const Mesh<Dim>& mesh) const;
 };
 
 /// Data that a simulation keeps from step to step, so that they are not made again: they change no result, only the time.
@@ -35,7 +31,7 @@ struct ProblemCache {
   template <typename Solver>
   explicit ProblemCache(Solver& solver) : system(solver) {}
   /// The newest scope, where it is of that mesh; else a new one.
-  std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space = {},
+  std::shared_ptr<MeshScope<Dim>> scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh,
                                            const ChordLevels& chords = {});
 
   SparseSystem system;       ///< with its pattern, analysis and factors

@@ -23,33 +23,6 @@ constexpr double kLossWorthTelling = 1e-12;
 /// The bodies' part of a field over bodies and obstacles.
 VectorX head_of(const VectorX& field, int dofs) { return field.head(dofs); }
 
-/// Gives the nodes of curved edges slots behind the vertices, in their order.
-template <int Dim>
-void add_nodes(State<Dim>& state) {
-  if (state.space.is_linear()) return;
-  if (state.strata.empty()) state.strata = Strata<Dim>(state.mesh);
-  for (const EdgeKey& edge : state.space.curved_edges()) state.mesh.add_node(edge);
-  state.strata.add_nodes(state.space.num_curved());
-  state.space = {};
-}
-
-/// Undoes that where no operation was accepted.
-template <int Dim>
-void remove_nodes(const Space& space, State<Dim>& state) {
-  if (space.is_linear()) return;
-  const auto map = state.mesh.compact();
-  state.strata.compact(map);
-  state.remesh_memory.renumber(map.vertex);
-  state.space = space;
-}
-
-/// The space of these nodes on the mesh that has been made compact; renumbering keeps the order of edges.
-Space space_of(const std::vector<std::pair<EdgeKey, VertexId>>& nodes, const std::vector<VertexId>& number) {
-  std::vector<EdgeKey> curved;
-  for (const auto& [edge, node] : nodes) curved.push_back({number[edge[0]], number[edge[1]]});
-  return Space(std::move(curved));
-}
-
 void tell_operations(const RemeshReport& remeshed, double split_tolerance, double scaling, StepReport& report) {
   report.split_tolerance = split_tolerance;
   report.best_refused_split = remeshed.best_refused_gain / scaling;
@@ -70,7 +43,7 @@ QuadratureLevels levels_by_cell(const State<Dim>& state) {
   QuadratureLevels levels(state.mesh.cell_slots(), 0);
   std::size_t next = 0;
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
-    if (has_curved_edge(state.mesh, state.space, c)) levels[c] = state.quadrature[next++];
+    if (state.mesh.is_curved(c)) levels[c] = state.quadrature[next++];
   return levels;
 }
 
@@ -84,18 +57,20 @@ QuadratureLevels levels_by_element(const QuadratureLevels& by_slot, const std::v
     if (number[slot] != kNone) by_cell[number[slot]] = by_slot[slot];
   QuadratureLevels levels;
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
-    if (has_curved_edge(state.mesh, state.space, c)) levels.push_back(by_cell[c]);
+    if (state.mesh.is_curved(c)) levels.push_back(by_cell[c]);
   return levels;
 }
 
 /// Gives curves that are still there their chords.
 template <int Dim>
 ChordLevels carried_chords(const State<Dim>& before, const std::vector<VertexId>& number, const State<Dim>& state) {
-  ChordLevels levels(before.chords.empty() ? 0 : state.space.num_curved(), 0);
+  const Mesh<Dim>& mesh = state.mesh;
+  ChordLevels levels(before.chords.empty() ? 0 : mesh.num_curved(), 0);
   for (std::size_t i = 0; i < before.chords.size(); ++i) {
-    const auto& [a, b] = before.space.curved_edges()[i];
+    const auto [a, b] = before.mesh.edge_of_node(before.mesh.num_vertices() + static_cast<int>(i));
     if (number[a] == kNone || number[b] == kNone) continue;
-    if (const int at = state.space.find(number[a], number[b]); at != kNone) levels[at] = before.chords[i];
+    if (const int node = mesh.node_of(number[a], number[b]); node != kNone)
+      levels[node - mesh.num_vertices()] = before.chords[i];
   }
   return levels;
 }
@@ -115,12 +90,13 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   StepContext<Dim> context;
   static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, state.t);
   if (setup.follower.forces) {
-    const int dofs = Dim * state.mesh.vertex_slots();
+    const int dofs = Dim * state.mesh.num_nodes();
     VectorX forces = VectorX::Zero(dofs);
     setup.follower.forces(state.mesh, x.head(dofs), state.t, forces);
     context.host.push_back(point_forces<Dim>(state.mesh, forces));
   }
   context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
+  context.contact.friction_velocity = problem.friction_velocity();
   context.held_components = held_components(setup);
   context.newton = setup.newton;
   context.shortest_edge = tools.initial_edges.shortest;
@@ -128,7 +104,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   // Corrections of the convergent form have negative weights, so that its energy may fall below 0.
   if (!setup.contact.convergent || energy.contact == 0)
     context.coupling = context.scaling * (energy.contact + energy.friction);
-  const int bodies = num_nodes(state.mesh, state.space);
+  const int bodies = state.mesh.num_nodes();
   auto& obstacles = context.obstacles;
   obstacles.rest = setup.obstacles.rest;
   obstacles.edges = setup.obstacles.edges;
@@ -142,7 +118,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
 template <int Dim>
 RemeshFields<Dim> make_fields(const StepSetup<Dim>& setup, const PotentialTerms<Dim>& terms, const State<Dim>& state,
                               const VectorX& x) {
-  const int dofs = Dim * num_nodes(state.mesh, state.space);
+  const int dofs = Dim * state.mesh.num_nodes();
   const TimeIntegrator integrator(setup.time);
   RemeshFields<Dim> fields;
   fields.x = head_of(x, dofs);
@@ -180,7 +156,7 @@ double mass_moment(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Vec
   double mass = 0;
   for (int c = 0; c < mesh.cell_slots(); ++c) mass += setup.materials.at(mesh.body(c)).density * mesh.volume(c);
   Box<Dim> box;
-  for (int v = 0; v < mesh.vertex_slots(); ++v) box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
+  for (int v = 0; v < mesh.num_vertices(); ++v) box.include(Vec<Dim>(x.segment<Dim>(Dim * v)));
   return mass * (box.max - box.min).norm();
 }
 
@@ -219,36 +195,28 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   RemeshReport remeshed;
   {
     const ScopedTimer timer(report.seconds.remesh);
-    add_nodes(state);
+    if (state.mesh.has_nodes() && state.strata.empty()) state.strata = Strata<Dim>(state.mesh);
     remeshed = operate(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
   tell_operations(remeshed, *options.split.acceptance_tolerance, problem.scaling(), report);
-  if (!remeshed.changed()) {
-    remove_nodes(before.space, state);
-    return std::nullopt;
-  }
+  if (!remeshed.changed()) return std::nullopt;
 
   const ScopedTimer timer(report.seconds.projection);
   TouchedCells touched{removed_cells(before.mesh, state.mesh), {}};
-  const auto nodes = state.mesh.nodes();
   auto map = state.mesh.compact();
   state.strata.compact(map);
   MeshRenumbering renumbering{std::move(map.vertex), std::move(map.cell), std::move(map.facet)};
   state.remesh_memory.renumber(renumbering.vertex);
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);
-  state.space = space_of(nodes, renumbering.vertex);
   state.chords = carried_chords(before, renumbering.vertex, state);
   state.quadrature = levels_by_element(fields.levels, renumbering.cell, state);
   const auto obstacle_dofs = Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const auto carried = [&](const VectorX& slots, const VectorX& with_obstacles) {
-    VectorX field(Dim * num_nodes(state.mesh, state.space) + obstacle_dofs);
+    VectorX field(Dim * state.mesh.num_nodes() + obstacle_dofs);
     for (std::size_t v = 0; v < renumbering.vertex.size(); ++v)
       if (renumbering.vertex[v] != kNone)
         field.segment<Dim>(Dim * renumbering.vertex[v]) = slots.segment<Dim>(Dim * static_cast<int>(v));
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      field.segment<Dim>(Dim * (state.mesh.vertex_slots() + static_cast<int>(i))) =
-          slots.segment<Dim>(Dim * nodes[i].second);
     field.tail(obstacle_dofs) = with_obstacles.tail(obstacle_dofs);
     return field;
   };
@@ -259,8 +227,8 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
   if (remeshed.coarsened()) {  // else interpolation is exact
-    const auto transfer = transfer_history(setup, before.mesh, before.space, before.history, state.mesh, state.space,
-                                           touched, tools.cache.system.solver(), state.history);
+    const auto transfer = transfer_history(setup, before.mesh, before.history, state.mesh, touched,
+                                           tools.cache.system.solver(), state.history);
     report.history_loss = transfer.loss / problem.scaling();
     tell(transfer, mass_moment(setup, state.mesh, x), state.step, setup.units, tools.logger);
   }
@@ -293,8 +261,8 @@ template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
                                                       double least_volume, const State<Dim>& before, State<Dim>& state,
                                                       VectorX& x, StepReport& report) {
-  const StepProblem<Dim> problem(tools.setup, before.mesh, before.space, before.history, before.t, tools.cache,
-                                 before.stiffness, before.quadrature, before.chords);
+  const StepProblem<Dim> problem(tools.setup, before.mesh, before.history, before.t, tools.cache, before.stiffness,
+                                 before.quadrature, before.chords);
   x = before.history.x[0];
   state = before;
   auto renumbering = change_and_project(tools, problem, before, state, x, report, [&](auto&&... all) {

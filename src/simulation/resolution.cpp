@@ -33,7 +33,7 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
     if (std::isfinite(value)) largest = std::max(largest, value);
   };
   const double before = std::max(setup.time.t0, t - setup.time.dt);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < mesh.node_slots(); ++v)
     if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.point(v), t).norm());
   const auto add_held = [&](const RestPoint<Dim>& X, const DirichletCondition<Dim>& condition) {
     const Vec<Dim> there = condition.displacement(X, t);
@@ -41,7 +41,7 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
     if (!setup.time.is_static) raise(actions.motion, (there - condition.displacement(X, before)).norm());
   };
   for (const auto& condition : setup.dirichlet)
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.point(v), condition);
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;

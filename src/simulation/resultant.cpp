@@ -26,11 +26,9 @@ void add_force(const Vec<Dim>& f, const Vec<Dim>& arm, Resultant<Dim>& sum) {
 template <int Dim>
 std::vector<char> nodes_of(const State<Dim>& state, std::span<const int> surfaces, std::span<const int> bodies) {
   const Mesh<Dim>& mesh = state.mesh;
-  std::vector<char> is_on(num_nodes(mesh, state.space), 0);
+  std::vector<char> is_on(mesh.num_nodes(), 0);
   const auto has = [](std::span<const int> list, int id) { return std::find(list.begin(), list.end(), id) != list.end(); };
-  const auto take = [&](const auto& simplex) {
-    for_each_node(simplex, state.space, mesh.vertex_slots(), [&](int node) { is_on[node] = 1; });
-  };
+  const auto take = [&](const auto& simplex) { for_each_node(mesh, simplex, [&](int node) { is_on[node] = 1; }); };
   if (!surfaces.empty())
     for (FacetId f = 0; f < mesh.facet_slots(); ++f)
       if (mesh.is_facet_alive(f) && has(surfaces, mesh.facet_tag(f))) take(mesh.facet(f));
@@ -71,7 +69,7 @@ void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_
 template <int Dim>
 ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
   const auto nodes = static_cast<std::size_t>(state.history.x[0].size()) / Dim;
-  refuse_unknown(target, state.mesh, nodes - static_cast<std::size_t>(num_nodes(state.mesh, state.space)),
+  refuse_unknown(target, state.mesh, nodes - static_cast<std::size_t>(state.mesh.num_nodes()),
                  "forces of '" + target.name + "'");
   return sum_forces(state, forces, target);
 }
@@ -79,7 +77,7 @@ ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, co
 template <int Dim>
 ForceSums<Dim> sum_forces(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
   const std::array<const VectorX*, 4> kinds{&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
-  const int bodies = num_nodes(state.mesh, state.space);
+  const int bodies = state.mesh.num_nodes();
   for (const VectorX* kind : {kinds[0], kinds[1], kinds[2], kinds[3], &forces.body, &forces.residual})
     if (kind->size() != Eigen::Index{Dim} * bodies)
       throw InputError({"", "fields", "not all kinds of forces",

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "itr/core/error.hpp"
-#include "itr/fem/space.hpp"
 #include "simulation/force_target.hpp"
 
 namespace itr {
@@ -50,7 +49,7 @@ void check_contact(const ContactOptions& contact) {
   require_not_negative("/contact/dhat", contact.activation_distance);
   require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
   require_not_negative("/contact/friction_coefficient", contact.friction_coefficient);
-  require_positive("/contact/epsv", contact.friction_velocity);
+  require_not_negative("/contact/epsv", contact.friction_velocity);
   require_not_negative("/solver/contact/friction_convergence_tol", contact.friction_tolerance);
 }
 
@@ -156,7 +155,7 @@ void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   const auto rows = static_cast<Eigen::Index>(proxy.rest.size()), vertices = Eigen::Index{setup.mesh.num_vertices()};
-  const Eigen::Index nodes = num_nodes(setup.mesh, space_of_orders(setup.mesh, setup.order));
+  const Eigen::Index nodes = setup.mesh.node_slots() + std::ssize(edges_of_order_2(setup.mesh, setup.order));
   if (proxy.weights.rows() != rows || (proxy.weights.cols() != vertices && proxy.weights.cols() != nodes))
     refuse("weights of the collision mesh", fmt::format("{} x {}", proxy.weights.rows(), proxy.weights.cols()),
            nodes == vertices ? fmt::format("{} x {}", rows, vertices)
@@ -178,6 +177,7 @@ void StepSetup<Dim>::validate() const {
   check_functions("neumann", neumann, &NeumannCondition<Dim>::traction);
   check_functions("pressure", pressure, &PressureCondition<Dim>::pressure);
   require_positive("/solver/advanced/lagged_load_tolerance", lagged_load_tolerance);
+  require_not_negative("/solver/lagging_tolerance", lagging_tolerance);
   for (std::size_t i = 0; i < damping.size(); ++i) {
     require_not_negative(element("damping", i) + ".coefficient", damping[i].coefficient);
     require_at_least(element("damping", i) + ".lagging_rounds", damping[i].lagging_rounds, 1);

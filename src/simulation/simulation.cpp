@@ -45,8 +45,7 @@ struct Simulation<Dim>::Impl {
   std::unique_ptr<linear::Solver> direct;  ///< or iterative
   std::unique_ptr<linear::ReusingSolver> solver;
   std::unique_ptr<ProblemCache<Dim>> cache;
-  std::shared_ptr<State<Dim>> state;  ///< snapshots may share it: see change_to
-  std::uint64_t mesh_revision = 0;
+  std::shared_ptr<State<Dim>> state;                                            ///< snapshots may share it: see change_to
   const std::shared_ptr<const char> identity = std::make_shared<const char>();  ///< of what save() gave
   mutable std::atomic<Phase> phase = Phase::between_steps;                      ///< terms are asked by several threads
   EdgeLengths initial_edges;
@@ -134,7 +133,7 @@ struct Simulation<Dim>::Impl {
     std::vector<VectorX> places = {before.history.x[0]};
     if (!setup.time.is_static && !setup.time.quasistatic)
       places.push_back(TimeIntegrator(setup.time).predictor(before.history));
-    const HeldDofs<Dim> held = held_dofs(setup, before.mesh, setup.time.time_after(before.step + 1), before.space);
+    const HeldDofs<Dim> held = held_dofs(setup, before.mesh, setup.time.time_after(before.step + 1));
     VectorX target = before.history.x[0];
     for (Eigen::Index i = 0; i < target.size(); ++i)
       if (held.held[i]) target[i] = held.target[i];
@@ -185,8 +184,8 @@ struct Simulation<Dim>::Impl {
     made.vertices = state->mesh.num_vertices();
     made.elements = state->mesh.num_cells();
     const VectorX& x = state->history.x[0];
-    StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
-                             state->quadrature, state->chords);
+    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *cache, state->stiffness, state->quadrature,
+                             state->chords);
     made.unknowns = problem.dofs().num_unknowns;
     made.energy = problem.report(x);
     made.energy_before_remesh = made.energy.total;
@@ -239,8 +238,8 @@ struct Simulation<Dim>::Impl {
   void set_forces_at_rest() {
     if (!setup.fields.any_forces()) return;
     const Inside inside(*this, Phase::in_step);
-    StepProblem<Dim> problem(setup, state->mesh, state->space, state->history, state->t, *cache, state->stiffness,
-                             state->quadrature, state->chords);
+    StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *cache, state->stiffness, state->quadrature,
+                             state->chords);
     forces = problem.forces_at_start(state->history.x[0]);
   }
 
@@ -304,7 +303,6 @@ StepResult Simulation<Dim>::adapt(double dt) {
         impl_->step_with_room(end, [&](const State<Dim>& now) { return take_step(impl_->tools(), now, end, start.get()); });
     if (!adapted.ok || adapted.renumbering.empty()) return adapted;
     before = impl_->change_to(start);
-    ++impl_->mesh_revision;
     impl_->set_forces_at_rest();
     impl_->add_remeshing(adapted.report, impl_->forces);
     return adapted;
@@ -334,7 +332,6 @@ StepResult Simulation<Dim>::advance() {
   impl_->add_remeshing(result.report, result.forces);
   impl_->forces = result.forces;
   impl_->report = result.report;
-  if (!result.renumbering.empty()) ++impl_->mesh_revision;  // whatever a listener throws
   impl_->watch.look(impl_->setup, *impl_->state, result.report, impl_->logger);
   impl_->tell(*before, result);
   return result;
@@ -359,11 +356,6 @@ void Simulation<Dim>::on_mesh_change(std::function<void(const MeshChange<Dim>&, 
 }
 
 template <int Dim>
-std::uint64_t Simulation<Dim>::mesh_revision() const {
-  return impl_->mesh_revision;
-}
-
-template <int Dim>
 Snapshot<Dim> Simulation<Dim>::save() const {
   return {impl_->state, impl_->setup.time, impl_->forces, impl_->report, impl_->identity};
 }
@@ -375,7 +367,6 @@ void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
     throw InputError({"", "saved state", "one of another simulation", "one that this simulation has saved"});
   impl_->state = std::const_pointer_cast<State<Dim>>(snapshot.state);  // change_to leaves it as it is
   impl_->flats->stretch(impl_->state->doublings, impl_->setup.obstacles);
-  ++impl_->mesh_revision;
   impl_->setup.time = snapshot.time;
   impl_->scale_tolerances();
   impl_->forces = snapshot.forces;
@@ -386,11 +377,10 @@ template <int Dim>
 void Simulation<Dim>::restore(State<Dim> state) {
   impl_->refuse_in_callback("restore");
   refuse_misfit(impl_->setup, state);
-  if (impl_->state->space.is_linear() && !state.space.is_linear()) refuse_unsupported(impl_->setup, state);
+  if (!impl_->state->mesh.has_nodes() && state.mesh.has_nodes()) refuse_unsupported(impl_->setup, state);
   if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
   impl_->change_to(std::make_shared<State<Dim>>(std::move(state)));
   impl_->flats->stretch(impl_->state->doublings, impl_->setup.obstacles);
-  ++impl_->mesh_revision;
   impl_->report.reset();
   impl_->set_forces_at_rest();
 }

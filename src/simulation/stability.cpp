@@ -111,18 +111,18 @@ bool may_buckle(const StepSetup<Dim>& setup, const State<Dim>& state, const Vect
   return false;
 }
 
-/// A field over the nodes of a space and obstacles in the space with all edges curved.
+/// A field over the nodes of a mesh and obstacles on the same one with all edges curved.
 template <int Dim>
-VectorX in_space(const Mesh<Dim>& mesh, const Space& space, const Space& curved, const VectorX& field) {
+VectorX on_curved(const Mesh<Dim>& mesh, const Mesh<Dim>& curved, const VectorX& field) {
   if (field.size() == 0) return field;
-  const int vertices = Dim * mesh.vertex_slots(), nodes = Dim * num_nodes(mesh, space);
+  const int vertices = Dim * mesh.num_vertices(), nodes = Dim * mesh.num_nodes();
   const auto at = [&](int node) { return field.segment<Dim>(Dim * node); };
-  VectorX result(field.size() + Dim * (curved.num_curved() - space.num_curved()));
+  VectorX result(field.size() + Dim * (curved.num_curved() - mesh.num_curved()));
   result.head(vertices) = field.head(vertices);
-  for (int i = 0; i < curved.num_curved(); ++i) {
-    const auto [a, b] = curved.curved_edges()[i];
-    const int node = space.node_of(a, b, mesh.vertex_slots());
-    result.segment<Dim>(vertices + Dim * i) = node == kNone ? Vec<Dim>((at(a) + at(b)) / 2) : Vec<Dim>(at(node));
+  for (VertexId i = curved.num_vertices(); i < curved.node_slots(); ++i) {
+    const auto [a, b] = curved.edge_of_node(i);
+    const int node = mesh.node_of(a, b);
+    result.segment<Dim>(Dim * i) = node == kNone ? Vec<Dim>((at(a) + at(b)) / 2) : Vec<Dim>(at(node));
   }
   result.tail(field.size() - nodes) = field.tail(field.size() - nodes);
   return result;
@@ -134,37 +134,39 @@ template <int Dim>
 std::vector<EdgeKey> find_edges_that_lock(const StepTools<Dim>& tools, const State<Dim>& state, const VectorX& x) {
   if (!may_buckle(tools.setup, state, x)) return {};
   const Mesh<Dim>& mesh = state.mesh;
-  const Space curved(mesh.edges());
-  if (curved == state.space) return {};
+  const std::vector<EdgeKey> edges = mesh.edges();
+  if (std::ssize(edges) == mesh.num_curved()) return {};
+  Mesh<Dim> curved = mesh;
+  curved.set_curved_edges(edges);
   History history = state.history;
   for (auto* fields : {&history.x, &history.v, &history.a})
-    for (VectorX& field : *fields) field = in_space(mesh, state.space, curved, field);
+    for (VectorX& field : *fields) field = on_curved(mesh, curved, field);
   ChordLevels chords(state.chords.empty() ? 0 : curved.num_curved(), 0);
   for (std::size_t i = 0; i < state.chords.size(); ++i) {
-    const auto& [a, b] = state.space.curved_edges()[i];
-    chords[curved.find(a, b)] = state.chords[i];
+    const EdgeKey edge = mesh.edge_of_node(mesh.num_vertices() + static_cast<int>(i));
+    chords[curved.node_of(edge) - curved.num_vertices()] = state.chords[i];
   }
   const linear::FactorRecord record = tools.solver.record();
   ProblemCache<Dim> cache(tools.solver);
   VectorX way;
   {
-    StepProblem<Dim> problem(tools.setup, mesh, curved, history, state.t, cache, state.stiffness, {}, chords);
-    way = problem.find_instability(in_space(mesh, state.space, curved, x));
+    StepProblem<Dim> problem(tools.setup, curved, history, state.t, cache, state.stiffness, {}, chords);
+    way = problem.find_instability(on_curved(mesh, curved, x));
   }
   tools.solver.restore(record);
   ++tools.cache.served;  // the solver has analysed another system since
   if (way.size() == 0) return {};
   std::vector<double> parts;
-  for (int i = 0; i < curved.num_curved(); ++i) {
-    const auto [a, b] = curved.curved_edges()[i];
+  for (const EdgeKey& edge : edges) {
+    const auto [a, b] = edge;
     const auto at = [&](int node) { return way.segment<Dim>(Dim * node); };
-    const bool is_straight = state.space.find(a, b) == kNone;
-    parts.push_back(is_straight ? (at(mesh.vertex_slots() + i) - (at(a) + at(b)) / 2).norm() : 0);
+    const bool is_straight = mesh.node_of(edge) == kNone;
+    parts.push_back(is_straight ? (at(curved.node_of(edge)) - (at(a) + at(b)) / 2).norm() : 0);
   }
   const double largest = *std::max_element(parts.begin(), parts.end());
   std::vector<EdgeKey> found;
-  for (int i = 0; i < curved.num_curved(); ++i)
-    if (parts[i] > kNegligible * largest) found.push_back(curved.curved_edges()[i]);
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    if (parts[i] > kNegligible * largest) found.push_back(edges[i]);
   return found;
 }
 

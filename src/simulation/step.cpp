@@ -62,9 +62,9 @@ std::string reason_of(const NewtonSummary& summary) {
 /// Finds what is violated by the present positions, or by those that the history holds.
 template <int Dim>
 std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
-  std::string violation = find_violation(setup, state.mesh, x, state.space, state.chords);
+  std::string violation = find_violation(setup, state.mesh, x, state.chords);
   for (const VectorX& past : state.history.x)
-    if (violation.empty()) violation = find_violation(setup, state.mesh, past, state.space, state.chords);
+    if (violation.empty()) violation = find_violation(setup, state.mesh, past, state.chords);
   return violation;
 }
 
@@ -73,17 +73,17 @@ std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state,
 template <int Dim>
 std::vector<CellId> find_nearly_inverted(const State<Dim>& state, const VectorX& x) {
   constexpr double kSmall = 0.1, kTolerance = 0.1;
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {}, state.space);
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
   std::vector<CellId> found;
-  for (const auto& element : cells.curved_elements) {
+  for (const auto& element : cells.curved()) {
     const double least = min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kTolerance);
     if (least * element.inverse_edges.determinant() >= kSmall) continue;
-    for (int k = 0; k <= Dim; ++k) {
-      const auto around = state.mesh.cells_of(element.nodes[k]);
+    for (const VertexId v : element.vertices) {
+      const auto around = state.mesh.cells_of(v);
       found.insert(found.end(), around.begin(), around.end());
     }
   }
-  if (found.empty() && !cells.curved_elements.empty()) {
+  if (found.empty() && cells.has_curved()) {
     found.resize(state.mesh.cell_slots());
     std::iota(found.begin(), found.end(), 0);
   }
@@ -113,9 +113,16 @@ class EffortClock {
 template <int Dim>
 class StepSolver {
  public:
-  /// The first solve starts at `x_start`; empty: at the positions before.
-  StepSolver(const StepTools<Dim>& tools, const State<Dim>& before, StepMethod method, const VectorX& x_start)
-      : tools_(tools), setup_(tools.setup), before_(before), next_(before), x_(x_start), guard_(tools.setup, before) {
+  /// The first solve starts at `x_start`; empty: at the positions before. It must settle what is lagged if the step may be
+  /// cut.
+  StepSolver(const StepTools<Dim>& tools, const State<Dim>& before, StepMethod method, const VectorX& x_start, bool may_cut)
+      : tools_(tools),
+        setup_(tools.setup),
+        before_(before),
+        next_(before),
+        x_(x_start),
+        guard_(tools.setup, before),
+        must_settle_(may_cut && tools.setup.lagging_tolerance > 0) {
     next_.step = before.step + 1;
     next_.t = setup_.time.time_after(next_.step);
     next_.history.damp_next = method == StepMethod::implicit_euler;
@@ -179,7 +186,7 @@ class StepSolver {
     if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
     TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
-    next_.chords = lowered_chords<Dim>(setup_, next_.mesh, next_.space, next_.chords, next_.history.x);
+    next_.chords = lowered_chords<Dim>(setup_, next_.mesh, next_.chords, next_.history.x);
     after = std::move(next_);  // before_ may be the same, and is not needed any more
     clock_.tell(report_);
     report_.peak_rss_mb = peak_rss_mb();
@@ -214,6 +221,7 @@ class StepSolver {
     else
       x_ = next_.history.x[0];
     first_summary_ = solve_between_chords(expected());
+    must_settle_ = false;  // a cut would not help what remeshing does
     if (!first_summary_.converged()) {
       // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
       const bool is_stuck = first_summary_.termination == Termination::no_descent ||
@@ -245,8 +253,8 @@ class StepSolver {
 
   void make_problem() {
     const ScopedTimer timer(report_.seconds.assembly);
-    problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.space, next_.history, next_.t, tools_.cache,
-                                                  next_.stiffness, next_.quadrature, next_.chords);
+    problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.history, next_.t, tools_.cache, next_.stiffness,
+                                                  next_.quadrature, next_.chords);
   }
 
   /// Solves from x, and again from there with more chords as long as curves leave theirs too far.
@@ -256,7 +264,7 @@ class StepSolver {
     make_problem();
     NewtonSummary summary = solve(expected);
     for (int solves = 1; summary.converged(); ++solves) {
-      const ChordDemand demand = find_chord_demand(setup_, next_.mesh, next_.space, next_.chords, x_);
+      const ChordDemand demand = find_chord_demand(setup_, next_.mesh, next_.chords, x_);
       if (demand.excess <= 1) return summary;
       if (demand.levels == next_.chords || solves == kMostSolves || !may_have(demand.levels, start)) {
         warn(
@@ -284,7 +292,7 @@ class StepSolver {
 
   /// Whether surfaces with these levels of chords are apart at x, and at past positions.
   bool may_have(const ChordLevels& levels, const VectorX& x) const {
-    const ContactSurface<Dim> contact = contact_surface(setup_, next_.mesh, next_.space, levels);
+    const ContactSurface<Dim> contact = contact_surface(setup_, next_.mesh, levels);
     const auto is_free = [&](const VectorX& at) { return !has_intersection<Dim>(contact.surface, contact.positions(at)); };
     return is_free(x) && std::all_of(next_.history.x.begin(), next_.history.x.end(), is_free);
   }
@@ -292,9 +300,8 @@ class StepSolver {
   /// Gives the curves of another mesh the chords that they ask for. Remeshing lets chords touch, not curves: where more
   /// chords would meet something, the solve begins where the step does, or is left with those that remeshing saw.
   void settle_chords() {
-    if (!setup_.contact.enabled || next_.space.is_linear()) return;
     const auto settled = [&](const ChordLevels& levels, std::span<const VectorX> positions) {
-      return settled_chords<Dim>(setup_, next_.mesh, next_.space, levels, positions);
+      return settled_chords<Dim>(setup_, next_.mesh, levels, positions);
     };
     const ChordLevels of_history = settled(next_.chords, next_.history.x), of_all = settled(of_history, {&x_, 1});
     if (of_all.empty()) return next_.chords.clear();
@@ -320,7 +327,7 @@ class StepSolver {
 
   /// From x, where what is lagged is lagged first.
   NewtonSummary solve(const VectorX& expected = {}) {
-    NewtonSummary summary = problem_->solve(x_, VectorX(x_), expected);
+    NewtonSummary summary = problem_->solve(x_, VectorX(x_), expected, must_settle_);
     add_seconds(summary, report_.seconds);
     report_.newton_iterations += summary.iterations;
     report_.residual_worth = std::max(report_.residual_worth, summary.decrement / problem_->scaling());
@@ -428,6 +435,7 @@ class StepSolver {
   VectorX x_;  ///< the solution, on next_.mesh; before the first solve its start
   std::unique_ptr<StepProblem<Dim>> problem_;
   EnergyGuard<Dim> guard_;
+  bool must_settle_;  ///< rounds of lagging, or the step is cut
   MeshRenumbering renumbering_;
   StepReport report_;
   NewtonSummary first_summary_;
@@ -463,7 +471,7 @@ StartOfStep<Dim> straighten(const StepTools<Dim>& tools, Straightening where, co
   clock.tell(from.effort);
   if (from.renumbering)
     tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", before.step + 1,
-                                     before.space.num_curved() - from.state.space.num_curved(), failure.reason));
+                                     before.mesh.num_curved() - from.state.mesh.num_curved(), failure.reason));
   return from;
 }
 
@@ -502,7 +510,8 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     if (from.straightening != Straightening::none && !from.renumbering) {
       failure.kind = StepFailure::Kind::nothing_straightened;
     } else {
-      if (!solver) solver.emplace(tools, from.renumbering ? from.state : before, attempt.method, from.x);
+      const bool may_cut = attempt.halvings < ladder.most_halvings;
+      if (!solver) solver.emplace(tools, from.renumbering ? from.state : before, attempt.method, from.x, may_cut);
       auto now = solver->solve(attempt.remeshing);
       if (!now) break;
       failure = std::move(*now);

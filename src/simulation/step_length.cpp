@@ -26,7 +26,7 @@ RestPoint<Dim> place_with(const Setup<Dim>& setup, int tag) {
   const Mesh<Dim>& mesh = setup.mesh;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f)
     if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == tag) return mesh.point(mesh.facet(f)[0]);
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+  for (VertexId v = 0; v < mesh.node_slots(); ++v)
     if (mesh.is_vertex_alive(v) && mesh.vertex_tag(v) == tag) return mesh.point(v);
   return mesh.point(0);
 }
@@ -107,24 +107,29 @@ double slowest_period(const Setup<Dim>& setup) {
 }  // namespace
 
 template <int Dim>
-double driven_speed(const Setup<Dim>& setup, double size, const Vec<Dim>& center) {
+double prescribed_speed(const Setup<Dim>& setup, const Vec<Dim>& center, int steps) {
   const TimeOptions& time = setup.time;
   double speed = 0;
   for (const auto& condition : setup.initial_velocity) speed = std::max(speed, condition.value(center, time.t0).norm());
-  if (setup.body_acceleration) {
-    const double a = setup.body_acceleration(center, time.t0).norm(), duration = time.dt * time.steps;
-    speed = std::max(speed, std::min(a * duration, std::sqrt(2 * a * size)));
-  }
   constexpr int kSamples = 20;
   VectorX before = held_dofs(setup, setup.mesh, time.t0).target;
   for (int i = 1; i <= kSamples; ++i) {
-    const VectorX after = held_dofs(setup, setup.mesh, time.t0 + time.dt * time.steps * i / kSamples).target;
+    const VectorX after = held_dofs(setup, setup.mesh, time.t0 + time.dt * steps * i / kSamples).target;
     const VectorX way = after - before;
     for (Eigen::Index k = 0; k + Dim <= way.size(); k += Dim)
-      speed = std::max(speed, way.template segment<Dim>(k).norm() * kSamples / (time.dt * time.steps));
+      speed = std::max(speed, way.template segment<Dim>(k).norm() * kSamples / (time.dt * steps));
     before = after;
   }
   return speed;
+}
+
+template <int Dim>
+double driven_speed(const Setup<Dim>& setup, double size, const Vec<Dim>& center) {
+  const TimeOptions& time = setup.time;
+  const double speed = prescribed_speed(setup, center, time.steps);
+  if (!setup.body_acceleration) return speed;
+  const double a = setup.body_acceleration(center, time.t0).norm(), duration = time.dt * time.steps;
+  return std::max(speed, std::min(a * duration, std::sqrt(2 * a * size)));
 }
 
 template <int Dim>
@@ -167,7 +172,9 @@ void find_long_steps(const Setup<Dim>& setup, double size, const Vec<Dim>& cente
                     dt, setup.units.text(period, "s", 2)));
 }
 
+template double prescribed_speed(const Setup<2>&, const Vec<2>&, int);
 template double driven_speed(const Setup<2>&, double, const Vec<2>&);
+template double prescribed_speed(const Setup<3>&, const Vec<3>&, int);
 template double driven_speed(const Setup<3>&, double, const Vec<3>&);
 template void find_long_steps(const Setup<2>&, double, const Vec<2>&, std::vector<std::string>&);
 template void find_long_steps(const Setup<3>&, double, const Vec<3>&, std::vector<std::string>&);

@@ -8,8 +8,12 @@
 
 namespace itr {
 
-/// Fastest that anything is driven [m/s]: at the start, by gravity over the size of the scene, by what is prescribed.
-/// `size` [m] of the bodies and a vertex at their `center` [m], where loads are asked for.
+/// Fastest of initial velocities and of what is prescribed in the first `steps` [m/s]. `center` [m]: a vertex at the bodies'
+/// centre, where loads are asked for.
+template <int Dim>
+double prescribed_speed(const Setup<Dim>& setup, const Vec<Dim>& center, int steps);
+
+/// Fastest that anything is driven [m/s]: by what is prescribed, and by gravity over the `size` of the bodies [m].
 template <int Dim>
 double driven_speed(const Setup<Dim>& setup, double size, const Vec<Dim>& center);
 

@@ -34,13 +34,11 @@ template <int Dim>
 Eigen::SparseMatrix<double> weights_between(const State<Dim>& of, const State<Dim>& now) {
   const Locator<Dim> locator(now.mesh);
   std::vector<Eigen::Triplet<double>> entries;
-  for (int node = 0; node < num_nodes(of.mesh, of.space); ++node) {
-    const int edge = node - of.mesh.vertex_slots();
-    const RestPoint<Dim> X = edge < 0 ? of.mesh.point(node) : of.mesh.middle(of.space.curved_edges()[edge]);
-    for_each_weight<Dim>(locator.find(X), now.space, now.mesh.vertex_slots(),
+  for (int node = 0; node < of.mesh.num_nodes(); ++node) {
+    for_each_weight<Dim>(locator.find(of.mesh.point_of_node(node)),
                          [&](int other, double weight) { entries.emplace_back(other, node, weight); });
   }
-  Eigen::SparseMatrix<double> weights(num_nodes(now.mesh, now.space), num_nodes(of.mesh, of.space));
+  Eigen::SparseMatrix<double> weights(now.mesh.num_nodes(), of.mesh.num_nodes());
   weights.setFromTriplets(entries.begin(), entries.end());
   return weights;
 }
@@ -48,8 +46,8 @@ Eigen::SparseMatrix<double> weights_between(const State<Dim>& of, const State<Di
 /// Adds forces, half of them, to those on another mesh of the bodies; they stay at their points.
 template <int Dim>
 void add_half(const NodalForces& forces, const State<Dim>& of, const State<Dim>& now, NodalForces& sum) {
-  const bool same = of.mesh.vertex_slots() == now.mesh.vertex_slots() && of.space == now.space &&
-                    node_rest_positions(of.mesh, of.space) == node_rest_positions(now.mesh, now.space);
+  const bool same = of.mesh.num_vertices() == now.mesh.num_vertices() && of.mesh.rest() == now.mesh.rest() &&
+                    of.mesh.curved_edges() == now.mesh.curved_edges();
   const Eigen::SparseMatrix<double> weights = same ? Eigen::SparseMatrix<double>() : weights_between(of, now);
   const auto add = [&](const VectorX& field, VectorX& to) {
     if (field.size() == 0) return;

@@ -32,16 +32,16 @@ double& entry_of(EnergyReport& report, EnergyEntry entry) {
 }  // namespace
 
 template <int Dim>
-StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history,
-                              double t, ProblemCache<Dim>& cache, const BarrierStiffness& stiffness,
-                              const QuadratureLevels& levels, const ChordLevels& chords)
+StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t,
+                              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness, const QuadratureLevels& levels,
+                              const ChordLevels& chords)
     : setup_(setup),
       terms_(potential_terms(setup, history, t)),
-      scope_(cache.scope_of(setup, mesh, space, chords)),
+      scope_(cache.scope_of(setup, mesh, chords)),
       cells_(scope_->cells),
       surface_(scope_->surface),
       workspace_(scope_->workspace),
-      held_(held_dofs(setup, mesh, t, space)),
+      held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
       potential_(terms_, cells_,
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
@@ -62,6 +62,7 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_.surface, setup.contact, average_mass(), terms_.scaling,
                                                            surface_.map.get());
   }
+  if (!history.v.empty()) last_motion_ = relative_motion(history.v[0]) * setup.time.dt;
   potential_.elastic()->set_quadrature_levels(levels);
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
     if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials); !loose.empty())
@@ -106,8 +107,26 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
 }
 
 template <int Dim>
-NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
-  return LaggedSolve<Dim>(*this).solve(x, lagged_x, expected);
+NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected, bool must_settle) {
+  return LaggedSolve<Dim>(*this, must_settle).solve(x, lagged_x, expected);
+}
+
+/// The diagonal of the box of all motions, obstacles' included [m].
+template <int Dim>
+double StepProblem<Dim>::relative_motion(const VectorX& increment) const {
+  Eigen::AlignedBox<double, Dim> box;
+  for (Eigen::Index i = 0; i < increment.size(); i += Dim) box.extend(Vec<Dim>(increment.template segment<Dim>(i)));
+  return box.isEmpty() ? 0 : box.diagonal().norm();
+}
+
+/// Where the scene leaves it open, friction is smoothed below a part of the relative motion in the step [m]: bodies that
+/// stick then creep by as much of the whole path, in any number of steps and in any unit of time.
+template <int Dim>
+void StepProblem<Dim>::smooth_friction_by(double motion) {
+  constexpr double kShare = 1e-3;
+  constexpr double kLeast = 1e-6;  // of the bodies' diagonal: less is no motion
+  if (setup_.contact.friction_velocity == 0)
+    terms_.contact.friction_velocity = kShare * std::max(motion, kLeast * scope_->diagonal) * terms_.velocity_rate;
 }
 
 template <int Dim>
@@ -262,7 +281,7 @@ double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
 template <int Dim>
 double StepProblem<Dim>::energy_resolution() const {
   double stiffness = 0;
-  for_each_cell(cells_, [&](int body, double volume) { stiffness += volume * setup_.materials.at(body).youngs_modulus; });
+  for (const auto& element : cells_.elements) stiffness += element.volume * setup_.materials.at(element.body).youngs_modulus;
   return kEnergyResolution * stiffness;
 }
 
@@ -275,10 +294,10 @@ double StepProblem<Dim>::min_distance(const VectorX& x) {
 template <int Dim>
 double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
   double least = std::numeric_limits<double>::infinity();
-  for (const auto& element : cells.elements) least = std::min(least, deformation_gradient<Dim>(element, x).determinant());
-  for (const auto& element : cells.curved_elements)
-    least = std::min(least, min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kVolumeRatioTolerance) *
-                                element.inverse_edges.determinant());
+  for (const auto& element : cells.elements)
+    least = std::min(least, element.curved ? min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kVolumeRatioTolerance) *
+                                                 element.inverse_edges.determinant()
+                                           : deformation_gradient<Dim>(element, x).determinant());
   return least;
 }
 

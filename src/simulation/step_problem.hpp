@@ -24,14 +24,13 @@ class StepProblem {
   /// `stiffness`, which the barrier starts from where it is adaptive, `levels` of quadrature, which the solve may raise, and
   /// those of `chords`.
   /// Problems may share a cache and solve in turn, each as if alone.
-  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const Space& space, const History& history, double t,
-              ProblemCache<Dim>& cache, const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {},
-              const ChordLevels& chords = {});
+  StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const History& history, double t, ProblemCache<Dim>& cache,
+              const BarrierStiffness& stiffness = {}, const QuadratureLevels& levels = {}, const ChordLevels& chords = {});
 
   /// Solves from x (feasible) in place, with rounds for what is lagged: friction, damping, pressure without a potential. In
   /// the first round they are lagged at `lagged_x`. Newton begins where the bodies are `expected` (empty: nowhere), if the
-  /// way there is free and the energy lower.
-  NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected = {});
+  /// way there is free and the energy lower. With `must_settle` it fails where StepSetup::lagging_tolerance is not reached.
+  NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected = {}, bool must_settle = false);
 
   /// x minus the positions at the start of the step [m]; of the last solve's x without the round-off of x.
   VectorX increment_of(const VectorX& x) const;
@@ -64,12 +63,15 @@ class StepProblem {
   const CellSet<Dim>& cells() const { return cells_; }
   const CollisionSurface& surface() const { return surface_.surface; }
   double scaling() const { return terms_.scaling; }
+  double friction_velocity() const { return terms_.contact.friction_velocity; }  ///< eps_v of the last solve [m/s]
 
  private:
   friend class LaggedSolve<Dim>;
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
   void initialize_stiffness(const VectorX& x);
+  double relative_motion(const VectorX& increment) const;
+  void smooth_friction_by(double motion);
   void reset_system();
   SparseSystem& system();
   VectorX momentum(const VectorX& v) const;
@@ -96,6 +98,7 @@ class StepProblem {
   ProblemCache<Dim>& cache_;
   unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this
   int rounds_ = 0;          ///< of the last solve
+  double last_motion_ = 0;  ///< the largest relative motion in the step before [m]
 };
 
 /// The least det F over the elements; of a curved one a lower bound.

@@ -62,8 +62,8 @@ typename HeldRule<Dim>::Components held_components(const StepSetup<Dim>& setup) 
 }
 
 template <int Dim>
-HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space) {
-  const int bodies = num_nodes(mesh, space), total = bodies + static_cast<int>(setup.obstacles.rest.size());
+HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t) {
+  const int bodies = mesh.num_nodes(), total = bodies + static_cast<int>(setup.obstacles.rest.size());
   HeldDofs<Dim> result{std::vector<char>(Dim * total, 0), VectorX::Zero(Dim * total)};
   const ConditionsByTag<Dim> conditions = conditions_by_tag(setup);
   const auto components = held_components(setup);
@@ -82,12 +82,8 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
       result.target[Dim * node + c] = target[c];
     }
   };
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
-    hold(v, rule.tags_at(mesh, std::array{v}), [&] { return mesh.point(v); });
-  for (int i = 0; i < space.num_curved(); ++i) {
-    const EdgeKey& edge = space.curved_edges()[i];
-    hold(mesh.vertex_slots() + i, rule.tags_at(mesh, edge), [&] { return mesh.middle(edge); });
-  }
+  for (VertexId node = 0; node < mesh.node_slots(); ++node)
+    hold(node, rule.tags_of_node(mesh, node), [&] { return mesh.point_of_node(node); });
   for (int o = 0; o < total - bodies; ++o) {
     const Vec<Dim>& X = setup.obstacles.rest[o];
     const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
@@ -122,12 +118,12 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
           .follower = {}};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                            \
-  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                     \
-  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double);     \
-  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                          \
-  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                       \
-  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double, const Space&); \
+#define ITR_INSTANTIATE(Dim)                                                                        \
+  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                 \
+  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double); \
+  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                      \
+  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                   \
+  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);           \
   template double rest_diagonal<Dim>(const Mesh<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

@@ -7,7 +7,6 @@
 
 #include "fem/held_rule.hpp"
 #include "itr/energy/terms.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/simulation/setup.hpp"
 #include "itr/time/integrator.hpp"
 
@@ -38,7 +37,7 @@ template <int Dim>
 typename HeldRule<Dim>::Components held_components(const StepSetup<Dim>& setup);
 
 template <int Dim>
-HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t, const Space& space = {});
+HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t);
 
 /// Diagonal of the bounding box of the bodies at rest [m].
 template <int Dim>

@@ -65,7 +65,7 @@ void refuse_unsupported(const Setup<Dim>& setup) {
 
 template <int Dim>
 void refuse_unsupported(const Setup<Dim>& setup, const State<Dim>& state) {
-  refuse(setup, !state.space.is_linear());
+  refuse(setup, state.mesh.has_nodes());
 }
 
 template void refuse_unsupported(const Setup<2>&);

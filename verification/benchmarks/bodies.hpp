@@ -16,8 +16,8 @@ namespace itr {
 template <int Dim>
 VectorX strained(const Mesh<Dim>& mesh, double noise, std::mt19937& random) {
   std::uniform_real_distribution<double> offset(-noise, noise);
-  VectorX x(Dim * mesh.vertex_slots());
-  for (int v = 0; v < mesh.vertex_slots(); ++v)
+  VectorX x(Dim * mesh.node_slots());
+  for (int v = 0; v < mesh.node_slots(); ++v)
     for (int c = 0; c < Dim; ++c) x[Dim * v + c] = (c == 0 ? 0.8 : 1.05) * mesh.rest(v)[c] + 0.2 * offset(random);
   return x;
 }

@@ -137,8 +137,8 @@ void CheckCollapseInContact(benchmark::State& state) {
   check_collapse<Dim>(state, true);
 }
 
-/// Commits an accepted split: it changes the mesh, fields, strata, and the surface in each stored configuration; the vertices of
-/// its cells move.
+/// Commits an accepted split: it changes the mesh, fields, strata, and the surface in each stored configuration; the
+/// vertices of its cells move.
 template <int Dim>
 void accept(Step<Dim>& step, const EdgeKey& edge, Marks& moved) {
   Mesh<Dim>& mesh = step.body.mesh;
@@ -146,8 +146,8 @@ void accept(Step<Dim>& step, const EdgeKey& edge, Marks& moved) {
   const auto edit = make_split(mesh, edge);
   const FacetId first_facet = mesh.facet_slots();
   const VertexId created = mesh.apply(edit);
-  moved.clear(mesh.vertex_slots());
-  step.fields.make_room(mesh.vertex_slots());
+  moved.clear(mesh.node_slots());
+  step.fields.make_room(mesh.node_slots());
   step.fields.follow(edit, created);
   step.gate.follow(edit, first_facet);
   step.body.strata.follow(edit, created);

@@ -22,7 +22,7 @@ SCENES = {
     "masticator 2D to t = 1, remeshed": ("examples/masticator.json", {"/time/tend": 1.0}),
     "ball-wall 2D to t = 0.0004, remeshed": ("examples/ball_wall.json", {"/time/tend": 0.0004}),
 }
-QUIET = {"/output/paraview/skip_frame": 10**6, "/solver/max_threads": 1}
+QUIET = {"/output/paraview/skip_frame": 10**6, "/solver/max_threads": 1, "/defaults": "polyfem"}
 STEP = """
 import json, sys, itr
 s = itr.Simulation(itr.Model.from_scene(sys.argv[1], json.loads(sys.argv[2])))

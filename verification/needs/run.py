@@ -71,7 +71,7 @@ class Row:
 
 def explained(itr, scene, sets):
     """Terms that are in, and what `explain` says of unknowns."""
-    text = subprocess.run([str(itr), "explain", str(scene), *sets], capture_output=True, text=True, check=True).stdout.splitlines()
+    text = subprocess.run([str(itr), "explain", str(scene), "--defaults", "polyfem", *sets], capture_output=True, text=True, check=True).stdout.splitlines()
     rows = [line.split() for line in text[text.index("energy terms") + 1:text.index("energy terms") + 1 + len(TERMS)]]
     return [row[0] for row in rows if row[1] == "yes"], text[text.index("unknowns") + 1].strip().split("(")[0].strip()
 
@@ -100,8 +100,8 @@ def everything(dim, terms, has_remeshing):
 
 def run(itr, scene, sets, folder):
     """Steps of a run, or why there are none."""
-    done = subprocess.run([str(itr), "run", str(scene), "-o", str(folder), "--overwrite", "--threads", "1", *sets],
-                          capture_output=True, text=True)
+    done = subprocess.run([str(itr), "run", str(scene), "-o", str(folder), "--overwrite", "--threads", "1", "--defaults", "polyfem",
+                           *sets], capture_output=True, text=True)
     if done.returncode != 0:
         return None, done.stderr.strip().splitlines()[-1][:200]
     return [json.loads(line) for line in open(folder / "steps.jsonl")], ""

@@ -39,7 +39,7 @@ VARIANTS = [
 
 def run(options, scene, sets, keys, folder):
     command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--overwrite",
-               "--threads", "1"]
+               "--threads", "1", "--defaults", "polyfem"]
     for assignment in sets + [KEY + key for key in keys]:
         command += ["--set", assignment]
     try:

@@ -71,7 +71,7 @@ def run(case, options, nth=0):
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch) / "out"
         path = options.shared / "paper-scenes/scripts" / scene if scene else bodies.build(name, scratch)
-        command = [str(options.itr), "run", str(path), "-o", str(folder), "--threads", "1"]
+        command = [str(options.itr), "run", str(path), "-o", str(folder), "--threads", "1", "--defaults", "polyfem"]
         spread = [f"/contact/dhat={reach(path) * (1 + STEP_OF_REACH * nth)!r}"] if nth else []
         for assignment in sets + spread + options.set:
             command += ["--set", assignment]

@@ -57,7 +57,7 @@ def run(name, options):
     """Whether it went to its end; stopped after its hours as a user would stop it, so that all that is done stays."""
     scene, results = SCENES[name], options.runs / name
     path = os.path.relpath(options.shared / "paper-scenes/scripts" / scene.file, ROOT)
-    command = [str(options.itr), "run", path, "-o", str(results), "--threads", "1"]
+    command = [str(options.itr), "run", path, "-o", str(results), "--threads", "1", "--defaults", "polyfem"]
     command += [word for setting in scene.sets for word in ("--set", setting)]
     if (results / "steps.jsonl").exists():
         command.append("--resume")

@@ -202,7 +202,7 @@ def run(case, options):
     name, scene, sets, reference = case
     folder = folder_of(name, options)
     command = [str(options.itr), "run", str(options.shared / "paper-scenes/scripts" / scene), "-o", str(folder), "--overwrite",
-               "--threads", "1"]
+               "--threads", "1", "--defaults", "polyfem"]
     for assignment in sets:
         command += ["--set", assignment]
     before = os.times()

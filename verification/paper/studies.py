@@ -91,8 +91,8 @@ def run(name, options):
     path = os.path.relpath(options.shared / "paper-scenes/scripts" / scene, ROOT)
     # Relative, since reasons of failures name files and are stored.
     def study(*more):
-        return subprocess.run([str(options.itr), "study", path, "-o", os.path.relpath(folder, ROOT), *arguments, *more], cwd=ROOT,
-                              stdout=subprocess.DEVNULL)
+        return subprocess.run([str(options.itr), "study", path, "-o", os.path.relpath(folder, ROOT), "--defaults", "polyfem",
+                               *arguments, *more], cwd=ROOT, stdout=subprocess.DEVNULL)
 
     done = study()
     references = REFERENCES.get(name, ())

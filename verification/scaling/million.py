@@ -92,7 +92,7 @@ def main():
         (work / "scene.json").write_text(json.dumps(scene(work), indent=1), encoding="utf-8")
     itr, folder = arguments.build / "bin" / "itr", work / "run"
     command = [itr, "run", work / "scene.json", "-o", folder, "--resume" if arguments.resume else "--overwrite", "--threads",
-               arguments.threads, "--solver", arguments.solver]
+               arguments.threads, "--solver", arguments.solver, "--defaults", "polyfem"]
     with open(work / "log", "w+", encoding="utf-8") as log:
         status = subprocess.run(list(map(str, command)), stdout=log, stderr=log, check=False).returncode
         log.seek(0)

@@ -61,7 +61,8 @@ ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROO
 def dump(itr, scene, sets, folder, seconds):
     """The folder of the last system that a scene's run solved before its time was over, or None."""
     if not any(folder.glob("*/values.npy")):
-        command = [itr, "run", scene, "-o", folder / "run", "--overwrite", "--dump-systems", folder, "--dump-every", "5"]
+        command = [itr, "run", scene, "-o", folder / "run", "--overwrite", "--dump-systems", folder, "--dump-every", "5",
+                   "--defaults", "polyfem"]
         for value in ['/solver/linear/solver="auto"', *sets]:
             command += ["--set", value]
         folder.mkdir(parents=True, exist_ok=True)
@@ -200,7 +201,7 @@ def plot(rows, file):
 
 def run_scene(itr, scene, sets, solver, folder, seconds, gib):
     """Processor seconds of all steps of a run on one thread, and those of their linear solves by their share of the time."""
-    command = [itr, "run", scene, "-o", folder, "--overwrite", "--threads", "1", "--solver", solver]
+    command = [itr, "run", scene, "-o", folder, "--overwrite", "--threads", "1", "--solver", solver, "--defaults", "polyfem"]
     for value in sets:
         command += ["--set", value]
     _, outcome = limited(command, seconds, gib)

@@ -80,7 +80,9 @@ SparseAssembler hessian(const Energy& energy, const CellSet<Dim>& cells, const V
 
 template <int Dim>
 void write_matrices(const Setup<Dim>& setup, const MatrixX& displacement, const std::string& folder) {
-  const CellSet<Dim> cells = whole_mesh<Dim>(setup.mesh, {}, space_of_orders(setup.mesh, setup.order));
+  Mesh<Dim> mesh = setup.mesh;
+  mesh.set_curved_edges(edges_of_order_2(mesh, setup.order));
+  const CellSet<Dim> cells = whole_mesh<Dim>(mesh, {});
   if (displacement.rows() != cells.num_vertices || displacement.cols() != Dim) fail("the displacement has another shape");
   VectorX x(Dim * cells.num_vertices);
   for (int v = 0; v < cells.num_vertices; ++v) x.segment<Dim>(Dim * v) = cells.rest[v] + displacement.row(v).transpose();

@@ -22,11 +22,13 @@ class Model {
  public:
   /// An empty model of dimension 2 or 3.
   explicit Model(int dimension);
-  /// Reads bodies, obstacles and options of a scene file. Its surfaces become boundaries named by their ids: "1", "2", ...
+  /// Reads bodies, obstacles and options of a scene file. Its surfaces become boundaries by their names or ids: "1", "2",
+  /// ...
   static Model from_scene(const std::string& file, const std::vector<scene::Override>& overrides = {});
 
   /// Merges a JSON object with keys of a scene, other than `geometry` and `output`, into the options. Materials refer to
-  /// bodies by `id`. Conditions refer to boundaries and obstacles by the id that their add function returns.
+  /// bodies by `id`. Conditions refer to boundaries and obstacles by their names, or the ids that their add functions
+  /// return.
   void set_options(const std::string& json);
   /// Sets one key by its JSON pointer and JSON text. A scene that was read is read again, so any key may be set.
   void set_option(const std::string& pointer, const std::string& value);
@@ -40,13 +42,16 @@ class Model {
   /// for a node off the middle of its edge.
   void set_quadratic_mesh(std::span<const double> nodes, std::span<const int> cells, std::span<const int> bodies = {});
 
-  /// Names facets of the mesh's boundary, `dimension` vertices each in any order, and returns their id. A facet belongs to
-  /// at most one boundary. The mesh must be set before.
+  /// Names facets of the mesh's boundary, `dimension` vertices each in any order, and returns their id. A facet may
+  /// belong to several boundaries. The mesh must be set before.
   int add_boundary(const std::string& name, std::span<const int> facets);
   /// Names the facets whose vertices are all in the closed box. Throws InputError if there are none.
   int add_boundary(const std::string& name, std::span<const double> box_min, std::span<const double> box_max);
   /// Names the facets whose middle X (`dimension` numbers) satisfies the rule.
   int add_boundary(const std::string& name, const std::function<bool(const double* X)>& rule);
+
+  /// Gives bodies a name, which options may write instead of their ids; several bodies may have the same.
+  void name_body(const std::string& name, int body) { body_names_[name].push_back(body); }
 
   /// Adds an obstacle of edges (two vertices each) and, in 3D, triangles (three vertices each), and returns its id. Vertices
   /// of no edge and no triangle collide as points.
@@ -82,6 +87,7 @@ class Model {
   std::vector<double> vertices_;
   std::vector<int> cells_, bodies_;
   std::vector<Part> boundaries_, obstacles_;
+  std::map<std::string, std::vector<int>> body_names_;
   std::map<int, std::shared_ptr<const OwnLaw>> laws_;  ///< by body
   std::optional<scene::Scene> scene_;
 };

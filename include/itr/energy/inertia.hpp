@@ -48,8 +48,8 @@ class InertiaEnergy final : public Energy, public IncrementalTerm {
       f(cells_.elements[e].body, cells_.elements[e].vertices, matrix);
     }
     for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
-      const auto& element = cells_.curved_elements[e];
-      f(element.body, element.nodes, (curved_mass_[e].mass * matrices_[curved_mass_[e].matrix]).eval());
+      const auto& element = cells_.curved()[e];
+      f(element.body, element.nodes(), (curved_mass_[e].mass * matrices_[curved_mass_[e].matrix]).eval());
     }
   }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "itr/energy/host_terms.hpp"
-#include "itr/fem/space.hpp"
 
 namespace itr {
 
@@ -11,6 +10,6 @@ namespace itr {
 /// on another mesh the vertices of the cell that a point is in share its force, which keeps resultant and moment. Throws
 /// InputError for a wrong length or numbers that are not finite.
 template <int Dim>
-TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces, const Space& space = {});
+TermFactory<Dim> point_forces(const Mesh<Dim>& mesh, ConstVectorView forces);
 
 }  // namespace itr

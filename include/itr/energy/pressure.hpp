@@ -20,7 +20,7 @@ class PressureEnergy final : public Energy {
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
-  bool empty() const { return facets_.empty() && curved_facets_.empty(); }
+  bool empty() const { return facets_.empty() && curves_.empty(); }
   /// Whether any force on an unknown was lagged: then the forces are exact only where this was made.
   bool is_lagged(const DofMap& dofs) const;
 
@@ -41,7 +41,7 @@ class PressureEnergy final : public Energy {
   void for_each_cone(ConstVectorView x, const F& f) const;
 
   std::vector<LoadedFacet> facets_;
-  std::vector<CurvedLoadedFacet> curved_facets_;
+  std::vector<CurvedLoadedFacet> curves_;
   Vec<Dim> origin_ = Vec<Dim>::Zero();  ///< near the facets: less round-off
   VectorX correction_;                  ///< sum of p c [N]
   double rest_work_ = 0;                ///< sum of p (V(X) + c . X) [J]

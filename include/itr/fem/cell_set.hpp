@@ -3,10 +3,11 @@
 // one, so global and local problems share all their code.
 #pragma once
 
+#include <algorithm>
+#include <span>
 #include <vector>
 
 #include "itr/fem/quadratic.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/mesh/mesh.hpp"
 
 namespace itr {
@@ -19,50 +20,72 @@ struct CellSet {
     double volume;           ///< rest volume [m^Dim]
     Mat<Dim> inverse_edges;  ///< inverse of the matrix of rest edges
     int part = kNone;        ///< Mesh::part
+    CellId cell = kNone;     ///< in the mesh
+    CurvedEdges curved = 0;
+    std::array<int, kSimplexEdges<Dim>> edge_nodes{};  ///< local ids; at a straight edge its first vertex
+
+    /// Vertices, then nodes of edges: at a straight edge its first vertex, of shape function 0.
+    std::array<int, kQuadraticNodes<Dim>> nodes() const { return joined(vertices, edge_nodes); }
   };
   struct BoundaryFacet {
     std::array<int, Dim> vertices;  ///< local ids
     int tag;
     int part = kNone;  ///< of its cell
+    CurvedEdges curved = 0;
+    std::array<int, kSimplexEdges<Dim - 1>> edge_nodes{};  ///< as those of an element
+
+    std::array<int, kQuadraticNodes<Dim - 1>> nodes() const { return joined(vertices, edge_nodes); }
   };
-  /// A cell with at least one curved edge.
-  struct CurvedElement {
-    std::array<int, kQuadraticNodes<Dim>> nodes;  ///< local ids; at a straight edge its first vertex, of shape function 0
-    CurvedEdges curved;
-    int body;
-    double volume;           ///< rest volume [m^Dim]
-    Mat<Dim> inverse_edges;  ///< inverse of the matrix of rest edges
-    CellId cell;             ///< in the mesh
-    int part = kNone;        ///< Mesh::part
-  };
-  /// A boundary facet with at least one curved edge.
-  struct CurvedFacet {
-    std::array<int, kQuadraticNodes<Dim - 1>> nodes;  ///< as those of a curved element
-    CurvedEdges curved;
-    int tag;
-    int part = kNone;  ///< of its cell
-  };
-  int num_vertices = 0;        ///< length of fields / Dim; may exceed the cells' vertices (obstacles)
-  std::vector<Vec<Dim>> rest;  ///< per local vertex
-  std::vector<Element> elements;
+  int num_vertices = 0;           ///< length of fields / Dim; may exceed the cells' vertices (obstacles)
+  std::vector<Vec<Dim>> rest;     ///< per local vertex
+  std::vector<Element> elements;  ///< those without curved edges first
   std::vector<BoundaryFacet> facets;
-  std::vector<CurvedElement> curved_elements;
-  std::vector<CurvedFacet> curved_facets;
+
+  /// The elements without curved edges, and those with at least one.
+  std::span<const Element> straight() const { return {elements.data(), num_straight()}; }
+  std::span<const Element> curved() const { return std::span(elements).subspan(num_straight()); }
+  bool has_curved() const { return !elements.empty() && elements.back().curved; }
+  /// Adds an element in its place.
+  void add(const Element& element) {
+    elements.insert(element.curved ? elements.end() : elements.begin() + static_cast<std::ptrdiff_t>(num_straight()),
+                    element);
+  }
+
+ private:
+  std::size_t num_straight() const {
+    if (!has_curved()) return elements.size();
+    const auto is_straight = [](const Element& element) { return element.curved == 0; };
+    return static_cast<std::size_t>(std::partition_point(elements.begin(), elements.end(), is_straight) - elements.begin());
+  }
+  template <std::size_t M, std::size_t N>
+  static std::array<int, M + N> joined(const std::array<int, M>& vertices, const std::array<int, N>& of_edges) {
+    std::array<int, M + N> nodes;
+    std::copy(of_edges.begin(), of_edges.end(), std::copy(vertices.begin(), vertices.end(), nodes.begin()));
+    return nodes;
+  }
 };
 
-/// Calls f(node) for the vertices of a simplex of a mesh with so many vertices, then for the nodes of its curved edges.
-template <std::size_t N, typename F>
-void for_each_node(const std::array<VertexId, N>& simplex, const Space& space, int num_vertices, const F& f) {
+/// Calls f(node) for the vertices of an element or a facet, then for the nodes of its curved edges.
+template <typename Simplex, typename F>
+void for_each_node(const Simplex& simplex, const F& f) {
+  for (const int v : simplex.vertices) f(v);
+  for (std::size_t edge = 0; edge < simplex.edge_nodes.size(); ++edge)
+    if (simplex.curved >> edge & 1) f(simplex.edge_nodes[edge]);
+}
+
+/// Calls f(node) for the vertices of a simplex of the mesh, then for the nodes of its curved edges.
+template <int Dim, std::size_t N, typename F>
+void for_each_node(const Mesh<Dim>& mesh, const std::array<VertexId, N>& simplex, const F& f) {
   for (const VertexId v : simplex) f(v);
   for_each_edge<static_cast<int>(N) - 1>([&](int, int i, int j) {
-    if (const int node = space.node_of(simplex[i], simplex[j], num_vertices); node != kNone) f(node);
+    if (const int node = mesh.node_of(simplex[i], simplex[j]); node != kNone) f(node);
   });
 }
 
 /// The whole of a compact mesh with its own numbering: vertices, the nodes of curved edges, then `extra` vertices without
 /// cells.
 template <int Dim>
-CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra, const Space& space = {});
+CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra);
 
 /// Nodes of the elements of one kind, `size` each.
 struct Stencils {
@@ -77,35 +100,32 @@ enum ElementKind { kStraight, kCurved };
 template <int Dim>
 std::vector<Stencils> element_stencils(const CellSet<Dim>& cells) {
   std::vector<Stencils> stencils{{{}, Dim + 1}, {{}, kQuadraticNodes<Dim>}};
-  auto &straight = stencils[kStraight].vertices, &curved = stencils[kCurved].vertices;
-  straight.reserve(cells.elements.size() * (Dim + 1));
-  for (const auto& element : cells.elements)
-    straight.insert(straight.end(), element.vertices.begin(), element.vertices.end());
-  curved.reserve(cells.curved_elements.size() * kQuadraticNodes<Dim>);
-  for (const auto& element : cells.curved_elements) curved.insert(curved.end(), element.nodes.begin(), element.nodes.end());
+  const auto fill = [](std::vector<int>& stencil, const auto& elements, std::size_t size, const auto& nodes_of) {
+    stencil.reserve(elements.size() * size);
+    for (const auto& element : elements) {
+      const auto nodes = nodes_of(element);
+      stencil.insert(stencil.end(), nodes.begin(), nodes.end());
+    }
+  };
+  fill(stencils[kStraight].vertices, cells.straight(), Dim + 1, [](const auto& element) { return element.vertices; });
+  fill(stencils[kCurved].vertices, cells.curved(), kQuadraticNodes<Dim>,
+       [](const auto& element) { return element.nodes(); });
   return stencils;
 }
 
-/// The body and measure of all cells, those with curved edges last: f(body, rest volume).
-template <int Dim, typename F>
-void for_each_cell(const CellSet<Dim>& cells, const F& f) {
-  for (const auto& element : cells.elements) f(element.body, element.volume);
-  for (const auto& element : cells.curved_elements) f(element.body, element.volume);
-}
-
 template <int Dim>
-Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>::CurvedElement& element) {
+Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) {
   Vec<Dim> sum = Vec<Dim>::Zero();
-  for (int k = 0; k <= Dim; ++k) sum += cells.rest[element.nodes[k]];
+  for (const int v : element.vertices) sum += cells.rest[v];
   return sum / (Dim + 1);
 }
 
 /// Rest position of a point of the cell by its barycentric coordinates.
 template <int Dim>
-Vec<Dim> rest_position(const CellSet<Dim>& cells, const typename CellSet<Dim>::CurvedElement& element,
+Vec<Dim> rest_position(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element,
                        const std::array<double, Dim + 1>& weights) {
   Vec<Dim> X = Vec<Dim>::Zero();
-  for (int k = 0; k <= Dim; ++k) X += weights[k] * cells.rest[element.nodes[k]];
+  for (int k = 0; k <= Dim; ++k) X += weights[k] * cells.rest[element.vertices[k]];
   return X;
 }
 
@@ -135,35 +155,31 @@ Vec<Dim> barycentric_gradient(const Mat<Dim>& inverse_edges, int k) {
 
 /// Gradients of the shape functions at a point of a cell with curved edges, as columns.
 template <int Dim>
-Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> shape_gradients(const typename CellSet<Dim>::CurvedElement& element,
+Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> shape_gradients(const typename CellSet<Dim>::Element& element,
                                                                  const std::array<double, Dim + 1>& weights) {
   return quadratic_gradients<Dim, Dim>(element.curved, weights, barycentric_gradients<Dim>(element.inverse_edges));
 }
 
 /// Values of an interleaved field at all nodes as columns: on straight edges the mean of the ends.
 template <int Dim>
-Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> at_all_nodes(const typename CellSet<Dim>::CurvedElement& element,
+Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> at_all_nodes(const typename CellSet<Dim>::Element& element,
                                                               ConstVectorView x) {
-  auto values = at_nodes<Dim>(element.nodes, x);
+  auto values = at_nodes<Dim>(element.nodes(), x);
   for_each_edge<Dim>([&](int edge, int i, int j) {
     if (!(element.curved >> edge & 1)) values.col(Dim + 1 + edge) = (values.col(i) + values.col(j)) / 2;
   });
   return values;
 }
 
-template <int Dim>
-Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) {
-  Vec<Dim> sum = Vec<Dim>::Zero();
-  for (const int v : element.vertices) sum += cells.rest[v];
-  return sum / (Dim + 1);
-}
-
-/// A straight cell of a mesh with the ids of its vertices there.
+/// A cell of a mesh with the ids of its nodes there.
 template <int Dim>
 typename CellSet<Dim>::Element element_of(const Mesh<Dim>& mesh, CellId c) {
-  return {mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), mesh.part(c)};
+  typename CellSet<Dim>::Element element{
+      mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), mesh.part(c), c};
+  if (mesh.has_nodes()) element.curved = find_edge_nodes<Dim>(mesh.cell(c), nodes_of_edges(mesh), element.edge_nodes);
+  return element;
 }
-/// Deformation gradient of an element at interleaved positions x.
+/// Deformation gradient of an element without curved edges at interleaved positions x.
 template <int Dim>
 Mat<Dim> deformation_gradient(const typename CellSet<Dim>::Element& element, ConstVectorView x) {
   Mat<Dim> edges;

@@ -139,15 +139,15 @@ class HessianSink {
   /// Adds a block for each straight element; `fill(e, block)` may be called at the same time for several of them.
   template <int Dim, typename Fill>
   void add_elements(const CellSet<Dim>& cells, const Fill& fill) {
-    add_blocks<Dim>(kStraight, cells.elements, fill);
+    add_blocks<Dim>(kStraight, cells.straight(), vertices_of<Dim>, fill);
   }
   /// Adds each curved element by `fill(e, nodes, block)`: only entries of these nodes count, the others are zero.
   template <int Dim, typename Fill>
   void add_curved_elements(const CellSet<Dim>& cells, const Fill& fill) {
-    const auto& elements = cells.curved_elements;
+    const auto elements = cells.curved();
     if (elements.empty()) return;
     if (!is_patch())
-      return add_blocks<Dim>(kCurved, elements,
+      return add_blocks<Dim>(kCurved, elements, nodes_of<Dim>,
                              [&](std::size_t e, auto& block) { fill(e, all_nodes<Dim>(elements[e].curved), block); });
     Mat<Dim * kQuadraticNodes<Dim>> block;
     for (std::size_t e = 0; e < elements.size(); ++e) {
@@ -159,16 +159,17 @@ class HessianSink {
   }
   /// One block times a factor for each straight element: a sum that is kept, and made anew only where it changes.
   template <int Dim>
-  void add_multiples(const CellSet<Dim>& cells, const std::vector<double>& factors, const Mat<Dim*(Dim + 1)>& block) {
+  void add_multiples(const CellSet<Dim>& cells, std::span<const double> factors, const Mat<Dim*(Dim + 1)>& block) {
     const auto fill = [&](std::size_t e, Mat<Dim*(Dim + 1)>& multiple) { multiple = factors[e] * block; };
-    add_constant<Dim>(kStraight, cells.elements, factors, {block.data(), static_cast<std::size_t>(block.size())}, fill);
+    add_constant<Dim>(kStraight, cells.straight(), vertices_of<Dim>, factors,
+                      {block.data(), static_cast<std::size_t>(block.size())}, fill);
   }
   /// A factor times a matrix `of(e)` by nodes for each curved element, the same in all directions. The sum is kept in the
   /// same way; `matrices` are all that there are.
   template <int Dim, typename Of>
   void add_curved_multiples(const CellSet<Dim>& cells, std::span<const double> factors, std::span<const double> matrices,
                             const Of& of) {
-    const auto& elements = cells.curved_elements;
+    const auto elements = cells.curved();
     if (elements.empty()) return;
     constexpr int kNodes = kQuadraticNodes<Dim>;
     if (is_patch()) {
@@ -180,7 +181,7 @@ class HessianSink {
       }
       return;
     }
-    add_constant<Dim>(kCurved, elements, factors, matrices, [&](std::size_t e, Mat<Dim * kNodes>& block) {
+    add_constant<Dim>(kCurved, elements, nodes_of<Dim>, factors, matrices, [&](std::size_t e, Mat<Dim * kNodes>& block) {
       const Mat<kNodes>& matrix = of(e);
       block.setZero();
       for (int i = 0; i < kNodes; ++i)
@@ -195,23 +196,25 @@ class HessianSink {
   bool is_patch() const { return dense_ && !motion_; }
   /// The nodes of an element of which at least one component is an unknown.
   template <int Dim>
-  NodeSet free_nodes(const typename CellSet<Dim>::CurvedElement& element) const {
+  NodeSet free_nodes(const typename CellSet<Dim>::Element& element) const {
     NodeSet free = 0;
+    const auto of_element = element.nodes();
     for_each_node<Dim>(all_nodes<Dim>(element.curved), [&](int k) {
       for (int c = 0; c < Dim; ++c)
-        if (dofs_->unknown[Dim * element.nodes[k] + c] != kNone) free = static_cast<NodeSet>(free | 1 << k);
+        if (dofs_->unknown[Dim * of_element[k] + c] != kNone) free = static_cast<NodeSet>(free | 1 << k);
     });
     return free;
   }
   /// Calls f(row, column, entry) for the rows and columns of a block of the element, of these nodes, that are unknowns in
   /// the lower triangle of the dense matrix.
   template <int Dim, typename F>
-  void for_each_free_pair(const typename CellSet<Dim>::CurvedElement& element, NodeSet nodes, const F& f) {
+  void for_each_free_pair(const typename CellSet<Dim>::Element& element, NodeSet nodes, const F& f) {
     std::array<int, Dim * kQuadraticNodes<Dim>> local, unknown;
+    const auto of_element = element.nodes();
     int count = 0;
     for_each_node<Dim>(nodes, [&](int k) {
       for (int c = 0; c < Dim; ++c) {
-        const int number = dofs_->unknown[Dim * element.nodes[k] + c];
+        const int number = dofs_->unknown[Dim * of_element[k] + c];
         if (number == kNone) continue;
         local[count] = Dim * k + c;
         unknown[count++] = number;
@@ -225,24 +228,22 @@ class HessianSink {
   }
 
   template <int Dim>
-  static const auto& nodes_of(const typename CellSet<Dim>::Element& element) {
+  static constexpr auto vertices_of = [](const auto& element) -> const auto& {
     return element.vertices;
-  }
+  };
   template <int Dim>
-  static const auto& nodes_of(const typename CellSet<Dim>::CurvedElement& element) {
-    return element.nodes;
-  }
+  static constexpr auto nodes_of = [](const auto& element) { return element.nodes(); };
 
-  template <int Dim, typename Element, typename Fill>
-  void add_blocks(ElementKind kind, const std::vector<Element>& elements, const Fill& fill) {
-    constexpr int kNodes = static_cast<int>(std::tuple_size_v<std::decay_t<decltype(nodes_of<Dim>(elements[0]))>>);
+  template <int Dim, typename Element, typename NodesOf, typename Fill>
+  void add_blocks(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of, const Fill& fill) {
+    constexpr int kNodes = static_cast<int>(std::tuple_size_v<std::decay_t<decltype(ids_of(elements[0]))>>);
     using Block = Mat<Dim * kNodes>;
     const std::size_t n = elements.size();
     if (dense_ && !motion_) {  // a patch: one block after the other, without a buffer for all
       Block block;
       for (std::size_t e = 0; e < n; ++e) {
         fill(e, block);
-        add<Dim>(nodes_of<Dim>(elements[e]), block.data());
+        add<Dim>(ids_of(elements[e]), block.data());
       }
       return;
     }
@@ -256,7 +257,7 @@ class HessianSink {
       if (is_base) sparse_->add_batch(kind, first, blocks.data()->data());
       if (is_base && !motion_) continue;
       for (std::size_t i = 0; i < count; ++i) {
-        const auto& nodes = nodes_of<Dim>(elements[first + i]);
+        const auto& nodes = ids_of(elements[first + i]);
         if (is_base)
           add_motion<Dim>(nodes, blocks[i].data());
         else
@@ -265,13 +266,13 @@ class HessianSink {
     }
   }
 
-  template <int Dim, typename Element, typename Fill>
-  void add_constant(ElementKind kind, const std::vector<Element>& elements, std::span<const double> factors,
-                    std::span<const double> block, const Fill& fill) {
-    if (!sparse_ || motion_) return add_blocks<Dim>(kind, elements, fill);
+  template <int Dim, typename Element, typename NodesOf, typename Fill>
+  void add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
+                    std::span<const double> factors, std::span<const double> block, const Fill& fill) {
+    if (!sparse_ || motion_) return add_blocks<Dim>(kind, elements, ids_of, fill);
     if (sparse_->add_kept(kind, factors, block)) return;
     sparse_->begin_keeping();
-    add_blocks<Dim>(kind, elements, fill);
+    add_blocks<Dim>(kind, elements, ids_of, fill);
     sparse_->end_keeping(kind, factors, block);
   }
 

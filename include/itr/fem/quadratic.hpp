@@ -32,16 +32,15 @@ bool has_node(CurvedEdges curved, int k) {
   return k <= Dim || curved >> (k - Dim - 1) & 1;
 }
 
-/// Sets the nodes of a simplex with these vertices, at a straight edge its first vertex, and returns which edges are curved.
-/// `node_of(a, b)`: the node of an edge or kNone.
+/// Sets the nodes of a simplex's edges, at a straight edge its first vertex, and returns which edges are curved. `node_of(a,
+/// b)`: the node of an edge or kNone.
 template <int Dim, typename NodeOf>
-CurvedEdges find_nodes(const std::array<int, Dim + 1>& vertices, const NodeOf& node_of,
-                       std::array<int, kQuadraticNodes<Dim>>& nodes) {
+CurvedEdges find_edge_nodes(const std::array<int, Dim + 1>& vertices, const NodeOf& node_of,
+                            std::array<int, kSimplexEdges<Dim>>& nodes) {
   CurvedEdges curved = 0;
-  std::copy(vertices.begin(), vertices.end(), nodes.begin());
   for_each_edge<Dim>([&](int edge, int i, int j) {
     const int node = node_of(vertices[i], vertices[j]);
-    nodes[Dim + 1 + edge] = node == kNone ? vertices[i] : node;
+    nodes[edge] = node == kNone ? vertices[i] : node;
     if (node != kNone) curved = static_cast<CurvedEdges>(curved | 1 << edge);
   });
   return curved;

@@ -5,13 +5,18 @@
 // removes dead slots. Boundary facets are the facets with one incident cell; they, and single vertices, carry the tags that
 // boundary conditions refer to.
 //
-// While it is remeshed, the node of a curved edge has a slot among the vertices, so that fields have one numbering. Such a
-// slot is not alive and has no cells; compact() removes it, and a Space takes the nodes over.
+// Cells are straight at rest. An edge may be curved: it carries one node more, at its middle at rest; on a straight edge
+// fields are linear. All edges curved is P2, none is P1, and every mixture is conforming, since cells that share an edge
+// agree about it. Fields are indexed by node: a vertex, or a curved edge's node, which has a slot among the vertices but is
+// not alive there and has no cells. In a compact mesh the nodes of curved edges come behind the vertices, in the order of
+// their edges.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -150,16 +155,23 @@ class Mesh {
   /// Throws InputError where `facets` are not the boundary facets, each once.
   void set_facets(const std::vector<Facet>& facets, const std::vector<int>& tags);
 
-  int num_vertices() const { return num_vertices_; }  ///< alive ones; ids run to vertex_slots()
+  /// Names the content: meshes of one revision are equal, a copy has that of the original, a change gives a new one.
+  std::uint64_t revision() const { return revision_; }
+  int num_vertices() const { return num_vertices_; }  ///< alive ones; ids run to node_slots(), of a compact mesh to this
+  int num_curved() const { return num_curved_; }      ///< edges that are curved
+  int num_nodes() const { return num_vertices_ + num_curved_; }
   int num_cells() const { return num_cells_; }
   int num_facets() const { return num_facets_; }
-  int vertex_slots() const { return static_cast<int>(rest_.size()); }
+  int node_slots() const { return static_cast<int>(rest_.size()); }  ///< vertices and nodes of curved edges, dead or alive
   int cell_slots() const { return static_cast<int>(cells_.size()); }
   int facet_slots() const { return static_cast<int>(facets_.size()); }
   bool is_vertex_alive(VertexId v) const { return vertex_alive_[v]; }
   bool is_cell_alive(CellId c) const { return cells_[c][0] != kNone; }
   bool is_facet_alive(FacetId f) const { return facets_[f][0] != kNone; }
+  /// Whether there are no dead slots, and vertices come before the nodes of curved edges.
+  bool is_compact() const;
 
+  const std::vector<Vec<Dim>>& rest() const { return rest_; }  ///< rest positions by node [m]
   const Vec<Dim>& rest(VertexId v) const { return rest_[v]; }
   const Cell& cell(CellId c) const { return cells_[c]; }
   int body(CellId c) const { return body_[c]; }
@@ -174,11 +186,17 @@ class Mesh {
   const Mat<Dim>& inverse_rest_edges(CellId c) const { return inverse_edges_[c]; }
   const Facet& facet(FacetId f) const { return facets_[f]; }
   int facet_tag(FacetId f) const { return facet_tag_[f]; }
-  void set_facet_tag(FacetId f, int tag) { facet_tag_[f] = tag; }
+  void set_facet_tag(FacetId f, int tag) {
+    facet_tag_[f] = tag;
+    renew_revision();
+  }
   /// Tag of a boundary vertex by itself, whatever its facets' tags are. Edits never move nor remove a vertex with a tag, and
   /// give the tag to a new one on a boundary edge between two that share it.
   int vertex_tag(VertexId v) const { return vertex_tag_[v]; }
-  void set_vertex_tag(VertexId v, int tag) { vertex_tag_[v] = tag; }
+  void set_vertex_tag(VertexId v, int tag) {
+    vertex_tag_[v] = tag;
+    renew_revision();
+  }
   /// The tag of both ends of an edge of the surface, all of which conditions with that tag hold; else kNoTag.
   int edge_tag(const EdgeKey& edge) const {
     const int tag = vertex_tag_[edge[0]];
@@ -191,6 +209,11 @@ class Mesh {
   RestPoint<Dim> point(VertexId v) const;
   /// The middle of an edge of alive cells, likewise.
   RestPoint<Dim> middle(const EdgeKey& edge) const;
+  /// A vertex or the node of a curved edge, likewise.
+  RestPoint<Dim> point_of_node(VertexId node) const {
+    const EdgeKey edge = edge_of_node(node);
+    return edge[0] == kNone ? point(node) : middle(edge);
+  }
 
   /// Cells that hold both ends of the edge, ascending.
   std::vector<CellId> cells_of_edge(const EdgeKey& edge) const;
@@ -207,8 +230,8 @@ class Mesh {
   double total_volume() const;
 
   /// Whether any edge is curved.
-  bool has_nodes() const { return num_nodes_ > 0; }
-  /// The slot of the edge's node; kNone where it is straight.
+  bool has_nodes() const { return num_curved_ > 0; }
+  /// The node of the edge; kNone where it is straight.
   VertexId node_of(VertexId a, VertexId b) const {
     const auto lower = static_cast<std::size_t>(std::min(a, b));
     if (lower >= nodes_from_.size()) return kNone;
@@ -217,28 +240,31 @@ class Mesh {
       if (end == upper) return node;
     return kNone;
   }
-  /// The edge of which the slot is the node; {kNone, kNone} of a vertex.
+  VertexId node_of(const EdgeKey& edge) const { return node_of(edge[0], edge[1]); }
+  /// The edge of which this is the node; {kNone, kNone} of a vertex.
   EdgeKey edge_of_node(VertexId node) const {
     const auto slot = static_cast<std::size_t>(node);
     return slot < edge_of_node_.size() ? edge_of_node_[slot] : EdgeKey{kNone, kNone};
   }
   /// Whether an edge of the cell is curved.
   bool is_curved(CellId c) const;
+  /// The curved edges, ascending.
+  std::vector<EdgeKey> curved_edges() const;
+  /// Makes these edges of a compact mesh the curved ones (ascending, each once).
+  void set_curved_edges(const std::vector<EdgeKey>& edges);
   /// Curves an edge: its node takes the next slot.
   VertexId add_node(const EdgeKey& edge);
-  /// The curved edges, ascending, and their nodes.
-  std::vector<std::pair<EdgeKey, VertexId>> nodes() const;
 
   /// Carries out an edit. Returns the id of the vertex that was created, or kNone. Ids of new cells are the next slots, in
   /// the order of the edit; its nodes take the last slots of vertices. Fields are the caller's to extend (see Edit::Value).
   VertexId apply(const Edit<Dim>& edit);
 
   struct Renumbering {
-    std::vector<VertexId> vertex;  ///< old id -> new id, kNone for dead ones
+    std::vector<VertexId> vertex;  ///< of vertices and nodes of curved edges: old id -> new id, kNone for dead ones
     std::vector<CellId> cell;
     std::vector<FacetId> facet;
   };
-  /// Removes dead slots and those of nodes, keeps the order of the others.
+  /// Removes dead slots, keeps the order of the others. Nodes of curved edges come last, in the order of their edges.
   Renumbering compact();
 
   /// First broken invariant in words (adjacency, orientation, facets against cells), or an empty string.
@@ -251,7 +277,10 @@ class Mesh {
   void remove_facet(FacetId f);
   std::array<Vec<Dim>, Dim + 1> corners(CellId c) const;
   void update_geometry(CellId c);
+  void renew_revision();
+  void remove_nodes();
 
+  std::uint64_t revision_ = 0;  ///< of the mesh without anything
   int num_vertices_ = 0, num_cells_ = 0, num_facets_ = 0;
   std::vector<Vec<Dim>> rest_;
   std::vector<char> vertex_alive_;
@@ -264,10 +293,21 @@ class Mesh {
   std::vector<int> facet_tag_;
   std::vector<std::vector<CellId>> cells_of_;
   std::vector<std::vector<FacetId>> facets_of_;
-  int num_nodes_ = 0;
+  int num_curved_ = 0;
   std::vector<std::vector<std::pair<VertexId, VertexId>>> nodes_from_;  ///< by lower end: upper end and node of each
   std::vector<EdgeKey> edge_of_node_;                                   ///< by slot, as far as there are nodes
 };
+
+/// The edges to curve where cells have these orders (1 or 2) by body, ascending; bodies that are not named are linear. An
+/// edge has the least order of its cells.
+template <int Dim>
+std::vector<EdgeKey> edges_of_order_2(const Mesh<Dim>& mesh, const std::map<int, int>& order);
+
+/// Mesh::node_of of a mesh that stays, as a function.
+template <int Dim>
+auto nodes_of_edges(const Mesh<Dim>& mesh) {
+  return [&mesh](VertexId a, VertexId b) { return mesh.node_of(a, b); };
+}
 
 extern template class Mesh<2>;
 extern template class Mesh<3>;

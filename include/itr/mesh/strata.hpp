@@ -38,7 +38,7 @@ class Strata {
   };
   /// All that there is, as lists.
   struct Record {
-    std::vector<Stratum> vertices;                     ///< by vertex slot
+    std::vector<Stratum> vertices;                     ///< by node slot; of nodes of curved edges `volume`
     std::vector<int> patches;                          ///< by facet slot
     std::vector<std::array<int, Dim + 1>> interfaces;  ///< facets between bodies, each ascending, and its patch; ascending
     std::vector<Plane> planes;                         ///< by patch

@@ -22,7 +22,7 @@ struct DisplacementNorms {
   double l2 = 0, h1 = 0, h1_semi = 0, linf = 0, linf_grad = 0, lp = 0;
 };
 template <int Dim>
-DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x, const Space& space = {});
+DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x);
 
 struct RunInfo {
   std::string scene;    ///< path of the scene file
@@ -32,6 +32,7 @@ struct RunInfo {
   std::optional<double> start{};  ///< when the run began, by its monotonic clock [s]; empty: only steps are timed
   /// Names that the folder gets too: forces.csv, report.html. Where one is taken, the run is refused before it begins.
   std::vector<std::string> files{};
+  std::string defaults{};  ///< the scene's set of them, with its version; empty: a program sets all
 };
 
 /// The writer of a run. Every file is complete or absent; steps.jsonl is flushed after each line. Throws InputError if the

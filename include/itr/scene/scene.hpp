@@ -20,11 +20,24 @@ struct Override {
   std::string value;  ///< JSON text
 };
 
-/// Names and ids of bodies and obstacles, as /output/forces takes them.
+/// Names and ids of bodies, surfaces and obstacles, as conditions and /output/forces take them.
 struct PartNames {
-  std::map<std::string, int> bodies;                  ///< ids by name
+  std::map<std::string, std::vector<int>> bodies;     ///< ids by name
+  std::map<std::string, std::vector<int>> surfaces;   ///< tags of facets and vertices by name
   std::map<std::string, std::vector<int>> obstacles;  ///< vertices by name
   std::map<int, std::vector<int>> obstacles_by_id;    ///< vertices by `surface_selection`
+};
+
+/// The set of defaults of a scene, with its version, and what it gave.
+struct ChosenDefaults {
+  std::string name;           ///< such as "itr-1"
+  bool is_asked_for = false;  ///< by the scene or an override
+  struct Value {
+    std::string pointer, value, reason;  ///< the value as JSON text
+  };
+  std::vector<Value> values;                ///< that the scene leaves out and the set gives
+  std::vector<std::string> unlike_polyfem;  ///< of PolyFEM's set: where results differ from PolyFEM's on purpose
+  std::string information;                  ///< a line on a scene that may expect the other set; or nothing
 };
 
 struct Scene {
@@ -34,6 +47,7 @@ struct Scene {
   std::string directory;              ///< output/directory, may be empty
   std::vector<std::string> warnings;  ///< on values that are legal and suspicious
   PartNames parts;
+  ChosenDefaults defaults;
   std::string identity;  ///< JSON of all that the results depend on: the merged scene, hashes of its files
 };
 
@@ -46,6 +60,8 @@ struct Change {
     scene     ///< what is simulated
   } of = Of::scene;
 };
+/// The name of the set of defaults in an identity; empty where there is none.
+std::string defaults_of(const std::string& identity);
 std::vector<Change> find_changes(const std::string& before, const std::string& now);
 
 /// Reads, merges (`common`, `patch`), applies overrides, validates, loads meshes. Throws InputError.
@@ -54,9 +70,12 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
 /// Geometry that a program brings instead of the files of a scene.
 template <int Dim>
 struct Geometry {
-  Mesh<Dim> mesh;            ///< with the facet tags that conditions refer to as `id`
-  Obstacles<Dim> obstacles;  ///< without motions
-  std::vector<int> id;       ///< by obstacle vertex, as of a `surface_selection`; kNoTag: none
+  Mesh<Dim> mesh;                                    ///< with the facet tags that conditions refer to as `id`
+  Obstacles<Dim> obstacles;                          ///< without motions
+  std::vector<int> id;                               ///< by obstacle vertex, as of a `surface_selection`; kNoTag: none
+  std::map<std::string, std::vector<int>> bodies{};  ///< ids that options may call by these names
+  /// Tags and obstacles' ids, likewise: first the id that options may write, then those of facets that are in others, too.
+  std::map<std::string, std::vector<int>> surfaces{};
 };
 
 /// Makes a setup from a mesh and the other keys of a scene as JSON text: materials, time, contact, conditions, ... Throws

@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "itr/core/types.hpp"
-#include "itr/fem/space.hpp"
 #include "itr/mesh/mesh.hpp"
 #include "itr/remesh/report.hpp"
 
 namespace itr {
+
+struct SetNames;
 
 /// Terms of the incremental potential divided by alpha h^2 [J], after the last solve of the step.
 struct EnergyReport {
@@ -128,7 +129,7 @@ struct FrameView {
   const std::vector<std::array<int, 3>>& obstacle_triangles;
   const AskedFields* asked = nullptr;  ///< null: nothing was asked for
   ProxyView<Dim> proxy{};
-  const Space* space = nullptr;  ///< null: all edges are straight
+  const SetNames* names = nullptr;  ///< of body ids and tags of the mesh; null: there are none
 };
 
 }  // namespace itr

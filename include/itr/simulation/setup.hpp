@@ -91,6 +91,11 @@ struct ForceTarget {
   std::array<double, 3> about{};         ///< point of moments [m]
 };
 
+/// Ids that names stand for: of bodies, and of facets and vertices (their tags). An id may stand in several.
+struct SetNames {
+  std::map<std::string, std::vector<int>> bodies, surfaces;
+};
+
 /// Fields that observers get beside positions, velocities and elastic density. Others are not computed.
 struct FieldOptions {
   bool contact_forces = false, friction_forces = false, reaction_forces = false;
@@ -131,6 +136,10 @@ struct StepSetup {
   /// Pressure and follower forces that have no potential are taken at the solution of the solve before. A step fails where
   /// they end farther off those of its own solution than this share of themselves.
   double lagged_load_tolerance = 1e-2;
+  /// Rounds for what is lagged (friction, pressure, damping) go on until no force at a vertex changes by more than this part
+  /// of the largest. Where they do not get there the step is cut, or where it may not, a warning says so. 0: rounds as
+  /// ContactOptions and DampingOptions say. A number of friction_iterations limits them.
+  double lagging_tolerance = 0;
   int quadrature_degree = kElasticDegree;  ///< of elasticity on cells with curved edges: 1 to 5
 
   Units units;  ///< that messages and results are to be in; all numbers here are in SI units
@@ -150,13 +159,18 @@ struct StepSetup {
 template <int Dim>
 struct Setup : StepSetup<Dim> {
   Mesh<Dim> mesh;            ///< with body ids and tags of facets and vertices
+  SetNames names;            ///< for output
   std::map<int, int> order;  ///< order of elements by body: 1, or 2 for curved edges; 1 for bodies that are not listed
   std::vector<InitialCondition<Dim>> initial_displacement, initial_velocity, initial_acceleration;
   bool consistent_initial_acceleration = false;  ///< solve M a0 = f0 instead
   LinearOptions linear;
 
   /// Fills in values that are left open and returns a sentence on each. A Simulation calls it.
-  /// - Activation distance 0 becomes a thousandth of the thinnest body, less where edges are short or gaps narrow.
+  /// - Activation distance 0 becomes a thousandth of the thinnest body, less where edges are short, gaps narrow or
+  /// prescribed
+  ///   motions without inertia small.
+  /// - Friction velocity 0 becomes in dynamics a part of the speed that the scene is driven with. Without inertia each step
+  ///   takes a thousandth of the largest relative motion in it, by its length.
   /// - Barrier stiffness 0 becomes a tenth of the stiffest body's modulus [Pa] in the convergent form, and its equivalent in
   ///   the plain form, unless it is adaptive.
   /// - An open split tolerance becomes relative_tolerance times an energy of the scene (docs/theory.md).

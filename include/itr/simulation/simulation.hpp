@@ -24,13 +24,12 @@
 
 namespace itr {
 
-/// The state of a simulation. Fields are interleaved over the space's nodes, vertices first, and then the obstacles'
+/// The state of a simulation. Fields are interleaved over the mesh's nodes, vertices first, and then the obstacles'
 /// vertices. The rest of a simulation is a pure function of state and setup, so that a resumed run has the same bits. A new
 /// member must be saved by output/checkpoint.cpp.
 template <int Dim>
 struct State {
   Mesh<Dim> mesh;   ///< compact
-  Space space;      ///< on the mesh
   History history;  ///< history.x[0] is the present
   int step = 0;
   double t = 0;                 ///< [s]
@@ -106,8 +105,7 @@ class Simulation {
   /// (find_violation). Strata of another mesh are dropped and found anew.
   void restore(State<Dim> state);
 
-  const State<Dim>& state() const;      ///< valid while no snapshot shares it; spans of its fields until it changes
-  std::uint64_t mesh_revision() const;  ///< another one whenever state().mesh may be another mesh
+  const State<Dim>& state() const;  ///< valid while no snapshot shares it; spans of its fields until it changes
   const Setup<Dim>& setup() const;
   const NodalForces& forces() const;       ///< the forces that the setup asks for, at the end of the last step
   std::string solver_name() const;         ///< the name in the setup, such as "auto"
@@ -130,7 +128,7 @@ class Simulation {
                          setup().obstacles.edges,
                          setup().obstacles.triangles,
                          &data.asked};
-    frame.space = &state.space;
+    frame.names = &setup().names;
     if (setup().proxy) frame.proxy = {&data.proxy_x, &setup().proxy->edges, &setup().proxy->triangles};
     observer(frame);
   }

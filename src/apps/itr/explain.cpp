@@ -46,10 +46,12 @@ template <int Dim>
 class Explanation {
  public:
   /// Throws InputError for what `run` would refuse.
-  Explanation(const Setup<Dim>& setup, linear::Registry& registry, std::vector<std::string> warnings)
+  Explanation(const Setup<Dim>& setup, linear::Registry& registry, const scene::ChosenDefaults& defaults,
+              std::vector<std::string> warnings)
       : registry_(registry),
         simulation_(setup, registry_, Logger([this](LogLevel, std::string_view text) { chosen_.emplace_back(text); })),
         setup_(simulation_.setup()),
+        defaults_(defaults),
         warnings_(std::move(warnings)) {
     for (std::string& found : find_suspicious(simulation_)) warnings_.push_back(std::move(found));
   }
@@ -69,6 +71,7 @@ class Explanation {
     const linear::MatrixTraits matrix = unknowns();
     fmt::print("linear solver\n  {}\n", solver(matrix));
     if (setup_.contact.enabled) contact();
+    defaults();
     fmt::print("warnings\n");
     if (warnings_.empty()) fmt::print("  none\n");
     for (const auto& warning : warnings_) fmt::print("  warning: {}\n", warning);
@@ -78,6 +81,15 @@ class Explanation {
   bool is_dynamic() const { return !setup_.time.is_static && !setup_.time.quasistatic; }
   bool has_friction() const {
     return setup_.contact.enabled && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
+  }
+
+  /// Prints the set of defaults and what it gives for keys that the scene leaves out.
+  void defaults() const {
+    fmt::print("defaults\n  {}{}\n", defaults_.name,
+               defaults_.unlike_polyfem.empty() ? "" : ": those of PolyFEM, which docs/scenes.md lists, but for these:");
+    for (const auto& row : defaults_.values) fmt::print("  {} = {}: {}\n", row.pointer, row.value, row.reason);
+    for (const auto& difference : defaults_.unlike_polyfem) fmt::print("  {}\n", difference);
+    if (!defaults_.information.empty()) fmt::print("  {}\n", defaults_.information);
   }
 
   void bodies() {
@@ -116,11 +128,11 @@ class Explanation {
     fmt::print("  {} vertices, {} elements, edges {:.4g} to {}, worst quality {:.3g} (1: regular; element {})\n",
                mesh.num_vertices(), mesh.num_cells(), units.from_si(shortest, "m"), units.text(longest, "m"), worst,
                worst_cell);
-    if (const Space& space = simulation_.state().space; !space.is_linear())
+    if (const Mesh<Dim>& curved = simulation_.state().mesh; curved.has_nodes())
       fmt::print(
           "  {} of {} edges are curved and carry a node: {} nodes in all; elasticity by {} points a cell with curved "
           "edges\n",
-          space.num_curved(), mesh.edges().size(), num_nodes(mesh, space), quadrature<Dim>(setup_.quadrature_degree).size());
+          curved.num_curved(), mesh.edges().size(), curved.num_nodes(), quadrature<Dim>(setup_.quadrature_degree).size());
   }
 
   std::array<Vec<Dim>, Dim + 1> corners(CellId c) const {
@@ -163,33 +175,32 @@ class Explanation {
   /// Pairs of nodes that share a cell.
   static std::set<std::array<int, 2>> coupled_nodes(const CellSet<Dim>& cells) {
     std::set<std::array<int, 2>> pairs;
-    const auto add = [&](const auto& nodes) {
-      for (const int a : nodes)
-        for (const int b : nodes)
+    for (const auto& element : cells.elements)
+      for_each_node(element, [&](int a) {
+        for_each_node(element, [&](int b) {
           if (a < b) pairs.insert({a, b});
-    };
-    for (const auto& element : cells.elements) add(element.vertices);
-    for (const auto& element : cells.curved_elements) add(element.nodes);
+        });
+      });
     return pairs;
   }
 
   /// Traits of the matrix that the elements give; contact adds to it. Held vertices that move through contact are counted as
   /// held.
   linear::MatrixTraits unknowns() {
-    const Space& space = simulation_.state().space;
-    const auto held = held_dofs(setup_, setup_.mesh, setup_.time.t0 + setup_.time.dt, space).held;
-    const int bodies = Dim * num_nodes(setup_.mesh, space);
+    const Mesh<Dim>& mesh = simulation_.state().mesh;
+    const auto held = held_dofs(setup_, mesh, setup_.time.t0 + setup_.time.dt).held;
+    const int bodies = Dim * mesh.num_nodes();
     const auto free = [&](int v) {
       return static_cast<int>(std::count(held.begin() + Dim * v, held.begin() + Dim * (v + 1), 0));
     };
     linear::MatrixTraits matrix;
     matrix.block_size = Dim;
     matrix.may_be_indefinite = setup_.newton.indefinite == IndefiniteHessian::accept;
-    for (int v = 0; v < num_nodes(setup_.mesh, space); ++v) {
+    for (int v = 0; v < mesh.num_nodes(); ++v) {
       matrix.order += free(v);
       matrix.nonzeros += free(v) * (free(v) + 1) / 2;
     }
-    for (const auto& [a, b] : coupled_nodes(whole_mesh(setup_.mesh, {}, space))) matrix.nonzeros += free(a) * free(b);
+    for (const auto& [a, b] : coupled_nodes(whole_mesh(mesh, {}))) matrix.nonzeros += free(a) * free(b);
     constexpr double kEntryBytes = 12, kMegabyte = 1e6;
     fmt::print("unknowns\n  {} of {} ({} held); matrix {:.1f} MB, factor of a direct solver up to about {:.1f} MB{}\n",
                matrix.order, bodies, bodies - matrix.order, kEntryBytes * static_cast<double>(matrix.nonzeros) / kMegabyte,
@@ -211,8 +222,7 @@ class Explanation {
 
   /// Surfaces and which of them can meet; what is near at the start.
   void contact() {
-    const ContactSurface<Dim> contact =
-        contact_surface(setup_, setup_.mesh, simulation_.state().space, simulation_.state().chords);
+    const ContactSurface<Dim> contact = contact_surface(setup_, simulation_.state().mesh, simulation_.state().chords);
     const CollisionSurface& surface = contact.surface;
     const VectorX x = contact.positions(simulation_.state().history.x[0]);
     const auto component = connected_parts<2>(surface.counts.size(), surface.edges);
@@ -237,6 +247,7 @@ class Explanation {
   std::vector<std::string> chosen_;  ///< what the simulation says of what the scene leaves open
   const Simulation<Dim> simulation_;
   const Setup<Dim>& setup_;
+  const scene::ChosenDefaults& defaults_;
   std::vector<std::string> warnings_;
 };
 
@@ -264,11 +275,15 @@ template <int Dim>
 Json chosen_settings(Setup<Dim> setup, const Json& scene) {
   const std::string stiffness = "/solver/contact/barrier_stiffness";
   const bool is_open = setup.contact.enabled && !scene.contains(Json::json_pointer(stiffness));
+  const bool has_open_dhat = setup.contact.enabled && setup.contact.activation_distance == 0;
   if (is_open) setup.contact.adaptive_stiffness = false, setup.contact.barrier_stiffness = 0;
+  const bool is_dhat_open = setup.contact.enabled && setup.contact.activation_distance == 0;
   setup.remesh.enabled = true;
   setup.choose_defaults();
   Json settings = Json::object();
+  if (is_dhat_open) settings["/contact/dhat"] = setup.units.from_si(setup.contact.activation_distance, "m");
   if (is_open) settings[stiffness] = setup.contact.barrier_stiffness / barrier_unit(setup.units, setup.contact);
+  if (has_open_dhat) settings["/contact/dhat"] = setup.units.from_si(setup.contact.activation_distance, "m");
   const auto add = [&](const char* operation, const std::optional<double>& tolerance) {
     if (tolerance)
       settings[fmt::format("/space/remesh/{}/acceptance_tolerance", operation)] = setup.units.from_si(*tolerance, "J");
@@ -328,7 +343,7 @@ int explain(const RunOptions& options) {
       [&](auto& setup) {
         const SolverChoice choice = choose_solver(setup.linear, options, registry);
         for (const auto& warning : choice.warnings) scene.warnings.push_back(warning);
-        Explanation(setup, registry, scene.warnings).print(scene.output.units);
+        Explanation(setup, registry, scene.defaults, scene.warnings).print(scene.output.units);
       },
       scene.setup);
   return done;

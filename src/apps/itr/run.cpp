@@ -254,7 +254,8 @@ class Run {
                                threads,
                                scene.identity,
                                start,
-                               further_files(simulation_.setup(), options)};
+                               further_files(simulation_.setup(), options),
+                               scene.defaults.name};
     if (const auto saved = find_resumable(folder, options)) {
       const auto checkpoint = restore(*saved, scene, options);
       writer_ = std::make_unique<output::Writer>(std::move(folder), scene.output, info, checkpoint);
@@ -401,7 +402,7 @@ class Run {
       if (!result.ok) {
         advice = fmt::format(
             "the state before it is saved in {}. To go on, change how steps are solved: `itr run` with --resume "
-            "--allow-changes and --set /time/step_cuts=4 (smaller steps where one fails), more "
+            "--allow-changes and --set /time/step_cuts=8 (smaller steps where one fails), more "
             "/solver/nonlinear/max_iterations, or another tolerance or solver; a smaller /time/dt needs a new run",
             directory_);
         return fmt::format("stopped in step {} (t = {}): {}", simulation_.state().step + 1,
@@ -449,15 +450,29 @@ class Run {
   Snapshot<Dim> before_;   ///< the state that the step begins with
 };
 
+/// Reads the scene anew where it asks for no defaults, with those that the run it goes on with had.
+void keep_defaults(const std::string& directory, const RunOptions& options, scene::Scene& scene) {
+  if (scene.defaults.is_asked_for || !std::filesystem::exists(directory)) return;
+  const auto saved = output::find_saved_state(directory);
+  const std::string name = saved ? scene::defaults_of(saved->scene) : "";
+  if (name.empty() || name == scene.defaults.name) return;
+  std::vector<scene::Override> overrides = options.overrides;
+  overrides.push_back({"/defaults", '"' + name + '"'});
+  scene = scene::read(options.scene, overrides);
+  spdlog::info("defaults: {}, as before", name);
+}
+
 }  // namespace
 
 int run(const RunOptions& options) {
   const double start = seconds_now();
   scene::Scene scene = scene::read(options.scene, options.overrides);
-  Warnings warnings;
-  for (const auto& warning : scene.warnings) warnings.add(warning);
   std::string directory = options.directory.empty() ? scene.directory : options.directory;
   if (directory.empty()) directory = (std::filesystem::path("results") / options.scene.stem()).string();
+  if (options.resume) keep_defaults(directory, options, scene);
+  Warnings warnings;
+  for (const auto& warning : scene.warnings) warnings.add(warning);
+  if (!scene.defaults.information.empty()) spdlog::info("{}", scene.defaults.information);
   const int threads = options.threads >= 0 ? options.threads : scene.max_threads;
   const ThreadLimit limit(threads);
   linear::Registry registry;

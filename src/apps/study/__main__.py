@@ -45,7 +45,10 @@ def read_options(words):
     add("--solver", default="", help="linear solver, see `itr solvers`")
     add("--threads", type=int, default=1, help="of each run (default: 1)")
     add("--set", action="append", default=[], help="/json/pointer=VALUE, for all runs")
+    add("--defaults", help="what keys that the scene leaves out stand for: itr (default) or polyfem, see docs/scenes.md")
     options = parser.parse_args(words)
+    if options.defaults:
+        options.set.append(f'/defaults="{options.defaults}"')
     for name, least in (("levels", 1), ("frames", 1), ("threads", 1), ("starts", 0), ("time_limit", 0), ("tolerances", 1e-300),
                         ("reference_tolerance", 1e-300)):
         values = getattr(options, name)
@@ -198,7 +201,7 @@ class Study:
         if results.refused:
             results.worth = None
             for row in results.rows:
-                row.errors = None if row.is_against_reference else row.errors
+                row.errors = None if row.run.reference == REFERENCE else row.errors
 
         results.reference = f"the run in `{options.reference}`" if options.reference else "nothing"
         if row := not options.reference and (reference or finest):

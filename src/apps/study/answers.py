@@ -293,7 +293,8 @@ class Answers(Results):
         reference = self.find(self.reference_run)
         if reference and not self.is_dynamic and not self.has_friction:
             # In equilibrium, of two states the one of lower potential is nearer to the limit.
-            best = min((reference, *(r for r in rows if r.certified and r.is_against_reference)), key=lambda row: row.potential)
+            others = (row for row in rows if row.certified and row.run.reference == REFERENCE)
+            best = min((reference, *others), key=lambda row: row.potential)
             if best is not reference:
                 yield (
                     f"`{best.run.name}` ends with a potential lower than the reference's, by "

@@ -17,7 +17,11 @@ REFERENCE_TRIES = 3  # tolerances of references, where none is asked for
 NEXT_TRY = 1 / 16  # tolerance of a reference by that of the one before, which split nothing
 SECOND_FRACTION = 4  # the second reference's tolerance by the first's
 # A remeshed step solves twice, so only friction that has converged is the same on all meshes.
-FRICTION_ROUNDS = {"/solver/contact/friction_iterations": "50", "/solver/contact/friction_convergence_tol": "0"}
+FRICTION_ROUNDS = {
+    "/solver/contact/friction_iterations": "50",
+    "/solver/contact/friction_convergence_tol": "0",
+    "/solver/lagging_tolerance": "0",
+}
 
 ORDER = "/space/discr_order"
 ENABLED, TOLERANCE = "/space/remesh/{}/enabled", "/space/remesh/{}/acceptance_tolerance"
@@ -145,8 +149,8 @@ class Plan:
 
     def shared_settings(self):
         """Values that the scene leaves open and all runs have to agree on, and those of their output."""
-        stiffness = "/solver/contact/barrier_stiffness"
-        shared = {stiffness: text_of(self.facts["settings"][stiffness])} if stiffness in self.facts["settings"] else {}
+        settings = self.facts["settings"].items()
+        shared = {pointer: text_of(value) for pointer, value in settings if not pointer.startswith("/space/remesh")}
         self.notes = ""  # further settings that all runs share, in words
         if self.facts["friction"]:
             shared |= {pointer: value for pointer, value in FRICTION_ROUNDS.items() if pointer not in self.options.sets}

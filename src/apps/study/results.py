@@ -65,11 +65,6 @@ class Row:
     def status(self):
         return "failed" if self.reason else "finished" if self.certified else "not certified"
 
-    @property
-    def is_against_reference(self):
-        """Tells errors against the reference from those of runs among themselves."""
-        return self.run.reference == REFERENCE
-
 
 @dataclass
 class Results:
@@ -96,7 +91,7 @@ class Results:
         """An error that is not below the reference's own; None where it is, or where there is none."""
         error = row.errors and row.errors[measure.name]
         own = self.worth and self.worth[measure.name]
-        has_bound = own is not None and row.is_against_reference and row.run.name != SECOND_REFERENCE
+        has_bound = own is not None and row.run.reference == REFERENCE and row.run.name != SECOND_REFERENCE
         return None if error is None or (has_bound and error < own) else error
 
     def relative_error(self, row, measure):

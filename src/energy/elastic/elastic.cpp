@@ -143,8 +143,7 @@ template <int Dim>
 void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double scale, int degree) {
   scale_ = scale;
   curved_.reset();
-  if (!cells_.curved_elements.empty())
-    curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
+  if (cells_.has_curved()) curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
   by_body_.clear();
   by_element_.clear();
   bool varies = false;
@@ -153,8 +152,8 @@ void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double 
     if (!material.has_varying_moduli()) by_body_.emplace_back(body, elastic_moduli<Dim>(material, Vec<Dim>::Zero()));
   }
   if (!varies) return;
-  by_element_.reserve(cells_.elements.size());
-  for (const auto& element : cells_.elements)
+  by_element_.reserve(cells_.straight().size());
+  for (const auto& element : cells_.straight())
     by_element_.push_back(elastic_moduli<Dim>(materials.at(element.body), rest_barycenter(cells_, element)));
 }
 
@@ -171,7 +170,7 @@ const ElasticModuli& ElasticEnergy<Dim>::moduli(std::size_t e) const {
 template <int Dim>
 template <typename F>
 double ElasticEnergy<Dim>::sum_over_elements(const F& f) const {
-  return scale_ * parallel_sum(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  return scale_ * parallel_sum(cells_.straight().size(), kBlock, [&](std::size_t begin, std::size_t end) {
            double sum = 0;
            for (std::size_t e = begin; e < end; ++e) sum += f(e);
            return sum;
@@ -206,7 +205,7 @@ void ElasticEnergy<Dim>::add_gradient_of(const Displacement<Dim>& u, ConstVector
     const Mat<Dim> P = elastic_stress<Dim>(displacement_gradient<Dim>(element, u), moduli(e));
     return scale_ * element.volume * P * element.inverse_edges.transpose();
   };
-  parallel_then_ordered<Mat<Dim>>(cells_.elements.size(), kBlock, forces_of, [&](std::size_t e, const Mat<Dim>& forces) {
+  parallel_then_ordered<Mat<Dim>>(cells_.straight().size(), kBlock, forces_of, [&](std::size_t e, const Mat<Dim>& forces) {
     const auto& vertices = cells_.elements[e].vertices;
     for (int k = 0; k < Dim; ++k) {
       gradient.segment<Dim>(Dim * vertices[k + 1]) += forces.col(k);
@@ -278,7 +277,7 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
 
 template <int Dim>
 double ElasticEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const {
-  const double straight = parallel_min(cells_.elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  const double straight = parallel_min(cells_.straight().size(), kBlock, [&](std::size_t begin, std::size_t end) {
     double step = 1;
     for (std::size_t e = begin; e < end; ++e) {
       const auto& element = cells_.elements[e];
@@ -308,7 +307,7 @@ void ElasticEnergy<Dim>::set_quadrature_levels(const QuadratureLevels& levels) {
 template <int Dim>
 StepLimit ElasticEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx) const {
   StepLimit least;
-  for (const auto& element : cells_.elements) {
+  for (const auto& element : cells_.straight()) {
     const double t = kInversionMargin * first_inversion(edges_of<Dim>(element, x), edges_of<Dim>(element, dx));
     if (t < least.step) least = {t, "cell", {element.vertices.begin(), element.vertices.end()}};
   }

@@ -27,7 +27,7 @@ class JacobianBarrier {
 
   /// `linear`: gradients of barycentric coordinates as columns. `positions` are those of at_nodes.
   JacobianBarrier(CurvedEdges curved, const Eigen::Matrix<double, Dim, Dim + 1>& linear, const Nodal& positions);
-  JacobianBarrier(const typename CellSet<Dim>::CurvedElement& element, const Nodal& positions)
+  JacobianBarrier(const typename CellSet<Dim>::Element& element, const Nodal& positions)
       : JacobianBarrier(element.curved, barycentric_gradients<Dim>(element.inverse_edges), positions) {}
 
   /// Whether it is not zero.

@@ -29,10 +29,11 @@ using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
 
 /// Displacements of the nodes from that of the first one, which derivatives do not depend on.
 template <int Dim>
-Nodal<Dim> relative_to_first(const typename CellSet<Dim>::CurvedElement& element, const Displacement<Dim>& u) {
+Nodal<Dim> relative_to_first(const typename CellSet<Dim>::Element& element, const Displacement<Dim>& u) {
   Nodal<Dim> values = Nodal<Dim>::Zero();
+  const auto nodes = element.nodes();
   for (int k = 1; k < kQuadraticNodes<Dim>; ++k)
-    if (has_node<Dim>(element.curved, k)) values.col(k) = u.difference(element.nodes[0], element.nodes[k]);
+    if (has_node<Dim>(element.curved, k)) values.col(k) = u.difference(nodes[0], nodes[k]);
   return values;
 }
 
@@ -139,10 +140,10 @@ class NeoHookeanSum {
 /// How far a step may go: not past an inversion, and not to where the least Bernstein coefficient of det F over its mean is
 /// less than a tenth of that before (at most of s0).
 template <int Dim>
-double free_step(const typename CellSet<Dim>::CurvedElement& element, ConstVectorView x, ConstVectorView dx) {
+double free_step(const typename CellSet<Dim>::Element& element, ConstVectorView x, ConstVectorView dx) {
   double t = max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, dx));
   if (t < 1) t *= kInversionMargin;
-  const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x), way = at_nodes<Dim>(element.nodes, dx);
+  const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x), way = at_nodes<Dim>(element.nodes(), dx);
   const auto least = [&](double at) { return JacobianBarrier<Dim>(element, positions + at * way).least_ratio(); };
   double at_end = least(t);
   if (at_end >= JacobianBarrier<Dim>::kActive) return t;
@@ -162,8 +163,8 @@ QuadraticElasticity<Dim>::QuadraticElasticity(const CellSet<Dim>& cells, const s
     varies = varies || material.has_varying_moduli();
     by_body_[body] = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
   }
-  by_element_.reserve(cells.curved_elements.size());
-  for (const Element& element : cells.curved_elements) by_element_.push_back(&by_body_.at(element.body));
+  by_element_.reserve(elements().size());
+  for (const Element& element : elements()) by_element_.push_back(&by_body_.at(element.body));
   if (!varies) return;
   materials_ = materials;
   sample_moduli();
@@ -176,7 +177,7 @@ void QuadraticElasticity<Dim>::sample_moduli() {
   at_barycenters_.clear();
   if (materials_.empty()) return;
   for (std::size_t e = 0; e < by_element_.size(); ++e) {
-    const Element& element = cells_.curved_elements[e];
+    const Element& element = elements()[e];
     first_varying_.push_back(varying_.size());
     at_barycenters_.push_back(elastic_moduli<Dim>(materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
     for (const auto& point : rule(e))
@@ -194,10 +195,10 @@ void QuadraticElasticity<Dim>::set_levels(const QuadratureLevels& levels) {
 /// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.
 template <int Dim>
 bool QuadraticElasticity<Dim>::is_blind(std::size_t e, ConstVectorView x) const {
-  const Element& element = cells_.curved_elements[e];
+  const Element& element = elements()[e];
   const QuadraticCell<Dim> all = at_all_nodes<Dim>(element, x);
   if (varies_little<Dim>(all, kSeen)) return false;
-  const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+  const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
   double seen = std::numeric_limits<double>::infinity();
   for (const auto& point : rule(e))
     seen = std::min(seen, (positions * shape_gradients<Dim>(element, point.weights).transpose()).determinant());
@@ -224,17 +225,17 @@ bool QuadraticElasticity<Dim>::refine_quadrature(ConstVectorView x) {
 template <int Dim>
 template <typename F>
 double QuadraticElasticity<Dim>::sum_over_cells(const Displacement<Dim>& u, ConstVectorView x, const F& at_point) const {
-  return scale_ * parallel_sum(cells_.curved_elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  return scale_ * parallel_sum(elements().size(), kBlock, [&](std::size_t begin, std::size_t end) {
            double sum = 0;
            for (std::size_t e = begin; e < end; ++e) {
-             const Element& element = cells_.curved_elements[e];
+             const Element& element = elements()[e];
              const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
              const auto& rule = this->rule(e);
              for (std::size_t q = 0; q < rule.size(); ++q) {
                const Mat<Dim> G = displacements * shape_gradients<Dim>(element, rule[q].weights).transpose();
                sum += rule[q].share * element.volume * at_point(DisplacementGradient<Dim>{G}, moduli(e, q));
              }
-             const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes, x));
+             const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x));
              sum += element.volume * barrier_density<Dim>(barrier, moduli_at_barycenter(e));
            }
            return sum;
@@ -258,7 +259,7 @@ double QuadraticElasticity<Dim>::size_of_summands(const Displacement<Dim>& u, Co
 template <int Dim>
 void QuadraticElasticity<Dim>::add_gradient(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const {
   const auto forces_of = [&](std::size_t e) -> Nodal<Dim> {
-    const Element& element = cells_.curved_elements[e];
+    const Element& element = elements()[e];
     const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
     Nodal<Dim> forces = Nodal<Dim>::Zero();
     const auto& rule = this->rule(e);
@@ -268,23 +269,21 @@ void QuadraticElasticity<Dim>::add_gradient(const Displacement<Dim>& u, ConstVec
       const Mat<Dim> P = elastic_stress<Dim>(at, moduli(e, q));
       forces.noalias() += (scale_ * rule[q].share * element.volume) * (P * gradients);
     }
-    if (const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes, x)); barrier.is_active())
+    if (const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x)); barrier.is_active())
       forces += scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
     return forces;
   };
-  parallel_then_ordered<Nodal<Dim>>(cells_.curved_elements.size(), kBlock, forces_of,
-                                    [&](std::size_t e, const Nodal<Dim>& forces) {
-                                      const auto& nodes = cells_.curved_elements[e].nodes;
-                                      for (int k = 0; k < kNodes; ++k)
-                                        gradient.segment<Dim>(Dim * nodes[k]) += forces.col(k);
-                                    });
+  parallel_then_ordered<Nodal<Dim>>(elements().size(), kBlock, forces_of, [&](std::size_t e, const Nodal<Dim>& forces) {
+    const auto nodes = elements()[e].nodes();
+    for (int k = 0; k < kNodes; ++k) gradient.segment<Dim>(Dim * nodes[k]) += forces.col(k);
+  });
 }
 
 template <int Dim>
 void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const {
   sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
-    const Element& element = cells_.curved_elements[e];
-    const Nodal<Dim> positions = at_nodes<Dim>(element.nodes, x);
+    const Element& element = elements()[e];
+    const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
     const auto& rule = this->rule(e);
     block.setZero();
     ModalSum<Dim> modes(block);
@@ -318,9 +317,9 @@ void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd,
 
 template <int Dim>
 double QuadraticElasticity<Dim>::max_step(ConstVectorView x, ConstVectorView dx) const {
-  return parallel_min(cells_.curved_elements.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  return parallel_min(elements().size(), kBlock, [&](std::size_t begin, std::size_t end) {
     double step = 1;
-    for (const Element& element : std::span(cells_.curved_elements).subspan(begin, end - begin))
+    for (const Element& element : elements().subspan(begin, end - begin))
       step = std::min(step, free_step<Dim>(element, x, dx));
     return step;
   });
@@ -328,9 +327,9 @@ double QuadraticElasticity<Dim>::max_step(ConstVectorView x, ConstVectorView dx)
 
 template <int Dim>
 void QuadraticElasticity<Dim>::limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const {
-  for (const Element& element : cells_.curved_elements) {
+  for (const Element& element : elements()) {
     const double t = free_step<Dim>(element, x, dx);
-    if (t < least.step) least = {t, "cell", {element.nodes.begin(), element.nodes.begin() + Dim + 1}};
+    if (t < least.step) least = {t, "cell", {element.vertices.begin(), element.vertices.end()}};
   }
 }
 

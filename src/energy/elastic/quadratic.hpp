@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <vector>
 
 #include "fem/displacement.hpp"
@@ -37,9 +38,10 @@ class QuadraticElasticity {
   void limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const;
 
  private:
-  using Element = typename CellSet<Dim>::CurvedElement;
+  using Element = typename CellSet<Dim>::Element;
   static constexpr int kNodes = kQuadraticNodes<Dim>;
 
+  std::span<const Element> elements() const { return cells_.curved(); }
   const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
     return cell_quadrature<Dim>(levels_.empty() ? 0 : levels_[e], degree_);
   }

@@ -74,7 +74,8 @@ class Model:
 
     @classmethod
     def from_scene(cls, file: str, overrides: Optional[Mapping[str, Any]] = None) -> "Model":
-        """Reads a scene file. `overrides` has values by JSON pointer. Surfaces become boundaries named "1", "2": their ids."""
+        """Reads a scene file. `overrides` has values by JSON pointer. Surfaces become boundaries by their names, or their
+        ids: "1", "2"."""
         model = cls.__new__(cls)
         model._model = _itr.Model.from_scene(str(file), dict(overrides or {}))
         model._kept = []
@@ -83,11 +84,16 @@ class Model:
     @classmethod
     def from_meshio(cls, mesh: meshio.Mesh) -> Model:
         """Takes the tetrahedra of a meshio.Mesh, or if there are none its triangles in the plane z = 0. Gmsh's physical groups
-        of cells become bodies of the same numbers, those of facets boundaries of the same names or numbers."""
+        of cells become bodies of the same numbers, those of facets boundaries of the same names or numbers. Names of physical
+        groups and of sets of cells are names of bodies; sets of facets, and sets of points by the facets that have all points
+        in them, are boundaries. Options may write these names as ids."""
         from ._convert import from_meshio
 
-        vertices, cells, bodies, boundaries = from_meshio(mesh)
+        vertices, cells, bodies, body_names, boundaries = from_meshio(mesh)
         model = cls(vertices, cells, bodies)
+        for name, ids in body_names.items():
+            for body in ids:
+                model._model.name_body(name, body)
         for name, facets in boundaries.items():
             model.add_boundary(name, facets)
         return model

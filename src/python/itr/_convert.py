@@ -22,9 +22,9 @@ QUADRATIC_EDGES = {2: [(0, 1), (1, 2), (2, 0)], 3: [(0, 1), (1, 2), (2, 0), (0, 
 PHYSICAL = "gmsh:physical"
 
 
-def from_meshio(mesh: meshio.Mesh) -> tuple[Array, Array, Array, dict[str, Array]]:
-    """Vertices (n x d), cells (m x (d + 1), or with the nodes of their edges), bodies (m,) and boundaries (k x d) by name of a
-    meshio.Mesh. Points that no cell has are left out; cells are turned to positive volume."""
+def from_meshio(mesh: meshio.Mesh) -> tuple[Array, Array, Array, dict[str, list[int]], dict[str, Array]]:
+    """Vertices (n x d), cells (m x (d + 1), or with the nodes of their edges), bodies (m,), bodies by name and boundaries
+    (k x d) by name of a meshio.Mesh. Points that no cell has are left out; cells are turned to positive volume."""
     kinds = {block.type for block in mesh.cells}
     dimension = 3 if kinds & {"tetra", "tetra10"} else 2
     if kinds & {"triangle6", "tetra10"}:
@@ -33,7 +33,10 @@ def from_meshio(mesh: meshio.Mesh) -> tuple[Array, Array, Array, dict[str, Array
         kind, facet_kind = ("tetra", "triangle") if dimension == 3 else ("triangle", "line")
     others = {k for k in kinds - {kind} if TOPOLOGICAL_DIMENSION.get(k, dimension) >= dimension}
     if kind not in kinds or others:
-        raise InputError(f"mesh: found cells {', '.join(sorted(others or kinds))}; expected tetra, triangle, tetra10 or triangle6 only")
+        raise InputError(
+            f"mesh: found cells {', '.join(sorted(others or kinds))}; expected tetra, triangle, tetra10 or triangle6 only: "
+            "itr.simplices splits others"
+        )
     cells, bodies = _blocks(mesh, kind)
     corners = np.unique(cells[:, : dimension + 1])
     used = np.concatenate([corners, np.setdiff1d(cells, corners)])  # boundaries count corners alone
@@ -46,11 +49,68 @@ def from_meshio(mesh: meshio.Mesh) -> tuple[Array, Array, Array, dict[str, Array
     edges = vertices[cells[:, 1 : dimension + 1], :dimension] - vertices[cells[:, :1], :dimension]
     inverted = np.linalg.det(edges) < 0
     cells[inverted] = cells[np.ix_(inverted, _turned(dimension, cells.shape[1]))]
+    bodies, body_names = _named_bodies(mesh, kind, bodies, dimension)
     facets, tags = _blocks(mesh, facet_kind)
     facets = facets[:, :dimension]
     names = {int(tag): name for name, (tag, dim) in mesh.field_data.items() if dim == dimension - 1}
     boundaries = {names.get(tag, str(tag)): new[facets[tags == tag]] for tag in np.unique(tags).tolist() if tag != 0}
-    return vertices[:, :dimension], cells, bodies, boundaries
+    outer = _outer_facets(cells[:, : dimension + 1])
+    for name, members in _cell_sets(mesh, facet_kind).items():
+        _add(boundaries, name, new[facets[members]], outer)
+    for name, points in getattr(mesh, "point_sets", {}).items():
+        is_in = np.zeros(len(vertices), bool)
+        known = new[np.asarray(points, int).ravel()]
+        is_in[known[known >= 0]] = True
+        _add(boundaries, name, outer[is_in[outer].all(axis=1)], outer)
+    return vertices[:, :dimension], cells, bodies, body_names, boundaries
+
+
+def _add(boundaries: dict[str, Array], name: str, facets: Array, outer: Array) -> None:
+    """Adds those of the facets that are on the boundary, if any: sets of cells have none."""
+    known = set(map(tuple, np.sort(outer, axis=1).tolist()))
+    facets = [facet for facet in np.sort(facets, axis=1).tolist() if tuple(facet) in known]
+    if facets:
+        boundaries[name] = np.array(facets + boundaries.get(name, np.empty((0, len(facets[0])), int)).tolist())
+
+
+def _outer_facets(cells: Array) -> Array:
+    corners = range(cells.shape[1])
+    facets = np.concatenate([np.delete(cells, corner, axis=1) for corner in corners])
+    ascending, count = np.unique(np.sort(facets, axis=1), axis=0, return_counts=True)
+    return ascending[count == 1]
+
+
+def _cell_sets(mesh: meshio.Mesh, kind: str) -> dict[str, Array]:
+    """Of the cells of a kind, as _blocks lists them: which each set has."""
+    sets = {}
+    for name, blocks in getattr(mesh, "cell_sets", {}).items():
+        members, first = [], 0
+        for block, chosen in zip(mesh.cells, blocks):
+            if block.type != kind:
+                continue
+            if chosen is not None:
+                members += [first + int(i) for i in np.asarray(chosen, int).ravel()]
+            first += len(block.data)
+        if members and not name.startswith("gmsh:"):
+            sets[name] = np.array(members, int)
+    return sets
+
+
+def _named_bodies(mesh: meshio.Mesh, kind: str, bodies: Array, dimension: int) -> tuple[Array, dict[str, list[int]]]:
+    """Bodies such that each set of cells is some of them, and which: parts of a body that are in other sets get new ids."""
+    names = {name: [int(tag)] for name, (tag, dim) in mesh.field_data.items() if dim == dimension}
+    sets = _cell_sets(mesh, kind)
+    signature = np.column_stack([bodies] + [np.isin(np.arange(len(bodies)), members) for members in sets.values()])
+    parts, of_cell = np.unique(signature, axis=0, return_inverse=True)
+    ids, used = [], set()
+    for number, *_ in parts.tolist():
+        ids.append(number if number not in used else max(used | set(bodies.tolist())) + 1)
+        used.add(ids[-1])
+    for i, name in enumerate(sets):
+        names[name] = [body for body, part in zip(ids, parts.tolist()) if part[i + 1]]
+    for tags in names.values():  # all parts of the bodies that Gmsh numbers
+        tags += [body for body, part in zip(ids, parts.tolist()) if part[0] in tags and body not in tags]
+    return np.array(ids)[of_cell.ravel()], names
 
 
 def _turned(dimension: int, nodes: int) -> list[int]:

@@ -21,12 +21,9 @@ std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>
     const Material& material = context.materials.at(mesh.body(c));
     const auto moduli = elastic_moduli<Dim>(material, mesh.barycenter(c));
     const auto element = element_of(mesh, c);
-    if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
-      for_each_gradient<Dim>(curved, element.inverse_edges, fields.x, [&](const Mat<Dim>& F, double fraction) {
-        energies[c] += context.scaling * element.volume * fraction * elastic_density<Dim>(F, moduli);
-      });
-    else
-      energies[c] = context.scaling * elastic_energy<Dim>(element, fields.x, moduli);
+    for_each_gradient<Dim>(element, fields.x, [&](const Mat<Dim>& F, double fraction) {
+      energies[c] += context.scaling * (element.volume * (fraction * elastic_density<Dim>(F, moduli)));
+    });
   }
   return energies;
 }
@@ -36,30 +33,26 @@ template <int Dim>
 std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields,
                                             const StepContext<Dim>& context) {
   const auto& obstacles = context.obstacles;
-  const int bodies = mesh.vertex_slots(), total = bodies + static_cast<int>(obstacles.x.size());
+  const int bodies = mesh.node_slots(), total = bodies + static_cast<int>(obstacles.x.size());
   std::vector<double> energies(total, 0);
   if (!context.contact.enabled) return energies;
   std::vector<typename MeshTypes<Dim>::Facet> chords;
   for (int f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
-    for_each_chord<Dim>(
-        mesh.facet(f), [&](VertexId a, VertexId b) { return mesh.node_of(a, b); },
-        [&](const auto& chord) { chords.push_back(chord); });
+    for_each_chord<Dim>(mesh.facet(f), nodes_of_edges(mesh), [&](const auto& chord) { chords.push_back(chord); });
   }
-  std::vector<Vec<Dim>> rest(bodies);
-  for (int v = 0; v < bodies; ++v) rest[v] = mesh.rest(v);
   VectorX x(Dim * total);
   x.head(Dim * bodies) = fields.x.head(Dim * bodies);
   for (int o = 0; o < total - bodies; ++o) x.segment<Dim>(Dim * (bodies + o)) = obstacles.x[o];
-  const CollisionSurface surface = surface_of_facets<Dim>(chords, std::move(rest), obstacles);
+  const CollisionSurface surface = surface_of_facets<Dim>(chords, mesh.rest(), obstacles);
   const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {
     const double part = context.scaling * contact.pair_energy(s, x) / s.size();
     for (int k = 0; k < s.size(); ++k) energies[s.vertices[k]] += part;
   }
-  for (const auto& [edge, node] : mesh.nodes())
-    for (const VertexId end : edge) energies[end] += energies[node] / 2;
+  for (const EdgeKey& edge : mesh.curved_edges())
+    for (const VertexId end : edge) energies[end] += energies[mesh.node_of(edge)] / 2;
   return energies;
 }
 

@@ -37,7 +37,7 @@ class SizingField {
       count.note(refusal);
       if (refusal != Refusal::none) continue;
       ++count.tried;
-      const VertexId created = queries_.mesh().vertex_slots();
+      const VertexId created = queries_.mesh().node_slots();
       if (!session_.commit_unjudged(make_split(queries_.mesh(), edge), count)) continue;
       for (const EdgeKey& near : edges_of<Dim>(queries_.mesh(), queries_.mesh().cells_of(created))) push_split(near);
     }
@@ -75,7 +75,7 @@ class SizingField {
   /// No edge is split that is shorter [m].
   double least_length() const {
     Box<Dim> box;
-    for (VertexId v = 0; v < queries_.mesh().vertex_slots(); ++v)
+    for (VertexId v = 0; v < queries_.mesh().node_slots(); ++v)
       if (queries_.mesh().is_vertex_alive(v)) box.include(queries_.mesh().rest(v));
     return queries_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
   }

@@ -168,7 +168,7 @@ template <int Dim>
 bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const {
   if (edit.kind == Edit<Dim>::Kind::curve) return true;  // the same functions
   return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
-    if (const auto curved = curved_cell_after(mesh_, edit, cell.vertices); curved.edges)
+    if (const auto curved = cell_after(mesh_, edit, cell.vertices); curved.edges)
       return is_positive_everywhere<Dim>(curved.values(x, edit));
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = RemeshFields<Dim>::after(x, edit, cell.vertices[k]);
@@ -179,10 +179,8 @@ bool Gate<Dim>::keeps_orientation(const Edit<Dim>& edit, const VectorX& x) const
 template <int Dim>
 bool Gate<Dim>::is_any_removed_curved(const Edit<Dim>& edit) const {
   bool is_any = false;
-  if (mesh_.has_nodes())
-    for (const FacetId f : edit.removed_facets)
-      for_each_node_on<Dim>(
-          mesh_.facet(f), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); }, [&](VertexId) { is_any = true; });
+  for (const FacetId f : edit.removed_facets)
+    for_each_node_on<Dim>(mesh_.facet(f), nodes_of_edges(mesh_), [&](VertexId) { is_any = true; });
   return is_any;
 }
 

@@ -54,10 +54,7 @@ template <int Dim>
 Box<Dim> SurfaceIndex<Dim>::box_of(FacetId f) const {
   Box<Dim> box;
   for (const int v : mesh_->facet(f)) box.include(at(v));
-  if (mesh_->has_nodes())
-    for_each_node_on<Dim>(
-        mesh_->facet(f), [&](VertexId a, VertexId b) { return mesh_->node_of(a, b); },
-        [&](VertexId node) { box.include(at(node)); });
+  for_each_node_on<Dim>(mesh_->facet(f), nodes_of_edges(*mesh_), [&](VertexId node) { box.include(at(node)); });
   return box;
 }
 
@@ -71,16 +68,10 @@ SurfacePiece<Dim> SurfaceIndex<Dim>::piece(FacetId f) const {
 template <int Dim>
 SurfacePieces<Dim> SurfaceIndex<Dim>::pieces(FacetId f) const {
   SurfacePieces<Dim> result;
-  if (!mesh_->has_nodes()) {
-    result.push_back(piece(f));
-    return result;
-  }
-  for_each_chord<Dim>(
-      mesh_->facet(f), [&](VertexId a, VertexId b) { return mesh_->node_of(a, b); },
-      [&](const auto& ids) {
-        SurfacePiece<Dim>& piece = result.emplace_back();
-        for (const int v : ids) piece.add(at(v), v);
-      });
+  for_each_chord<Dim>(mesh_->facet(f), nodes_of_edges(*mesh_), [&](const auto& ids) {
+    SurfacePiece<Dim>& piece = result.emplace_back();
+    for (const int v : ids) piece.add(at(v), v);
+  });
   return result;
 }
 

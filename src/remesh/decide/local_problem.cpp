@@ -100,9 +100,9 @@ LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const C
       is_after_(is_after),
       scratch_(scratch),
       storage_(scratch.take_storage()) {
-  scratch_.known.clear(mesh_.vertex_slots());
+  scratch_.known.clear(mesh_.node_slots());
   scratch_.known_obstacles.clear(static_cast<int>(state.context.obstacles.x.size()));
-  if (static_cast<int>(scratch_.local_of.size()) < mesh_.vertex_slots()) scratch_.local_of.resize(2 * mesh_.vertex_slots());
+  if (static_cast<int>(scratch_.local_of.size()) < mesh_.node_slots()) scratch_.local_of.resize(2 * mesh_.node_slots());
   scratch_.local_of_obstacle.resize(state.context.obstacles.x.size());
   add_cells(patch);
   if (needs_facets(state.context)) add_loaded_facets();
@@ -116,8 +116,6 @@ LocalProblem<Dim>::~LocalProblem() {
   cells_.rest.clear();
   cells_.elements.clear();
   cells_.facets.clear();
-  cells_.curved_elements.clear();
-  cells_.curved_facets.clear();
   vertices_.clear();
   changes_.clear();
   energy_.clear();
@@ -208,56 +206,39 @@ void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
     scratch_.cells.mark(c);
     if (is_after_ && std::find(edit_.removed_cells.begin(), edit_.removed_cells.end(), c) != edit_.removed_cells.end())
       continue;
-    add_cell(mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c), c, mesh_.part(c));
+    add_cell({mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c), mesh_.part(c), c});
   }
   if (!is_after_) return;
   for (const auto& cell : edit_.inserted_cells) {
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = cells_.rest[local(cell.vertices[k])];
     const Mat<Dim> edges = edge_matrix<Dim>(p);
-    add_cell(cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), kNone,
-             mesh_.part(edit_.removed_cells[0]));
+    add_cell({cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), mesh_.part(edit_.removed_cells[0])});
   }
 }
 
-/// Local ids of a simplex's nodes, and which of its edges are curved.
+/// Makes the vertices of a simplex local, and finds its curved edges.
 template <int Dim>
-template <int SimplexDim>
-CurvedEdges LocalProblem<Dim>::find_nodes(const std::array<VertexId, SimplexDim + 1>& vertices,
-                                          std::array<int, kQuadraticNodes<SimplexDim>>& nodes) {
-  if (!mesh_.has_nodes() && (!is_after_ || edit_.inserted_nodes.empty())) return 0;
-  const CurvedCell<SimplexDim> found =
-      curved_cell<SimplexDim>(vertices, [&](VertexId a, VertexId b) { return node_of(a, b); });
-  if (found.edges)
-    for (std::size_t k = 0; k < nodes.size(); ++k) nodes[k] = local(found.nodes[k]);
-  return found.edges;
+template <typename Simplex>
+void LocalProblem<Dim>::localize(Simplex& simplex) {
+  if (has_curves(mesh_, edit_))
+    simplex.curved = find_edge_nodes<static_cast<int>(std::tuple_size_v<decltype(simplex.vertices)>) - 1>(
+        simplex.vertices, [&](VertexId a, VertexId b) { return node_of(a, b); }, simplex.edge_nodes);
+  for (VertexId& v : simplex.vertices) v = local(v);
+  if (simplex.curved)
+    for (VertexId& node : simplex.edge_nodes) node = local(node);
 }
 
 template <int Dim>
-void LocalProblem<Dim>::add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume,
-                                 const Mat<Dim>& inverse_edges, CellId c, int part) {
-  typename CellSet<Dim>::CurvedElement curved{{}, 0, body, volume, inverse_edges, c, part};
-  curved.curved = find_nodes<Dim>(cell, curved.nodes);
-  if (curved.curved) {
-    cells_.curved_elements.push_back(curved);
-    return;
-  }
-  std::array<int, Dim + 1> vertices;
-  for (int k = 0; k <= Dim; ++k) vertices[k] = local(cell[k]);
-  cells_.elements.push_back({vertices, body, volume, inverse_edges, part});
+void LocalProblem<Dim>::add_cell(typename CellSet<Dim>::Element cell) {
+  localize(cell);
+  cells_.add(cell);
 }
 
 template <int Dim>
-void LocalProblem<Dim>::add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag, int part) {
-  typename CellSet<Dim>::CurvedFacet curved{{}, 0, tag, part};
-  curved.curved = find_nodes<Dim - 1>(facet, curved.nodes);
-  if (curved.curved) {
-    cells_.curved_facets.push_back(curved);
-    return;
-  }
-  typename CellSet<Dim>::BoundaryFacet loaded{{}, tag, part};
-  for (int k = 0; k < Dim; ++k) loaded.vertices[k] = local(facet[k]);
-  cells_.facets.push_back(loaded);
+void LocalProblem<Dim>::add_loaded_facet(typename CellSet<Dim>::BoundaryFacet facet) {
+  localize(facet);
+  cells_.facets.push_back(facet);
 }
 
 template <int Dim>
@@ -270,12 +251,12 @@ void LocalProblem<Dim>::add_loaded_facets() {
       const auto& facet = mesh_.facet(f);
       const auto is_known = [&](VertexId w) { return scratch_.known[w]; };
       if (facet[0] != v.id || !std::all_of(facet.begin() + 1, facet.end(), is_known) || is_removed(f)) continue;
-      add_loaded_facet(facet, mesh_.facet_tag(f), mesh_.part_of_vertex(v.id));
+      add_loaded_facet({facet, mesh_.facet_tag(f), mesh_.part_of_vertex(v.id)});
     }
   }
   if (!is_after_) return;
   for (const auto& facet : edit_.inserted_facets)
-    add_loaded_facet(facet.vertices, facet.tag, mesh_.part(edit_.removed_cells[0]));
+    add_loaded_facet({facet.vertices, facet.tag, mesh_.part(edit_.removed_cells[0])});
 }
 
 template <int Dim>
@@ -311,10 +292,10 @@ void LocalProblem<Dim>::set_quadrature(ConstVectorView x) {
     QuadratureLevels levels;
     std::size_t next = 0;  // of the edit's cells, of which the curved ones are here
     const auto level_of_next = [&] {
-      while (curved_cell_after<Dim>(mesh_, edit_, edit_.inserted_cells[next].vertices).edges == 0) ++next;
+      while (cell_after<Dim>(mesh_, edit_, edit_.inserted_cells[next].vertices).edges == 0) ++next;
       return state_.fields.level_of_new_cell(edit_, next++);
     };
-    for (const auto& element : cells_.curved_elements)
+    for (const auto& element : cells_.curved())
       levels.push_back(element.cell == kNone ? level_of_next() : state_.fields.levels[element.cell]);
     elastic.set_quadrature_levels(levels);
   }
@@ -337,7 +318,7 @@ void LocalProblem<Dim>::add_terms() {
   else
     storage_->potential.emplace(context, cells_, history);
   IncrementalPotential<Dim>& potential = *storage_->potential;
-  if (!cells_.curved_elements.empty()) set_quadrature(x);
+  set_quadrature(x);
   // With lumped mass a split changes how inertia is integrated.
   const bool is_nested = !is_after_ || (edit_.is_nested() && context.mass == MassKind::consistent);
   if (context.has_inertia && !is_nested && state_.history == HistoryRule::function)
@@ -369,7 +350,7 @@ void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
   };
   double loss = 0;
   for (const CellId c : edit_.removed_cells) {
-    const auto cell = curved_cell<Dim>(mesh_.cell(c), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); });
+    const auto cell = cell_before(mesh_, c);
     const double mass = state_.context.materials.at(mesh_.body(c)).density * mesh_.volume(c);
     const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
     const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
@@ -391,7 +372,7 @@ void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) c
   for (const CellId c : edit_.removed_cells)
     add_to_side<Dim>(mesh_.cell(c), cell_before(mesh_, c), density(mesh_.body(c)), old_side);
   for (const auto& cell : edit_.inserted_cells)
-    add_to_side<Dim>(cell.vertices, curved_cell_after(mesh_, edit_, cell.vertices), density(cell.body), new_side);
+    add_to_side<Dim>(cell.vertices, cell_after(mesh_, edit_, cell.vertices), density(cell.body), new_side);
   const auto local_vertex = [&](VertexId v) { return LocalVertex{is_created(v) ? Kind::created : Kind::of_mesh, v}; };
   for (const VertexId v : old_side.vertices) old_side.rest.push_back(mesh_.rest(v));
   for (const VertexId v : new_side.vertices) new_side.rest.push_back(rest_position(local_vertex(v)));
@@ -418,7 +399,7 @@ NewtonSummary LocalProblem<Dim>::relax(int max_iterations) {
   NewtonOptions options = state_.context.newton;
   options.max_iterations = max_iterations;
   NewtonExtras extras{.is_brief = true};
-  if (!cells_.curved_elements.empty())
+  if (cells_.has_curved())
     extras.after_step = [&](const VectorX& x) { return storage_->potential->elastic()->refine_quadrature(x); };
   if (options.norm != NewtonNorm::euclidean) {
     VectorView weights = storage_->norm_weights.resize(Dim * cells_.num_vertices);
@@ -435,7 +416,7 @@ double LocalProblem<Dim>::contact_energy() {
 
 template <int Dim>
 bool LocalProblem<Dim>::distorts() const {
-  return std::any_of(cells_.curved_elements.begin(), cells_.curved_elements.end(), [&](const auto& element) {
+  return std::ranges::any_of(cells_.curved(), [&](const auto& element) {
     return element.cell == kNone && relative_jacobian<Dim>(at_all_nodes<Dim>(element, x_.view())) < kLeastRelativeJacobian;
   });
 }

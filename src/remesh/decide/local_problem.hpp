@@ -113,12 +113,10 @@ class LocalProblem {
   int local(LocalVertex v);
   int local(VertexId v) { return local({is_created(v) ? Kind::created : Kind::of_mesh, v}); }
   bool is_created(VertexId v) const { return v > kNewVertex - 1 - static_cast<int>(edit_.inserted_nodes.size()); }
-  template <int SimplexDim>
-  CurvedEdges find_nodes(const std::array<VertexId, SimplexDim + 1>& vertices,
-                         std::array<int, kQuadraticNodes<SimplexDim>>& nodes);
-  void add_cell(const typename MeshTypes<Dim>::Cell& cell, int body, double volume, const Mat<Dim>& inverse_edges, CellId c,
-                int part);
-  void add_loaded_facet(const typename MeshTypes<Dim>::Facet& facet, int tag, int part);
+  template <typename Simplex>
+  void localize(Simplex& simplex);
+  void add_cell(typename CellSet<Dim>::Element cell);
+  void add_loaded_facet(typename CellSet<Dim>::BoundaryFacet facet);
   EdgeKey edge_of(const LocalVertex& node) const;
   /// The node of an edge on the side of the comparison that this is, or kNone.
   VertexId node_of(VertexId a, VertexId b) const;

@@ -18,12 +18,10 @@ void LocalProblem<Dim>::find_what_changes() {
     if (is_after_ && v == edit_.removed_vertex) return;
     changes_[local(v)] = 1;
   };
-  const bool has_nodes = mesh_.has_nodes() || !edit_.inserted_nodes.empty();
   const auto mark_all = [&](const typename MeshTypes<Dim>::Facet& facet) {
     for (const int v : facet) mark(v);
-    if (has_nodes)
-      for_each_node_on<Dim>(
-          facet, [&](VertexId a, VertexId b) { return node_of(a, b); }, mark);
+    for_each_node_on<Dim>(
+        facet, [&](VertexId a, VertexId b) { return node_of(a, b); }, mark);
   };
   for (const FacetId f : edit_.removed_facets) mark_all(mesh_.facet(f));
   for (const auto& facet : edit_.inserted_facets) mark_all(facet.vertices);

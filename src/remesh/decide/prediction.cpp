@@ -6,13 +6,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <span>
 
 #include <boost/container/small_vector.hpp>
-#include "energy/elastic/jacobian_barrier.hpp"
-#include "nodal_models.hpp"
-#include "quadratic_model.hpp"
-#include "remesh/edits.hpp"
+#include "fem/held_rule.hpp"
+#include "remesh/placed_cell.hpp"
 #include "split_model.hpp"
 
 namespace itr {
@@ -25,49 +22,75 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 /// resist.
 constexpr double kShareOfRelaxation = 0.25;
 
-/// The vertex and nodes that the edit sets move under all forces on them, since all of their cells are here; the others
-/// under the forces that the edit adds. Each moves by itself, which is an estimate of what they gain together. Forgotten
-/// history is left out.
+/// A cell on these vertices after an edit.
 template <int Dim>
-double predict_gain_at_curves(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
-  if (!state.context.loads.tractions.empty() && !edit.inserted_facets.empty()) return kUnknown;
-  NodalModels<Dim> before(state, edit), after(state, edit);
-  for (const CellId c : edit.removed_cells) before.add_cell(state.mesh.cell(c), state.mesh.body(c), false);
-  for (const auto& cell : edit.inserted_cells) after.add_cell(cell.vertices, cell.body, true);
-  if (!std::isfinite(after.energy()) || before.has_barrier()) return kUnknown;  // inverted there, or nearly so now
-  double gain = before.energy() - after.energy();
-  for (const auto& model : after.models()) {
-    const bool is_set = (edit.value && model.id == edit.value->vertex) || model.id >= state.mesh.vertex_slots();
-    const auto* old = is_set ? nullptr : before.find(model.id);
-    const Vec<Dim> force = old ? Vec<Dim>(model.gradient - old->gradient) : model.gradient;
-    const Eigen::LLT<Mat<Dim>> llt(model.hessian);
-    if (llt.info() != Eigen::Success) return kUnknown;
-    gain += (is_set ? 1 : kShareOfRelaxation) * 0.5 * force.dot(llt.solve(force));
-  }
-  return gain;
+PlacedCell<Dim> place(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& vertices, const Edit<Dim>& edit) {
+  return place(state.mesh, state.fields, state.context, cell_after(state.mesh, edit, vertices), edit);
+}
+template <int Dim>
+PlacedCell<Dim> place(const RemeshState<Dim>& state, CellId c) {
+  return place(state, state.mesh.cell(c), no_edit<Dim>());
 }
 
-/// A swap sets no vertex. Each vertex moves by itself under the forces that the edit adds.
+/// Adds a facet after an edit, of which corners have these places.
 template <int Dim>
-double predict_gain_of_swap(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
-  boost::container::small_vector<VertexId, 64> vertices;  // ascending
-  for (const auto& cell : edit.inserted_cells) vertices.insert(vertices.end(), cell.vertices.begin(), cell.vertices.end());
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  const std::span<const VertexId> moving(vertices.data(), vertices.size());
-  MovingModels<Dim> before(state, moving), after(state, moving);
-  for (const CellId c : edit.removed_cells) before.add_cell(state.mesh.cell(c), state.mesh.body(c));
-  for (const auto& cell : edit.inserted_cells) after.add_cell(cell.vertices, cell.body);
-  if (!state.context.loads.tractions.empty()) {
-    for (const FacetId f : edit.removed_facets) before.add_facet(state.mesh.facet(f), state.mesh.facet_tag(f));
-    for (const auto& facet : edit.inserted_facets) after.add_facet(facet.vertices, facet.tag);
+void add_facet(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Facet& facet, int tag, const Edit<Dim>& edit,
+               const typename CellModel<Dim>::Places& places, CellModel<Dim>& model) {
+  std::array<Vec<Dim>, Dim> X, x;
+  for (int k = 0; k < Dim; ++k) {
+    X[k] = rest_after(state.mesh, edit, facet[k]);
+    x[k] = RemeshFields<Dim>::after(state.fields.x, edit, facet[k]);
+  }
+  model.add_facet(X, x, tag, places);
+}
+
+/// Each vertex and node moves by itself, which is an estimate of what they gain together: those that the edit sets under all
+/// forces on them, since all of their cells are here, the others under the forces that the edit adds. At curved edges
+/// forgotten history is left out.
+template <int Dim>
+double predict_gain_of_each(const RemeshState<Dim>& state, const Edit<Dim>& edit, bool has_curves) {
+  const StepContext<Dim>& context = state.context;
+  if (has_curves && !context.loads.tractions.empty() && !edit.inserted_facets.empty()) return kUnknown;
+  boost::container::small_vector<VertexId, 64> ids;  // ascending
+  for (const auto& cell : edit.inserted_cells) {
+    const CurvedCell<Dim> nodes = cell_after(state.mesh, edit, cell.vertices);
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
+      if (has_node<Dim>(nodes.edges, k)) ids.push_back(nodes.nodes[k]);
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  const auto places_of = [&](const auto& nodes, CurvedEdges edges) {
+    auto places = CellModel<Dim>::still();
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const auto at = std::lower_bound(ids.begin(), ids.end(), nodes[k]);
+      if (has_node<Dim>(edges, static_cast<int>(k)) && at != ids.end() && *at == nodes[k])
+        places[k] = static_cast<int>(at - ids.begin());
+    }
+    return places;
+  };
+  const auto add = [&](const typename MeshTypes<Dim>::Cell& vertices, int body, const Edit<Dim>& by, CellModel<Dim>& model) {
+    const CurvedCell<Dim> cell = cell_after(state.mesh, by, vertices);
+    model.add(place(state.mesh, state.fields, context, cell, by), body, places_of(cell.nodes, cell.edges));
+  };
+  const int part = state.mesh.part(edit.removed_cells[0]);
+  CellModel<Dim> before(context, part), after(context, part);
+  for (const CellId c : edit.removed_cells) add(state.mesh.cell(c), state.mesh.body(c), no_edit<Dim>(), before);
+  for (const auto& cell : edit.inserted_cells) add(cell.vertices, cell.body, edit, after);
+  if (has_curves && (!std::isfinite(after.energy()) || before.has_barrier())) return kUnknown;  // inverted, or nearly so now
+  if (!context.loads.tractions.empty()) {
+    for (const FacetId f : edit.removed_facets)
+      add_facet(state, state.mesh.facet(f), state.mesh.facet_tag(f), no_edit<Dim>(), places_of(state.mesh.facet(f), 0),
+                before);
+    for (const auto& facet : edit.inserted_facets)
+      add_facet(state, facet.vertices, facet.tag, edit, places_of(facet.vertices, 0), after);
   }
   double gain = before.energy() - after.energy();
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const Vec<Dim> force = after[i].gradient() - before[i].gradient();
-    const Eigen::LLT<Mat<Dim>> llt(after[i].hessian());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const bool is_set = edit.sets(ids[i]) || ids[i] >= state.mesh.node_slots();
+    const Vec<Dim> force = is_set ? after.gradient(i) : Vec<Dim>(after.gradient(i) - before.gradient(i));
+    const Eigen::LLT<Mat<Dim>> llt(after.hessian(i));
     if (llt.info() != Eigen::Success) return kUnknown;
-    gain += kShareOfRelaxation * 0.5 * force.dot(llt.solve(force));
+    gain += (is_set ? 1 : kShareOfRelaxation) * 0.5 * force.dot(llt.solve(force));
   }
   return gain;
 }
@@ -119,48 +142,25 @@ template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   const StepContext<Dim>& context = state.context;
   if (!is_predictable(context)) return kUnknown;
-  if (state.mesh.has_nodes()) {
-    const auto is_curved = [&](CellId c) { return state.mesh.is_curved(c); };
-    if (std::any_of(edit.removed_cells.begin(), edit.removed_cells.end(), is_curved))
-      return predict_gain_at_curves(state, edit);
-  }
-  if (!edit.value) return predict_gain_of_swap(state, edit);
+  const bool has_curves = std::ranges::any_of(edit.removed_cells, [&](CellId c) { return state.mesh.is_curved(c); });
+  if (has_curves || !edit.value) return predict_gain_of_each(state, edit, has_curves);
   const VertexId set = edit.value->vertex;
-  const auto at = [&](const VectorX& field, VertexId v, bool after) {
-    return after ? RemeshFields<Dim>::after(field, edit, v) : Vec<Dim>(field.segment<Dim>(Dim * v));
+  const auto places_of = [&](const auto& vertices) {
+    const auto at = std::find(vertices.begin(), vertices.end(), set);
+    return CellModel<Dim>::moving(at == vertices.end() ? kNone : static_cast<int>(at - vertices.begin()));
   };
-  const auto rest = [&](VertexId v) { return rest_after(state.mesh, edit, v); };
   const int part = state.mesh.part(edit.removed_cells[0]);
-  QuadraticModel<Dim> before(context, part), after(context, part);
-  for (const CellId c : edit.removed_cells)
-    before.add_cell(corners_of(state, state.mesh.cell(c)), state.mesh.body(c), kNone);
-  for (const auto& cell : edit.inserted_cells) {
-    typename QuadraticModel<Dim>::Corners corners;
-    int moving = kNone;
-    for (int k = 0; k <= Dim; ++k) {
-      const VertexId v = cell.vertices[k];
-      if (v == set) moving = k;
-      corners.rest[k] = rest(v);
-      corners.x[k] = at(state.fields.x, v, true);
-      if (context.has_inertia) corners.predictor[k] = at(state.fields.predictor, v, true);
-    }
-    after.add_cell(corners, cell.body, moving);
-  }
+  CellModel<Dim> before(context, part), after(context, part);
+  for (const CellId c : edit.removed_cells) before.add(place(state, c), state.mesh.body(c));
+  for (const auto& cell : edit.inserted_cells)
+    after.add(place(state, cell.vertices, edit), cell.body, places_of(cell.vertices));
   if (!context.loads.tractions.empty()) {
-    const auto add_facet = [&](const auto& facet, int tag, bool is_after, QuadraticModel<Dim>& model) {
-      std::array<Vec<Dim>, Dim> X, x;
-      int moving = kNone;
-      for (int k = 0; k < Dim; ++k) {
-        if (is_after && facet[k] == set) moving = k;
-        X[k] = is_after ? rest(facet[k]) : state.mesh.rest(facet[k]);
-        x[k] = at(state.fields.x, facet[k], is_after);
-      }
-      model.add_facet(X, x, tag, moving);
-    };
-    for (const FacetId f : edit.removed_facets) add_facet(state.mesh.facet(f), state.mesh.facet_tag(f), false, before);
-    for (const auto& facet : edit.inserted_facets) add_facet(facet.vertices, facet.tag, true, after);
+    for (const FacetId f : edit.removed_facets)
+      add_facet(state, state.mesh.facet(f), state.mesh.facet_tag(f), no_edit<Dim>(), CellModel<Dim>::still(), before);
+    for (const auto& facet : edit.inserted_facets)
+      add_facet(state, facet.vertices, facet.tag, edit, places_of(facet.vertices), after);
   }
-  double gain = before.energy() - after.relaxed();
+  double gain = before.energy() - (after.energy() - after.relaxation_of(0));
   if (context.has_inertia && state.history == HistoryRule::function && !edit.is_nested())
     gain -= least_forgotten<Dim>(state, edit);
   return gain;
@@ -175,18 +175,37 @@ double predict_split(const RemeshState<Dim>& state, const EdgeKey& edge) {
   if (!is_predictable(context) || context.mass == MassKind::lumped || !context.loads.tractions.empty() ||
       std::any_of(around.begin(), around.end(), varies))
     return predict_gain<Dim>(state, make_split<Dim>(mesh, edge));
-  QuadraticModel<Dim> model(context, mesh.part_of_vertex(edge[0]));
+  CellModel<Dim> model(context, mesh.part_of_vertex(edge[0]));
   for (const CellId c : around) {
     const auto& cell = mesh.cell(c);
     const auto b = static_cast<int>(std::find(cell.begin(), cell.end(), edge[1]) - cell.begin());
     if (b > Dim) continue;
     const auto a = static_cast<int>(std::find(cell.begin(), cell.end(), edge[0]) - cell.begin());
-    model.add_split_cell(mesh, c, corners_of(state, cell), a, b);
+    model.add_halves(place(state, c), mesh.body(c), mesh.inverse_rest_edges(c), mesh.volume(c), a, b);
   }
-  return -model.relaxed();
+  return -(model.energy() - model.relaxation_of(0));
 }
 
 namespace {
+
+/// The node in a cell of the edge between two of its vertices.
+template <int Dim>
+int place_of_node(const typename MeshTypes<Dim>::Cell& cell, const EdgeKey& edge) {
+  int node = kNone;
+  for_each_edge<Dim>([&](int k, int i, int j) {
+    if (edge_key(cell[i], cell[j]) == edge) node = Dim + 1 + k;
+  });
+  return node;
+}
+/// The vertices between which a node of a cell is.
+template <int Dim>
+std::array<int, 2> ends_of_node(int node) {
+  std::array<int, 2> ends{};
+  for_each_edge<Dim>([&](int k, int i, int j) {
+    if (Dim + 1 + k == node) ends = {i, j};
+  });
+  return ends;
+}
 
 /// Whether a JacobianBarrier acts in a cell around an edge: predictions of splits, curves and straightenings leave it out.
 template <int Dim>
@@ -231,23 +250,23 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const auto around = mesh.cells_of_edge(edge);
   const auto is_hard = [&](CellId c) { return context.materials.at(mesh.body(c)).has_varying_moduli(); };
   if (std::any_of(around.begin(), around.end(), is_hard)) return kCannotTell;
-  QuadraticModel<Dim> model(context, mesh.part_of_vertex(edge[0]));
+  CellModel<Dim> model(context, mesh.part_of_vertex(edge[0]));
   for (const CellId c : around) {
-    if (mesh.is_curved(c)) {
-      model.add_mixed_cell(state, c, edge);
-      continue;
-    }
-    const auto& cell = mesh.cell(c);
-    const auto place = [&](VertexId v) { return static_cast<int>(std::find(cell.begin(), cell.end(), v) - cell.begin()); };
-    model.add_curved_cell(mesh, c, corners_of(state, cell), place(edge[0]), place(edge[1]));
+    PlacedCell<Dim> cell = place(state, c);
+    const int node = place_of_node<Dim>(mesh.cell(c), edge);
+    const auto [i, j] = ends_of_node<Dim>(node);
+    cell.curved = static_cast<CurvedEdges>(cell.curved | 1 << (node - Dim - 1));
+    for (QuadraticCell<Dim>* values : {&cell.x, &cell.way}) values->col(node) = (values->col(i) + values->col(j)) / 2;
+    model.add(cell, mesh.body(c), CellModel<Dim>::moving(node));
   }
   const Vec<Dim> middle = (mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2;
   for (const FacetId f : mesh.facets_of_edge(edge)) {
     std::array<Vec<Dim>, Dim> rest;
     for (int k = 0; k < Dim; ++k) rest[k] = mesh.rest(mesh.facet(f)[k]);
-    model.add_curved_facet(rest, middle, mesh.facet_tag(f));
+    model.add_facet_of_node(rest, middle, mesh.facet_tag(f));
   }
-  return -model.relaxed(HeldRule<Dim>(context.held_components).tags_at(mesh, edge));
+  model.hold(0, HeldRule<Dim>(context.held_components).tags_at(mesh, edge));
+  return model.relaxation_of(0);
 }
 
 // Motion that the straight edge cannot carry counts as it does in the space before (rule b). There the straightened mesh has
@@ -259,55 +278,28 @@ double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge) {
   const Mesh<Dim>& mesh = state.mesh;
   if (!are_terms_constant(state, edge)) return kCannotTell;
   if (context.has_inertia && state.history != HistoryRule::function) return kCannotTell;
-  const VertexId node = mesh.node_of(edge[0], edge[1]);
-  const auto at = [&](VertexId v) { return state.fields.x.template segment<Dim>(Dim * v); };
-  const Vec<Dim> middle = (at(edge[0]) + at(edge[1])) / 2, move = middle - at(node);
-  double gain = 0;
+  const int part = mesh.part_of_vertex(edge[0]);
+  CellModel<Dim> before(context, part), after(context, part);
   for (const CellId c : mesh.cells_of_edge(edge)) {
-    const Material& material = context.materials.at(mesh.body(c));
-    const CurvedCell<Dim> cell = cell_before(mesh, c);
-    const auto n = std::find(cell.nodes.begin() + Dim + 1, cell.nodes.end(), node) - cell.nodes.begin();
-    const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
-    const ElasticModuli moduli = elastic_moduli<Dim>(material, mesh.rest(edge[0]));
-    const auto x = at_nodes<Dim>(cell.nodes, state.fields.x);
-    auto straight = x;
-    straight.col(n) = middle;
-    if (JacobianBarrier<Dim>(cell.edges, linear, straight).is_active()) return kCannotTell;
-    const int level = state.fields.levels.empty() ? 0 : state.fields.levels[c];
-    double density = 0;
-    for (const auto& point : cell_quadrature<Dim>(level, context.quadrature_degree)) {
-      const auto shapes = quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear);
-      density += point.share * (elastic_density<Dim>(x * shapes.transpose(), moduli) -
-                                elastic_density<Dim>(straight * shapes.transpose(), moduli));
-    }
-    gain += context.scaling * mesh.volume(c) * density;
-    const double mass = material.density * mesh.volume(c);
-    const auto& unit = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
-    if (context.has_inertia) {
-      const QuadraticCell<Dim> way = x - at_nodes<Dim>(cell.nodes, state.fields.predictor);
-      gain -= mass * ((way * unit.col(n)).dot(move) + 0.5 * unit(n, n) * move.squaredNorm());
-    }
-    if (!context.loads.acceleration) continue;
-    for (const auto& point : quadrature<Dim>(kMassDegree)) {
-      Vec<Dim> X = Vec<Dim>::Zero();
-      for (int k = 0; k <= Dim; ++k) X += point.weights[k] * mesh.rest(cell.nodes[k]);
-      const double share = point.share * quadratic_shapes<Dim>(cell.edges, point.weights)[n];
-      gain += context.scaling * mass * share * context.loads.acceleration(X).dot(move);
-    }
+    PlacedCell<Dim> cell = place(state, c);
+    if (!state.fields.levels.empty()) cell.level = state.fields.levels[c];
+    before.add(cell, mesh.body(c));
+    const int node = place_of_node<Dim>(mesh.cell(c), edge);
+    const auto [i, j] = ends_of_node<Dim>(node);
+    const Vec<Dim> move = (cell.x.col(i) + cell.x.col(j)) / 2 - cell.x.col(node);
+    cell.x.col(node) += move;
+    cell.way.col(node) += move;
+    after.add(cell, mesh.body(c));
   }
-  return gain;
+  return after.has_barrier() ? kCannotTell : before.energy() - after.energy();
 }
 
 template <int Dim>
 double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>::Cell& cell, int body,
                    const Edit<Dim>& edit) {
-  if (const auto curved = curved_cell_after(state.mesh, edit, cell); curved.edges) {
-    NodalModels<Dim> models(state, edit);
-    models.add_still_cell(curved, body);
-    return models.energy();
-  }
-  QuadraticModel<Dim> model(state.context, state.mesh.part_of_vertex(cell[0]));
-  model.add_cell(corners_of(state, cell), body, kNone);
+  const int part = edit.removed_cells.empty() ? state.mesh.part_of_vertex(cell[0]) : state.mesh.part(edit.removed_cells[0]);
+  CellModel<Dim> model(state.context, part);
+  model.add(place(state, cell, edit), body);
   return model.energy();
 }
 

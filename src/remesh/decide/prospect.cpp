@@ -6,11 +6,8 @@
 #include <limits>
 #include <optional>
 
-#include "energy/elastic/jacobian_barrier.hpp"
-#include "energy/elastic/point.hpp"
-#include "itr/fem/mass.hpp"
 #include "mesh/connected_parts.hpp"
-#include "remesh/curved_cell.hpp"
+#include "remesh/placed_cell.hpp"
 
 namespace itr {
 
@@ -21,7 +18,7 @@ template <int Dim>
 std::optional<Vec<Dim>> uniform_acceleration(const Mesh<Dim>& mesh, const Loads<Dim>& loads) {
   std::optional<Vec<Dim>> all;
   if (!loads.acceleration) return Vec<Dim>::Zero();
-  for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) {
     if (!mesh.is_vertex_alive(v)) continue;
     const Vec<Dim> own = loads.acceleration(mesh.point(v));
     if (all && *all != own) return std::nullopt;
@@ -37,28 +34,7 @@ std::vector<int> parts_of(const Mesh<Dim>& mesh) {
   cells.reserve(mesh.cell_slots());
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
     if (mesh.is_cell_alive(c)) cells.push_back(mesh.cell(c));
-  return connected_parts<Dim + 1>(mesh.vertex_slots(), cells);
-}
-
-/// Elastic energy and inertia of a cell with curved edges, by the rules of quadrature that the step has.
-template <int Dim>
-double energy_at_curves(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context, CellId c,
-                        const CurvedCell<Dim>& cell, const Vec<Dim>& fall) {
-  const Material& material = context.materials.at(mesh.body(c));
-  const auto linear = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c));
-  const auto moduli = elastic_moduli<Dim>(material, mesh.rest(cell.nodes[0]));
-  const auto x = at_nodes<Dim>(cell.nodes, fields.x);
-  const int level = fields.levels.empty() ? 0 : fields.levels[c];
-  double density = barrier_density<Dim>(JacobianBarrier<Dim>(cell.edges, linear, x), moduli);
-  for (const auto& point : cell_quadrature<Dim>(level, context.quadrature_degree))
-    density += point.share * elastic_density<Dim>(
-                                 x * quadratic_gradients<Dim, Dim>(cell.edges, point.weights, linear).transpose(), moduli);
-  double energy = context.scaling * mesh.volume(c) * density;
-  if (!context.has_inertia) return energy;
-  const QuadraticCell<Dim> way = (x - at_nodes<Dim>(cell.nodes, fields.predictor)).colwise() - fall;
-  const auto& mass = constant_quadratic_mass<Dim>(context.mass, cell.edges);
-  energy += 0.5 * material.density * mesh.volume(c) * (way * mass).cwiseProduct(way).sum();
-  return energy;
+  return connected_parts<Dim + 1>(mesh.node_slots(), cells);
 }
 
 /// Volume of a cell whose edges are so long: isosceles and right-angled in 2D, regular in 3D.
@@ -76,28 +52,18 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   const auto acceleration = uniform_acceleration(mesh, context.loads);
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;
+  PotentialTerms<Dim> terms = context;
+  terms.loads = {};  // they complete squares
   const std::vector<int> parts = parts_of(mesh);
-  std::vector<double> energy(mesh.vertex_slots(), context.coupling);
+  std::vector<double> energy(mesh.node_slots(), context.coupling);
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
-    if (const CurvedCell<Dim> cell = cell_before(mesh, c); cell.edges) {
-      energy[parts[cell.nodes[0]]] += energy_at_curves(mesh, fields, context, c, cell, fall);
-      continue;
-    }
-    const auto element = element_of(mesh, c);
-    const Material& material = context.materials.at(element.body);
-    const auto moduli = elastic_moduli<Dim>(material, mesh.rest(element.vertices[0]));
-    energy[parts[element.vertices[0]]] += context.scaling * elastic_energy<Dim>(element, fields.x, moduli);
-    if (!context.has_inertia) continue;
-    const ElementMass<Dim> mass(context.mass, material.density * element.volume);
-    Vec<Dim> total = Vec<Dim>::Zero();
-    double squares = 0;
-    for (const int v : element.vertices) {
-      const Vec<Dim> d = fields.x.template segment<Dim>(Dim * v) - fields.predictor.template segment<Dim>(Dim * v) - fall;
-      total += d;
-      squares += d.squaredNorm();
-    }
-    energy[parts[element.vertices[0]]] += mass.energy(total, squares);
+    PlacedCell<Dim> cell = place(mesh, fields, terms, cell_before(mesh, c), no_edit<Dim>());
+    if (!fields.levels.empty()) cell.level = fields.levels[c];
+    cell.way.colwise() -= fall;
+    CellModel<Dim> model(terms, mesh.part(c));
+    model.add(cell, mesh.body(c));
+    energy[parts[mesh.cell(c)[0]]] += model.energy();
   }
   return *std::max_element(energy.begin(), energy.end());
 }

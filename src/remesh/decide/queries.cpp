@@ -216,15 +216,10 @@ double RemeshQueries<Dim>::roughness(const Candidate& candidate) const {
     for (const CellId c : around) {
       const auto element = element_of(mesh_, c);
       const double w = weight(c);
-      const auto add = [&](const Mat<Dim>& gradient, double fraction) {
-        sum += fraction * gradient;
-        squares += fraction * gradient.squaredNorm();
-      };
-      if (const CurvedCell<Dim> cell = cell_before(mesh_, c); cell.edges)
-        for_each_gradient<Dim>(cell, element.inverse_edges, field,
-                               [&](const Mat<Dim>& gradient, double fraction) { add(gradient, fraction * w); });
-      else
-        add(deformation_gradient<Dim>(element, field), w);
+      for_each_gradient<Dim>(element, field, [&](const Mat<Dim>& gradient, double fraction) {
+        sum += fraction * w * gradient;
+        squares += fraction * w * gradient.squaredNorm();
+      });
       total += w;
     }
     return std::max(0.0, squares - sum.squaredNorm() / total);
@@ -259,8 +254,7 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const LocalRelaxationOptions& 
   // The vertex or nodes that a move or a swap sets do not tell what the vertices around gain.
   if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap)
     options.patch_over_vertex = is_refined && !trial.in_contact ? *patch_over_refinement(trial) : patch_over_vertex(trial);
-  const bool has_nodes = !edit.inserted_nodes.empty() || any_is_curved(edit.removed_cells);
-  if (has_nodes && !trial.in_contact) options.predicted = trial.gain;
+  if (has_curves(mesh_, edit) && !trial.in_contact) options.predicted = trial.gain;
   trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);

@@ -93,7 +93,7 @@ class RemeshQueries {
   double predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch,
                           Box<Dim>* surface_read = nullptr) const;
   bool any_is_curved(std::span<const CellId> cells) const {
-    return mesh_.has_nodes() && std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh_.is_curved(c); });
+    return std::any_of(cells.begin(), cells.end(), [&](CellId c) { return mesh_.is_curved(c); });
   }
   /// Energy of a cell, which need not be in the mesh, on the nodes of an edit at present positions. [J, times the scaling]
   double energy_of(const typename MeshTypes<Dim>::Cell& cell, int body, const Edit<Dim>& edit) const {

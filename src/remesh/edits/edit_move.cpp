@@ -151,7 +151,7 @@ Proposal<Dim> propose_move(const Mesh<Dim>& mesh, const Strata<Dim>& strata, Ver
     edit.removed_facets.push_back(f);
     edit.inserted_facets.push_back({mesh.facet(f), mesh.facet_tag(f), f});
   }
-  if (mesh.has_nodes()) move_nodes(mesh, vertex, edit);
+  move_nodes(mesh, vertex, edit);
   return {.edit = std::move(edit)};
 }
 

@@ -56,16 +56,11 @@ Vec<Dim> configurational_gradient(const RemeshQueries<Dim>& queries, VertexId ve
     const auto element = element_of(mesh, c);
     const Vec<Dim> gradient = barycentric_gradient<Dim>(element.inverse_edges, static_cast<int>(k));
     const ElasticModuli moduli = elastic_moduli<Dim>(queries.context().materials.at(element.body), mesh.barycenter(c));
-    const auto add = [&](const Mat<Dim>& F, double weight) {
-      sum += weight *
-             (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
-    };
     const double weight = queries.context().scaling * element.volume;
-    if (const CurvedCell<Dim> curved = cell_before(mesh, c); curved.edges)
-      for_each_gradient<Dim>(curved, element.inverse_edges, queries.fields().x,
-                             [&](const Mat<Dim>& F, double fraction) { add(F, fraction * weight); });
-    else
-      add(deformation_gradient<Dim>(element, queries.fields().x), weight);
+    for_each_gradient<Dim>(element, queries.fields().x, [&](const Mat<Dim>& F, double fraction) {
+      sum += fraction * weight *
+             (elastic_density<Dim>(F, moduli) * gradient - F.transpose() * (elastic_stress<Dim>(F, moduli) * gradient));
+    });
   }
   return sum;
 }
@@ -78,7 +73,7 @@ void run_moves(RemeshSession<Dim>& session, Operation<Dim>& move, double same) {
   move.local.rings = 1;
   move.list = [&] {
     std::vector<Candidate> found;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v)
+    for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.is_vertex_alive(v) && !mesh.is_boundary(v)) found.emplace_back(move.kind, v);
     return found;
   };

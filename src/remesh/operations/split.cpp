@@ -45,7 +45,7 @@ bool may_refine(const RemeshSession<Dim>& session, const EdgeKey& edge) {
 template <int Dim>
 void inherit(RemeshSession<Dim>& session, const Trial<Dim>& trial) {
   const Mesh<Dim>& mesh = session.queries().mesh();
-  const VertexId created = mesh.vertex_slots() - 1 - static_cast<int>(trial.edit->inserted_nodes.size());
+  const VertexId created = mesh.node_slots() - 1 - static_cast<int>(trial.edit->inserted_nodes.size());
   const int generation = session.memory().depth(trial.edge()) + 1;
   for (const EdgeKey& near : edges_of<Dim>(mesh, mesh.cells_of(created))) {
     if (near[0] != created && near[1] != created) continue;

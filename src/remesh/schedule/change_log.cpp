@@ -23,16 +23,14 @@ void ChangeLog<Dim>::write_surface(VertexId v) {
   const auto include = [&](VertexId w) { surfaces_.back().include(x_.template segment<Dim>(Dim * w)); };
   for_each_facet_at(mesh_, v, [&](FacetId f) {
     for (const VertexId w : mesh_.facet(f)) include(w);
-    if (mesh_.has_nodes())
-      for_each_node_on<Dim>(
-          mesh_.facet(f), [&](VertexId a, VertexId b) { return mesh_.node_of(a, b); }, include);
+    for_each_node_on<Dim>(mesh_.facet(f), nodes_of_edges(mesh_), include);
   });
 }
 
 template <int Dim>
 Change<Dim> ChangeLog<Dim>::commit(const Edit<Dim>& edit, std::span<const Position> positions) {
   surfaces_.emplace_back();
-  const VertexId first_slot = mesh_.vertex_slots();
+  const VertexId first_slot = mesh_.node_slots();
   for (const CellId c : edit.removed_cells)
     for (const VertexId v : mesh_.cell(c)) write(v);
   if (logs_surface_) {
@@ -44,14 +42,14 @@ Change<Dim> ChangeLog<Dim>::commit(const Edit<Dim>& edit, std::span<const Positi
   const CellId first_cell = mesh_.cell_slots();
   const FacetId first_facet = mesh_.facet_slots();
   Change<Dim> change{.edit = edit, .created = mesh_.apply(edit), .first_facet = first_facet, .first_node = kNone};
-  change.first_node = mesh_.vertex_slots() - static_cast<int>(edit.inserted_nodes.size());
+  change.first_node = mesh_.node_slots() - static_cast<int>(edit.inserted_nodes.size());
   change.cells.resize(mesh_.cell_slots() - first_cell);
   std::iota(change.cells.begin(), change.cells.end(), first_cell);
   const auto slot_of = [&](VertexId v) {
     return v < first_slot ? v : v == kNewVertex ? change.created : change.first_node + (kNewVertex - 1 - v);
   };
   for (const auto& [v, x] : positions) change.positions.push_back({slot_of(v), x});
-  touched_.resize(mesh_.vertex_slots());
+  touched_.resize(mesh_.node_slots());
   for (const auto& follow : followers_) follow(change);
 
   for (const auto& [v, x] : change.positions) {

@@ -31,7 +31,7 @@ class ChangeLog {
   using Position = typename LocalProblem<Dim>::Position;
   /// `x`: positions [m]. The surface is logged where something can touch it.
   ChangeLog(Mesh<Dim>& mesh, const VectorX& x, bool logs_surface)
-      : mesh_(mesh), x_(x), logs_surface_(logs_surface), touched_(mesh.vertex_slots()) {}
+      : mesh_(mesh), x_(x), logs_surface_(logs_surface), touched_(mesh.node_slots()) {}
   /// Followers are called in the order in which they were added.
   void add_follower(std::function<void(const Change<Dim>&)> follower) { followers_.push_back(std::move(follower)); }
   /// Applies an edit with the positions to which it relaxed.

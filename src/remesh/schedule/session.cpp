@@ -24,7 +24,7 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   if (strata.empty()) strata = Strata<Dim>(mesh);
   ITR_AUDIT(strata.find_defect(mesh).empty(), strata.find_defect(mesh));
   log_.add_follower([&](const Change<Dim>& change) {
-    fields.make_room(mesh.vertex_slots());
+    fields.make_room(mesh.node_slots());
     fields.follow(change.edit, change.created, change.first_node);
     for (const auto& [v, x] : change.positions) fields.x.template segment<Dim>(Dim * v) = x;
   });
@@ -37,11 +37,8 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
   log_.add_follower([&](const Change<Dim>& change) { memory_.follow(mesh, change); });
   log_.add_follower([&](const Change<Dim>&) {
     ITR_AUDIT(mesh.find_defect().empty(), mesh.find_defect());
-    [[maybe_unused]] const auto inverted = [&](const VectorX& x) {
-      return find_inverted(mesh, x, [&](VertexId a, VertexId b) { return mesh.node_of(a, b); });
-    };
-    ITR_AUDIT(inverted(fields.x) == kNone, inverted(fields.x));
-    for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(inverted(past) == kNone);
+    ITR_AUDIT(find_inverted(mesh, fields.x) == kNone, find_inverted(mesh, fields.x));
+    for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(find_inverted(mesh, past) == kNone);
   });
 }
 
@@ -58,7 +55,7 @@ bool RemeshSession<Dim>::commit_unjudged(const Edit<Dim>& edit, OperationCount& 
 
 template <int Dim>
 RemeshReport RemeshSession<Dim>::finish() {
-  fields_.trim(queries_.mesh().vertex_slots());
+  fields_.trim(queries_.mesh().node_slots());
   stored_.refusals = memory_.remembered(queries_);
   if (trial_seconds_.empty()) return report_;
   const auto middle = trial_seconds_.begin() + static_cast<std::ptrdiff_t>(trial_seconds_.size() / 2);

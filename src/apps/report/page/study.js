@@ -247,7 +247,7 @@ async function openStudy() {
       await Promise.all(report.views.map(view => view.set({field, log, edges, axis, cut, flip})));
     });
     const finished = study.runs.filter(r => names.includes(r.run)),
-          best = finished.filter(r => r.errors).sort((a, b) => a.errors.l2 - b.errors.l2)[0];
+          best = finished.filter(r => r.errors && r.against === 'reference').sort((a, b) => a.errors.l2 - b.errors.l2)[0];
     const left = best?.run ?? names[0], others = names.filter(name => name !== left);
     report.shown = [left, others.includes('reference') ? 'reference' : others.pop() ?? left];
     await report.show(0, report.shown[0]);

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+#include "vtk_cells.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "itr/core/error.hpp"
+#include "readers.hpp"
+
+namespace itr {
+
+namespace {
+
+struct CellType {
+  int type, dim;
+  bool is_second_order;
+};
+constexpr CellType kTypes[] = {{1, 0, false}, {2, 0, false},  {3, 1, false}, {4, 1, false}, {5, 2, false},
+                               {7, 2, false}, {10, 3, false}, {21, 1, true}, {22, 2, true}, {24, 3, true}};
+constexpr const char* kNumbered[] = {"body", "gmsh:physical", "medit:ref", "MaterialIDs", "CellEntityIds"};
+constexpr std::string_view kSet = "set:";
+
+const char* name_of(int type) {
+  constexpr std::pair<int, const char*> kNames[] = {
+      {6, "triangle strip"}, {8, "pixel"},       {9, "quadrilateral"}, {11, "voxel"},
+      {12, "hexahedron"},    {13, "prism"},      {14, "pyramid"},      {23, "quadrilateral"},
+      {25, "hexahedron"},    {26, "prism"},      {27, "pyramid"},      {28, "quadrilateral"},
+      {29, "hexahedron"},    {42, "polyhedron"}, {69, "triangle"},     {71, "tetrahedron"}};
+  for (const auto& [known, name] : kNames)
+    if (known == type) return name;
+  return "unknown";
+}
+
+bool is_numbered(const std::string& name) {
+  return std::find(std::begin(kNumbered), std::end(kNumbered), name) != std::end(kNumbered);
+}
+
+}  // namespace
+
+void VtkCells::begin_piece(const std::vector<double>& coordinates) {
+  first_ += static_cast<std::int64_t>(num_points_);
+  num_points_ = coordinates.size() / 3;
+  cells_.clear();
+  for (std::size_t p = 0; p < num_points_; ++p)
+    mesh_.add_node(first_ + static_cast<std::int64_t>(p) + 1,
+                   Vec<3>(coordinates[3 * p], coordinates[3 * p + 1], coordinates[3 * p + 2]));
+}
+
+void VtkCells::add(int type, const std::vector<std::int64_t>& points) {
+  const std::int64_t number = all_cells_++;
+  const auto fail = [&](const std::string& found, const std::string& expected) {
+    throw InputError({file_.string(), "cell " + std::to_string(number), found, expected});
+  };
+  const auto known = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const CellType& t) { return t.type == type; });
+  if (known == std::end(kTypes))
+    fail("VTK's type " + std::to_string(type) + ", " + name_of(type),
+         "vertices, lines, triangles and tetrahedra, linear or quadratic; " + split_advice(file_));
+  std::vector<std::int64_t> nodes;
+  for (const std::int64_t point : points) {
+    if (point < 0 || point >= static_cast<std::int64_t>(num_points_))
+      fail("point " + std::to_string(point), "0 to " + std::to_string(num_points_) + " - 1");
+    nodes.push_back(first_ + point + 1);
+  }
+  auto& elements = cells_.emplace_back();
+  if (known->dim == 0) {
+    for (const std::int64_t node : nodes) elements.push_back({0, node});
+  } else if (type == 4) {
+    for (std::size_t i = 0; i + 1 < nodes.size(); ++i)
+      elements.push_back({1, mesh_.add_element(1, std::span(nodes).subspan(i, 2), number)});
+  } else {
+    const std::size_t expected = MeshBuilder::num_nodes_of(known->dim, known->is_second_order);
+    if (nodes.size() != expected)
+      fail(std::to_string(nodes.size()) + " points", std::to_string(expected) + (type == 7 ? ": triangles only" : ""));
+    elements.push_back({known->dim, mesh_.add_element(known->dim, nodes, number)});
+  }
+}
+
+void VtkCells::add_cell_data(const std::string& name, const std::vector<double>& values) {
+  if (values.size() != cells_.size() || !(is_numbered(name) || name.starts_with(kSet))) return;
+  const bool is_set = name.starts_with(kSet);
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    const bool is_integer = values[c] == std::floor(values[c]) && std::abs(values[c]) < 2147483647;
+    if (!is_integer || values[c] == 0 || (!is_set && values[c] < 0)) continue;
+    for (const auto& [dim, element] : cells_[c])
+      mesh_.add_member(
+          is_set ? mesh_.group(dim, 0, name.substr(kSet.size())) : mesh_.group(dim, static_cast<int>(values[c]), ""),
+          element);
+  }
+}
+
+void VtkCells::add_point_data(const std::string& name, const std::vector<double>& values) {
+  if (values.size() != num_points_ || !name.starts_with(kSet)) return;
+  const int group = mesh_.group(0, 0, name.substr(kSet.size()));
+  for (std::size_t p = 0; p < values.size(); ++p)
+    if (values[p] != 0) mesh_.add_member(group, first_ + static_cast<std::int64_t>(p) + 1);
+}
+
+}  // namespace itr

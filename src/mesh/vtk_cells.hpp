@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Cells and arrays of VTK's files, text or XML, as elements and groups.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mesh_builder.hpp"
+
+namespace itr {
+
+class VtkCells {
+ public:
+  explicit VtkCells(const std::filesystem::path& file) : mesh_(file), file_(file) {}
+
+  /// Three coordinates a point. Points of cells are counted from the first of these.
+  void begin_piece(const std::vector<double>& coordinates);
+  /// Adds a cell of VTK's type `type`. Throws InputError for types that are not read.
+  void add(int type, const std::vector<std::int64_t>& points);
+  std::size_t num_cells() const { return cells_.size(); }  ///< of this piece
+  std::size_t num_points() const { return num_points_; }   ///< of this piece
+
+  /// Numbers of cells become groups where the array is one that says so (`body`, `gmsh:physical`, ...), and those other than
+  /// 0 a named set where it is called "set:NAME".
+  void add_cell_data(const std::string& name, const std::vector<double>& values);
+  /// Points other than 0 in an array called "set:NAME" become that set.
+  void add_point_data(const std::string& name, const std::vector<double>& values);
+
+  MeshFile finish() { return mesh_.finish(); }
+
+ private:
+  MeshBuilder mesh_;
+  const std::filesystem::path& file_;
+  std::size_t num_points_ = 0;
+  std::int64_t first_ = 0, all_cells_ = 0;
+  std::vector<std::vector<std::pair<int, std::int64_t>>> cells_;  ///< of this piece: elements that each became
+};
+
+}  // namespace itr

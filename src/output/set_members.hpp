@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Members of the named sets of a setup on the mesh of a frame.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "itr/simulation/frame.hpp"
+#include "itr/simulation/setup.hpp"
+
+namespace itr::output {
+
+/// One set; other lists than its own are empty.
+struct SetMembers {
+  std::string name;
+  std::vector<std::int64_t> cells;
+  std::vector<std::int64_t> facets;    ///< rows of the boundary
+  std::vector<std::int64_t> vertices;  ///< that are in it by themselves
+};
+
+template <int Dim>
+std::vector<SetMembers> set_members(const FrameView<Dim>& frame) {
+  std::vector<SetMembers> sets;
+  if (!frame.names) return sets;
+  const Mesh<Dim>& mesh = frame.mesh;
+  const auto list = [](int count, const std::vector<int>& ids, const auto& id_of) {
+    std::vector<std::int64_t> members;
+    for (int i = 0; i < count; ++i)
+      if (std::find(ids.begin(), ids.end(), id_of(i)) != ids.end()) members.push_back(i);
+    return members;
+  };
+  for (const auto& [name, ids] : frame.names->bodies)
+    sets.push_back({name, list(mesh.cell_slots(), ids, [&](CellId c) { return mesh.body(c); }), {}, {}});
+  for (const auto& [name, tags] : frame.names->surfaces)
+    sets.push_back({name,
+                    {},
+                    list(mesh.facet_slots(), tags, [&](FacetId f) { return mesh.facet_tag(f); }),
+                    list(mesh.num_vertices(), tags, [&](VertexId v) { return mesh.vertex_tag(v); })});
+  return sets;
+}
+
+/// The name without characters that end or quote names in files.
+inline std::string plain_name(std::string name) {
+  for (char& c : name)
+    if (std::string_view("/<>&\"'").find(c) != std::string_view::npos || static_cast<unsigned char>(c) < ' ') c = '_';
+  return name == "." || name == ".." ? "_" : name;
+}
+
+}  // namespace itr::output

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// Cells as an edit would make them, or as they are, for a CellModel.
+#pragma once
+
+#include "energy/cell_model.hpp"
+#include "remesh/curved_cell.hpp"
+#include "remesh/edits.hpp"
+
+namespace itr {
+
+/// Leaves everything as it is.
+template <int Dim>
+const Edit<Dim>& no_edit() {
+  static const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
+  return none;
+}
+
+/// A cell after an edit at present positions. Without inertia `way` is 0.
+template <int Dim>
+PlacedCell<Dim> place(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const PotentialTerms<Dim>& terms,
+                      const CurvedCell<Dim>& cell, const Edit<Dim>& edit) {
+  PlacedCell<Dim> placed;
+  placed.curved = cell.edges;
+  if (!terms.has_inertia) placed.way.setZero();
+  for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
+    if (!has_node<Dim>(cell.edges, k)) continue;
+    const VertexId v = cell.nodes[k];
+    if (k <= Dim) placed.rest[k] = rest_after(mesh, edit, v);
+    placed.x.col(k) = RemeshFields<Dim>::after(fields.x, edit, v);
+    if (terms.has_inertia) placed.way.col(k) = placed.x.col(k) - RemeshFields<Dim>::after(fields.predictor, edit, v);
+  }
+  return placed;
+}
+
+}  // namespace itr
