@@ -328,12 +328,12 @@ TEST(Locator, FindsPointsAndVertices) {
   const Locator<3> locator(mesh);
   for (int v = 0; v < mesh.node_slots(); ++v) {
     const auto place = locator.find(mesh.rest(v));
-    for (int k = 0; k <= 3; ++k) EXPECT_EQ(place.weights[k], place.vertices[k] == v ? 1 : 0);
+    for (int k = 0; k <= 3; ++k) EXPECT_EQ(place.weights[k], place.nodes[k] == v ? 1 : 0);
   }
   const Vec<3> X(0.07, 0.11, 0.03);
   const auto place = locator.find(X);
   Vec<3> there = Vec<3>::Zero();
-  for (int k = 0; k <= 3; ++k) there += place.weights[k] * mesh.rest(place.vertices[k]);
+  for (int k = 0; k <= 3; ++k) there += place.weights[k] * mesh.rest(place.nodes[k]);
   EXPECT_LT((there - X).norm(), 1e-15);
   EXPECT_EQ(locator.find(X, 7).cell, kNone);  // no such body
   VectorX values(8);

@@ -61,7 +61,7 @@ PUBLIC = {
 WALLS = {
     r"nlohmann/": {"scene", "output", "apps", "embed"},
     r"CGAL/": {"geometry"},
-    r"boost/": {"remesh"},
+    r"boost/": {"energy", "remesh"},
     r"(oneapi/)?tbb/": {"core"},
     r"hdf5\.h|H5": {"core"},
     r"zlib\.h": {"apps", "mesh"},

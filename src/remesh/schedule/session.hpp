@@ -12,10 +12,7 @@
 #include "itr/core/parallel.hpp"
 #include "itr/mesh/strata.hpp"
 #include "itr/remesh/remesher.hpp"
-<<<<<<< ours
 #include "itr/remesh/report.hpp"
-=======
->>>>>>> theirs
 #include "remesh/decide/queries.hpp"
 #include "remesh/paper/baseline.hpp"
 #include "session_memory.hpp"
