@@ -22,13 +22,21 @@ PlacedCell<Dim> place(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, co
   PlacedCell<Dim> placed;
   placed.curved = cell.edges;
   if (!terms.has_inertia) placed.way.setZero();
-  for (int k = 0; k < kQuadraticNodes<Dim>; ++k) {
-    if (!has_node<Dim>(cell.edges, k)) continue;
-    const VertexId v = cell.nodes[k];
-    if (k <= Dim) placed.rest[k] = rest_after(mesh, edit, v);
-    placed.x.col(k) = RemeshFields<Dim>::after(fields.x, edit, v);
-    if (terms.has_inertia) placed.way.col(k) = placed.x.col(k) - RemeshFields<Dim>::after(fields.predictor, edit, v);
-  }
+  const auto fill = [&](const auto& value_of, const auto& rest_of) {
+    for (int k = 0; k < (cell.edges ? kQuadraticNodes<Dim> : Dim + 1); ++k) {
+      if (!has_node<Dim>(cell.edges, k)) continue;
+      const VertexId v = cell.nodes[k];
+      if (k <= Dim) placed.rest[k] = rest_of(v);
+      placed.x.col(k) = value_of(fields.x, v);
+      if (terms.has_inertia) placed.way.col(k) = placed.x.col(k) - value_of(fields.predictor, v);
+    }
+  };
+  if (&edit == &no_edit<Dim>())
+    fill([](const VectorX& field, VertexId v) -> Vec<Dim> { return field.segment<Dim>(Dim * v); },
+         [&](VertexId v) -> const Vec<Dim>& { return mesh.rest(v); });
+  else
+    fill([&](const VectorX& field, VertexId v) { return RemeshFields<Dim>::after(field, edit, v); },
+         [&](VertexId v) { return rest_after(mesh, edit, v); });
   return placed;
 }
 
