@@ -281,7 +281,7 @@ itr::Setup<Dim> opened_cracks(Mesh<Dim> mesh, const std::function<double(double)
   itr::Setup<Dim> setup;
   setup.mesh = std::move(mesh);
   for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f) setup.mesh.set_facet_tag(f, kNoTag);
-  VectorX inward = VectorX::Zero(Dim * setup.mesh.vertex_slots());
+  VectorX inward = VectorX::Zero(Dim * setup.mesh.num_vertices());
   for (const FacetId f : crack_facets(setup.mesh)) {
     setup.mesh.set_facet_tag(f, 1);
     std::array<Vec<Dim>, Dim> p;
@@ -382,7 +382,7 @@ void check_far_openings(bool remeshed) {
       if (saved) after.push_back(simulation.state().history.x[0]);
     }
     const Mesh<Dim>& mesh = simulation.state().mesh;
-    for (VertexId v = 0; v < mesh.vertex_slots(); ++v) opened += mesh.steps_apart(v) > 0 && mesh.steps_apart(v) != kApart;
+    for (VertexId v = 0; v < mesh.num_vertices(); ++v) opened += mesh.steps_apart(v) > 0 && mesh.steps_apart(v) != kApart;
     if (!saved) continue;
     Simulation<Dim> resumed(setup, registry);
     resumed.restore(*saved);

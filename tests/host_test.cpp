@@ -338,7 +338,7 @@ TEST(Locator, FindsPointsAndVertices) {
   EXPECT_EQ(locator.find(X, 7).cell, kNone);  // no such body
   VectorX values(8);
   for (int v = 0; v < 8; ++v) values[v] = mesh.rest(v)[1];
-  EXPECT_NEAR(nodal_function<3>(std::make_shared<Locator<3>>(mesh), values)(X)[0], 0.11, 1e-15);
+  EXPECT_NEAR(nodal_function<3>(std::make_shared<Locator<3>>(mesh), values, 1)(X)[0], 0.11, 1e-15);
 }
 
 }  // namespace

@@ -329,7 +329,7 @@ TYPED_TEST(CurvedContact, ProjectionsSeeTheChordsOfTheWholeSurface) {
       moving[i] = !patch.at_rim[i];
       vertex_of<Dim>(goal, static_cast<int>(i)) = vertex_of<Dim>(x, ids[i]);
     }
-    const auto found = patch_surface<Dim>(mesh, obstacles, patch, moving, x, goal, 100);
+    const auto found = patch_surface<Dim>(mesh, obstacles, patch, moving, x, goal, 100, 0);
     if (found.empty()) continue;
     const CollisionSurface whole = collision_surface(mesh, obstacles);
     const auto id = [&](int v) {

@@ -87,6 +87,7 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
     auto element = element_of(mesh, ids[i]);
     element.vertices = patch.new_cells.cells[i];
     element.part = kNone;
+    element.edge_nodes.fill(element.vertices[0]);
     if (element.curved) {
       const auto& nodes = patch.new_cells.nodes[i];
       std::copy(nodes.begin() + Dim + 1, nodes.end(), element.edge_nodes.begin());

@@ -25,6 +25,7 @@ itr::Setup<2> falling_square() {
 
 /// Its argument is the linear solver, if there is one.
 int main(int argc, char** argv) {
+  static_assert(alignof(itr::Mat<2>) == 32, "else the library reads what we allocate with other alignment");
   itr::linear::Registry registry;
   itr::Setup<2> setup = falling_square();
   if (argc > 1) setup.linear.solvers = {argv[1]};

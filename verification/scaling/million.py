@@ -68,7 +68,7 @@ def scene(work):
         "initial_conditions": {"velocity": [{"id": 1, "value": [0, 0, -SPEED]}]},
         "time": {"dt": STEP, "time_steps": 20},
         "contact": {"enabled": True, "dhat": 1e-3, "use_convergent_formulation": True},
-        "solver": {"nonlinear": {"solver": "Newton", "x_delta": 1e-4, "grad_norm": 1e-8, "line_search": {"method": "RobustArmijo"}},
+        "solver": {"nonlinear": {"solver": "Newton", "x_delta": 1e-4, "grad_norm": 1e-8},
                    "contact": {"barrier_stiffness": 1e6}},
         "output": {"checkpoint_period": 300},
     }

@@ -57,7 +57,7 @@ double coincidence(const Vec<Dim>& least, const Vec<Dim>& most) {
   return 1e-12 * std::max((most - least).norm(), 1e-3 * farthest);
 }
 
-/// Those of a problem whose vertices are at `rest` [m]. `is_closed(i)`: of the i-th of them.
+/// Finds the closed faces of a problem whose vertices are at `rest` [m]. `is_closed(i)`: whether the i-th of them is.
 template <int Dim, typename IsClosed>
 ClosedFaces closed_faces(const std::vector<Vec<Dim>>& rest, double dhat, double coincident, const IsClosed& is_closed) {
   ClosedFaces faces;

@@ -221,12 +221,12 @@ void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
 template <int Dim>
 template <typename Simplex>
 void LocalProblem<Dim>::localize(Simplex& simplex) {
-  if (has_curves(mesh_, edit_))
+  if (has_curves(mesh_, edit_)) {
     simplex.curved = find_edge_nodes<static_cast<int>(std::tuple_size_v<decltype(simplex.vertices)>) - 1>(
         simplex.vertices, [&](VertexId a, VertexId b) { return node_of(a, b); }, simplex.edge_nodes);
-  for (VertexId& v : simplex.vertices) v = local(v);
-  if (simplex.curved)
     for (VertexId& node : simplex.edge_nodes) node = local(node);
+  }
+  for (VertexId& v : simplex.vertices) v = local(v);
 }
 
 template <int Dim>
