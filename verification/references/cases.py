@@ -117,18 +117,7 @@ class Change:
     positions: float | None = 0.0
 
 
-PLANNED = [
-    Change("Predictions at curved edges are sums of one CellModel: last bits of gains, which refusals remember and reports tell",
-           ("*-curves*",), ("states", "reports")),
-    Change("one pipeline asks all operations in one order: predictions are stored exactly, no longer as rounded priorities; each "
-           "refusal is counted; states have the tolerance of facet removals", ("*",), ("states", "reports")),
-    Change("candidates that lengths, depths or dhat refuse take no places in batches, and the memory is asked whenever a "
-           "prediction is made anew, so that other candidates are evaluated together",
-           ("first", "masticator", "press-damped", "drop", "twist*"), ("frames", "forces"), 1e-3, 0.1, None),
-    Change("edges are straightened first, then collapses are shortest first also where edges are curved; chords replace no "
-           "curves in batches", ("*-curves*",), ("frames", "forces"), 1e-3, 1.0, None),
-    Change("the scene in a saved state names its set of defaults", ("*",), ("states",)),
-]
+PLANNED: list[Change] = []
 
 
 def planned(name):
