@@ -426,6 +426,25 @@ TEST(BodiesThatTouch, PartWhereTheyArePulledApart) {
   EXPECT_EQ(violation_of(simulation), "");
 }
 
+TEST(BodiesThatTouch, AreInContactOnceTheyHaveParted) {
+  linear::Registry registry;
+  itr::Setup<2> setup = two_squares(0, 0);
+  setup.body_acceleration = [](const RestPoint<2>&, double t) { return Vec<2>(0, t < 0.2 ? 2 : -4); };
+  setup.time.steps = 40;
+  Simulation<2> simulation(setup, registry);
+  double most = 0, lowest = 1;
+  for (int step = 0; step < 40; ++step) {
+    const StepResult result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    ASSERT_EQ(violation_of(simulation), "");
+    most = std::max(most, result.report.energy.contact);
+    lowest = std::min(lowest, simulation.state().history.x[0][2 * 4 + 1]);
+  }
+  EXPECT_GT(most, 0);
+  EXPECT_GT(lowest, 0.9);  // the square comes down on the body, and stays on it
+  EXPECT_LT(simulation.state().history.x[0][2 * 4 + 1], 1.01);
+}
+
 TEST(BodiesThatTouch, NeedAGapWhereTheyArePressedTogether) {
   linear::Registry registry;
   std::vector<std::string> warnings;
