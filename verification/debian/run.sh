@@ -12,12 +12,12 @@ source=$(git -C "$here" rev-parse --show-toplevel)
 [ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase "$suite" "$root" http://deb.debian.org/debian
 mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
 trap 'umount "$root/proc"' EXIT
-rm -rf "$root/root/itr"
-git clone -q "$source" "$root/root/itr"
+rm -rf "$root/srv/itr"
+git clone -q "$source" "$root/srv/itr"
 
-inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root "$@"; }
-log=$root/root/quickstart.log status=0 begin=$SECONDS
-inside bash /root/itr/examples/quickstart.sh >"$log" 2>&1 || status=$?
+inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin "$@"; }
+log=$root/srv/quickstart.log status=0 begin=$SECONDS
+inside bash /srv/itr/examples/quickstart.sh >"$log" 2>&1 || status=$?
 {
   echo "commit $(git -C "$source" rev-parse --short HEAD), $(date -u +%F), Debian $(cat "$root/etc/debian_version")"
   inside dpkg-query -W -f '${Package} ${Version}\n' g++ cmake libcgal-dev libeigen3-dev libfmt-dev libhdf5-dev libtbb-dev python3 || true

@@ -15,23 +15,23 @@ suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
 wheels=$(mktemp -d)
 trap 'rm -rf "$wheels"' EXIT
 /usr/bin/python3 -m pip wheel "$source" --no-deps --no-build-isolation --config-settings portable=yes -w "$wheels" -q
-rm -rf "$root/root/itr"
-/usr/bin/python3 -m pip install -q --no-deps --target "$root/root/itr/site" "$wheels"/*.whl
-cp -r "$source/examples" "$root/root/itr/examples"
-sed -n '/^```python$/,/^```$/p' "$source/README.md" | sed '/^```/d' >"$root/root/itr/program.py"
+rm -rf "$root/srv/itr"
+/usr/bin/python3 -m pip install -q --no-deps --target "$root/srv/itr/site" "$wheels"/*.whl
+cp -r "$source/examples" "$root/srv/itr/examples"
+sed -n '/^```python$/,/^```$/p' "$source/README.md" | sed '/^```/d' >"$root/srv/itr/program.py"
 
 status=0
 mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
 trap 'rm -rf "$wheels"; umount "$root/proc"' EXIT
 run() {  # KERNEL COMMAND...
   echo "$1:"
-  chroot "$root" env -i PATH=/usr/bin:/bin PYTHONPATH=/root/itr/site sh -c 'cd /root/itr && exec "$@"' run "${@:2}" 2>&1 | tail -n 2
+  chroot "$root" env -i PATH=/usr/bin:/bin PYTHONPATH=/srv/itr/site sh -c 'cd /srv/itr && exec "$@"' run "${@:2}" 2>&1 | tail -n 2
 }
 {
   echo "commit $(git -C "$source" rev-parse --short HEAD), $(date -u +%F), Debian $(cat "$root/etc/debian_version")"
   echo "$(basename "$wheels"/*.whl): $(($(stat -c %s "$wheels"/*.whl) / 1024)) KiB"
   run "the processor's kernel" python3 -c 'import itr; print(itr._itr.__name__); exec(open("program.py").read())' || status=$?
-  rm -r "$root/root/itr/site/itr/x86_64_v3"
+  rm -r "$root/srv/itr/site/itr/x86_64_v3"
   run "plain x86-64" python3 -c 'import itr; print(itr._itr.__name__); exec(open("program.py").read())' || status=$?
 } | tee "$here/wheel.log"
 exit "$status"
