@@ -66,6 +66,7 @@ MeshFile read_mesh_file(const fs::path& file) {
          "converted by `meshio convert`: docs/user-guide.md, \"Mesh files\")"});
   MeshFile mesh = reader->second(read_bytes(file), file);
   check(mesh, file);
+  mesh.triangle_body.resize(mesh.triangles.size());
   return mesh;
 }
 
