@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What readers of mesh files share: numbers, lines, and a position in bytes.
+// Reads numbers and lines of mesh files, and bytes from a position on.
 #pragma once
 
 #include <algorithm>
