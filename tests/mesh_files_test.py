@@ -211,6 +211,25 @@ class MeshFiles(unittest.TestCase):
                 self.assertEqual(sorted(stored["sets/cells"]), ["A", "B"])
                 self.assertEqual([len(stored["sets/facets"][name]) for name in ("left", "right")], [2, 2])
 
+    def test_names_of_any_character(self):
+        names = ["Load Face", "a/b", "a_b", "a%2Fb", ".", "<&'>"]
+        sets = "".join(f"*NSET, NSET={name}\n{i // 3 + 1}, {i % 3 + 2}\n" for i, name in enumerate(names))
+        deck = "*NODE\n1, 0, 0\n2, 1, 0\n3, 1, 1\n4, 0, 1\n*ELEMENT, TYPE=CPS3\n1, 1, 2, 3\n2, 1, 3, 4\n"
+        (self.folder / "a.inp").write_text(deck + sets)
+        scene = {
+            "geometry": [{"mesh": "a.inp"}],
+            "materials": MATERIAL,
+            "boundary_conditions": {"dirichlet_boundary": [{"id": name, "value": [0, 0]} for name in names]},
+            "time": {"dt": 0.1, "time_steps": 1},
+            "output": {"paraview": {"vtu": True}},
+        }
+        done, frame = run(self.folder, scene)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with h5py.File(frame) as stored:
+            self.assertEqual({*stored["sets/facets"], *stored["sets/vertices"]}, {"Load Face", "a%2Fb", "a_b", "a%252Fb", "%2E", "%3C%26%27%3E"})
+        certified = subprocess.run([ITR, "certify", self.folder / "out"], capture_output=True, text=True)
+        self.assertEqual(certified.returncode, 0, certified.stderr)
+
     def test_vtu_there_and_back(self):
         hexahedra(self.folder / "a.inp", 1)
         text = (self.folder / "a.inp").read_text().replace("C3D8", "C3D4")

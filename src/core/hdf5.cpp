@@ -124,8 +124,9 @@ void File::read_digests() {
   if (!contains(kDigests)) return;
   const std::string text = read_text(kDigests);
   for (std::size_t line = 0; line < text.size();) {
-    const std::size_t end = std::min(text.find('\n', line), text.size()), space = text.find(' ', line);
-    if (space >= end) refuse(kDigests, "a line without a digest", "those that were written: the file is damaged");
+    const std::size_t end = std::min(text.find('\n', line), text.size()), space = text.rfind(' ', end);
+    if (space == text.npos || space < line)
+      refuse(kDigests, "a line without a digest", "those that were written: the file is damaged");
     const char* const last = text.data() + end;
     std::uint64_t value = 0;
     if (const auto [stop, error] = std::from_chars(text.data() + space + 1, last, value, 16);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads numbers and lines of mesh files, and bytes from a position on.
 #pragma once
 
 #include <algorithm>
@@ -6,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -13,6 +15,46 @@
 #include "itr/core/error.hpp"
 
 namespace itr {
+
+/// The number that a word is, which may begin with a plus sign; nothing if it is another word.
+template <typename T>
+std::optional<T> number_of(std::string_view word) {
+  const std::string_view digits = word.substr(word.starts_with('+') ? 1 : 0);
+  T value{};
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  return error == std::errc() && end == digits.data() + digits.size() ? std::optional(value) : std::nullopt;
+}
+
+/// The first characters of what was found, for a message.
+inline std::string quoted_start(std::string_view text) { return quoted(text.substr(0, 40)); }
+
+/// Lines of a text, one after another.
+class Lines {
+ public:
+  Lines(std::string_view bytes, const std::filesystem::path& file) : rest_(bytes), file_(file) {}
+
+  /// Goes to the next line; false: there is none.
+  bool next() {
+    if (rest_.empty()) return false;
+    const auto end = std::min(rest_.find('\n'), rest_.size());
+    text = rest_.substr(0, end);
+    rest_.remove_prefix(std::min(end + 1, rest_.size()));
+    ++number;
+    return true;
+  }
+
+  std::string_view text;
+  int number = 0;
+
+  [[noreturn]] void fail(const std::string& found, const std::string& expected) const { fail_at(number, found, expected); }
+  [[noreturn]] void fail_at(int line, const std::string& found, const std::string& expected) const {
+    throw InputError({file_.string(), "line " + std::to_string(line), found, expected});
+  }
+
+ private:
+  std::string_view rest_;
+  const std::filesystem::path& file_;
+};
 
 /// Position in the bytes of a file, reading numbers as the file writes them.
 class Cursor {
@@ -33,7 +75,7 @@ class Cursor {
   std::string quoted_text() {
     skip_space();
     const auto end = position_ < bytes_.size() && bytes_[position_] == '"' ? bytes_.find('"', position_ + 1) : bytes_.npos;
-    if (end == bytes_.npos) fail(quoted(bytes_.substr(position_, 40)), "a name between double quotes");
+    if (end == bytes_.npos) fail(quoted_start(bytes_.substr(position_)), "a name between double quotes");
     const std::string text(bytes_.substr(position_ + 1, end - position_ - 1));
     position_ = end + 1;
     return text;
@@ -85,7 +127,7 @@ class Cursor {
 
   void expect_end(const std::string& name) {
     const std::string_view found = word();
-    if (found != "$End" + name) fail(quoted(found.substr(0, 40)), "$End" + name);
+    if (found != "$End" + name) fail(quoted_start(found), "$End" + name);
   }
 
   /// A number as it is in memory, little endian.
@@ -104,14 +146,9 @@ class Cursor {
     skip_space();
     const std::size_t begin = position_;
     const std::string_view token = word();
-    const std::string_view digits = token.substr(token.starts_with('+') ? 1 : 0);
-    T value{};
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error != std::errc() || end != digits.data() + digits.size()) {
-      position_ = begin;
-      fail(token.empty() ? "the end of the file" : quoted(token.substr(0, 40)), "a number");
-    }
-    return value;
+    if (const std::optional<T> value = number_of<T>(token)) return *value;
+    position_ = begin;
+    fail(token.empty() ? "the end of the file" : quoted_start(token), "a number");
   }
 
   [[noreturn]] void fail(const std::string& found, const std::string& expected) const {

@@ -34,7 +34,6 @@ class MeshBuilder {
   int group(int dim, int number, std::string_view name);
   /// Adds an element by its index, or in dimension 0 a node by its tag.
   void add_member(int group, std::int64_t member);
-  const std::vector<std::int64_t>& members(int group) const { return members_[group]; }
 
   /// The corners of an element.
   std::span<const std::int64_t> corners(int dim, std::int64_t index) const {

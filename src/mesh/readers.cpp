@@ -3,11 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include "core/quoted.hpp"
+#include "core/read_file.hpp"
 #include "readers.hpp"
 
 namespace itr {
@@ -15,15 +14,6 @@ namespace itr {
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string read_bytes(const fs::path& file) {
-  std::error_code ignored;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || fs::is_directory(file, ignored)) throw InputError({file.string(), "", "no readable file", "a mesh file"});
-  std::ostringstream bytes;
-  bytes << stream.rdbuf();
-  return std::move(bytes).str();
-}
 
 template <std::size_t N>
 void check_indices(const std::vector<std::array<int, N>>& elements, std::size_t num_vertices, const std::string& kind,
@@ -64,8 +54,11 @@ MeshFile read_mesh_file(const fs::path& file) {
         {file.string(), "", "a name that ends in " + quoted(std::string_view(ending)),
          ".msh, .inp, .vtu, .vtp, .vtk, .stl, .obj or .ply (geometry of CAD is meshed by Gmsh, other meshes are "
          "converted by `meshio convert`: docs/user-guide.md, \"Mesh files\")"});
-  MeshFile mesh = reader->second(read_bytes(file), file);
+  const std::optional<std::string> bytes = read_file(file);
+  if (!bytes) throw InputError({file.string(), "", "no readable file", "a mesh file"});
+  MeshFile mesh = reader->second(*bytes, file);
   check(mesh, file);
+  mesh.triangle_body.resize(mesh.triangles.size());
   return mesh;
 }
 

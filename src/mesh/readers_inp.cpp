@@ -4,14 +4,13 @@
 // passed over.
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
 #include <unordered_set>
 
-#include "core/quoted.hpp"
+#include "cursor.hpp"
 #include "mesh_builder.hpp"
 #include "readers.hpp"
 
@@ -61,7 +60,7 @@ std::vector<std::string_view> split(std::string_view line) {
 
 class InpReader {
  public:
-  InpReader(std::string_view bytes, const std::filesystem::path& file) : rest_(bytes), mesh_(file), file_(file) {}
+  InpReader(std::string_view bytes, const std::filesystem::path& file) : lines_(bytes, file), mesh_(file), file_(file) {}
 
   MeshFile read() {
     next_line();
@@ -93,15 +92,10 @@ class InpReader {
 
   /// Goes to the next line that is neither empty nor a comment.
   void next_line() {
-    for (;;) {
-      is_at_end_ = rest_.empty();
-      if (is_at_end_) return;
-      const auto end = rest_.find('\n');
-      line_ = trimmed(rest_.substr(0, end));
-      rest_ = end == rest_.npos ? std::string_view() : rest_.substr(end + 1);
-      ++line_number_;
-      if (!line_.empty() && !line_.starts_with("**")) return;
-    }
+    do {
+      is_at_end_ = !lines_.next();
+      line_ = trimmed(lines_.text);
+    } while (!is_at_end_ && (line_.empty() || line_.starts_with("**")));
   }
   bool is_keyword() const { return !is_at_end_ && line_.starts_with('*'); }
   bool is_data() const { return !is_at_end_ && !line_.starts_with('*'); }
@@ -168,13 +162,13 @@ class InpReader {
     Set* set = parameters_.contains("NSET") ? &set_of(kNodes, parameter("NSET")) : nullptr;
     for (; is_data(); next_line()) {
       const std::vector<std::string_view> words = split(line_);
-      if (words.size() < 3) fail(quoted(line_.substr(0, 40)), "a number and 2 or 3 coordinates");
+      if (words.size() < 3) fail(quoted_start(line_), "a number and 2 or 3 coordinates");
       const std::int64_t label = integer(words[0]);
       Vec<3> X = Vec<3>::Zero();
       for (std::size_t c = 0; c < 3 && c + 1 < words.size(); ++c) X[static_cast<int>(c)] = real(words[c + 1]);
       mesh_.add_node(label, X);
       labels_.insert(label);
-      if (set) set->members.push_back({label, label, 1, "", "", line_number_});
+      if (set) set->members.push_back({label, label, 1, "", "", lines_.number});
     }
   }
 
@@ -200,14 +194,14 @@ class InpReader {
     std::vector<std::int64_t> numbers;
     while (is_data()) {
       numbers.clear();
-      const int first_line = line_number_;
+      const int first_line = lines_.number;
       while (is_data() && numbers.size() < num_nodes + 1) {
         for (const std::string_view word : split(line_)) numbers.push_back(integer(word));
         next_line();
       }
       if (numbers.size() != num_nodes + 1)
-        fail_at(first_line, "an element of " + std::to_string(numbers.size() - 1) + " nodes",
-                std::to_string(num_nodes) + " of " + type.base);
+        lines_.fail_at(first_line, "an element of " + std::to_string(numbers.size() - 1) + " nodes",
+                       std::to_string(num_nodes) + " of " + type.base);
       const std::int64_t label = numbers[0];
       const std::span<const std::int64_t> corners = std::span(numbers).subspan(1);
       if (type.is_second_order && type.dim > 1) middles_.insert(corners.begin() + type.dim + 1, corners.end());
@@ -215,7 +209,7 @@ class InpReader {
       const int index = is_late ? -1 : mesh_.add_element(type.dim, corners, label);
       if (is_late) late_lines_.push_back({label, {corners[0], corners[1], corners[2]}});
       if (!elements_.try_emplace(label, Element{type.dim, index, type.is_shell}).second)
-        fail_at(first_line, "element " + std::to_string(label) + " twice", "different element numbers");
+        lines_.fail_at(first_line, "element " + std::to_string(label) + " twice", "different element numbers");
       if (set) set->members.push_back({label, label, 1, "", "", first_line});
     }
   }
@@ -235,10 +229,10 @@ class InpReader {
     for (; is_data(); next_line()) {
       const std::vector<std::string_view> words = split(line_);
       if (is_generated) {
-        if (words.size() < 2 || words.size() > 3) fail(quoted(line_.substr(0, 40)), "first, last and step");
+        if (words.size() < 2 || words.size() > 3) fail(quoted_start(line_), "first, last and step");
         const std::int64_t step = words.size() > 2 ? integer(words[2]) : 1;
         if (step < 1) fail("a step of " + std::to_string(step), "at least 1");
-        if (!is_left_out) set.members.push_back({integer(words[0]), integer(words[1]), step, "", "", line_number_});
+        if (!is_left_out) set.members.push_back({integer(words[0]), integer(words[1]), step, "", "", lines_.number});
         continue;
       }
       for (const std::string_view word : words)
@@ -252,7 +246,7 @@ class InpReader {
     const bool is_label = !word.empty() && (std::isdigit(static_cast<unsigned char>(word.front())) || word.front() == '-');
     if (is_label && is_left_out) return;
     const std::int64_t label = is_label ? integer(word) : 0;
-    set.members.push_back({label, label, 1, is_label ? "" : std::string(word), face, line_number_});
+    set.members.push_back({label, label, 1, is_label ? "" : std::string(word), face, lines_.number});
   }
 
   void read_surface() {
@@ -303,13 +297,15 @@ class InpReader {
       if (!member.set.empty()) {
         const auto inner = sets_.find(key_of(kind, member.set));
         if (inner == sets_.end() || depth == kMostDepth)
-          fail_at(member.line, itr::quoted(member.set), kind == kNodes ? "the name of an NSET" : "the name of an ELSET");
+          lines_.fail_at(member.line, itr::quoted(member.set),
+                         kind == kNodes ? "the name of an NSET" : "the name of an ELSET");
         for_each_member(inner->second, all, kind, f, outer ? outer : &member, depth + 1);
         continue;
       }
       auto entry = all.lower_bound(member.first);
       if (member.first == member.last && (entry == all.end() || label_of(*entry) != member.first))
-        fail_at(member.line, (kind == kNodes ? "node " : "element ") + std::to_string(member.first), "one of the file");
+        lines_.fail_at(member.line, (kind == kNodes ? "node " : "element ") + std::to_string(member.first),
+                       "one of the file");
       for (; entry != all.end() && label_of(*entry) <= member.last; ++entry)
         if ((label_of(*entry) - member.first) % member.step == 0) f(*entry, outer ? *outer : member);
     }
@@ -320,10 +316,10 @@ class InpReader {
     static const std::vector<std::vector<int>> kFaces[] = {
         {}, {}, {{0, 1}, {1, 2}, {2, 0}}, {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}};
     const auto refuse = [&] {
-      fail_at(member.line, "the face " + itr::quoted(member.face),
-              element.is_shell   ? "SPOS or SNEG"
-              : element.dim == 3 ? "S1 to S4"
-                                 : "S1 to S3");
+      lines_.fail_at(member.line, "the face " + itr::quoted(member.face),
+                     element.is_shell   ? "SPOS or SNEG"
+                     : element.dim == 3 ? "S1 to S4"
+                                        : "S1 to S3");
     };
     const bool is_whole = element.is_shell && (member.face == "SPOS" || member.face == "SNEG" || member.face.empty());
     if (is_whole) return mesh_.add_member(mesh_.group(element.dim, 0, name), element.index);
@@ -340,35 +336,27 @@ class InpReader {
   }
 
   std::int64_t integer(std::string_view word) const {
-    std::int32_t value = 0;
-    const std::string_view digits = word.substr(word.starts_with('+') ? 1 : 0);
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error != std::errc() || end != digits.data() + digits.size()) fail(quoted(word.substr(0, 40)), "an integer");
-    return value;
+    const std::optional<std::int32_t> value = number_of<std::int32_t>(word);
+    if (!value) fail(quoted_start(word), "an integer");
+    return *value;
   }
 
   /// FORTRAN's exponents have a D.
   double real(std::string_view word) const {
-    std::string text(word.substr(word.starts_with('+') ? 1 : 0));
+    std::string text(word);
     std::replace_if(
         text.begin(), text.end(), [](char c) { return c == 'D' || c == 'd'; }, 'e');
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) fail(quoted(word.substr(0, 40)), "a number");
-    return value;
+    const std::optional<double> value = number_of<double>(text);
+    if (!value) fail(quoted_start(word), "a number");
+    return *value;
   }
 
-  [[noreturn]] void fail(const std::string& found, const std::string& expected) const {
-    fail_at(line_number_, found, expected);
-  }
-  [[noreturn]] void fail_at(int line, const std::string& found, const std::string& expected) const {
-    throw InputError({file_.string(), "line " + std::to_string(line), found, expected});
-  }
+  [[noreturn]] void fail(const std::string& found, const std::string& expected) const { lines_.fail(found, expected); }
 
-  std::string_view rest_, line_;
+  Lines lines_;
+  std::string_view line_;  ///< without spaces around it
   MeshBuilder mesh_;
   const std::filesystem::path& file_;
-  int line_number_ = 0;
   bool is_at_end_ = false, is_in_assembly_ = false;
   int num_parts_ = 0, num_instances_ = 0;
   std::string keyword_;

@@ -63,7 +63,7 @@ class MshReader {
   }
 
   void read_section(std::string_view section) {
-    if (section.front() != '$') in_.fail(quoted(section.substr(0, 40)), "a section, such as $Nodes");
+    if (section.front() != '$') in_.fail(quoted_start(section), "a section, such as $Nodes");
     const std::string name(section.substr(1));
     const bool is_of_entities = name == "Entities" || name == "PartitionedEntities";
     const bool is_of_nodes = name == "Nodes" || name == "ParametricNodes";

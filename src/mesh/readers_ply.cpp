@@ -51,7 +51,6 @@ class PlyReader {
 
   MeshFile read() {
     for (const Element& element : read_header()) read_element(element);
-    mesh_.triangle_body.assign(mesh_.triangles.size(), 0);
     return std::move(mesh_);
   }
 

@@ -11,7 +11,6 @@
 #include <map>
 
 #include "cursor.hpp"
-#include "mesh/mesh_file.hpp"
 #include "readers.hpp"
 
 namespace itr {
@@ -32,7 +31,6 @@ class StlReader {
     is_binary() ? read_binary() : read_text();
     weld();
     note_open_edges();
-    mesh_.triangle_body.assign(mesh_.triangles.size(), 0);
     return std::move(mesh_);
   }
 
@@ -66,7 +64,7 @@ class StlReader {
         in_.end_line();
         continue;
       }
-      if (word != "facet") in_.fail(quoted(word.substr(0, 40)), "'facet' or 'endsolid'");
+      if (word != "facet") in_.fail(quoted_start(word), "'facet' or 'endsolid'");
       expect("normal");
       for (int c = 0; c < 3; ++c) in_.word();  // some programs write nan
       expect("outer"), expect("loop");
@@ -82,7 +80,7 @@ class StlReader {
 
   void expect(std::string_view word) {
     const std::string_view found = in_.word();
-    if (found != word) in_.fail(found.empty() ? "the end of the file" : quoted(found.substr(0, 40)), quoted(word));
+    if (found != word) in_.fail(found.empty() ? "the end of the file" : quoted_start(found), quoted(word));
   }
 
   /// Corners near an earlier one become that; triangles that nothing is left of go.

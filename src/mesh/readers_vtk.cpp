@@ -58,7 +58,9 @@ class VtkReader {
     read_head();
     for (std::string_view keyword = word(); !keyword.empty(); keyword = word()) read_section(keyword);
     if (!has_points_) in_.fail("no points", "POINTS");
-    add_cells();
+    cells_.begin_piece(points_);
+    for (const auto& [type, points, ends] : lists_)
+      cells_.add(points, ends, type == 0 ? types_ : std::vector<double>(ends.size(), type));
     for (const auto& [name, values] : cell_data_) cells_.add_cell_data(name, values);
     for (const auto& [name, values] : point_data_) cells_.add_point_data(name, values);
     return cells_.finish();
@@ -66,8 +68,8 @@ class VtkReader {
 
  private:
   struct Lists {
-    int type;  ///< of all of them; 0: CELL_TYPES has each
-    std::vector<std::vector<std::int64_t>> cells;
+    double type;  ///< of all of them; 0: CELL_TYPES has each
+    std::vector<double> points{}, ends{};
   };
 
   std::string_view word() {
@@ -88,16 +90,16 @@ class VtkReader {
     in_.end_line();
     in_.end_line();
     const std::string_view format = word();
-    if (format != "ASCII" && format != "BINARY") in_.fail(quoted(format.substr(0, 40)), "ASCII or BINARY");
+    if (format != "ASCII" && format != "BINARY") in_.fail(quoted_start(format), "ASCII or BINARY");
     is_binary_ = format == "BINARY";
   }
 
   void read_section(std::string_view keyword) {
-    constexpr int kVertices = 2, kLines = 4, kPolygons = 7;
+    constexpr double kVertices = 2, kLines = 4, kPolygons = 7;
     if (keyword == "DATASET") {
       const std::string_view type = word();
       if (type != "UNSTRUCTURED_GRID" && type != "POLYDATA")
-        in_.fail("a dataset of type " + quoted(type.substr(0, 40)), "UNSTRUCTURED_GRID or POLYDATA");
+        in_.fail("a dataset of type " + quoted_start(type), "UNSTRUCTURED_GRID or POLYDATA");
     } else if (keyword == "POINTS") {
       const std::size_t count = in_.count(integer());
       points_ = numbers(word(), 3 * count);
@@ -127,36 +129,28 @@ class VtkReader {
   }
 
   /// Reads a count and points a cell in files before 5.1, later their ends and all points.
-  void read_lists(int type) {
+  void read_lists(double type) {
     const std::int64_t rows = integer(), size = integer();
-    Lists lists{type, {}};
-    const std::string_view next = in_.peek();
-    if (next == "OFFSETS") {
+    Lists lists{type};
+    if (in_.peek() == "OFFSETS") {
       word();
-      const std::vector<double> ends = numbers(word(), in_.count(rows));
+      lists.ends = numbers(word(), in_.count(rows));
+      if (!lists.ends.empty()) lists.ends.erase(lists.ends.begin());  // the first cell begins at 0
       if (word() != "CONNECTIVITY") in_.fail("no CONNECTIVITY", "it behind OFFSETS");
-      const std::vector<double> points = numbers(word(), in_.count(size));
-      for (std::size_t c = 0; c + 1 < ends.size(); ++c) {
-        if (!(ends[c] >= 0 && ends[c] <= ends[c + 1] && ends[c + 1] <= static_cast<double>(points.size())))
-          in_.fail("an offset of " + std::to_string(ends[c + 1]), "ascending ones, up to " + std::to_string(points.size()));
-        add_list(lists, points, static_cast<std::size_t>(ends[c]), static_cast<std::size_t>(ends[c + 1]));
-      }
+      lists.points = numbers(word(), in_.count(size));
     } else {
       const std::vector<double> all = numbers("int", in_.count(size));
       for (std::size_t at = 0; at < all.size();) {
         const double length = all[at];
         if (!(length >= 0 && length < static_cast<double>(all.size() - at)))
           in_.fail("a cell of " + std::to_string(length) + " points", "as many as there are");
-        add_list(lists, all, at + 1, at + 1 + static_cast<std::size_t>(length));
+        const auto begin = all.begin() + static_cast<std::ptrdiff_t>(at) + 1;
+        lists.points.insert(lists.points.end(), begin, begin + static_cast<std::ptrdiff_t>(length));
+        lists.ends.push_back(static_cast<double>(lists.points.size()));
         at += 1 + static_cast<std::size_t>(length);
       }
     }
     lists_.push_back(std::move(lists));
-  }
-
-  static void add_list(Lists& lists, const std::vector<double>& points, std::size_t begin, std::size_t end) {
-    auto& cell = lists.cells.emplace_back();
-    for (std::size_t i = begin; i < end; ++i) cell.push_back(static_cast<std::int64_t>(std::clamp(points[i], -1., 1e15)));
   }
 
   void read_attribute(std::string_view keyword) {
@@ -168,7 +162,7 @@ class VtkReader {
       skip_colors(keyword == "LOOKUP_TABLE" ? 4 * count : data_count_ * count);
       return;
     }
-    if (known == std::end(kAttributes)) in_.fail(quoted(keyword.substr(0, 40)), "a keyword of VTK, such as CELL_DATA");
+    if (known == std::end(kAttributes)) in_.fail(quoted_start(keyword), "a keyword of VTK, such as CELL_DATA");
     const std::string name(word());
     std::size_t components = static_cast<std::size_t>(known->components);
     if (keyword == "TEXTURE_COORDINATES") components = in_.count(integer());
@@ -199,24 +193,13 @@ class VtkReader {
   std::vector<double> numbers(std::string_view type, std::size_t count) {
     const auto known =
         std::find_if(std::begin(kNumberTypes), std::end(kNumberTypes), [&](const NumberType& t) { return t.name == type; });
-    if (known == std::end(kNumberTypes))
-      in_.fail("numbers of type " + quoted(type.substr(0, 40)), "float, double, int, ...");
+    if (known == std::end(kNumberTypes)) in_.fail("numbers of type " + quoted_start(type), "float, double, int, ...");
     std::vector<double> values(in_.count(static_cast<std::int64_t>(count)));
     if (is_binary_) in_.end_line();
     in_.binary = is_binary_;
     for (double& value : values) value = known->read(in_);
     in_.binary = false;
     return values;
-  }
-
-  void add_cells() {
-    cells_.begin_piece(points_);
-    for (const Lists& lists : lists_) {
-      if (lists.type == 0 && types_.size() != lists.cells.size())
-        in_.fail(std::to_string(types_.size()) + " CELL_TYPES", std::to_string(lists.cells.size()) + ", one a cell");
-      for (std::size_t c = 0; c < lists.cells.size(); ++c)
-        cells_.add(lists.type != 0 ? lists.type : static_cast<int>(std::clamp(types_[c], -1., 1e9)), lists.cells[c]);
-    }
   }
 
   Cursor in_;

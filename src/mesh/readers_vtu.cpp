@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <map>
 #include <optional>
 
-#include "core/quoted.hpp"
-#include "itr/core/error.hpp"
+#include "cursor.hpp"
 #include "readers.hpp"
 #include "vtk_cells.hpp"
 
@@ -174,7 +172,7 @@ class VtuReader {
   void read_head(const Tag& tag) {
     const std::string type = attribute(tag, "type", "");
     if (type != "UnstructuredGrid" && type != "PolyData")
-      fail_at(tag.begin, "a file of type " + quoted(std::string_view(type)), "UnstructuredGrid or PolyData");
+      fail_at(tag.begin, "a file of type " + quoted_start(type), "UnstructuredGrid or PolyData");
     if (attribute(tag, "byte_order", "LittleEndian") != "LittleEndian") fail_at(tag.begin, "big endian", "LittleEndian");
     size_of_head_ = attribute(tag, "header_type", "UInt32") == "UInt64" ? 8 : 4;
     const std::string compressor = attribute(tag, "compressor", "");
@@ -203,30 +201,15 @@ class VtuReader {
     const Arrays& points = sections["Points"];
     if (points.size() != 1 || points.begin()->second.size() % 3 != 0) fail("no <Points>", "three coordinates a point");
     cells_.begin_piece(points.begin()->second);
-    constexpr std::pair<const char*, int> kOfPolygons[] = {{"Verts", 2}, {"Lines", 4}, {"Polys", 7}, {"Strips", 6}};
-    for (const auto& [name, type] : kOfPolygons)
-      if (sections.contains(name)) add_cells(sections[name], type);
-    if (sections.contains("Cells")) add_cells(sections["Cells"], 0);
+    constexpr std::pair<const char*, double> kOfPolygons[] = {{"Verts", 2}, {"Lines", 4}, {"Polys", 7}, {"Strips", 6}};
+    for (const auto& [name, type] : kOfPolygons) {
+      const std::vector<double>& ends = sections[name]["offsets"];
+      cells_.add(sections[name]["connectivity"], ends, std::vector<double>(ends.size(), type));
+    }
+    Arrays& cells = sections["Cells"];
+    cells_.add(cells["connectivity"], cells["offsets"], cells["types"]);
     for (const auto& [name, values] : sections["CellData"]) cells_.add_cell_data(name, values);
     for (const auto& [name, values] : sections["PointData"]) cells_.add_point_data(name, values);
-  }
-
-  /// All of one type, or each of that in the array "types".
-  void add_cells(Arrays& arrays, int type) {
-    const std::vector<double>&points = arrays["connectivity"], &ends = arrays["offsets"], &types = arrays["types"];
-    if (type == 0 && types.size() != ends.size())
-      fail(std::to_string(types.size()) + " types", std::to_string(ends.size()) + ", one a cell");
-    std::vector<std::int64_t> cell;
-    double begin = 0;
-    for (std::size_t c = 0; c < ends.size(); ++c) {
-      if (!(ends[c] >= begin && ends[c] <= static_cast<double>(points.size())))
-        fail("an offset of " + std::to_string(ends[c]), "ascending ones, up to " + std::to_string(points.size()));
-      cell.clear();
-      for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(ends[c]); ++i)
-        cell.push_back(static_cast<std::int64_t>(std::clamp(points[i], -1., 1e15)));
-      begin = ends[c];
-      cells_.add(type != 0 ? type : static_cast<int>(std::clamp(types[c], -1., 1e9)), cell);
-    }
   }
 
   /// Goes behind the end of an array, which may hold tags of its own.
@@ -249,30 +232,24 @@ class VtuReader {
     std::vector<double> values;
     if (format == "appended") {
       const std::string text = attribute(tag, "offset", "");
-      std::size_t offset = 0;
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset);
-      if (error != std::errc() || offset > appended_.size())
-        fail_at(tag.begin, "the offset " + quoted(std::string_view(text)), "one in <AppendedData>");
-      known->append(read_bytes(tag, Source(appended_.substr(offset), appended_is_base64_)), values);
+      const std::optional<std::size_t> offset = number_of<std::size_t>(text);
+      if (!offset || *offset > appended_.size())
+        fail_at(tag.begin, "the offset " + quoted_start(text), "one in <AppendedData>");
+      known->append(read_bytes(tag, Source(appended_.substr(*offset), appended_is_base64_)), values);
     } else {
-      if (format != "binary")
-        fail_at(tag.begin, "the format " + quoted(std::string_view(format)), "ascii, binary or appended");
+      if (format != "binary") fail_at(tag.begin, "the format " + quoted_start(format), "ascii, binary or appended");
       known->append(read_bytes(tag, Source(content, true)), values);
     }
     return values;
   }
 
   std::vector<double> read_text(const Tag& tag, std::string_view text) const {
-    constexpr std::string_view kSpace = " \t\r\n";
     std::vector<double> values;
-    for (auto begin = text.find_first_not_of(kSpace); begin != text.npos; begin = text.find_first_not_of(kSpace)) {
-      text.remove_prefix(begin);
-      double value = 0;
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-      if (error != std::errc())
-        fail_at(tag.begin, quoted(text.substr(0, std::min<std::size_t>(text.find_first_of(kSpace), 40))), "a number");
-      values.push_back(value);
-      text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    Cursor in(text, file_);
+    for (std::string_view word = in.word(); !word.empty(); word = in.word()) {
+      const std::optional<double> value = number_of<double>(word);
+      if (!value) fail_at(tag.begin, quoted_start(word), "a number");
+      values.push_back(*value);
     }
     return values;
   }

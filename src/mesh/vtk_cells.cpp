@@ -46,33 +46,48 @@ void VtkCells::begin_piece(const std::vector<double>& coordinates) {
                    Vec<3>(coordinates[3 * p], coordinates[3 * p + 1], coordinates[3 * p + 2]));
 }
 
-void VtkCells::add(int type, const std::vector<std::int64_t>& points) {
-  const std::int64_t number = all_cells_++;
-  const auto fail = [&](const std::string& found, const std::string& expected) {
-    throw InputError({file_.string(), "cell " + std::to_string(number), found, expected});
-  };
+void VtkCells::fail(const std::string& found, const std::string& expected) const {
+  throw InputError({file_.string(), "cell " + std::to_string(all_cells_), found, expected});
+}
+
+void VtkCells::add(const std::vector<double>& points, const std::vector<double>& ends, const std::vector<double>& types) {
+  if (types.size() != ends.size())
+    fail(std::to_string(types.size()) + " types of cells", std::to_string(ends.size()) + ", one a cell");
+  double begin = 0;
+  for (std::size_t c = 0; c < ends.size(); ++c) {
+    if (!(ends[c] >= begin && ends[c] <= static_cast<double>(points.size())))
+      fail("an offset of " + std::to_string(ends[c]), "ascending ones, up to " + std::to_string(points.size()));
+    const auto first = static_cast<std::size_t>(begin), last = static_cast<std::size_t>(ends[c]);
+    add_cell(types[c] >= 0 && types[c] < 256 ? static_cast<int>(types[c]) : -1,
+             std::span(points).subspan(first, last - first));
+    begin = ends[c];
+  }
+}
+
+void VtkCells::add_cell(int type, std::span<const double> points) {
   const auto known = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const CellType& t) { return t.type == type; });
   if (known == std::end(kTypes))
     fail("VTK's type " + std::to_string(type) + ", " + name_of(type),
          "vertices, lines, triangles and tetrahedra, linear or quadratic; " + split_advice(file_));
   std::vector<std::int64_t> nodes;
-  for (const std::int64_t point : points) {
-    if (point < 0 || point >= static_cast<std::int64_t>(num_points_))
-      fail("point " + std::to_string(point), "0 to " + std::to_string(num_points_) + " - 1");
-    nodes.push_back(first_ + point + 1);
+  for (const double point : points) {
+    if (!(point >= 0 && point < static_cast<double>(num_points_)))
+      fail("point " + std::to_string(std::llround(point)), "0 to " + std::to_string(num_points_) + " - 1");
+    nodes.push_back(first_ + static_cast<std::int64_t>(point) + 1);
   }
   auto& elements = cells_.emplace_back();
   if (known->dim == 0) {
     for (const std::int64_t node : nodes) elements.push_back({0, node});
   } else if (type == 4) {
     for (std::size_t i = 0; i + 1 < nodes.size(); ++i)
-      elements.push_back({1, mesh_.add_element(1, std::span(nodes).subspan(i, 2), number)});
+      elements.push_back({1, mesh_.add_element(1, std::span(nodes).subspan(i, 2), all_cells_)});
   } else {
     const std::size_t expected = MeshBuilder::num_nodes_of(known->dim, known->is_second_order);
     if (nodes.size() != expected)
       fail(std::to_string(nodes.size()) + " points", std::to_string(expected) + (type == 7 ? ": triangles only" : ""));
-    elements.push_back({known->dim, mesh_.add_element(known->dim, nodes, number)});
+    elements.push_back({known->dim, mesh_.add_element(known->dim, nodes, all_cells_)});
   }
+  ++all_cells_;
 }
 
 void VtkCells::add_cell_data(const std::string& name, const std::vector<double>& values) {

@@ -15,10 +15,10 @@ class VtkCells {
 
   /// Three coordinates a point. Points of cells are counted from the first of these.
   void begin_piece(const std::vector<double>& coordinates);
-  /// Adds a cell of VTK's type `type`. Throws InputError for types that are not read.
-  void add(int type, const std::vector<std::int64_t>& points);
-  std::size_t num_cells() const { return cells_.size(); }  ///< of this piece
-  std::size_t num_points() const { return num_points_; }   ///< of this piece
+  /// Adds cells as VTK's files have them: all `points`, one cell after another, and by cell where its points end
+  /// and VTK's type. Throws InputError for types that are not read, and for counts, ends and
+  /// points that do not fit.
+  void add(const std::vector<double>& points, const std::vector<double>& ends, const std::vector<double>& types);
 
   /// Numbers of cells become groups where the array is one that says so (`body`, `gmsh:physical`, ...), and those other than
   /// 0 a named set where it is called "set:NAME".
@@ -29,6 +29,9 @@ class VtkCells {
   MeshFile finish() { return mesh_.finish(); }
 
  private:
+  void add_cell(int type, std::span<const double> points);
+  [[noreturn]] void fail(const std::string& found, const std::string& expected) const;
+
   MeshBuilder mesh_;
   const std::filesystem::path& file_;
   std::size_t num_points_ = 0;

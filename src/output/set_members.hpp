@@ -2,6 +2,8 @@
 // Members of the named sets of a setup on the mesh of a frame.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <string>
@@ -41,11 +43,17 @@ std::vector<SetMembers> set_members(const FrameView<Dim>& frame) {
   return sets;
 }
 
-/// The name without characters that end or quote names in files.
-inline std::string plain_name(std::string name) {
-  for (char& c : name)
-    if (std::string_view("/<>&\"'").find(c) != std::string_view::npos || static_cast<unsigned char>(c) < ' ') c = '_';
-  return name == "." || name == ".." ? "_" : name;
+/// The name with characters that end or quote names in files as in addresses of the web, such as %2F for a slash: different
+/// names stay different.
+inline std::string plain_name(const std::string& name) {
+  const bool is_place = name == "." || name == "..";
+  std::string plain;
+  for (const char c : name) {
+    const bool is_plain =
+        std::string_view("/<>&\"'%").find(c) == std::string_view::npos && static_cast<unsigned char>(c) >= ' ';
+    plain += is_plain && !is_place ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return plain;
 }
 
 }  // namespace itr::output

@@ -2,8 +2,8 @@
 #include "merge.hpp"
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
+
+#include "core/read_file.hpp"
 
 namespace itr::scene {
 
@@ -12,13 +12,9 @@ namespace fs = std::filesystem;
 namespace {
 
 std::string read_text(const fs::path& file, const std::string& asking_file, const std::string& place) {
-  std::error_code ignored;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || fs::is_directory(file, ignored))
-    throw InputError({asking_file, place, "no readable file '" + file.string() + "'", "a scene file"});
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return std::move(text).str();
+  std::optional<std::string> text = read_file(file);
+  if (!text) throw InputError({asking_file, place, "no readable file '" + file.string() + "'", "a scene file"});
+  return *std::move(text);
 }
 
 /// The pointer of the first number in valid JSON that no double holds.

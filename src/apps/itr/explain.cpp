@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "geometry/measures.hpp"
 #include "itr/core/error.hpp"
 #include "itr/fem/quadrature.hpp"
 #include "itr/simulation/simulation.hpp"
@@ -31,6 +30,10 @@ static_assert(std::size(kLaws) == static_cast<std::size_t>(MaterialLaw::own) + 1
 
 void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
+}
+
+bool has_friction(const ContactOptions& contact) {
+  return contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0;
 }
 
 std::string describe(const TimeOptions& time, const Units& units) {
@@ -78,11 +81,6 @@ class Explanation {
   }
 
  private:
-  bool is_dynamic() const { return !setup_.time.is_static && !setup_.time.quasistatic; }
-  bool has_friction() const {
-    return setup_.contact.enabled && setup_.contact.friction_coefficient > 0 && setup_.contact.friction_iterations != 0;
-  }
-
   /// Prints the set of defaults and what it gives for keys that the scene leaves out.
   void defaults() const {
     fmt::print("defaults\n  {}{}\n", defaults_.name,
@@ -105,8 +103,7 @@ class Explanation {
       Sum& sum = sums[mesh.body(c)];
       ++sum.cells;
       sum.volume += mesh.volume(c);
-      const double q = simplex_quality<Dim>(corners(c));
-      if (q < worst) worst = q, worst_cell = c;
+      if (mesh.quality(c) < worst) worst = mesh.quality(c), worst_cell = c;
     }
     for (const auto& [a, b] : mesh.edges()) {
       const double length = (mesh.rest(a) - mesh.rest(b)).norm();
@@ -135,15 +132,9 @@ class Explanation {
           curved.num_curved(), mesh.edges().size(), curved.num_nodes(), quadrature<Dim>(setup_.quadrature_degree).size());
   }
 
-  std::array<Vec<Dim>, Dim + 1> corners(CellId c) const {
-    std::array<Vec<Dim>, Dim + 1> corners;
-    for (int i = 0; i <= Dim; ++i) corners[i] = setup_.mesh.rest(setup_.mesh.cell(c)[i]);
-    return corners;
-  }
-
   void terms() {
     fmt::print("energy terms\n");
-    term("inertia", is_dynamic(),
+    term("inertia", !setup_.time.is_static && !setup_.time.quasistatic,
          setup_.time.is_static     ? "no /time: static"
          : setup_.time.quasistatic ? "/time/quasistatic"
          : setup_.lump_mass        ? "dynamics, lumped mass"
@@ -164,10 +155,10 @@ class Explanation {
          !setup_.contact.enabled     ? "/contact/enabled is false"
          : setup_.contact.convergent ? "convergent form"
                                      : "/contact/enabled");
-    term("friction", has_friction(),
-         has_friction()            ? fmt::format("mu = {}", setup_.contact.friction_coefficient)
-         : !setup_.contact.enabled ? "no contact"
-                                   : "no coefficient of friction, or no iterations for it");
+    term("friction", has_friction(setup_.contact),
+         has_friction(setup_.contact) ? fmt::format("mu = {}", setup_.contact.friction_coefficient)
+         : !setup_.contact.enabled    ? "no contact"
+                                      : "no coefficient of friction, or no iterations for it");
     term("remeshing", setup_.remesh.enabled,
          setup_.remesh.enabled ? "/space/remesh/enabled" : "/space/remesh/enabled is false");
   }
@@ -326,7 +317,7 @@ Json facts(const Setup<Dim>& setup, const Json& scene) {
           {"bodies", bodies},
           {"box", filled_box(setup.mesh, units)},
           {"contact", contact.enabled},
-          {"friction", contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0},
+          {"friction", has_friction(contact)},
           {"settings", chosen_settings(setup, scene)},
           {"solvers", available_solvers()}};
 }

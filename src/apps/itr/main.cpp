@@ -111,12 +111,6 @@ int distance(const std::string& directory, const std::string& reference, bool la
   return cli::done;
 }
 
-void add_defaults_option(CLI::App& command, std::vector<std::string>& sets) {
-  command.add_option_function<std::string>(
-      "--defaults", [&sets](const std::string& name) { sets.push_back("/defaults=\"" + name + "\""); },
-      "what keys that the scene leaves out stand for: itr (default) or polyfem, see docs/scenes.md");
-}
-
 /// Adds the options of a scene that `run` and `explain` share.
 void add_scene_options(CLI::App& command, cli::RunOptions& options, std::vector<std::string>& sets) {
   command.add_option("scene", options.scene, "scene file (JSON), see docs/scenes.md")->required();
@@ -125,7 +119,9 @@ void add_scene_options(CLI::App& command, cli::RunOptions& options, std::vector<
   command.add_option("--threads", options.threads, "number of threads (0: all)")->check(CLI::NonNegativeNumber);
   command.add_option("--set", sets, "/json/pointer=VALUE: set a key of the merged scene (VALUE is JSON)")
       ->allow_extra_args(false);
-  add_defaults_option(command, sets);
+  command.add_option_function<std::string>(
+      "--defaults", [&sets](const std::string& name) { sets.push_back("/defaults=\"" + name + "\""); },
+      "what keys that the scene leaves out stand for: itr (default) or polyfem, see docs/scenes.md");
   auto* overwrite = command.add_flag("--overwrite", options.overwrite, "replace the results that the folder has");
   auto* resume = command.add_flag("--resume", options.resume,
                                   "go on from the newest state that the folder has, or from the beginning; tend may change");

@@ -256,22 +256,19 @@ class Run {
                                start,
                                further_files(simulation_.setup(), options),
                                scene.defaults.name};
-    if (const auto saved = find_resumable(folder, options)) {
-      const auto checkpoint = restore(*saved, scene, options);
-      writer_ = std::make_unique<output::Writer>(std::move(folder), scene.output, info, checkpoint);
-      warnings.set_writer(writer_.get());
-      if (const int count = writer_->removed_files(); count > 0)
-        spdlog::info("removed from {}: {} files of the run that goes on, written after this state or at its end", directory_,
-                     count);
-      is_saved_ = true;
+    const auto saved = find_resumable(folder, options);
+    writer_ = saved
+                  ? std::make_unique<output::Writer>(std::move(folder), scene.output, info, restore(*saved, scene, options))
+                  : std::make_unique<output::Writer>(std::move(folder), scene.output, info);
+    warnings.set_writer(writer_.get());
+    if (const int count = writer_->removed_files(); count > 0)
+      spdlog::info("removed from {}: {} files of {}", directory_, count,
+                   saved ? "the run that goes on, written after this state or at its end" : "an earlier run, and no others");
+    is_saved_ = saved.has_value();
+    if (saved)
       spdlog::info("going on after step {}", simulation_.state().step);
-    } else {
-      writer_ = std::make_unique<output::Writer>(std::move(folder), scene.output, info);
-      warnings.set_writer(writer_.get());
-      if (const int count = writer_->removed_files(); count > 0)
-        spdlog::info("removed from {}: {} files of an earlier run, and no others", directory_, count);
+    else
       write(simulation_.report());
-    }
   }
 
   int run() {

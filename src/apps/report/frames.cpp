@@ -33,13 +33,18 @@ double magnitude(const double* values, int columns) {
   return std::sqrt(sum);
 }
 
+void include(std::array<double, 2>& range, double value) {
+  if (!std::isfinite(value)) return;
+  range[0] = std::min(range[0], value);
+  range[1] = std::max(range[1], value);
+}
+
 double diagonal(const StoredFrame& frame) {
   double sum = 0;
   for (int k = 0; k < frame.dim; ++k) {
-    double low = INFINITY, high = -INFINITY;
-    for (std::size_t i = k; i < frame.x.size(); i += frame.dim)
-      low = std::min(low, frame.x[i]), high = std::max(high, frame.x[i]);
-    if (low < high) sum += (high - low) * (high - low);
+    std::array<double, 2> range{INFINITY, -INFINITY};
+    for (std::size_t i = k; i < frame.x.size(); i += frame.dim) include(range, frame.x[i]);
+    if (range[0] < range[1]) sum += (range[1] - range[0]) * (range[1] - range[0]);
   }
   return std::sqrt(sum);
 }
@@ -51,25 +56,19 @@ LivingRows::Key sorted_key(std::vector<int> ids) {
   return key;
 }
 
-void include(std::array<double, 2>& range, double value) {
-  if (!std::isfinite(value)) return;
-  range[0] = std::min(range[0], value);
-  range[1] = std::max(range[1], value);
-}
-
 /// For each facet of the surface the cell that has it; -1: none.
 std::vector<int> cells_of_facets(const StoredFrame& frame) {
   const int dim = frame.dim, corners = dim + 1;
   using Facet = std::vector<std::int64_t>;
+  const auto sorted_row = [](const std::vector<std::int64_t>& rows, std::size_t at, int columns) {
+    Facet row(rows.begin() + at, rows.begin() + at + columns);
+    std::sort(row.begin(), row.end());
+    return row;
+  };
   std::map<Facet, int> cells;
-  for (std::size_t i = 0; i < frame.surface.size(); i += dim) {
-    Facet facet(frame.surface.begin() + i, frame.surface.begin() + i + dim);
-    std::sort(facet.begin(), facet.end());
-    cells[facet] = -1;
-  }
+  for (std::size_t i = 0; i < frame.surface.size(); i += dim) cells[sorted_row(frame.surface, i, dim)] = -1;
   for (std::size_t i = 0; i < frame.simplices.size(); i += corners) {
-    Facet cell(frame.simplices.begin() + i, frame.simplices.begin() + i + corners);
-    std::sort(cell.begin(), cell.end());
+    const Facet cell = sorted_row(frame.simplices, i, corners);
     for (int k = 0; k < corners; ++k) {
       Facet facet = cell;
       facet.erase(facet.begin() + k);
@@ -77,11 +76,7 @@ std::vector<int> cells_of_facets(const StoredFrame& frame) {
     }
   }
   std::vector<int> found;
-  for (std::size_t i = 0; i < frame.surface.size(); i += dim) {
-    Facet facet(frame.surface.begin() + i, frame.surface.begin() + i + dim);
-    std::sort(facet.begin(), facet.end());
-    found.push_back(cells[facet]);
-  }
+  for (std::size_t i = 0; i < frame.surface.size(); i += dim) found.push_back(cells[sorted_row(frame.surface, i, dim)]);
   return found;
 }
 

@@ -24,20 +24,18 @@ std::vector<int> parts_of(const StoredFrame& frame, int nodes) {
   return part;
 }
 
+/// Facets; edges and points of obstacles are facets with equal corners.
 template <int Dim>
 struct Primitive {
-  std::array<Vec<Dim>, 3> corners;
-  int count = 0;
+  std::array<Vec<Dim>, Dim> corners;
   int part = -1;  ///< -1: of an obstacle
 };
 
-template <int Dim>
-double squared_distance(const Vec<Dim>& p, const Primitive<Dim>& to) {
-  const auto& [a, b, c] = to.corners;
-  if (to.count == 1) return (p - a).squaredNorm();
-  if constexpr (Dim == 3)
-    if (to.count == 3) return point_triangle_distance_squared(p, a, b, c);
-  return point_edge_distance_squared<Dim>(p, a, b);
+double squared_distance(const Vec<2>& p, const std::array<Vec<2>, 2>& to) {
+  return point_edge_distance_squared<2>(p, to[0], to[1]);
+}
+double squared_distance(const Vec<3>& p, const std::array<Vec<3>, 3>& to) {
+  return point_triangle_distance_squared(p, to[0], to[1], to[2]);
 }
 
 template <int Dim>
@@ -53,9 +51,8 @@ std::vector<double> gaps_in(const StoredFrame& frame, double most) {
   const auto add = [&](const std::vector<double>& x, const std::vector<std::int64_t>& ids, int count, bool is_obstacle) {
     for (std::size_t i = 0; i + count <= ids.size(); i += count) {
       Primitive<Dim>& one = primitives.emplace_back();
-      one.count = count;
       if (!is_obstacle) one.part = part[ids[i]];
-      for (int k = 0; k < count; ++k) one.corners[k] = point<Dim>(x, ids[i + k]);
+      for (int k = 0; k < Dim; ++k) one.corners[k] = point<Dim>(x, ids[i + std::min(k, count - 1)]);
     }
   };
   add(frame.x, frame.surface, Dim, false);
@@ -71,7 +68,7 @@ std::vector<double> gaps_in(const StoredFrame& frame, double most) {
 
   std::vector<Box<Dim>> boxes(primitives.size());
   for (std::size_t i = 0; i < primitives.size(); ++i)
-    for (int k = 0; k < primitives[i].count; ++k) boxes[i].include(primitives[i].corners[k]);
+    for (const Vec<Dim>& corner : primitives[i].corners) boxes[i].include(corner);
   const Bvh<Dim> tree(boxes);
   std::vector<char> is_outside(nodes, 0);
   for (const std::int64_t v : frame.surface) is_outside[v] = 1;
@@ -90,7 +87,7 @@ std::vector<double> gaps_in(const StoredFrame& frame, double most) {
     double least = most * most;
     for (const int hit : hits) {
       const Primitive<Dim>& one = primitives[hit];
-      if (one.part != part[i]) least = std::min(least, squared_distance<Dim>(p, one));
+      if (one.part != part[i]) least = std::min(least, squared_distance(p, one.corners));
     }
     found[i] = std::sqrt(least);
   }

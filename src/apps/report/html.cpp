@@ -2,11 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <numeric>
-#include <sstream>
 
 #include "assets.hpp"
+#include "core/read_file.hpp"
 #include "deflate.hpp"
 #include "frames.hpp"
 #include "itr/core/error.hpp"
@@ -22,13 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-std::string read_text(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 std::string escaped(std::string_view text) {
   std::string out;
@@ -82,7 +73,7 @@ std::vector<int> thinned(int n, int every) {
 
 /// Whole lines only: a run that goes on may be writing the next.
 std::string step_lines(const fs::path& directory) {
-  const std::string text = read_text(directory / "steps.jsonl");
+  const std::string text = read_file(directory / "steps.jsonl").value_or("");
   return text.substr(0, text.rfind('\n') + 1);
 }
 
@@ -128,7 +119,7 @@ std::string run_blocks(const std::string& prefix, const RunData& run, const std:
     data += block(fmt::format("{}frame{}", prefix, frames.size()), encoder.frames()[i].bytes);
     frames.push_back(describe(encoder.frames()[i], dim));
   }
-  const Json summary = Json::parse(read_text(run.directory / "summary.json"), nullptr, false);
+  const Json summary = Json::parse(read_file(run.directory / "summary.json").value_or(""), nullptr, false);
   const Json meta = {{"title", run.name},
                      {"version", ITR_VERSION},
                      {"dim", dim},
@@ -190,7 +181,6 @@ ReportSummary write_report(const fs::path& directory, const fs::path& file, cons
   const int every = std::max(options.every, 1);
   for (const int i : thinned(static_cast<int>(stored.size()), every)) encoder.add(stored[i]);
   ReportSummary summary;
-  summary.stored = static_cast<int>(stored.size());
   std::string html;
   for (int factor = 1;; factor *= 2) {
     const std::vector<int> chosen = thinned(static_cast<int>(encoder.frames().size()), factor);
@@ -209,10 +199,10 @@ ReportSummary write_report(const fs::path& directory, const fs::path& file, cons
 
 ReportSummary write_study_report(const fs::path& directory, const fs::path& file, const ReportOptions& options) {
   const fs::path source = directory / "study.json";
-  const Json results = Json::parse(read_text(source), nullptr, false);
+  const Json results = Json::parse(read_file(source).value_or(""), nullptr, false);
   if (!results.is_object() || !results.contains("runs") || !results["runs"].is_array())
     throw InputError({source.string(), "", "no results of a study", "what `itr study` writes"});
-  const std::string diagram = read_text(directory / "study.svg");
+  const std::string diagram = read_file(directory / "study.svg").value_or("");
   ReportSummary summary;
   std::vector<std::pair<std::string, std::string>> shown;  // run, its blocks
   std::string data = json_block("study", results);
@@ -222,7 +212,6 @@ ReportSummary write_study_report(const fs::path& directory, const fs::path& file
     const fs::path folder = directory / "runs" / name;
     const auto frames = run.value("status", "") == "failed" ? std::vector<fs::path>() : output::stored_frames(folder);
     if (frames.empty()) continue;
-    ++summary.stored;
     FrameEncoder encoder;
     encoder.add(frames.back());
     shown.push_back({name, run_blocks("run-" + name + "-", {name, folder, encoder}, {0})});

@@ -16,7 +16,7 @@ struct ReportOptions {
 
 /// Contents of the file, and what was left out for its size.
 struct ReportSummary {
-  int frames = 0, stored = 0;
+  int frames = 0;
   double mb = 0;                   ///< of the file, 10^6 bytes
   std::vector<std::string> notes;  ///< sentences; the page has them too
 };

@@ -289,7 +289,7 @@ class View {
     for (const id of before.mesh.vertices)
       if (vertices.death[id] === f && kind[id] === KIND.vertex) found.gone.push(whereNow(id, old));
     // A new cell of vertices that were there comes from a swap, but where a vertex is gone beside it.
-    const besideGone = new Set(), oldEdges = new Set();
+    const besideGone = new Set();
     for (const c of before.mesh.cells) {
       const ids = corners.map(column => column[c]);
       if (cells.death[c] === f && ids.some(id => vertices.death[id] === f)) ids.forEach(id => besideGone.add(id));
@@ -300,7 +300,7 @@ class View {
       if (ids.some(id => vertices.birth[id] === f) || ids.filter(id => besideGone.has(id)).length >= run.dim) continue;
       found.swapped.push(at(this.x, ids));
     }
-    const keyOf = (a, b) => run.edgeKey(a, b), had = before.mesh.curved, has = this.frame.mesh.curved;
+    const had = before.mesh.curved, has = this.frame.mesh.curved;
     if (has)
       for (const [key, node] of has)
         if (!had?.has(key)) found.curved.push(at(this.x, [node]));

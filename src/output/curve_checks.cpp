@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: MIT
+#include "curve_checks.hpp"
+
+#include <cmath>
+
+#include "fem/chords.hpp"
+
+namespace itr::output {
+
+namespace {
+
+template <int Dim>
+bool is_nearer(const Vec<Dim>& a, const Vec<Dim>& b, const FrameSurface<Dim>& surface, int primitive, double distance) {
+  std::array<Vec<Dim>, Dim> corners;
+  for (int k = 0; k < Dim; ++k) corners[k] = surface.x[facets_of(surface)[primitive][k]];
+  return simplex_distance_squared<Dim>(std::array{a, b}, corners) < distance * distance;
+}
+
+/// Calls visit(vertex, curve, is_hollow) for vertices between a curve and its chords, where neither is crossed. `is_hollow`:
+/// the curve lies on the body's side of the chord.
+template <typename Visit>
+void for_each_beyond_chord(const FrameSurface<2>& surface, const Patches<2>& all, const Visit& visit) {
+  for (std::size_t i = 0; i < all.patches.size(); ++i) {
+    if (!all.is_curved[i]) continue;
+    Box<2> box;
+    for (const auto& row : all.patches[i].at)
+      for (const Vec<2>& p : row) box.include(p);
+    const auto halves = parts_of(all.patches[i]);
+    for (std::size_t j = 0; j < all.facets.size(); ++j) {
+      const auto& other = all.facets[j];
+      const Vec<2>& p = surface.x[other[0]];
+      if ((p.array() < box.min.array()).any() || (p.array() > box.max.array()).any()) continue;
+      const bool has_points = surface.is_obstacle(other) && other[0] != other[1];  // ends are tested as points
+      if (has_points || num_shared(all.facets[i], other) > 0 || surface.closed.exclude<2>(all.facets[i], other)) continue;
+      for (const auto& half : halves)
+        if (is_beyond_chord(half, p)) visit(other[0], i, orientation(half.at[0][0], half.at[1][1], half.at[0][1]) > 0);
+    }
+  }
+}
+
+}  // namespace
+
+template <int Dim>
+Patches<Dim> true_surface(const StoredFrame& frame, const FrameSurface<Dim>& surface) {
+  Patches<Dim> result;
+  const CurvedNodes node_of(frame);
+  const auto& x = surface.x;
+  const auto add = [&](const std::array<int, Dim>& facet) {
+    bool is_curved = false;
+    std::array<Vec<Dim>, Dim> corners;
+    for (int k = 0; k < Dim; ++k) corners[k] = x[facet[k]];
+    result.patches.push_back(quadratic_patch<Dim>(corners, [&](int i, int j) -> Vec<Dim> {
+      const int node = surface.is_obstacle(facet) ? kNone : node_of(facet[i], facet[j]);
+      is_curved = is_curved || node != kNone;
+      return node != kNone ? x[node] : Vec<Dim>((corners[i] + corners[j]) / 2);
+    }));
+    result.facets.push_back(facet);
+    result.is_curved.push_back(is_curved);
+  };
+  for (const auto& facet : surface.boundary) add(facet);
+  for (const auto& facet : facets_of(surface))
+    if (surface.is_obstacle(facet)) add(facet);
+  if constexpr (Dim == 3)
+    for (const auto& [a, b] : surface.edges)
+      if (surface.is_obstacle(std::array{a, b})) add({a, b, b});
+  for (int v = surface.num_body_vertices; v < static_cast<int>(x.size()); ++v) {
+    std::array<int, Dim> point;
+    point.fill(v);
+    add(point);
+  }
+  return result;
+}
+
+template <int Dim>
+std::set<int> find_in_hollows([[maybe_unused]] const FrameSurface<Dim>& surface, [[maybe_unused]] const Patches<Dim>& all) {
+  std::set<int> found;
+  if constexpr (Dim == 2)
+    for_each_beyond_chord(surface, all, [&](int vertex, std::size_t, bool is_hollow) {
+      if (is_hollow) found.insert(vertex);
+    });
+  return found;
+}
+
+template <int Dim>
+void check_curves(const FrameSurface<Dim>& surface, const Patches<Dim>& all, const std::string& name,
+                  std::vector<Violation>& violations) {
+  std::vector<Box<Dim>> boxes(all.patches.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    for (const auto& row : all.patches[i].at)
+      for (const Vec<Dim>& p : row) boxes[i].include(p);
+  const Bvh<Dim> tree(boxes);
+  std::vector<int> hits;
+  for (int i = 0; i < static_cast<int>(boxes.size()); ++i) {
+    if (!all.is_curved[i]) continue;
+    hits.clear();
+    tree.query(boxes[i], hits);
+    for (const int j : hits) {
+      if ((all.is_curved[j] && j <= i) || num_shared(all.facets[i], all.facets[j]) > 0) continue;
+      if (surface.closed.template exclude<Dim>(all.facets[i], all.facets[j])) continue;  // their chords are checked
+      if (!are_apart(all.patches[i], all.patches[j]))
+        violations.push_back(
+            {Violation::Of::surfaces, fmt::format("{}: curve {} is not proven to be apart from {}", name,
+                                                  surface.name(all.facets[i]), surface.name(all.facets[j]))});
+    }
+  }
+  if constexpr (Dim == 2)
+    for_each_beyond_chord(surface, all, [&](int vertex, std::size_t curve, bool is_hollow) {
+      if (!is_hollow)
+        violations.push_back(
+            {Violation::Of::surfaces, fmt::format("{}: vertex ({}) is between curve {} and its chords", name,
+                                                  surface.name(vertex), surface.name(all.facets[curve]))});
+    });
+}
+
+template <int Dim>
+void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surface, Certificate& certificate) {
+  const CurvedNodes node_of(frame);
+  if (node_of.edges.empty() || surface.has_proxy) return;
+  const auto& primitives = facets_of(surface);
+  const Bvh<Dim> tree(boxes_of<Dim>(surface.x, primitives));
+  const auto& x = surface.x;
+  std::vector<int> hits;
+  for (const auto& facet : surface.boundary)
+    for (int k = 0; k < (Dim == 2 ? 1 : 3); ++k) {
+      const int a = facet[k], b = facet[(k + 1) % Dim], node = node_of(a, b);
+      if (node == kNone) continue;
+      std::array<Vec<Dim>, Dim> corners;
+      for (int i = 0; i < Dim; ++i) corners[i] = x[facet[i]];
+      const double height = distance_from_chords<Dim>(corners, k, (k + 1) % Dim, x[node]);
+      certificate.overhang = std::max(certificate.overhang, height);
+      if (height <= certificate.blocked_overhang) continue;
+      Box<Dim> box;
+      for (const int v : {a, b, node}) box.include(x[v]);
+      hits.clear();
+      tree.query(box.inflated(height), hits);
+      std::vector<int> around;
+      for (const int i : hits)
+        if (num_shared(primitives[i], std::array{a, b, node}) > 0)
+          around.insert(around.end(), primitives[i].begin(), primitives[i].end());
+      const auto is_around = [&](int v) { return std::find(around.begin(), around.end(), v) != around.end(); };
+      if (std::any_of(hits.begin(), hits.end(), [&](int i) {
+            return std::none_of(primitives[i].begin(), primitives[i].end(), is_around) &&
+                   (is_nearer(x[a], x[node], surface, i, height) || is_nearer(x[node], x[b], surface, i, height));
+          }))
+        certificate.blocked_overhang = height;
+    }
+}
+
+template Patches<2> true_surface(const StoredFrame&, const FrameSurface<2>&);
+template std::set<int> find_in_hollows(const FrameSurface<2>&, const Patches<2>&);
+template void check_curves(const FrameSurface<2>&, const Patches<2>&, const std::string&, std::vector<Violation>&);
+template void measure_overhangs(const StoredFrame&, const FrameSurface<2>&, Certificate&);
+template Patches<3> true_surface(const StoredFrame&, const FrameSurface<3>&);
+template std::set<int> find_in_hollows(const FrameSurface<3>&, const Patches<3>&);
+template void check_curves(const FrameSurface<3>&, const Patches<3>&, const std::string&, std::vector<Violation>&);
+template void measure_overhangs(const StoredFrame&, const FrameSurface<3>&, Certificate&);
+
+}  // namespace itr::output

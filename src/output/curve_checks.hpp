@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Certifies the curved edges of a frame's surface as curves, not as chords through their nodes.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "certify.hpp"
+#include "frame_surface.hpp"
+#include "geometry/quadratic_patch.hpp"
+
+namespace itr::output {
+
+/// The true boundary of the bodies, then the obstacles, whose edges and vertices are triangles without an area in 3D.
+template <int Dim>
+struct Patches {
+  std::vector<std::array<int, Dim>> facets;
+  std::vector<QuadraticPatch<Dim>> patches;
+  std::vector<char> is_curved;
+};
+
+template <int Dim>
+Patches<Dim> true_surface(const StoredFrame& frame, const FrameSurface<Dim>& surface);
+
+/// Vertices that chords have inside of a body and curves have not. None in 3D, which is the safe side.
+template <int Dim>
+std::set<int> find_in_hollows(const FrameSurface<Dim>& surface, const Patches<Dim>& all);
+
+/// Proves by Bernstein bounds that true curves meet nothing. Neighbours in the surface are left to the cells.
+template <int Dim>
+void check_curves(const FrameSurface<Dim>& surface, const Patches<Dim>& all, const std::string& name,
+                  std::vector<Violation>& violations);
+
+/// Fills in what curved edges do beyond their chords. Pieces of the surface around an edge do not count as something else.
+template <int Dim>
+void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surface, Certificate& certificate);
+
+}  // namespace itr::output
