@@ -313,7 +313,7 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     const bool is_first_step = std::isinf(stiffness_.largest);
     if (adaptive_ && !is_first_step)
       problem_.initialize_stiffness(x);  // what the friction of the first round is lagged with
-    const double motion = problem_.relative_motion(with_held_at_targets(lagged_x) - base_);
+    const double motion = relative_motion<Dim>(with_held_at_targets(lagged_x) - base_);
     problem_.smooth_friction_by(lagged_x == base_ ? std::max(motion, problem_.last_motion_) : motion);
     lagged_ = potential_.lag(lagged_x, workspace_);
     // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
@@ -341,7 +341,7 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     VectorX gradient = VectorX::Zero(x.size());
     {
       const ScopedTimer timer(summary.assembly_seconds);
-      problem_.smooth_friction_by(problem_.relative_motion(problem_.increment_of(x)));
+      problem_.smooth_friction_by(relative_motion<Dim>(problem_.increment_of(x)));
       next_lagged = potential_.lag(x, workspace_);
       EnergyOfIncrement(potential_.sum(next_lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
     }
