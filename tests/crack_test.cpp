@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -399,6 +400,67 @@ void check_far_openings(bool remeshed) {
 TEST(Cracks, StayValidWhereTheyOpenFar2D) { check_far_openings<2>(false); }
 TEST(Cracks, StayValidWhereTheyOpenFar3D) { check_far_openings<3>(false); }
 TEST(Cracks, StayValidWhereTheyOpenFarRemeshed2D) { check_far_openings<2>(true); }
+
+/// The least distance along x of vertices of a plane crack that coincide at rest [m]; negative: its faces overlap.
+template <int Dim>
+double least_opening(const State<Dim>& state) {
+  const Mesh<Dim>& mesh = state.mesh;
+  const auto is_left = [&](VertexId v) {
+    return std::ranges::any_of(mesh.cell(mesh.cells_of(v)[0]),
+                               [&](VertexId w) { return mesh.rest(w)[0] < mesh.rest(v)[0]; });
+  };
+  double least = std::numeric_limits<double>::infinity();
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v)
+    for (VertexId w = 0; w < mesh.num_vertices(); ++w)
+      if (v != w && mesh.rest(v) == mesh.rest(w) && is_left(v) && !is_left(w))
+        least = std::min(least, state.history.x[0][Dim * w] - state.history.x[0][Dim * v]);
+  return least;
+}
+
+/// A body with a plane crack, whose sides are pulled apart and pressed together then, farther than the crack is open.
+template <int Dim>
+void check_closing(bool remeshed) {
+  linear::Registry registry;
+  for (unsigned seed = 0; seed < (remeshed || Dim == 3 ? 3 : 6); ++seed) {
+    std::mt19937 random(seed);
+    itr::Setup<Dim> setup = opened_cracks<Dim>(with_plane_crack<Dim>(random), {});
+    setup.neumann.clear();
+    std::array<bool, Dim> all;
+    all.fill(true);
+    for (const int side : {0, 1}) {
+      for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f)
+        if (std::ranges::all_of(setup.mesh.facet(f), [&](VertexId v) { return setup.mesh.rest(v)[0] == side; }))
+          setup.mesh.set_facet_tag(f, 2 + side);
+      setup.dirichlet.push_back({2 + side, all, [side](const RestPoint<Dim>&, double t) {
+                                   return Vec<Dim>((2 * side - 1) * (t < 4.5 ? 0.01 * t : 0.01 * (8 - t)) *
+                                                   Vec<Dim>::UnitX());
+                                 }});
+    }
+    setup.time = {.quasistatic = true, .dt = 1, .steps = 12};
+    setup.contact.activation_distance = 1e-3;
+    setup.remesh.enabled = remeshed;
+    Simulation<Dim> with(setup, registry);
+    setup.contact.enabled = false;
+    Simulation<Dim> without(setup, registry);
+    StepResult result;
+    double widest = 0;
+    for (int step = 0; step < setup.time.steps; ++step) {
+      result = with.advance();
+      ASSERT_TRUE(result.ok) << "seed " << seed << ", step " << step << ": " << result.reason;
+      ASSERT_TRUE(without.advance().ok);
+      ASSERT_EQ(violation_of(with), "") << "seed " << seed << ", step " << step;
+      ASSERT_GT(least_opening(with.state()), 0) << "seed " << seed << ", step " << step;
+      widest = std::max(widest, least_opening(with.state()));
+    }
+    EXPECT_GT(widest, 3 * setup.contact.activation_distance);
+    EXPECT_LT(least_opening(without.state()), -3 * setup.contact.activation_distance);
+    EXPECT_LT(least_opening(with.state()), setup.contact.activation_distance);
+    EXPECT_GT(result.report.energy.contact, 0);
+  }
+}
+TEST(Cracks, AreInContactWhereTheyCloseAgain2D) { check_closing<2>(false); }
+TEST(Cracks, AreInContactWhereTheyCloseAgain3D) { check_closing<3>(false); }
+TEST(Cracks, AreInContactWhereTheyCloseAgainRemeshed2D) { check_closing<2>(true); }
 
 /// A square over a wider body, which is held below; `gap`: between them [m].
 itr::Setup<2> two_squares(double gap, double acceleration) {

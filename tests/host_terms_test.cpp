@@ -170,6 +170,14 @@ TEST(HostForces, ThatDoNotSettleToTheToleranceCutTheStep) {
   EXPECT_NE(warnings.find("expected at most 0.001 (/solver/lagging_tolerance)"), std::string::npos) << warnings;
 }
 
+TEST(HostForces, ThatDoNotSettleToTheToleranceAreWarnedOfWhereNoStepIsCut) {
+  auto setup = between_springs(9000);
+  setup.lagging_tolerance = 1e-6;
+  std::string warnings;
+  EXPECT_TRUE(step_of(setup, &warnings).ok);
+  EXPECT_NE(warnings.find("expected at most 1e-06 (/solver/lagging_tolerance)"), std::string::npos) << warnings;
+}
+
 TEST(HostForces, InACycleAreNoSolution) {
   // On the whole block, of its mass by the square of the time step: it goes there and back from round to round.
   auto setup = block<2>();

@@ -107,9 +107,8 @@ void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const Ve
 }
 
 template <int Dim>
-Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords,
-                          int age) {
-  const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords, age);
+Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords) {
+  const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords);
   return body_boundary(mesh, x, chords).find_overlap(contact.surface.closed);
 }
 
@@ -119,7 +118,7 @@ Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
   template double coincidence(const Mesh<Dim>&);                                                   \
   template void close_coincident_faces(const StepSetup<Dim>&, Mesh<Dim>&);                         \
   template void open_faces(const StepSetup<Dim>&, const ChordLevels&, const VectorX&, Mesh<Dim>&); \
-  template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const VectorX&, const ChordLevels&, int);
+  template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const VectorX&, const ChordLevels&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)
 #undef ITR_INSTANTIATE

@@ -26,9 +26,8 @@ void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh);
 template <int Dim>
 void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const VectorX& x, Mesh<Dim>& mesh);
 
-/// How bodies overlap at x.
+/// How bodies overlap at x, the present positions.
 template <int Dim>
-Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords,
-                          int age = 0);
+Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords);
 
 }  // namespace itr

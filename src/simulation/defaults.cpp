@@ -115,10 +115,7 @@ double prescribed_way(const Setup<Dim>& setup) {
     const int steps = setup.time.is_static ? 1 : kFirstSteps;
     for (int i = 1; i <= steps; ++i) {
       const double t = setup.time.t0 + setup.time.dt * i;
-      const VectorX way = held_dofs(setup, setup.mesh, t).target - first;
-      Eigen::AlignedBox<double, Dim> box;
-      for (Eigen::Index k = 0; k < way.size(); k += Dim) box.extend(Vec<Dim>(way.template segment<Dim>(k)));
-      longest = std::max(longest, box.diagonal().norm());
+      longest = std::max(longest, relative_motion<Dim>(held_dofs(setup, setup.mesh, t).target - first));
     }
   } catch (const InputError&) {  // no value at a time that no step asks for
   }

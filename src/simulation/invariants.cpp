@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "fem/inverted.hpp"
-#include "simulation/closed_faces.hpp"
 #include "simulation/contact_surface.hpp"
 
 namespace itr {
@@ -21,8 +20,7 @@ std::string pressed_faces(const Overlap<Dim>& overlap, double dhat, const Units&
   for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.4g}", c ? ", " : "", units.from_si(overlap.place[c], "m"));
   return fmt::format(
       "faces that coincide at rest are pressed into each other, by {}more than d-hat, {}, at ({}): contact acts between "
-      "them "
-      "only once they have been apart by d-hat; where they are to be pressed together, leave a gap between them",
+      "them only once they have been apart by d-hat; where they are to be pressed together, leave a gap between them",
       std::isfinite(overlap.depth) ? units.text(overlap.depth, "m", 3) + ", " : "", units.text(dhat, "m", 3), place);
 }
 
@@ -45,7 +43,7 @@ std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords, age);
   const double dhat = setup.contact.activation_distance;
   const bool has_closed = !contact.surface.closed.empty();
-  const auto overlap = has_closed ? find_overlap(setup, mesh, x, chords, age) : Overlap<Dim>{};
+  const auto overlap = has_closed ? body_boundary(mesh, x, chords).find_overlap(contact.surface.closed) : Overlap<Dim>{};
   if (overlap.depth > dhat && std::isfinite(overlap.depth)) return pressed_faces(overlap, dhat, setup.units);
   const VectorX y = contact.positions(x);
   if (const auto pairs = find_intersections<Dim>(contact.surface, y, 1); !pairs.empty()) {

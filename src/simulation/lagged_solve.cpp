@@ -247,13 +247,16 @@ template <int Dim>
 void LaggedSolve<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds,
                                      NewtonSummary& summary) {
   if (!now) now = potential_.lag(x, workspace_);
-  if (const double change = must_settle_ ? largest_change(x, *now) : 0; change > setup_.lagging_tolerance) {
-    summary.termination = Termination::lagging;
+  const double asked = setup_.lagging_tolerance, change = asked > 0 ? largest_change(x, *now) : 0;
+  if (change > asked) {
     summary.message = fmt::format(
         "friction, pressure or damping changes by {:.2g} of the largest force, {} after {} solves; expected at most {:g} "
         "(/solver/lagging_tolerance)",
-        change, how, rounds, setup_.lagging_tolerance);
-    return;
+        change, how, rounds, asked);
+    if (must_settle_) {
+      summary.termination = Termination::lagging;
+      return;
+    }
   }
   if (has_lagged_loads()) {
     const double off = change_of(x, *now, [](const Traits& term) { return term.has_no_potential; });
@@ -268,12 +271,12 @@ void LaggedSolve<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now
           off, how, rounds, setup_.lagged_load_tolerance);
       return;
     }
-    if (off > kLoadsWorthSaying * setup_.lagged_load_tolerance)
+    if (asked == 0 && off > kLoadsWorthSaying * setup_.lagged_load_tolerance)
       summary.message = fmt::format(
           "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves", off,
           how, rounds);
   }
-  if (!lagged_.friction || !now->friction) return;
+  if (asked > 0 || !lagged_.friction || !now->friction) return;
   const double off = change_of(x, *now, [](const Traits& term) { return term.kind == TermKind::friction; });
   if (off > kFrictionWorthSaying)
     summary.message += fmt::format(
@@ -310,7 +313,7 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     const bool is_first_step = std::isinf(stiffness_.largest);
     if (adaptive_ && !is_first_step)
       problem_.initialize_stiffness(x);  // what the friction of the first round is lagged with
-    const double motion = problem_.relative_motion(with_held_at_targets(lagged_x) - base_);
+    const double motion = relative_motion<Dim>(with_held_at_targets(lagged_x) - base_);
     problem_.smooth_friction_by(lagged_x == base_ ? std::max(motion, problem_.last_motion_) : motion);
     lagged_ = potential_.lag(lagged_x, workspace_);
     // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
@@ -338,7 +341,7 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     VectorX gradient = VectorX::Zero(x.size());
     {
       const ScopedTimer timer(summary.assembly_seconds);
-      problem_.smooth_friction_by(problem_.relative_motion(problem_.increment_of(x)));
+      problem_.smooth_friction_by(relative_motion<Dim>(problem_.increment_of(x)));
       next_lagged = potential_.lag(x, workspace_);
       EnergyOfIncrement(potential_.sum(next_lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
     }

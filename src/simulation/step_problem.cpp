@@ -62,7 +62,7 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_.surface, setup.contact, average_mass(), terms_.scaling,
                                                            surface_.map.get());
   }
-  if (!history.v.empty()) last_motion_ = relative_motion(history.v[0]) * setup.time.dt;
+  if (!history.v.empty()) last_motion_ = relative_motion<Dim>(history.v[0]) * setup.time.dt;
   potential_.elastic()->set_quadrature_levels(levels);
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
     if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials); !loose.empty())
@@ -109,14 +109,6 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
 template <int Dim>
 NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected, bool must_settle) {
   return LaggedSolve<Dim>(*this, must_settle).solve(x, lagged_x, expected);
-}
-
-/// The diagonal of the box of all motions, obstacles' included [m].
-template <int Dim>
-double StepProblem<Dim>::relative_motion(const VectorX& increment) const {
-  Eigen::AlignedBox<double, Dim> box;
-  for (Eigen::Index i = 0; i < increment.size(); i += Dim) box.extend(Vec<Dim>(increment.template segment<Dim>(i)));
-  return box.isEmpty() ? 0 : box.diagonal().norm();
 }
 
 /// Where the scene leaves it open, friction is smoothed below a part of the relative motion in the step [m]: bodies that

@@ -70,7 +70,6 @@ class StepProblem {
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
   void initialize_stiffness(const VectorX& x);
-  double relative_motion(const VectorX& increment) const;
   void smooth_friction_by(double motion);
   void reset_system();
   SparseSystem& system();

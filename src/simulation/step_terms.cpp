@@ -97,6 +97,13 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
 }
 
 template <int Dim>
+double relative_motion(const VectorX& motions) {
+  Eigen::AlignedBox<double, Dim> box;
+  for (Eigen::Index i = 0; i < motions.size(); i += Dim) box.extend(Vec<Dim>(motions.segment<Dim>(i)));
+  return box.isEmpty() ? 0 : box.diagonal().norm();
+}
+
+template <int Dim>
 double rest_diagonal(const Mesh<Dim>& mesh) {
   return rest_box(mesh).diagonal().norm();
 }
@@ -124,6 +131,7 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
   template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                      \
   template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                   \
   template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);           \
+  template double relative_motion<Dim>(const VectorX&);                                             \
   template double rest_diagonal<Dim>(const Mesh<Dim>&);
 ITR_INSTANTIATE(2)
 ITR_INSTANTIATE(3)

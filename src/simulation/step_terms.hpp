@@ -39,6 +39,10 @@ typename HeldRule<Dim>::Components held_components(const StepSetup<Dim>& setup);
 template <int Dim>
 HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t);
 
+/// Diagonal of the box of all motions, of bodies and obstacles [m].
+template <int Dim>
+double relative_motion(const VectorX& motions);
+
 /// Diagonal of the bounding box of the bodies at rest [m].
 template <int Dim>
 double rest_diagonal(const Mesh<Dim>& mesh);

@@ -30,7 +30,12 @@ struct Step {
         state{body.mesh, fields, context, gate.present(), HistoryRule::function} {}
 
   static RemeshFields<Dim> make_fields(const Body<Dim>& body) {
-    return {.x = body.x, .predictor = body.x, .velocity_reference = body.x, .past_positions = {body.x}, .past_rates = {}};
+    return {.x = body.x,
+            .predictor = body.x,
+            .velocity_reference = body.x,
+            .past_positions = {body.x},
+            .past_rates = {},
+            .levels = {}};
   }
   static StepContext<Dim> make_context(int n, bool has_contact) {
     StepContext<Dim> context;
@@ -90,7 +95,7 @@ double bound(Step<Dim>& step, const EdgeKey& edge) {
 template <int Dim>
 double trial(Step<Dim>& step, const EdgeKey& edge) {
   const auto edit = make_split(step.body.mesh, edge);
-  preview<Dim>(step.state, step.gate, edit, {.required = 1e9, .total_volume = 1, .local = {}}, step.scratch, step.verdict);
+  preview<Dim>(step.state, step.gate, edit, {.required = 1e9, .local = {}}, step.scratch, step.verdict);
   return step.verdict.gain;
 }
 

@@ -19,10 +19,12 @@ int dump(const std::string& scene, const std::string& folder, int every, const s
          std::vector<scene::Override> overrides) {
   const auto registry = std::make_shared<linear::Registry>();
   registry->allow_mpi_start();
-  registry->add({.name = "dumped", .capabilities = {.iterative = true}, .available = true},
-                [&, solvers = registry.get()](const linear::SolverOptions&) {
-                  return linear::make_dumping_solver(solvers->create(solver), folder, every);
-                });
+  linear::BackendInfo info;
+  info.name = "dumped";
+  info.capabilities.iterative = info.available = true;
+  registry->add(info, [&, solvers = registry.get()](const linear::SolverOptions&) {
+    return linear::make_dumping_solver(solvers->create(solver), folder, every);
+  });
   overrides.push_back({"/solver/linear/solver", "\"dumped\""});
   AnySimulation simulation(Model::from_scene(scene, overrides), {}, registry);
   while (!simulation.finished())
