@@ -17,8 +17,8 @@ class VtkCells {
   void begin_piece(const std::vector<double>& coordinates);
   /// Adds a cell of VTK's type `type`. Throws InputError for types that are not read.
   void add(int type, const std::vector<std::int64_t>& points);
-  std::size_t num_cells() const { return cells_.size(); }  ///< of this piece
-  std::size_t num_points() const { return num_points_; }   ///< of this piece
+  std::size_t num_cells() const { return num_cells_; }    ///< of this piece
+  std::size_t num_points() const { return num_points_; }  ///< of this piece
 
   /// Numbers of cells become groups where the array is one that says so (`body`, `gmsh:physical`, ...), and those other than
   /// 0 a named set where it is called "set:NAME".
@@ -31,9 +31,14 @@ class VtkCells {
  private:
   MeshBuilder mesh_;
   const std::filesystem::path& file_;
-  std::size_t num_points_ = 0;
+  struct Element {
+    std::size_t cell;  ///< of this piece
+    int dim;
+    std::int64_t member;  ///< see MeshBuilder::add_member
+  };
+  std::size_t num_points_ = 0, num_cells_ = 0;
   std::int64_t first_ = 0, all_cells_ = 0;
-  std::vector<std::vector<std::pair<int, std::int64_t>>> cells_;  ///< of this piece: elements that each became
+  std::vector<Element> elements_;  ///< of this piece
 };
 
 }  // namespace itr
