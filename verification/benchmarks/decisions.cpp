@@ -90,7 +90,7 @@ double bound(Step<Dim>& step, const EdgeKey& edge) {
 template <int Dim>
 double trial(Step<Dim>& step, const EdgeKey& edge) {
   const auto edit = make_split(step.body.mesh, edge);
-  preview<Dim>(step.state, step.gate, edit, {.required = 1e9, .total_volume = 1, .local = {}}, step.scratch, step.verdict);
+  preview<Dim>(step.state, step.gate, edit, {.required = 1e9, .local = {}}, step.scratch, step.verdict);
   return step.verdict.gain;
 }
 

@@ -266,7 +266,7 @@ void ProjectCoarsening(benchmark::State& state) {
   for (int c = before.cell_slots(); c < mesh.cell_slots(); ++c) touched.new_cells.push_back(c);
   const VectorX field = VectorX::Random(3 * before.node_slots());
   for (auto _ : state) {
-    const TransferPatch<3> patch = make_transfer_patch(before, {}, mesh, {}, touched, kMaterials, 3);
+    const TransferPatch<3> patch = make_transfer_patch(before, mesh, touched, kMaterials, 3);
     MatrixX u_old(patch.old_cells.vertices.size(), 6), u_bar(patch.new_cells.vertices.size(), 6);
     u_old << patch.old_cells.gather(field), patch.old_cells.gather(field);
     u_bar << patch.new_cells.gather(field), patch.new_cells.gather(field);
