@@ -329,10 +329,15 @@ TEST(CurvedMesh, AnEdgeHasTheLeastOrderOfItsCells) {
 }
 
 TEST(CurvedMesh, HasEdgesOfItsOwnOnlyAscendingAndOnce) {
-  const Mesh<2> mesh = two_cells<2>();
   const std::vector<std::vector<EdgeKey>> wrong = {{{1, 3}},  {{0, 4}},         {{1, 0}},
                                                    {{-1, 2}}, {{0, 2}, {0, 1}}, {{0, 1}, {0, 1}}};
-  for (const auto& edges : wrong) EXPECT_THROW(curved(mesh, edges), InputError) << edges[0][0] << " " << edges[0][1];
+  Mesh<2> mesh = curved(two_cells<2>(), {{0, 1}});
+  const std::uint64_t revision = mesh.revision();
+  for (const auto& edges : wrong) {
+    EXPECT_THROW(mesh.set_curved_edges(edges), InputError) << edges[0][0] << " " << edges[0][1];
+    EXPECT_EQ(mesh.curved_edges(), (std::vector<EdgeKey>{{0, 1}}));
+    EXPECT_EQ(mesh.revision(), revision);
+  }
 }
 
 /// A revision stays with copies, and no two contents share one.

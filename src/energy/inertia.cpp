@@ -84,8 +84,9 @@ double InertiaEnergy<Dim>::value_of(ConstVectorView distance) const {
     }
     return part;
   });
+  const auto curved = cells_.curved();
   for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
-    const auto d = at_nodes<Dim>(cells_.curved()[e].nodes(), distance);
+    const auto d = at_nodes<Dim>(curved[e].nodes(), distance);
     sum += 0.5 * curved_mass_[e].mass * (d * matrices_[curved_mass_[e].matrix]).cwiseProduct(d).sum();
   }
   if (residual_.size() > 0) sum += residual_.view().dot(distance) + loss_;
@@ -127,8 +128,9 @@ void InertiaEnergy<Dim>::add_mass_product(ConstVectorView x, VectorView y) const
   Eigen::Map<Rows> to(y.data(), y.size() / Dim, Dim);
   for (std::size_t e = 0; e < mass_.size(); ++e)
     ElementMass<Dim>(kind_, mass_[e]).add_product(cells_.elements[e].vertices, from, to);
+  const auto curved = cells_.curved();
   for (std::size_t e = 0; e < curved_mass_.size(); ++e) {
-    const auto nodes = cells_.curved()[e].nodes();
+    const auto nodes = curved[e].nodes();
     const auto product = (curved_mass_[e].mass * at_nodes<Dim>(nodes, x) * matrices_[curved_mass_[e].matrix]).eval();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k) y.template segment<Dim>(Dim * nodes[k]) += product.col(k);
   }

@@ -56,9 +56,8 @@ class Locator {
   Locator(Locator&&) noexcept;
 
   struct Place {
-    CellId cell = kNone;  ///< kNone: there are no cells (of that body)
-    std::array<VertexId, kQuadraticNodes<Dim>>
-        nodes{};  ///< of the cell, vertices first; at a straight edge its first vertex
+    CellId cell = kNone;                                 ///< kNone: there are no cells (of that body)
+    std::array<VertexId, kQuadraticNodes<Dim>> nodes{};  ///< of the cell, as CellSet::Element::nodes
     CurvedEdges curved = 0;
     std::array<double, Dim + 1> weights{};  ///< barycentric: >= 0, of sum 1; exactly 1 and 0 at a vertex
   };

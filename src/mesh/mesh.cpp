@@ -292,12 +292,12 @@ void Mesh<Dim>::remove_nodes() {
 template <int Dim>
 void Mesh<Dim>::set_curved_edges(const std::vector<EdgeKey>& edges) {
   ITR_CHECK(is_compact(), node_slots(), num_vertices_);
-  remove_nodes();
   for (const auto& [a, b] : edges)
     if (a < 0 || b <= a || b >= num_vertices_ || !are_joined(a, b))
       throw InputError({"", "curved edges", std::to_string(a) + "-" + std::to_string(b), "edges of the mesh"});
   if (std::adjacent_find(edges.begin(), edges.end(), std::greater_equal<>()) != edges.end())
     throw InputError({"", "curved edges", "rows in another order", "ascending rows"});
+  remove_nodes();
   for (const EdgeKey& edge : edges) add_node(edge);
   renew_revision();
 }

@@ -149,8 +149,8 @@ void MeshBuilder::merge_repeated(std::vector<std::array<int, N>>& elements, int 
       for (int& member : group.members) member = place[member];
 }
 
-/// The library's meshes are straight at rest: of a file of second order the corners say all, if the other nodes are where
-/// they say. Whether this one is elsewhere.
+/// Measures how far a node is from the middle of its edge, where it is in meshes that are straight at rest. Returns whether
+/// that is more than rounding.
 bool MeshBuilder::measure_sag(const Middle& middle, int a, int b, int m) {
   constexpr double kRounding = 1e-6;  // of the edge's length: digits of text files
   const Vec<3>&A = mesh_.vertices[a], &B = mesh_.vertices[b];

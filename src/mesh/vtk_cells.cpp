@@ -40,7 +40,8 @@ bool is_numbered(const std::string& name) {
 void VtkCells::begin_piece(const std::vector<double>& coordinates) {
   first_ += static_cast<std::int64_t>(num_points_);
   num_points_ = coordinates.size() / 3;
-  cells_.clear();
+  num_cells_ = 0;
+  elements_.clear();
   for (std::size_t p = 0; p < num_points_; ++p)
     mesh_.add_node(first_ + static_cast<std::int64_t>(p) + 1,
                    Vec<3>(coordinates[3 * p], coordinates[3 * p + 1], coordinates[3 * p + 2]));
@@ -75,31 +76,30 @@ void VtkCells::add_cell(int type, std::span<const double> points) {
       fail("point " + std::to_string(std::llround(point)), "0 to " + std::to_string(num_points_) + " - 1");
     nodes.push_back(first_ + static_cast<std::int64_t>(point) + 1);
   }
-  auto& elements = cells_.emplace_back();
+  const std::size_t cell = num_cells_++;
   if (known->dim == 0) {
-    for (const std::int64_t node : nodes) elements.push_back({0, node});
+    for (const std::int64_t node : nodes) elements_.push_back({cell, 0, node});
   } else if (type == 4) {
     for (std::size_t i = 0; i + 1 < nodes.size(); ++i)
-      elements.push_back({1, mesh_.add_element(1, std::span(nodes).subspan(i, 2), all_cells_)});
+      elements_.push_back({cell, 1, mesh_.add_element(1, std::span(nodes).subspan(i, 2), all_cells_)});
   } else {
     const std::size_t expected = MeshBuilder::num_nodes_of(known->dim, known->is_second_order);
     if (nodes.size() != expected)
       fail(std::to_string(nodes.size()) + " points", std::to_string(expected) + (type == 7 ? ": triangles only" : ""));
-    elements.push_back({known->dim, mesh_.add_element(known->dim, nodes, all_cells_)});
+    elements_.push_back({cell, known->dim, mesh_.add_element(known->dim, nodes, all_cells_)});
   }
   ++all_cells_;
 }
 
 void VtkCells::add_cell_data(const std::string& name, const std::vector<double>& values) {
-  if (values.size() != cells_.size() || !(is_numbered(name) || name.starts_with(kSet))) return;
+  if (values.size() != num_cells_ || !(is_numbered(name) || name.starts_with(kSet))) return;
   const bool is_set = name.starts_with(kSet);
-  for (std::size_t c = 0; c < values.size(); ++c) {
-    const bool is_integer = values[c] == std::floor(values[c]) && std::abs(values[c]) < 2147483647;
-    if (!is_integer || values[c] == 0 || (!is_set && values[c] < 0)) continue;
-    for (const auto& [dim, element] : cells_[c])
-      mesh_.add_member(
-          is_set ? mesh_.group(dim, 0, name.substr(kSet.size())) : mesh_.group(dim, static_cast<int>(values[c]), ""),
-          element);
+  for (const auto& [cell, dim, member] : elements_) {
+    const double value = values[cell];
+    const bool is_integer = value == std::floor(value) && std::abs(value) < 2147483647;
+    if (!is_integer || value == 0 || (!is_set && value < 0)) continue;
+    mesh_.add_member(is_set ? mesh_.group(dim, 0, name.substr(kSet.size())) : mesh_.group(dim, static_cast<int>(value), ""),
+                     member);
   }
 }
 

@@ -15,9 +15,8 @@ class VtkCells {
 
   /// Three coordinates a point. Points of cells are counted from the first of these.
   void begin_piece(const std::vector<double>& coordinates);
-  /// Adds cells as VTK's files have them: all `points`, one cell after another, and by cell where its points end
-  /// and VTK's type. Throws InputError for types that are not read, and for counts, ends and
-  /// points that do not fit.
+  /// Adds cells as VTK's files have them: all `points`, one cell after another, and by cell where its points end and VTK's
+  /// type. Throws InputError for types that are not read, and for counts, ends and points that do not fit.
   void add(const std::vector<double>& points, const std::vector<double>& ends, const std::vector<double>& types);
 
   /// Numbers of cells become groups where the array is one that says so (`body`, `gmsh:physical`, ...), and those other than
@@ -32,11 +31,17 @@ class VtkCells {
   void add_cell(int type, std::span<const double> points);
   [[noreturn]] void fail(const std::string& found, const std::string& expected) const;
 
+  struct Element {
+    std::size_t cell;  ///< of this piece
+    int dim;
+    std::int64_t member;  ///< see MeshBuilder::add_member
+  };
+
   MeshBuilder mesh_;
   const std::filesystem::path& file_;
-  std::size_t num_points_ = 0;
+  std::size_t num_points_ = 0, num_cells_ = 0;
   std::int64_t first_ = 0, all_cells_ = 0;
-  std::vector<std::vector<std::pair<int, std::int64_t>>> cells_;  ///< of this piece: elements that each became
+  std::vector<Element> elements_;  ///< of this piece
 };
 
 }  // namespace itr

@@ -67,13 +67,12 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
   std::size_t first = 0;
   for (int ring = 0; ring <= rings; ++ring) {  // cells around the vertices of the ring before
     const std::size_t end = patch.new_cells.vertices.size();
-    for (std::size_t i = std::exchange(first, end); i < end; ++i) {
+    for (std::size_t i = std::exchange(first, end); i < end; ++i)
       for (const CellId c : mesh.cells_of(patch.new_cells.vertices[i]))  // of a curved edge's node none: its ends are there
         if (inside.insert(c).second) {
           ids.push_back(c);
           numbering.add(c);
         }
-    }
   }
   for (const int v : patch.new_cells.vertices) {
     std::vector<CellId> of_edge;
@@ -83,17 +82,18 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
   }
   patch.cells.num_vertices = static_cast<int>(patch.new_cells.vertices.size());
   patch.cells.rest = patch.new_cells.rest;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    auto element = element_of(mesh, ids[i]);
-    element.vertices = patch.new_cells.cells[i];
-    element.part = kNone;
-    element.edge_nodes.fill(element.vertices[0]);
-    if (element.curved) {
-      const auto& nodes = patch.new_cells.nodes[i];
-      std::copy(nodes.begin() + Dim + 1, nodes.end(), element.edge_nodes.begin());
+  for (const bool is_curved : {false, true})  // in the order of CellSet, which else moves others for each
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      if (is_curved != (patch.new_cells.view().curved_edges(i) != 0)) continue;
+      auto element = element_of(mesh, ids[i]);
+      element.vertices = patch.new_cells.cells[i];
+      element.edge_nodes.fill(element.vertices[0]);
+      if (is_curved) {
+        const auto& nodes = patch.new_cells.nodes[i];
+        std::copy(nodes.begin() + Dim + 1, nodes.end(), element.edge_nodes.begin());
+      }
+      patch.cells.add(element);
     }
-    patch.cells.add(element);
-  }
   return patch;
 }
 

@@ -115,10 +115,4 @@ class ElasticPoint {
   EigenSystem<Dim> system_;  ///< of other laws
 };
 
-/// Elastic energy of a straight element.
-template <int Dim>
-double elastic_energy(const typename CellSet<Dim>::Element& element, ConstVectorView x, const ElasticModuli& moduli) {
-  return element.volume * elastic_density<Dim>(deformation_gradient<Dim>(element, x), moduli);
-}
-
 }  // namespace itr

@@ -157,14 +157,14 @@ double free_step(const typename CellSet<Dim>::Element& element, ConstVectorView 
 template <int Dim>
 QuadraticElasticity<Dim>::QuadraticElasticity(const CellSet<Dim>& cells, const std::map<int, Material>& materials,
                                               double scale, int degree)
-    : cells_(cells), degree_(degree), scale_(scale) {
+    : cells_(cells), elements_(cells.curved()), degree_(degree), scale_(scale) {
   bool varies = false;
   for (const auto& [body, material] : materials) {
     varies = varies || material.has_varying_moduli();
     by_body_[body] = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
   }
-  by_element_.reserve(elements().size());
-  for (const Element& element : elements()) by_element_.push_back(&by_body_.at(element.body));
+  by_element_.reserve(elements_.size());
+  for (const Element& element : elements_) by_element_.push_back(&by_body_.at(element.body));
   if (!varies) return;
   materials_ = materials;
   sample_moduli();
@@ -177,7 +177,7 @@ void QuadraticElasticity<Dim>::sample_moduli() {
   at_barycenters_.clear();
   if (materials_.empty()) return;
   for (std::size_t e = 0; e < by_element_.size(); ++e) {
-    const Element& element = elements()[e];
+    const Element& element = elements_[e];
     first_varying_.push_back(varying_.size());
     at_barycenters_.push_back(elastic_moduli<Dim>(materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
     for (const auto& point : rule(e))
@@ -195,7 +195,7 @@ void QuadraticElasticity<Dim>::set_levels(const QuadratureLevels& levels) {
 /// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.
 template <int Dim>
 bool QuadraticElasticity<Dim>::is_blind(std::size_t e, ConstVectorView x) const {
-  const Element& element = elements()[e];
+  const Element& element = elements_[e];
   const QuadraticCell<Dim> all = at_all_nodes<Dim>(element, x);
   if (varies_little<Dim>(all, kSeen)) return false;
   const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
@@ -225,10 +225,10 @@ bool QuadraticElasticity<Dim>::refine_quadrature(ConstVectorView x) {
 template <int Dim>
 template <typename F>
 double QuadraticElasticity<Dim>::sum_over_cells(const Displacement<Dim>& u, ConstVectorView x, const F& at_point) const {
-  return scale_ * parallel_sum(elements().size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  return scale_ * parallel_sum(elements_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
            double sum = 0;
            for (std::size_t e = begin; e < end; ++e) {
-             const Element& element = elements()[e];
+             const Element& element = elements_[e];
              const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
              const auto& rule = this->rule(e);
              for (std::size_t q = 0; q < rule.size(); ++q) {
@@ -259,7 +259,7 @@ double QuadraticElasticity<Dim>::size_of_summands(const Displacement<Dim>& u, Co
 template <int Dim>
 void QuadraticElasticity<Dim>::add_gradient(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const {
   const auto forces_of = [&](std::size_t e) -> Nodal<Dim> {
-    const Element& element = elements()[e];
+    const Element& element = elements_[e];
     const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
     Nodal<Dim> forces = Nodal<Dim>::Zero();
     const auto& rule = this->rule(e);
@@ -273,8 +273,8 @@ void QuadraticElasticity<Dim>::add_gradient(const Displacement<Dim>& u, ConstVec
       forces += scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
     return forces;
   };
-  parallel_then_ordered<Nodal<Dim>>(elements().size(), kBlock, forces_of, [&](std::size_t e, const Nodal<Dim>& forces) {
-    const auto nodes = elements()[e].nodes();
+  parallel_then_ordered<Nodal<Dim>>(elements_.size(), kBlock, forces_of, [&](std::size_t e, const Nodal<Dim>& forces) {
+    const auto nodes = elements_[e].nodes();
     for (int k = 0; k < kNodes; ++k) gradient.segment<Dim>(Dim * nodes[k]) += forces.col(k);
   });
 }
@@ -282,7 +282,7 @@ void QuadraticElasticity<Dim>::add_gradient(const Displacement<Dim>& u, ConstVec
 template <int Dim>
 void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const {
   sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
-    const Element& element = elements()[e];
+    const Element& element = elements_[e];
     const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
     const auto& rule = this->rule(e);
     block.setZero();
@@ -317,9 +317,9 @@ void QuadraticElasticity<Dim>::add_hessian(ConstVectorView x, PsdProjection psd,
 
 template <int Dim>
 double QuadraticElasticity<Dim>::max_step(ConstVectorView x, ConstVectorView dx) const {
-  return parallel_min(elements().size(), kBlock, [&](std::size_t begin, std::size_t end) {
+  return parallel_min(elements_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     double step = 1;
-    for (const Element& element : elements().subspan(begin, end - begin))
+    for (const Element& element : elements_.subspan(begin, end - begin))
       step = std::min(step, free_step<Dim>(element, x, dx));
     return step;
   });
@@ -327,7 +327,7 @@ double QuadraticElasticity<Dim>::max_step(ConstVectorView x, ConstVectorView dx)
 
 template <int Dim>
 void QuadraticElasticity<Dim>::limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const {
-  for (const Element& element : elements()) {
+  for (const Element& element : elements_) {
     const double t = free_step<Dim>(element, x, dx);
     if (t < least.step) least = {t, "cell", {element.vertices.begin(), element.vertices.end()}};
   }

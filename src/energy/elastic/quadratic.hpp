@@ -41,7 +41,6 @@ class QuadraticElasticity {
   using Element = typename CellSet<Dim>::Element;
   static constexpr int kNodes = kQuadraticNodes<Dim>;
 
-  std::span<const Element> elements() const { return cells_.curved(); }
   const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
     return cell_quadrature<Dim>(levels_.empty() ? 0 : levels_[e], degree_);
   }
@@ -57,7 +56,8 @@ class QuadraticElasticity {
   }
 
   const CellSet<Dim>& cells_;
-  int degree_;  ///< of level 0
+  std::span<const Element> elements_;  ///< the curved ones
+  int degree_;                         ///< of level 0
   QuadratureLevels levels_;
   std::map<int, Material> materials_;  ///< empty unless moduli vary in space
   std::map<int, ElasticModuli> by_body_;

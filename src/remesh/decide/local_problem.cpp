@@ -202,19 +202,21 @@ template <int Dim>
 void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
   scratch_.cells.clear(mesh_.cell_slots());
   cells_.elements.reserve(patch.size() + edit_.inserted_cells.size());
+  scratch_.curved.clear();
   for (const CellId c : patch) {
     scratch_.cells.mark(c);
     if (is_after_ && std::find(edit_.removed_cells.begin(), edit_.removed_cells.end(), c) != edit_.removed_cells.end())
       continue;
     add_cell({mesh_.cell(c), mesh_.body(c), mesh_.volume(c), mesh_.inverse_rest_edges(c), mesh_.part(c), c});
   }
-  if (!is_after_) return;
-  for (const auto& cell : edit_.inserted_cells) {
+  for (std::size_t i = 0; is_after_ && i < edit_.inserted_cells.size(); ++i) {
+    const auto& cell = edit_.inserted_cells[i];
     std::array<Vec<Dim>, Dim + 1> p;
     for (int k = 0; k <= Dim; ++k) p[k] = cells_.rest[local(cell.vertices[k])];
     const Mat<Dim> edges = edge_matrix<Dim>(p);
     add_cell({cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), mesh_.part(edit_.removed_cells[0])});
   }
+  for (const auto& element : scratch_.curved) cells_.add(element);
 }
 
 /// Makes the vertices of a simplex local, and finds its curved edges.
@@ -232,7 +234,10 @@ void LocalProblem<Dim>::localize(Simplex& simplex) {
 template <int Dim>
 void LocalProblem<Dim>::add_cell(typename CellSet<Dim>::Element cell) {
   localize(cell);
-  cells_.add(cell);
+  if (cell.curved)
+    scratch_.curved.push_back(cell);
+  else
+    cells_.add(cell);
 }
 
 template <int Dim>

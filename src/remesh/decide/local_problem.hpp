@@ -70,6 +70,7 @@ struct LocalScratch {
   std::vector<int> local_of_obstacle;  ///< the same of the obstacles' vertices
   Marks known, known_obstacles, cells, patch, facets, primitives;
   std::vector<CellId> star;
+  std::vector<typename CellSet<Dim>::Element> curved;  ///< to be added behind the others
   std::vector<FacetId> near_facets;
   std::vector<int> near_primitives, points;
   typename SurfaceIndex<Dim>::Hits hits;

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include <boost/container/small_vector.hpp>
+#include "energy/elastic/jacobian_barrier.hpp"
 #include "fem/held_rule.hpp"
 #include "remesh/placed_cell.hpp"
 #include "split_model.hpp"
