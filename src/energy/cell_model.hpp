@@ -118,7 +118,6 @@ class CellModel {
   double elastic_energy() const { return elastic_; }
   /// Whether a JacobianBarrier acts in one of the cells.
   bool has_barrier() const { return has_barrier_; }
-  std::size_t num_moving() const { return moving_.size(); }
   Vec<Dim> gradient(std::size_t i) const { return i < moving_.size() ? moving_[i].gradient : Vec<Dim>(Vec<Dim>::Zero()); }
   const Mat<Dim>& hessian(std::size_t i) const { return moving_[i].hessian; }
 
