@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <memory>
+
 #include "fem/inverted.hpp"
 #include "itr/remesh/remesher.hpp"
 #include "random_terms.hpp"
@@ -14,6 +16,15 @@ namespace itr {
 namespace {
 
 using Kind = Edit<2>::Kind;
+
+/// A term of a program that is 0. No prediction knows it, so that patches alone decide.
+class UnknownTerm final : public Energy {
+ public:
+  std::string_view name() const override { return "unknown"; }
+  double value(ConstVectorView, Workspace&) const override { return 0; }
+  void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
+  void add_hessian(ConstVectorView, PsdProjection, HessianSink&, Workspace&) const override {}
+};
 
 /// Operations of one kind, with patches relaxed to convergence before the decision.
 RemeshOptions only(Kind kind, Screening screening) {
@@ -26,6 +37,7 @@ RemeshOptions only(Kind kind, Screening screening) {
   options.swap.enabled = kind == Kind::swap;
   options.smooth.enabled = kind == Kind::smooth;
   options.split.max_depth = 1;
+  options.split.acceptance_tolerance = 0;  // of swaps and moves that only stir the mesh
   options.collapse.rel_max_edge_length = 100;
   options.local.max_iterations = options.local.max_contact_iterations = 100;
   return options;
@@ -50,7 +62,8 @@ Remeshed remesh_sharply(const TrialScene& scene, RemeshOptions options, double m
   result.high = most;
   for (int i = 0; i < 36; ++i) {
     const double middle = 0.5 * (result.low + result.high);
-    options.split.acceptance_tolerance = options.collapse.acceptance_tolerance = middle;
+    if (options.split.enabled) options.split.acceptance_tolerance = middle;
+    options.collapse.acceptance_tolerance = middle;
     options.swap.acceptance_tolerance = options.smooth.acceptance_tolerance = middle;
     Mesh<2> mesh = scene.mesh;
     RemeshFields<2> fields = scene.fields;
@@ -121,6 +134,8 @@ RC_GTEST_PROP(WholeMesh, LosesTheEnergyThatAnAcceptedOperationIsSaidToGain, ()) 
   RC_PRE(before.minimize(relaxed));
   const double slack = energy - before.value(relaxed);
 
+  if (screening == by_patches)
+    scene.context.host.push_back([](const CellSet<2>&, double, double) { return std::make_shared<UnknownTerm>(); });
   const double scale = scene.context.scaling;
   const Remeshed after = remesh_sharply(scene, only(kind, screening), std::abs(energy) / scale);
   RC_PRE(after.accepted == 1);
@@ -137,13 +152,12 @@ RC_GTEST_PROP(WholeMesh, LosesTheEnergyThatAnAcceptedOperationIsSaidToGain, ()) 
   const double inertia = inertia_of();
   const double gain = energy - changed.without_inertia(after.fields.x) - inertia;
   const double round_off = 1e-10 * std::abs(energy);
-  RC_LOG() << terms << ", gain " << gain << " J s^2, asked " << scale * after.low << " to " << scale * after.high
-           << ", left over before " << slack << "\n";
+  RC_LOG() << kind << ", " << terms << ", gain " << gain << " J s^2, asked " << scale * after.low << " to "
+           << scale * after.high << ", left over before " << slack << "\n";
   RC_CLASSIFY(gain > 1e3 * (slack + round_off), "gain well above what was left over");
   RC_ASSERT(gain >= scale * after.low - round_off);
-  // Patches alone decide where no prediction knows a term.
-  if (screening == by_patches && (terms.pressure || terms.damping))
-    RC_ASSERT(gain <= scale * after.high + slack + round_off);
+  // The force that a move follows promises it too little in some scenes, as it leaves out inertia and pressure.
+  if (screening == by_patches && kind != Kind::smooth) RC_ASSERT(gain <= scale * after.high + slack + round_off);
 
   RC_ASSERT(is_near(after.mesh, after.fields.predictor, evaluate(scene.mesh, scene.fields.predictor, after.mesh)));
   RC_ASSERT(is_near(after.mesh, after.fields.velocity_reference,

@@ -52,12 +52,9 @@ struct CurvedCell {
 template <int Dim, typename NodeOf>
 CurvedCell<Dim> curved_cell(const std::array<VertexId, Dim + 1>& vertices, const NodeOf& node_of) {
   CurvedCell<Dim> cell;
-  std::copy(vertices.begin(), vertices.end(), cell.nodes.begin());
-  for_each_edge<Dim>([&](int edge, int i, int j) {
-    const VertexId node = node_of(vertices[i], vertices[j]);
-    cell.nodes[Dim + 1 + edge] = node == kNone ? vertices[i] : node;
-    if (node != kNone) cell.edges = static_cast<CurvedEdges>(cell.edges | 1 << edge);
-  });
+  std::array<VertexId, kSimplexEdges<Dim>> middles;
+  cell.edges = find_edge_nodes<Dim>(vertices, node_of, middles);
+  std::copy(middles.begin(), middles.end(), std::copy(vertices.begin(), vertices.end(), cell.nodes.begin()));
   return cell;
 }
 

@@ -9,9 +9,9 @@
 
 #include "geometry/measures.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
-#include "remesh/curved_cell.hpp"
 #include "remesh/decide/prospect.hpp"
 #include "remesh/edits.hpp"
+#include "remesh/placed_cell.hpp"
 #include "remesh/schedule/session.hpp"
 
 namespace itr {
@@ -46,19 +46,15 @@ std::array<double, kOperationKinds> tolerances_of(const RemeshOptions& options) 
 template <int Dim>
 bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit, double least_share) {
   constexpr double kTolerance = 0.1;
-  const Edit<Dim> none{.kind = Edit<Dim>::Kind::split};
-  const auto node_before = nodes_of_edges(mesh);
-  const auto node_later = [&](VertexId a, VertexId b) { return node_after(mesh, edit, a, b); };
   const auto keeps = [&](const VectorX& x) {
     double before = std::numeric_limits<double>::infinity();
     for (const CellId c : edit.removed_cells)
-      before = std::min(before, mean_jacobian<Dim>(curved_cell<Dim>(mesh.cell(c), node_before).values(x, none)) *
+      before = std::min(before, mean_jacobian<Dim>(cell_before(mesh, c).values(x, no_edit<Dim>())) *
                                     mesh.inverse_rest_edges(c).determinant());
     return std::all_of(edit.inserted_cells.begin(), edit.inserted_cells.end(), [&](const auto& cell) {
       std::array<Vec<Dim>, Dim + 1> rest;
-      for (int k = 0; k <= Dim; ++k)
-        rest[k] = cell.vertices[k] == kNewVertex ? edit.value->rest : mesh.rest(cell.vertices[k]);
-      const auto nodes = curved_cell<Dim>(cell.vertices, node_later).values(x, edit);
+      for (int k = 0; k <= Dim; ++k) rest[k] = rest_after(mesh, edit, cell.vertices[k]);
+      const auto nodes = cell_after(mesh, edit, cell.vertices).values(x, edit);
       return min_jacobian_bound<Dim>(nodes, kTolerance) >= least_share * before * edge_matrix<Dim>(rest).determinant();
     });
   };

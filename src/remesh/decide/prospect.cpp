@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <vector>
 
-#include "mesh/connected_parts.hpp"
 #include "remesh/placed_cell.hpp"
 
 namespace itr {
@@ -27,16 +27,6 @@ std::optional<Vec<Dim>> uniform_acceleration(const Mesh<Dim>& mesh, const Loads<
   return all;
 }
 
-/// By vertex slot, the number of its connected part.
-template <int Dim>
-std::vector<int> parts_of(const Mesh<Dim>& mesh) {
-  std::vector<typename Mesh<Dim>::Cell> cells;
-  cells.reserve(mesh.cell_slots());
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c)) cells.push_back(mesh.cell(c));
-  return connected_parts<Dim + 1>(mesh.node_slots(), cells);
-}
-
 /// Volume of a cell whose edges are so long: isosceles and right-angled in 2D, regular in 3D.
 template <int Dim>
 double volume_of(double length) {
@@ -53,9 +43,8 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;
   PotentialTerms<Dim> terms = context;
-  terms.loads = {};  // they complete squares
-  const std::vector<int> parts = parts_of(mesh);
-  std::vector<double> energy(mesh.node_slots(), context.coupling);
+  terms.loads = {};                                                 // they complete squares
+  std::vector<double> energy(mesh.node_slots(), context.coupling);  // by part
   for (CellId c = 0; c < mesh.cell_slots(); ++c) {
     if (!mesh.is_cell_alive(c)) continue;
     PlacedCell<Dim> cell = place(mesh, fields, terms, cell_before(mesh, c), no_edit<Dim>());
@@ -63,7 +52,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
     cell.way.colwise() -= fall;
     CellModel<Dim> model(terms, mesh.part(c));
     model.add(cell, mesh.body(c));
-    energy[parts[mesh.cell(c)[0]]] += model.energy();
+    energy[mesh.part(c)] += model.energy();
   }
   return *std::max_element(energy.begin(), energy.end());
 }

@@ -9,8 +9,8 @@
 #include "core/timer.hpp"
 #include "fem/chords.hpp"
 #include "prospect.hpp"
-#include "remesh/curved_cell.hpp"
 #include "remesh/edits.hpp"
+#include "remesh/placed_cell.hpp"
 
 namespace itr {
 
@@ -132,10 +132,9 @@ bool RemeshQueries<Dim>::overhangs(const EdgeKey& e, LocalScratch<Dim>& scratch)
 
 template <int Dim>
 bool RemeshQueries<Dim>::is_distorted(std::span<const CellId> cells) const {
-  const Edit<Dim> none{};
   return std::any_of(cells.begin(), cells.end(), [&](CellId c) {
     const CurvedCell<Dim> cell = cell_before(mesh_, c);
-    return cell.edges && relative_jacobian<Dim>(cell.values(fields_.x, none)) < kLeastRelativeJacobian;
+    return cell.edges && relative_jacobian<Dim>(cell.values(fields_.x, no_edit<Dim>())) < kLeastRelativeJacobian;
   });
 }
 
@@ -152,12 +151,11 @@ template <int Dim>
 double RemeshQueries<Dim>::predict_collapse(const Edit<Dim>& edit, double tolerance, LocalScratch<Dim>& scratch,
                                             Box<Dim>* surface_read) const {
   if (!any_is_curved(edit.removed_cells)) return predict(edit);
-  const RemeshState<Dim> judged = state();
-  if (context_.has_inertia && judged.history == HistoryRule::function) {
+  if (context_.has_inertia) {
     const double most = gain_of_vertex<Dim>(state(HistoryRule::interpolated), edit, scratch, surface_read);
     if (is_hopeless(most, itr::patch_over_vertex<Dim>(largest_poisson_ratio(edit.removed_cells)), tolerance)) return most;
   }
-  return gain_of_vertex<Dim>(judged, edit, scratch, surface_read);
+  return gain_of_vertex<Dim>(state(), edit, scratch, surface_read);
 }
 
 template <int Dim>
@@ -253,7 +251,8 @@ void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const LocalRelaxationOptions& 
   // The vertex or nodes that a move or a swap sets do not tell what the vertices around gain.
   if ((!baseline_ || baseline_->has_bounds()) && !moves && edit.kind != Edit<Dim>::Kind::swap)
     options.patch_over_vertex = is_refined && !trial.in_contact ? *patch_over_refinement(trial) : patch_over_vertex(trial);
-  if (has_curves(mesh_, edit) && !trial.in_contact) options.predicted = trial.gain;
+  const bool is_curved = any_is_curved(edit.removed_cells) || !edit.inserted_nodes.empty();
+  if (is_curved && !trial.in_contact) options.predicted = trial.gain;
   trial.was_previewed = true;
   preview<Dim>(state, gate_, edit, options, scratch, trial.verdict);
   trial.surface_read.include(trial.verdict.surface_read);

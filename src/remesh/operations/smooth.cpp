@@ -102,9 +102,9 @@ void follow_forces(RemeshSession<Dim>& session) {
   move.propose = [&](const Candidate& candidate, auto&) {
     const VertexId v = candidate.vertex();
     const Vec<Dim> gradient = configurational_gradient(queries, v);
-    const double force = gradient.norm();
-    if (force * length(v) <= least_promise) return refused<Dim>(Refusal::prediction);
-    return propose_move<Dim>(mesh, queries.strata(), v, mesh.rest(v) - length(v) / force * gradient);
+    const double force = gradient.norm(), step = length(v);
+    if (force * step <= least_promise) return refused<Dim>(Refusal::prediction);
+    return propose_move<Dim>(mesh, queries.strata(), v, mesh.rest(v) - step / force * gradient);
   };
   run_moves(session, move, kSameForce);
 }

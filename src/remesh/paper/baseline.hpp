@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The paper's rules in place of ours (docs/theory.md): culling, sizing field. A session has a Baseline
-// only if its options choose one of them.
+// The paper's rules in place of ours (docs/theory.md): culling, sizing field. A session has a Baseline only if its options
+// choose one of them.
 #pragma once
 
 #include <memory>

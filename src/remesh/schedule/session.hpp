@@ -29,9 +29,7 @@ class RemeshSession {
 
   const RemeshQueries<Dim>& queries() const { return queries_; }
   SessionMemory<Dim>& memory() { return memory_; }
-  const SessionMemory<Dim>& memory() const { return memory_; }
   ChangeLog<Dim>& log() { return log_; }
-  const ChangeLog<Dim>& log() const { return log_; }
   const Gate<Dim>& gate() const { return gate_; }
   /// Null where options choose none.
   Baseline<Dim>* baseline() { return baseline_.get(); }
