@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/embed/any_simulation.hpp"
+#include "itr/itr.hpp"
 
 #include <fmt/format.h>
 
@@ -8,14 +8,14 @@
 #include <numeric>
 
 #include "arrays.hpp"
+#include "core/parallel.hpp"
 #include "fem/locator.hpp"
 #include "host_term.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/simulation/resultant.hpp"
+#include "itr/energy.hpp"
 #include "named_parts.hpp"
 #include "simulation/cell_stress.hpp"
 #include "simulation/force_target.hpp"
+#include "simulation/resultant.hpp"
 
 namespace itr {
 

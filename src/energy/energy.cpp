@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/energy.hpp"
+#include "energy/energy.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "itr/core/kept_vector.hpp"
+#include "core/kept_vector.hpp"
 #include "round_off.hpp"
 
 namespace itr {

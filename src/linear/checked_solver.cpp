@@ -6,8 +6,7 @@
 #include <new>
 #include <utility>
 
-#include "itr/linear/engine.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

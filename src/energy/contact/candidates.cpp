@@ -5,7 +5,7 @@
 #include <atomic>
 #include <tuple>
 
-#include "itr/core/parallel.hpp"
+#include "core/parallel.hpp"
 
 namespace itr {
 
