@@ -332,7 +332,7 @@ StepResult Simulation<Dim>::advance() {
   impl_->add_remeshing(result.report, result.forces);
   impl_->forces = result.forces;
   impl_->report = result.report;
-  impl_->watch.look(impl_->setup, *impl_->state, result.report, impl_->logger);
+  impl_->watch.look(impl_->setup, *impl_->state, result.report, result.forces, impl_->logger);
   impl_->tell(*before, result);
   return result;
 }
