@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 

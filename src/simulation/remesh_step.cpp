@@ -8,11 +8,11 @@
 #include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/energy.hpp"
+#include "remesh/remesher.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/momentum_change.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 

@@ -2,7 +2,7 @@
 // Warnings about the end of a step against the model or its tolerances. Each is said once.
 #pragma once
 
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 
