@@ -20,10 +20,12 @@
 #include <utility>
 
 #include "core/parallel.hpp"
+#include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "itr/core.hpp"
 #include "itr/output.hpp"
 #include "output/force_file.hpp"
+#include "output/profile_file.hpp"
 #include "output/warnings.hpp"
 #include "ranks.hpp"
 #include "simulation/advice.hpp"
@@ -224,6 +226,7 @@ template <int Dim>
 std::vector<std::string> further_files(const Setup<Dim>& setup, const RunOptions& options) {
   std::vector<std::string> names;
   if (!setup.fields.curves.empty()) names.emplace_back(output::kForceFile);
+  if (options.profile) names.emplace_back(output::kProfileFile);
   if (options.report) names.emplace_back(kReportFile);
   return names;
 }
@@ -260,6 +263,7 @@ class Run {
     writer_ = saved
                   ? std::make_unique<output::Writer>(std::move(folder), scene.output, info, restore(*saved, scene, options))
                   : std::make_unique<output::Writer>(std::move(folder), scene.output, info);
+    if (options.profile) profile_.emplace(directory_, threads);
     warnings.set_writer(writer_.get());
     if (const int count = writer_->removed_files(); count > 0)
       spdlog::info("removed from {}: {} files of {}", directory_, count,
@@ -289,8 +293,7 @@ class Run {
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     const bool is_finished = outcome == kFinished;
-    if (is_finished)
-      fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
+    if (is_finished) fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
     if (is_finished) tell_remeshing();
     count_warnings();
     if (with_report_) write_report();
@@ -394,8 +397,7 @@ class Run {
           return failed;
         }
       }();
-      if (!result.ok && stop_now)
-        return fmt::format("interrupted in step {}, which is dropped", simulation_.steps() + 1);
+      if (!result.ok && stop_now) return fmt::format("interrupted in step {}, which is dropped", simulation_.steps() + 1);
       if (!result.ok) {
         advice = fmt::format(
             "the state before it is saved in {}. To go on, change how steps are solved: `itr run` with --resume "
@@ -406,6 +408,7 @@ class Run {
                            units.text(simulation_.time() + simulation_.setup().time.dt, "s", 6), result.reason);
       }
       write(result.report);
+      if (profile_) profile_->add(result.report.step);
       ++steps_done_;
       show_progress(result.report, units, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.steps());
@@ -426,6 +429,7 @@ class Run {
     report.seconds.total += output_seconds_;
     output_seconds_ = 0;
     const ScopedTimer timer(output_seconds_);
+    const auto phase = ScopedPhase::coarse("output");
     const State<Dim>& state = simulation_.state();
     is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(simulation_.steps());
     simulation_.observe([&](const FrameView<Dim>& frame) { writer_->write(frame, report, is_saved_ ? &state : nullptr); });
@@ -439,6 +443,7 @@ class Run {
   bool with_report_;
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
+  std::optional<output::ProfileFile> profile_;
   double output_seconds_ = 0;
   double start_ = seconds_now();
   int steps_done_ = 0;
