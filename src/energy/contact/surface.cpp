@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "itr/contact.hpp"
 #include "mesh/validate.hpp"
 
 namespace itr {
