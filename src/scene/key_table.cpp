@@ -76,6 +76,22 @@ const std::vector<Kind>& kinds() {
 
 }  // namespace
 
+const std::vector<Key>& keys() {
+  static const std::vector<Key> all = [] {
+    const std::map<std::string, Role> roles = {
+        {"", Role::read},     {"ignored", Role::ignored}, {"unwritten", Role::unwritten},
+        {"only", Role::only}, {"refused", Role::refused}, {"removed", Role::removed}};
+    std::vector<Key> rows;
+    for (const Json& row : Json::parse(kKeys)) {
+      const auto text = [&](const char* name) { return row.value(name, ""); };
+      rows.push_back({text("keys"), roles.at(text("role")), text("kind"), text("default"), text("unit"), text("meaning"),
+                      row.value("basic", false), text("refused")});
+    }
+    return rows;
+  }();
+  return all;
+}
+
 std::vector<std::string> expand(const std::string& pointer) {
   const auto open = pointer.find('{');
   if (open == std::string::npos) return {pointer};
@@ -89,7 +105,7 @@ std::vector<std::string> expand(const std::string& pointer) {
 }
 
 Kind kind_of(const Key& key) {
-  const std::string name = key.kind;
+  const std::string& name = key.kind;
   if (name.find('|') == std::string::npos) {
     const auto found = std::find_if(kinds().begin(), kinds().end(), [&](const Kind& kind) { return name == kind.name; });
     ITR_CHECK(found != kinds().end(), key.pointer, name);
@@ -107,8 +123,7 @@ Kind kind_of(const Key& key) {
 
 KeyTable::KeyTable() {
   for (const Key& key : keys()) {
-    const std::string fallback = key.fallback;
-    const Entry entry{&key, kind_of(key), Json::parse(fallback.starts_with('(') ? "" : fallback, nullptr, false)};
+    const Entry entry{&key, kind_of(key), Json::parse(key.fallback.starts_with('(') ? "" : key.fallback, nullptr, false)};
     for (const std::string& pattern : expand(key.pointer)) {
       ITR_CHECK(entries_.emplace(pattern, entry).second, "two rows for", pattern);
       for (std::string child = pattern; !child.empty();) {
