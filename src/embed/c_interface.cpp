@@ -5,7 +5,6 @@
 #include <limits>
 #include <new>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "c_callbacks.hpp"
 #include "itr/core/error.hpp"
@@ -360,12 +359,9 @@ itr_status itr_watch_forces(itr_simulation* simulation, int watched) {
   return with(simulation, [&](itr::AnySimulation& s) { s.watch_forces(watched != 0); });
 }
 const double* itr_forces(const itr_simulation* simulation, itr_force kind) {
-  if (!simulation) return nullptr;
-  const itr::NodalForces& forces = simulation->simulation.forces();
-  const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction,
-                                       &forces.applied, &forces.body,     &forces.residual};
-  if (kind < ITR_CONTACT || kind > ITR_RESIDUAL || kinds[kind]->size() == 0) return nullptr;
-  return kinds[kind]->data();
+  if (!simulation || kind < ITR_CONTACT || kind > ITR_RESIDUAL) return nullptr;
+  const itr::VectorX& forces = simulation->simulation.forces().*itr::kForcesOnBodies[kind];
+  return forces.size() == 0 ? nullptr : forces.data();
 }
 itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* von_mises) {
   return with(simulation, [&](itr::AnySimulation& s) { copy(s.von_mises(), "von_mises", length, von_mises); });

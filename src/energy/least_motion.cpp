@@ -210,8 +210,6 @@ MatrixX LeastMotion<Dim>::rigid_motions(ConstVectorView x, const DofMap& dofs) c
   template class LeastMotion<Dim>;                                                                               \
   template LooseParts<Dim> find_loose_parts<Dim>(const CellSet<Dim>&, ConstVectorView, const std::vector<char>&, \
                                                  const std::map<int, Material>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "itr/energy/load.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "itr/energy/elastic/laws.hpp"
 #include "itr/fem/quadrature.hpp"
 #include "load_points.hpp"

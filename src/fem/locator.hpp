@@ -6,7 +6,6 @@
 #include <limits>
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "itr/fem/quadratic.hpp"
 #include "itr/mesh/mesh.hpp"

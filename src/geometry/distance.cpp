@@ -343,8 +343,6 @@ Mat<12> edge_cross_squared_hessian(const Vec<3>* x) {
   template double box_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                              \
   template double pair_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                             \
   template double point_edge_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -148,8 +148,6 @@ double max_positive_step(const QuadraticCell<Dim>& x, const QuadraticCell<Dim>& 
   template double min_jacobian_bound<Dim>(const QuadraticCell<Dim>&, double, double); \
   template bool varies_little<Dim>(const QuadraticCell<Dim>&, double);                \
   template double max_positive_step<Dim>(const QuadraticCell<Dim>&, const QuadraticCell<Dim>&, double);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

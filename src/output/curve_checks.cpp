@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "curve_checks.hpp"
 
-#include <cmath>
-
 #include "fem/chords.hpp"
 
 namespace itr::output {

@@ -23,8 +23,7 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
     norms.linf = std::max(norms.linf, size);
     norms.linf_grad = std::max(norms.linf_grad, gradient);
   };
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     const auto element = element_of(mesh, c);
     if (!element.curved) {
       std::array<Vec<Dim>, Dim + 1> u;

@@ -358,8 +358,6 @@ MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& n
   template VectorX mass_squares<Dim>(const TransferMesh<Dim>&, const MatrixX&);                                             \
   template MatrixX project_l2<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, const TouchedCells&, const MatrixX&, \
                                    const MatrixX&, std::span<const char>, TransferReport&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

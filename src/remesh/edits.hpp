@@ -3,7 +3,6 @@
 // and whether positions stay valid, is decided in a trial.
 #pragma once
 
-#include <array>
 #include <functional>
 #include <optional>
 

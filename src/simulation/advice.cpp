@@ -58,8 +58,7 @@ struct MeshFigures {
       longest = std::max(longest, length);
     }
     Eigen::AlignedBox<double, Dim> box;
-    for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-      if (!mesh.is_cell_alive(c)) continue;
+    for (const CellId c : mesh.live_cells()) {
       std::array<Vec<Dim>, Dim + 1> corners;
       for (int i = 0; i <= Dim; ++i) box.extend(corners[i] = mesh.rest(mesh.cell(c)[i]));
       const double quality = simplex_quality<Dim>(corners);
@@ -69,16 +68,15 @@ struct MeshFigures {
     size = box.sizes().maxCoeff();
     const Vec<Dim> middle = box.center();  // may lie outside of the bodies, where loads need not be defined
     center = mesh.rest(0);
-    for (VertexId v = 0; v < mesh.node_slots(); ++v)
-      if (mesh.is_vertex_alive(v) && (mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
+    for (const VertexId v : mesh.live_vertices())
+      if ((mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
   }
 };
 
 template <int Dim>
 std::map<int, double> volumes_by_body(const Mesh<Dim>& mesh) {
   std::map<int, double> volumes;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c)) volumes[mesh.body(c)] += mesh.volume(c);
+  for (const CellId c : mesh.live_cells()) volumes[mesh.body(c)] += mesh.volume(c);
   return volumes;
 }
 
@@ -93,7 +91,7 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
             : fmt::format("the bodies span {:.4g} m: are lengths in metres? (for a mesh in millimetres /geometry/*/unit is "
                           "\"mm\", for a whole scene /units/length)",
                           figures.size));
-  const bool has_mass = (!setup.time.is_static && !setup.time.quasistatic) || setup.body_acceleration;
+  const bool has_mass = setup.time.has_inertia() || setup.body_acceleration;
   for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (is_outside(material.youngs_modulus, kUsualModulus))
@@ -169,8 +167,8 @@ std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
     for (int c = 0; c < Dim; ++c)
       if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(part[v]);
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || fixed.contains(part[mesh.cell(c)[0]])) continue;
+  for (const CellId c : mesh.live_cells()) {
+    if (fixed.contains(part[mesh.cell(c)[0]])) continue;
     loose.insert(part[mesh.cell(c)[0]]);
     bodies.insert(mesh.body(c));
   }
@@ -198,7 +196,7 @@ void find_held_loads(const Setup<Dim>& setup, std::vector<std::string>& found) {
 
 template <int Dim>
 void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found) {
-  if (!setup.time.is_static && !setup.time.quasistatic) return;
+  if (setup.time.has_inertia()) return;
   const auto [bodies, parts] = find_loose_parts(setup);
   if (parts == 0) return;
   std::string names;
@@ -417,7 +415,7 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
   words.push_back(fmt::format("total mass {}, weight {}; moduli {:.4g} to {}", units.text(mass, "kg"),
                               units.text(mass * acceleration.norm(), "N"), units.from_si(softest, "Pa"),
                               units.text(stiffest, "Pa")));
-  if (!setup.time.is_static && !setup.time.quasistatic) foretell_waves(setup, figures, words);
+  if (setup.time.has_inertia()) foretell_waves(setup, figures, words);
   return words;
 }
 

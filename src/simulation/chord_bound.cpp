@@ -270,8 +270,6 @@ ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   template ChordDemand find_chord_demand(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, const VectorX&, int); \
   template ChordLevels settled_chords(const StepSetup<Dim>&, const Mesh<Dim>&, ChordLevels, std::span<const VectorX>);      \
   template ChordLevels lowered_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, std::span<const VectorX>);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/closed_faces.hpp"
 
-#include <algorithm>
 #include <vector>
 
 #include "energy/contact/candidates.hpp"
@@ -119,8 +118,6 @@ Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
   template void close_coincident_faces(const StepSetup<Dim>&, Mesh<Dim>&);                         \
   template void open_faces(const StepSetup<Dim>&, const ChordLevels&, const VectorX&, Mesh<Dim>&); \
   template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const VectorX&, const ChordLevels&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -116,8 +116,6 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
   template CollisionSurface collision_surface(const Mesh<Dim>&, const Obstacles<Dim>&);              \
   template std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>&, const Mesh<Dim>&); \
   template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, int);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -43,8 +43,7 @@ template <int Dim>
 double mean_vertex_area(const Mesh<Dim>& mesh) {
   double area = 0;
   int vertices = 0;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) area += facet_measure(mesh, f);
+  for (const FacetId f : mesh.live_facets()) area += facet_measure(mesh, f);
   for (VertexId v = 0; v < mesh.node_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
   return area / std::max(1, vertices);
 }
@@ -65,8 +64,7 @@ double available_energy(const Setup<Dim>& setup) {
   auto box = rest_box(mesh);
   for (const Vec<Dim>& p : setup.obstacles.rest) box.extend(p);
   double energy = 0;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     const double mass = setup.materials.at(mesh.body(c)).density * mesh.volume(c);
     const Vec<Dim> X = rest_center(mesh, c);
     if (setup.body_acceleration) energy += mass * setup.body_acceleration(X, setup.time.t0).cwiseAbs().dot(box.sizes());
@@ -161,8 +159,7 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
             std::min(shortest, (setup.mesh.rest(setup.mesh.facet(f)[i]) - setup.mesh.rest(setup.mesh.facet(f)[j])).norm());
   const Units& units = setup.units;
   double& dhat = contact.activation_distance;
-  const bool has_inertia = !setup.time.quasistatic && !setup.time.is_static;
-  const double way = has_inertia ? std::numeric_limits<double>::infinity() : prescribed_way(setup);
+  const double way = setup.time.has_inertia() ? std::numeric_limits<double>::infinity() : prescribed_way(setup);
   dhat = std::min({kDhatByThickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * way});
   double gap = std::numeric_limits<double>::infinity();
   if (!setup.proxy) {
@@ -186,9 +183,8 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
 template <int Dim>
 std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
   double energy = 0;
-  for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
-    if (setup.mesh.is_cell_alive(c))
-      energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
+  for (const CellId c : setup.mesh.live_cells())
+    energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
   const double available = available_energy(setup);
   if (available > 0) energy = std::min(energy, available);
   setup.follows_stored_energy.split = available == 0;
@@ -235,8 +231,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   if (contact.enabled && contact.activation_distance == 0) words.push_back(choose_activation_distance(*this, contact));
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
-  const bool has_inertia = !this->time.quasistatic && !this->time.is_static;
-  if (contact.enabled && contact.friction_velocity == 0 && has_inertia) {
+  if (contact.enabled && contact.friction_velocity == 0 && this->time.has_inertia()) {
     std::string chosen = choose_friction_velocity(*this, contact);
     if (contact.friction_coefficient > 0 && contact.friction_iterations != 0) words.push_back(std::move(chosen));
   }

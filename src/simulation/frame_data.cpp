@@ -170,8 +170,6 @@ void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, const State<Dim>& sta
 #define ITR_INSTANTIATE(Dim)                                                                                    \
   template Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>&, const NodalForces&) const; \
   template void Simulation<Dim>::add_asked(const CellSet<Dim>&, const State<Dim>&, Simulation<Dim>::FrameData&) const;
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -31,12 +31,12 @@ std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
     holding[v].push_back(condition);
   };
   for (const auto& [tag, condition] : all)
-    for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == tag)
+    for (const FacetId f : mesh.live_facets())
+      if (mesh.facet_tag(f) == tag)
         for (const VertexId v : mesh.facet(f)) add(v, condition);
   for (const auto& [tag, condition] : all)
-    for (VertexId v = 0; v < mesh.node_slots(); ++v)
-      if (mesh.is_vertex_alive(v) && mesh.vertex_tag(v) == tag) add(v, condition);
+    for (const VertexId v : mesh.live_vertices())
+      if (mesh.vertex_tag(v) == tag) add(v, condition);
   return holding;
 }
 
@@ -89,13 +89,11 @@ void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& foun
         if (by > here.by) here = {here.vertices, v, by};
       }
   for (const auto& [ids, here] : all) {
-    std::string place;
-    for (int c = 0; c < Dim; ++c)
-      place += fmt::format("{}{:.4g}", c ? ", " : "", setup.units.from_si(setup.mesh.rest(here.worst)[c], "m"));
+    const Vec<Dim> place = setup.mesh.rest(here.worst) / setup.units.factor("m");
     found.push_back(fmt::format(
         "the Dirichlet conditions of the ids {} and {} contradict each other at {} vertices that both hold, by up to {} at "
-        "({}): that of {} counts there",
-        ids.first, ids.second, here.vertices, setup.units.text(here.by, "m", 3), place, ids.second));
+        "({:.4g}): that of {} counts there",
+        ids.first, ids.second, here.vertices, setup.units.text(here.by, "m", 3), fmt::join(place, ", "), ids.second));
   }
 }
 

@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -23,9 +21,7 @@ namespace {
 
 template <int Dim>
 std::string describe(const Vec<Dim>& p, const Units& units) {
-  std::string text;
-  for (int c = 0; c < Dim; ++c) text += fmt::format("{}{:.6g}", c ? ", " : "(", units.from_si(p[c], "m"));
-  return text + ")";
+  return fmt::format("({:.6g})", fmt::join(Vec<Dim>(p / units.factor("m")), ", "));
 }
 
 /// Where no surfaces cross: what is wholly inside of a body.
@@ -192,8 +188,6 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
   template State<Dim> initial_state(const Setup<Dim>&);                     \
   template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
   template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

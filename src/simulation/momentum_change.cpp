@@ -43,7 +43,7 @@ std::map<int, Momentum<Dim>> momenta_of(const StepSetup<Dim>& setup, const CellS
 template <int Dim>
 std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const State<Dim>& before, const State<Dim>& after,
                                              const TouchedCells& touched) {
-  if (setup.time.quasistatic || setup.time.is_static) return {};
+  if (!setup.time.has_inertia()) return {};
   std::set<int> bodies;
   for (const CellId c : touched.old_cells) bodies.insert(before.mesh.body(c));
   for (const CellId c : touched.new_cells) bodies.insert(after.mesh.body(c));

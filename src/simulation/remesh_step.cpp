@@ -280,8 +280,6 @@ std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tool
                                                                  VectorX&, StepReport&);                                   \
   template std::optional<MeshRenumbering> straighten_and_project<Dim>(                                                     \
       const StepTools<Dim>&, std::span<const CellId>, double, const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -43,8 +43,7 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   for (const auto& condition : setup.dirichlet)
     for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.point(v), condition);
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets()) {
     const RestPoint<Dim> X = mesh.point(mesh.facet(f)[0]);
     for (const auto& condition : setup.dirichlet)
       if (condition.tag == mesh.facet_tag(f)) add_held(X, condition);
@@ -83,7 +82,7 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
     const double of_load = stress / material.youngs_modulus;
     strain = std::max({strain, of_load, actions.displacement / length,
                        actions.speed / std::sqrt(material.youngs_modulus / material.density)});
-    if (time.quasistatic || time.is_static)
+    if (!time.has_inertia())
       motion = std::max(motion, of_load * length);
     else
       motion = std::max(motion, time.dt * (actions.speed + time.dt * (actions.acceleration +

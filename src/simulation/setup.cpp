@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <limits>
 #include <set>
 
 #include "itr/core/error.hpp"
@@ -132,8 +131,7 @@ void check_functions(const char* name, const List& list, Member member) {
 template <int Dim>
 void check_materials(const Setup<Dim>& setup) {
   std::set<int> bodies;
-  for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
-    if (setup.mesh.is_cell_alive(c)) bodies.insert(setup.mesh.body(c));
+  for (const CellId c : setup.mesh.live_cells()) bodies.insert(setup.mesh.body(c));
   for (const int body : bodies)
     if (!setup.materials.contains(body))
       refuse("/materials", fmt::format("no material with the id {}, which elements have", body), "one for every body");

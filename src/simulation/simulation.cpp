@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -131,8 +130,7 @@ struct Simulation<Dim>::Impl {
   /// Where nodes are now, where they fly, and where they are held at the end of the step.
   std::vector<VectorX> places_of_step(const State<Dim>& before) const {
     std::vector<VectorX> places = {before.history.x[0]};
-    if (!setup.time.is_static && !setup.time.quasistatic)
-      places.push_back(TimeIntegrator(setup.time).predictor(before.history));
+    if (setup.time.has_inertia()) places.push_back(TimeIntegrator(setup.time).predictor(before.history));
     const HeldDofs<Dim> held = held_dofs(setup, before.mesh, setup.time.time_after(before.step + 1));
     VectorX target = before.history.x[0];
     for (Eigen::Index i = 0; i < target.size(); ++i)

@@ -6,7 +6,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -185,7 +184,7 @@ class StepSolver {
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
     if (setup_.contact.enabled) tell_of_closed_faces();
-    if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
+    if (setup_.time.has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
     TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
     if (setup_.contact.enabled) open_faces(setup_, next_.chords, next_.history.x[0], next_.mesh);
@@ -337,11 +336,9 @@ class StepSolver {
         setup_.units.text(depth, "m", 3)));
   }
 
-  bool has_inertia() const { return !setup_.time.quasistatic && !setup_.time.is_static; }
-
   /// Where forces that act as in the last step lead to; empty without inertia.
   VectorX expected() const {
-    if (!has_inertia()) return {};
+    if (!setup_.time.has_inertia()) return {};
     VectorX x = TimeIntegrator(setup_.time).predictor(next_.history);
     if (next_.deviation.size() == x.size()) x += next_.deviation;
     return x;
@@ -397,8 +394,9 @@ class StepSolver {
 
   /// Whether edges become curved where straight ones keep up what would buckle.
   bool may_curve_for_stability() const {
-    return !has_inertia() && setup_.remesh.curve.for_stability && !setup_.remesh.sizing_field.enabled && !setup_.lump_mass &&
-           setup_.terms.empty() && !setup_.follower.forces && setup_.newton.indefinite == IndefiniteHessian::project;
+    return !setup_.time.has_inertia() && setup_.remesh.curve.for_stability && !setup_.remesh.sizing_field.enabled &&
+           !setup_.lump_mass && setup_.terms.empty() && !setup_.follower.forces &&
+           setup_.newton.indefinite == IndefiniteHessian::project;
   }
 
   /// Curves edges and solves again as long as the solution is stable only because edges are straight. The last solve, if it
@@ -565,8 +563,6 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
 #define ITR_INSTANTIATE(Dim)                                \
   template EdgeLengths edge_lengths<Dim>(const Mesh<Dim>&); \
   template StepResult take_step<Dim>(const StepTools<Dim>&, const State<Dim>&, State<Dim>&, State<Dim>*, Attempt);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

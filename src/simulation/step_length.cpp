@@ -24,10 +24,10 @@ struct Prescribed {
 template <int Dim>
 RestPoint<Dim> place_with(const Setup<Dim>& setup, int tag) {
   const Mesh<Dim>& mesh = setup.mesh;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f) && mesh.facet_tag(f) == tag) return mesh.point(mesh.facet(f)[0]);
-  for (VertexId v = 0; v < mesh.node_slots(); ++v)
-    if (mesh.is_vertex_alive(v) && mesh.vertex_tag(v) == tag) return mesh.point(v);
+  for (const FacetId f : mesh.live_facets())
+    if (mesh.facet_tag(f) == tag) return mesh.point(mesh.facet(f)[0]);
+  for (const VertexId v : mesh.live_vertices())
+    if (mesh.vertex_tag(v) == tag) return mesh.point(v);
   return mesh.point(0);
 }
 

@@ -4,9 +4,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "diagnosis.hpp"
@@ -296,8 +294,6 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
 #define ITR_INSTANTIATE(Dim)       \
   template class StepProblem<Dim>; \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -23,8 +23,8 @@ constexpr double kResidualShare = 0.1;  ///< of the split tolerance, from which 
 template <int Dim>
 double stiffness(const Setup<Dim>& setup) {
   double sum = 0;
-  for (CellId c = 0; c < setup.mesh.cell_slots(); ++c)
-    if (setup.mesh.is_cell_alive(c)) sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
+  for (const CellId c : setup.mesh.live_cells())
+    sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
   return sum;
 }
 
@@ -44,8 +44,8 @@ void Watch<Dim>::find_rotation(const Setup<Dim>& setup, const State<Dim>& state,
   const Mesh<Dim>& mesh = state.mesh;
   double most = 0;
   int body = 0;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || setup.materials.at(mesh.body(c)).law != MaterialLaw::linear) continue;
+  for (const CellId c : mesh.live_cells()) {
+    if (setup.materials.at(mesh.body(c)).law != MaterialLaw::linear) continue;
     const auto element = element_of(mesh, c);
     const double angle = rotation_angle(deformation_gradient<Dim>(element, state.history.x[0]));
     if (angle > most) most = angle, body = mesh.body(c);

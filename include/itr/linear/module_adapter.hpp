@@ -15,7 +15,6 @@
 #include <exception>
 #include <new>
 #include <string>
-#include <string_view>
 
 #include "itr/linear/abi.h"
 

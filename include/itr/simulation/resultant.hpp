@@ -3,8 +3,6 @@
 
 #include <span>
 
-#include <array>
-
 #include "itr/simulation/simulation.hpp"
 
 namespace itr {

@@ -26,6 +26,7 @@ struct TimeOptions {
   int steps = 1;       ///< number of steps
   int first_step = 0;  ///< after which it is t0: steps after it have the length dt, those before it had others
 
+  bool has_inertia() const { return !quasistatic && !is_static; }
   double time_after(int step) const { return t0 + (step - first_step) * dt; }  ///< [s]
 };
 

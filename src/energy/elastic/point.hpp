@@ -4,7 +4,6 @@
 #pragma once
 
 #include <Eigen/LU>
-#include <cmath>
 #include <limits>
 
 #include "itr/energy/elastic/laws.hpp"

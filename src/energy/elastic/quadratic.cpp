@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
 
 #include "core/parallel_reduce.hpp"
 #include "energy/project_block.hpp"

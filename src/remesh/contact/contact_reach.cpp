@@ -27,8 +27,7 @@ double room_for(double longest, double dhat) { return std::max(kRoomInDistances 
 template <int Dim>
 double span_of_clearances(const Mesh<Dim>& mesh, const VectorX& x, double dhat) {
   double squared = 0;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets()) {
     const auto& facet = mesh.facet(f);
     for (int k = 0; k < Dim; ++k)
       squared =

@@ -41,8 +41,7 @@ SurfaceIndex<Dim>::SurfaceIndex(const Mesh<Dim>& mesh, const VectorX& x, const O
   stamps_.assign(mesh.facet_slots(), now_);
   changed_ = stamps_;
   std::vector<Box<Dim>> boxes(mesh.facet_slots());
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) boxes[f] = box_of(f);
+  for (const FacetId f : mesh.live_facets()) boxes[f] = box_of(f);
   facets_.build(boxes);
   boxes.assign(primitives.all.size(), {});
   for (std::size_t i = 0; i < boxes.size(); ++i)

@@ -92,8 +92,6 @@ bool come_near(const SurfacePiece<Dim>& a, const SurfacePiece<Dim>& b, double re
 #define ITR_INSTANTIATE(Dim)                                                                  \
   template double distance_below(const SurfacePiece<Dim>&, const SurfacePiece<Dim>&, double); \
   template bool come_near(const SurfacePiece<Dim>&, const SurfacePiece<Dim>&, double);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

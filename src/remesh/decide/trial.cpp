@@ -2,9 +2,7 @@
 #include "trial.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <utility>
 
 #include "patch.hpp"
 #include "prediction.hpp"
@@ -144,8 +142,6 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   template double gain_of_vertex<Dim>(const RemeshState<Dim>&, const Edit<Dim>&, LocalScratch<Dim>&, Box<Dim>*); \
   template void preview<Dim>(const RemeshState<Dim>&, const Gate<Dim>&, const Edit<Dim>&, const TrialOptions&,   \
                              LocalScratch<Dim>&, Verdict<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -5,7 +5,6 @@
 // 1 are split, largest first; then edges collapse, shortest first, where no edge becomes larger than 0.8.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "itr/geometry/distance.hpp"
 #include "remesh/edits/edit_checks.hpp"
@@ -75,8 +74,7 @@ class SizingField {
   /// No edge is split that is shorter [m].
   double least_length() const {
     Box<Dim> box;
-    for (VertexId v = 0; v < queries_.mesh().node_slots(); ++v)
-      if (queries_.mesh().is_vertex_alive(v)) box.include(queries_.mesh().rest(v));
+    for (const VertexId v : queries_.mesh().live_vertices()) box.include(queries_.mesh().rest(v));
     return queries_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
   }
 
