@@ -12,19 +12,46 @@
 #include "diagnosis.hpp"
 #include "flight_guard.hpp"
 #include "held_turn.hpp"
-#include "lagging_rounds.hpp"
 #include "newton/corrected_system.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr std::size_t kLongestCycle = 16;      ///< rounds that are remembered
-constexpr int kPressureRounds = 50;            ///< most, where pressure has no potential
-constexpr int kMostRounds = 1000;              ///< where no number limits them
-constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: less is not said
+constexpr double kFixedPoint = 1e-12;       ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
+constexpr double kSameState = 1e-3;         ///< of a solve's step tolerance: states nearer than that are one
+constexpr std::size_t kLongestCycle = 16;   ///< rounds that are remembered
+constexpr int kPressureRounds = 50;         ///< most, where pressure has no potential
+constexpr int kMostRounds = 1000;           ///< where no number limits them
+constexpr double kLoadsWorthSaying = 1e-2;  ///< of what loads may be off: less is not said
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
+
+/// How rounds of lagging end.
+enum class RoundsEnd {
+  settled,  ///< another round changes nothing, to the solver's tolerances
+  asked,    ///< as many as the scene asks for, or forces to its tolerance
+  most,     ///< as many as there may be
+  cycle,    ///< an earlier round has been reached again
+  stalled   ///< forces have not come nearer for long
+};
+
+/// Says how rounds ended that did not settle.
+std::string_view to_string(RoundsEnd end) {
+  return end == RoundsEnd::most ? "out of rounds" : end == RoundsEnd::cycle ? "in a cycle" : "not coming nearer";
+}
+
+/// Whether rounds that reached x, after `previous` (newest last), are over. Lagging need not converge: it can go round in
+/// circles, and then every further round repeats an earlier one. `diagonal`: of the bodies [m].
+std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
+                                      double diagonal) {
+  const double last = (x - previous.back()).lpNorm<Eigen::Infinity>();
+  if (last <= kFixedPoint * diagonal) return RoundsEnd::settled;
+  const bool has_met = std::any_of(previous.begin(), previous.end() - 1,
+                                   [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
+  if (!has_met) return std::nullopt;
+  return (x - previous.back()).norm() <= step_tolerance ? RoundsEnd::settled : RoundsEnd::cycle;
+}
 
 }  // namespace
 
@@ -244,7 +271,7 @@ double LaggedSolve<Dim>::change_of(const VectorX& x, const Lagged& now, const F&
 
 /// Warns or fails where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or nothing.
 template <int Dim>
-void LaggedSolve<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds,
+void LaggedSolve<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, std::string_view how, int rounds,
                                      NewtonSummary& summary) {
   if (!now) now = potential_.lag(x, workspace_);
   const double asked = setup_.lagging_tolerance, change = asked > 0 ? largest_change(x, *now) : 0;

@@ -4,8 +4,10 @@
 
 #include <functional>
 #include <optional>
+#include <string_view>
 #include <vector>
 
+#include "itr/core/types.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -39,7 +41,7 @@ class LaggedSolve {
   template <typename F>
   double change_of(const VectorX& x, const Lagged& now, const F& is_asked);
   double largest_change(const VectorX& x, const Lagged& now);
-  void judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds, NewtonSummary& summary);
+  void judge_lagging(const VectorX& x, std::optional<Lagged> now, std::string_view how, int rounds, NewtonSummary& summary);
 
   StepProblem<Dim>& problem_;
   bool must_settle_;

@@ -11,7 +11,6 @@
 
 #include "core/process.hpp"
 #include "incoming_state.hpp"
-#include "initial_acceleration.hpp"
 #include "itr/core/error.hpp"
 #include "linear/choice.hpp"
 #include "simulation/flat_obstacles.hpp"
