@@ -9,7 +9,7 @@
 #include "itr/energy/inertia.hpp"
 #include "itr/linear/registry.hpp"
 #include "linear/forwarding.hpp"
-#include "simulation/problem_cache.hpp"
+#include "simulation/step_problem.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <functional>
+#include <memory>
 
 #include <boost/container/small_vector.hpp>
 #include "itr/energy/terms.hpp"

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "itr/fem/quadratic.hpp"
 #include "itr/mesh/mesh.hpp"

@@ -3,6 +3,7 @@
 // and whether positions stay valid, is decided in a trial.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 

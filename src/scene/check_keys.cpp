@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "check_keys.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "key_table.hpp"
+#include "readers.hpp"
 
 namespace itr::scene {
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "conditions.hpp"
-
 #include <algorithm>
 #include <set>
 
 #include "function.hpp"
+#include "readers.hpp"
 #include "selection.hpp"
 
 namespace itr::scene {

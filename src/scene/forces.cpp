@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "forces.hpp"
-
 #include <algorithm>
 #include <set>
+
+#include "readers.hpp"
 
 namespace itr::scene {
 

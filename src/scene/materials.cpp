@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "materials.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -8,6 +6,7 @@
 #include <utility>
 
 #include "function.hpp"
+#include "readers.hpp"
 
 namespace itr::scene {
 

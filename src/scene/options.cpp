@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "options.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <sstream>
+
+#include "readers.hpp"
 
 namespace itr::scene {
 

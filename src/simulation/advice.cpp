@@ -8,22 +8,111 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "barrier_stiffness.hpp"
 #include "geometry/measures.hpp"
+#include "itr/core/error.hpp"
+#include "itr/simulation/setup.hpp"
 #include "mesh/connected_parts.hpp"
-#include "simulation/held_corners.hpp"
 #include "simulation/incoming_state.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
+#include "simulation/step_terms.hpp"
 #include "sizes.hpp"
 
 namespace itr {
 
 namespace {
+
+/// Adds a sentence for each two Dirichlet conditions that ask for different displacements of a vertex which both hold: that
+/// of the larger id counts, and that of points before that of surfaces (see HeldRule).
+template <int Dim>
+void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& found);
+
+constexpr double kResolved = 1e-12;  ///< of the bodies' diagonal
+
+template <int Dim>
+using Conditions = std::vector<const DirichletCondition<Dim>*>;
+
+/// Conditions that hold each vertex, the winner last.
+template <int Dim>
+std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  const ConditionsByTag<Dim> all = conditions_by_tag<Dim>(setup);
+  std::vector<Conditions<Dim>> holding(mesh.node_slots());
+  const auto add = [&](VertexId v, const DirichletCondition<Dim>* condition) {
+    std::erase(holding[v], condition);
+    holding[v].push_back(condition);
+  };
+  for (const auto& [tag, condition] : all)
+    for (const FacetId f : mesh.live_facets())
+      if (mesh.facet_tag(f) == tag)
+        for (const VertexId v : mesh.facet(f)) add(v, condition);
+  for (const auto& [tag, condition] : all)
+    for (const VertexId v : mesh.live_vertices())
+      if (mesh.vertex_tag(v) == tag) add(v, condition);
+  return holding;
+}
+
+/// Largest difference of the displacements that two conditions prescribe in a component that both hold, at the ends of the
+/// first, the middle and the last step. Less than `resolved` [m] is none.
+template <int Dim>
+double difference(const DirichletCondition<Dim>& a, const DirichletCondition<Dim>& b, const RestPoint<Dim>& X,
+                  const TimeOptions& time, double resolved) {
+  constexpr double kRounding = 1e-9;
+  double largest = 0;
+  for (const int step : {1, (time.steps + 1) / 2, time.steps}) {
+    const double t = time.time_after(time.first_step + step);
+    const Vec<Dim> of_a = a.displacement(X, t), of_b = b.displacement(X, t);
+    for (int c = 0; c < Dim; ++c) {
+      if (!a.components[c] || !b.components[c]) continue;
+      const double by = std::abs(of_a[c] - of_b[c]);
+      if (by > std::max(resolved, kRounding * std::max(std::abs(of_a[c]), std::abs(of_b[c]))))
+        largest = std::max(largest, by);
+    }
+  }
+  return largest;
+}
+
+struct Contradiction {
+  int vertices = 0;
+  VertexId worst = kNone;
+  double by = 0;  ///< [m]
+};
+
+template <int Dim>
+void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  std::map<std::pair<int, int>, Contradiction> all;  // of the id that loses and of the one that wins
+  const std::vector<Conditions<Dim>> holding = by_vertex(setup);
+  const double resolved = kResolved * rest_diagonal(setup.mesh);
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v)
+    for (std::size_t i = 0; i < holding[v].size(); ++i)
+      for (std::size_t j = i + 1; j < holding[v].size(); ++j) {
+        const auto &loser = *holding[v][i], &winner = *holding[v][j];
+        double by = 0;
+        try {
+          by = difference<Dim>(loser, winner, setup.mesh.point(v), setup.time, resolved);
+        } catch (const InputError&) {  // the step that asks for it says so
+          continue;
+        }
+        if (!(by > 0)) continue;
+        Contradiction& here = all[{loser.tag, winner.tag}];
+        ++here.vertices;
+        if (by > here.by) here = {here.vertices, v, by};
+      }
+  for (const auto& [ids, here] : all) {
+    const Vec<Dim> place = setup.mesh.rest(here.worst) / setup.units.factor("m");
+    found.push_back(fmt::format(
+        "the Dirichlet conditions of the ids {} and {} contradict each other at {} vertices that both hold, by up to {} at "
+        "({:.4g}): that of {} counts there",
+        ids.first, ids.second, here.vertices, setup.units.text(here.by, "m", 3), fmt::join(place, ", "), ids.second));
+  }
+}
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSliver = 0.1;                  ///< quality below which an element is one

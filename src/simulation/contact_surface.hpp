@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "geometry/closed_surface.hpp"
 #include "itr/energy/contact/surface.hpp"

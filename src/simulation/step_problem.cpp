@@ -5,16 +5,43 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
 #include "itr/core/error.hpp"
 #include "itr/geometry/quadratic_validity.hpp"
-#include "lagged_solve.hpp"
 #include "newton/curvature.hpp"
 
 namespace itr {
+
+template <int Dim>
+MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& chords)
+    : mesh_revision(mesh.revision()),
+      chords(chords),
+      cells(whole_mesh(mesh, setup.obstacles.rest)),
+      diagonal(rest_diagonal(mesh)) {
+  if (setup.contact.enabled) surface = contact_surface(setup, mesh, chords);
+}
+
+template <int Dim>
+bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& asked_chords) const {
+  return mesh_revision == mesh.revision() && chords == asked_chords &&
+         std::ranges::equal(setup.obstacles.rest, std::span(cells.rest).subspan(mesh.num_nodes()));
+}
+
+template <int Dim>
+std::shared_ptr<MeshScope<Dim>> ProblemCache<Dim>::scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh,
+                                                            const ChordLevels& chords) {
+  if (!scope || !scope->is_of(setup, mesh, chords)) scope = std::make_shared<MeshScope<Dim>>(setup, mesh, chords);
+  return scope;
+}
+
+template struct MeshScope<2>;
+template struct MeshScope<3>;
+template struct ProblemCache<2>;
+template struct ProblemCache<3>;
 
 namespace {
 
@@ -102,11 +129,6 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
         -terms_.scaling * (held_.target.template segment<Dim>(bodies + Dim * o) - setup_.obstacles.rest[o]);
   adaptive_->initialize(surface_.positions(x), gradient, stiffness_, workspace_);
   potential_.contact()->set_stiffness(stiffness_.value);
-}
-
-template <int Dim>
-NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected, bool must_settle) {
-  return LaggedSolve<Dim>(*this, must_settle).solve(x, lagged_x, expected);
 }
 
 /// Where the scene leaves it open, friction is smoothed below a part of the relative motion in the step [m]: bodies that

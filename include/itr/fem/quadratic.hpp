@@ -3,6 +3,7 @@
 // vertex i has l_i - sum over its curved edges ij of 2 l_i l_j; a straight edge has none (Lagrange's where all are curved).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 

@@ -5,6 +5,8 @@
 // that they span, a smooth function. Derivatives are with respect to the stacked positions of the pair.
 #pragma once
 
+#include <span>
+
 #include "itr/core/types.hpp"
 
 namespace itr {

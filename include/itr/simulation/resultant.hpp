@@ -3,6 +3,8 @@
 
 #include <span>
 
+#include <array>
+
 #include "itr/simulation/simulation.hpp"
 
 namespace itr {

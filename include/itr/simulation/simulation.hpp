@@ -2,6 +2,7 @@
 // A simulation: the state, and one time step after another. `src/simulation/step.cpp` is the whole method on a page.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/LU>
+#include <cmath>
 #include <limits>
 
 #include "itr/energy/elastic/laws.hpp"
