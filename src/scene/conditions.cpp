@@ -4,7 +4,6 @@
 
 #include "function.hpp"
 #include "readers.hpp"
-#include "selection.hpp"
 
 namespace itr::scene {
 

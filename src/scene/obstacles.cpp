@@ -8,7 +8,7 @@
 
 #include "geometry.hpp"
 #include "mesh/rest_box.hpp"
-#include "selection.hpp"
+#include "transformation.hpp"
 
 namespace itr::scene {
 

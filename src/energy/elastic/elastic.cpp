@@ -18,7 +18,6 @@ namespace itr {
 namespace {
 
 constexpr std::size_t kBlock = 256;
-constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
 
 struct PositionScratch {
   KeptVector x;
