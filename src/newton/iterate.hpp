@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "core/timer.hpp"
 #include "itr/newton/newton.hpp"
 
 namespace itr {
@@ -89,7 +90,8 @@ struct Step {
 /// Where a solve is: positions, their energy and its gradient. It alone evaluates the energy, and keeps the time of that.
 class Iterate {
  public:
-  Iterate(const Task& task, VectorView x);
+  Iterate(const Task& task, VectorView x)
+      : task_(task), x_(x), gradient_(task.workspace.get<Kept>().gradient.resize(x.size())), value_(value_at(x)) {}
 
   const VectorView& x() const { return x_; }
   double value() const { return value_; }
@@ -105,20 +107,60 @@ class Iterate {
   /// The decrease of energy that the quadratic model promises for a full Newton step.
   double decrement_of(const Step& step) const { return -0.5 * task_.norms.dot(step.way, gradient_); }
   /// By how much round-off may change the value.
-  double value_round_off() const;
+  double value_round_off() const {
+    if (value_round_off_at_ != revision_) {
+      const ScopedTimer timer(task_.summary.line_search_seconds);
+      value_round_off_ = task_.energy.value_round_off(x_, task_.workspace);
+      value_round_off_at_ = revision_;
+    }
+    return value_round_off_;
+  }
   /// The norm of what round-off may change of the gradient.
-  double gradient_round_off() const;
+  double gradient_round_off() const {
+    if (gradient_round_off_at_ != revision_) {
+      const ScopedTimer timer(task_.summary.assembly_seconds);
+      VectorView round_off = task_.workspace.get<Kept>().round_off.resize(x_.size());
+      round_off.setZero();
+      task_.energy.add_gradient_round_off(x_, round_off, task_.workspace);
+      gradient_round_off_ = task_.norms.of_gradient(round_off);
+      gradient_round_off_at_ = revision_;
+    }
+    return gradient_round_off_;
+  }
   /// Whether a step promises less than the energy resolves.
   bool is_unresolved(const Step& step) const { return decrement_of(step) < value_round_off(); }
 
-  double value_at(ConstVectorView x) const;
-  void gradient_at(ConstVectorView x, VectorView gradient) const;
+  double value_at(ConstVectorView x) const {
+    const ScopedTimer timer(task_.summary.line_search_seconds);
+    return task_.energy.value(x, task_.workspace);
+  }
+  void gradient_at(ConstVectorView x, VectorView gradient) const {
+    const ScopedTimer timer(task_.summary.assembly_seconds);
+    gradient.setZero();
+    task_.energy.add_gradient(x, gradient, task_.workspace);
+  }
   /// Share of a way that is feasible.
-  double free_share(ConstVectorView way) const;
+  double free_share(ConstVectorView way) const {
+    const ScopedTimer timer(task_.summary.ccd_seconds);
+    return task_.energy.max_step(x_, way, task_.workspace);
+  }
 
   void update_value() { value_ = value_at(x_); }
-  void update_gradient();
-  void move_to(ConstVectorView x, double value);
+  void update_gradient() {
+    const ScopedTimer timer(task_.summary.assembly_seconds);
+    VectorView sizes = task_.workspace.get<Kept>().sizes.resize(x_.size());
+    sizes.setZero();
+    gradient_.setZero();
+    task_.energy.add_gradient_and_sizes(x_, gradient_, sizes, task_.workspace);
+    has_gradient_ = true;
+    gradient_norm_ = task_.norms.of_gradient(gradient_);
+    force_size_ = task_.norms.of_forces(sizes);
+  }
+  void move_to(ConstVectorView x, double value) {
+    x_ = x;
+    value_ = value;
+    ++revision_;
+  }
 
  private:
   struct Kept {

@@ -31,43 +31,7 @@ class Interpolation {
     }
     if (kind_ < Kind::piecewise_constant) return;
     read_points(node);
-    if (kind_ == Kind::piecewise_cubic && points_.size() > 1) fit_spline() {
-        const int n = static_cast<int>(points_.size());
-        std::vector<Eigen::Triplet<double>> entries;
-        Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
-        const auto width = [&](int i) { return points_[i + 1] - points_[i]; };
-        const auto chord = [&](int i) { return (values_[i + 1] - values_[i]) / width(i); };
-        const auto add_slope_at_begin = [&](int row, int i, double sign) {  // chord - h/6 (2 m_i + m_i+1)
-          entries.emplace_back(row, i, -sign * width(i) / 3);
-          entries.emplace_back(row, i + 1, -sign * width(i) / 6);
-          right[row] -= sign * chord(i);
-        };
-        const auto add_slope_at_end = [&](int row, int i, double sign) {  // chord + h/6 (m_i + 2 m_i+1)
-          entries.emplace_back(row, i, sign * width(i) / 6);
-          entries.emplace_back(row, i + 1, sign * width(i) / 3);
-          right[row] -= sign * chord(i);
-        };
-        for (int i = 1; i + 1 < n; ++i) {
-          add_slope_at_end(i, i - 1, 1);
-          add_slope_at_begin(i, i, -1);
-        }
-        if (extend_ == Extend::constant) {
-          add_slope_at_begin(0, 0, 1);
-          add_slope_at_end(n - 1, n - 2, 1);
-        } else if (extend_ == Extend::extrapolate) {
-          entries.emplace_back(0, 0, 1);
-          entries.emplace_back(n - 1, n - 1, 1);
-        } else {
-          add_slope_at_end(0, n - 2, 1);
-          add_slope_at_begin(0, 0, -1);
-          entries.emplace_back(n - 1, 0, 1);
-          entries.emplace_back(n - 1, n - 1, -1);
-        }
-        Eigen::SparseMatrix<double> matrix(n, n);
-        matrix.setFromTriplets(entries.begin(), entries.end());
-        const Eigen::VectorXd m = Eigen::SparseLU<Eigen::SparseMatrix<double>>(matrix).solve(right);
-        curvature_.assign(m.data(), m.data() + n);
-      }
+    if (kind_ == Kind::piecewise_cubic && points_.size() > 1) fit_spline();
   }
 
   double operator()(double t) const {
@@ -97,7 +61,45 @@ class Interpolation {
       node["points"].fail("points in time that increase strictly");
     if (values_.size() != points_.size()) node["values"].fail("as many values as points: " + std::to_string(points_.size()));
   }
-  void fit_spline();
+  /// Fits a C2 cubic by its second derivatives m at the points. Row i says that the slopes of both pieces agree at point i;
+  /// the end rows say: slope zero (constant), m = 0 (extrapolate), or slope and m periodic (repeat, repeat_offset).
+  void fit_spline() {
+    const int n = static_cast<int>(points_.size());
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+    const auto width = [&](int i) { return points_[i + 1] - points_[i]; };
+    const auto chord = [&](int i) { return (values_[i + 1] - values_[i]) / width(i); };
+    const auto add_slope_at_begin = [&](int row, int i, double sign) {  // chord - h/6 (2 m_i + m_i+1)
+      entries.emplace_back(row, i, -sign * width(i) / 3);
+      entries.emplace_back(row, i + 1, -sign * width(i) / 6);
+      right[row] -= sign * chord(i);
+    };
+    const auto add_slope_at_end = [&](int row, int i, double sign) {  // chord + h/6 (m_i + 2 m_i+1)
+      entries.emplace_back(row, i, sign * width(i) / 6);
+      entries.emplace_back(row, i + 1, sign * width(i) / 3);
+      right[row] -= sign * chord(i);
+    };
+    for (int i = 1; i + 1 < n; ++i) {
+      add_slope_at_end(i, i - 1, 1);
+      add_slope_at_begin(i, i, -1);
+    }
+    if (extend_ == Extend::constant) {
+      add_slope_at_begin(0, 0, 1);
+      add_slope_at_end(n - 1, n - 2, 1);
+    } else if (extend_ == Extend::extrapolate) {
+      entries.emplace_back(0, 0, 1);
+      entries.emplace_back(n - 1, n - 1, 1);
+    } else {
+      add_slope_at_end(0, n - 2, 1);
+      add_slope_at_begin(0, 0, -1);
+      entries.emplace_back(n - 1, 0, 1);
+      entries.emplace_back(n - 1, n - 1, -1);
+    }
+    Eigen::SparseMatrix<double> matrix(n, n);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    const Eigen::VectorXd m = Eigen::SparseLU<Eigen::SparseMatrix<double>>(matrix).solve(right);
+    curvature_.assign(m.data(), m.data() + n);
+  }
   double inside(double t, std::size_t i) const {
     if (kind_ == Kind::piecewise_constant) return values_[i];
     const double h = points_[i + 1] - points_[i];
@@ -135,8 +137,5 @@ class Interpolation {
   std::vector<double> points_, values_;
   std::vector<double> curvature_;  ///< second derivatives of the spline at the points
 };
-
-// A C2 cubic by its second derivatives m at the points. Row i says that the slopes of both pieces agree at point i; the
-// end rows say: slope zero (constant), m = 0 (extrapolate), or slope and m periodic (repeat, repeat_offset).
 
 }  // namespace itr::scene

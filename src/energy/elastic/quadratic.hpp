@@ -177,20 +177,7 @@ class QuadraticElasticity {
     for (const Element& element : elements_) by_element_.push_back(&by_body_.at(element.body));
     if (!varies) return;
     materials_ = materials;
-    sample_moduli() {
-      varying_.clear();
-      first_varying_.clear();
-      at_barycenters_.clear();
-      if (materials_.empty()) return;
-      for (std::size_t e = 0; e < by_element_.size(); ++e) {
-        const Element& element = elements_[e];
-        first_varying_.push_back(varying_.size());
-        at_barycenters_.push_back(elastic_moduli<Dim>(materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
-        for (const auto& point : rule(e))
-          varying_.push_back(
-              elastic_moduli<Dim>(materials_.at(element.body), rest_position<Dim>(cells_, element, point.weights)));
-      }
-    }
+    sample_moduli();
   }
 
   /// `x` are the positions that `u` leads to.
@@ -325,7 +312,20 @@ class QuadraticElasticity {
              return sum;
            });
   }
-  void sample_moduli();
+  void sample_moduli() {
+    varying_.clear();
+    first_varying_.clear();
+    at_barycenters_.clear();
+    if (materials_.empty()) return;
+    for (std::size_t e = 0; e < by_element_.size(); ++e) {
+      const Element& element = elements_[e];
+      first_varying_.push_back(varying_.size());
+      at_barycenters_.push_back(elastic_moduli<Dim>(materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
+      for (const auto& point : rule(e))
+        varying_.push_back(
+            elastic_moduli<Dim>(materials_.at(element.body), rest_position<Dim>(cells_, element, point.weights)));
+    }
+  }
   /// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.
   bool is_blind(std::size_t e, ConstVectorView x) const {
     const Element& element = elements_[e];
