@@ -24,11 +24,6 @@ namespace itr {
 
 namespace {
 
-/// A program's term in one dimension; `name` is for its errors. Throws InputError (when it is asked for its Hessian) for
-/// blocks of vertices that are not there.
-template <int Dim>
-TermFactory<Dim> as_factory(std::shared_ptr<const HostTerm> term, std::string name);
-
 template <int Dim>
 class TermOfHost final : public Energy {
  public:
@@ -85,6 +80,8 @@ class TermOfHost final : public Energy {
   std::vector<int> cells_, bodies_, facets_, boundaries_;
 };
 
+/// A program's term in one dimension; `name` is for its errors. Throws InputError (when it is asked for its Hessian) for
+/// blocks of vertices that are not there.
 template <int Dim>
 TermFactory<Dim> as_factory(std::shared_ptr<const HostTerm> term, std::string name) {
   return [term = std::move(term), place = "term '" + name + "'"](const CellSet<Dim>& cells, double t, double scale) {

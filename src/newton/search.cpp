@@ -21,11 +21,6 @@ struct StepOrigin {
   Workspace& workspace;
 };
 
-/// Turns a Newton step of which only `share` is free, so that the pairs that stop it keep a gap at its end. The turned step
-/// is the minimum of the quadratic model under bounds on linearised gaps (an active set, as in sequential quadratic
-/// programming). Returns the free share of `step`; both stay unchanged if the model gains no more along the turned step.
-double turn_blocked_step(const StepOrigin& origin, VectorView step, double share);
-
 constexpr int kMostRounds = 6;            ///< gaps are linearised so often
 constexpr Eigen::Index kMostPairs = 128;  ///< a back-solve each
 constexpr double kAhead = 4;              ///< pairs that stop the step within so many times its free share are bounded
@@ -104,6 +99,9 @@ class BoundedGaps {
   VectorX asked_;
 };
 
+/// Turns a Newton step of which only `share` is free, so that the pairs that stop it keep a gap at its end. The turned step
+/// is the minimum of the quadratic model under bounds on linearised gaps (an active set, as in sequential quadratic
+/// programming). Returns the free share of `step`; both stay unchanged if the model gains no more along the turned step.
 double turn_blocked_step(const StepOrigin& origin, VectorView step, double share) {
   const auto& [energy, x, dofs, gradient, system, workspace] = origin;
   const VectorX first = step;

@@ -29,11 +29,6 @@ namespace itr {
 
 namespace {
 
-/// Adds a sentence for each two Dirichlet conditions that ask for different displacements of a vertex which both hold: that
-/// of the larger id counts, and that of points before that of surfaces (see HeldRule).
-template <int Dim>
-void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& found);
-
 constexpr double kResolved = 1e-12;  ///< of the bodies' diagonal
 
 template <int Dim>
@@ -85,6 +80,8 @@ struct Contradiction {
   double by = 0;  ///< [m]
 };
 
+/// Adds a sentence for each two Dirichlet conditions that ask for different displacements of a vertex which both hold: that
+/// of the larger id counts, and that of points before that of surfaces (see HeldRule).
 template <int Dim>
 void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& found) {
   std::map<std::pair<int, int>, Contradiction> all;  // of the id that loses and of the one that wins

@@ -22,12 +22,6 @@ namespace itr {
 
 namespace {
 
-/// Changes by edits, between two states at the start of a step, of the momentum that bodies would have at its end without
-/// forces: for the bodies of `touched`, as an impulse over the step.
-template <int Dim>
-std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const State<Dim>& before, const State<Dim>& after,
-                                             const TouchedCells& touched);
-
 template <int Dim>
 struct Momentum {
   Vec<Dim> linear = Vec<Dim>::Zero();
@@ -55,6 +49,8 @@ std::map<int, Momentum<Dim>> momenta_of(const StepSetup<Dim>& setup, const CellS
   return momenta;
 }
 
+/// Changes by edits, between two states at the start of a step, of the momentum that bodies would have at its end without
+/// forces: for the bodies of `touched`, as an impulse over the step.
 template <int Dim>
 std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const State<Dim>& before, const State<Dim>& after,
                                              const TouchedCells& touched) {

@@ -19,13 +19,10 @@ namespace itr {
 
 namespace {
 
-/// Which shares of their ways the vertices of a pair may go, from 0 to 1, for a plane to stay between its primitives all the
-/// way. `dhat`: they may come as near as half of it, or of their distance.
-template <int Dim>
-std::array<double, 4> planar_shares(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& way, double dhat);
-
 constexpr double kKeptGap = 0.5;  ///< of the gap, or of the activation distance where the gap is wider
 
+/// Which shares of their ways the vertices of a pair may go, from 0 to 1, for a plane to stay between its primitives all the
+/// way. `dhat`: they may come as near as half of it, or of their distance.
 template <int Dim>
 std::array<double, 4> planar_shares(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& way, double dhat) {
   std::array<double, 4> shares{1, 1, 1, 1};
