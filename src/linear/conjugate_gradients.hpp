@@ -13,6 +13,12 @@
 
 namespace itr::linear {
 
+/// A x = b, of a lower triangle. It refers to what others own.
+struct SystemView {
+  const SparsityPattern& pattern;
+  std::span<const double> values, b;
+};
+
 constexpr int kTellsRate = 6;       ///< iterations after which their rate is known roughly, to a factor of two
 constexpr double kCertain = 1e-12;  ///< negative curvature, relative, that is no round-off
 constexpr double kNoise = 1e-2;     ///< of the right-hand side: what iterations start from in every direction
@@ -38,12 +44,6 @@ inline void multiply(const SystemView& system, std::span<const double> x, std::s
     y[j] += row;
   }
 }
-
-/// A x = b, of a lower triangle. It refers to what others own.
-struct SystemView {
-  const SparsityPattern& pattern;
-  std::span<const double> values, b;
-};
 
 /// Conjugate gradients with a given preconditioner. The solution is kept, and can be given more digits.
 class ConjugateGradients {

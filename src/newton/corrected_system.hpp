@@ -9,6 +9,8 @@
 
 namespace itr {
 
+constexpr double kKnown = 0.1;  ///< relative: a stiffness that differs by less is the known one
+
 /// A Newton system whose solutions are exact along motions that nothing but a small known stiffness resists: there a
 /// residual of the usual size stands for a long way.
 class CorrectedSystem final : public NewtonSystem {
@@ -80,9 +82,5 @@ class CorrectedSystem final : public NewtonSystem {
   MatrixX combinations_;  ///< of the modes: those that nothing else resists
   VectorX inverse_;       ///< of their stiffness; empty: nothing is corrected
 };
-
-namespace {
-constexpr double kKnown = 0.1;  ///< relative: a stiffness that differs by less is the known one
-}
 
 }  // namespace itr
