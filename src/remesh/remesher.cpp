@@ -145,17 +145,13 @@ RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume
   return session.finish();
 }
 
-template RemeshReport curve_edges(std::span<const EdgeKey>, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,
-                                  const RemeshOptions&, RemeshMemory&, Strata<2>&);
-template RemeshReport curve_edges(std::span<const EdgeKey>, Mesh<3>&, RemeshFields<3>&, const StepContext<3>&,
-                                  const RemeshOptions&, RemeshMemory&, Strata<3>&);
-template RemeshReport straighten_cells(std::span<const CellId>, double, Mesh<2>&, RemeshFields<2>&, const StepContext<2>&,
-                                       const RemeshOptions&, RemeshMemory&, Strata<2>&);
-template RemeshReport straighten_cells(std::span<const CellId>, double, Mesh<3>&, RemeshFields<3>&, const StepContext<3>&,
-                                       const RemeshOptions&, RemeshMemory&, Strata<3>&);
-template RemeshReport remesh(Mesh<2>&, RemeshFields<2>&, const StepContext<2>&, const RemeshOptions&, RemeshMemory&,
-                             Strata<2>&);
-template RemeshReport remesh(Mesh<3>&, RemeshFields<3>&, const StepContext<3>&, const RemeshOptions&, RemeshMemory&,
-                             Strata<3>&);
+#define ITR_INSTANTIATE(Dim)                                                                                           \
+  template RemeshReport curve_edges(std::span<const EdgeKey>, Mesh<Dim>&, RemeshFields<Dim>&, const StepContext<Dim>&, \
+                                    const RemeshOptions&, RemeshMemory&, Strata<Dim>&);                                \
+  template RemeshReport straighten_cells(std::span<const CellId>, double, Mesh<Dim>&, RemeshFields<Dim>&,              \
+                                         const StepContext<Dim>&, const RemeshOptions&, RemeshMemory&, Strata<Dim>&);  \
+  template RemeshReport remesh(Mesh<Dim>&, RemeshFields<Dim>&, const StepContext<Dim>&, const RemeshOptions&,          \
+                               RemeshMemory&, Strata<Dim>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

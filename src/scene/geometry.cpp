@@ -452,11 +452,10 @@ std::vector<Vec<Dim>> points_of(const MeshFile& file) {
   return points;
 }
 
-template Mesh<2> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&);
-template Mesh<3> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&);
-template std::vector<Vec<2>> read_copies(const Node&, const Vec<2>&);
-template std::vector<Vec<3>> read_copies(const Node&, const Vec<3>&);
-template std::vector<Vec<2>> points_of(const MeshFile&);
-template std::vector<Vec<3>> points_of(const MeshFile&);
+#define ITR_INSTANTIATE(Dim)                                                                                    \
+  template Mesh<Dim> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&); \
+  template std::vector<Vec<Dim>> read_copies(const Node&, const Vec<Dim>&);                                     \
+  template std::vector<Vec<Dim>> points_of(const MeshFile&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

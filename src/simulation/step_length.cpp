@@ -172,11 +172,10 @@ void find_long_steps(const Setup<Dim>& setup, double size, const Vec<Dim>& cente
                     dt, setup.units.text(period, "s", 2)));
 }
 
-template double prescribed_speed(const Setup<2>&, const Vec<2>&, int);
-template double driven_speed(const Setup<2>&, double, const Vec<2>&);
-template double prescribed_speed(const Setup<3>&, const Vec<3>&, int);
-template double driven_speed(const Setup<3>&, double, const Vec<3>&);
-template void find_long_steps(const Setup<2>&, double, const Vec<2>&, std::vector<std::string>&);
-template void find_long_steps(const Setup<3>&, double, const Vec<3>&, std::vector<std::string>&);
+#define ITR_INSTANTIATE(Dim)                                                 \
+  template double prescribed_speed(const Setup<Dim>&, const Vec<Dim>&, int); \
+  template double driven_speed(const Setup<Dim>&, double, const Vec<Dim>&);  \
+  template void find_long_steps(const Setup<Dim>&, double, const Vec<Dim>&, std::vector<std::string>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -126,11 +126,10 @@ void ContactReach<Dim>::sort() {
   touching_.erase(std::unique(touching_.begin(), touching_.end()), touching_.end());
 }
 
-template double span_of_clearances(const Mesh<2>&, const VectorX&, double);
-template double span_of_clearances(const Mesh<3>&, const VectorX&, double);
-template class Neighbourhoods<2>;
-template class Neighbourhoods<3>;
-template class ContactReach<2>;
-template class ContactReach<3>;
+#define ITR_INSTANTIATE(Dim)                                                    \
+  template double span_of_clearances(const Mesh<Dim>&, const VectorX&, double); \
+  template class Neighbourhoods<Dim>;                                           \
+  template class ContactReach<Dim>;
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

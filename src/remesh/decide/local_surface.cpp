@@ -156,15 +156,12 @@ void LocalProblem<Dim>::add_surface() {
   complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 
-template void LocalProblem<2>::find_what_changes();
-template void LocalProblem<2>::find_contacts();
-template void LocalProblem<2>::find_stars_of_touching();
-template void LocalProblem<2>::add_surface();
-template bool LocalProblem<2>::is_closed(const LocalVertex&) const;
-template void LocalProblem<3>::find_what_changes();
-template void LocalProblem<3>::find_contacts();
-template void LocalProblem<3>::find_stars_of_touching();
-template void LocalProblem<3>::add_surface();
-template bool LocalProblem<3>::is_closed(const LocalVertex&) const;
+#define ITR_INSTANTIATE(Dim)                                 \
+  template void LocalProblem<Dim>::find_what_changes();      \
+  template void LocalProblem<Dim>::find_contacts();          \
+  template void LocalProblem<Dim>::find_stars_of_touching(); \
+  template void LocalProblem<Dim>::add_surface();            \
+  template bool LocalProblem<Dim>::is_closed(const LocalVertex&) const;
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -304,19 +304,14 @@ double cell_energy(const RemeshState<Dim>& state, const typename MeshTypes<Dim>:
   return model.energy();
 }
 
-template double predict_gain(const RemeshState<2>&, const Edit<2>&);
-template double predict_gain(const RemeshState<3>&, const Edit<3>&);
-template double least_forgotten(const RemeshState<2>&, const Edit<2>&);
-template double least_forgotten(const RemeshState<3>&, const Edit<3>&);
-template double predict_split(const RemeshState<2>&, const EdgeKey&);
-template double predict_split(const RemeshState<3>&, const EdgeKey&);
-template double predict_split_at_curves(const RemeshState<2>&, const EdgeKey&);
-template double predict_split_at_curves(const RemeshState<3>&, const EdgeKey&);
-template double predict_curve(const RemeshState<2>&, const EdgeKey&);
-template double predict_curve(const RemeshState<3>&, const EdgeKey&);
-template double predict_straighten(const RemeshState<2>&, const EdgeKey&);
-template double predict_straighten(const RemeshState<3>&, const EdgeKey&);
-template double cell_energy<2>(const RemeshState<2>&, const MeshTypes<2>::Cell&, int, const Edit<2>&);
-template double cell_energy<3>(const RemeshState<3>&, const MeshTypes<3>::Cell&, int, const Edit<3>&);
+#define ITR_INSTANTIATE(Dim)                                                        \
+  template double predict_gain(const RemeshState<Dim>&, const Edit<Dim>&);          \
+  template double least_forgotten(const RemeshState<Dim>&, const Edit<Dim>&);       \
+  template double predict_split(const RemeshState<Dim>&, const EdgeKey&);           \
+  template double predict_split_at_curves(const RemeshState<Dim>&, const EdgeKey&); \
+  template double predict_curve(const RemeshState<Dim>&, const EdgeKey&);           \
+  template double predict_straighten(const RemeshState<Dim>&, const EdgeKey&);      \
+  template double cell_energy<Dim>(const RemeshState<Dim>&, const MeshTypes<Dim>::Cell&, int, const Edit<Dim>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr
