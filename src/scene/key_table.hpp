@@ -33,7 +33,7 @@ struct Key {
 };
 /// The rows in the order of the page.
 const std::vector<Key>& keys();
-extern const char* const kKeys;  ///< text of keys.json
+extern const char* const kKeys;  ///< text of keys.json: rows of kinds and of keys
 
 /// Kind of a value, as the reader checks it and as the schema says it.
 struct Kind {
