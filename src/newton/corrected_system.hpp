@@ -2,14 +2,15 @@
 #pragma once
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
 #include <functional>
+#include <limits>
 
 #include "itr/newton/newton.hpp"
 
 namespace itr {
 
 constexpr double kKnown = 0.1;  ///< relative: a stiffness that differs by less is the known one
+constexpr double kTrue = 1e-2;  ///< relative residual: the true matrix is as good as the one that was solved with
 
 /// A Newton system whose solutions are exact along motions that nothing but a small known stiffness resists: there a
 /// residual of the usual size stands for a long way.
@@ -29,14 +30,14 @@ class CorrectedSystem final : public NewtonSystem {
     by_unknown_.resize(dofs.num_unknowns, modes.cols());
     for (Eigen::Index i = 0; i < modes.rows(); ++i)
       if (dofs.unknown[i] != kNone) by_unknown_.row(dofs.unknown[i]) = modes.row(i);
-    inverse_.resize(0);
+    stiffness_.resize(0);
     if (!product_) return;
     MatrixX of_modes(by_unknown_.rows(), by_unknown_.cols());
     for (Eigen::Index k = 0; k < modes.cols(); ++k) product_(by_unknown_.col(k), of_modes.col(k));
     const Eigen::SelfAdjointEigenSolver<MatrixX> reduced(by_unknown_.transpose() * of_modes);
     if (reduced.info() != Eigen::Success) return;
     combinations_ = reduced.eigenvectors();
-    inverse_ = reduced.eigenvalues().unaryExpr([](double value) { return std::abs(value - 1) < kKnown ? 1 / value : 0.0; });
+    stiffness_ = reduced.eigenvalues();
   }
   linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                              VectorView solution) override {
@@ -61,15 +62,20 @@ class CorrectedSystem final : public NewtonSystem {
   double curvature_of(const Shift& shift, ConstVectorView step) const override { return system_.curvature_of(shift, step); }
 
  private:
-  /// Makes the residual zero along motions that nothing else resists.
+  /// Makes the residual zero along motions that nothing else resists, and along all of them where projections have not made
+  /// the solution another one than that of the true matrix.
   void correct(ConstVectorView rhs, VectorView solution) const {
     constexpr int kRounds = 2;
-    if (!product_ || inverse_.size() == 0 || !solution.allFinite()) return;
-    VectorX image(rhs.size());
+    if (!product_ || stiffness_.size() == 0 || !solution.allFinite()) return;
+    VectorX residual(rhs.size());
     for (int round = 0; round < kRounds; ++round) {
-      product_(solution, image);
-      const VectorX missing = combinations_.transpose() * (by_unknown_.transpose() * (rhs - image));
-      const VectorX correction = by_unknown_ * (combinations_ * inverse_.cwiseProduct(missing));
+      product_(solution, residual);
+      residual = rhs - residual;
+      const double most = residual.norm() <= kTrue * rhs.norm() ? std::numeric_limits<double>::infinity() : 1 + kKnown;
+      const VectorX inverse =
+          stiffness_.unaryExpr([&](double value) { return 1 - kKnown < value && value < most ? 1 / value : 0.0; });
+      const VectorX missing = combinations_.transpose() * (by_unknown_.transpose() * residual);
+      const VectorX correction = by_unknown_ * (combinations_ * inverse.cwiseProduct(missing));
       if (!correction.allFinite()) return;
       solution += correction;
     }
@@ -79,8 +85,8 @@ class CorrectedSystem final : public NewtonSystem {
   Modes modes_;
   Product product_;       ///< of the true matrix at the iterate
   MatrixX by_unknown_;    ///< modes
-  MatrixX combinations_;  ///< of the modes: those that nothing else resists
-  VectorX inverse_;       ///< of their stiffness; empty: nothing is corrected
+  MatrixX combinations_;  ///< of the modes, which the true matrix does not couple
+  VectorX stiffness_;     ///< of these combinations, by the known one; empty: nothing is corrected
 };
 
 }  // namespace itr

@@ -43,10 +43,12 @@ double stiffness(const Setup<Dim>& setup) {
 template <int Dim>
 class Watch {
  public:
-  void look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger) {
+  void look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const NodalForces& forces,
+            const Logger& logger) {
     if (!has_said_rotation_) find_rotation(setup, state, logger);
     if (!has_said_remeshing_) find_starved_remeshing(setup, report, logger);
     if (!has_said_forces_) find_loose_forces(setup, state, report, logger);
+    if (!has_said_reactions_) find_unbalanced_reactions(setup, report, forces, logger);
   }
 
  private:
@@ -93,8 +95,29 @@ class Watch {
         report.step, setup.units.text(report.residual_worth, "J", 2), setup.units.text(energy, "J", 2), 100 * error));
   }
 
-  bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false;
-  int loose_steps_ = 0;  ///< in a row
+  /// Reactions are off by what the balance of forces lacks at free vertices.
+  void find_unbalanced_reactions(const Setup<Dim>& setup, const StepReport& report, const NodalForces& forces,
+                                 const Logger& logger) {
+    const auto largest = [](const VectorX& force) {
+      return force.size() > 0 ? std::sqrt(force.reshaped(Dim, force.size() / Dim).colwise().squaredNorm().maxCoeff()) : 0;
+    };
+    largest_reaction_ = std::max(largest_reaction_, largest(forces.reaction));
+    const double left = largest(forces.residual);
+    unbalanced_steps_ = left > kForceError * largest_reaction_ && largest_reaction_ > 0 ? unbalanced_steps_ + 1 : 0;
+    if (unbalanced_steps_ < kLooseSteps && !(unbalanced_steps_ > 0 && report.step >= setup.time.steps)) return;
+    has_said_reactions_ = true;
+    logger.warning(fmt::format(
+        "step {}: {} are left of the balance of forces at a vertex, {:.2g} % of the largest reaction: reactions may be off "
+        "by "
+        "as much; over steps of {} positions may have too few digits for accelerations, which a longer /time/dt mends, or a "
+        "tolerance is too large",
+        report.step, setup.units.text(left, "N", 2), 100 * left / largest_reaction_,
+        setup.units.text(setup.time.dt, "s", 3)));
+  }
+
+  bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false, has_said_reactions_ = false;
+  int loose_steps_ = 0, unbalanced_steps_ = 0;  ///< in a row
+  double largest_reaction_ = 0;                 ///< at a vertex, so far [N]
 };
 
 /// Where a simulation is when it calls the program.
@@ -403,7 +426,7 @@ StepResult Simulation<Dim>::advance() {
   impl_->add_remeshing(result.report, result.forces);
   impl_->forces = result.forces;
   impl_->report = result.report;
-  impl_->watch.look(impl_->setup, *impl_->state, result.report, impl_->logger);
+  impl_->watch.look(impl_->setup, *impl_->state, result.report, result.forces, impl_->logger);
   impl_->tell(*before, result);
   return result;
 }
