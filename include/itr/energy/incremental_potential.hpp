@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "itr/core/kept_vector.hpp"
+#include "itr/core/scratch_vector.hpp"
 #include "itr/energy/contact/contact.hpp"
 #include "itr/energy/contact/friction.hpp"
 #include "itr/energy/damping.hpp"
@@ -91,7 +91,7 @@ class IncrementalPotential {
 
   const PotentialTerms<Dim>* terms_;
   const CellSet<Dim>& cells_;
-  KeptVector velocity_reference_;  ///< as in PotentialHistory
+  ScratchVector velocity_reference_;  ///< as in PotentialHistory
   std::shared_ptr<const VertexMap<Dim>> map_;
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;

@@ -4,7 +4,7 @@
 #include <functional>
 #include <map>
 
-#include "itr/core/kept_vector.hpp"
+#include "itr/core/scratch_vector.hpp"
 #include "itr/energy/energy.hpp"
 #include "itr/energy/increment.hpp"
 #include "itr/energy/material.hpp"
@@ -51,7 +51,7 @@ class LoadEnergy final : public Energy, public IncrementalTerm {
 
  private:
   const CellSet<Dim>& cells_;
-  KeptVector forces_;
+  ScratchVector forces_;
   double rest_work_ = 0;  ///< f . X
   double scale_ = 1;
 };

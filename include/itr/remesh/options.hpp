@@ -75,7 +75,7 @@ struct RemeshOptions {
   SwapOptions swap;
   SmoothOptions smooth;
   LocalRelaxationOptions local;
-  double relative_tolerance = 1e-4;  ///< share of the scene's energy that choose_defaults takes as tolerance of splits
+  double relative_tolerance = 1e-4;  ///< fraction of the scene's energy that choose_defaults takes as tolerance of splits
   Screening screening = Screening::bounds;
 
   /// Tolerances of curves and of straightenings [J], filled in.

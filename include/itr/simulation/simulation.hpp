@@ -129,7 +129,7 @@ class Simulation {
                          setup().obstacles.triangles,
                          &data.asked};
     frame.names = &setup().names;
-    frame.dhat = setup().contact.activation_distance;
+    frame.dhat = setup().contact.dhat;
     if (setup().proxy) frame.proxy = {&data.proxy_x, &setup().proxy->edges, &setup().proxy->triangles};
     observer(frame);
   }
