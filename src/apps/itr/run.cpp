@@ -18,11 +18,13 @@
 #include <thread>
 #include <utility>
 
+#include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "itr/core/error.hpp"
 #include "itr/core/parallel.hpp"
 #include "itr/output/writer.hpp"
 #include "output/force_file.hpp"
+#include "output/profile_file.hpp"
 #include "output/warnings.hpp"
 #include "ranks.hpp"
 #include "simulation/advice.hpp"
@@ -223,6 +225,7 @@ template <int Dim>
 std::vector<std::string> further_files(const Setup<Dim>& setup, const RunOptions& options) {
   std::vector<std::string> names;
   if (!setup.fields.curves.empty()) names.emplace_back(output::kForceFile);
+  if (options.profile) names.emplace_back(output::kProfileFile);
   if (options.report) names.emplace_back(kReportFile);
   return names;
 }
@@ -259,6 +262,7 @@ class Run {
     writer_ = saved
                   ? std::make_unique<output::Writer>(std::move(folder), scene.output, info, restore(*saved, scene, options))
                   : std::make_unique<output::Writer>(std::move(folder), scene.output, info);
+    if (options.profile) profile_.emplace(directory_, threads);
     warnings.set_writer(writer_.get());
     if (const int count = writer_->removed_files(); count > 0)
       spdlog::info("removed from {}: {} files of {}", directory_, count,
@@ -405,6 +409,7 @@ class Run {
                            units.text(simulation_.state().t + simulation_.setup().time.dt, "s", 6), result.reason);
       }
       write(result.report);
+      if (profile_) profile_->add(result.report.step);
       ++steps_done_;
       show_progress(result.report, units, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
@@ -425,6 +430,7 @@ class Run {
     report.seconds.total += output_seconds_;
     output_seconds_ = 0;
     const ScopedTimer timer(output_seconds_);
+    const auto phase = ScopedPhase::coarse("output");
     const State<Dim>& state = simulation_.state();
     is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(state.step);
     simulation_.observe([&](const FrameView<Dim>& frame) { writer_->write(frame, report, is_saved_ ? &state : nullptr); });
@@ -438,6 +444,7 @@ class Run {
   bool with_report_;
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
+  std::optional<output::ProfileFile> profile_;
   double output_seconds_ = 0;
   double start_ = seconds_now();
   int steps_done_ = 0;
