@@ -8,8 +8,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
 #include "random_cube.hpp"

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "itr/core/error.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
 #include "random_tets.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "itr/core/parallel.hpp"
+#include "core/parallel.hpp"
 
 namespace itr {
 namespace {

@@ -8,9 +8,9 @@
 #include <random>
 
 #include "interrupt.hpp"
-#include "itr/core/error.hpp"
-#include "itr/output/checkpoint.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
+#include "itr/scene.hpp"
 #include "output/certify.hpp"
 
 namespace itr::output {

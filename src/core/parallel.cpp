@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/core/parallel.hpp"
+#include "core/parallel.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/embed/any_simulation.hpp"
+#include "itr/itr.hpp"
 
 #include <fmt/format.h>
 
@@ -9,16 +9,16 @@
 #include <numeric>
 
 #include "arrays.hpp"
+#include "core/parallel.hpp"
+#include "energy/energy.hpp"
 #include "energy/project_block.hpp"
+#include "fem/cell_set.hpp"
 #include "fem/locator.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/energy.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/simulation/resultant.hpp"
+#include "itr/energy.hpp"
 #include "named_parts.hpp"
 #include "simulation/cell_stress.hpp"
 #include "simulation/force_target.hpp"
+#include "simulation/resultant.hpp"
 
 namespace itr {
 

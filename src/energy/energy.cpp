@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/energy.hpp"
+#include "energy/energy.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/profile.hpp"
-#include "itr/core/scratch_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "round_off.hpp"
 
 namespace itr {

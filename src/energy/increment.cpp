@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/increment.hpp"
+#include "energy/increment.hpp"
 
 #include <cmath>
 

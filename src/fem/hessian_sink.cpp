@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/fem/hessian_sink.hpp"
+#include "fem/hessian_sink.hpp"
 
 #include <algorithm>
 #include <utility>

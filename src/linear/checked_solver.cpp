@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "core/profile.hpp"
-#include "itr/linear/engine.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/linear/reuse.hpp"
+#include "linear/reuse.hpp"
 
 #include <algorithm>
 #include <cmath>

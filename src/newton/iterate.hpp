@@ -6,7 +6,7 @@
 #include <span>
 
 #include "core/timer.hpp"
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "frame_file.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "report_json.hpp"
 
 namespace itr::output {

@@ -10,7 +10,7 @@
 #include <fstream>
 #include <utility>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr::output {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/output/writer.hpp"
+#include "itr/output.hpp"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "files.hpp"
 #include "force_file.hpp"
 #include "frame_file.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "report_json.hpp"
 #include "time_series.hpp"
 #include "units.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "fem/chords.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 

@@ -7,7 +7,7 @@
 
 #include "cell_stress.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
-#include "itr/energy/inertia.hpp"
+#include "energy/inertia.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/force_target.hpp"
 

@@ -9,15 +9,15 @@
 
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "energy/inertia.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/projection/transfer.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/simulation/simulation.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/energy.hpp"
+#include "itr/transfer.hpp"
+#include "remesh/remesher.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/moment.hpp"
+#include "simulation/state.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "core/process.hpp"
 #include "geometry/rotation.hpp"
 #include "incoming_state.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "linear/choice.hpp"
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/step.hpp"

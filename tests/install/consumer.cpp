@@ -2,8 +2,8 @@
 // Embeds the library: fills in a Setup by hand, steps it, and reads the reports. A unit square falls freely for one second.
 #include <cmath>
 #include <cstdio>
-#include <itr/linear/registry.hpp>
-#include <itr/simulation/simulation.hpp>
+#include <itr/simulation.hpp>
+#include <itr/solver.hpp>
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "apps/report/report.hpp"
-#include "itr/linear/registry.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::cli {
 

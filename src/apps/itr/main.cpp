@@ -15,8 +15,8 @@
 #include <thread>
 
 #include "commands.hpp"
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "itr_commit.hpp"
 #include "linear/modules.hpp"
 #include "output/certify.hpp"

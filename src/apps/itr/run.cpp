@@ -18,11 +18,11 @@
 #include <thread>
 #include <utility>
 
+#include "core/parallel.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
-#include "itr/core/error.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/output/writer.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
 #include "output/force_file.hpp"
 #include "output/profile_file.hpp"
 #include "output/warnings.hpp"

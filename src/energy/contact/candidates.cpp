@@ -5,8 +5,8 @@
 #include <atomic>
 #include <tuple>
 
+#include "core/parallel.hpp"
 #include "core/profile.hpp"
-#include "itr/core/parallel.hpp"
 
 namespace itr {
 

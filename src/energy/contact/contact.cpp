@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/contact/contact.hpp"
+#include "energy/contact/contact.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -11,8 +11,8 @@
 
 #include "candidates.hpp"
 #include "core/parallel_reduce.hpp"
+#include "core/scratch_vector.hpp"
 #include "geometry/ccd.hpp"
-#include "itr/core/scratch_vector.hpp"
 #include "pairs.hpp"
 
 namespace itr {

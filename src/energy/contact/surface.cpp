@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/contact/surface.hpp"
+#include "energy/contact/surface.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "change_log.hpp"
+#include "core/parallel.hpp"
 #include "core/profile.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/mesh/strata.hpp"
-#include "itr/remesh/memory.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/remesh/report.hpp"
+#include "mesh/strata.hpp"
 #include "remesh/decide/queries.hpp"
+#include "remesh/memory.hpp"
 #include "remesh/paper/baseline.hpp"
+#include "remesh/remesher.hpp"
+#include "remesh/report.hpp"
 
 namespace itr {
 
