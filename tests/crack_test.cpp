@@ -347,7 +347,7 @@ State<Dim> written_and_read(const Simulation<Dim>& simulation) {
       output::write_checkpoint(file, simulation.state(), {"{}", "eigen", "{}", 0});
     });
   });
-  return output::read_checkpoint<Dim>({path, "{}", "eigen", Dim}).state;
+  return *output::read_checkpoint<Dim>({path, "{}", "eigen", Dim}).state;
 }
 
 /// Cracks open far, and are pressed together then. Parts of cracks that are not plane close at once.

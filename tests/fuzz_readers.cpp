@@ -226,7 +226,7 @@ std::string saved_state(Setup<Dim> setup, const fs::path& folder) {
 template <int Dim>
 void read_state(const fs::path& path, const std::shared_ptr<Simulation<Dim>>& simulation) {
   auto checkpoint = output::read_checkpoint<Dim>({path, "{}", "eigen", Dim});
-  simulation->restore(std::move(checkpoint.state));
+  simulation->restore(*checkpoint.state);
   simulation->report();
 }
 

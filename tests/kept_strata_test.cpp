@@ -135,7 +135,7 @@ class SavedStrata : public ::testing::Test {
         damage(file);
       });
     });
-    return output::read_checkpoint<3>({path, "scene", "backend", 3}).state;
+    return *output::read_checkpoint<3>({path, "scene", "backend", 3}).state;
   }
 
   void expect_refused(const std::string& name, const std::vector<std::int64_t>& values, int columns,

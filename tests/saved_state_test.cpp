@@ -122,7 +122,7 @@ TEST_F(DamageTest, OfInvariantsIsRefused) {
   const auto saved = find_saved_state(run);
   ASSERT_TRUE(saved.has_value());
   auto checkpoint = read_checkpoint<2>(*saved);
-  const State<2> good = checkpoint.state;
+  const State<2> good = *checkpoint.state;
   const scene::Scene scene =
       scene::read(fmt::format("{}/examples/{}", ITR_SOURCE_DIR, kStopped.scene), {{"/space/remesh/enabled", "false"}});
   linear::Registry registry;

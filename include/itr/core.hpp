@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What everything uses: errors, messages, units, numbers of threads.
+// Errors, messages, units and numbers of threads, which everything uses.
 //
 // The three kinds of failure: a user's mistake throws InputError; a numerical outcome is an enum in a summary; a broken
 // invariant of ours throws InternalError through ITR_CHECK (core/check.hpp).

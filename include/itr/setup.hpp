@@ -77,7 +77,7 @@ struct InitialCondition {
 
 /// Vertices whose forces are summed: on surfaces, of bodies, or of obstacles. Each counts once.
 struct ForceTarget {
-  std::string name;
+  std::string name{};
   std::vector<int> surfaces{};           ///< tags of boundary facets
   std::vector<int> bodies{};             ///< ids
   std::vector<int> obstacle_vertices{};  ///< indices into Obstacles::rest

@@ -68,7 +68,7 @@ class ITR_EXPORT Simulation {
   /// Conditions that a program may change between steps: values, loads, motions of obstacles, terms, remesh.enabled. Mesh,
   /// bodies, numbers of vertices, contact, solver and integrator must stay.
   Setup<Dim>& conditions();
-  /// Sets the listener that is called with the old mesh after each step that changed the mesh. state().mesh is the new one.
+  /// Sets the listener that is called with the old mesh after each step that changed the mesh. mesh() is the new one.
   /// Null removes the listener.
   void on_mesh_change(std::function<void(const MeshChange<Dim>& change, const Mesh<Dim>& before)> listener);
 

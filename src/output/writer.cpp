@@ -186,10 +186,10 @@ Writer::Writer(fs::path directory, OutputOptions options, RunInfo info)
 template <int Dim>
 Writer::Writer(Folder folder, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint)
     : impl_(
-          std::make_unique<Impl>(std::move(folder), options, std::move(info), checkpoint.state.step, checkpoint.log_bytes)) {
+          std::make_unique<Impl>(std::move(folder), options, std::move(info), checkpoint.state->step, checkpoint.log_bytes)) {
   impl_->totals.restore(checkpoint.totals);
   impl_->seconds_before = impl_->totals.report().seconds.total;
-  const State<Dim>& state = checkpoint.state;
+  const State<Dim>& state = *checkpoint.state;
   impl_->norms = displacement_norms(state.mesh, state.history.x[0]);
 }
 

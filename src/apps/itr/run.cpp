@@ -321,7 +321,7 @@ class Run {
   output::Checkpoint<Dim> restore(output::SavedState saved, const scene::Scene& scene, const RunOptions& options) {
     output::Checkpoint<Dim> checkpoint = read_whole(saved, scene, options);
     try {
-      simulation_.restore(checkpoint.state);
+      simulation_.restore(*checkpoint.state);
     } catch (const InputError& error) {  // older states would fit no better, and their steps would replace good results
       throw InputError({saved.file.string(), error.parts().place, error.parts().found, error.parts().expected});
     }
